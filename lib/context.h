@@ -49,15 +49,15 @@ struct triptych {
     trip_lod_parts parts;   /* of the frame that is begun */
     int part;               /* of these the one that is drawn, */
     float *before;          /* and the picture of those before it, of the budget; else NULL */
-    triptych_frame_stats before_stats;
-    trip_settings settings;  /* slices 0: by the view */
-    triptych_clip clip;      /* as given; frames have it in drawn_settings */
-    double max_ms;           /* 0: no bound of time */
-    double bytes_per_ms;     /* that bounded frames took; 0: none was drawn */
-    bool kernel_warned;      /* that the halo is short for it */
-    bool classify_auto;      /* settings.classify is what that has come to for a frame */
-    double kelvin[2];        /* of emission, as set */
-    int effects;             /* as set; frames have what they come to in drawn_settings */
+    triptych_frame_stats before_stats; /* theirs */
+    trip_settings settings;            /* slices 0: by the view */
+    triptych_clip clip;                /* as given; frames have it in drawn_settings */
+    double max_ms;                     /* 0: no bound of time */
+    double bytes_per_ms;               /* that bounded frames took; 0: none was drawn */
+    bool kernel_warned;                /* that the halo is short for it */
+    bool classify_auto;                /* settings.classify is what that has come to for a frame */
+    double kelvin[2];                  /* of emission, as set */
+    int effects;                       /* as set; frames have what they come to in drawn_settings */
     const char *why_effects; /* of those that auto chose or left; NULL: nothing was left to it */
     trip_light_map *light;   /* of frames with shadows or occlusion; NULL: none was drawn of late */
     trip_emission *heat;     /* NULL: none is given */

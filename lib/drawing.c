@@ -6,6 +6,7 @@
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
 #include "kernel.h"
+#include "lod_limit.h"
 #include "normalise.h"
 #include "report.h"
 #include "rounding.h"
@@ -204,9 +205,10 @@ static size_t pixels_drawn(const triptych *t)
     return (size_t)t->camera.width * (size_t)t->camera.height;
 }
 
+/* One picture, and another where a third is put behind both. */
 static size_t before_bytes(const triptych *t)
 {
-    return pixels_drawn(t) * 4 * sizeof *t->before;
+    return pixels_drawn(t) * 4 * sizeof *t->before * (t->parts.count > 2 ? 2 : 1);
 }
 
 /* Of a frame that is planned, before the reader takes its part of what is left. */
@@ -331,7 +333,10 @@ static void check_bound(const triptych *t)
     char is[32], allowed[32];
     if (!(most > 0))
         return;
-    const double bytes = t->plan.lod.level ? t->plan.lod.limit.bytes : t->parts.limit.bytes;
+    const double bytes = t->plan.lod.level    ? t->plan.lod.limit.bytes
+                         : t->parts.bytes > 0 ? t->parts.bytes
+                                              : trip_lod_values_bytes(t->session.data, &t->camera,
+                                                                      &t->drawn_settings, 0);
     if (bytes <= most)
         return;
     trip_format_bytes((uint64_t)bytes, is);
@@ -517,17 +522,10 @@ static int take_colours(triptych *t, float *rgba, float *depth)
 /* Adds the part that is drawn to those before it. */
 static int keep_before(triptych *t)
 {
-    if (t->part == 0)
-        return trip_frame_picture(&t->drawing, t->before, NULL);
-    trip_budget *budget = t->session.budget;
-    float *picture = trip_budget_take(budget, before_bytes(t));
-    if (!picture)
-        return trip_fail(TRIP_ERROR, "render", "levels",
-                         "pictures of several levels do not fit the memory given; raise --memory");
+    float *picture = t->part == 0 ? t->before : t->before + 4 * pixels_drawn(t);
     int status = trip_frame_picture(&t->drawing, picture, NULL);
-    if (!status)
+    if (!status && t->part > 0)
         trip_lod_parts_add(&t->parts, t->before, picture, true, pixels_drawn(t), t->before);
-    trip_budget_release(budget, picture, before_bytes(t));
     return status;
 }
 

@@ -92,11 +92,7 @@ int session_read_text(session *s)
 
 trip_classification *session_classified(session *s, unsigned level)
 {
-    trip_classification *c = &s->classified[level % 2];
-    if (s->classified_level[level % 2] != level)
-        *c = (trip_classification){ 0 };
-    s->classified_level[level % 2] = level;
-    return c;
+    return &s->classified[level];
 }
 
 void session_keep_tables(session *s)
@@ -111,7 +107,7 @@ int session_use_function(session *s, const session_look *look)
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
     int status = session_read_text(s);
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i <= TRIP_DATASET_LEVELS_MOST; i++)
         trip_classification_forget_form(&s->classified[i]);
     trip_mean_tables_release(&s->mean_tables, s->budget);
     if (!status && !s->table)

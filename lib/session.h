@@ -3,6 +3,7 @@
 #ifndef TRIP_SESSION_H
 #define TRIP_SESSION_H
 
+#include "dataset_level.h"
 #include "dataset_text.h"
 #include "plan.h"
 #include "reader.h"
@@ -19,10 +20,8 @@ typedef struct session {
     trip_dataset_text **texts; /* by part; NULL until they are wanted */
     trip_dataset_text *text;   /* the first of these */
     trip_tf_entry *table;      /* 65536 entries; the same */
-    /* Of frames before, by whether their level is odd: a frame may have two, one above the other.
-     */
-    trip_classification classified[2];
-    unsigned classified_level[2];
+    /* Of frames before, by their level: a frame may have several. */
+    trip_classification classified[1 + TRIP_DATASET_LEVELS_MOST];
     trip_mean_tables mean_tables; /* of coarse levels: they may be kept for the next frame */
 } session;
 

@@ -1,5 +1,4 @@
 /* What a frame takes: the plan in words, statistics of the frame and by list. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -19,9 +18,12 @@ static void explain_parts(const triptych *t, FILE *out)
         fprintf(out, ", and %.0f %% of the picture of level %u", 100 * p->share, p->level[1]);
     for (int i = 1; i < p->count && !(p->share > 0); i++)
         fprintf(out, ", from %.6g along the view on level %u", p->distance[i], p->level[i]);
-    fprintf(out, ": the coarsest whose voxels are at most %.3g pixels wide%s\n",
-            fmax(s->lod_px, p->limit.px / s->samples),
-            p->limit.px > 0 ? ", by the bound on bytes" : "");
+    if (p->bounded)
+        fputs(": the finest that the bound on bytes allows\n", out);
+    else if (s->lod_px > 0)
+        fprintf(out, ": the coarsest whose voxels are at most %g pixels wide\n", s->lod_px);
+    else
+        fputs(": the finest\n", out);
 }
 
 /* What was not set, and what it came to. */
@@ -158,7 +160,7 @@ static triptych_list_stats list_stats(const triptych *t, unsigned i)
 /* Of frames whose levels are bounded: what bounds of time are made of. */
 static void note_rate(triptych *t)
 {
-    const double bytes = t->plan.lod.limit.bytes + t->parts.limit.bytes;
+    const double bytes = t->plan.lod.limit.bytes + t->parts.bytes;
     const double ms = t->stats.ms - t->stats.merge_ms;
     if (!(bytes > 0 && ms > 0) || t->part + 1 < t->parts.count)
         return;

@@ -1,6 +1,7 @@
 #include "lod_limit.h"
 
 #include "brick_box.h"
+#include "dataset_level.h"
 #include "plan_cull.h"
 #include "report.h"
 #include "weight.h"
@@ -11,7 +12,8 @@ typedef struct limiting {
     const trip_dataset *data;
     uint32_t *voxels; /* of level 0 in the cube; 0 where it is out of view */
     float *width;     /* px, of those voxels */
-    double bytes[32]; /* of a voxel of level 0, drawn at a level, in all lists that are read */
+    double bytes[1 + TRIP_DATASET_LEVELS_MOST]; /* of a voxel of level 0, drawn at a level, in all
+                                                   lists that are read */
 } limiting;
 
 static int lists_read(const trip_camera *camera, const trip_settings *settings)
@@ -29,16 +31,16 @@ static double code_bytes(const trip_dataset *data, const trip_list *list)
     return own ? own : data->header.code_bytes;
 }
 
-/* What is drawn at a level: by splats voxels or means, where values are interpolated those and
- * their halo. */
-static bool is_drawn(const limiting *l, const trip_list *list, unsigned level)
+/* What is drawn, along one axis of three: by splats voxels or means, where values are interpolated
+ * those and their halo. */
+static bool is_drawn(const trip_lod *lod, const trip_list *list)
 {
-    if (list->axis != 2 || list->level != level)
+    if (list->axis != 2 || list->level > lod->levels)
         return false;
-    if (level > 0)
-        return list->kind == l->lod->kind;
+    if (list->level > 0)
+        return list->kind == lod->kind;
     return list->kind == TRIP_KIND_VOXELS ||
-           (list->kind == TRIP_KIND_HALO && l->lod->kind == TRIP_KIND_VALUES);
+           (list->kind == TRIP_KIND_HALO && lod->kind == TRIP_KIND_VALUES);
 }
 
 static void weigh_levels(limiting *l, const trip_camera *camera, const trip_settings *settings)
@@ -46,15 +48,12 @@ static void weigh_levels(limiting *l, const trip_camera *camera, const trip_sett
     const bool splats = l->lod->kind == TRIP_KIND_MEANS;
     const double normals = settings->shading && splats ? l->data->header.normal_bytes : 0;
     const double kept = (double)l->data->header.kept;
-    for (unsigned level = 0; level <= l->lod->levels; level++) {
-        l->bytes[level] = 0;
-        for (unsigned i = 0; i < l->data->list_count; i++) {
-            const trip_list *list = &l->data->lists[i];
-            const double share = kept > 0 ? (double)list->records / kept : 0;
-            if (is_drawn(l, list, level))
-                l->bytes[level] +=
-                    lists_read(camera, settings) * share * (code_bytes(l->data, list) + normals);
-        }
+    const double lists = kept > 0 ? lists_read(camera, settings) / kept : 0;
+    for (unsigned i = 0; i < l->data->list_count; i++) {
+        const trip_list *list = &l->data->lists[i];
+        if (is_drawn(l->lod, list))
+            l->bytes[list->level] +=
+                lists * (double)list->records * (code_bytes(l->data, list) + normals);
     }
 }
 
@@ -197,4 +196,17 @@ int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *c
     if (l.width)
         trip_budget_release(budget, l.width, cubes * sizeof *l.width);
     return status;
+}
+
+double trip_lod_values_bytes(const trip_dataset *data, const trip_camera *camera,
+                             const trip_settings *settings, unsigned level)
+{
+    const trip_lod lod = { .kind = TRIP_KIND_VALUES, .levels = level };
+    double bytes = 0;
+    for (unsigned i = 0; i < data->list_count; i++) {
+        const trip_list *list = &data->lists[i];
+        if (list->level == level && is_drawn(&lod, list))
+            bytes += (double)list->records * code_bytes(data, list);
+    }
+    return bytes * lists_read(camera, settings);
 }

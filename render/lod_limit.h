@@ -16,4 +16,8 @@
 int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, trip_budget *budget);
 
+/* Of the values of a level in all lists that are read, whatever is in view. */
+double trip_lod_values_bytes(const trip_dataset *data, const trip_camera *camera,
+                             const trip_settings *settings, unsigned level);
+
 #endif

@@ -4,7 +4,6 @@
 
 #include "dataset_level.h"
 #include "lod_limit.h"
-#include "report.h"
 
 /* Octaves of distance over which a level gives way to the next where all has one. */
 #define MIXED_OCTAVES 0.25
@@ -32,40 +31,54 @@ static double width_at(const trip_camera *camera, double depth)
     return camera->ortho || depth > 0 ? trip_lod_width_px(camera, depth) : HUGE_VAL;
 }
 
-/* How wide voxels may be; 0: there is no coarse level then. */
-static int find_px(trip_lod_parts *parts, const trip_dataset *data, const trip_camera *camera,
-                   const trip_settings *settings, trip_budget *budget, double *px)
-{
-    trip_lod cubes;
-    *px = settings->lod_px * settings->samples;
-    if (!(settings->max_bytes > 0))
-        return 0;
-    int status = trip_lod_make(&cubes, data, TRIP_KIND_VALUES, camera, settings, budget);
-    if (status)
-        return status;
-    parts->limit = cubes.limit;
-    *px = fmax(*px, cubes.limit.px * (1 + 1e-6)); /* it was found from rounded widths */
-    trip_lod_release(&cubes, budget);
-    return 0;
-}
-
 static void add_part(trip_lod_parts *parts, unsigned level)
 {
     parts->level[parts->count++] = level;
 }
 
-/* All has one level, but for what is mixed in of the next. */
-static void choose_one(trip_lod_parts *parts, double width, double px, unsigned most, bool mixes)
+/* What a part is chosen from. */
+typedef struct choosing {
+    const trip_dataset *data;
+    const trip_camera *camera;
+    const trip_settings *settings;
+    double px;     /* voxels may be so wide; 0: all are of level 0 */
+    unsigned most; /* levels */
+} choosing;
+
+static double values_bytes(const choosing *c, unsigned level)
 {
-    const unsigned level = px > 0 ? trip_lod_level(width, px, most) : 0;
+    return trip_lod_values_bytes(c->data, c->camera, c->settings, level);
+}
+
+/* What part of the next coarser level's picture is mixed into that of a level whose voxels are so
+ * wide at level 0. None where the bound has room for one picture alone. */
+static double share_of_next(const choosing *c, double width, unsigned level)
+{
+    const double room = c->settings->max_bytes;
+    if (!(c->px > 0) || level >= c->most)
+        return 0;
+    const double share = 1 - log2(ldexp(width, (int)level + 1) / c->px) / MIXED_OCTAVES;
+    if (!(share > 0) || (room > 0 && values_bytes(c, level) + values_bytes(c, level + 1) > room))
+        return 0;
+    return fmin(share, 1);
+}
+
+/* All has one level, but for what is mixed in of the next; `width` is that of voxels of level 0
+ * where they are widest. */
+static void choose_one(trip_lod_parts *parts, const choosing *c, double width, bool mixes)
+{
+    const double room = c->settings->max_bytes;
+    const unsigned wanted = c->px > 0 ? trip_lod_level(width, c->px, c->most) : 0;
+    unsigned level = wanted;
+    while (room > 0 && level < c->most && values_bytes(c, level) > room)
+        level++;
     add_part(parts, level);
-    if (!mixes || !(px > 0) || level >= most)
-        return;
-    const double share = 1 - log2(ldexp(width, (int)level + 1) / px) / MIXED_OCTAVES;
-    if (!(share > 0))
-        return;
-    parts->share = fmin(share, 1);
-    add_part(parts, level + 1);
+    parts->bounded = level > wanted;
+    if (room > 0 && c->most > 0)
+        parts->bytes = values_bytes(c, level);
+    parts->share = mixes && !parts->bounded ? share_of_next(c, width, level) : 0;
+    if (parts->share > 0)
+        add_part(parts, level + 1);
 }
 
 /* What lies at least so deep, in the world. */
@@ -78,17 +91,33 @@ static trip_half_space half_space_from(const trip_camera *camera, double depth)
     return trip_clip_before(&clip, &to_index).planes[0];
 }
 
-static void divide(trip_lod_parts *parts, const trip_camera *camera, range depths, double px,
-                   unsigned most)
+/* Raises how wide voxels may be until the bound suffices. */
+static int bound(trip_lod_parts *parts, choosing *c, trip_budget *budget)
 {
+    trip_lod cubes;
+    if (!(c->settings->max_bytes > 0))
+        return 0;
+    int status = trip_lod_make(&cubes, c->data, TRIP_KIND_VALUES, c->camera, c->settings, budget);
+    if (status)
+        return status;
+    parts->bounded = cubes.limit.px > 0;
+    parts->bytes = cubes.limit.bytes;
+    c->px = fmax(c->px, cubes.limit.px);
+    trip_lod_release(&cubes, budget);
+    return 0;
+}
+
+static void divide(trip_lod_parts *parts, const choosing *c, range depths)
+{
+    const trip_camera *camera = c->camera;
     const double unit = trip_camera_ray_length(camera, camera->width / 2.0, camera->height / 2.0);
     const double width = trip_lod_width_px(camera, 1);
     const double nearest =
-        parts->limit.px > 0 ? fmax(depths.nearest, TRIP_LOD_NEAREST_VOXELS) : depths.nearest;
-    unsigned level = trip_lod_level(width_at(camera, nearest), px, most);
+        parts->bounded ? fmax(depths.nearest, TRIP_LOD_NEAREST_VOXELS) : depths.nearest;
+    unsigned level = trip_lod_level(width_at(camera, nearest), c->px, c->most);
     add_part(parts, level);
-    while (level < most && parts->count < TRIP_LOD_PARTS_MOST) {
-        const double depth = ldexp(width, (int)++level) / px;
+    while (level < c->most) {
+        const double depth = ldexp(width, (int)++level) / c->px;
         if (!(depth < depths.farthest))
             return;
         parts->begin[parts->count] = half_space_from(camera, depth);
@@ -110,21 +139,21 @@ static unsigned count_levels(const trip_dataset *data)
 int trip_lod_parts_make(trip_lod_parts *parts, const trip_dataset *data, const trip_camera *camera,
                         const trip_settings *settings, bool one, trip_budget *budget)
 {
-    const unsigned most = trip_settings_has_levels(settings) ? count_levels(data) : 0;
+    choosing c = { data, camera, settings, settings->lod_px * settings->samples, 0 };
     const range depths = depths_of(data, camera);
     const bool thin = camera->ortho || (depths.nearest > 0 &&
                                         depths.farthest < depths.nearest * exp2(MIXED_OCTAVES));
-    double px = 0;
     *parts = (trip_lod_parts){ 0 };
-    int status = most > 0 ? find_px(parts, data, camera, settings, budget, &px) : 0;
-    if (status)
-        return status;
-    if (one || thin || !(px > 0))
-        choose_one(parts, width_at(camera, depths.nearest), px, most,
-                   !one && !(parts->limit.px > 0));
-    else
-        divide(parts, camera, depths, px, most);
-    return 0;
+    if (trip_settings_has_levels(settings))
+        c.most = count_levels(data);
+    if (one || thin || c.most == 0) {
+        choose_one(parts, &c, width_at(camera, depths.nearest), !one);
+        return 0;
+    }
+    int status = bound(parts, &c, budget);
+    if (!status)
+        divide(parts, &c, depths);
+    return status;
 }
 
 void trip_lod_parts_clip(const trip_lod_parts *parts, int part, trip_clip *clip)

@@ -13,13 +13,15 @@
  * then, a part of the next coarser level's picture is mixed in, which grows from 0 to 1 while
  * voxels become narrower by a quarter of an octave, down to where that level is chosen.
  *
- * A bound on bytes (lod_limit.h) is as if lod_px were larger. Plain values. */
+ * A bound on bytes is as if lod_px were larger, for what is in view of parts (lod_limit.h), and for
+ * all of the grid where it has one level. Plain values. */
 #ifndef TRIP_LOD_PARTS_H
 #define TRIP_LOD_PARTS_H
 
+#include "dataset_level.h"
 #include "lod.h"
 
-enum { TRIP_LOD_PARTS_MOST = 32 };
+enum { TRIP_LOD_PARTS_MOST = 1 + TRIP_DATASET_LEVELS_MOST };
 
 typedef struct trip_lod_parts {
     int count; /* of pictures, 1 at least */
@@ -29,7 +31,8 @@ typedef struct trip_lod_parts {
     trip_half_space begin[TRIP_LOD_PARTS_MOST];
     double distance[TRIP_LOD_PARTS_MOST];
     double share; /* of the second of two that are mixed; 0: they lie behind one another */
-    trip_lod_limit limit;
+    bool bounded; /* levels are coarser than lod_px calls for */
+    double bytes; /* where there is a bound: that the levels chosen have */
 } trip_lod_parts;
 
 /* `camera` is made with level 0's map. `one`: of one level alone. */

@@ -6,7 +6,11 @@
 
 #include "dataset.h"
 
-/* How many coarse levels have lists of a kind along each axis, without a gap. */
+/* No grid has a level beyond that has more than a voxel along any axis. */
+enum { TRIP_DATASET_LEVELS_MOST = 31 };
+
+/* How many coarse levels have lists of a kind along each axis, without a gap: those that are drawn.
+ */
 unsigned trip_dataset_levels(const trip_dataset *d, trip_kind kind);
 
 /* `level`: from 1 to the number of those that have values. */

@@ -23,6 +23,22 @@ def splats_read(lists):
     return sum(axis["splats_read"] for axis in lists.values())
 
 
+class Levels(program.ProgramTest):
+    def test_lists_of_coarse_levels_count_where_they_are_drawn_from(self):
+        ramp = numpy.add.outer(numpy.add.outer(numpy.arange(64), numpy.arange(64)),
+                               numpy.arange(64)).astype("u1")
+        program.write_nrrd("ramp.nrrd", ramp)
+        self.works("brick", "ramp.nrrd", "-q", "--keep-all", "--tile", "16")
+        for classify in "pre", "post":
+            r = self.works("render", "ramp.trip", "-o", "r.exr", "--size", "32x32", "--renderer",
+                           "cpu", "--tf", "grey", "--lod", "8", "--stats", "-", "--classify",
+                           classify)
+            lists = json.loads(r.stdout)["frames"][0]["lists"]
+            coarse = {name: one for name, one in lists.items() if name[1:]}
+            self.assertGreater(splats_read(coarse), 0, classify)
+            self.assertGreater(bytes_read({"lists": coarse}), 0, classify)
+
+
 class Depth(program.ProgramTest):
     """An opaque plate, one voxel thick, seen from straight ahead and from the side."""
 

@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "contexts.h"
+
 enum { NX = 64, NY = 64, NZ = 192, SIZE = 64, FLOATS = 4 * SIZE * SIZE };
 
 #define VOLUME "ramp.nrrd"
@@ -46,32 +48,18 @@ static int write_volume(int nx)
     return fclose(f);
 }
 
-static triptych *new_context(void)
+static int brick_ramp(int nx)
 {
-    triptych *t;
-    assert_int_equal(triptych_create(&t), TRIPTYCH_OK);
-    return t;
-}
-
-static int brick_volume(int nx)
-{
-    if (write_volume(nx))
-        return -1;
-    triptych *t = new_context();
     const triptych_brick_options options = {
         .keep_all = 1, .levels = 4, .tile_voxels = 16, .memory_bytes = 64 << 20, .replace = 1
     };
-    int status = triptych_brick(t, VOLUME, DATA_SET, &options, NULL);
-    if (status)
-        print_error("%s\n", triptych_error(t));
-    triptych_destroy(t);
-    return status;
+    return write_volume(nx) ? -1 : brick_volume(VOLUME, DATA_SET, &options);
 }
 
 static int brick(void **state)
 {
     (void)state;
-    return brick_volume(NX);
+    return brick_ramp(NX);
 }
 
 static int remove_data(void **state)
@@ -271,12 +259,29 @@ static void a_bound_makes_parts_coarser(void **state)
     triptych_destroy(t);
 }
 
+/* Where all has one level, that is bounded by all of it, though the nearest voxels are the widest.
+ */
+static void a_bound_holds_for_one_level(void **state)
+{
+    (void)state;
+    static float picture[FLOATS];
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
+    triptych_settings s = plain(0);
+    s.effects = TRIPTYCH_OCCLUSION;
+    s.shading = 1;
+    const uint64_t of_fine = draw(t, &s, picture);
+    s.max_bytes = 3.0 * 2 * NX * NY * NZ / 8;        /* of the first level, in three lists */
+    assert_true(draw(t, &s, picture) < of_fine / 4); /* bricks are wider, and more of them seen */
+    assert_int_equal(count_parts(t), 1);
+    triptych_destroy(t);
+}
+
 /* The second level of three voxels has one, in which there is no cell: it is not drawn. */
 static void levels_of_a_thin_grid_have_cells(void **state)
 {
     (void)state;
     static float thin[FLOATS];
-    assert_int_equal(brick_volume(3), 0);
+    assert_int_equal(brick_ramp(3), 0);
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, (double[]){ 10, 30, -500 });
     triptych_settings s = plain(100);
     s.clip = (triptych_clip){ 0 };
@@ -296,6 +301,7 @@ int main(void)
         cmocka_unit_test(steps_come_to_the_same_bits),
         cmocka_unit_test(what_takes_one_level_has_one),
         cmocka_unit_test(a_bound_makes_parts_coarser),
+        cmocka_unit_test(a_bound_holds_for_one_level),
         cmocka_unit_test(levels_of_a_thin_grid_have_cells),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);

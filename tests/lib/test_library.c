@@ -15,23 +15,16 @@
 
 #include <cmocka.h>
 
+#include "contexts.h"
+
 enum { SIZE = 96, FLOATS = 4 * SIZE * SIZE };
 
 #define DATA_SET "library.trip"
 #define VOLUME TRIP_SOURCE_DIR "/datasets/tooth.nhdr"
 
-static triptych *new_context(void)
-{
-    triptych *t;
-    assert_int_equal(triptych_create(&t), TRIPTYCH_OK);
-    assert_string_equal(triptych_error(t), "");
-    return t;
-}
-
 static int brick(void **state)
 {
     (void)state;
-    triptych *t = new_context();
     const char *grey = "grey";
     const triptych_brick_options options = { .functions = &grey,
                                              .function_count = 1,
@@ -40,11 +33,7 @@ static int brick(void **state)
                                              .replace = 1,
                                              .memory_bytes = 64 << 20,
                                              .threads = 2 };
-    int status = triptych_brick(t, VOLUME, DATA_SET, &options, NULL);
-    if (status)
-        print_error("%s\n", triptych_error(t));
-    triptych_destroy(t);
-    return status;
+    return brick_volume(VOLUME, DATA_SET, &options);
 }
 
 static int remove_data(void **state)
