@@ -1,17 +1,37 @@
 #include "code_set.h"
 
+#include <math.h>
 #include <string.h>
+
+/* The least float that is no less. */
+static float at_least(double least)
+{
+    float nearest = (float)least;
+    return (double)nearest < least ? nextafterf(nearest, INFINITY) : nearest;
+}
+
+/* A bit each of 64 entries. Eight bytes of 0 or 1 are moved into one by a product, whose terms do
+ * not overlap; so the comparisons are left to the compiler to do several at a time. */
+static uint64_t with_extinction(const trip_tf_entry entries[64], float least)
+{
+    unsigned char is_in[64];
+    uint64_t bits = 0, eight;
+    for (int i = 0; i < 64; i++)
+        is_in[i] = entries[i].extinction >= least;
+    for (int i = 0; i < 64; i += 8) {
+        memcpy(&eight, is_in + i, sizeof eight);
+        bits |= (eight * UINT64_C(0x0102040810204080) >> 56) << i;
+    }
+    return bits;
+}
 
 void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double least)
 {
+    const float limit = at_least(least);
     memset(set->some, 0, sizeof set->some);
     for (unsigned word = 0; word < 1024; word++) {
-        const trip_tf_entry *entries = table + word * 64;
-        uint64_t bits = 0;
-        for (unsigned i = 0; i < 64; i++)
-            bits |= (uint64_t)((double)entries[i].extinction >= least) << i;
-        set->codes[word] = bits;
-        set->some[word / 64] |= (uint64_t)(bits != 0) << word % 64;
+        set->codes[word] = with_extinction(table + word * 64, limit);
+        set->some[word / 64] |= (uint64_t)(set->codes[word] != 0) << word % 64;
     }
 }
 

@@ -128,8 +128,32 @@ static void set_compact_normals(trip_cpu_view *view, const trip_dataset *data, d
             view->compact[i][j] = (float)(c.to_world[i][j] * c.step[j] / full);
 }
 
+static void set_byte_rows(trip_cpu_view *view)
+{
+    unsigned least = 255, most = 0, shown = 0;
+    for (unsigned i = 0; i < 256; i++) {
+        view->byte_rows[i] = view->table[i * 257];
+        if (!(view->byte_rows[i].extinction > 0))
+            continue;
+        least = shown > 0 ? least : i;
+        most = i;
+        shown++;
+    }
+    const bool has_gaps = shown != most - least + 1;
+    view->shown_least = has_gaps ? 1 : (uint8_t)least;
+    view->shown_most = has_gaps ? 0 : (uint8_t)most;
+}
+
+void trip_cpu_view_set_table(trip_cpu_view *view, const trip_tf_entry *table)
+{
+    view->table = table;
+    if (view->code_bytes == 1)
+        set_byte_rows(view);
+}
+
+/* `code_bytes`: of the codes that the view's voxels have. */
 static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_camera *camera,
-                      int axis, bool front_to_back)
+                      int axis, unsigned code_bytes, bool front_to_back)
 {
     const trip_file_header *header = &frame->data->header;
     const double full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
@@ -137,7 +161,6 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
     const trip_vec3 light = trip_light_place(frame->settings, &camera->index_to_world);
     *view = (trip_cpu_view){
         .of = frame,
-        .table = frame->table,
         .coordinates =
             trip_coordinates_uneven(&frame->data->coordinates) ? &frame->data->coordinates : NULL,
         .splat = trip_splat_frame_make(camera, frame->settings),
@@ -146,7 +169,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         .axis = axis,
         .u_axis = (axis + 1) % 3,
         .v_axis = (axis + 2) % 3,
-        .code_bytes = header->code_bytes,
+        .code_bytes = code_bytes,
         .normal_bytes = header->normal_bytes,
         .normal_full = (float)fmin(header->gradient_full / full, 1e30),
     };
@@ -157,6 +180,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         for (int k = 0; k < 3; k++)
             view->world[k][i] = camera->index_to_world.m[k][axes[i]] / camera->voxel_world;
     }
+    trip_cpu_view_set_table(view, frame->table);
     set_compact_normals(view, frame->data, full);
     set_along(view->along_x, view, camera->to_x);
     set_along(view->along_y, view, camera->to_y);
@@ -172,10 +196,11 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
 void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip_list *list,
                         bool front_to_back)
 {
-    make_view(view, frame, &frame->plan->lists[list->index].camera, list->axis, front_to_back);
+    const unsigned code_bytes = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
+    make_view(view, frame, &frame->plan->lists[list->index].camera, list->axis, code_bytes,
+              front_to_back);
     view->list = list;
     trip_cpu_effects_make(&view->effects, frame, list->axis, &frame->plan->lists[list->index].grid);
-    view->code_bytes = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
     double tint[3] = { 0 };
     view->tinted = trip_tint_of(frame->settings, list->axis, list->level, tint);
     for (int i = 0; i < 3; i++)
@@ -185,5 +210,5 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip
 void trip_cpu_layer_view_make(trip_cpu_view *view, const trip_frame *frame, int axis,
                               bool front_to_back)
 {
-    make_view(view, frame, frame->camera, axis, front_to_back);
+    make_view(view, frame, frame->camera, axis, frame->data->header.code_bytes, front_to_back);
 }

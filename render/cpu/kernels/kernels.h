@@ -84,7 +84,7 @@ typedef enum trip_cpu_rays {
 /* Constants of one list of one frame, or of a layer: what panes begin and end with. */
 typedef struct trip_cpu_view {
     const trip_frame *of;
-    const trip_tf_entry *table; /* of the list's codes */
+    const trip_tf_entry *table; /* of 16-bit codes, set by trip_cpu_view_set_table() */
     const trip_list *list;      /* NULL: of a layer, by level 0's map */
     trip_splat_frame splat;     /* by the camera of the list */
     trip_cpu_rays rays;
@@ -120,7 +120,17 @@ typedef struct trip_cpu_view {
     float behind;        /* splats at this depth or less do not show */
     float near;          /* in parallel views: splats of less depth are near */
     trip_cpu_effects effects;
+    trip_tf_entry byte_rows[256];    /* of the table, where codes take a byte */
+    uint8_t shown_least, shown_most; /* those of them with extinction, where these follow one
+                                        another without a gap; else least > most */
 } trip_cpu_view;
+
+/* What a list's codes show as, by code as it is stored: those of one byte have a table of their
+ * own, 4 KiB that stay in the nearest cache, where the whole one's rows lie a page apart. */
+static inline const trip_tf_entry *trip_cpu_rows(const trip_cpu_view *view)
+{
+    return view->code_bytes == 1 ? view->byte_rows : view->table;
+}
 
 /* Whether near splats have G and the stretch in index spaces of their own: in perspective, with
  * uneven spacing, but where splats are summed, which have no room for it. As the two unit vectors
@@ -149,12 +159,15 @@ typedef struct trip_cpu_square {
 /* For each byte of a mask, the places of its bits in a square, u + 8 v, a byte each, the lowest
  * bit's first. */
 extern const uint64_t trip_cpu_places[256];
+/* And their numbers. */
+extern const uint64_t trip_cpu_bits_set[256];
 
 /* Voxels waiting to be projected: one entry a lane, from any runs. */
 #define TRIP_CPU_STAGED 320
 typedef struct trip_cpu_staged {
     int32_t u[TRIP_CPU_STAGED + 16], v[TRIP_CPU_STAGED + 16], sheet[TRIP_CPU_STAGED + 16];
-    int32_t code[TRIP_CPU_STAGED + 16], normal[TRIP_CPU_STAGED + 16];
+    int32_t code[TRIP_CPU_STAGED + 16]; /* a row of trip_cpu_rows() */
+    int32_t normal[TRIP_CPU_STAGED + 16];
 } trip_cpu_staged;
 
 /* The same voxels on their way to splats: what one loop of the projection leaves to the next. */

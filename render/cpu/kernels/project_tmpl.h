@@ -25,15 +25,15 @@
 /* Room for loads and stores that end behind the last byte. */
 enum { PLACES_ROOM = 64 + V };
 
-/* The places of a mask's voxels in the square, u + 8 v; returns their number. */
-INLINE uint32_t places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
+/* The places of a mask's voxels in the square, u + 8 v. */
+INLINE void places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
 {
 #ifdef V_PACKS_BITS
     v_bytes all;
     for (unsigned i = 0; i < 64; i++)
         all[i] = (uint8_t)((i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i & 2) << 2 | (i & 8) << 1 |
                            (i & 32));
-    return v_pack_bytes(places, mask, all);
+    v_pack_bytes(places, mask, all);
 #else
     uint32_t n = 0;
     for (unsigned i = 0; i < 8; i++) {
@@ -43,7 +43,6 @@ INLINE uint32_t places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
         memcpy(places + n, &eight, sizeof eight);
         n += (uint32_t)__builtin_popcount(byte);
     }
-    return n;
 #endif
 }
 
@@ -56,12 +55,12 @@ INLINE vi load_bytes(const uint8_t *from)
     return __builtin_convertvector(b, vi);
 }
 
-/* The codes of V voxels from number `at` on, a multiple of V; those of one byte as 16 bits. Lanes
- * behind the square's voxels are codes too. */
+/* The codes of V voxels from number `at` on, a multiple of V. Lanes behind the square's voxels are
+ * codes too. */
 INLINE vi load_codes(const trip_cpu_square *square, unsigned code_bytes, int32_t at)
 {
     if (code_bytes == 1)
-        return load_bytes(square->codes + at) * 257;
+        return load_bytes(square->codes + at);
     const uint32_t width = square->width;
     return (vi_load_bits(square->codes + (size_t)at * width / 8, width) + (int32_t)square->least) &
            UINT16_MAX;
@@ -72,17 +71,35 @@ INLINE vi load_normals(const unsigned char *normals, unsigned normal_bytes, int3
     return normal_bytes == 4 ? vi_load(normals + 4 * at) : vi_load_3_bytes(normals + 3 * at);
 }
 
-/* Lanes beyond the square's voxels hold what lies there, and are left out by a mask. */
-INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *square,
-                             unsigned code_bytes, bool reversed, trip_cpu_staged *staged,
-                             uint32_t filled)
+INLINE uint64_t reversed_bits(uint64_t a)
 {
-    const float *extinction = &view->table[0].extinction;
+    a = (a >> 1 & UINT64_C(0x5555555555555555)) | (a & UINT64_C(0x5555555555555555)) << 1;
+    a = (a >> 2 & UINT64_C(0x3333333333333333)) | (a & UINT64_C(0x3333333333333333)) << 2;
+    a = (a >> 4 & UINT64_C(0x0f0f0f0f0f0f0f0f)) | (a & UINT64_C(0x0f0f0f0f0f0f0f0f)) << 4;
+    return __builtin_bswap64(a);
+}
+
+/* `in_range`: codes are bytes, and those with extinction are those from view->shown_least to
+ * view->shown_most, so that what is seen of the square is known at once. Lanes beyond the square's
+ * voxels hold what lies there, and are left out. */
+INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *square,
+                             unsigned code_bytes, bool in_range, bool reversed,
+                             trip_cpu_staged *staged, uint32_t filled)
+{
+    const float *extinction = &trip_cpu_rows(view)->extinction;
     const vi u = vi_set(square->u), v = vi_set(square->v), sheet = vi_set(square->sheet);
+    int32_t count = __builtin_popcountll(square->mask), all = (count + V - 1) / V * V;
+    uint64_t seen = UINT64_MAX >> (64 - count);
+    if (in_range)
+        seen &= v_bytes_within(square->codes, view->shown_least, view->shown_most);
+    if (seen == 0)
+        return filled;
     uint8_t places[PLACES_ROOM];
-    int32_t count = (int32_t)places_of(square->mask, places), all = (count + V - 1) / V * V;
+    places_of(square->mask, places);
+    const uint64_t in_order = reversed ? reversed_bits(seen) >> (64 - all) : seen;
     for (int32_t i = 0; i < all; i += V) {
         int32_t at = reversed ? all - V - i : i;
+        unsigned lanes = (unsigned)(in_order >> i) & ((1u << V) - 1);
         vi place = load_bytes(places + at), code = load_codes(square, code_bytes, at);
         vi normal = vi_set(0);
         if (view->shading || view->flattens)
@@ -92,17 +109,15 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
             code = vi_reverse(code);
             normal = vi_reverse(normal);
         }
-        vm seen = v_gt(v_gather(extinction, code * 4), v_set(0));
-        if (count - at < V)
-            seen = vm_and(seen, reversed ? vm_last((unsigned)(count - at))
-                                         : vm_first((unsigned)(count - at)));
-        vi_store_packed(staged->u + filled, seen, u + (place & 7));
-        vi_store_packed(staged->v + filled, seen, v + v_shift_right(place, 3));
-        vi_store_packed(staged->sheet + filled, seen, sheet);
-        vi_store_packed(staged->code + filled, seen, code);
+        if (!in_range)
+            lanes &= vm_bits(v_gt(v_gather(extinction, code * 4), v_set(0)));
+        vi_store_packed(staged->u + filled, lanes, u + (place & 7));
+        vi_store_packed(staged->v + filled, lanes, v + v_shift_right(place, 3));
+        vi_store(staged->sheet + filled, sheet);
+        vi_store_packed(staged->code + filled, lanes, code);
         if (view->shading || view->flattens)
-            vi_store_packed(staged->normal + filled, seen, normal);
-        filled += (uint32_t)__builtin_popcount(vm_bits(seen));
+            vi_store_packed(staged->normal + filled, lanes, normal);
+        filled += (uint32_t)__builtin_popcount(lanes);
     }
     return filled;
 }
@@ -110,11 +125,14 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
 static uint32_t stage(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled)
 {
+    if (view->code_bytes == 1 && view->shown_least <= view->shown_most)
+        return reversed ? stage_square(view, square, 1, true, true, staged, filled)
+                        : stage_square(view, square, 1, true, false, staged, filled);
     if (view->code_bytes == 1)
-        return reversed ? stage_square(view, square, 1, true, staged, filled)
-                        : stage_square(view, square, 1, false, staged, filled);
-    return reversed ? stage_square(view, square, 2, true, staged, filled)
-                    : stage_square(view, square, 2, false, staged, filled);
+        return reversed ? stage_square(view, square, 1, false, true, staged, filled)
+                        : stage_square(view, square, 1, false, false, staged, filled);
+    return reversed ? stage_square(view, square, 2, false, true, staged, filled)
+                    : stage_square(view, square, 2, false, false, staged, filled);
 }
 
 /* ---- the centre ---- */
@@ -765,7 +783,7 @@ static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged 
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
         uint32_t k = at + i;
-        double extinction = (double)view->table[staged->code[k]].extinction;
+        double extinction = (double)trip_cpu_rows(view)[staged->code[k]].extinction;
         const float flat[4] = { along.normal.x[i], along.normal.y[i], along.normal.z[i],
                                 along.share[i] };
         if (trip_cpu_project_scalar(view, staged->u[k], staged->v[k], staged->sheet[k], extinction,
@@ -795,7 +813,7 @@ static void replace_scalar(trip_cpu_splat *out, const uint32_t row[V], unsigned 
 INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
     vf entry[4];
-    v_load_rows(&view->table[0].r, staged->code + at, entry);
+    v_load_rows(&trip_cpu_rows(view)->r, staged->code + at, entry);
     colour c = { entry[0], entry[1], entry[2] };
     if (view->tinted)
         c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
@@ -940,7 +958,7 @@ INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
         unsigned usual = view->coordinates ? 0 : vm_bits(f.usual);
         unsigned scalar = valid & ~behind & ~usual;
         vf entry[4];
-        v_load_rows(&view->table[0].r, staged->code + i, entry);
+        v_load_rows(&trip_cpu_rows(view)->r, staged->code + i, entry);
         unsigned kept = complete(view, &f, entry[3], lanes, i) & valid & ~scalar;
         if (open && kept)
             kept &= over_open_texels(lanes, i, open, view->panes_across);

@@ -12,6 +12,8 @@
 #ifndef TRIP_CPU_SIMD_H
 #define TRIP_CPU_SIMD_H
 
+#include "cpu/kernels/kernels.h"
+
 #include <math.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -332,10 +334,10 @@ INLINE unsigned vw_not_0(vw a)
     return _mm512_test_epi64_mask((__m512i)a, (__m512i)a);
 }
 
-/* Lanes of a where m is set, packed to the front of p; V lanes of p may be overwritten. */
-INLINE void vi_store_packed(void *p, vm m, vi a)
+/* Lanes of a whose bits are set, packed to the front of p; V lanes of p may be overwritten. */
+INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 {
-    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, (__m512i)a));
+    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32((__mmask16)bits, (__m512i)a));
 }
 
 #ifdef __AVX512VBMI2__
@@ -800,9 +802,14 @@ INLINE vf v_fnma_where(vm m, vf a, vf b, vf c)
     return v_select(m, v_fnma(a, b, c), a);
 }
 
-INLINE void vi_store_packed(void *p, vm m, vi a)
+/* Without a branch, which would be taken anew at every vector: the lanes wanted are permuted to the
+ * front. */
+INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 {
-    unsigned bits = vm_bits(m);
+#if TRIP_SIMD == TRIP_SIMD_AVX2
+    __m128i lanes = _mm_loadl_epi64((const void *)&trip_cpu_bits_set[bits]);
+    vi_store(p, (vi)_mm256_permutevar8x32_epi32((__m256i)a, _mm256_cvtepu8_epi32(lanes)));
+#else
     int32_t *out = p;
     if ((bits & (bits + 1)) == 0) { /* the first ones */
         vi_store(out, a);
@@ -810,9 +817,33 @@ INLINE void vi_store_packed(void *p, vm m, vi a)
     }
     for (; bits; bits &= bits - 1)
         *out++ = a[__builtin_ctz(bits)];
+#endif
 }
 
 #endif
+
+/* Of 64 bytes, a bit each: whether they lie from `least` to `most`, which is no less. */
+INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t least, uint8_t most)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+    __m512i above = _mm512_sub_epi8(_mm512_loadu_si512(from), _mm512_set1_epi8((char)least));
+    return _mm512_cmple_epu8_mask(above, _mm512_set1_epi8((char)(most - least)));
+#elif TRIP_SIMD == TRIP_SIMD_AVX2
+    uint64_t bits = 0;
+    for (int i = 0; i < 2; i++) {
+        __m256i a = _mm256_loadu_si256((const void *)(from + 32 * i));
+        __m256i limited = _mm256_min_epu8(_mm256_max_epu8(a, _mm256_set1_epi8((char)least)),
+                                          _mm256_set1_epi8((char)most));
+        bits |= (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(a, limited)) << 32 * i;
+    }
+    return bits;
+#else
+    uint64_t bits = 0;
+    for (int i = 0; i < 64; i++)
+        bits |= (uint64_t)(from[i] >= least && from[i] <= most) << i;
+    return bits;
+#endif
+}
 
 /* Three bytes a lane; as many as a vector has are read. */
 INLINE vi vi_load_3_bytes(const unsigned char *from)
