@@ -1,9 +1,9 @@
-/* Everything that touches picture files is done by a second program, triptych-images, and files of
- * netCDF-4 are read by another, triptych-netcdf; this is how the others talk to them. OpenImageIO
- * brings some 250 libraries, 120 MB of resident memory and a fifth of a second to start; here they
- * count only where pictures are read or written, and not towards the memory that the renderer
- * promises. A decoder that a broken file brings down takes nobody with it, and what the libraries
- * print goes nowhere.
+/* Picture files are read by a second program, triptych-images, and written by it but for PNG, which
+ * needs none of its libraries; files of netCDF-4 are read by another, triptych-netcdf. This is how
+ * the others talk to them. OpenImageIO brings some 250 libraries, 120 MB of resident memory and a
+ * fifth of a second to start; here they count only where they are needed, and not towards the
+ * memory that the renderer promises. A decoder that a broken file brings down takes nobody with it,
+ * and what the libraries print goes nowhere.
  *
  * Nor is a decoder that a hostile file has taken over trusted: the helper may read files, use the
  * memory it is given and write to the descriptor it is given, and no more (sandbox.h); whatever it

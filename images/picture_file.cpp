@@ -69,35 +69,24 @@ class FileSink : public OIIO::Filesystem::IOProxy
 struct Encoding {
     const char *plugin;
     trip_image_depth depth;
-    int channels;
-    bool associated; /* alpha, where there are four channels */
-    bool linear;     /* light, where others hold display values */
+    int channels; /* four: the fourth is associated alpha */
+    bool linear;  /* light, where others hold display values */
 };
 
 Encoding choose_encoding(const trip_picture &p)
 {
     const char *extension = std::strrchr(p.path.c_str(), '.') + 1;
     bool alpha = !p.params.drop_alpha;
-    Encoding e = { "png", TRIP_IMAGE_U8, alpha ? 4 : 3, false, false };
+    Encoding e = { "jpeg", TRIP_IMAGE_U8, 3, false };
     if (strcasecmp(extension, "exr") == 0)
-        e = { "openexr", TRIP_IMAGE_FLOAT, alpha ? 4 : 3, true, true };
+        e = { "openexr", TRIP_IMAGE_FLOAT, alpha ? 4 : 3, true };
     else if (strncasecmp(extension, "tif", 3) == 0)
-        e = { "tiff", TRIP_IMAGE_U16, alpha ? 4 : 3, true, false };
-    else if (strcasecmp(extension, "png") != 0)
-        e = { "jpeg", TRIP_IMAGE_U8, 3, false, false };
+        e = { "tiff", TRIP_IMAGE_U16, alpha ? 4 : 3, false };
     if (p.params.depth != TRIP_IMAGE_DEPTH_DEFAULT)
         e.depth = p.params.depth;
     if (p.params.distances)
-        e = { e.plugin, TRIP_IMAGE_FLOAT, 1, false, false };
+        e = { e.plugin, TRIP_IMAGE_FLOAT, 1, false };
     return e;
-}
-
-/* Colour times 1 / alpha, before rounding, so that thin places keep their hue. */
-void unpremultiply(float rgba[4])
-{
-    float alpha = rgba[3] < 0 ? 0 : rgba[3] > 1 ? 1 : rgba[3];
-    for (int c = 0; c < 3; c++)
-        rgba[c] = alpha > 0 ? rgba[c] / alpha : 0;
 }
 
 /* The sRGB transfer function (IEC 61966-2-1) and its inverse; negative numbers mirror positive
@@ -127,11 +116,8 @@ template <typename Curve> void apply_curve(const Curve &curve, float rgba[4], bo
 
 template <typename T> void quantise(const float *from, int channels, T *to)
 {
-    const float top = (T)-1;
-    for (int c = 0; c < channels; c++) {
-        float v = from[c] < 0 ? 0 : from[c] > 1 ? 1 : from[c];
-        to[c] = (T)std::floor(v * top + 0.5f);
-    }
+    for (int c = 0; c < channels; c++)
+        to[c] = (T)trip_image_integer(from[c], (T)-1);
 }
 
 /* One row in the file's channels and type. Distances are left as they are. */
@@ -145,8 +131,6 @@ void convert_row(const Encoding &e, int width, const float *from, void *to)
         float rgba[4];
         size_t at = (size_t)x * (size_t)e.channels;
         std::memcpy(rgba, from, sizeof rgba);
-        if (e.channels == 4 && !e.associated)
-            unpremultiply(rgba);
         if (e.linear)
             apply_curve(linear_of_display, rgba, e.channels == 4);
         if (e.depth == TRIP_IMAGE_U8)
@@ -173,7 +157,7 @@ OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
     if (e.channels == 4) {
         spec.alpha_channel = 3;
         /* Says what the values are, so that OpenImageIO leaves them alone. */
-        spec.attribute("oiio:UnassociatedAlpha", e.associated ? 0 : 1);
+        spec.attribute("oiio:UnassociatedAlpha", 0);
     }
     if (e.channels == 1) {
         spec.channelnames = { "Z" };
@@ -182,7 +166,7 @@ OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
     if (std::strcmp(e.plugin, "jpeg") == 0) {
         spec.attribute("CompressionQuality", p.params.jpeg_quality ? p.params.jpeg_quality : 95);
         spec.attribute("jpeg:subsampling", "4:4:4");
-    } else if (std::strcmp(e.plugin, "png") != 0) {
+    } else {
         spec.attribute("compression", "zip");
     }
     /* Otherwise OpenImageIO notes the time, and the same picture would be another file. */

@@ -182,7 +182,11 @@ int triptych_prepare_write(triptych *t, const char *path, const char *depth_path
     int status = trip_image_check_path(path, NULL);
     if (!status && depth_path)
         status = trip_image_check_path(depth_path, &(trip_image_params){ .distances = true });
-    return trip_context_leave(before, status ? status : trip_image_prepare(&t->files));
+    if (!status)
+        status = trip_image_prepare(&t->files, path);
+    if (!status && depth_path)
+        status = trip_image_prepare(&t->files, depth_path);
+    return trip_context_leave(before, status);
 }
 
 int triptych_write(triptych *t, const char *path, int width, int height, const float *rgba)

@@ -10,21 +10,23 @@
 #include "budget.h"
 #include "image_helper.h"
 #include "new_file.h"
+#include "png_file.h"
 #include "report.h"
 
 /* What a format can hold, the default depth first. */
 typedef struct format {
     const char *extension;
+    bool is_png;
     trip_image_depth depths[3];
 } format;
 
 static const format formats[] = {
-    { "png", { TRIP_IMAGE_U8, TRIP_IMAGE_U16 } },
-    { "jpg", { TRIP_IMAGE_U8 } },
-    { "jpeg", { TRIP_IMAGE_U8 } },
-    { "tif", { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
-    { "tiff", { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
-    { "exr", { TRIP_IMAGE_FLOAT, TRIP_IMAGE_HALF } },
+    { "png", true, { TRIP_IMAGE_U8, TRIP_IMAGE_U16 } },
+    { "jpg", false, { TRIP_IMAGE_U8 } },
+    { "jpeg", false, { TRIP_IMAGE_U8 } },
+    { "tif", false, { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
+    { "tiff", false, { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
+    { "exr", false, { TRIP_IMAGE_FLOAT, TRIP_IMAGE_HALF } },
 };
 
 static const format *find_format(const char *path)
@@ -73,9 +75,9 @@ void trip_image_close(trip_image_files *files)
     files->helper = NULL;
 }
 
-int trip_image_prepare(trip_image_files *files)
+int trip_image_prepare(trip_image_files *files, const char *path)
 {
-    return start_helper(files, "write");
+    return find_format(path)->is_png ? 0 : start_helper(files, "write");
 }
 
 static size_t channels_of(const trip_image_params *params)
@@ -102,29 +104,39 @@ static int check_numbers(const char *path, int width, int height, const float *p
 }
 
 /* After a failure the connection may be in the middle of something. */
-static int write_checked(trip_image_files *files, const char *path, int width, int height,
-                         const float *pixels, const trip_image_params *params)
+static int write_by_helper(trip_image_files *files, int fd, const char *path, int width, int height,
+                           const float *pixels, const trip_image_params *params)
 {
-    trip_new_file file;
     const int64_t form = params->distances    ? TRIP_IMAGE_FORM_DISTANCES
                          : params->drop_alpha ? TRIP_IMAGE_FORM_RGB
                                               : TRIP_IMAGE_FORM_RGBA;
     const int64_t numbers[5] = { width, height, params->depth, form, params->jpeg_quality };
-    int status = trip_new_file_begin(&file, "write", path);
-    if (status < 0)
-        return status;
-    status = start_helper(files, "write");
+    int status = start_helper(files, "write");
     if (status == 0)
-        status = trip_image_helper_request(files->helper, TRIP_IMAGE_WRITE, path, numbers, file.fd);
+        status = trip_image_helper_request(files->helper, TRIP_IMAGE_WRITE, path, numbers, fd);
     if (status == 0)
         status = trip_image_helper_send(files->helper, pixels,
                                         (size_t)width * (size_t)height * channels_of(params) *
                                             sizeof(float));
     if (status == 0)
         status = trip_image_helper_expect(files->helper, 0);
+    if (status < 0)
+        trip_image_close(files);
+    return status;
+}
+
+static int write_checked(trip_image_files *files, const char *path, int width, int height,
+                         const float *pixels, const trip_image_params *params)
+{
+    trip_new_file file;
+    int status = trip_new_file_begin(&file, "write", path);
+    if (status < 0)
+        return status;
+    status = find_format(path)->is_png
+                 ? trip_png_write(file.fd, path, width, height, pixels, params)
+                 : write_by_helper(files, file.fd, path, width, height, pixels, params);
     if (status == 0)
         return trip_new_file_finish(&file);
-    trip_image_close(files);
     trip_new_file_abandon(&file);
     return status;
 }

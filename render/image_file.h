@@ -1,4 +1,5 @@
-/* Pictures in files: PNG, JPEG, TIFF and OpenEXR, written by the helper program of image_helper.h.
+/* Pictures in files: PNG, written here (png_file.h), and JPEG, TIFF and OpenEXR, which the helper
+ * program of image_helper.h writes.
  * One thread at a time uses a helper; several threads have one each.
  *
  * In memory a picture is float RGBA, premultiplied (associated) alpha, `height` rows of `width`
@@ -39,9 +40,10 @@ typedef struct trip_image_files {
  * done: 0, or TRIP_USAGE and one line that names the formats. */
 int trip_image_check_path(const char *path, const trip_image_params *params);
 
-/* Starts the helper, which needs a fifth of a second to get ready, so that the first picture need
- * not wait; a helper that is missing is noticed before any work is done. */
-int trip_image_prepare(trip_image_files *files);
+/* Starts the helper where files of that name are written by it: it needs a fifth of a second to get
+ * ready, for which the first picture then need not wait, and one that is missing is noticed before
+ * any work is done. */
+int trip_image_prepare(trip_image_files *files, const char *path);
 /* Ends the helper. */
 void trip_image_close(trip_image_files *files);
 
@@ -53,6 +55,13 @@ void trip_image_close(trip_image_files *files);
  * Distances go as they are into one channel of floats, in EXR called Z, and may be +infinity. */
 int trip_image_write(trip_image_files *files, const char *path, int width, int height,
                      const float *pixels, const trip_image_params *params);
+
+/* A component as an integer from 0 to `top`, as files have it. */
+static inline unsigned trip_image_integer(float v, unsigned top)
+{
+    const float within = v < 0 ? 0 : v > 1 ? 1 : v;
+    return (unsigned)(within * (float)top + 0.5f);
+}
 
 /* Reads a picture of one to four channels (grey, grey and alpha, RGB, RGBA) into *rgba_out, which
  * the caller frees with free(). */
