@@ -10,7 +10,7 @@
 #include "scenes.h"
 #include "test.h"
 
-enum { SIZE = 64, VIEWS = 12 };
+enum { SIZE = 96, VIEWS = 12 };
 
 /* Bricks a volume of the project's and opens it as a scene, drawn as it would be by default. */
 static void open_volume(scene *s, const char *name)
