@@ -257,8 +257,8 @@ typedef struct trip_cpu_kernels {
     uint64_t (*squares)(const trip_cpu_view *view, const struct trip_cpu_region *region,
                         const _Atomic uint64_t *open, trip_cpu_lanes *lanes);
 
-    /* Adds the voxels of a square to `staged` in draw order, leaving out transparent ones; there is
-     * room for 64. Returns the new fill. */
+    /* Adds the voxels of a square, of which there are some, to `staged` in draw order, leaving out
+     * transparent ones; there is room for 64. Returns the new fill. */
     uint32_t (*stage)(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
