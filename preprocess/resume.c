@@ -150,6 +150,18 @@ static int replay_run(replay *r, const trip_run_record *run)
                : status;
 }
 
+/* Whether all was read, and as many bytes written: blocks packed less tightly than the writer packs
+ * them are none that it left. */
+static bool is_all(const replay *r, const trip_checkpoint *c)
+{
+    const trip_list_output *o = r->output;
+    bool is_same = r->splats == c->ordered_splats;
+    for (int i = 0; i < TRIP_PLANES; i++)
+        is_same = is_same && r->at[i] == c->ordered_bytes[i] &&
+                  trip_writer_plane_bytes(o->writer, o->list, i) == c->ordered_bytes[i];
+    return is_same;
+}
+
 static int replay_runs(replay *r, trip_journal *j)
 {
     const trip_checkpoint *c = trip_journal_get_checkpoint(j);
@@ -161,10 +173,7 @@ static int replay_runs(replay *r, trip_journal *j)
         for (size_t k = 0; k < n && status == 0; k++)
             status = replay_run(r, &runs[k]);
     }
-    if (status == 0 &&
-        (r->splats != c->ordered_splats || memcmp(r->at, c->ordered_bytes, sizeof r->at) != 0))
-        status = fail_damaged();
-    return status;
+    return status == 0 && !is_all(r, c) ? fail_damaged() : status;
 }
 
 int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_builder *builder,
