@@ -12,14 +12,14 @@
 #ifndef TRIP_CPU_SIMD_H
 #define TRIP_CPU_SIMD_H
 
-#include "cpu/kernels/kernels.h"
-
 #include <math.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+
+#include "cpu/kernels/kernels.h"
 
 #define TRIP_SIMD_PLAIN 0
 #define TRIP_SIMD_AVX2 2
