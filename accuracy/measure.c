@@ -181,23 +181,30 @@ __attribute__((format(printf, 2, 3))) static void leave_out(accuracy_row *row, c
     row->state = ACCURACY_LEFT_OUT;
 }
 
+/* Whether there are coarse levels to draw a setting by: of values (post) or of means (pre). */
+static bool has_levels(triptych *t, const triptych_info *info, const triptych_settings *settings)
+{
+    const char *kind = settings->classify == TRIPTYCH_PRE ? "means" : "values";
+    for (unsigned i = 0; i < info->lists; i++) {
+        triptych_list list;
+        if (triptych_get_list(t, i, &list) == 0 && list.level > 0 && !strcmp(list.kind, kind))
+            return true;
+    }
+    return false;
+}
+
 /* What says nothing here. */
 static int leave_out_idle(sweep *s)
 {
     triptych *t;
-    unsigned levels = 0;
     int status = accuracy_contexts_open(&s->contexts, 0, TRIPTYCH_RENDERER_CPU, &t);
     triptych_info info;
-    triptych_list list;
     if (status == TRIP_ERROR)
         return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "%s",
                          s->contexts.why[0][TRIPTYCH_RENDERER_CPU]);
     if (status || triptych_get_info(t, &info))
         return status ? status : TRIP_ERROR;
     s->m->checksum = info.checksum;
-    for (unsigned i = 0; i < info.lists; i++)
-        if (triptych_get_list(t, i, &list) == 0 && list.level > levels)
-            levels = list.level;
     for (int i = 0; i < s->m->row_count; i++) {
         accuracy_row *row = &s->m->rows[i];
         const int64_t *n = info.dims;
@@ -207,8 +214,8 @@ static int leave_out_idle(sweep *s)
                       "VTK would hold the whole volume in memory; --beside draws it all the same");
         if (row->beside)
             continue;
-        if (row->setting.settings.lod_px > 0 && !levels)
-            leave_out(row, "the data set has no coarse levels");
+        if (row->setting.settings.lod_px > 0 && !has_levels(t, &info, &row->setting.settings))
+            leave_out(row, "the data set has no coarse levels for it");
         else if (row->setting.settings.samples > s->o->samples)
             leave_out(row, "the integral has %d x %d rays a pixel: --samples %d compares them",
                       s->o->samples, s->o->samples, row->setting.settings.samples);

@@ -303,8 +303,10 @@ int bench_levels(const session *s, const bench_options *o, bench_report *r)
     if (!status)
         status = bench_context_levels(&m.context, &m.levels);
     if (!status && m.levels == 0)
-        status = trip_fail(TRIP_ERROR, "bench", o->input,
-                           "has no coarse levels; `triptych brick` without --levels 0 makes them");
+        status =
+            trip_fail(TRIP_ERROR, "bench", o->input,
+                      "has no coarse levels for %s; `triptych brick --levels-for both` makes them",
+                      o->settings.classify == TRIP_CLASSIFY_POST ? "post" : "pre");
     bench_progress_expect(o->progress, (int)m.levels * o->views * 5 + 2 * (DOLLY_STEPS + 1));
     if (!status)
         status = measure_levels(&m);

@@ -103,10 +103,12 @@ int bench_sample_make_field(bench_sample *s, const char *field, int n, const cha
     if (!status && !tf)
         status = trip_new_file_of_text("bench", tf = function, field_function);
     if (!status)
-        status = trip_brick(
-            &(trip_brick_params){
-                .input = volume, .output = s->data, .functions = &tf, .function_count = 1 },
-            &summary);
+        status = trip_brick(&(trip_brick_params){ .input = volume,
+                                                  .output = s->data,
+                                                  .functions = &tf,
+                                                  .function_count = 1,
+                                                  .levels_for = TRIP_LEVELS_FOR_BOTH },
+                            &summary);
     remove(volume);
     return status;
 }

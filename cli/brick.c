@@ -39,6 +39,7 @@ enum key {
     KEY_NORMALS,
     KEY_HALO,
     KEY_LEVELS,
+    KEY_LEVELS_FOR,
     KEY_TILE,
     KEY_SLAB_SHEETS,
     KEY_MEMORY,
@@ -104,6 +105,10 @@ static const struct argp_option option_table[] = {
       "Keep the transparent neighbours of what is kept, for interpolation (default: 1)", 3 },
     { "levels", KEY_LEVELS, "N|auto", 0,
       "Coarse levels, each of half the resolution (default: auto, down to one brick; 0: none)", 3 },
+    { "levels-for", KEY_LEVELS_FOR, "post|pre|both|auto", 0,
+      "What coarse levels are drawn by: interpolated values, splats or either (default: auto, "
+      "post, or pre without the halo)",
+      3 },
     { "tile", KEY_TILE, "N", 0, "Tile edge in voxels: 16, 32, 64 or 128 (default: 64)", 3 },
     { "slab-sheets", KEY_SLAB_SHEETS, "N", 0, "Sheets of a brick, 1 to 64 (default: 8)", 3 },
     { "limits", KEY_LIMITS, NULL, 0,
@@ -263,6 +268,15 @@ static int parse_levels(const char *text, int *levels)
     return status;
 }
 
+static int parse_levels_for(const char *text, triptych_levels_for *levels_for)
+{
+    static const char *const names[] = { "auto", "post", "pre", "both", NULL };
+    int choice = 0;
+    int status = trip_option_choice("--levels-for", text, names, &choice);
+    *levels_for = (triptych_levels_for)choice;
+    return status;
+}
+
 static int parse_unsigned(const char *option, const char *text, int hi, unsigned *out)
 {
     int number;
@@ -334,6 +348,8 @@ static error_t parse_output_option(int key, char *argument, options *o)
         return parse_halo(argument, &o->brick.no_halo);
     case KEY_LEVELS:
         return parse_levels(argument, &o->brick.levels);
+    case KEY_LEVELS_FOR:
+        return parse_levels_for(argument, &o->brick.levels_for);
     case KEY_TILE:
         return parse_tile(argument, &o->brick.tile_voxels);
     case KEY_SLAB_SHEETS:
@@ -361,6 +377,11 @@ static error_t check_options(const options *o)
         return trip_option_fail("--range", "says nothing beside --keep-all");
     if (o->dry_run && p->resume)
         return trip_option_fail("--resume", "says nothing beside --dry-run");
+    if (p->levels < 0 && p->levels_for)
+        return trip_option_fail("--levels-for", "says nothing beside --levels 0");
+    if (p->no_halo &&
+        (p->levels_for == TRIPTYCH_LEVELS_FOR_POST || p->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
+        return trip_option_fail("--levels-for", "post needs the halo: values are interpolated");
     if (o->limits && (o->quiet || o->dry_run))
         return trip_option_fail("--limits", "prints nothing beside --quiet or --dry-run");
     if (o->quiet && o->json)

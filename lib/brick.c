@@ -57,6 +57,7 @@ static trip_brick_params brick_params(triptych *t, const char *volume,
         .normals = (trip_brick_normals)o->normals,
         .no_halo = o->no_halo,
         .levels = o->levels,
+        .levels_for = (trip_brick_levels_for)o->levels_for,
         .replace = o->replace,
         .resume = o->resume,
         .tile_voxels = o->tile_voxels,
@@ -100,6 +101,11 @@ static const char *fault_of_options(const triptych_brick_options *o)
         return "codes have 8 or 16 bits";
     if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_NONE)
         return "there are no such normals";
+    if (o->levels_for < TRIPTYCH_LEVELS_FOR_AUTO || o->levels_for > TRIPTYCH_LEVELS_FOR_BOTH)
+        return "coarse levels are for post, pre or both";
+    if (o->no_halo &&
+        (o->levels_for == TRIPTYCH_LEVELS_FOR_POST || o->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
+        return "coarse levels for post need the halo";
     for (size_t i = 0; i < o->range_count; i++)
         if (!(o->ranges[i].lo <= o->ranges[i].hi))
             return "the lower end of a range is above the upper";

@@ -55,6 +55,7 @@ struct triptych {
     double max_ms;                     /* 0: no bound of time */
     double bytes_per_ms;               /* that bounded frames took; 0: none was drawn */
     bool kernel_warned;                /* that the halo is short for it */
+    bool levels_warned;                /* that there are none for the classification */
     bool classify_auto;                /* settings.classify is what that has come to for a frame */
     double kelvin[2];                  /* of emission, as set */
     int effects;                       /* as set; frames have what they come to in drawn_settings */

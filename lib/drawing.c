@@ -390,6 +390,24 @@ static void warn_of_halo(triptych *t)
         trip_kernel_name(t->settings.kernel));
 }
 
+/* Once for a data set, of frames that are drawn by levels: it has those of the other classification
+ * alone. */
+static void warn_of_levels(triptych *t)
+{
+    const trip_dataset *data = t->session.data;
+    const bool post = t->drawn_settings.classify == TRIP_CLASSIFY_POST;
+    if (t->levels_warned || !(t->drawn_settings.lod_px > 0) ||
+        trip_dataset_levels(data, post ? TRIP_KIND_VALUES : TRIP_KIND_MEANS) > 0 ||
+        trip_dataset_levels(data, post ? TRIP_KIND_MEANS : TRIP_KIND_VALUES) == 0)
+        return;
+    t->levels_warned = true;
+    trip_warn(
+        t->session.input,
+        "has no coarse levels for %s: the finest is drawn everywhere; brick --levels-for both "
+        "makes them",
+        post ? "post" : "pre");
+}
+
 static int start(triptych *t)
 {
     int status = trip_context_begin_light(t);
@@ -413,6 +431,8 @@ static int start(triptych *t)
         status = trip_frame_begin(&t->drawing, t->renderer, t->reader, &t->frame);
     if (!status)
         warn_of_halo(t);
+    if (!status)
+        warn_of_levels(t);
     return status;
 }
 

@@ -218,7 +218,7 @@ static void close_data(triptych *t)
     session_close(&t->session);
     free(t->name);
     t->name = NULL;
-    t->open = t->has_function = t->has_view = false;
+    t->open = t->has_function = t->has_view = t->levels_warned = false;
 }
 
 void triptych_close(triptych *t)

@@ -37,6 +37,14 @@ typedef enum triptych_normals {
     TRIPTYCH_NORMALS_NONE,
 } triptych_normals;
 
+/* What coarse levels are drawn by: interpolated values (post), splats (pre). */
+typedef enum triptych_levels_for {
+    TRIPTYCH_LEVELS_FOR_AUTO, /* post, or pre where there is no halo */
+    TRIPTYCH_LEVELS_FOR_POST, /* not without a halo */
+    TRIPTYCH_LEVELS_FOR_PRE,
+    TRIPTYCH_LEVELS_FOR_BOTH, /* not without a halo */
+} triptych_levels_for;
+
 typedef struct triptych_range {
     double lo, hi; /* inclusive */
 } triptych_range;
@@ -75,8 +83,9 @@ typedef struct triptych_brick_options {
     /* What is made. */
     triptych_code_bits code_bits; /* of a value */
     triptych_normals normals;
-    int no_halo;           /* not 0: not the transparent neighbours of what is kept */
-    int levels;            /* coarse levels; 0: down to one brick, below 0: none */
+    int no_halo; /* not 0: not the transparent neighbours of what is kept */
+    int levels;  /* coarse levels; 0: down to one brick, below 0: none */
+    triptych_levels_for levels_for;
     unsigned tile_voxels;  /* 16, 32, 64 or 128; default 64 */
     unsigned slab_sheets;  /* 1 to 64; default 8 */
     int replace;           /* not 0: a data set of that name */

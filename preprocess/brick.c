@@ -33,7 +33,8 @@ typedef struct brick {
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
-    unsigned levels; /* coarse ones */
+    unsigned levels;        /* coarse ones */
+    trip_level_kinds kinds; /* of those */
     trip_upright upright;
     uint64_t written_before; /* up to the end of the last stage */
 } brick;
@@ -119,8 +120,10 @@ static int open_writer(brick *b)
                              .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     b->levels = trip_levels_count(p.dims, levels, 1u << b->format.tile_log2);
+    b->kinds = trip_levels_kinds(b->params->levels_for, b->format.halo);
     p.lists = lists;
-    p.list_count = trip_levels_lists(p.dims, &p.index_to_world, b->format.halo, b->levels, lists);
+    p.list_count =
+        trip_levels_lists(p.dims, &p.index_to_world, b->format.halo, b->kinds, b->levels, lists);
     return trip_writer_open(&b->writer, b->params->output, &p, b->in.budget);
 }
 
@@ -328,6 +331,7 @@ static int make_levels(brick *b)
     b->builder = NULL;
     b->splatter = NULL;
     trip_levels_params p = { .format = b->format,
+                             .kinds = b->kinds,
                              .quantiser = b->codes.quantiser,
                              .compact = b->codes.normal_bytes == 3 ? &b->codes.compact : NULL,
                              .code_bytes = b->codes.code_bytes,
@@ -371,11 +375,12 @@ static int check_records(brick *b)
     s->code_bytes = b->codes.code_bytes;
     s->normal_bytes = b->codes.normal_bytes;
     s->bytes = trip_writer_bytes(b->writer);
-    const unsigned lists = trip_piece_list_count(&b->format);
+    const unsigned lists = trip_levels_first_list(b->format.halo, b->kinds, 1);
+    const unsigned past = trip_levels_first_list(b->format.halo, b->kinds, b->levels + 1);
     for (unsigned list = TRIP_HALO_LISTS; list < lists; list++)
         s->halo_bytes += trip_writer_plane_bytes(b->writer, list, TRIP_PLANE_VOXELS);
     s->levels = b->levels;
-    for (unsigned list = lists; list < lists * (b->levels + 1); list++)
+    for (unsigned list = lists; list < past; list++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
             s->level_bytes += trip_writer_plane_bytes(b->writer, list, plane);
     return 0;
@@ -396,7 +401,8 @@ static int find_upright(brick *b)
 {
     const trip_quantiser *q = &b->codes.quantiser;
     trip_occupancy_params p = { .levels = b->levels,
-                                .level_lists = trip_piece_list_count(&b->format),
+                                .halo = b->format.halo,
+                                .kinds = b->kinds,
                                 .tile_log2 = b->format.tile_log2,
                                 .scale = trip_mean_scale_make(
                                     b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };

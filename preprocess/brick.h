@@ -25,6 +25,14 @@ typedef enum trip_brick_normals {
     TRIP_NORMALS_NONE,
 } trip_brick_normals;
 
+/* What coarse levels are drawn by: interpolated values (post), splats (pre). */
+typedef enum trip_brick_levels_for {
+    TRIP_LEVELS_FOR_AUTO, /* post, or pre where there is no halo */
+    TRIP_LEVELS_FOR_POST, /* not without a halo */
+    TRIP_LEVELS_FOR_PRE,
+    TRIP_LEVELS_FOR_BOTH, /* not without a halo */
+} trip_brick_levels_for;
+
 /* Zero means the default everywhere. */
 typedef struct trip_brick_params {
     const char *input, *output;
@@ -45,6 +53,7 @@ typedef struct trip_brick_params {
     /* Coarse levels: 0 as many as it takes until one is a single brick; below 0: none; else so
      * many, or fewer where fewer come to one voxel. */
     int levels;
+    trip_brick_levels_for levels_for;
     bool no_halo; /* leave out the transparent neighbours of kept voxels */
     bool replace; /* replace an existing data set; otherwise that is a reported failure */
     /* Resume an interrupted run with the same input and parameters, if there is one. */

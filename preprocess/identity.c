@@ -7,11 +7,12 @@
 #include <xxhash.h>
 
 #include "format.h"
+#include "levels.h"
 #include "report.h"
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 11 };
+enum { BRICKER_VERSION = 12 };
 
 /* A file is identified by its name, length and time of change, a pattern by its text. */
 static void write_input(FILE *f, const trip_brick_params *p)
@@ -39,9 +40,10 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 
 static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
 {
-    fprintf(f, "%d %d %d %d %d %d %d %u %u %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION, p->keep_all,
-            p->automatic, (int)p->code_bits, (int)p->normals, p->no_halo, p->tile_voxels,
-            p->slab_sheets, p->levels);
+    const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
+    fprintf(f, "%d %d %d %d %d %d %d %u %u %d %d %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION,
+            p->keep_all, p->automatic, (int)p->code_bits, (int)p->normals, p->no_halo,
+            p->tile_voxels, p->slab_sheets, p->levels, kinds.means, kinds.values);
     for (int a = 0; a < 3 && !trip_region_is_whole(&p->region); a++)
         fprintf(f, "%" PRId64 ":%" PRId64 "\n", p->region.first[a], p->region.past[a]);
     for (size_t i = 0; i < p->range_count; i++)

@@ -18,9 +18,13 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     size_t used = 0;
     *l = (trip_level_lane){ .producer = producer, .box.tables = &w->tables };
     l->squares = carve(memory, &used, squares * sizeof *l->squares);
-    l->sums = carve(memory, &used, plane * sizeof *l->sums);
-    l->voxels = carve(memory, &used, plane * sizeof *l->voxels);
+    l->value_sums = carve(memory, &used, plane * sizeof *l->value_sums);
+    l->values = carve(memory, &used, plane * sizeof *l->values);
     l->touched = carve(memory, &used, plane / 8);
+    if (w->params->kinds.means) {
+        l->mean_sums = carve(memory, &used, plane * sizeof *l->mean_sums);
+        l->means = carve(memory, &used, plane * sizeof *l->means);
+    }
     l->box.values = carve(memory, &used, plane * sizeof(uint32_t));
     l->box.normals = carve(memory, &used, plane * sizeof(uint32_t));
     for (int axis = 0; axis < 3; axis++)
@@ -28,7 +32,9 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     if (w->lists)
         l->run = carve(memory, &used, trip_list_buffer_bytes());
     else
-        l->below = carve(memory, &used, plane * sizeof *l->below);
+        l->values_below = carve(memory, &used, plane * sizeof *l->values_below);
+    if (!w->lists && w->params->kinds.means)
+        l->means_below = carve(memory, &used, plane * sizeof *l->means_below);
     if (w->format.halo)
         used += trip_sharpen_lane_make(&l->sharpen, w->edge_log2, memory ? memory + used : NULL);
     return used;
@@ -56,54 +62,90 @@ static uint32_t normal_of(const trip_level_work *w, const double gradient[3])
     return trip_compact_normal_pack(w->params->compact, index);
 }
 
-static trip_coarse_sum *sum_at(trip_level_lane *l, size_t at)
+/* Clears the sums of a voxel before its first. */
+static void touch(trip_level_lane *l, size_t at)
 {
-    uint64_t bit = UINT64_C(1) << at % 64;
-    if (!(l->touched[at / 64] & bit))
-        trip_coarse_sum_clear(&l->sums[at]);
+    const uint64_t bit = UINT64_C(1) << at % 64;
+    if (l->touched[at / 64] & bit)
+        return;
     l->touched[at / 64] |= bit;
-    return &l->sums[at];
+    l->value_sums[at] = (trip_coarse_value_sum){ 0 };
+    if (l->mean_sums)
+        trip_coarse_mean_clear(&l->mean_sums[at]);
+}
+
+/* Where a voxel of the level below is added up, and how odd its coordinates are. */
+typedef struct place {
+    size_t at;
+    unsigned odd;
+} place;
+
+static place place_of(const trip_level_work *w, const trip_level_source *square, unsigned u,
+                      unsigned v)
+{
+    const size_t x = (size_t)square->u + u, y = (size_t)square->v + v;
+    return (place){ (y >> 1 << w->edge_log2) + (x >> 1),
+                    (unsigned)((x & 1) | (y & 1) << 1) | square->odd << 2 };
+}
+
+static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square,
+                      const trip_list_run *run)
+{
+    double gradient[3];
+    for (uint32_t i = 0; i < run->count; i++) {
+        const uint32_t voxel = run->voxels[i];
+        const place p = place_of(w, square, trip_voxel_u(voxel), trip_voxel_v(voxel));
+        if (run->normals)
+            gradient_of(w, run->normals[i], gradient);
+        trip_coarse_mean_add_whole(&l->mean_sums[p.at], (uint16_t)trip_voxel_code(voxel), p.odd,
+                                   run->normals ? gradient : NULL);
+    }
 }
 
 static int add_run(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square)
 {
     trip_list_run run;
-    double gradient[3];
     int status = trip_list_cursor_read(square->cursor, &square->run, l->run, &run);
-    const bool normals = run.normals && square->kept;
-    trip_coarse_sum *sum = NULL;
-    size_t last = SIZE_MAX; /* in list order those of a voxel come together */
-    for (uint32_t i = 0; i < run.count && status == 0; i++) {
+    if (status < 0)
+        return status;
+    for (uint32_t i = 0; i < run.count; i++) {
         const uint32_t voxel = run.voxels[i];
-        const size_t u = (size_t)square->u + trip_voxel_u(voxel),
-                     v = (size_t)square->v + trip_voxel_v(voxel);
-        const unsigned odd = (u & 1) | (v & 1) << 1 | square->odd << 2;
-        const size_t at = (v >> 1 << w->edge_log2) + (u >> 1);
-        if (at != last)
-            sum = sum_at(l, last = at);
-        if (normals)
-            gradient_of(w, run.normals[i], gradient);
-        trip_coarse_sum_add_whole(sum, (uint16_t)trip_voxel_code(voxel), square->kept, odd,
-                                  normals ? gradient : NULL);
+        const place p = place_of(w, square, trip_voxel_u(voxel), trip_voxel_v(voxel));
+        touch(l, p.at);
+        trip_coarse_value_add(&l->value_sums[p.at], TRIP_COARSE_ALL,
+                              (uint16_t)trip_voxel_code(voxel));
     }
+    if (l->mean_sums && square->kept)
+        add_means(l, w, square, &run);
+    return 0;
+}
+
+static int read_square(trip_level_lane *l, const trip_level_source *square)
+{
+    const uint32_t count = square->voxels.count;
+    const uint64_t at = square->voxels.at, values = count * sizeof *l->values_below;
+    int status = trip_output_read(square->file, at, l->values_below, values);
+    if (status == 0 && l->means_below)
+        status = trip_output_read(square->file, at + values, l->means_below,
+                                  count * sizeof *l->means_below);
     return status;
 }
 
 static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square)
 {
-    const bool normals = w->format.normals;
-    const uint32_t count = square->voxels.count;
     double gradient[3];
-    int status =
-        trip_output_read(square->file, square->voxels.at, l->below, count * sizeof *l->below);
-    for (uint32_t i = 0; i < count && status == 0; i++) {
-        const trip_coarse_voxel *voxel = &l->below[i];
-        size_t u = (size_t)square->u + voxel->u, v = (size_t)square->v + voxel->v;
-        unsigned odd = (u & 1) | (v & 1) << 1 | square->odd << 2;
-        if (normals && voxel->kept)
-            gradient_of(w, voxel->normal, gradient);
-        trip_coarse_sum_add(sum_at(l, (v >> 1 << w->edge_log2) + (u >> 1)), voxel, odd,
-                            normals && voxel->kept ? gradient : NULL);
+    int status = read_square(l, square);
+    for (uint32_t i = 0; i < square->voxels.count && status == 0; i++) {
+        const trip_coarse_value *value = &l->values_below[i];
+        const place p = place_of(w, square, value->u, value->v);
+        touch(l, p.at);
+        trip_coarse_value_add(&l->value_sums[p.at], value->known, value->value);
+        if (!l->means_below || !l->means_below[i].kept)
+            continue;
+        if (w->format.normals)
+            gradient_of(w, l->means_below[i].normal, gradient);
+        trip_coarse_mean_add(&l->mean_sums[p.at], &l->means_below[i], p.odd,
+                             w->format.normals ? gradient : NULL);
     }
     return status;
 }
@@ -114,22 +156,28 @@ int trip_level_lane_add(trip_level_lane *l, const trip_level_work *w,
     return w->lists ? add_run(l, w, square) : add_voxels(l, w, square);
 }
 
+static void take_mean(const trip_level_lane *l, const trip_level_work *w, size_t at,
+                      trip_coarse_mean *mean)
+{
+    double gradient[3];
+    trip_coarse_mean_get(&l->mean_sums[at], mean);
+    trip_coarse_mean_gradient(&l->mean_sums[at], gradient);
+    if (mean->kept && w->format.normals)
+        mean->normal = normal_of(w, gradient);
+}
+
 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_work *w)
 {
     const size_t words = (size_t)1 << (2 * w->edge_log2 - 6), edge = (size_t)1 << w->edge_log2;
     uint32_t n = 0;
     for (size_t word = 0; word < words; word++) {
         for (uint64_t bits = l->touched[word]; bits; bits &= bits - 1) {
-            size_t at = word * 64 + (size_t)__builtin_ctzll(bits);
-            trip_coarse_voxel *voxel = &l->voxels[n];
-            double gradient[3];
-            if (!trip_coarse_sum_get(&l->sums[at], voxel))
-                continue;
-            trip_coarse_sum_gradient(&l->sums[at], gradient);
-            voxel->u = (uint8_t)(at & (edge - 1));
-            voxel->v = (uint8_t)(at >> w->edge_log2);
-            if (voxel->kept && w->format.normals)
-                voxel->normal = normal_of(w, gradient);
+            const size_t at = word * 64 + (size_t)__builtin_ctzll(bits);
+            l->values[n].u = (uint8_t)(at & (edge - 1));
+            l->values[n].v = (uint8_t)(at >> w->edge_log2);
+            trip_coarse_value_get(&l->value_sums[at], &l->values[n]);
+            if (l->means)
+                take_mean(l, w, at, &l->means[n]);
             n++;
         }
         l->touched[word] = 0;
@@ -144,88 +192,88 @@ static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
     return trip_list_builder_reserve(user, thread, list, bytes);
 }
 
-/* Marks the voxels of a square in the box: all, or of lists of means those that were kept. False
- * where there are none. */
-static bool mark(trip_level_lane *l, const trip_coarse_voxel *voxels, uint32_t count, bool kept)
-{
-    bool some = false;
-    for (uint32_t i = 0; i < count; i++) {
-        if (kept && !voxels[i].kept)
-            continue;
-        trip_splat_box_mark(&l->box, voxels[i].v, 0, &voxels[i].u, 1);
-        some = true;
-    }
-    return some;
-}
-
-static uint32_t value_code(const trip_level_work *w, const trip_coarse_voxel *voxel)
-{
-    return w->params->code_bytes == 1 ? (voxel->value + 128u) / 257 * 257 : voxel->value;
-}
-
-static uint32_t shares_of(const trip_coarse_voxel *voxel, int axis)
-{
-    if (voxel->kept == TRIP_COARSE_ALL)
-        return TRIP_MEAN_SHARES - 1;
-    return trip_mean_pack_shares(voxel->cover[axis] / (double)TRIP_COARSE_ALL,
-                                 voxel->kept / (double)voxel->cover[axis]);
-}
-
-static void put_values(trip_level_lane *l, const trip_level_work *w,
-                       const trip_coarse_voxel *voxels, uint32_t count)
-{
-    for (uint32_t i = 0; i < count; i++)
-        l->box.values[trip_splat_box_row(&l->box, voxels[i].v, 0) + voxels[i].u] =
-            value_code(w, &voxels[i]);
-}
-
-/* The values of a list of means, and with the first of them what the others have too. */
-static void put_means(trip_level_lane *l, const trip_level_work *w, const trip_coarse_voxel *voxels,
-                      uint32_t count, unsigned list)
-{
-    for (uint32_t i = 0; i < count; i++) {
-        const trip_coarse_voxel *voxel = &voxels[i];
-        const size_t at = trip_splat_box_row(&l->box, voxel->v, 0) + voxel->u;
-        if (!voxel->kept)
-            continue;
-        if (list == 0) {
-            l->box.normals[at] = voxel->normal;
-            l->box.values[at] = trip_mean_pack_value(&w->scale, voxel->mean);
-        }
-        l->box.values[at] = (l->box.values[at] & ~(uint32_t)(TRIP_MEAN_SHARES - 1)) |
-                            shares_of(voxel, trip_list_axis(list));
-    }
-}
-
-/* The pieces of a list. */
-static int emit(trip_level_lane *l, const trip_level_work *w, const trip_coarse_voxel *voxels,
-                uint32_t count, unsigned list)
-{
-    const trip_piece_format f = trip_piece_format_of(&w->format, list);
-    const trip_piece_sink sink = { reserve, w->builder, l->producer };
-    if (list < TRIP_HALO_LISTS)
-        put_means(l, w, voxels, count, list);
-    else if (list == TRIP_HALO_LISTS) /* the same along all axes */
-        put_values(l, w, voxels, count);
-    return trip_splat_box_emit(&l->box, &f, list, &sink);
-}
-
-int trip_level_lane_emit(trip_level_lane *l, const trip_level_work *w, uint64_t key,
-                         const trip_coarse_voxel *voxels, uint32_t count, unsigned first)
+/* Begins a box of the voxels of a square, none of which is marked yet. */
+static void begin_square(trip_level_lane *l, const trip_level_work *w, uint64_t key)
 {
     const uint64_t morton = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
     const int64_t edge = (int64_t)1 << w->edge_log2;
     const int64_t size[3] = { edge, edge, 1 };
     int64_t lo[3] = { 0, 0, (int64_t)(key >> TRIP_TILE_MORTON_BITS) };
-    int status = 0;
     for (int bit = 0; bit < TRIP_TILE_MORTON_BITS; bit++)
         lo[bit % 2] |= (int64_t)(morton >> bit & 1) << bit / 2;
     lo[0] <<= w->edge_log2;
     lo[1] <<= w->edge_log2;
     trip_splat_box_begin(&l->box, lo, size);
-    if (!mark(l, voxels, count, first == 0))
-        return 0;
-    for (unsigned list = first; list < first + 3 && status == 0; list++)
-        status = emit(l, w, voxels, count, list);
+}
+
+/* Marks a voxel; where it is in the box. */
+static size_t mark(trip_level_lane *l, const trip_coarse_value *voxel)
+{
+    trip_splat_box_mark(&l->box, voxel->v, 0, &voxel->u, 1);
+    return trip_splat_box_row(&l->box, voxel->v, 0) + voxel->u;
+}
+
+static int emit(trip_level_lane *l, const trip_level_work *w, unsigned list)
+{
+    const trip_piece_format f = trip_piece_format_of(&w->format, list);
+    const trip_piece_sink sink = { reserve, w->builder, l->producer };
+    return trip_splat_box_emit(&l->box, &f, list, &sink);
+}
+
+static uint32_t shares_of(const trip_coarse_mean *mean, int axis)
+{
+    if (mean->kept == TRIP_COARSE_ALL)
+        return TRIP_MEAN_SHARES - 1;
+    return trip_mean_pack_shares(mean->cover[axis] / (double)TRIP_COARSE_ALL,
+                                 mean->kept / (double)mean->cover[axis]);
+}
+
+/* What differs between the lists of means. */
+static void put_shares(trip_level_lane *l, uint32_t count, int axis)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const trip_coarse_value *voxel = &l->values[i];
+        const size_t at = trip_splat_box_row(&l->box, voxel->v, 0) + voxel->u;
+        if (l->means[i].kept)
+            l->box.values[at] = (l->box.values[at] & ~(uint32_t)(TRIP_MEAN_SHARES - 1)) |
+                                shares_of(&l->means[i], axis);
+    }
+}
+
+int trip_level_lane_emit_means(trip_level_lane *l, const trip_level_work *w, uint64_t key,
+                               uint32_t count)
+{
+    bool some = false;
+    int status = 0;
+    begin_square(l, w, key);
+    for (uint32_t i = 0; i < count; i++) {
+        if (!l->means[i].kept)
+            continue;
+        const size_t at = mark(l, &l->values[i]);
+        l->box.normals[at] = l->means[i].normal;
+        l->box.values[at] = trip_mean_pack_value(&w->scale, l->means[i].mean);
+        some = true;
+    }
+    for (unsigned list = 0; list < TRIP_HALO_LISTS && some && status == 0; list++) {
+        put_shares(l, count, trip_list_axis(list));
+        status = emit(l, w, list);
+    }
+    return status;
+}
+
+static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *voxel)
+{
+    return w->params->code_bytes == 1 ? (voxel->value + 128u) / 257 * 257 : voxel->value;
+}
+
+int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w, uint64_t key,
+                                const trip_coarse_value *values, uint32_t count)
+{
+    int status = 0;
+    begin_square(l, w, key);
+    for (uint32_t i = 0; i < count; i++)
+        l->box.values[mark(l, &values[i])] = value_code(w, &values[i]);
+    for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS && status == 0; list++)
+        status = emit(l, w, list);
     return status;
 }

@@ -32,11 +32,17 @@ typedef struct trip_level_lane {
     trip_level_source *squares;
 
     trip_splat_box box;
-    trip_coarse_sum *sums; /* of a square, by row */
-    uint64_t *touched;     /* bits of those */
-    trip_coarse_voxel *voxels;
-    trip_coarse_voxel *below; /* of a square of the file */
-    trip_list_buffer *run;    /* of a list */
+    /* Of a square, by row; those of means NULL where there are no lists of these. */
+    trip_coarse_value_sum *value_sums;
+    trip_coarse_mean_sum *mean_sums;
+    uint64_t *touched; /* bits of both */
+    /* Its voxels, one after the other. */
+    trip_coarse_value *values;
+    trip_coarse_mean *means;
+    /* Of a square of the file. */
+    trip_coarse_value *values_below;
+    trip_coarse_mean *means_below;
+    trip_list_buffer *run; /* of a list */
     trip_sharpen_lane sharpen;
 } trip_level_lane;
 
@@ -48,11 +54,14 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
 /* Adds the voxels of the square that a source is at. */
 int trip_level_lane_add(trip_level_lane *l, const trip_level_work *w,
                         const trip_level_source *square);
-/* Turns what was added up into `voxels`; returns their number. */
+/* Turns what was added up into `values` and `means`; returns their number. */
 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_work *w);
 
-/* The pieces of a square in the three lists from `first` on: those of means, or of values. */
-int trip_level_lane_emit(trip_level_lane *l, const trip_level_work *w, uint64_t key,
-                         const trip_coarse_voxel *voxels, uint32_t count, unsigned first);
+/* The pieces of a square in the lists of means, of the lane's own values and means. */
+int trip_level_lane_emit_means(trip_level_lane *l, const trip_level_work *w, uint64_t key,
+                               uint32_t count);
+/* In the lists of values. */
+int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w, uint64_t key,
+                                const trip_coarse_value *values, uint32_t count);
 
 #endif

@@ -34,21 +34,21 @@ static void place(trip_level_source *s, uint64_t sheet, uint64_t morton)
 }
 
 int trip_level_source_list(trip_level_source *s, trip_writer *w, unsigned list, bool kept,
-                           unsigned odd, unsigned tile_log2, unsigned edge_log2,
+                           bool normals, unsigned odd, unsigned tile_log2, unsigned edge_log2,
                            trip_budget *budget)
 {
     *s = (trip_level_source){
         .odd = odd, .kept = kept, .edge_log2 = edge_log2, .tile_log2 = tile_log2
     };
-    int status = trip_list_cursor_open(&s->cursor, w, list, odd, budget);
+    int status = trip_list_cursor_open(&s->cursor, w, list, odd, normals, budget);
     return status == 0 ? trip_level_source_next(s) : status;
 }
 
-int trip_level_source_file(trip_level_source *s, const trip_output *file, unsigned odd,
+int trip_level_source_file(trip_level_source *s, const trip_output *file, bool means, unsigned odd,
                            unsigned edge_log2)
 {
     *s = (trip_level_source){
-        .odd = odd, .file = file, .edge_log2 = edge_log2, .tile_log2 = edge_log2
+        .odd = odd, .file = file, .means = means, .edge_log2 = edge_log2, .tile_log2 = edge_log2
     };
     return trip_level_source_next(s);
 }
@@ -80,7 +80,7 @@ static int next_of_file(trip_level_source *s)
         if (status < 0)
             return status;
         s->voxels.at = s->next + TRIP_LEVEL_SQUARE_BYTES;
-        s->next = s->voxels.at + s->voxels.count * sizeof(trip_coarse_voxel);
+        s->next = s->voxels.at + trip_level_voxels_bytes(s->voxels.count, s->means);
         if ((key >> TRIP_TILE_MORTON_BITS) % 2 == s->odd) {
             place(s, key >> TRIP_TILE_MORTON_BITS, key & TILE_MASK);
             return 0;
@@ -100,10 +100,12 @@ int trip_level_source_next(trip_level_source *s)
     return status < 0 ? status : 0;
 }
 
-int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_voxel *voxels,
-                           uint32_t count)
+int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_value *values,
+                           const trip_coarse_mean *means, uint32_t count)
 {
     const square_header h = { .key = key, .count = count };
     int status = trip_output_append(file, &h, sizeof h);
-    return status == 0 ? trip_output_append(file, voxels, count * sizeof *voxels) : status;
+    if (status == 0)
+        status = trip_output_append(file, values, count * sizeof *values);
+    return status == 0 && means ? trip_output_append(file, means, count * sizeof *means) : status;
 }

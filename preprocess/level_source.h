@@ -22,6 +22,7 @@ typedef struct trip_level_source {
     trip_list_place run;
     /* Of a file. */
     const trip_output *file;
+    bool means; /* it has them */
     uint64_t next;
     struct {
         uint64_t at;
@@ -32,12 +33,13 @@ typedef struct trip_level_source {
     unsigned tile_log2; /* of squares here */
 } trip_level_source;
 
-/* Of a list along Z; `kept`: it holds voxels that were kept, not their halo. */
+/* Of a list along Z; `kept`: it holds voxels that were kept, not their halo; `normals`: these are
+ * read, too, where it has them. */
 int trip_level_source_list(trip_level_source *s, trip_writer *w, unsigned list, bool kept,
-                           unsigned odd, unsigned tile_log2, unsigned edge_log2,
+                           bool normals, unsigned odd, unsigned tile_log2, unsigned edge_log2,
                            trip_budget *budget);
-/* Of a flushed file of trip_level_file_append(). */
-int trip_level_source_file(trip_level_source *s, const trip_output *file, unsigned odd,
+/* Of a flushed file of trip_level_file_append(), with means or without. */
+int trip_level_source_file(trip_level_source *s, const trip_output *file, bool means, unsigned odd,
                            unsigned edge_log2);
 void trip_level_source_close(trip_level_source *s);
 
@@ -45,9 +47,16 @@ void trip_level_source_close(trip_level_source *s);
  * copy of the source says where they are, and any thread may read them. */
 int trip_level_source_next(trip_level_source *s);
 
-/* Appends the voxels of a square; keys ascend. */
-int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_voxel *voxels,
-                           uint32_t count);
+/* Appends the voxels of a square, values before means, or without means (NULL), which is the same
+ * for all of a file; keys ascend. */
+int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_value *values,
+                           const trip_coarse_mean *means, uint32_t count);
+
+/* Of a square of so many voxels. */
+static inline uint64_t trip_level_voxels_bytes(uint32_t count, bool means)
+{
+    return count * (sizeof(trip_coarse_value) + (means ? sizeof(trip_coarse_mean) : 0));
+}
 
 /* Reads back what stands before a square's voxels, which follow TRIP_LEVEL_SQUARE_BYTES behind. */
 enum { TRIP_LEVEL_SQUARE_BYTES = 16 };

@@ -75,20 +75,40 @@ static trip_writer_list list_of(const int64_t dims[3], const trip_affine *index_
     return list;
 }
 
-unsigned trip_levels_lists(const int64_t dims[3], const trip_affine *index_to_world, bool halo,
-                           unsigned levels, trip_writer_list *lists)
+trip_level_kinds trip_levels_kinds(trip_brick_levels_for wanted, bool halo)
 {
-    const trip_kind kinds[2][2] = { { TRIP_KIND_VOXELS, TRIP_KIND_HALO },
-                                    { TRIP_KIND_MEANS, TRIP_KIND_VALUES } };
-    unsigned n = 0;
-    for (unsigned level = 0; level <= levels; level++)
-        for (int kind = 0; kind < (halo ? 2 : 1); kind++)
-            for (int axis = 0; axis < 3; axis++) {
-                lists[n] = list_of(dims, index_to_world, level);
-                lists[n].kind = kinds[level > 0][kind];
-                lists[n++].axis = axis;
-            }
+    return (trip_level_kinds){ .means = !halo || wanted >= TRIP_LEVELS_FOR_PRE,
+                               .values = halo && wanted != TRIP_LEVELS_FOR_PRE };
+}
+
+/* Three lists of a kind, behind `n` others; returns how many there are then. */
+static unsigned add_lists(trip_writer_list *lists, unsigned n, trip_writer_list list,
+                          trip_kind kind)
+{
+    list.kind = kind;
+    for (list.axis = 0; list.axis < 3; list.axis++)
+        lists[n++] = list;
     return n;
+}
+
+unsigned trip_levels_lists(const int64_t dims[3], const trip_affine *index_to_world, bool halo,
+                           trip_level_kinds kinds, unsigned levels, trip_writer_list *lists)
+{
+    unsigned n = 0;
+    for (unsigned level = 0; level <= levels; level++) {
+        const trip_writer_list list = list_of(dims, index_to_world, level);
+        if (level == 0 || kinds.means)
+            n = add_lists(lists, n, list, level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
+        if (level == 0 ? halo : kinds.values)
+            n = add_lists(lists, n, list, level ? TRIP_KIND_VALUES : TRIP_KIND_HALO);
+    }
+    return n;
+}
+
+unsigned trip_levels_first_list(bool halo, trip_level_kinds kinds, unsigned level)
+{
+    const unsigned finest = halo ? 6 : 3, coarse = kinds.means && kinds.values ? 6 : 3;
+    return level > 0 ? finest + (level - 1) * coarse : 0;
 }
 
 /* ---- memory ---- */
@@ -151,6 +171,7 @@ static int open_builder(making *m)
     trip_list_builder_params b = { .format = m->work.format,
                                    .quantiser = p->quantiser,
                                    .producers = m->lane_count,
+                                   .from = p->kinds.means ? 0 : TRIP_HALO_LISTS,
                                    .first_list = m->first_list,
                                    .memory_bytes = wanted < left ? wanted : left,
                                    .writer = p->writer,
@@ -225,7 +246,8 @@ static int append(making *m, const trip_level_lane *l, uint32_t count)
 {
     if (!await_turn(m, l))
         return 0;
-    int status = count > 0 ? trip_level_file_append(m->file, l->key, l->voxels, count) : 0;
+    int status =
+        count > 0 ? trip_level_file_append(m->file, l->key, l->values, l->means, count) : 0;
     pthread_mutex_lock(&m->lock);
     m->appended++;
     pthread_cond_broadcast(&m->turned);
@@ -241,13 +263,13 @@ static int make_square(making *m, trip_level_lane *l)
     uint32_t count = status == 0 ? trip_level_lane_take(l, &m->work) : 0;
     if (status == 0 && m->file)
         status = append(m, l, count);
-    if (status == 0 && count > 0)
-        status = trip_level_lane_emit(l, &m->work, l->key, l->voxels, count, 0);
+    if (status == 0 && l->means)
+        status = trip_level_lane_emit_means(l, &m->work, l->key, count);
     return status == 0 ? poll() : status;
 }
 
 /* The work of a lane. */
-static int make_means(void *user, unsigned thread, uint64_t item)
+static int make_squares(void *user, unsigned thread, uint64_t item)
 {
     making *m = user;
     trip_level_lane *l = &m->lanes[item];
@@ -279,8 +301,8 @@ static int make_values(void *user, unsigned thread, uint64_t item)
     while (status == 0 && (status = take_task(m, &task)) == 1) {
         status = trip_sharpen_do(&m->sharpen, &l->sharpen, &task);
         if (status == 0)
-            status = trip_level_lane_emit(l, &m->work, task.square.key, l->sharpen.voxels,
-                                          task.square.count, TRIP_HALO_LISTS);
+            status = trip_level_lane_emit_values(l, &m->work, task.square.key, l->sharpen.values,
+                                                 task.square.count);
         status = status == 0 ? poll() : status;
     }
     return end_lane(m, status);
@@ -309,7 +331,7 @@ static int run_lanes(making *m, trip_work work)
 
 static int make_level(making *m)
 {
-    int status = run_lanes(m, make_means);
+    int status = run_lanes(m, make_squares);
     if (status == 0 && m->file)
         status = trip_output_flush(m->file);
     if (status == 0 && m->work.format.halo)
@@ -326,11 +348,11 @@ static int open_lists(making *m)
     int status = 0;
     for (unsigned i = 0; i < 4 && status == 0; i++) {
         bool halo = i / 2;
-        if (halo && !p->format.halo)
+        if (halo && !p->kinds.values)
             continue;
         status = trip_level_source_list(&m->sources[m->source_count++], p->writer,
-                                        (halo ? TRIP_HALO_LISTS : 0) + 2, !halo, i % 2,
-                                        p->format.tile_log2, m->work.edge_log2, m->budget);
+                                        (halo ? TRIP_HALO_LISTS : 0) + 2, !halo, p->kinds.means,
+                                        i % 2, p->format.tile_log2, m->work.edge_log2, m->budget);
     }
     return status;
 }
@@ -339,8 +361,8 @@ static int open_file(making *m, const trip_output *below)
 {
     int status = 0;
     for (unsigned odd = 0; odd < 2 && status == 0; odd++)
-        status =
-            trip_level_source_file(&m->sources[m->source_count++], below, odd, m->work.edge_log2);
+        status = trip_level_source_file(&m->sources[m->source_count++], below,
+                                        m->work.params->kinds.means, odd, m->work.edge_log2);
     return status;
 }
 
@@ -359,8 +381,8 @@ static int create_file(making *m, trip_output *file)
 static void open_sharpen(making *m)
 {
     const double least = m->work.scale.lo, most = m->work.scale.lo + m->work.scale.width;
-    trip_sharpen_open(&m->sharpen, m->file, m->work.edge_log2, (uint16_t)ceil(least),
-                      (uint16_t)floor(most), m->budget);
+    trip_sharpen_open(&m->sharpen, m->file, m->work.params->kinds.means, m->work.edge_log2,
+                      (uint16_t)ceil(least), (uint16_t)floor(most), m->budget);
 }
 
 static void close_making(making *m)
@@ -394,13 +416,16 @@ static int make(making *m, const trip_output *below, trip_output *file)
 
 static void begin(making *m, const trip_levels_params *params, unsigned level, trip_budget *budget)
 {
-    *m = (making){ .budget = budget,
-                   .level = level,
-                   .first_list = level * trip_piece_list_count(&params->format) };
+    *m =
+        (making){ .budget = budget,
+                  .level = level,
+                  .first_list = trip_levels_first_list(params->format.halo, params->kinds, level) };
     trip_level_work *w = &m->work;
     w->params = params;
     w->format = params->format;
     w->format.quantised = true; /* pieces are of codes, whatever those of level 0 were */
+    w->format.halo = params->kinds.values;
+    w->format.normals = params->format.normals && params->kinds.means;
     w->scale = trip_mean_scale_make(params->value_min, params->value_max, params->quantiser.lo,
                                     params->quantiser.hi);
     w->edge_log2 = (unsigned)__builtin_ctzll((unsigned long long)trip_splat_box_edge(&w->format));

@@ -1,18 +1,27 @@
 /* The coarse levels of a data set: each is made of the one below when that is written, from its
  * lists along Z or, above the first, from a file of its voxels. Two sheets are read
  * at a time, square by square, so that memory does not grow with the volume. The pieces go to a
- * list builder, which sorts them as those of level 0. */
+ * list builder, which sorts them as those of level 0. What only means call for, normals and how
+ * much of a voxel was kept, is read and added up only where there are lists of means. */
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 
+#include "brick.h"
 #include "list_builder.h"
 #include "normal.h"
 
 /* Levels above 0. */
 enum { TRIP_LEVELS_MOST = 24 };
 
+/* What lists a level above 0 has, three each: of means, which are drawn as splats, before those of
+ * values, which are interpolated. */
+typedef struct trip_level_kinds {
+    bool means, values; /* one of them at least */
+} trip_level_kinds;
+
 typedef struct trip_levels_params {
     trip_piece_format format; /* of level 0 */
+    trip_level_kinds kinds;   /* values: where level 0 has a halo */
     trip_quantiser quantiser;
     const trip_compact_normals *compact; /* how normals of 3 bytes are encoded; NULL: they have 4 */
     unsigned code_bytes;                 /* of values */
@@ -32,10 +41,15 @@ typedef struct trip_levels_params {
 /* How many levels trip_brick_params.levels comes to. */
 unsigned trip_levels_count(const int64_t dims[3], int wanted, unsigned tile_voxels);
 
+trip_level_kinds trip_levels_kinds(trip_brick_levels_for wanted, bool halo);
+
 /* The lists of levels 0 to `levels`, as the writer takes them; returns their number. `lists` has
- * room for 6 a level. Without a halo there are no lists of values to interpolate. */
+ * room for 6 a level. */
 unsigned trip_levels_lists(const int64_t dims[3], const trip_affine *index_to_world, bool halo,
-                           unsigned levels, trip_writer_list *lists);
+                           trip_level_kinds kinds, unsigned levels, trip_writer_list *lists);
+
+/* The number of the first of a level's. */
+unsigned trip_levels_first_list(bool halo, trip_level_kinds kinds, unsigned level);
 
 /* Makes all levels above 0, once the lists of level 0 are complete. */
 int trip_levels_make(const trip_levels_params *params, trip_budget *budget);

@@ -263,8 +263,8 @@ static int create_parts(trip_list_builder *b, trip_budget *budget)
 {
     const trip_list_builder_params *p = &b->params;
     int status = trip_piece_pool_create(&b->pool, &p->format, p->dims, p->memory_bytes, budget);
-    for (unsigned list = 0; list < b->lists && status == 0; list++) {
-        status = trip_list_output_create(&b->outputs[list], p->first_list + list,
+    for (unsigned list = p->from; list < b->lists && status == 0; list++) {
+        status = trip_list_output_create(&b->outputs[list], p->first_list + (list - p->from),
                                          &b->pool.formats[list], p->writer, budget);
     }
     b->outputs[ORDERED_LIST].run = p->in_order ? note_run : NULL;
@@ -355,7 +355,7 @@ int trip_list_builder_finish(trip_list_builder *b, const trip_quantiser *quantis
                               .spill = b->params.spill,
                               .outputs = b->outputs,
                               .quantiser = quantiser };
-    for (unsigned list = 0; list < b->lists; list++) {
+    for (unsigned list = b->params.from; list < b->lists; list++) {
         close_list(b, list);
         merge.lists[list] = is_spilled(b, list);
     }

@@ -25,7 +25,8 @@ typedef struct trip_list_builder_params {
     /* The ordered list arrives in order, batch by batch: it is written as it comes and never
      * spilled. All its splats of a batch have to fit into memory. */
     bool in_order;
-    unsigned first_list;   /* of the writer: what list 0 is there */
+    unsigned from;         /* lists before that are not built: pieces have others alone */
+    unsigned first_list;   /* of the writer: what list `from` is there */
     uint64_t memory_bytes; /* for pieces */
     trip_writer *writer;
     trip_spill *spill;

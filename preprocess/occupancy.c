@@ -8,7 +8,7 @@
 
 enum {
     MOST_VOXELS = 128, /* along each axis of the level that is read */
-    KEPT_ALONG_Z = 2,
+    ALONG_Z = 2,
     WHOLE_VOXEL = 1023, /* weight of a voxel of the greatest value */
 };
 
@@ -34,11 +34,26 @@ static void choose_level(summing *s)
     }
 }
 
-/* How far its value is from the volume's least, times the part of it that was kept. */
+/* Whether the list has means. */
+static bool has_means(const summing *s)
+{
+    return s->level > 0 && !s->params->kinds.values;
+}
+
+static unsigned list_of(const summing *s)
+{
+    const trip_occupancy_params *p = s->params;
+    const bool both = s->level > 0 && p->kinds.means && p->kinds.values;
+    return trip_levels_first_list(p->halo, p->kinds, s->level) + (both ? TRIP_HALO_LISTS : 0) +
+           ALONG_Z;
+}
+
+/* How far its value is from the volume's least, times the part of it that was kept if that is
+ * there. */
 static uint64_t weight_of(const summing *s, unsigned code)
 {
     const trip_mean_scale *scale = &s->params->scale;
-    if (s->level == 0) {
+    if (!has_means(s)) {
         double part = scale->width > 0 ? ((double)code - scale->lo) / scale->width : 1;
         return (uint64_t)(fmin(1, fmax(0, part)) * WHOLE_VOXEL + 0.5);
     }
@@ -66,11 +81,10 @@ static void add_run(summing *s, const trip_list_place *place, const trip_list_ru
 static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *buffer,
                       trip_budget *budget)
 {
-    unsigned list = s->level * s->params->level_lists + KEPT_ALONG_Z;
     trip_list_cursor *cursor;
     trip_list_place place;
     trip_list_run run;
-    int status = trip_list_cursor_open(&cursor, w, list, odd, budget);
+    int status = trip_list_cursor_open(&cursor, w, list_of(s), odd, false, budget);
     if (status < 0)
         return status;
     while ((status = trip_list_cursor_next(cursor, &place)) > 0) {

@@ -3,8 +3,8 @@
 #ifndef TRIP_OCCUPANCY_H
 #define TRIP_OCCUPANCY_H
 
+#include "levels.h"
 #include "mean.h"
-#include "writer.h"
 
 enum { TRIP_OCCUPANCY_EDGE = 64 }; /* bins along each axis, at most */
 
@@ -26,15 +26,17 @@ typedef struct trip_occupancy_row {
 trip_occupancy_row trip_occupancy_along(const trip_occupancy *o, int axis, int a, int b);
 
 typedef struct trip_occupancy_params {
-    int64_t dims[3];       /* of level 0 */
-    unsigned levels;       /* coarse ones that are written */
-    unsigned level_lists;  /* lists of a level; its third is that of kept voxels along Z */
+    int64_t dims[3]; /* of level 0 */
+    unsigned levels; /* coarse ones that are written */
+    bool halo;       /* level 0 has lists of it */
+    trip_level_kinds kinds;
     unsigned tile_log2;    /* of the lists' tiles */
     trip_mean_scale scale; /* of the codes of means */
 } trip_occupancy_params;
 
-/* Of lists that are complete: reads that of one level along Z, the first in which some 128 voxels
- * span the grid, or of the coarsest. Takes what it works with from the budget. */
+/* Of lists that are complete: reads that of one level along Z, of values if it has them, the first
+ * in which some 128 voxels span the grid, or of the coarsest. Takes what it works with from the
+ * budget. */
 int trip_occupancy_read(trip_occupancy *o, trip_writer *w, const trip_occupancy_params *params,
                         trip_budget *budget);
 

@@ -37,7 +37,7 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
 {
     const size_t plane = (size_t)1 << 2 * edge_log2;
     size_t at = 0;
-    l->voxels = part(memory, &at, plane * sizeof *l->voxels);
+    l->values = part(memory, &at, plane * sizeof *l->values);
     l->sums = part(memory, &at, plane * sizeof *l->sums);
     l->squares = part(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
@@ -49,12 +49,15 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
     return at;
 }
 
-void trip_sharpen_open(trip_sharpen *s, const trip_output *file, unsigned edge_log2, uint16_t least,
-                       uint16_t most, trip_budget *budget)
+void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
+                       uint16_t least, uint16_t most, trip_budget *budget)
 {
-    *s = (trip_sharpen){
-        .budget = budget, .file = file, .edge_log2 = edge_log2, .least = least, .most = most
-    };
+    *s = (trip_sharpen){ .budget = budget,
+                         .file = file,
+                         .means = means,
+                         .edge_log2 = edge_log2,
+                         .least = least,
+                         .most = most };
     for (unsigned i = 0; i < 3; i++)
         s->sheets[i].number = UINT64_MAX;
 }
@@ -119,7 +122,7 @@ static int look_ahead(trip_sharpen *s, uint64_t last)
             sheet->count = 0;
         sheet->number = number;
         place.at = s->ahead + TRIP_LEVEL_SQUARE_BYTES;
-        s->ahead = place.at + place.count * sizeof(trip_coarse_voxel);
+        s->ahead = place.at + trip_level_voxels_bytes(place.count, s->means);
         status = add_place(s, sheet, place);
     }
     return status;
@@ -145,22 +148,22 @@ static const trip_sharpen_place *find_place(const trip_sharpen *s, uint64_t key)
 
 /* ---- squares ---- */
 
-static int read_voxels(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place)
+static int read_values(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place)
 {
-    return trip_output_read(s->file, place->at, l->voxels, place->count * sizeof *l->voxels);
+    return trip_output_read(s->file, place->at, l->values, place->count * sizeof *l->values);
 }
 
 static int read_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
                        trip_sharpen_square *to)
 {
-    int status = read_voxels(s, l, place);
+    int status = read_values(s, l, place);
     to->key = place->key;
     to->held = status == 0;
     memset(to->known, 0, sizeof *to->known << 2 * s->edge_log2);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
-        const size_t at = ((size_t)l->voxels[i].v << s->edge_log2) + l->voxels[i].u;
+        const size_t at = ((size_t)l->values[i].v << s->edge_log2) + l->values[i].u;
         to->known[at] = UINT16_MAX;
-        to->values[at] = l->voxels[i].value;
+        to->values[at] = l->values[i].value;
     }
     return status;
 }
@@ -246,9 +249,9 @@ int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_shar
     if (status == 0)
         status = add_around(s, l, task->beside);
     if (status == 0) /* others were read into the same memory */
-        status = read_voxels(s, l, place);
+        status = read_values(s, l, place);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
-        trip_coarse_voxel *voxel = &l->voxels[i];
+        trip_coarse_value *voxel = &l->values[i];
         voxel->value =
             sharpened(s, voxel->value, l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u]);
     }

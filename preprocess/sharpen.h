@@ -40,7 +40,7 @@ typedef struct trip_sharpen_task {
 
 /* Memory of a thread. */
 typedef struct trip_sharpen_lane {
-    trip_coarse_voxel *voxels;
+    trip_coarse_value *values;
     int32_t *sums; /* of a square's voxels: how much more each is than those beside */
     trip_sharpen_square *squares; /* the one at hand, and some that were needed lately */
 } trip_sharpen_lane;
@@ -48,6 +48,7 @@ typedef struct trip_sharpen_lane {
 typedef struct trip_sharpen {
     trip_budget *budget;
     const trip_output *file;
+    bool means; /* the file has them */
     unsigned edge_log2;
     uint16_t least, most;
     uint64_t ahead;               /* in the file: the first square that is not in a sheet below */
@@ -56,10 +57,10 @@ typedef struct trip_sharpen {
     size_t next;                  /* square of that sheet */
 } trip_sharpen;
 
-/* Of a file with squares of 2^edge_log2 voxels; values remain in [least, most]. The file is
- * complete and flushed before the first square is taken. */
-void trip_sharpen_open(trip_sharpen *s, const trip_output *file, unsigned edge_log2, uint16_t least,
-                       uint16_t most, trip_budget *budget);
+/* Of a file with squares of 2^edge_log2 voxels, with means or without; values remain in [least,
+ * most]. The file is complete and flushed before the first square is taken. */
+void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
+                       uint16_t least, uint16_t most, trip_budget *budget);
 void trip_sharpen_close(trip_sharpen *s);
 
 /* What it takes of the budget later, at most, of a level of at most so many voxels. */
@@ -71,7 +72,7 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
 
 /* The next square. Returns 1, 0 after the last one, or a negative status. One thread at a time. */
 int trip_sharpen_take(trip_sharpen *s, trip_sharpen_task *task);
-/* Its task.square.count voxels, in the lane until the next call. */
+/* Its task.square.count values, in the lane until the next call. */
 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task);
 
 #endif

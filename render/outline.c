@@ -58,7 +58,9 @@ static const trip_list *coarse_list(const trip_dataset *data)
     for (int a = 0; a < 3; a++)
         while ((data->header.dims[a] - 1) >> level >= MOST_VOXELS)
             level++;
-    return trip_dataset_find(data, AXIS, level, level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
+    const trip_list *values =
+        trip_dataset_find(data, AXIS, level, level ? TRIP_KIND_VALUES : TRIP_KIND_VOXELS);
+    return values ? values : trip_dataset_find(data, AXIS, level, TRIP_KIND_MEANS);
 }
 
 static trip_vec3 column(const trip_affine *m, int axis)
@@ -139,10 +141,10 @@ static void fill_masses(summing *s)
     double extinctions[TRIP_MEAN_SHARES];
     for (unsigned code = 0; code < CODES; code += TRIP_MEAN_SHARES) {
         const double of_mean = (double)s->params->table[trip_mean_value(&scale, code)].extinction;
-        if (s->list->level)
+        if (s->list->kind == TRIP_KIND_MEANS)
             trip_mean_extinctions(of_mean, length, extinctions);
         for (unsigned i = 0; i < TRIP_MEAN_SHARES; i++) {
-            if (!s->list->level)
+            if (s->list->kind != TRIP_KIND_MEANS)
                 extinctions[i] = (double)s->params->table[code + i].extinction;
             s->mass[code + i] = extinctions[i] > 0 ? -expm1(-extinctions[i] * length) * area : 0;
         }

@@ -17,7 +17,7 @@ struct trip_list_cursor {
     trip_budget *budget;
     const trip_writer *writer;
     trip_list_writer *list;
-    bool odd;
+    bool odd, normals;
     uint64_t next_slab;
     trip_file_slab slab;
     trip_file_brick *bricks; /* of the slab */
@@ -62,7 +62,7 @@ static int flush_list(trip_writer *w, trip_list_writer *l)
 }
 
 int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list, bool odd,
-                          trip_budget *budget)
+                          bool normals, trip_budget *budget)
 {
     trip_list_cursor *c = *out = trip_budget_take(budget, sizeof *c);
     if (!c)
@@ -71,6 +71,7 @@ int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list,
     c->writer = w;
     c->list = &w->lists[list];
     c->odd = odd;
+    c->normals = normals && c->list->planes_present >> TRIP_PLANE_NORMALS & 1;
     return flush_list(w, c->list);
 }
 
@@ -127,7 +128,7 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *plac
 {
     const trip_list_writer *l = c->list;
     const trip_file_run *r = &place->run;
-    const bool normals = l->planes_present >> TRIP_PLANE_NORMALS & 1;
+    const bool normals = c->normals;
     int status = trip_output_read(&l->planes[TRIP_PLANE_VOXELS], place->at[TRIP_PLANE_VOXELS],
                                   to->block, 8 * (size_t)r->words);
     if (status == TRIP_OK && normals)

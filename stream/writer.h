@@ -98,9 +98,9 @@ typedef struct trip_list_run {
     const uint32_t *voxels, *normals; /* as appended, in the buffer; normals may be NULL */
 } trip_list_run;
 
-/* Sheets with sheet % 2 == `odd` alone. */
+/* Sheets with sheet % 2 == `odd` alone; without `normals` these are not read. */
 int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list, bool odd,
-                          trip_budget *budget);
+                          bool normals, trip_budget *budget);
 void trip_list_cursor_close(trip_list_cursor *c);
 /* 1: *place is that of the next one; 0: there is none; negative: failed. */
 int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place);

@@ -351,7 +351,7 @@ static void levels_of_a_plain_block_are_near_the_finest(void **state)
     assert_int_equal(fclose(f), 0);
     program_call(&r,
                  "brick plain.raw --size 32,32,32 --type uint8 --keep-all --tf plain.tf --levels 2 "
-                 "-o plain.trip -q");
+                 "--levels-for both -o plain.trip -q");
     assert_works(&r);
     cJSON *root = bench("levels plain.trip --views 1 --no-shading");
     const cJSON *rows = rows_of(root, "levels"), *row;

@@ -142,7 +142,8 @@ class Accuracy(program.ProgramTest):
         os.chmod(".", 0o755)
         program.write_nrrd("a.nrrd", program.ball((24, 28, 40)))
         program.write("a.tf", b"40 1 0.5 0.2 0\n200 0.2 0.6 1 0.4\n")
-        assert program.call("brick", "a.nrrd", "-q", "--keep-all", "--tile", "16").returncode == 0
+        assert program.call("brick", "a.nrrd", "-q", "--keep-all", "--tile", "16",
+                            "--levels-for", "both").returncode == 0
         run = program.call(
             "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", "--pictures", "--source", "a.nrrd",
             "--settings", "post,post-slices-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2,popping-post",
@@ -310,7 +311,8 @@ class Accuracy(program.ProgramTest):
         """Bricked again alike it is the same, otherwise not."""
         size = ["--size", "40x32", "-o", "e.exr", "--tf", "a.tf", "--error", "255"]
         for name, options in ("again", ["--keep-all"]), ("other", ["--range", "60:255"]):
-            self.works("brick", "a.nrrd", "-q", "--tile", "16", "-o", name + ".trip", *options)
+            self.works("brick", "a.nrrd", "-q", "--tile", "16", "--levels-for", "both", "-o",
+                       name + ".trip", *options)
         self.works("render", "again.trip", *size, "--report", "report")
         self.fails(1, "render", "other.trip", *size, "--report", "report", says="another data set")
         self.works("brick", "a.nrrd", "-q", "-o", "usual.trip")

@@ -116,7 +116,7 @@ class Drawn(program.ProgramTest):
         seen, renderers = [], ("cpu", "reference", *program.GL)
         for halo in "0", "1":
             made = self.brick(os.path.join(program.DATASETS, "tooth.nhdr"), "h.trip", "--force",
-                              "--halo", halo)
+                              "--halo", halo, "--levels-for", "pre")
             self.assertEqual(made["halo"] > 0, halo == "1")
             for renderer in renderers:
                 view = ("h.trip", "--renderer", renderer, "--size", "90x90")

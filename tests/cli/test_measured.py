@@ -15,6 +15,11 @@ VIEW = ["--tf", "solid.tf", "--renderer", "cpu", "--threads", "1", "--size", "25
 COUNTS = ("splats_projected", "splats_drawn")
 
 
+def contents(path):
+    with open(path, "rb") as f:
+        return f.read()
+
+
 def bytes_read(frame):
     return sum(axis["bytes_read"] for axis in frame["lists"].values())
 
@@ -28,7 +33,7 @@ class Levels(program.ProgramTest):
         ramp = numpy.add.outer(numpy.add.outer(numpy.arange(64), numpy.arange(64)),
                                numpy.arange(64)).astype("u1")
         program.write_nrrd("ramp.nrrd", ramp)
-        self.works("brick", "ramp.nrrd", "-q", "--keep-all", "--tile", "16")
+        self.works("brick", "ramp.nrrd", "-q", "--keep-all", "--tile", "16", "--levels-for", "both")
         for classify in "pre", "post":
             r = self.works("render", "ramp.trip", "-o", "r.exr", "--size", "32x32", "--renderer",
                            "cpu", "--tf", "grey", "--lod", "8", "--stats", "-", "--classify",
@@ -37,6 +42,29 @@ class Levels(program.ProgramTest):
             coarse = {name: one for name, one in lists.items() if name[1:]}
             self.assertGreater(splats_read(coarse), 0, classify)
             self.assertGreater(bytes_read({"lists": coarse}), 0, classify)
+
+    def test_the_finest_is_drawn_with_a_warning_where_there_are_none_for_the_classification(self):
+        values = numpy.arange(96 * 64 * 64, dtype="u4").reshape(64, 64, 96).astype("u1")
+        program.write_nrrd("v.nrrd", values)
+        drawn = ["--size=32x32", "--renderer=cpu", "--tf=grey"]
+        for kept, other in ("post", "pre"), ("pre", "post"):
+            self.works("brick", "v.nrrd", "-q", "--keep-all", "--tile=16", "--force",
+                       f"--levels-for={kept}")
+            for classify in kept, other:
+                options = [*drawn, f"--classify={classify}"]
+                self.works("render", "v.trip", "-o", "finest.exr", *options)
+                r = self.works("render", "v.trip", "-o", "lod.exr", "--lod=8", *options)
+                same = contents("lod.exr") == contents("finest.exr")
+                self.assertEqual(same, classify == other)
+                warned = f"v.trip: has no coarse levels for {classify}: " in r.stderr
+                self.assertEqual(warned, classify == other)
+        # Of a volume those are made that are called for.
+        for classify in "pre", "post":
+            options = ["v.nrrd", "--size=32x32", "--renderer=cpu", f"--classify={classify}"]
+            self.works("render", *options, "-o", "finest.exr")
+            r = self.works("render", *options, "-o", "lod.exr", "--lod=8")
+            self.assertNotEqual(contents("lod.exr"), contents("finest.exr"))
+            self.assertNotIn("warning", r.stderr)
 
 
 class Depth(program.ProgramTest):
@@ -55,8 +83,7 @@ class Depth(program.ProgramTest):
         arguments = ["--renderer", renderer, "--size", "32x32", "--tf", "plate.tf", *view]
         self.works("render", "plate.trip", "-o", "plain.exr", *arguments)
         self.works("render", "plate.trip", "-o", "p.exr", "--depth", "z.exr", *arguments)
-        with open("plain.exr", "rb") as one, open("p.exr", "rb") as other:
-            self.assertEqual(one.read(), other.read())
+        self.assertEqual(contents("plain.exr"), contents("p.exr"))
         names, z = program.read_exr_channels("z.exr")
         self.assertEqual(names, [b"Z"])
         return z[..., 0]

@@ -37,6 +37,7 @@ BRICK = {
     "--normals": ["", "nonsense", "3"],
     "--halo": ["", "2", "-1", "yes"],
     "--levels": ["", "-1", "25", "1.5", "yes"],
+    "--levels-for": NAMES + ["means"],
     "--quiet": None,
     "--resume": None,
     "--dry-run": None,
@@ -203,6 +204,9 @@ class Options(program.ProgramTest):
             [
                 brick + ["--keep-all", "--range=1:2"],
                 brick + ["--quiet", "--json"],
+                brick + ["--levels=0", "--levels-for=pre"],
+                brick + ["--halo=0", "--levels-for=post"],
+                brick + ["--halo=0", "--levels-for=both"],
                 brick + ["--grid=density", "--grid=heat"],
                 render + ["--grid=density", "--grid=heat"],
                 render + ["--grid=density"],

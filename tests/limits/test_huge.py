@@ -34,8 +34,8 @@ class Huge(limits.Test):
             e = json.loads(r.out)
             self.assertEqual((e["voxels"], e["kept"]), (voxels, voxels))
             # Three lists: a code and a normal of 3 bytes each, and a bit in a full square's mask.
-            # Coarse levels have a seventh of the voxels: means of 2 bytes with a normal, and values.
-            fine, coarse = 3 * (1 + 3 + 1 / 8), 3 * (2 + 3 + 1 + 2 / 8) / 7
+            # Coarse levels have a seventh of the voxels, of which values alone.
+            fine, coarse = 3 * (1 + 3 + 1 / 8), 3 * (1 + 1 / 8) / 7
             self.assertGreaterEqual(e["bytes"], (fine + coarse) * voxels)
             self.assertLess(e["bytes"], 1.06 * (fine + coarse) * voxels)
             self.assertGreater(e["temporary_bytes"], e["bytes"] / 2)

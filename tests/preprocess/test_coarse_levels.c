@@ -58,6 +58,8 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
     strcpy(path, test_path(output));
     p.input = input;
     p.output = path;
+    if (!p.levels_for && !p.no_halo)
+        p.levels_for = TRIP_LEVELS_FOR_BOTH;
     p.ranges = &high;
     p.range_count = 1;
     p.replace = true;
@@ -178,13 +180,14 @@ static uint64_t count_cubes(const trip_list *list)
     return count;
 }
 
-static void check_data_set(const char *name, unsigned levels)
+/* `lists`: of each coarse level. */
+static void check_data_set(const char *name, unsigned levels, unsigned lists)
 {
     trip_dataset *d;
     trip_budget *budget;
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
     assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
-    assert_int_equal(d->list_count, 6 * (levels + 1));
+    assert_int_equal(d->list_count, 6 + lists * levels);
     for (unsigned i = 6; i < d->list_count; i++) {
         const trip_list *list = &d->lists[i];
         uint64_t records = check_list(d, list);
@@ -206,7 +209,7 @@ static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
             brick_to("a.trip", (trip_brick_params){ .tile_voxels = 64, .threads = 2 });
         assert_int_equal(s.levels, 2); /* 150 voxels: 75, 38 */
         assert_true(s.level_bytes > 0 && s.level_bytes < s.bytes);
-        check_data_set("a.trip", 2);
+        check_data_set("a.trip", 2, 6);
     }
 }
 
@@ -217,7 +220,7 @@ static void tiles_of_any_size_have_levels(void **state)
     for (unsigned tile = 16; tile <= 128; tile *= 2) {
         brick_to("a.trip",
                  (trip_brick_params){ .tile_voxels = tile, .slab_sheets = 3, .levels = 2 });
-        check_data_set("a.trip", 2);
+        check_data_set("a.trip", 2, 6);
     }
 }
 
@@ -233,6 +236,35 @@ static void memory_threads_and_slices_make_no_difference(void **state)
         brick_to("b.trip", p);
         test_same_dataset("a.trip", "b.trip");
     }
+}
+
+static void expect_same_file(const char *a, const char *b)
+{
+    char command[512];
+    snprintf(command, sizeof command, "test -s '%s' && cmp -s '%s' '%s'", test_path(a),
+             test_path(a), test_path(b));
+    assert_int_equal(system(command), 0);
+}
+
+/* By default there are those to interpolate, without the halo those to splat; either are the same
+ * as where there are both. */
+static void levels_are_of_what_they_are_for(void **state)
+{
+    (void)state;
+    make_bytes(11, 100);
+    brick_to("both.trip", (trip_brick_params){ 0 });
+    brick_to("pre.trip", (trip_brick_params){ .levels_for = TRIP_LEVELS_FOR_PRE });
+    brick_to("post.trip", (trip_brick_params){ .levels_for = TRIP_LEVELS_FOR_POST });
+    expect_same_file("both.trip/x1.means", "pre.trip/x1.means");
+    expect_same_file("both.trip/y2.mean-normals", "pre.trip/y2.mean-normals");
+    expect_same_file("both.trip/x1.values", "post.trip/x1.values");
+    expect_same_file("both.trip/z2.values", "post.trip/z2.values");
+    assert_false(test_exists("pre.trip/x1.values"));
+    assert_false(test_exists("post.trip/x1.means"));
+    check_data_set("pre.trip", 2, 3);
+    check_data_set("post.trip", 2, 3);
+    assert_true(trip_levels_kinds(TRIP_LEVELS_FOR_AUTO, true).values);
+    assert_false(trip_levels_kinds(TRIP_LEVELS_FOR_AUTO, true).means);
 }
 
 static void levels_can_be_left_out_and_stop_at_one_voxel(void **state)
@@ -289,6 +321,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(tiles_of_any_size_have_levels, test_begin, test_end),
         cmocka_unit_test_setup_teardown(memory_threads_and_slices_make_no_difference, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(levels_are_of_what_they_are_for, test_begin, test_end),
         cmocka_unit_test_setup_teardown(levels_can_be_left_out_and_stop_at_one_voxel, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(normals_are_those_of_the_faces, test_begin, test_end),
