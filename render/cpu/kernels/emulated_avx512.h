@@ -84,6 +84,20 @@ static inline __attribute__((always_inline)) __m512i emulated_cvttps_epi32(__m51
 #undef _mm512_cvttps_epi32
 #define _mm512_cvttps_epi32 emulated_cvttps_epi32
 
+/* The same numbers of each four. */
+static inline __m512i emulated_shuffle_epi32(__m512i a, unsigned order)
+{
+    emulated_i32 r;
+    for (unsigned i = 0; i < 16; i++)
+        r[i] = ((emulated_i32)a)[i / 4 * 4 + (order >> i % 4 * 2 & 3)];
+    return (__m512i)r;
+}
+#undef _mm512_shuffle_epi32
+#define _mm512_shuffle_epi32 emulated_shuffle_epi32
+
+#undef _mm512_madd_epi16
+#define _mm512_madd_epi16 simde_mm512_madd_epi16
+
 #undef _mm512_cvtepi32_ps
 #define _mm512_cvtepi32_ps(a) ((__m512) __builtin_convertvector((emulated_i32)(a), emulated_ps))
 

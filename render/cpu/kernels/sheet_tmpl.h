@@ -262,6 +262,18 @@ INLINE vi vi_greater(vi a, vi b)
     return (vi)_mm256_max_epi32((__m256i)a, (__m256i)b);
 }
 
+#elif TRIP_SIMD == TRIP_SIMD_AVX512
+
+INLINE vi vi_lesser(vi a, vi b)
+{
+    return (vi)_mm512_min_epi32((__m512i)a, (__m512i)b);
+}
+
+INLINE vi vi_greater(vi a, vi b)
+{
+    return (vi)_mm512_max_epi32((__m512i)a, (__m512i)b);
+}
+
 #else
 
 INLINE vi vi_lesser(vi a, vi b)
@@ -717,140 +729,7 @@ INLINE vi index_of(const trip_cpu_integrals *in, vi code)
     return ((code + (1 << (log2 - 1))) >> log2) + (TRIP_CPU_CODE_BIAS >> in->entry_log2);
 }
 
-#if TRIP_SIMD == TRIP_SIMD_AVX2
-
-/* Two corners beside each other of each lane: faster than the instruction that gathers them. */
-INLINE __m256i two_codes(const int16_t *pool, const int32_t at[V])
-{
-    __m128i of[2];
-    for (int i = 0; i < 2; i++) {
-        int32_t two[4];
-        for (int k = 0; k < 4; k++)
-            memcpy(&two[k], pool + at[4 * i + k], sizeof *two);
-        of[i] = _mm_setr_epi32(two[0], two[1], two[2], two[3]);
-    }
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(of[0]), of[1], 1);
-}
-
-/* The index, and which rays lack a corner. */
-INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
-{
-    const int16_t *pool = (const int16_t *)g->pool;
-    const __m256i missing = _mm256_set1_epi16(TRIP_CPU_CODE_MISSING);
-    int32_t places[V];
-    vi_store(places, at);
-    __m256i top = two_codes(pool, places),
-            bottom = two_codes(pool + TRIP_CPU_RASTER_STRIDE, places);
-    vi lack =
-        (vi)_mm256_or_si256(_mm256_cmpeq_epi16(top, missing), _mm256_cmpeq_epi16(bottom, missing));
-    vi sum = (vi)_mm256_madd_epi16(top, (__m256i)s->top) +
-             (vi)_mm256_madd_epi16(bottom, (__m256i)s->bottom);
-    s->there = vi_is_0(lack);
-    s->index = index_of(in, sum);
-}
-
-/* Gradients of two corners beside each other, of lanes i and i + 4: along u twice, along v, ... */
-INLINE __m256i two_gradients(const int16_t *low, const int16_t *high)
-{
-    const __m256i order = _mm256_broadcastsi128_si256(
-        _mm_setr_epi8(0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, -1, -1, -1, -1));
-    __m128i first = _mm_loadu_si128((const void *)low);
-    __m256i both = _mm256_inserti128_si256(_mm256_castsi128_si256(first),
-                                           _mm_loadu_si128((const void *)high), 1);
-    return _mm256_shuffle_epi8(both, order);
-}
-
-INLINE void find_gradients(const trip_cpu_group *g, sample *s)
-{
-    const int16_t *pool = (const int16_t *)g->pool;
-    const int below = 3 * TRIP_CPU_RASTER_STRIDE;
-    int32_t at[V];
-    __m256i of[4];
-    vi_store(at, s->gradient_at);
-#define OF_LANES(i)                                                                                \
-    do {                                                                                           \
-        const int16_t *low = pool + at[i], *high = pool + at[i + 4];                               \
-        __m256i above = _mm256_madd_epi16(two_gradients(low, high),                                \
-                                          _mm256_shuffle_epi32((__m256i)s->top, 0x55 * (i)));      \
-        __m256i under = _mm256_madd_epi16(two_gradients(low + below, high + below),                \
-                                          _mm256_shuffle_epi32((__m256i)s->bottom, 0x55 * (i)));   \
-        of[i] = _mm256_add_epi32(above, under);                                                    \
-    } while (0)
-    OF_LANES(0);
-    OF_LANES(1);
-    OF_LANES(2);
-    OF_LANES(3);
-#undef OF_LANES
-    __m256i ab = _mm256_unpacklo_epi32(of[0], of[1]), cd = _mm256_unpacklo_epi32(of[2], of[3]);
-    s->gradient[0] = (vi)_mm256_unpacklo_epi64(ab, cd);
-    s->gradient[1] = (vi)_mm256_unpackhi_epi64(ab, cd);
-    s->gradient[2] = (vi)_mm256_unpacklo_epi64(_mm256_unpackhi_epi32(of[0], of[1]),
-                                               _mm256_unpackhi_epi32(of[2], of[3]));
-}
-
-/* Rows of four numbers by lane, as four vectors. */
-INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
-{
-    int32_t at[V];
-    __m256i of[4];
-    vi_store(at, numbers);
-    for (int i = 0; i < 4; i++) {
-        __m256i row = _mm256_castsi128_si256(_mm_loadu_si128((const void *)rows[at[i]]));
-        of[i] = _mm256_inserti128_si256(row, _mm_loadu_si128((const void *)rows[at[i + 4]]), 1);
-    }
-    __m256i ab0 = _mm256_unpacklo_epi32(of[0], of[1]), ab1 = _mm256_unpackhi_epi32(of[0], of[1]);
-    __m256i cd0 = _mm256_unpacklo_epi32(of[2], of[3]), cd1 = _mm256_unpackhi_epi32(of[2], of[3]);
-    out[0] = (vi)_mm256_unpacklo_epi64(ab0, cd0);
-    out[1] = (vi)_mm256_unpackhi_epi64(ab0, cd0);
-    out[2] = (vi)_mm256_unpacklo_epi64(ab1, cd1);
-    out[3] = (vi)_mm256_unpackhi_epi64(ab1, cd1);
-}
-
-#else
-
-/* Two corners' share of a sample. */
-INLINE int32_t of_two(int16_t left, int16_t right, int32_t weights)
-{
-    return left * (weights & 0xffff) + right * (weights >> 16);
-}
-
-INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
-{
-    vi sum, lack;
-    for (int i = 0; i < V; i++) {
-        const int16_t *top = (const int16_t *)g->pool + at[i],
-                      *bottom = top + TRIP_CPU_RASTER_STRIDE;
-        lack[i] = top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
-                  bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
-        sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
-    }
-    s->there = vi_is_0(lack);
-    s->index = index_of(in, sum);
-}
-
-INLINE void find_gradients(const trip_cpu_group *g, sample *s)
-{
-    for (int i = 0; i < V; i++) {
-        const int16_t *top = (const int16_t *)g->pool + s->gradient_at[i];
-        const int16_t *bottom = top + 3 * TRIP_CPU_RASTER_STRIDE;
-        for (int k = 0; k < 3; k++)
-            s->gradient[k][i] = of_two(top[k], top[3 + k], s->top[i]) +
-                                of_two(bottom[k], bottom[3 + k], s->bottom[i]);
-    }
-}
-
-INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
-{
-    int32_t at[V], of[4][V];
-    vi_store(at, numbers);
-    for (int i = 0; i < V; i++)
-        for (int k = 0; k < 4; k++)
-            of[k][i] = rows[at[i]][k];
-    for (int k = 0; k < 4; k++)
-        out[k] = vi_load(of[k]);
-}
-
-#endif
+#include "cpu/kernels/corners_tmpl.h"
 
 INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, const pane_path *path,
                       const patch_path *area, const stamp_rays *l, unsigned n, sample *s)
