@@ -325,7 +325,8 @@ typedef struct triptych_settings {
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
-                      0 to 1000; 0, the default: the finest alone. Not with indexed */
+                      0 to 1000; 0, the default: the finest alone. Of those of the classification
+                      (triptych_levels_for); a warning where there are none. Not with indexed */
     double max_bytes; /* > 0: what is widest in the picture first is drawn by the finest levels with
                          which codes and normals of so many bytes at most are in view; not counted
                          are positions, some 10 to 30 % more. Not beyond what lod_px calls for */

@@ -25,10 +25,11 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
         l->mean_sums = carve(memory, &used, plane * sizeof *l->mean_sums);
         l->means = carve(memory, &used, plane * sizeof *l->means);
     }
-    l->box.values = carve(memory, &used, plane * sizeof(uint32_t));
+    const size_t sheets = w->params->kinds.values ? TRIP_SHARPEN_SHEETS : 1;
+    l->box.values = carve(memory, &used, sheets * plane * sizeof(uint32_t));
     l->box.normals = carve(memory, &used, plane * sizeof(uint32_t));
     for (int axis = 0; axis < 3; axis++)
-        l->box.bits[axis] = carve(memory, &used, (axis == 2 ? 1 : edge) * plane / 8);
+        l->box.bits[axis] = carve(memory, &used, (axis == 2 ? sheets : edge) * plane / 8);
     if (w->lists)
         l->run = carve(memory, &used, trip_list_buffer_bytes());
     else
@@ -108,11 +109,13 @@ static int add_run(trip_level_lane *l, const trip_level_work *w, const trip_leve
     int status = trip_list_cursor_read(square->cursor, &square->run, l->run, &run);
     if (status < 0)
         return status;
+    size_t last = SIZE_MAX; /* in list order those of a voxel come together */
     for (uint32_t i = 0; i < run.count; i++) {
         const uint32_t voxel = run.voxels[i];
-        const place p = place_of(w, square, trip_voxel_u(voxel), trip_voxel_v(voxel));
-        touch(l, p.at);
-        trip_coarse_value_add(&l->value_sums[p.at], TRIP_COARSE_ALL,
+        const size_t at = place_of(w, square, trip_voxel_u(voxel), trip_voxel_v(voxel)).at;
+        if (at != last)
+            touch(l, last = at);
+        trip_coarse_value_add(&l->value_sums[at], TRIP_COARSE_ALL,
                               (uint16_t)trip_voxel_code(voxel));
     }
     if (l->mean_sums && square->kept)
@@ -192,13 +195,14 @@ static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
     return trip_list_builder_reserve(user, thread, list, bytes);
 }
 
-/* Begins a box of the voxels of a square, none of which is marked yet. */
-static void begin_square(trip_level_lane *l, const trip_level_work *w, uint64_t key)
+/* Begins a box of the voxels of a square, or of some one behind the other, none of which is marked
+ * yet. */
+static void begin_squares(trip_level_lane *l, const trip_level_work *w, uint64_t sheet,
+                          uint64_t morton, int64_t sheets)
 {
-    const uint64_t morton = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
     const int64_t edge = (int64_t)1 << w->edge_log2;
-    const int64_t size[3] = { edge, edge, 1 };
-    int64_t lo[3] = { 0, 0, (int64_t)(key >> TRIP_TILE_MORTON_BITS) };
+    const int64_t size[3] = { edge, edge, sheets };
+    int64_t lo[3] = { 0, 0, (int64_t)sheet };
     for (int bit = 0; bit < TRIP_TILE_MORTON_BITS; bit++)
         lo[bit % 2] |= (int64_t)(morton >> bit & 1) << bit / 2;
     lo[0] <<= w->edge_log2;
@@ -207,10 +211,10 @@ static void begin_square(trip_level_lane *l, const trip_level_work *w, uint64_t 
 }
 
 /* Marks a voxel; where it is in the box. */
-static size_t mark(trip_level_lane *l, const trip_coarse_value *voxel)
+static size_t mark(trip_level_lane *l, const trip_coarse_value *voxel, int64_t sheet)
 {
-    trip_splat_box_mark(&l->box, voxel->v, 0, &voxel->u, 1);
-    return trip_splat_box_row(&l->box, voxel->v, 0) + voxel->u;
+    trip_splat_box_mark(&l->box, voxel->v, sheet, &voxel->u, 1);
+    return trip_splat_box_row(&l->box, voxel->v, sheet) + voxel->u;
 }
 
 static int emit(trip_level_lane *l, const trip_level_work *w, unsigned list)
@@ -245,11 +249,12 @@ int trip_level_lane_emit_means(trip_level_lane *l, const trip_level_work *w, uin
 {
     bool some = false;
     int status = 0;
-    begin_square(l, w, key);
+    begin_squares(l, w, key >> TRIP_TILE_MORTON_BITS,
+                  key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1), 1);
     for (uint32_t i = 0; i < count; i++) {
         if (!l->means[i].kept)
             continue;
-        const size_t at = mark(l, &l->values[i]);
+        const size_t at = mark(l, &l->values[i], 0);
         l->box.normals[at] = l->means[i].normal;
         l->box.values[at] = trip_mean_pack_value(&w->scale, l->means[i].mean);
         some = true;
@@ -266,13 +271,20 @@ static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *vo
     return w->params->code_bytes == 1 ? (voxel->value + 128u) / 257 * 257 : voxel->value;
 }
 
-int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w, uint64_t key,
-                                const trip_coarse_value *values, uint32_t count)
+int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
+                                const trip_sharpen *sharpen, const trip_sharpen_column *column)
 {
     int status = 0;
-    begin_square(l, w, key);
-    for (uint32_t i = 0; i < count; i++)
-        l->box.values[mark(l, &values[i])] = value_code(w, &values[i]);
+    begin_squares(l, w, column->sheet, column->morton, TRIP_SHARPEN_SHEETS);
+    for (int sheet = 0; sheet < TRIP_SHARPEN_SHEETS && status == 0; sheet++) {
+        const trip_sharpen_task *task = &column->squares[sheet];
+        if (task->square.count > 0)
+            status = trip_sharpen_do(sharpen, &l->sharpen, task);
+        for (uint32_t i = 0; i < task->square.count && status == 0; i++) {
+            const trip_coarse_value *voxel = &l->sharpen.values[i];
+            l->box.values[mark(l, voxel, sheet)] = value_code(w, voxel);
+        }
+    }
     for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS && status == 0; list++)
         status = emit(l, w, list);
     return status;

@@ -60,8 +60,8 @@ uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_work *w);
 /* The pieces of a square in the lists of means, of the lane's own values and means. */
 int trip_level_lane_emit_means(trip_level_lane *l, const trip_level_work *w, uint64_t key,
                                uint32_t count);
-/* In the lists of values. */
-int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w, uint64_t key,
-                                const trip_coarse_value *values, uint32_t count);
+/* Those of a column in the lists of values, once it is sharpened. */
+int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
+                                const trip_sharpen *sharpen, const trip_sharpen_column *column);
 
 #endif

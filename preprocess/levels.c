@@ -280,12 +280,12 @@ static int make_squares(void *user, unsigned thread, uint64_t item)
     return end_lane(m, status);
 }
 
-static int take_task(making *m, trip_sharpen_task *task)
+static int take_column(making *m, trip_sharpen_column *column)
 {
     pthread_mutex_lock(&m->lock);
-    int status = m->failed ? 0 : trip_sharpen_take(&m->sharpen, task);
+    int status = m->failed ? 0 : trip_sharpen_take(&m->sharpen, column);
     if (status == 1)
-        m->sheet = task->square.key >> TRIP_TILE_MORTON_BITS;
+        m->sheet = column->sheet;
     pthread_mutex_unlock(&m->lock);
     return status;
 }
@@ -295,14 +295,11 @@ static int make_values(void *user, unsigned thread, uint64_t item)
 {
     making *m = user;
     trip_level_lane *l = &m->lanes[item];
-    trip_sharpen_task task;
+    trip_sharpen_column column;
     int status = 0;
     (void)thread;
-    while (status == 0 && (status = take_task(m, &task)) == 1) {
-        status = trip_sharpen_do(&m->sharpen, &l->sharpen, &task);
-        if (status == 0)
-            status = trip_level_lane_emit_values(l, &m->work, task.square.key, l->sharpen.values,
-                                                 task.square.count);
+    while (status == 0 && (status = take_column(m, &column)) == 1) {
+        status = trip_level_lane_emit_values(l, &m->work, &m->sharpen, &column);
         status = status == 0 ? poll() : status;
     }
     return end_lane(m, status);

@@ -38,6 +38,7 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
     const size_t plane = (size_t)1 << 2 * edge_log2;
     size_t at = 0;
     l->values = part(memory, &at, plane * sizeof *l->values);
+    l->beside = part(memory, &at, plane * sizeof *l->beside);
     l->sums = part(memory, &at, plane * sizeof *l->sums);
     l->squares = part(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
@@ -57,14 +58,15 @@ void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, uns
                          .means = means,
                          .edge_log2 = edge_log2,
                          .least = least,
-                         .most = most };
-    for (unsigned i = 0; i < 3; i++)
+                         .most = most,
+                         .sheet = UINT64_MAX };
+    for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS_HELD; i++)
         s->sheets[i].number = UINT64_MAX;
 }
 
 void trip_sharpen_close(trip_sharpen *s)
 {
-    for (unsigned i = 0; i < 3; i++)
+    for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS_HELD; i++)
         if (s->sheets[i].places)
             trip_budget_release(s->budget, s->sheets[i].places,
                                 s->sheets[i].room * sizeof *s->sheets[i].places);
@@ -75,8 +77,7 @@ void trip_sharpen_close(trip_sharpen *s)
 
 enum { LEAST_ROOM = 64 };
 
-/* Three sheets, in arrays that are up to twice as long as what they hold, and one that is copied.
- */
+/* Sheets, in arrays that are up to twice as long as what they hold, and one that is copied. */
 uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uint64_t voxels)
 {
     uint64_t across = (uint64_t)(dims[0] - 1) >> edge_log2;
@@ -85,7 +86,12 @@ uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uin
         squares = voxels;
     if (squares < LEAST_ROOM)
         squares = LEAST_ROOM;
-    return 7 * squares * sizeof(trip_sharpen_place);
+    return (2 * TRIP_SHARPEN_SHEETS_HELD + 1) * squares * sizeof(trip_sharpen_place);
+}
+
+static trip_sharpen_sheet *sheet_of(trip_sharpen *s, uint64_t number)
+{
+    return &s->sheets[number % TRIP_SHARPEN_SHEETS_HELD];
 }
 
 static int add_place(trip_sharpen *s, trip_sharpen_sheet *sheet, trip_sharpen_place place)
@@ -117,7 +123,7 @@ static int look_ahead(trip_sharpen *s, uint64_t last)
         const uint64_t number = place.key >> TRIP_TILE_MORTON_BITS;
         if (status < 0 || number > last)
             break;
-        trip_sharpen_sheet *sheet = &s->sheets[number % 3];
+        trip_sharpen_sheet *sheet = sheet_of(s, number);
         if (sheet->number != number)
             sheet->count = 0;
         sheet->number = number;
@@ -132,7 +138,7 @@ static int look_ahead(trip_sharpen *s, uint64_t last)
 static const trip_sharpen_place *find_place(const trip_sharpen *s, uint64_t key)
 {
     const uint64_t number = key >> TRIP_TILE_MORTON_BITS;
-    const trip_sharpen_sheet *sheet = &s->sheets[number % 3];
+    const trip_sharpen_sheet *sheet = &s->sheets[number % TRIP_SHARPEN_SHEETS_HELD];
     size_t first = 0, past = sheet->number == number ? sheet->count : 0;
     while (first < past) {
         const size_t middle = first + (past - first) / 2;
@@ -148,22 +154,18 @@ static const trip_sharpen_place *find_place(const trip_sharpen *s, uint64_t key)
 
 /* ---- squares ---- */
 
-static int read_values(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place)
+/* `values`: of the lane, for what is read. */
+static int read_square(const trip_sharpen *s, const trip_sharpen_place *place,
+                       trip_coarse_value *values, trip_sharpen_square *to)
 {
-    return trip_output_read(s->file, place->at, l->values, place->count * sizeof *l->values);
-}
-
-static int read_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
-                       trip_sharpen_square *to)
-{
-    int status = read_values(s, l, place);
+    int status = trip_output_read(s->file, place->at, values, place->count * sizeof *values);
     to->key = place->key;
     to->held = status == 0;
     memset(to->known, 0, sizeof *to->known << 2 * s->edge_log2);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
-        const size_t at = ((size_t)l->values[i].v << s->edge_log2) + l->values[i].u;
+        const size_t at = ((size_t)values[i].v << s->edge_log2) + values[i].u;
         to->known[at] = UINT16_MAX;
-        to->values[at] = l->values[i].value;
+        to->values[at] = values[i].value;
     }
     return status;
 }
@@ -174,7 +176,7 @@ static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_s
     trip_sharpen_square *square =
         &l->squares[1 + (place->key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
     *out = square;
-    return square->held && square->key == place->key ? 0 : read_square(s, l, place, square);
+    return square->held && square->key == place->key ? 0 : read_square(s, place, l->beside, square);
 }
 
 /* Where the others are there. */
@@ -244,12 +246,10 @@ static uint16_t sharpened(const trip_sharpen *s, uint16_t value, int32_t sum)
 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task)
 {
     const trip_sharpen_place *place = &task->square;
-    int status = read_square(s, l, place, &l->squares[0]);
+    int status = read_square(s, place, l->values, &l->squares[0]);
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     if (status == 0)
         status = add_around(s, l, task->beside);
-    if (status == 0) /* others were read into the same memory */
-        status = read_values(s, l, place);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
         trip_coarse_value *voxel = &l->values[i];
         voxel->value =
@@ -260,21 +260,20 @@ int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_shar
 
 /* ---- one after the other ---- */
 
-/* The number of the next sheet with squares, UINT64_MAX when there is none. */
-static int next_sheet(trip_sharpen *s, uint64_t *number)
+/* The first sheet of the next columns, UINT64_MAX when there are none. */
+static int next_sheet(trip_sharpen *s, uint64_t *first)
 {
-    const uint64_t here = s->sheet;
+    const uint64_t behind = s->sheet + TRIP_SHARPEN_SHEETS;
     uint32_t count;
-    uint64_t key = UINT64_MAX;
-    *number = UINT64_MAX;
-    if (s->next > 0 && s->sheets[(here + 1) % 3].number == here + 1) {
-        *number = here + 1;
-        return 0;
+    uint64_t key;
+    int status = 0;
+    *first = UINT64_MAX;
+    if (s->sheet != UINT64_MAX && sheet_of(s, behind)->number == behind) {
+        *first = behind;
+    } else if (s->ahead < s->file->bytes) {
+        status = trip_level_file_square(s->file, s->ahead, s->edge_log2, &key, &count);
+        *first = (key >> TRIP_TILE_MORTON_BITS) / TRIP_SHARPEN_SHEETS * TRIP_SHARPEN_SHEETS;
     }
-    if (s->ahead >= s->file->bytes)
-        return 0;
-    int status = trip_level_file_square(s->file, s->ahead, s->edge_log2, &key, &count);
-    *number = key >> TRIP_TILE_MORTON_BITS;
     return status;
 }
 
@@ -310,22 +309,53 @@ static void find_beside(const trip_sharpen *s, trip_sharpen_task *task)
     }
 }
 
-int trip_sharpen_take(trip_sharpen *s, trip_sharpen_task *task)
+/* Of a sheet of the columns at hand the square that is next; NULL: there is none. */
+static const trip_sharpen_place *next_place(const trip_sharpen *s, unsigned i)
 {
-    const trip_sharpen_sheet *sheet = &s->sheets[s->sheet % 3];
-    if (sheet->number != s->sheet || s->next == sheet->count) {
-        uint64_t number;
-        int status = next_sheet(s, &number);
-        if (status < 0 || number == UINT64_MAX)
+    const uint64_t number = s->sheet + i;
+    const trip_sharpen_sheet *sheet = &s->sheets[number % TRIP_SHARPEN_SHEETS_HELD];
+    return sheet->number == number && s->next[i] < sheet->count ? &sheet->places[s->next[i]] : NULL;
+}
+
+/* Where the next column lies in its sheets; UINT64_MAX: there is none in those at hand. */
+static uint64_t next_morton(const trip_sharpen *s)
+{
+    uint64_t least = UINT64_MAX;
+    for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS && s->sheet != UINT64_MAX; i++) {
+        const trip_sharpen_place *place = next_place(s, i);
+        if (place && (place->key & TILE_MASK) < least)
+            least = place->key & TILE_MASK;
+    }
+    return least;
+}
+
+static void take_column(trip_sharpen *s, uint64_t morton, trip_sharpen_column *column)
+{
+    *column = (trip_sharpen_column){ .sheet = s->sheet, .morton = morton };
+    for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS; i++) {
+        const trip_sharpen_place *place = next_place(s, i);
+        if (!place || (place->key & TILE_MASK) != morton)
+            continue;
+        column->squares[i].square = *place;
+        find_beside(s, &column->squares[i]);
+        s->next[i]++;
+    }
+}
+
+int trip_sharpen_take(trip_sharpen *s, trip_sharpen_column *column)
+{
+    uint64_t morton;
+    while ((morton = next_morton(s)) == UINT64_MAX) {
+        uint64_t first;
+        int status = next_sheet(s, &first);
+        if (status < 0 || first == UINT64_MAX)
             return status;
-        s->sheet = number;
-        s->next = 0;
-        status = look_ahead(s, number + 1);
+        s->sheet = first;
+        memset(s->next, 0, sizeof s->next);
+        status = look_ahead(s, first + TRIP_SHARPEN_SHEETS);
         if (status < 0)
             return status;
-        sheet = &s->sheets[number % 3];
     }
-    task->square = sheet->places[s->next++];
-    find_beside(s, task);
+    take_column(s, morton, column);
     return 1;
 }

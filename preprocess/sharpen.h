@@ -5,10 +5,11 @@
  *     value + the sum over the six voxels beside it of (value - theirs) / TRIP_SHARPEN_PART,
  *
  * those that are not there counting as equal, and within the volume's range of values. The voxels
- * come from the file that trip_level_file_append() writes, square by square; of the sheets before
- * and behind only where their squares lie is held, and a few squares by each lane. One thread opens
- * and closes it; threads take squares one at a time, and sharpen them at the same time, each in a
- * lane. */
+ * come from the file that trip_level_file_append() writes, square by square. They are taken by
+ * columns, the squares of a few sheets one behind the other, so that what is made of them lies
+ * together in every list; of those sheets and the ones before and behind only where their squares
+ * lie is held, and a few squares by each lane. One thread opens and closes it; threads take columns
+ * one at a time, and sharpen them at the same time, each in a lane. */
 #ifndef TRIP_SHARPEN_H
 #define TRIP_SHARPEN_H
 
@@ -32,15 +33,23 @@ typedef struct trip_sharpen_sheet {
     size_t count, room;
 } trip_sharpen_sheet;
 
+/* Sheets of a column: the first is a multiple of that. Held are those before and behind, too. */
+enum { TRIP_SHARPEN_SHEETS = 8, TRIP_SHARPEN_SHEETS_HELD = TRIP_SHARPEN_SHEETS + 2 };
+
 /* A square, and those beside it, which have no voxels where the count is 0: along u, along v, in
  * the sheets before and behind. */
 typedef struct trip_sharpen_task {
     trip_sharpen_place square, beside[6];
 } trip_sharpen_task;
 
+typedef struct trip_sharpen_column {
+    uint64_t sheet, morton; /* of its first square */
+    trip_sharpen_task squares[TRIP_SHARPEN_SHEETS];
+} trip_sharpen_column;
+
 /* Memory of a thread. */
 typedef struct trip_sharpen_lane {
-    trip_coarse_value *values;
+    trip_coarse_value *values, *beside;
     int32_t *sums; /* of a square's voxels: how much more each is than those beside */
     trip_sharpen_square *squares; /* the one at hand, and some that were needed lately */
 } trip_sharpen_lane;
@@ -51,10 +60,10 @@ typedef struct trip_sharpen {
     bool means; /* the file has them */
     unsigned edge_log2;
     uint16_t least, most;
-    uint64_t ahead;               /* in the file: the first square that is not in a sheet below */
-    trip_sharpen_sheet sheets[3]; /* by number, modulo 3 */
-    uint64_t sheet;               /* of the square at hand */
-    size_t next;                  /* square of that sheet */
+    uint64_t ahead; /* in the file: the first square that is not in a sheet below */
+    trip_sharpen_sheet sheets[TRIP_SHARPEN_SHEETS_HELD]; /* by number, modulo their number */
+    uint64_t sheet;                                      /* the first of the columns at hand */
+    size_t next[TRIP_SHARPEN_SHEETS];                    /* square of each of their sheets */
 } trip_sharpen;
 
 /* Of a file with squares of 2^edge_log2 voxels, with means or without; values remain in [least,
@@ -70,9 +79,9 @@ uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uin
  * only. */
 size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned char *memory);
 
-/* The next square. Returns 1, 0 after the last one, or a negative status. One thread at a time. */
-int trip_sharpen_take(trip_sharpen *s, trip_sharpen_task *task);
-/* Its task.square.count values, in the lane until the next call. */
+/* The next column. Returns 1, 0 after the last one, or a negative status. One thread at a time. */
+int trip_sharpen_take(trip_sharpen *s, trip_sharpen_column *column);
+/* Of one of its squares the task.square.count values, in the lane until the next call. */
 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task);
 
 #endif
