@@ -277,10 +277,10 @@ int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
     int status = 0;
     begin_squares(l, w, column->sheet, column->morton, TRIP_SHARPEN_SHEETS);
     for (int sheet = 0; sheet < TRIP_SHARPEN_SHEETS && status == 0; sheet++) {
-        const trip_sharpen_task *task = &column->squares[sheet];
-        if (task->square.count > 0)
-            status = trip_sharpen_do(sharpen, &l->sharpen, task);
-        for (uint32_t i = 0; i < task->square.count && status == 0; i++) {
+        const trip_sharpen_neighbourhood *of = &column->squares[sheet];
+        if (of->square.count > 0)
+            status = trip_sharpen_do(sharpen, &l->sharpen, of);
+        for (uint32_t i = 0; i < of->square.count && status == 0; i++) {
             const trip_coarse_value *voxel = &l->sharpen.values[i];
             l->box.values[mark(l, voxel, sheet)] = value_code(w, voxel);
         }

@@ -1,8 +1,8 @@
 /* The coarse levels of a data set: each is made of the one below when that is written, from its
  * lists along Z or, above the first, from a file of its voxels. Two sheets are read
  * at a time, square by square, so that memory does not grow with the volume. The pieces go to a
- * list builder, which sorts them as those of level 0. What only means call for, normals and how
- * much of a voxel was kept, is read and added up only where there are lists of means. */
+ * list builder, which sorts them as those of level 0. Normals and how much of a voxel was kept,
+ * which means alone call for, are read and added up only where there are lists of these. */
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 

@@ -243,13 +243,14 @@ static uint16_t sharpened(const trip_sharpen *s, uint16_t value, int32_t sum)
     return (uint16_t)(to < s->least ? s->least : to > s->most ? s->most : to);
 }
 
-int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task)
+int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
+                    const trip_sharpen_neighbourhood *of)
 {
-    const trip_sharpen_place *place = &task->square;
+    const trip_sharpen_place *place = &of->square;
     int status = read_square(s, place, l->values, &l->squares[0]);
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     if (status == 0)
-        status = add_around(s, l, task->beside);
+        status = add_around(s, l, of->beside);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
         trip_coarse_value *voxel = &l->values[i];
         voxel->value =
@@ -299,12 +300,12 @@ static trip_sharpen_place beside(const trip_sharpen *s, uint64_t key, int64_t u,
     return place ? *place : (trip_sharpen_place){ 0 };
 }
 
-static void find_beside(const trip_sharpen *s, trip_sharpen_task *task)
+static void find_beside(const trip_sharpen *s, trip_sharpen_neighbourhood *of)
 {
-    const uint64_t key = task->square.key;
+    const uint64_t key = of->square.key;
     for (int i = 0; i < 6; i++) {
         const int step = i % 2 ? 1 : -1;
-        task->beside[i] =
+        of->beside[i] =
             beside(s, key, i / 2 == 0 ? step : 0, i / 2 == 1 ? step : 0, i / 2 == 2 ? step : 0);
     }
 }

@@ -38,13 +38,13 @@ enum { TRIP_SHARPEN_SHEETS = 8, TRIP_SHARPEN_SHEETS_HELD = TRIP_SHARPEN_SHEETS +
 
 /* A square, and those beside it, which have no voxels where the count is 0: along u, along v, in
  * the sheets before and behind. */
-typedef struct trip_sharpen_task {
+typedef struct trip_sharpen_neighbourhood {
     trip_sharpen_place square, beside[6];
-} trip_sharpen_task;
+} trip_sharpen_neighbourhood;
 
 typedef struct trip_sharpen_column {
     uint64_t sheet, morton; /* of its first square */
-    trip_sharpen_task squares[TRIP_SHARPEN_SHEETS];
+    trip_sharpen_neighbourhood squares[TRIP_SHARPEN_SHEETS];
 } trip_sharpen_column;
 
 /* Memory of a thread. */
@@ -81,7 +81,8 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
 
 /* The next column. Returns 1, 0 after the last one, or a negative status. One thread at a time. */
 int trip_sharpen_take(trip_sharpen *s, trip_sharpen_column *column);
-/* Of one of its squares the task.square.count values, in the lane until the next call. */
-int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_task *task);
+/* Of one of its squares the of->square.count values, in the lane until the next call. */
+int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
+                    const trip_sharpen_neighbourhood *of);
 
 #endif

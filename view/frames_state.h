@@ -46,6 +46,7 @@ struct trip_frames {
     bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
     bool frugal;                /* no pages are kept between frames of it */
     bool plain;                 /* and moving views have no coarse levels */
+    bool by_values;             /* it has those of values alone: moving views are drawn by these */
     unsigned document;
     const char *source;  /* that was found for what is named; NULL: nothing is held */
     char *function;      /* that the context has, as a key */

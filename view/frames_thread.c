@@ -179,6 +179,19 @@ static int open_heat(trip_frames *f)
     return 0;
 }
 
+/* Of values (post) or of means (pre). */
+static bool has_levels(triptych *t, const char *kind)
+{
+    triptych_info info;
+    triptych_list list;
+    bool has = false;
+    if (triptych_get_info(t, &info))
+        return false;
+    for (unsigned i = 0; i < info.lists && !has; i++)
+        has = triptych_get_list(t, i, &list) == 0 && list.level > 0 && !strcmp(list.kind, kind);
+    return has;
+}
+
 static int open_data(trip_frames *f)
 {
     f->frugal &= f->document == f->now.document;
@@ -209,6 +222,7 @@ static int open_data(trip_frames *f)
     if (!status && w->heat)
         status = open_heat(f);
     f->open = status == 0;
+    f->by_values = f->open && has_levels(f->t, "values") && !has_levels(f->t, "means");
     return status;
 }
 
@@ -252,6 +266,9 @@ static triptych_settings with_levels(const trip_frames *f, double lod_px, double
     triptych_settings s = f->now.settings;
     if (f->plain)
         return s;
+    /* Post, unless something is set that splats alone have. */
+    if (f->by_values && s.classify == TRIPTYCH_PRE)
+        s.classify = TRIPTYCH_CLASSIFY_AUTO;
     s.lod_px = fmax(s.lod_px, lod_px);
     s.max_ms = s.max_ms > 0 ? fmin(s.max_ms, most_ms) : most_ms;
     return s;

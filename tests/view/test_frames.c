@@ -16,7 +16,7 @@
 enum { SIDE = 20, WIDTH = 60, HEIGHT = 40, LARGE = 200 };
 
 static char folder[] = "/tmp/trip-frames-XXXXXX";
-static char data[64], other[64];
+static char data[64], other[64], with_levels[64];
 
 /* A ball whose middle is nearer to one end, of values that differ everywhere. */
 static void write_volume(const char *path, int seed)
@@ -32,7 +32,7 @@ static void write_volume(const char *path, int seed)
     assert_int_equal(fclose(f), 0);
 }
 
-static void brick(const char *name, char path[64], int seed)
+static void brick(const char *name, char path[64], int seed, int levels)
 {
     char volume[128];
     triptych *t;
@@ -40,9 +40,11 @@ static void brick(const char *name, char path[64], int seed)
     snprintf(path, 64, "%s/%s.trip", folder, name);
     write_volume(volume, seed);
     assert_int_equal(triptych_create(&t), 0);
-    const triptych_brick_options options = {
-        .raw_dims = { SIDE, SIDE, SIDE }, .raw_type = "uint8", .keep_all = 1, .threads = 2
-    };
+    const triptych_brick_options options = { .raw_dims = { SIDE, SIDE, SIDE },
+                                             .raw_type = "uint8",
+                                             .keep_all = 1,
+                                             .levels = levels,
+                                             .threads = 2 };
     assert_int_equal(triptych_brick(t, volume, path, &options, NULL), 0);
     triptych_destroy(t);
 }
@@ -51,8 +53,9 @@ static int set_up(void **state)
 {
     (void)state;
     assert_non_null(mkdtemp(folder));
-    brick("one", data, 0);
-    brick("two", other, 40);
+    brick("one", data, 0, 0);
+    brick("two", other, 40, 0);
+    brick("levels", with_levels, 0, 2);
     return 0;
 }
 
@@ -176,6 +179,24 @@ static void at_rest_it_is_the_librarys_picture(void **state)
     c = take(f);
     assert_memory_equal(&c.picture.navigation, &w.navigation, sizeof w.navigation);
     assert_drawn_alike(&c, data, &w);
+    trip_frames_stop(f);
+}
+
+/* Of coarse levels there are those for post alone: moving views are drawn by these, without a
+ * warning that there are no others; the picture at rest is of splats. */
+static void splats_move_by_the_levels_that_there_are(void **state)
+{
+    (void)state;
+    trip_frames *f = start();
+    trip_wanted w = wanted_of(1, with_levels);
+    w.settings.classify = TRIPTYCH_PRE;
+    trip_frames_want(f, &w);
+    const trip_frames_status s = await(f, 1);
+    assert_true(s.exact && s.moving > 0 && s.lod_px > 0);
+    assert_string_equal(s.message, "");
+    const copy c = take(f);
+    assert_true(c.picture.whole);
+    assert_drawn_alike(&c, with_levels, &w);
     trip_frames_stop(f);
 }
 
@@ -303,6 +324,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(at_rest_it_is_the_librarys_picture),
+        cmocka_unit_test(splats_move_by_the_levels_that_there_are),
         cmocka_unit_test(of_many_wishes_the_last_is_fulfilled),
         cmocka_unit_test(failures_are_said_and_do_not_last),
         cmocka_unit_test(the_least_memory_for_a_picture_is_enough),
