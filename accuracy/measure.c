@@ -181,16 +181,11 @@ __attribute__((format(printf, 2, 3))) static void leave_out(accuracy_row *row, c
     row->state = ACCURACY_LEFT_OUT;
 }
 
-/* Whether there are coarse levels to draw a setting by: of values (post) or of means (pre). */
-static bool has_levels(triptych *t, const triptych_info *info, const triptych_settings *settings)
+/* Whether there are coarse levels to draw a setting by. */
+static bool has_levels(triptych *t, const triptych_settings *settings)
 {
-    const char *kind = settings->classify == TRIPTYCH_PRE ? "means" : "values";
-    for (unsigned i = 0; i < info->lists; i++) {
-        triptych_list list;
-        if (triptych_get_list(t, i, &list) == 0 && list.level > 0 && !strcmp(list.kind, kind))
-            return true;
-    }
-    return false;
+    unsigned levels;
+    return triptych_count_levels(t, settings->classify, &levels) == 0 && levels > 0;
 }
 
 /* What says nothing here. */
@@ -214,7 +209,7 @@ static int leave_out_idle(sweep *s)
                       "VTK would hold the whole volume in memory; --beside draws it all the same");
         if (row->beside)
             continue;
-        if (row->setting.settings.lod_px > 0 && !has_levels(t, &info, &row->setting.settings))
+        if (row->setting.settings.lod_px > 0 && !has_levels(t, &row->setting.settings))
             leave_out(row, "the data set has no coarse levels for it");
         else if (row->setting.settings.samples > s->o->samples)
             leave_out(row, "the integral has %d x %d rays a pixel: --samples %d compares them",

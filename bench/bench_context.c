@@ -102,15 +102,6 @@ int bench_context_voxel(bench_context *c, double *width)
 
 int bench_context_levels(bench_context *c, unsigned *levels)
 {
-    const char *kind = c->settings.classify == TRIPTYCH_POST ? "values" : "means";
-    triptych_info info;
-    int status = triptych_get_info(c->t, &info);
-    *levels = 0;
-    for (unsigned i = 0; !status && i < info.lists; i++) {
-        triptych_list list;
-        status = triptych_get_list(c->t, i, &list);
-        if (!status && !strcmp(list.kind, kind) && list.level > *levels)
-            *levels = list.level;
-    }
+    int status = triptych_count_levels(c->t, c->settings.classify, levels);
     return check(c, status);
 }

@@ -379,9 +379,6 @@ static error_t check_options(const options *o)
         return trip_option_fail("--resume", "says nothing beside --dry-run");
     if (p->levels < 0 && p->levels_for)
         return trip_option_fail("--levels-for", "says nothing beside --levels 0");
-    if (p->no_halo &&
-        (p->levels_for == TRIPTYCH_LEVELS_FOR_POST || p->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
-        return trip_option_fail("--levels-for", "post needs the halo: values are interpolated");
     if (o->limits && (o->quiet || o->dry_run))
         return trip_option_fail("--limits", "prints nothing beside --quiet or --dry-run");
     if (o->quiet && o->json)

@@ -44,8 +44,7 @@ static triptych_brick_options brick_options(const render_options *o, const tript
     options.functions = &look->name;
     options.function_count = look->name && !options.keep_all ? 1 : 0;
     options.automatic = 1;
-    if (o->settings.classify == TRIPTYCH_PRE &&
-        (o->settings.lod_px > 0 || o->settings.max_bytes > 0 || o->settings.max_ms > 0))
+    if (o->settings.classify == TRIPTYCH_PRE && render_options_have_levels(&o->settings))
         options.levels_for = TRIPTYCH_LEVELS_FOR_BOTH;
     options.memory_bytes = o->memory_bytes;
     options.threads = (unsigned)(o->threads < MOST_THREADS ? o->threads : MOST_THREADS);

@@ -696,6 +696,11 @@ static int check_sequence(const parse *p)
     return check_path(p);
 }
 
+bool render_options_have_levels(const triptych_settings *s)
+{
+    return s->lod_px > 0 || s->max_bytes > 0 || s->max_ms > 0;
+}
+
 static int check_depth(const render_options *o)
 {
     if (!o->depth)
@@ -732,7 +737,7 @@ static int check_integral(parse *p)
     if (integral && o->settings.show != TRIPTYCH_SHOW_PICTURE)
         return trip_option_fail("--show", "does not apply to --renderer integral, which has no "
                                           "lists and no levels");
-    if (integral && (o->settings.lod_px > 0 || o->settings.max_bytes > 0 || o->settings.max_ms > 0))
+    if (integral && render_options_have_levels(&o->settings))
         return trip_option_fail(
             "--lod, --max-bytes, --max-ms",
             "do not apply to --renderer integral, which draws the finest level");
@@ -773,7 +778,7 @@ static int choose_renderer(parse *p)
         return trip_option_fail("--weights", "vertex goes with --compositing splat");
     if (image && (p->compositing || s->traversal != TRIPTYCH_OUTWARD))
         return trip_option_fail("--method", "image goes without --compositing and --traversal");
-    if ((image || fixed) && (s->lod_px > 0 || s->max_bytes > 0 || s->max_ms > 0))
+    if ((image || fixed) && render_options_have_levels(s))
         return trip_option_fail(image ? "--method image" : "--kernel fixed",
                                 "goes without --lod, --max-bytes and --max-ms");
     if (reference && o->renderer != TRIPTYCH_RENDERER_AUTO &&

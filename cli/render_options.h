@@ -60,5 +60,7 @@ typedef struct render_options {
 int render_options_parse(render_options *o, int argc, char **argv);
 /* What cannot be written at the end, before any work: 0, or TRIP_ERROR once reported. */
 int render_options_check_outputs(const render_options *o);
+/* Whether pictures are to be drawn by coarse levels. */
+bool render_options_have_levels(const triptych_settings *s);
 
 #endif

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "context.h"
+#include "dataset_level.h"
 #include "report.h"
 
 /* ---- contexts ---- */
@@ -400,6 +401,15 @@ int triptych_get_list(triptych *t, unsigned number, triptych_list *out)
     trip_scope *before = trip_context_enter(t);
     int status = trip_context_check_list(t, number);
     *out = status ? (triptych_list){ 0 } : list_of(&t->session.data->lists[number]);
+    return trip_context_leave(before, status);
+}
+
+int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *levels)
+{
+    trip_scope *before = trip_context_enter(t);
+    const trip_kind kind = classify == TRIPTYCH_PRE ? TRIP_KIND_MEANS : TRIP_KIND_VALUES;
+    int status = trip_context_check_open(t);
+    *levels = status ? 0 : trip_dataset_levels(t->session.data, kind);
     return trip_context_leave(before, status);
 }
 

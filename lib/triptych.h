@@ -243,6 +243,10 @@ typedef enum triptych_classify {
     TRIPTYCH_CLASSIFY_AUTO,
 } triptych_classify;
 
+/* How many coarse levels there are to draw the data set's pictures by, of values (post, auto) or of
+ * means (pre). */
+TRIPTYCH_API int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *levels);
+
 /* What of splats (pre) is composited. */
 typedef enum triptych_compositing {
     TRIPTYCH_BY_SPLAT, /* each, in list order */

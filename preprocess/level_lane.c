@@ -24,10 +24,10 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     if (w->params->kinds.means) {
         l->mean_sums = carve(memory, &used, plane * sizeof *l->mean_sums);
         l->means = carve(memory, &used, plane * sizeof *l->means);
+        l->box.normals = carve(memory, &used, plane * sizeof(uint32_t));
     }
     const size_t sheets = w->params->kinds.values ? TRIP_SHARPEN_SHEETS : 1;
     l->box.values = carve(memory, &used, sheets * plane * sizeof(uint32_t));
-    l->box.normals = carve(memory, &used, plane * sizeof(uint32_t));
     for (int axis = 0; axis < 3; axis++)
         l->box.bits[axis] = carve(memory, &used, (axis == 2 ? sheets : edge) * plane / 8);
     if (w->lists)

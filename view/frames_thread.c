@@ -179,17 +179,10 @@ static int open_heat(trip_frames *f)
     return 0;
 }
 
-/* Of values (post) or of means (pre). */
-static bool has_levels(triptych *t, const char *kind)
+static bool has_levels(triptych *t, triptych_classify classify)
 {
-    triptych_info info;
-    triptych_list list;
-    bool has = false;
-    if (triptych_get_info(t, &info))
-        return false;
-    for (unsigned i = 0; i < info.lists && !has; i++)
-        has = triptych_get_list(t, i, &list) == 0 && list.level > 0 && !strcmp(list.kind, kind);
-    return has;
+    unsigned levels;
+    return triptych_count_levels(t, classify, &levels) == 0 && levels > 0;
 }
 
 static int open_data(trip_frames *f)
@@ -222,7 +215,7 @@ static int open_data(trip_frames *f)
     if (!status && w->heat)
         status = open_heat(f);
     f->open = status == 0;
-    f->by_values = f->open && has_levels(f->t, "values") && !has_levels(f->t, "means");
+    f->by_values = f->open && has_levels(f->t, TRIPTYCH_POST) && !has_levels(f->t, TRIPTYCH_PRE);
     return status;
 }
 

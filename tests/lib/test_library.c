@@ -890,6 +890,11 @@ static void a_level_is_mixed_into_the_one_before_it(void **state)
     const triptych_resources resources = { .memory_bytes = 64 << 20,
                                            .renderer = TRIPTYCH_RENDERER_CPU };
     assert_int_equal(triptych_open(t, "levels.trip", &resources), TRIPTYCH_OK);
+    unsigned levels[2];
+    assert_int_equal(triptych_count_levels(t, TRIPTYCH_POST, &levels[0]), TRIPTYCH_OK);
+    assert_int_equal(triptych_count_levels(t, TRIPTYCH_PRE, &levels[1]), TRIPTYCH_OK);
+    assert_int_equal(levels[0], 1);
+    assert_int_equal(levels[1], 0);
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
     const uint64_t of_fine = draw_at(t, 0.26, fine).splats;
     const uint64_t of_coarse = draw_at(t, -0.01, coarse).splats;
