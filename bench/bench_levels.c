@@ -34,10 +34,15 @@ typedef struct measuring {
 
 /* ---- levels ---- */
 
+/* settings.lod_px at which a level is drawn whose voxels are a pixel wide. */
+static const double level_px = 1.0001;
+
 /* The pictures of a level. */
 typedef struct entry {
-    accuracy_error colour, alpha, fine_colour, fine_alpha; /* fine: the finest level at that size */
-    double ms, fine_ms;                                    /* over the views */
+    accuracy_error colour, alpha;           /* with a ray a pixel */
+    accuracy_error own_colour, own_alpha;   /* with as many as the truth */
+    accuracy_error fine_colour, fine_alpha; /* the finest level at that size, with a ray a pixel */
+    double ms, fine_ms;                     /* over the views */
     int width;
 } entry;
 
@@ -79,9 +84,13 @@ static int draw_and_compare(measuring *m, unsigned level, entry *e, float *truth
     if (status)
         return status;
     accuracy_error_add_apart(&e->fine_colour, &e->fine_alpha, rgba, truth, pixels);
-    status = bench_context_draw(&m->context, 1.0001, 1, rgba, NULL);
+    status = bench_context_draw(&m->context, level_px, samples_of(level), rgba, NULL);
+    if (status)
+        return status;
+    accuracy_error_add_apart(&e->own_colour, &e->own_alpha, rgba, truth, pixels);
+    status = bench_context_draw(&m->context, level_px, 1, rgba, NULL);
     if (!status)
-        status = bench_context_draw(&m->context, 1.0001, 1, rgba, &ms);
+        status = bench_context_draw(&m->context, level_px, 1, rgba, &ms);
     if (status)
         return status;
     accuracy_error_add_apart(&e->colour, &e->alpha, rgba, truth, pixels);
@@ -121,6 +130,8 @@ static const bench_column level_columns[] = {
     { "alpha_mean", "alpha: mean", 2, 0 },
     { "alpha_99", "99 %", 1, 0 },
     { "ms", "ms", 1, 0 },
+    { "own_colour_mean", "rays as the truth: colour", 2, 0 },
+    { "own_alpha_mean", "alpha", 2, 0 },
     { "fine_colour_mean", "finest: colour", 2, 0 },
     { "fine_alpha_mean", "alpha", 2, 0 },
     { "fine_ms", "ms", 1, 0 },
@@ -138,6 +149,8 @@ static void add_level(const measuring *m, cJSON *table, unsigned level, const en
     cJSON_AddNumberToObject(row, "alpha_mean", alpha.mean);
     cJSON_AddNumberToObject(row, "alpha_99", alpha.percentile_99);
     cJSON_AddNumberToObject(row, "ms", e->ms / m->options->views);
+    cJSON_AddNumberToObject(row, "own_colour_mean", accuracy_error_measure(&e->own_colour).mean);
+    cJSON_AddNumberToObject(row, "own_alpha_mean", accuracy_error_measure(&e->own_alpha).mean);
     cJSON_AddNumberToObject(row, "fine_colour_mean", accuracy_error_measure(&e->fine_colour).mean);
     cJSON_AddNumberToObject(row, "fine_alpha_mean", accuracy_error_measure(&e->fine_alpha).mean);
     cJSON_AddNumberToObject(row, "fine_ms", e->fine_ms / m->options->views);
@@ -307,7 +320,7 @@ int bench_levels(const session *s, const bench_options *o, bench_report *r)
             trip_fail(TRIP_ERROR, "bench", o->input,
                       "has no coarse levels for %s; `triptych brick --levels-for both` makes them",
                       o->settings.classify == TRIP_CLASSIFY_POST ? "post" : "pre");
-    bench_progress_expect(o->progress, (int)m.levels * o->views * 5 + 2 * (DOLLY_STEPS + 1));
+    bench_progress_expect(o->progress, (int)m.levels * o->views * 6 + 2 * (DOLLY_STEPS + 1));
     if (!status)
         status = measure_levels(&m);
     if (!status)

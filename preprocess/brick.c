@@ -194,8 +194,9 @@ static int summarise_done(brick *b)
 
 static int open_output(brick *b)
 {
-    const trip_block_form form = { b->format.tile_log2, b->codes.code_bytes,
-                                   b->codes.normal_bytes };
+    const trip_block_form form = { .tile_log2 = b->format.tile_log2,
+                                   .code_bytes = b->codes.code_bytes,
+                                   .normal_bytes = b->codes.normal_bytes };
     int status = open_writer(b);
     if (status == 0)
         status = open_splatter(b);
@@ -334,7 +335,6 @@ static int make_levels(brick *b)
                              .kinds = b->kinds,
                              .quantiser = b->codes.quantiser,
                              .compact = b->codes.normal_bytes == 3 ? &b->codes.compact : NULL,
-                             .code_bytes = b->codes.code_bytes,
                              .index_to_world = b->in.info->index_to_world,
                              .levels = b->levels,
                              .value_min = b->in.tally->value_min,

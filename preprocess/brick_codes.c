@@ -19,14 +19,28 @@ static void include_background(trip_quantiser *q, const trip_brick_input *in)
     }
 }
 
+/* Coarse levels hold values sharpened (sharpen.h), which may leave the range. Integers have the
+ * range of their type in 16 bits, each a code or more. */
+static void make_room(trip_quantiser *q, const trip_brick_input *in)
+{
+    const double room = (q->hi - q->lo) / 4;
+    if (q->bytes) {
+        trip_quantiser_set_bytes(q, q->lo, q->hi);
+    } else if (!trip_brick_has_narrow_type(in)) {
+        q->lo -= room;
+        q->hi += room;
+    }
+}
+
 void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in, double lo,
                                 double hi)
 {
     hi = hi > lo ? hi : lo + 1;
     c->quantiser = (trip_quantiser){ lo, hi, trip_brick_gradient_full(in, lo, hi),
                                      trip_gradient_unit(&in->info->index_to_world),
-                                     trip_brick_rounds_codes(in) };
+                                     trip_brick_code_bytes(in) == 1 };
     include_background(&c->quantiser, in);
+    make_room(&c->quantiser, in);
 }
 
 static void choose_range(trip_brick_codes *c, const trip_brick_input *in)

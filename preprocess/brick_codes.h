@@ -14,7 +14,8 @@ typedef struct trip_brick_codes {
 
 /* Chooses how to encode the values and normals of the input, after the scan if there is one. Codes
  * cover the range of types of 8 or 16 bits that are not rounded, else the range of the values, if
- * that was scanned; else it is to be set before values are quantised. */
+ * that was scanned; else it is to be set before values are quantised. There are codes below and
+ * above those of values of 8 bits, and of numbers that are no integers of 16. */
 void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in);
 /* Codes cover [lo, hi], the values, and the background of a sparse volume where that is not much
  * farther off than values are apart. */

@@ -143,12 +143,14 @@ void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
 static bool are_bytes_exact(const trip_brick_input *in)
 {
     trip_quantiser q = { 0 };
+    double lo, hi;
     if (!has_byte_type(in))
         return false;
-    trip_brick_type_range(in->info, &q.lo, &q.hi);
+    trip_brick_type_range(in->info, &lo, &hi);
+    trip_quantiser_set_bytes(&q, lo, hi);
     for (int stored = in->info->type == TRIP_I8 ? -128 : 0, i = 0; i < 256; i++) {
         double value = in->info->slope * (stored + i) + in->info->inter;
-        if (trip_quantise(&q, (float)value) % TRIP_BYTE_CODE)
+        if (trip_quantise(&q, (float)value) % TRIP_CODE_STEP)
             return false;
     }
     return true;

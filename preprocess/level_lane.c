@@ -268,7 +268,8 @@ int trip_level_lane_emit_means(trip_level_lane *l, const trip_level_work *w, uin
 
 static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *voxel)
 {
-    return w->params->code_bytes == 1 ? (voxel->value + 128u) / 257 * 257 : voxel->value;
+    const unsigned step = w->params->quantiser.bytes ? TRIP_CODE_STEP : 1;
+    return (voxel->value + step / 2) / step * step;
 }
 
 int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,

@@ -377,9 +377,8 @@ static int create_file(making *m, trip_output *file)
 
 static void open_sharpen(making *m)
 {
-    const double least = m->work.scale.lo, most = m->work.scale.lo + m->work.scale.width;
     trip_sharpen_open(&m->sharpen, m->file, m->work.params->kinds.means, m->work.edge_log2,
-                      (uint16_t)ceil(least), (uint16_t)floor(most), m->budget);
+                      m->budget);
 }
 
 static void close_making(making *m)

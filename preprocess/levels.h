@@ -24,7 +24,6 @@ typedef struct trip_levels_params {
     trip_level_kinds kinds;   /* values: where level 0 has a halo */
     trip_quantiser quantiser;
     const trip_compact_normals *compact; /* how normals of 3 bytes are encoded; NULL: they have 4 */
-    unsigned code_bytes;                 /* of values */
     int64_t dims[3];                     /* of level 0 */
     trip_affine index_to_world;
     unsigned levels;

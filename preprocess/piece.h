@@ -17,6 +17,7 @@
 #include <stdint.h>
 
 #include "budget.h"
+#include "format.h"
 
 /* Lists by number: of kept voxels along X, Y and Z, then of their halo. */
 enum { TRIP_HALO_LISTS = 3, TRIP_MOST_LISTS = 6 };
@@ -37,17 +38,25 @@ typedef struct trip_quantiser {
     double lo, hi;
     double gradient_full; /* of 4-byte normals (normal.h) */
     double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
-    bool rounds;          /* to multiples of TRIP_BYTE_CODE, which 8 bits hold */
+    bool bytes;           /* only those codes that 8 bits stand for (format.h) */
 } trip_quantiser;
 
-enum { TRIP_BYTE_CODE = 257 };
+/* From the values of the first and the last code that 8 bits stand for those of codes 0 and 65535.
+ */
+static inline void trip_quantiser_set_bytes(trip_quantiser *q, double first, double last)
+{
+    const double below = TRIP_CODE_FIRST * ((last - first) / 255);
+    q->lo = first - below;
+    q->hi = last + below;
+}
 
-/* The nearest code. */
+/* The nearest code; of NaN the least. */
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
 {
-    const uint32_t step = q->rounds ? TRIP_BYTE_CODE : 1, most = 65535 / step;
-    double code = (value - q->lo) * (most / (q->hi - q->lo)) + 0.5;
-    return !(code > 0) ? 0 : code >= most ? 65535 : (uint32_t)code * step; /* NaN: 0 */
+    const uint32_t step = q->bytes ? TRIP_CODE_STEP : 1, least = q->bytes ? TRIP_CODE_FIRST : 0,
+                   most = q->bytes ? TRIP_CODE_FIRST + 255 : 65535;
+    double code = (value - q->lo) * (65535 / step / (q->hi - q->lo)) + 0.5;
+    return step * (!(code > least) ? least : code >= most ? most : (uint32_t)code);
 }
 
 /* The format of all pieces that one bricking makes; those of the halo have no normals. */

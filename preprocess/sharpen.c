@@ -51,15 +51,11 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
 }
 
 void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
-                       uint16_t least, uint16_t most, trip_budget *budget)
+                       trip_budget *budget)
 {
-    *s = (trip_sharpen){ .budget = budget,
-                         .file = file,
-                         .means = means,
-                         .edge_log2 = edge_log2,
-                         .least = least,
-                         .most = most,
-                         .sheet = UINT64_MAX };
+    *s = (trip_sharpen){
+        .budget = budget, .file = file, .means = means, .edge_log2 = edge_log2, .sheet = UINT64_MAX
+    };
     for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS_HELD; i++)
         s->sheets[i].number = UINT64_MAX;
 }
@@ -236,11 +232,11 @@ static int add_around(const trip_sharpen *s, trip_sharpen_lane *l,
 }
 
 /* value + sum / TRIP_SHARPEN_PART, the nearest. */
-static uint16_t sharpened(const trip_sharpen *s, uint16_t value, int32_t sum)
+static uint16_t sharpened(uint16_t value, int32_t sum)
 {
     const int32_t half = sum < 0 ? -TRIP_SHARPEN_PART / 2 : TRIP_SHARPEN_PART / 2;
     const int32_t to = value + (sum + half) / TRIP_SHARPEN_PART;
-    return (uint16_t)(to < s->least ? s->least : to > s->most ? s->most : to);
+    return (uint16_t)(to < 0 ? 0 : to > UINT16_MAX ? UINT16_MAX : to);
 }
 
 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
@@ -254,7 +250,7 @@ int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
         trip_coarse_value *voxel = &l->values[i];
         voxel->value =
-            sharpened(s, voxel->value, l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u]);
+            sharpened(voxel->value, l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u]);
     }
     return status;
 }

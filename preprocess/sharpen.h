@@ -4,12 +4,13 @@
  *
  *     value + the sum over the six voxels beside it of (value - theirs) / TRIP_SHARPEN_PART,
  *
- * those that are not there counting as equal, and within the volume's range of values. The voxels
- * come from the file that trip_level_file_append() writes, square by square. They are taken by
- * columns, the squares of a few sheets one behind the other, so that what is made of them lies
- * together in every list; of those sheets and the ones before and behind only where their squares
- * lie is held, and a few squares by each lane. One thread opens and closes it; threads take columns
- * one at a time, and sharpen them at the same time, each in a lane. */
+ * those that are not there counting as equal, and within the range of codes, which is wider than
+ * that of values (brick_codes.h). The voxels come from the file that trip_level_file_append()
+ * writes, square by square. They are taken by columns, the squares of a few sheets one behind the
+ * other, so that what is made of them lies together in every list; of those sheets and the ones
+ * before and behind only where their squares lie is held, and a few squares by each lane. One
+ * thread opens and closes it; threads take columns one at a time, and sharpen them at the same
+ * time, each in a lane. */
 #ifndef TRIP_SHARPEN_H
 #define TRIP_SHARPEN_H
 
@@ -17,7 +18,7 @@
 #include "output.h"
 
 /* An eighth would undo it for what is smooth, and would make more of noise than a tenth. */
-enum { TRIP_SHARPEN_PART = 10 };
+enum { TRIP_SHARPEN_PART = 8 };
 
 typedef struct trip_sharpen_square trip_sharpen_square;
 
@@ -59,17 +60,16 @@ typedef struct trip_sharpen {
     const trip_output *file;
     bool means; /* the file has them */
     unsigned edge_log2;
-    uint16_t least, most;
     uint64_t ahead; /* in the file: the first square that is not in a sheet below */
     trip_sharpen_sheet sheets[TRIP_SHARPEN_SHEETS_HELD]; /* by number, modulo their number */
     uint64_t sheet;                                      /* the first of the columns at hand */
     size_t next[TRIP_SHARPEN_SHEETS];                    /* square of each of their sheets */
 } trip_sharpen;
 
-/* Of a file with squares of 2^edge_log2 voxels, with means or without; values remain in [least,
- * most]. The file is complete and flushed before the first square is taken. */
+/* Of a file with squares of 2^edge_log2 voxels, with means or without. The file is complete and
+ * flushed before the first square is taken. */
 void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
-                       uint16_t least, uint16_t most, trip_budget *budget);
+                       trip_budget *budget);
 void trip_sharpen_close(trip_sharpen *s);
 
 /* What it takes of the budget later, at most, of a level of at most so many voxels. */

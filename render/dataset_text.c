@@ -166,9 +166,11 @@ int trip_dataset_text_tf(const trip_dataset_text *t, const trip_dataset *d, trip
     const char *text = string_at(t, "transfer_function");
     if (text)
         return trip_tf_parse(out, t->path, text, strlen(text));
+    const trip_file_header *h = &d->header;
+    const bool range = h->value_max > h->value_min;
     const trip_tf_point ramp[2] = {
-        { d->header.code_lo, { 0.2, 0.2, 0.2, 0.001 } },
-        { d->header.code_hi, { 1, 1, 1, 0.05 } },
+        { range ? h->value_min : h->code_lo, { 0.2, 0.2, 0.2, 0.001 } },
+        { range ? h->value_max : h->code_hi, { 1, 1, 1, 0.05 } },
     };
     return trip_tf_from_points(out, ramp, 2, false, 0);
 }

@@ -27,8 +27,8 @@ static int lists_read(const trip_camera *camera, const trip_settings *settings)
 
 static double code_bytes(const trip_dataset *data, const trip_list *list)
 {
-    const unsigned own = trip_kind_of(list->kind)->code_bytes;
-    return own ? own : data->header.code_bytes;
+    const trip_kind_info *of = trip_kind_of(list->kind);
+    return of->code_bytes && !of->steps ? of->code_bytes : data->header.code_bytes;
 }
 
 /* What is drawn, along one axis of three: by splats voxels or means, where values are interpolated

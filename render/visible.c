@@ -222,11 +222,11 @@ static void look_at_voxel(search *s, unsigned forms, const trip_visible_place *a
     }
 }
 
-static void look_at_square(search *s, const trip_run *run, const trip_block *block,
-                           const trip_square *square, unsigned forms)
+static void look_at_square(search *s, const trip_run *run, const trip_square *square,
+                           unsigned forms)
 {
     uint32_t voxels[64];
-    trip_square_voxels(block, square, voxels);
+    trip_square_voxels(square, voxels);
     s->visible->splats += square->count;
     for (uint32_t n = 0; n < square->count; n++) {
         const trip_visible_place at = { run->u + (double)trip_voxel_u(voxels[n]),
@@ -249,7 +249,7 @@ static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
         const trip_brick_box place = square_box(run, &s->squares[i]);
         const unsigned forms = forms_beyond(s, &place);
         if (forms)
-            look_at_square(s, run, &block, &s->squares[i], forms);
+            look_at_square(s, run, &s->squares[i], forms);
     }
 }
 

@@ -81,7 +81,7 @@ uint even_bits(uint n)
 real3 offset_of(trip_gl_square square, uint k, out uint code)
 {
     uint place = find_bit(square.mask_low, square.mask_high, k);
-    code = code_at(square.codes, square.least_width, k) * (uint(edge.y) == 1u ? 257u : 1u);
+    code = code_at(square.codes, square.least_width, k) * uint(edge.y);
     return real3(0.0, (square.corner & 0xffffu) + even_bits(place),
                  (square.corner >> 16) + even_bits(place >> 1));
 }

@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint voxels[]; };
 layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_sheet_square squares[]; };
 layout(r32f, binding = TRIP_GL_IMAGE) writeonly uniform image2D sheet;
-layout(location = TRIP_GL_SHEET) uniform uvec2 form; // the first square, bytes of a code
+layout(location = TRIP_GL_SHEET) uniform uvec2 form; // the first square, step of codes
 
 #include "code.glsl"
 
@@ -25,7 +25,7 @@ void main()
     if ((word & bit) == 0u)
         return;
     uint before = uint(bitCount(word & (bit - 1u))) + (n < 32u ? 0u : uint(bitCount(square.mask_low)));
-    uint code = code_at(square.codes, square.least_width, before) * (form.y == 1u ? 257u : 1u);
+    uint code = code_at(square.codes, square.least_width, before) * form.y;
     uvec2 place = uvec2(square.corner, square.corner >> 16) + uvec2(even_bits(n), even_bits(n >> 1));
     imageStore(sheet, ivec2(place & 0xffffu), vec4(code));
 }

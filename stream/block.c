@@ -2,8 +2,6 @@
 
 #include <string.h>
 
-enum { CODE_STEP = 257 /* between the 16-bit codes that 8-bit ones stand for */ };
-
 /* A voxel's u and v in its square, by its Morton number. */
 #define PLACE(n)                                                                                   \
     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4) | ((n)&2) << 7 | ((n)&8) << 6 | ((n)&32) << 5)
@@ -136,6 +134,7 @@ trip_block trip_block_make(const trip_block_form *f, uint32_t records, uint32_t 
                      .present_words = trip_block_present_words(f->tile_log2),
                      .code_bytes = f->code_bytes,
                      .normal_bytes = f->normal_bytes,
+                     .step = trip_block_step(f),
                      .present = block,
                      .normals = normals };
     b.squares = count_squares(b.present, b.present_words);
@@ -188,19 +187,27 @@ static bool pack_bytes(const uint32_t *voxels, uint32_t count, unsigned char *co
 {
     uint32_t rest = 0;
     for (uint32_t i = 0; i < count; i++) {
-        uint32_t code = trip_voxel_code(voxels[i]);
-        codes[i] = (unsigned char)code;
-        rest |= code ^ (code & 255) * CODE_STEP;
+        const uint32_t code = trip_voxel_code(voxels[i]);
+        codes[i] = (unsigned char)(code / TRIP_CODE_STEP - TRIP_CODE_FIRST);
+        rest |= code ^ (codes[i] + TRIP_CODE_FIRST) * TRIP_CODE_STEP;
     }
     return rest == 0;
 }
 
+static bool are_steps(const uint32_t *voxels, uint32_t count, uint32_t step)
+{
+    uint32_t rest = 0;
+    for (uint32_t i = 0; i < count; i++)
+        rest |= trip_voxel_code(voxels[i]) % step;
+    return rest == 0;
+}
+
 /* The form that fits the codes. */
-static uint32_t form_of(const uint32_t *voxels, uint32_t count)
+static uint32_t form_of(const uint32_t *voxels, uint32_t count, uint32_t step)
 {
     uint32_t least = UINT16_MAX, most = 0;
     for (uint32_t i = 0; i < count; i++) {
-        uint32_t code = trip_voxel_code(voxels[i]);
+        uint32_t code = trip_voxel_code(voxels[i]) / step;
         least = code < least ? code : least;
         most = code > most ? code : most;
     }
@@ -209,14 +216,14 @@ static uint32_t form_of(const uint32_t *voxels, uint32_t count)
 }
 
 /* A square's codes; returns the bytes. */
-static uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t form,
+static uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t step, uint32_t form,
                             unsigned char *out)
 {
     const uint32_t least = form & UINT16_MAX, width = width_of(form);
     uint64_t bits = 0;
     uint32_t filled = 0, bytes = 0;
     for (uint32_t i = 0; i < count; i++) {
-        bits |= (uint64_t)(trip_voxel_code(voxels[i]) - least) << filled;
+        bits |= (uint64_t)(trip_voxel_code(voxels[i]) / step - least) << filled;
         for (filled += width; filled >= 8; filled -= 8, bits >>= 8)
             out[bytes++] = (unsigned char)bits;
     }
@@ -226,8 +233,8 @@ static uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t for
 }
 
 /* Forms and codes of all groups; returns the words. */
-static uint32_t pack_groups(const uint32_t *voxels, const uint64_t *masks, uint32_t squares,
-                            uint64_t *out)
+static uint32_t pack_groups(const uint32_t *voxels, uint32_t step, const uint64_t *masks,
+                            uint32_t squares, uint64_t *out)
 {
     const uint32_t head = form_words(count_groups(masks, squares));
     void *forms_at = out, *codes_at = out + head;
@@ -236,10 +243,10 @@ static uint32_t pack_groups(const uint32_t *voxels, const uint64_t *masks, uint3
     out[head - 1] = 0;
     for (uint32_t i = 0; i < squares; form++) {
         const uint32_t end = group_end(masks, squares, i);
-        *form = form_of(voxels, count_records(masks + i, end - i));
+        *form = form_of(voxels, count_records(masks + i, end - i), step);
         for (; i < end; i++) {
             const uint32_t count = trip_bits_set(masks[i]);
-            bytes += pack_square(voxels, count, *form, codes + bytes);
+            bytes += pack_square(voxels, count, step, *form, codes + bytes);
             voxels += count;
         }
     }
@@ -259,8 +266,12 @@ uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels, uint3
     uint32_t words = code_words(count);
     if (squares == 0)
         return 0;
-    if (f->code_bytes != 1)
-        return present + squares + pack_groups(voxels, block + present, squares, behind);
+    if (f->code_bytes != 1) {
+        const uint32_t step = trip_block_step(f);
+        return are_steps(voxels, count, step)
+                   ? present + squares + pack_groups(voxels, step, block + present, squares, behind)
+                   : 0;
+    }
     behind[words - 1] = 0;
     return pack_bytes(voxels, count, (unsigned char *)behind) ? present + squares + words : 0;
 }
@@ -301,9 +312,10 @@ uint32_t trip_block_squares(const trip_block *b, trip_square squares[TRIP_BLOCK_
     const unsigned char *codes = behind;
     for (uint32_t i = 0; i < n; i++) {
         trip_square *s = &squares[i];
-        const uint32_t form = packed ? forms[s->least] : 8u << 16;
+        const uint32_t form = packed ? forms[s->least] : TRIP_CODE_FIRST | 8u << 16;
         s->least = form & UINT16_MAX;
         s->width = width_of(form);
+        s->step = b->step;
         s->codes = codes;
         codes += trip_square_code_bytes(s);
     }
@@ -327,16 +339,17 @@ static void unpack_square(const trip_square *s, uint16_t above[64])
 
 void trip_square_codes(const trip_square *s, uint16_t codes[64])
 {
-    if (s->width == 8 && s->least == 0) {
+    const uint32_t least = s->least, step = s->step;
+    if (s->width == 8) {
         unsigned char bytes[64]; /* a copy, which compilers then know to be apart */
         memcpy(bytes, s->codes, s->count);
         for (uint32_t i = 0; i < s->count; i++)
-            codes[i] = bytes[i];
+            codes[i] = (uint16_t)((bytes[i] + least) * step);
         return;
     }
     unpack_square(s, codes);
     for (uint32_t i = 0; i < 64; i++)
-        codes[i] = (uint16_t)(codes[i] + s->least);
+        codes[i] = (uint16_t)((codes[i] + least) * step);
 }
 
 /* ---- checking ---- */
@@ -433,7 +446,8 @@ static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
         least = codes[i] < least ? codes[i] : least;
         most = codes[i] > most ? codes[i] : most;
     }
-    return least * CODE_STEP >= brick->code_min && most * CODE_STEP <= brick->code_max;
+    return (least + TRIP_CODE_FIRST) * TRIP_CODE_STEP >= brick->code_min &&
+           (most + TRIP_CODE_FIRST) * TRIP_CODE_STEP <= brick->code_max;
 }
 
 /* Codes are looked at where the width's bits could say more than the brick's range has. */
@@ -441,14 +455,14 @@ static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
 {
     uint16_t above[64];
     uint32_t most = 0;
-    if (s->least < brick->code_min)
+    if (s->least * s->step < brick->code_min)
         return false;
-    if (s->least + (1u << s->width) - 1 <= brick->code_max)
+    if ((s->least + (1u << s->width) - 1) * s->step <= brick->code_max)
         return true;
     unpack_square(s, above);
     for (uint32_t i = 0; i < s->count; i++)
         most = above[i] > most ? above[i] : most;
-    return s->least + most <= brick->code_max;
+    return (s->least + most) * s->step <= brick->code_max;
 }
 
 static bool are_codes_within(const trip_block *b, const trip_file_brick *brick)
@@ -509,14 +523,13 @@ uint32_t trip_square_corner(const trip_square *s)
     return corner_of(s->number);
 }
 
-void trip_square_voxels(const trip_block *b, const trip_square *s, uint32_t voxels[64])
+void trip_square_voxels(const trip_square *s, uint32_t voxels[64])
 {
-    const uint32_t step = b->code_bytes == 1 ? CODE_STEP : 1;
     uint16_t codes[64];
     trip_square_codes(s, codes);
     square_places(s->mask, corner_of(s->number), 0, s->count, voxels);
     for (uint32_t i = 0; i < s->count; i++)
-        voxels[i] |= codes[i] * step << 16;
+        voxels[i] |= (uint32_t)codes[i] << 16;
 }
 
 /* Adds codes of 16 bits to the places of all records from `first` on. */
@@ -527,7 +540,7 @@ static void add_codes(const trip_block *b, uint32_t first, uint32_t count, uint3
     if (b->code_bytes == 1) {
         const unsigned char *from = trip_block_codes(b) + first;
         for (uint32_t i = 0; i < count; i++)
-            voxels[i] |= (uint32_t)from[i] * CODE_STEP << 16;
+            voxels[i] |= (uint32_t)(from[i] + TRIP_CODE_FIRST) * TRIP_CODE_STEP << 16;
         return;
     }
     const uint32_t n = trip_block_squares(b, squares);

@@ -39,23 +39,25 @@ enum {
 /* What the header says of all blocks, and a list's kind of its own. */
 typedef struct trip_block_form {
     unsigned tile_log2, code_bytes, normal_bytes;
+    bool steps; /* of 2 bytes: codes are whole steps, and these are what is packed */
 } trip_block_form;
 
 typedef struct trip_block {
     uint32_t count, words; /* records; length */
     uint32_t squares;      /* present */
     unsigned present_words, code_bytes, normal_bytes;
+    unsigned step; /* from one code to the next */
     const uint64_t *present, *masks;
     const unsigned char *normals; /* NULL without that plane */
 } trip_block;
 
 /* A square of a block, and where its codes lie: they are `least` and what the width's bits say
- * above it; 257 times that with code_bytes 1. */
+ * above it, times `step`. */
 typedef struct trip_square {
     uint64_t mask;
     uint32_t number;       /* Morton number in the tile */
     uint32_t first, count; /* records of the run */
-    uint32_t least, width;
+    uint32_t least, width, step;
     const unsigned char *codes;
 } trip_square;
 
@@ -75,8 +77,14 @@ static inline uint32_t trip_bits_set(uint64_t x)
 
 static inline trip_block_form trip_block_form_of(const trip_file_header *h, trip_kind kind)
 {
-    unsigned own = trip_kind_of(kind)->code_bytes;
-    return (trip_block_form){ h->tile_log2, own ? own : h->code_bytes, h->normal_bytes };
+    const trip_kind_info *of = trip_kind_of(kind);
+    return (trip_block_form){ h->tile_log2, of->code_bytes ? of->code_bytes : h->code_bytes,
+                              h->normal_bytes, of->steps && h->code_bytes == 1 };
+}
+
+static inline unsigned trip_block_step(const trip_block_form *f)
+{
+    return f->code_bytes == 1 || f->steps ? TRIP_CODE_STEP : 1;
 }
 
 static inline unsigned trip_block_present_words(unsigned tile_log2)
@@ -98,7 +106,7 @@ trip_block trip_block_make(const trip_block_form *f, uint32_t records, uint32_t 
 
 /* Packs `count` voxels, at least 1, in Morton order of (u, v), all within the tile; there is room
  * for the tile's largest block. Returns the words; 0 when voxels are out of order or out of the
- * tile, or code_bytes is 1 and a code is no multiple of 257. */
+ * tile, or a code is none of those that the form has. */
 uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels, uint32_t count,
                          uint64_t *block);
 /* Packs normals from 32 bits each. */
@@ -123,13 +131,13 @@ static inline uint32_t trip_square_code_bytes(const trip_square *s)
 {
     return (s->count * s->width + 7) / 8;
 }
-/* The codes of a square as they are in the file: of 8 bits with code_bytes 1. */
+/* The 16-bit codes of a square. */
 void trip_square_codes(const trip_square *s, uint16_t codes[64]);
 
 /* u and v of a square's corner in the tile, as a voxel with code 0. */
 uint32_t trip_square_corner(const trip_square *s);
 /* The records of a square of the block, as voxels with u and v in the tile and 16-bit codes. */
-void trip_square_voxels(const trip_block *b, const trip_square *s, uint32_t voxels[64]);
+void trip_square_voxels(const trip_square *s, uint32_t voxels[64]);
 
 /* Records [first, first + count) of a checked block, as voxels with u and v in the tile and 16-bit
  * codes. */

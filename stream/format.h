@@ -1,4 +1,4 @@
-/* The bytes of a data set on disk, `NAME.trip/`, format version 4; FORMAT.md describes the same for
+/* The bytes of a data set on disk, `NAME.trip/`, format version 5; FORMAT.md describes the same for
  * people. Fixed width, little-endian, no pointers; reserved bits are zero and refused otherwise.
  *
  *   index.trip               header, list descriptors, slabs, bricks, runs, page checksums, text
@@ -25,7 +25,7 @@
 #include <stdint.h>
 
 #define TRIP_MAGIC "TRIPTYCH"
-#define TRIP_FORMAT_VERSION 4
+#define TRIP_FORMAT_VERSION 5
 #define TRIP_HEADER_BYTES 1024
 #define TRIP_LISTS_MAX 4096
 #define TRIP_RECORD_BYTES 4 /* of a voxel, and of a normal, in memory */
@@ -127,7 +127,12 @@ static_assert(sizeof(trip_file_brick) == 24, "brick size");
 static_assert(sizeof(trip_file_run) == 4, "run size");
 
 /* A voxel in memory: byte 0 u within the tile, byte 1 v within the tile, bytes 2-3 the 16-bit code.
- * An 8-bit code c of the file stands for 257 c. */
+ * An 8-bit code c of the file stands for (c + TRIP_CODE_FIRST) TRIP_CODE_STEP. */
+enum {
+    TRIP_CODE_STEP = 85,   /* of the 65536 codes there are 771 steps, */
+    TRIP_CODE_FIRST = 258, /* of which as many lie below those of 8 bits as above */
+};
+
 static inline uint32_t trip_voxel_pack(unsigned u, unsigned v, unsigned code)
 {
     return (uint32_t)u | (uint32_t)v << 8 | (uint32_t)code << 16;

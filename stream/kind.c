@@ -28,6 +28,8 @@ static const trip_kind_info kinds[TRIP_KINDS] = {
                            .plane_names = { "values" },
                            .planes = 1u << TRIP_PLANE_VOXELS,
                            .lattice = true,
+                           .code_bytes = 2,
+                           .steps = true,
                            .coarse = true },
 };
 

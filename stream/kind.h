@@ -22,6 +22,7 @@ typedef struct trip_kind_info {
     /* Of its codes; 0: the header's. The lowest axis_bits of them belong to the list's axis, so
      * that lists along other axes hold others. */
     unsigned code_bytes, axis_bits;
+    bool steps;   /* its codes are whole steps where the header's have 8 bits */
     bool coarse;  /* at levels above 0 alone */
     double reach; /* how far a splat reaches from its voxel, as multiple of the kernel radius */
 } trip_kind_info;

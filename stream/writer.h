@@ -34,7 +34,7 @@ typedef struct trip_writer_codes {
 typedef struct trip_writer_params {
     bool replace;          /* an existing NAME.trip is replaced; otherwise refused */
     bool halo;             /* the default lists have halos */
-    unsigned code_bytes;   /* 1, for codes that are multiples of 257, or 2 (default) */
+    unsigned code_bytes;   /* 1, for codes that 8 bits can stand for (format.h), or 2 (default) */
     unsigned normal_bytes; /* 3 or 4; 0: no normals */
     unsigned tile_voxels;  /* 16, 32, 64 (default) or 128 */
     unsigned slab_sheets;  /* default 8 */

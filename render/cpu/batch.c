@@ -23,20 +23,21 @@ static bool may_read_behind(const trip_batch *batch, int plane, const unsigned c
            batch->plane_bytes[plane];
 }
 
-/* Copies what of the square's records is drawn: the codes, unpacked, and normals of some of its
- * voxels. */
+/* Copies what of the square's records is drawn: the codes, unpacked where they are not bytes, and
+ * normals of some of its voxels. */
 static void keep_drawn(trip_cpu_worker *w, const trip_block *b, const trip_square *at,
                        uint64_t drawn, trip_cpu_square *s)
 {
     unsigned char *codes = w->codes, *normals = w->normals;
     const unsigned code = b->code_bytes, normal = b->normal_bytes;
     uint16_t unpacked[64];
+    const unsigned char *from = code == 1 ? at->codes : (const unsigned char *)unpacked;
     uint32_t n = 0, k = 0;
     trip_square_codes(at, unpacked);
     for (uint64_t rest = s->mask; rest; rest &= rest - 1, k++) {
         if (!(drawn & rest & -rest))
             continue;
-        memcpy(codes + (size_t)n * code, &unpacked[k], code);
+        memcpy(codes + (size_t)n * code, from + (size_t)k * code, code);
         if (s->normals)
             memmove(normals + (size_t)n * normal, s->normals + (size_t)k * normal, normal);
         n++;

@@ -132,7 +132,7 @@ static void set_byte_rows(trip_cpu_view *view)
 {
     unsigned least = 255, most = 0, shown = 0;
     for (unsigned i = 0; i < 256; i++) {
-        view->byte_rows[i] = view->table[i * 257];
+        view->byte_rows[i] = view->table[(i + TRIP_CODE_FIRST) * TRIP_CODE_STEP];
         if (!(view->byte_rows[i].extinction > 0))
             continue;
         least = shown > 0 ? least : i;

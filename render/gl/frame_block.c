@@ -166,7 +166,7 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
         (trip_gl_double4){ { constants.sigma * constants.sigma, constants.cutoff2,
                              constants.low_pass2, constants.amplitude * c->voxel_world } };
     out->edge.v[0] = constants.edge;
-    out->edge.v[1] = frame->data->header.code_bytes;
+    out->edge.v[1] = 1;
     out->edge.v[2] = 0.5 * constants.front;
     out->depth = (trip_gl_double4){ { trip_layer_depth_unit(c, whole) * centre_length(whole) /
                                           centre_length(c),
@@ -198,7 +198,8 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
     const double *scale = planned->grid.scale;
     make(out, frame, &planned->camera, list->axis);
     set_tint(out, frame->settings, list->axis, list->level);
-    out->edge.v[1] = trip_block_form_of(&frame->data->header, list->kind).code_bytes;
+    const trip_block_form form = trip_block_form_of(&frame->data->header, list->kind);
+    out->edge.v[1] = trip_block_step(&form);
     if (trip_kind_of(list->kind)->axis_bits > 0)
         out->edge.v[3] = world_length(&planned->camera, list->axis);
     out->to_grid = in_list_axes(trip_v3(scale[0], scale[1], scale[2]), list->axis,

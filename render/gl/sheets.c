@@ -229,6 +229,7 @@ static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_r
 static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
 {
     const trip_gl_slot *slot = s->batch.slot;
+    const trip_block_form form = trip_block_form_of(&s->frame->data->header, TRIP_KIND_VOXELS);
     int status = use_program(s, TRIP_GL_PASS_SHEET_DECODE);
     if (status)
         return status;
@@ -239,7 +240,7 @@ static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
                       (GLsizeiptr)(slot->bytes - s->batch.codes_offset));
     glBindImageTexture(TRIP_GL_IMAGE, s->textures.codes, 0, GL_FALSE, s->held[s->count - 1].layer,
                        GL_WRITE_ONLY, GL_R32F);
-    glUniform2ui(TRIP_GL_SHEET, first, s->frame->data->header.code_bytes);
+    glUniform2ui(TRIP_GL_SHEET, first, trip_block_step(&form));
     glDispatchCompute(count, 1, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
     status = trip_gl_queue_end_part(s->queue);

@@ -76,7 +76,7 @@ class Axis:
             slabs.append(struct.pack("<3Q2I", first, first * EDGE ** 3, first * EDGE * BLOCK_BYTES,
                                      each, slab))
             for tile in self.tiles:
-                code = 0 if self.away(slab, tile) else 257 * VALUE
+                code = 85 * (258 + (0 if self.away(slab, tile) else VALUE))
                 bricks.append(struct.pack("<3I2H6BH", *tile, EDGE ** 3, code, code, 0, EDGE - 1, 0,
                                           EDGE - 1, 0, EDGE - 1, 0))
         runs = struct.pack("<2H", EDGE * EDGE, BLOCK_BYTES // 8) * (self.brick_count * EDGE)
@@ -109,8 +109,8 @@ def write_data_set(folder):
     checksums = struct.pack(f"<{len(pages)}Q", *pages)
     end = 1024 + len(body)
     header = bytearray(struct.pack(
-        "<8s2I4Q3Q12d4dQ3dd3Q8I4Q", b"TRIPTYCH", 4, 1024, 0, end + len(checksums), end,
-        xxh64(checksums), *DIMS, *IDENTITY, 0, 255, 0, 255, 0, 0, 0, 0, 0, VOXELS, VOXELS, 0,
+        "<8s2I4Q3Q12d4dQ3dd3Q8I4Q", b"TRIPTYCH", 5, 1024, 0, end + len(checksums), end,
+        xxh64(checksums), *DIMS, *IDENTITY, -258, 513, 0, 255, 0, 0, 0, 0, 0, VOXELS, VOXELS, 0,
         6, EDGE, 16, 1, 1, 0, 3, 0, 1024, at, 2, 0))
     header += bytes(1024 - len(header))
     struct.pack_into("<Q", header, 16, xxh64(bytes(header)))

@@ -53,7 +53,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (size < sizeof in)
         return 0;
     memcpy(&in, data, sizeof in);
-    const trip_block_form form = { 4 + in.tile_log2 % 4, 1 + in.code_bytes % 2, 0 };
+    const unsigned code_bytes = 1 + in.code_bytes % 2;
+    const trip_block_form form = { .tile_log2 = 4 + in.tile_log2 % 4,
+                                   .code_bytes = code_bytes,
+                                   .steps = code_bytes == 2 && in.code_bytes / 2 % 2 };
     const uint8_t edge = (uint8_t)((1u << form.tile_log2) - 1);
     const trip_file_brick brick = { .code_min = in.code_min,
                                     .code_max = in.code_max,

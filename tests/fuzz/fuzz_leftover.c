@@ -48,8 +48,9 @@ static void make_folder(void)
 static void take_apart(given *g, const uint8_t *data, size_t size)
 {
     static const unsigned normal_bytes[] = { 0, 3, 4 };
-    g->form =
-        (trip_block_form){ 4 + data[0] % 4, 1 + data[0] / 4 % 2, normal_bytes[data[0] / 8 % 3] };
+    g->form = (trip_block_form){ .tile_log2 = 4 + data[0] % 4,
+                                 .code_bytes = 1 + data[0] / 4 % 2,
+                                 .normal_bytes = normal_bytes[data[0] / 8 % 3] };
     g->format = (trip_piece_format){ .tile_log2 = g->form.tile_log2,
                                      .quantised = true,
                                      .normals = g->form.normal_bytes > 0 };

@@ -76,7 +76,7 @@ static void kept_voxels_are_those_of_the_envelope(void **state)
     for (int i = 0; i < N; i++) {
         bool keep = bytes[i] >= 100 && bytes[i] <= 180;
         kept += keep;
-        assert_int_equal(l.codes[0][i], keep ? 257 * bytes[i] : -1);
+        assert_int_equal(l.codes[0][i], keep ? 85 * (258 + bytes[i]) : -1);
     }
     assert_int_equal(l.header.kept, kept);
     assert_int_equal(s.kept, kept);
@@ -124,8 +124,10 @@ static void without_an_envelope_something_is_kept_and_a_function_stored(void **s
     test_free_lists(&l);
 }
 
-/* Codes of so many steps are the nearest over the whole range of the values, kept or not. */
-static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes, int steps)
+/* Codes of so many steps are the nearest over the whole range of the values, kept or not, and a
+ * share of that on either side. */
+static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes, int steps,
+                                  double room)
 {
     test_lists l;
     trip_brick_summary s;
@@ -145,14 +147,16 @@ static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes
     test_check_lists(&l);
     assert_int_equal(s.code_bytes, code_bytes);
     assert_int_equal(l.header.code_bytes, code_bytes);
-    assert_true(l.header.code_lo == lo && l.header.code_hi == hi);
+    const double range_of_values = (double)hi - lo, all = (1 + 2 * room) * range_of_values;
+    assert_true(fabs(l.header.code_lo - (lo - room * range_of_values)) < 1e-9 * all);
+    assert_true(fabs(l.header.code_hi - (hi + room * range_of_values)) < 1e-9 * all);
     assert_true(l.header.value_min == lo && l.header.value_max == hi);
     for (int i = 0; i < N; i++) {
-        double value = lo + ((double)hi - lo) * l.codes[0][i] / 65535;
+        double value = lo - room * range_of_values + all * l.codes[0][i] / 65535;
         assert_int_equal(l.codes[0][i] >= 0, floats[i] >= -1 && floats[i] <= 20);
         if (l.codes[0][i] >= 0) {
             assert_int_equal(l.codes[0][i] % (65535 / steps), 0);
-            assert_true(fabs(value - floats[i]) <= 0.5001 * ((double)hi - lo) / steps);
+            assert_true(fabs(value - floats[i]) <= 0.5001 * all / steps);
         }
     }
     test_free_lists(&l);
@@ -162,13 +166,13 @@ static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes
 static void codes_of_floats_are_of_the_range_of_all_values(void **state)
 {
     (void)state;
-    check_codes_of_floats(TRIP_CODE_BITS_AUTO, 2, 65535);
+    check_codes_of_floats(TRIP_CODE_BITS_AUTO, 2, 65535, 0.25);
 }
 
 static void codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values(void **state)
 {
     (void)state;
-    check_codes_of_floats(TRIP_CODE_BITS_8, 1, 255);
+    check_codes_of_floats(TRIP_CODE_BITS_8, 1, 771, 258.0 / 255);
 }
 
 /* The range is that of the values, not of the type, in which they would be a few codes. */
@@ -190,9 +194,9 @@ static void shorts_of_a_narrow_range_have_all_codes_of_a_byte(void **state)
     assert_int_equal(trip_brick(&p, &s), 0);
     test_read_lists("a.trip", &l);
     test_check_lists(&l);
-    assert_true(l.header.code_lo == 1000 && l.header.code_hi == 1510);
+    assert_true(l.header.code_lo == 1000 - 2 * 258 && l.header.code_hi == 1510 + 2 * 258);
     for (int i = 0; i < N; i++)
-        assert_int_equal(l.codes[0][i], 257 * (shorts[i] - 1000) / 2);
+        assert_int_equal(l.codes[0][i], 85 * (258 + (shorts[i] - 1000) / 2));
     test_free_lists(&l);
 }
 
@@ -288,7 +292,7 @@ static void codes_have_the_bytes_of_the_source(void **state)
         assert_int_equal(s.code_bytes, i == 2 ? 2 : 1);
         assert_int_equal(l.header.code_bytes, s.code_bytes);
         for (int n = 0; n < N && i < 2; n++)
-            assert_int_equal(l.codes[0][n], 257 * (i ? (int8_t)bytes[n] + 128 : bytes[n]));
+            assert_int_equal(l.codes[0][n], 85 * (258 + (i ? (int8_t)bytes[n] + 128 : bytes[n])));
         test_free_lists(&l);
     }
 }

@@ -86,7 +86,7 @@ static cube sum_cube(const int64_t at[3], unsigned level, int axis)
         double code = 0;
         if (x >= 0 && y >= 0 && z >= 0 && x < NX && y < NY && z < NZ &&
             known[(z * NY + y) * NX + x]) {
-            code = 257.0 * bytes[(z * NY + y) * NX + x];
+            code = 85.0 * (258 + bytes[(z * NY + y) * NX + x]);
             c.known++;
             c.value += code;
         }
@@ -116,8 +116,8 @@ static void expect_mean(const trip_mean_scale *scale, const cube *c, unsigned co
         assert_int_equal(code & (TRIP_MEAN_SHARES - 1), TRIP_MEAN_SHARES - 1);
 }
 
-/* The cube's mean of values, and a tenth of how much more it is than each of the six beside it that
- * have one. */
+/* The cube's mean of values, and an eighth of how much more it is than each of the six beside it
+ * that have one. */
 static double sharp_value(const int64_t at[3], unsigned level, int axis, double own)
 {
     double sum = own;
@@ -126,7 +126,7 @@ static double sharp_value(const int64_t at[3], unsigned level, int axis, double 
         to[n / 2] += n % 2 ? 1 : -1;
         cube beside = sum_cube(to, level, axis);
         if (beside.known > 0)
-            sum += (own - beside.value) / 10;
+            sum += (own - beside.value) / 8;
     }
     return fmin(65535, fmax(0, sum));
 }
@@ -158,7 +158,7 @@ static uint64_t check_list(const trip_dataset *d, const trip_list *list)
             if (list->kind == TRIP_KIND_MEANS)
                 expect_mean(&scale, &c, code, list->level);
             else
-                assert_true(fabs(code - sharp_value(at, list->level, list->axis, c.value)) < 257);
+                assert_true(fabs(code - sharp_value(at, list->level, list->axis, c.value)) < 85);
             assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : c.known > 0);
         }
         records += run.count;

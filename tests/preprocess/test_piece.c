@@ -165,9 +165,15 @@ static void codes_are_the_nearest_and_end_at_the_ends(void **state)
 static void codes_of_8_and_16_bits_are_exact(void **state)
 {
     (void)state;
-    const trip_quantiser bytes = { .lo = -128, .hi = 127 }, words = { .lo = 0, .hi = 65535 };
+    const trip_quantiser words = { .lo = 0, .hi = 65535 };
+    trip_quantiser bytes = { .bytes = true };
+    trip_quantiser_set_bytes(&bytes, -128, 127);
+    assert_true(bytes.lo == -128 - 258 && bytes.hi == 127 + 258);
     for (int value = -128; value < 128; value++)
-        assert_int_equal(trip_quantise(&bytes, value), 257 * (value + 128));
+        assert_int_equal(trip_quantise(&bytes, value), 85 * (258 + value + 128));
+    assert_int_equal(trip_quantise(&bytes, -1e30), 85 * 258);
+    assert_int_equal(trip_quantise(&bytes, NAN), 85 * 258);
+    assert_int_equal(trip_quantise(&bytes, 1e30), 85 * (258 + 255));
     for (int value = 0; value < 65536; value++)
         assert_int_equal(trip_quantise(&words, value), value);
 }

@@ -33,7 +33,9 @@ static fixture *make(void)
 /* Voxels of a tile: in some squares all, in others few, in others none. */
 static void fill(fixture *f, unsigned tile_log2, unsigned code_bytes, unsigned normal_bytes)
 {
-    f->form = (trip_block_form){ tile_log2, code_bytes, normal_bytes };
+    f->form = (trip_block_form){ .tile_log2 = tile_log2,
+                                 .code_bytes = code_bytes,
+                                 .normal_bytes = normal_bytes };
     f->count = 0;
     double share = 0, range = 256;
     for (uint32_t i = 0; i < 1u << 2 * tile_log2; i++) {
@@ -47,8 +49,8 @@ static void fill(fixture *f, unsigned tile_log2, unsigned code_bytes, unsigned n
             range = code_bytes == 1 ? 256 : exp2(17 * test_random());
         }
         double random = test_random() * range;
-        unsigned code =
-            code_bytes == 1 ? (unsigned)random * 257 : (unsigned)(65535 - fmin(random, 65535));
+        unsigned code = code_bytes == 1 ? ((unsigned)random + TRIP_CODE_FIRST) * TRIP_CODE_STEP
+                                        : (unsigned)(65535 - fmin(random, 65535));
         if (test_random() >= share)
             continue;
         f->normals[f->count] = (uint32_t)(test_random() * 0x1p24) << (normal_bytes == 4 ? 8 : 0);
@@ -163,7 +165,9 @@ static void check_staged(fixture *f, const trip_cpu_kernels *kernels, const trip
             assert_int_equal(f->staged.u[filled], 1000 + (int)trip_voxel_u(voxel));
             assert_int_equal(f->staged.v[filled], 2000 + (int)trip_voxel_v(voxel));
             assert_int_equal(f->staged.sheet[filled], 77);
-            assert_int_equal(f->staged.code[filled] * (view->code_bytes == 1 ? 257 : 1),
+            const int32_t code = f->staged.code[filled];
+            assert_int_equal(view->code_bytes == 1 ? (code + TRIP_CODE_FIRST) * TRIP_CODE_STEP
+                                                   : code,
                              trip_voxel_code(voxel));
             if (view->shading)
                 assert_int_equal((uint32_t)f->staged.normal[filled], f->normals[at]);

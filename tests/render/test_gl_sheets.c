@@ -43,11 +43,11 @@ static void make_shells(scene *s, const trip_affine *index_to_world, unsigned co
     scene_colour(s, 50001, 65535, 1, 1, 0.6, 0.8);
 }
 
-/* Whole multiples of 257, as codes of one byte are. */
+/* Codes that a byte stands for. */
 static bool coarse_shells(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     bool there = shells(user, i, j, k, code, gradient);
-    *code = *code / 257 * 257;
+    *code = TRIP_CODE_STEP * (TRIP_CODE_FIRST + *code / 257);
     return there;
 }
 

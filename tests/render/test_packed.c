@@ -22,7 +22,7 @@ static bool ball(void *user, int i, int j, int k, unsigned *code, double gradien
     gradient[0] = g.x;
     gradient[1] = g.y;
     gradient[2] = g.z;
-    *code = 257 * (128 + hash % 100);
+    *code = TRIP_CODE_STEP * (TRIP_CODE_FIRST + 128 + hash % 100);
     return trip_length(d) < 7 && trip_length(d) > 5;
 }
 
@@ -36,8 +36,9 @@ static void make(scene *s, unsigned code_bytes, unsigned normal_bytes)
                                      .code_bytes = code_bytes,
                                      .normal_bytes = normal_bytes,
                                      .voxel = ball });
-    scene_colour(s, 257 * 100, 257 * 180, 1, 0.6, 0.2, 0.3);
-    scene_colour(s, 257 * 180 + 1, 65535, 0.2, 0.5, 0.9, 0.3);
+    const int middle = TRIP_CODE_STEP * (TRIP_CODE_FIRST + 180);
+    scene_colour(s, 0, middle, 1, 0.6, 0.2, 0.3);
+    scene_colour(s, middle + 1, 65535, 0.2, 0.5, 0.9, 0.3);
 }
 
 static trip_settings lit(bool headlight)

@@ -61,7 +61,7 @@ static void make_voxels(fixture *f)
             (fixture_voxel){ .p = { (uint32_t)(i % (size_t)dims[0]),
                                     (uint32_t)(i / (size_t)dims[0] % (size_t)dims[1]),
                                     (uint32_t)(i / (size_t)(dims[0] * dims[1])) },
-                             .code = f->params.code_bytes == 1 ? (r & 255) * 257 : r & 65535,
+                             .code = f->params.code_bytes == 1 ? ((r & 255) + 258) * 85 : r & 65535,
                              .normal = (uint32_t)(r * 2654435761u >> 3) &
                                        (f->params.normal_bytes == 3 ? 0xffffff : UINT32_MAX) };
     }

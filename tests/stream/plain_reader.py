@@ -21,7 +21,8 @@ except ImportError as missing:
     sys.exit(77)
 
 KINDS = (("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values",))
-CODE_BYTES = {2: 2}  # of a kind, whatever the header says
+PACKED = (2, 3)  # kinds whose codes are packed, whatever the header says
+VALUES = 3
 
 
 def fail(name, place, why):
@@ -65,7 +66,7 @@ def read_header(index):
         index,
         0,
     )
-    if at != 328 or header["version"] != 4 or header["header_bytes"] != 1024:
+    if at != 328 or header["version"] != 5 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
     if header["reserved"] or header["reserved_scale"] or any(index[328:1024]):
         fail("index.trip", 328, "reserved bytes")
@@ -200,7 +201,7 @@ def packed_codes(name, at, masks, data):
     return codes, start
 
 
-def decode_block(header, code_bytes, name, at, block, count):
+def decode_block(header, kind, name, at, block, count):
     """(u, v, code) of the records of a block."""
     words = 4 if header["tile_log2"] == 7 else 1
     present = int.from_bytes(block[: 8 * words], "little")
@@ -214,10 +215,12 @@ def decode_block(header, code_bytes, name, at, block, count):
             fail(name, at, "empty mask")
         places += [place(64 * square + bit) for bit in range(64) if mask >> bit & 1]
     data = block[8 * (words + len(squares)) :]
-    if code_bytes == 1:
-        codes, end = [257 * code for code in data[:count]], count
+    if header["code_bytes"] == 1 and kind not in PACKED:
+        codes, end = [85 * (258 + code) for code in data[:count]], count
     else:
+        step = 85 if header["code_bytes"] == 1 and kind == VALUES else 1
         codes, end = packed_codes(name, at, masks, data)
+        codes = [step * code for code in codes]
     if len(places) != count or len(data) != (end + 7) // 8 * 8 or any(data[end:]):
         fail(name, at, "block")
     return [(u, v, code) for (u, v), code in zip(places, codes)]
@@ -276,9 +279,8 @@ def print_list(folder, index, header, number, out):
     voxels = read_plane(folder, index, header, a_list, 0)
     normals, gradient = read_normals(folder, index, header, a_list)
     tile, axis = 1 << header["tile_log2"], a_list["axis"]
-    code_bytes = CODE_BYTES.get(a_list["kind"], header["code_bytes"])
     for sheet, tile_u, tile_v, first, count, at, size in runs(index, header, a_list):
-        block = decode_block(header, code_bytes, a_list["files"][0], at, voxels[at : at + size], count)
+        block = decode_block(header, a_list["kind"], a_list["files"][0], at, voxels[at : at + size], count)
         for n, (u, v, code) in enumerate(block, first):
             where = [0, 0, 0]
             where[axis] = sheet

@@ -24,6 +24,23 @@ typedef struct run {
 
 static run shared; /* large */
 
+/* Codes of a byte, of two, and of whole steps in two. */
+enum { BYTES, CODES, STEPS, FORMS };
+
+static trip_block_form form_of(unsigned tile_log2, int form)
+{
+    return (trip_block_form){ .tile_log2 = tile_log2,
+                              .code_bytes = form == BYTES ? 1 : 2,
+                              .steps = form == STEPS };
+}
+
+static uint32_t random_code(const trip_block_form *f, uint64_t random)
+{
+    return f->code_bytes == 1 ? 85 * (258 + (random & 255))
+           : f->steps         ? 85 * ((random & 65535) % 772)
+                              : random & 65535;
+}
+
 /* Each voxel of the tile with that chance, in Morton order, and the block of those. */
 static run *make_run(trip_block_form form, double density, uint64_t seed)
 {
@@ -41,7 +58,7 @@ static run *make_run(trip_block_form form, double density, uint64_t seed)
         if ((double)(random >> 40) >= density * (1 << 24) && n + 1 < edge * edge)
             continue;
         uint32_t place = by_number[n], u = place & 255, v = place >> 8;
-        uint32_t code = form.code_bytes == 1 ? (random & 255) * 257 : random & 65535;
+        uint32_t code = random_code(&form, random);
         r->voxels[r->count++] = place | code << 16;
         b->u_min = (uint8_t)(u < b->u_min ? u : b->u_min);
         b->u_max = (uint8_t)(u > b->u_max ? u : b->u_max);
@@ -66,9 +83,9 @@ static void what_is_packed_is_decoded_from_any_record_on(void **state)
     uint64_t seed = 1;
     (void)state;
     for (unsigned log2 = 4; log2 <= 7; log2++)
-        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++)
+        for (int form = 0; form < FORMS; form++)
             for (int i = 0; i < 5; i++) {
-                const run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, densities[i], i);
+                const run *r = make_run(form_of(log2, form), densities[i], i);
                 const trip_block b = block_of(r);
                 assert_true(trip_block_words_fit(&r->form, r->count, r->words));
                 assert_true(r->words <= trip_block_most_words(&r->form));
@@ -91,13 +108,13 @@ static void squares_hold_the_records_of_their_block(void **state)
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     (void)state;
     for (unsigned log2 = 4; log2 <= 7; log2++)
-        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++) {
-            const run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, 0.3, log2);
+        for (int form = 0; form < FORMS; form++) {
+            const run *r = make_run(form_of(log2, form), 0.3, log2);
             const trip_block b = block_of(r);
             const uint32_t count = trip_block_squares(&b, squares);
             for (uint32_t i = 0; i < count; i++) {
                 uint32_t voxels[64], corner = trip_square_corner(&squares[i]);
-                trip_square_voxels(&b, &squares[i], voxels);
+                trip_square_voxels(&squares[i], voxels);
                 for (uint32_t k = 0; k < squares[i].count; k++)
                     assert_int_equal(voxels[k] & 0xf8f8, corner);
                 memcpy(out + squares[i].first, voxels, squares[i].count * sizeof *voxels);
@@ -110,22 +127,28 @@ static void a_block_has_the_bytes_that_the_format_says(void **state)
 {
     (void)state;
     /* (1, 0) is voxel 1 of square 0; (9, 8) is voxel 1 of square 3, (15, 15) voxel 63. */
-    const uint32_t voxels[] = { trip_voxel_pack(1, 0, 257), trip_voxel_pack(9, 8, 514),
-                                trip_voxel_pack(15, 15, 65535) };
+    const uint32_t voxels[] = { trip_voxel_pack(1, 0, 21930), trip_voxel_pack(9, 8, 22015),
+                                trip_voxel_pack(15, 15, 43605) };
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
-    assert_int_equal(trip_block_pack(&(trip_block_form){ 4, 1, 0 }, voxels, 3, block), 4);
+    const trip_block_form bytes = form_of(4, BYTES), codes = form_of(7, CODES);
+    assert_int_equal(trip_block_pack(&bytes, voxels, 3, block), 4);
     assert_true(block[0] == 9 && block[1] == 2 && block[2] == (UINT64_C(1) << 63 | 2));
-    assert_true(block[3] == 0xff0201);
-    assert_int_equal(trip_block_pack(&(trip_block_form){ 7, 2, 0 }, voxels, 3, block), 8);
+    assert_true(block[3] == 0xff0100); /* 85 (258 + c) */
+    assert_int_equal(trip_block_pack(&codes, voxels, 3, block), 8);
     assert_true(block[0] == 9 && !block[1] && !block[2] && !block[3] && block[4] == 2);
-    assert_true(block[6] == 0x100101);                 /* one group: from 257 on, 16 bits */
-    assert_true(block[7] == UINT64_C(0xfefe01010000)); /* above 257 */
+    assert_true(block[6] == 0x1055aa);                 /* one group: from 21930 on, 16 bits */
+    assert_true(block[7] == UINT64_C(0x54ab00550000)); /* above 21930 */
+    const trip_block_form steps = form_of(7, STEPS);
+    assert_int_equal(trip_block_pack(&steps, voxels, 3, block), 8);
+    assert_true(block[6] == 0x80102);  /* one group: from step 258 on, 8 bits */
+    assert_true(block[7] == 0xff0100); /* above that */
 }
 
 /* A square of 32 records is a group, whose codes span 31; what is left is another, of one code. */
 static void codes_are_packed_by_groups_of_squares(void **state)
 {
     uint32_t voxels[33];
+    const trip_block_form form = form_of(4, CODES);
     uint64_t block[TRIP_BLOCK_WORDS_MAX], codes[3] = { 0 };
     (void)state;
     for (uint32_t i = 0; i < 32; i++) {
@@ -136,7 +159,7 @@ static void codes_are_packed_by_groups_of_squares(void **state)
             codes[(6 * i + bit) / 64] |= (uint64_t)(above >> bit & 1) << (6 * i + bit) % 64;
     }
     voxels[32] = trip_voxel_pack(8, 8, 7);
-    assert_int_equal(trip_block_pack(&(trip_block_form){ 4, 2, 0 }, voxels, 33, block), 7);
+    assert_int_equal(trip_block_pack(&form, voxels, 33, block), 7);
     assert_true(block[0] == 9 && block[1] == UINT32_MAX && block[2] == 1);
     assert_true(block[3] == (UINT64_C(7) << 32 | 6 << 16 | 1000));
     assert_memory_equal(block + 4, codes, sizeof codes);
@@ -145,23 +168,29 @@ static void codes_are_packed_by_groups_of_squares(void **state)
 static void what_is_no_run_is_not_packed(void **state)
 {
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
-    const trip_block_form small = { 4, 2, 0 }, bytes = { 4, 1, 0 };
+    const trip_block_form small = form_of(4, CODES), bytes = form_of(4, BYTES),
+                          steps = form_of(4, STEPS);
     const uint32_t backwards[] = { trip_voxel_pack(1, 0, 0), trip_voxel_pack(0, 0, 0) };
     const uint32_t twice[] = { 5, 5 }, outside = trip_voxel_pack(16, 0, 0);
     const uint32_t far = trip_voxel_pack(128, 0, 0), odd = trip_voxel_pack(0, 0, 258);
+    const uint32_t low = trip_voxel_pack(0, 0, 85 * 257), high = trip_voxel_pack(0, 0, 85 * 514);
     (void)state;
     assert_int_equal(trip_block_pack(&small, backwards, 2, block), 0);
     assert_int_equal(trip_block_pack(&small, twice, 2, block), 0);
     assert_int_equal(trip_block_pack(&small, &outside, 1, block), 0);
     assert_int_equal(trip_block_pack(&small, &far, 1, block), 0);
     assert_int_equal(trip_block_pack(&bytes, &odd, 1, block), 0);
+    assert_int_equal(trip_block_pack(&bytes, &low, 1, block), 0);
+    assert_int_equal(trip_block_pack(&bytes, &high, 1, block), 0);
+    assert_int_equal(trip_block_pack(&steps, &odd, 1, block), 0);
+    assert_int_equal(trip_block_pack(&steps, &low, 1, block), 3);
     assert_int_equal(trip_block_pack(&small, &odd, 1, block), 3);
 }
 
 static void a_number_of_words_fits_where_squares_can_hold_the_records(void **state)
 {
-    const trip_block_form bytes = { 4, 1, 0 }; /* a word of presence, four squares */
-    const trip_block_form f = { 4, 2, 0 };     /* two groups a word, of no bits to four codes */
+    const trip_block_form bytes = form_of(4, BYTES); /* a word of presence, four squares */
+    const trip_block_form f = form_of(4, CODES); /* two groups a word, of no bits to four codes */
     (void)state;
     assert_false(trip_block_words_fit(&bytes, 0, 2));
     assert_false(trip_block_words_fit(&bytes, 1, 2));
@@ -192,8 +221,8 @@ static void how_far_a_block_goes_follows_from_what_is_there(void **state)
 {
     (void)state;
     for (unsigned log2 = 4; log2 <= 7; log2++)
-        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++) {
-            const run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, 0.1, log2);
+        for (int form = 0; form < FORMS; form++) {
+            const run *r = make_run(form_of(log2, form), 0.1, log2);
             uint64_t *part = calloc(r->words, sizeof *part); /* of which no more is read */
             uint32_t words = 0, end, parts = 0;
             assert_non_null(part);
@@ -201,7 +230,7 @@ static void how_far_a_block_goes_follows_from_what_is_there(void **state)
                 assert_true(end <= r->words);
                 memcpy(part + words, r->block + words, (end - words) * sizeof *part);
             }
-            assert_true(words == r->words && parts == 2 + code_bytes);
+            assert_true(words == r->words && parts == (form == BYTES ? 3 : 4));
             free(part);
         }
 }
@@ -219,9 +248,9 @@ static void records_outside_their_brick_are_found(void **state)
 {
     (void)state;
     for (unsigned log2 = 4; log2 <= 7; log2++)
-        for (unsigned code_bytes = 1; code_bytes <= 2; code_bytes++)
+        for (int form = 0; form < FORMS; form++)
             for (uint64_t seed = 0; seed < 8; seed++) {
-                run *r = make_run((trip_block_form){ log2, code_bytes, 0 }, 0.02, seed);
+                run *r = make_run(form_of(log2, form), 0.02, seed);
                 const trip_file_brick exact = r->brick;
                 r->brick.u_min++;
                 expect_fault(r, "outside its brick's bounds");
@@ -245,7 +274,7 @@ static void records_outside_their_brick_are_found(void **state)
 
 static void masks_that_do_not_agree_with_the_run_are_found(void **state)
 {
-    const trip_block_form f = { 6, 2, 0 };
+    const trip_block_form f = form_of(6, CODES);
     (void)state;
     run *r = make_run(f, 0.3, 3);
     r->block[0] &= r->block[0] - 1;
@@ -268,7 +297,7 @@ static void masks_that_do_not_agree_with_the_run_are_found(void **state)
     r->block[1] = 0;
     r->block[2] = both[1];
     expect_fault(r, "a mask is empty");
-    r = make_run((trip_block_form){ 4, 2, 0 }, 0.3, 3); /* squares 0 to 3; bit 63 is none of it */
+    r = make_run(form_of(4, CODES), 0.3, 3); /* squares 0 to 3; bit 63 is none of it */
     r->block[0] ^= UINT64_C(1) << 3 | UINT64_C(1) << 63;
     expect_fault(r, "outside its brick's bounds");
 }
@@ -283,7 +312,7 @@ static uint32_t *first_form(run *r)
  * bits. */
 static void forms_that_lead_astray_are_found(void **state)
 {
-    const trip_block_form f = { 6, 2, 0 };
+    const trip_block_form f = form_of(6, CODES);
     const uint32_t widths[] = { 15, 1, 17, 18, 32, 65535 };
     (void)state;
     for (int i = 0; i < 6; i++) {
@@ -310,14 +339,14 @@ static void forms_that_lead_astray_are_found(void **state)
 static void padding_that_is_not_zero_is_found(void **state)
 {
     (void)state;
-    run *r = make_run((trip_block_form){ 5, 1, 0 }, 0.1, 5);
+    run *r = make_run(form_of(5, BYTES), 0.1, 5);
     while (r->count % 8 == 0)
         r = make_run(r->form, 0.1, r->count);
     const trip_block b = block_of(r);
     assert_true(trip_block_is_padded(&b));
     r->block[r->words - 1] |= UINT64_C(1) << 63;
     assert_false(trip_block_is_padded(&b));
-    r = make_run((trip_block_form){ 4, 2, 0 }, 0, 5); /* one group, of one code */
+    r = make_run(form_of(4, CODES), 0, 5); /* one group, of one code */
     const trip_block one = block_of(r);
     assert_true(r->words == 3 && trip_block_is_padded(&one));
     r->block[2] |= UINT64_C(1) << 32;

@@ -283,7 +283,8 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->version = 1, "format version 1, which is not read any more");
     REFUSE(c.header->version = 2, "format version 2, which is not read any more");
     REFUSE(c.header->version = 3, "format version 3, which is not read any more");
-    REFUSE(c.header->version = 5, "format version 5");
+    REFUSE(c.header->version = 4, "format version 4, which is not read any more");
+    REFUSE(c.header->version = 6, "format version 6");
     REFUSE(c.header->header_bytes = 512, "header size");
     REFUSE(c.header->reserved[690] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");

@@ -41,7 +41,7 @@ static void json_has_what_programs_rely_on(void **state)
     assert_int_equal(run(arguments, output, sizeof output), 0);
     cJSON *root = cJSON_Parse(output);
     assert_non_null(root);
-    assert_true(number(root, "format_version") == 4);
+    assert_true(number(root, "format_version") == 5);
     assert_true(number(root, "value_min") == -1 && number(root, "value_max") == 2);
     assert_true(number(root, "voxels") == 6000);
     assert_true(number(root, "kept") == (double)f.count);

@@ -208,16 +208,12 @@ static const uint16_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PL
 
 /* The codes of a square's records, stretched and biased; by copies, which compilers then know to be
  * apart. */
-static void square_codes(const trip_square *at, unsigned code_bytes, trip_cpu_codes stretch,
-                         int16_t out[64])
+static void square_codes(const trip_square *at, trip_cpu_codes stretch, int16_t out[64])
 {
     uint16_t codes[64];
     int16_t biased[64];
     const uint32_t count = at->count;
     trip_square_codes(at, codes);
-    if (code_bytes == 1)
-        for (uint32_t i = 0; i < count; i++)
-            codes[i] = (uint16_t)(257 * codes[i]);
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
@@ -226,12 +222,11 @@ static void square_codes(const trip_square *at, unsigned code_bytes, trip_cpu_co
     memcpy(out, biased, sizeof *out * count);
 }
 
-static void decode_square(int16_t *to, const trip_square *at, unsigned code_bytes,
-                          trip_cpu_codes stretch)
+static void decode_square(int16_t *to, const trip_square *at, trip_cpu_codes stretch)
 {
     int16_t codes[64];
     const int16_t *next = codes;
-    square_codes(at, code_bytes, stretch, codes);
+    square_codes(at, stretch, codes);
     if (at->mask == UINT64_MAX) { /* two voxels in a row follow one another */
         for (unsigned i = 0; i < 64; i += 2)
             memcpy(to + places[i], codes + i, 2 * sizeof *codes);
@@ -265,7 +260,7 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         if (!sheet->rasters[at] || !(s->open[at] & bit))
             continue;
         decode_square(s->voxels[sheet->rasters[at]].codes + v * TRIP_CPU_RASTER_STRIDE + u, square,
-                      block->code_bytes, s->codes);
+                      s->codes);
         atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
     }
 }
