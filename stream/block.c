@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#define INLINE static inline __attribute__((always_inline))
+
 /* A voxel's u and v in its square, by its Morton number. */
 #define PLACE(n)                                                                                   \
     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4) | ((n)&2) << 7 | ((n)&8) << 6 | ((n)&32) << 5)
@@ -194,11 +196,11 @@ static bool pack_bytes(const uint32_t *voxels, uint32_t count, unsigned char *co
     return rest == 0;
 }
 
-static bool are_steps(const uint32_t *voxels, uint32_t count, uint32_t step)
+static bool are_steps(const uint32_t *voxels, uint32_t count)
 {
     uint32_t rest = 0;
     for (uint32_t i = 0; i < count; i++)
-        rest |= trip_voxel_code(voxels[i]) % step;
+        rest |= trip_voxel_code(voxels[i]) % TRIP_CODE_STEP;
     return rest == 0;
 }
 
@@ -207,16 +209,18 @@ static uint32_t form_of(const uint32_t *voxels, uint32_t count, uint32_t step)
 {
     uint32_t least = UINT16_MAX, most = 0;
     for (uint32_t i = 0; i < count; i++) {
-        uint32_t code = trip_voxel_code(voxels[i]) / step;
+        uint32_t code = trip_voxel_code(voxels[i]);
         least = code < least ? code : least;
         most = code > most ? code : most;
     }
+    least /= step;
+    most /= step;
     uint32_t width = most > least ? 32 - (uint32_t)__builtin_clz(most - least) : 0;
     return least | (width + width % 2) << 16;
 }
 
 /* A square's codes; returns the bytes. */
-static uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t step, uint32_t form,
+INLINE uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t step, uint32_t form,
                             unsigned char *out)
 {
     const uint32_t least = form & UINT16_MAX, width = width_of(form);
@@ -232,8 +236,8 @@ static uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t ste
     return bytes;
 }
 
-/* Forms and codes of all groups; returns the words. */
-static uint32_t pack_groups(const uint32_t *voxels, uint32_t step, const uint64_t *masks,
+/* Forms and codes of all groups; returns the words. `step` is a constant where it is called. */
+INLINE uint32_t pack_groups(const uint32_t *voxels, uint32_t step, const uint64_t *masks,
                             uint32_t squares, uint64_t *out)
 {
     const uint32_t head = form_words(count_groups(masks, squares));
@@ -266,12 +270,12 @@ uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels, uint3
     uint32_t words = code_words(count);
     if (squares == 0)
         return 0;
-    if (f->code_bytes != 1) {
-        const uint32_t step = trip_block_step(f);
-        return are_steps(voxels, count, step)
-                   ? present + squares + pack_groups(voxels, step, block + present, squares, behind)
-                   : 0;
-    }
+    if (f->steps && !are_steps(voxels, count))
+        return 0;
+    if (f->code_bytes != 1)
+        return present + squares +
+               (f->steps ? pack_groups(voxels, TRIP_CODE_STEP, block + present, squares, behind)
+                         : pack_groups(voxels, 1, block + present, squares, behind));
     behind[words - 1] = 0;
     return pack_bytes(voxels, count, (unsigned char *)behind) ? present + squares + words : 0;
 }
