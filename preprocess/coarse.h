@@ -35,6 +35,14 @@ static inline void trip_coarse_value_add(trip_coarse_value_sum *s, uint16_t know
     s->value += (uint64_t)known * value;
 }
 
+/* Some voxels of level 0 at once, and the sum of their codes. */
+static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_t count,
+                                               uint32_t codes)
+{
+    s->known += count * TRIP_COARSE_ALL;
+    s->value += (uint64_t)codes * TRIP_COARSE_ALL;
+}
+
 /* The known part and the value, of a sum of some. */
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out);
 

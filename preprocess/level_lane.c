@@ -89,38 +89,68 @@ static place place_of(const trip_level_work *w, const trip_level_source *square,
                     (unsigned)((x & 1) | (y & 1) << 1) | square->odd << 2 };
 }
 
-static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square,
-                      const trip_list_run *run)
+/* In a square four voxels that follow one another are of one coarse voxel; where that lies. */
+#define CELL(n)                                                                                    \
+    {                                                                                              \
+        ((n)&1) | ((n) >> 1 & 2), ((n) >> 1 & 1) | ((n) >> 2 & 2)                                  \
+    }
+#define CELLS4(n) CELL(n), CELL((n) + 1), CELL((n) + 2), CELL((n) + 3)
+static const uint8_t cells[16][2] = { CELLS4(0), CELLS4(4), CELLS4(8), CELLS4(12) };
+
+static void add_values(trip_level_lane *l, const trip_level_work *w,
+                       const trip_level_source *square, const trip_square *of)
 {
+    const uint32_t corner = trip_square_corner(of);
+    const size_t first = place_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
+    uint32_t sums[16] = { 0 };
+    uint16_t codes[64];
+    const uint16_t *code = codes;
+    trip_square_codes(of, codes);
+    for (int n = 0; n < 16 && of->mask == UINT64_MAX; n++, code += 4)
+        sums[n] = (uint32_t)code[0] + code[1] + code[2] + code[3];
+    for (uint64_t rest = of->mask; rest && of->mask != UINT64_MAX; rest &= rest - 1)
+        sums[__builtin_ctzll(rest) / 4] += *code++;
+    const uint64_t twos = of->mask - (of->mask >> 1 & UINT64_C(0x5555555555555555));
+    uint64_t counts = (twos & UINT64_C(0x3333333333333333)) + /* four bits each */
+                      (twos >> 2 & UINT64_C(0x3333333333333333));
+    for (int n = 0; n < 16; n++, counts >>= 4) {
+        const size_t at = first + ((size_t)cells[n][1] << w->edge_log2) + cells[n][0];
+        if ((counts & 15) == 0)
+            continue;
+        touch(l, at);
+        trip_coarse_value_add_whole(&l->value_sums[at], counts & 15, sums[n]);
+    }
+}
+
+static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square,
+                      const trip_block *run, const trip_square *of)
+{
+    uint32_t voxels[64], normals[64];
     double gradient[3];
-    for (uint32_t i = 0; i < run->count; i++) {
-        const uint32_t voxel = run->voxels[i];
-        const place p = place_of(w, square, trip_voxel_u(voxel), trip_voxel_v(voxel));
+    trip_square_voxels(of, voxels);
+    if (run->normals)
+        trip_block_normals(run, of->first, of->count, normals);
+    for (uint32_t i = 0; i < of->count; i++) {
+        const place p = place_of(w, square, trip_voxel_u(voxels[i]), trip_voxel_v(voxels[i]));
         if (run->normals)
-            gradient_of(w, run->normals[i], gradient);
-        trip_coarse_mean_add_whole(&l->mean_sums[p.at], (uint16_t)trip_voxel_code(voxel), p.odd,
+            gradient_of(w, normals[i], gradient);
+        trip_coarse_mean_add_whole(&l->mean_sums[p.at], (uint16_t)trip_voxel_code(voxels[i]), p.odd,
                                    run->normals ? gradient : NULL);
     }
 }
 
 static int add_run(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square)
 {
-    trip_list_run run;
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    trip_block run;
     int status = trip_list_cursor_read(square->cursor, &square->run, l->run, &run);
-    if (status < 0)
-        return status;
-    size_t last = SIZE_MAX; /* in list order those of a voxel come together */
-    for (uint32_t i = 0; i < run.count; i++) {
-        const uint32_t voxel = run.voxels[i];
-        const size_t at = place_of(w, square, trip_voxel_u(voxel), trip_voxel_v(voxel)).at;
-        if (at != last)
-            touch(l, last = at);
-        trip_coarse_value_add(&l->value_sums[at], TRIP_COARSE_ALL,
-                              (uint16_t)trip_voxel_code(voxel));
+    const uint32_t count = status == 0 ? trip_block_squares(&run, squares) : 0;
+    for (uint32_t i = 0; i < count; i++) {
+        add_values(l, w, square, &squares[i]);
+        if (l->mean_sums && square->kept)
+            add_means(l, w, square, &run, &squares[i]);
     }
-    if (l->mean_sums && square->kept)
-        add_means(l, w, square, &run);
-    return 0;
+    return status;
 }
 
 static int read_square(trip_level_lane *l, const trip_level_source *square)

@@ -63,19 +63,28 @@ static uint64_t weight_of(const summing *s, unsigned code)
     return (uint64_t)(mean * kept + 0.5);
 }
 
-static void add_run(summing *s, const trip_list_place *place, const trip_list_run *run,
-                    unsigned tile_log2)
+static void add_square(summing *s, const trip_list_place *place, const trip_square *square)
 {
     const int *dims = s->dims;
+    const unsigned tile_log2 = s->params->tile_log2;
     const uint64_t plane = (uint64_t)(place->sheet >> s->shift[2]) * (uint64_t)dims[1];
-    for (uint32_t n = 0; n < run->count; n++) {
-        uint32_t voxel = run->voxels[n];
+    uint32_t voxels[64];
+    trip_square_voxels(square, voxels);
+    for (uint32_t n = 0; n < square->count; n++) {
         uint64_t i =
-            (((uint64_t)place->brick.tile_u << tile_log2) + trip_voxel_u(voxel)) >> s->shift[0];
+            (((uint64_t)place->brick.tile_u << tile_log2) + trip_voxel_u(voxels[n])) >> s->shift[0];
         uint64_t j =
-            (((uint64_t)place->brick.tile_v << tile_log2) + trip_voxel_v(voxel)) >> s->shift[1];
-        s->weights[(plane + j) * (uint64_t)dims[0] + i] += weight_of(s, trip_voxel_code(voxel));
+            (((uint64_t)place->brick.tile_v << tile_log2) + trip_voxel_v(voxels[n])) >> s->shift[1];
+        s->weights[(plane + j) * (uint64_t)dims[0] + i] += weight_of(s, trip_voxel_code(voxels[n]));
     }
+}
+
+static void add_run(summing *s, const trip_list_place *place, const trip_block *run)
+{
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(run, squares);
+    for (uint32_t i = 0; i < count; i++)
+        add_square(s, place, &squares[i]);
 }
 
 static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *buffer,
@@ -83,7 +92,7 @@ static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *bu
 {
     trip_list_cursor *cursor;
     trip_list_place place;
-    trip_list_run run;
+    trip_block run;
     int status = trip_list_cursor_open(&cursor, w, list_of(s), odd, false, budget);
     if (status < 0)
         return status;
@@ -93,7 +102,7 @@ static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *bu
             status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
         if (status < 0)
             break;
-        add_run(s, &place, &run, s->params->tile_log2);
+        add_run(s, &place, &run);
     }
     trip_list_cursor_close(cursor);
     return status;

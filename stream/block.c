@@ -223,16 +223,16 @@ static uint32_t form_of(const uint32_t *voxels, uint32_t count, uint32_t step)
 INLINE uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t step, uint32_t form,
                             unsigned char *out)
 {
-    const uint32_t least = form & UINT16_MAX, width = width_of(form);
-    uint64_t bits = 0;
-    uint32_t filled = 0, bytes = 0;
-    for (uint32_t i = 0; i < count; i++) {
-        bits |= (uint64_t)(trip_voxel_code(voxels[i]) / step - least) << filled;
-        for (filled += width; filled >= 8; filled -= 8, bits >>= 8)
-            out[bytes++] = (unsigned char)bits;
+    const uint32_t least = form & UINT16_MAX, width = width_of(form),
+                   bytes = (count * width + 7) / 8;
+    unsigned char packed[2 * 64 + sizeof(uint64_t)];
+    for (uint32_t i = 0; i < count; i += 4) { /* four begin at a whole byte */
+        uint64_t four = 0;
+        for (uint32_t k = 0; k < 4 && i + k < count; k++)
+            four |= (uint64_t)(trip_voxel_code(voxels[i + k]) / step - least) << k * width;
+        memcpy(packed + i / 4 * width / 2, &four, sizeof four);
     }
-    if (filled > 0)
-        out[bytes++] = (unsigned char)bits;
+    memcpy(out, packed, bytes);
     return bytes;
 }
 

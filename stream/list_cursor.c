@@ -8,7 +8,6 @@
 struct trip_list_buffer {
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
 };
 
 /* At a run of a slab. The tables of the slab at hand are in memory, as they are while it is
@@ -124,7 +123,7 @@ static int enter_slab(trip_list_cursor *c)
 }
 
 int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place,
-                          trip_list_buffer *to, trip_list_run *run)
+                          trip_list_buffer *to, trip_block *out)
 {
     const trip_list_writer *l = c->list;
     const trip_file_run *r = &place->run;
@@ -136,18 +135,11 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *plac
                                   to->packed, (size_t)r->records * l->form.normal_bytes);
     if (status < 0)
         return status;
-    const trip_block block =
-        trip_block_make(&l->form, r->records, r->words, to->block, normals ? to->packed : NULL);
+    *out = trip_block_make(&l->form, r->records, r->words, to->block, normals ? to->packed : NULL);
     if (!trip_block_words_fit(&l->form, r->records, r->words) ||
-        trip_block_check(&block, &place->brick))
+        trip_block_check(out, &place->brick))
         return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,
                          "is not what was written: the disk, or another program, changed it");
-    trip_block_voxels(&block, 0, r->records, to->voxels);
-    if (normals)
-        trip_block_normals(&block, 0, r->records, to->normals);
-    *run = (trip_list_run){ .count = r->records,
-                            .voxels = to->voxels,
-                            .normals = normals ? to->normals : NULL };
     return TRIP_OK;
 }
 

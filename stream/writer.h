@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 
+#include "block.h"
 #include "budget.h"
 #include "coordinates.h"
 #include "format.h"
@@ -93,11 +94,6 @@ typedef struct trip_list_place {
 /* What a thread reads a run into. */
 typedef struct trip_list_buffer trip_list_buffer;
 
-typedef struct trip_list_run {
-    uint32_t count;
-    const uint32_t *voxels, *normals; /* as appended, in the buffer; normals may be NULL */
-} trip_list_run;
-
 /* Sheets with sheet % 2 == `odd` alone; without `normals` these are not read. */
 int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list, bool odd,
                           bool normals, trip_budget *budget);
@@ -108,8 +104,9 @@ int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place);
 int trip_list_buffer_create(trip_list_buffer **out, const trip_writer *w, trip_budget *budget);
 void trip_list_buffer_destroy(trip_list_buffer *b, trip_budget *budget);
 uint64_t trip_list_buffer_bytes(void);
+/* The run there, checked, in the buffer; its normals NULL where they are not read. */
 int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place,
-                          trip_list_buffer *to, trip_list_run *run);
+                          trip_list_buffer *to, trip_block *out);
 
 uint64_t trip_writer_bytes(const trip_writer *w);
 /* Of a list, by its number. */
