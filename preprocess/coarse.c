@@ -14,6 +14,7 @@ void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *ou
 {
     out->known = eighth(s->known);
     out->value = (uint16_t)((s->value + s->known / 2) / s->known);
+    out->least = s->kept ? (uint16_t)(UINT16_MAX - s->below) : TRIP_COARSE_NONE;
 }
 
 void trip_coarse_mean_clear(trip_coarse_mean_sum *s)

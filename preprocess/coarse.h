@@ -13,7 +13,10 @@ typedef struct trip_coarse_value {
     uint8_t u, v;   /* in its square of the sheet, along x and y */
     uint16_t known; /* the part of its voxels of level 0 that have a value: kept ones and halo */
     uint16_t value; /* their mean code */
+    uint16_t least; /* of the codes known; TRIP_COARSE_NONE unless some of its voxels were kept */
 } trip_coarse_value;
+
+enum { TRIP_COARSE_NONE = UINT16_MAX };
 
 /* What its splat needs. */
 typedef struct trip_coarse_mean {
@@ -27,23 +30,36 @@ typedef struct trip_coarse_mean {
 typedef struct trip_coarse_value_sum {
     uint64_t value;
     uint32_t known;
+    uint16_t below; /* how far the least code lies below UINT16_MAX */
+    bool kept;
 } trip_coarse_value_sum;
 
-static inline void trip_coarse_value_add(trip_coarse_value_sum *s, uint16_t known, uint16_t value)
+static inline void trip_coarse_value_add_least(trip_coarse_value_sum *s, uint16_t least, bool kept)
 {
-    s->known += known;
-    s->value += (uint64_t)known * value;
+    const uint16_t below = (uint16_t)(UINT16_MAX - least);
+    s->below = below > s->below ? below : s->below;
+    s->kept |= kept;
 }
 
-/* Some voxels of level 0 at once, and the sum of their codes. */
+/* Of the value itself, its `u` and `v` aside. */
+static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value)
+{
+    const bool kept = value->least != TRIP_COARSE_NONE;
+    s->known += value->known;
+    s->value += (uint64_t)value->known * value->value;
+    trip_coarse_value_add_least(s, kept ? value->least : value->value, kept);
+}
+
+/* Some voxels of level 0 at once: the sum of their codes and the least of them. */
 static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_t count,
-                                               uint32_t codes)
+                                               uint32_t codes, uint16_t least, bool kept)
 {
     s->known += count * TRIP_COARSE_ALL;
     s->value += (uint64_t)codes * TRIP_COARSE_ALL;
+    trip_coarse_value_add_least(s, least, kept);
 }
 
-/* The known part and the value, of a sum of some. */
+/* All but `u` and `v`, of a sum of some. */
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out);
 
 /* The same of means; cleared before the first. */

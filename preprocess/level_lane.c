@@ -1,5 +1,7 @@
 #include "level_lane.h"
 
+#include <string.h>
+
 #include "format.h"
 
 static void *carve(unsigned char *base, size_t *used, size_t bytes)
@@ -103,13 +105,15 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
     const uint32_t corner = trip_square_corner(of);
     const size_t first = place_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
     uint32_t sums[16] = { 0 };
-    uint16_t codes[64];
+    uint16_t codes[64], least[16];
     const uint16_t *code = codes;
     trip_square_codes(of, codes);
-    for (int n = 0; n < 16 && of->mask == UINT64_MAX; n++, code += 4)
-        sums[n] = (uint32_t)code[0] + code[1] + code[2] + code[3];
-    for (uint64_t rest = of->mask; rest && of->mask != UINT64_MAX; rest &= rest - 1)
-        sums[__builtin_ctzll(rest) / 4] += *code++;
+    memset(least, 255, sizeof least);
+    for (uint64_t rest = of->mask; rest; rest &= rest - 1, code++) {
+        const int n = __builtin_ctzll(rest) / 4;
+        sums[n] += *code;
+        least[n] = *code < least[n] ? *code : least[n];
+    }
     const uint64_t twos = of->mask - (of->mask >> 1 & UINT64_C(0x5555555555555555));
     uint64_t counts = (twos & UINT64_C(0x3333333333333333)) + /* four bits each */
                       (twos >> 2 & UINT64_C(0x3333333333333333));
@@ -118,7 +122,8 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
         if ((counts & 15) == 0)
             continue;
         touch(l, at);
-        trip_coarse_value_add_whole(&l->value_sums[at], counts & 15, sums[n]);
+        trip_coarse_value_add_whole(&l->value_sums[at], counts & 15, sums[n], least[n],
+                                    square->kept);
     }
 }
 
@@ -172,7 +177,7 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         const trip_coarse_value *value = &l->values_below[i];
         const place p = place_of(w, square, value->u, value->v);
         touch(l, p.at);
-        trip_coarse_value_add(&l->value_sums[p.at], value->known, value->value);
+        trip_coarse_value_add(&l->value_sums[p.at], value);
         if (!l->means_below || !l->means_below[i].kept)
             continue;
         if (w->format.normals)

@@ -100,6 +100,13 @@ int trip_level_source_next(trip_level_source *s)
     return status < 0 ? status : 0;
 }
 
+int trip_level_fail_memory(void)
+{
+    return trip_fail(
+        TRIP_ERROR, "brick", "levels",
+        "need more memory: give more with --memory, or leave them out with --levels 0");
+}
+
 int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_value *values,
                            const trip_coarse_mean *means, uint32_t count)
 {

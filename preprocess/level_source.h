@@ -47,6 +47,9 @@ void trip_level_source_close(trip_level_source *s);
  * copy of the source says where they are, and any thread may read them. */
 int trip_level_source_next(trip_level_source *s);
 
+/* Reports that there is no memory for levels. */
+int trip_level_fail_memory(void);
+
 /* Appends the voxels of a square, values before means, or without means (NULL), which is the same
  * for all of a file; keys ascend. */
 int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_value *values,

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "folder.h"
+#include "level_halo.h"
 #include "level_lane.h"
 #include "report.h"
 
@@ -25,6 +26,7 @@ typedef struct making {
     trip_level_source sources[SOURCES];
     unsigned source_count;
     trip_output *file; /* of its voxels, for its values and the next level; NULL: there is none */
+    trip_output with_halo; /* the same with the level's halo, for its values; above level 1 */
     trip_sharpen sharpen;
     uint64_t sheets_before, sheets; /* of all levels: progress */
 
@@ -113,13 +115,6 @@ unsigned trip_levels_first_list(bool halo, trip_level_kinds kinds, unsigned leve
 
 /* ---- memory ---- */
 
-static int fail_memory(void)
-{
-    return trip_fail(
-        TRIP_ERROR, "brick", "levels",
-        "need more memory: give more with --memory, or leave them out with --levels 0");
-}
-
 static uint64_t records_below(const making *m)
 {
     uint64_t records = 0;
@@ -128,12 +123,21 @@ static uint64_t records_below(const making *m)
     return records;
 }
 
+/* That of level 0 reaches all voxels beside most of level 1's; the others would make lists half as
+ * long again. */
+static bool has_halo_of_its_own(const making *m)
+{
+    return m->work.format.halo && m->level > 1;
+}
+
 /* Taken once the lists are being built. */
 static uint64_t late_bytes(const making *m)
 {
     uint64_t bytes = BUILDER_BYTES;
-    if (m->work.format.halo)
-        bytes += trip_sharpen_later_bytes(m->dims, m->work.edge_log2, records_below(m));
+    if (has_halo_of_its_own(m)) /* a kept voxel has 26 beside it */
+        bytes += trip_level_halo_bytes(m->dims, m->work.edge_log2, 27 * records_below(m));
+    else if (m->work.format.halo)
+        bytes += trip_level_places_later_bytes(m->dims, m->work.edge_log2, records_below(m));
     return bytes;
 }
 
@@ -153,7 +157,7 @@ static int open_lanes(making *m)
     m->memory = trip_budget_take(m->budget, count * m->lane_bytes);
     m->lanes = trip_budget_take(m->budget, count * sizeof *m->lanes);
     if (!m->memory || !m->lanes)
-        return fail_memory();
+        return trip_level_fail_memory();
     for (unsigned i = 0; i < count; i++)
         trip_level_lane_make(&m->lanes[i], &m->work, i, m->memory + i * m->lane_bytes);
     return 0;
@@ -326,11 +330,20 @@ static int run_lanes(making *m, trip_work work)
     return status;
 }
 
+static int add_halo(making *m)
+{
+    int status = trip_level_halo_add(m->file, m->work.params->kinds.means, &m->with_halo, m->dims,
+                                     m->work.edge_log2, m->budget);
+    return status == 0 ? trip_output_flush(&m->with_halo) : status;
+}
+
 static int make_level(making *m)
 {
     int status = run_lanes(m, make_squares);
     if (status == 0 && m->file)
         status = trip_output_flush(m->file);
+    if (status == 0 && has_halo_of_its_own(m))
+        status = add_halo(m);
     if (status == 0 && m->work.format.halo)
         status = run_lanes(m, make_values);
     if (status == 0)
@@ -364,9 +377,8 @@ static int open_file(making *m, const trip_output *below)
 }
 
 /* A file without a name. */
-static int create_file(making *m, trip_output *file)
+static int create_file(const making *m, trip_output *file)
 {
-    m->file = file;
     return trip_output_create(file,
                               &(trip_output_params){ .folder = m->work.params->folder,
                                                      .name = TRIP_SPOOL_NAME,
@@ -375,16 +387,20 @@ static int create_file(making *m, trip_output *file)
                               m->budget);
 }
 
-static void open_sharpen(making *m)
+static int open_sharpen(making *m)
 {
-    trip_sharpen_open(&m->sharpen, m->file, m->work.params->kinds.means, m->work.edge_log2,
-                      m->budget);
+    const bool own = has_halo_of_its_own(m);
+    int status = own ? create_file(m, &m->with_halo) : 0;
+    trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file,
+                      m->work.params->kinds.means && !own, m->work.edge_log2, m->budget);
+    return status;
 }
 
 static void close_making(making *m)
 {
     trip_list_builder_destroy(m->work.builder);
     trip_sharpen_close(&m->sharpen);
+    trip_output_close(&m->with_halo);
     for (unsigned i = 0; i < m->source_count; i++)
         trip_level_source_close(&m->sources[i]);
     if (m->lanes)
@@ -400,9 +416,9 @@ static int make(making *m, const trip_output *below, trip_output *file)
     const bool halo = m->work.format.halo;
     int status = m->work.lists ? open_lists(m) : open_file(m, below);
     if (status == 0 && (m->level < m->work.params->levels || halo))
-        status = create_file(m, file);
+        status = create_file(m, m->file = file);
     if (status == 0 && halo)
-        open_sharpen(m);
+        status = open_sharpen(m);
     if (status == 0)
         status = open_lanes(m);
     if (status == 0)
@@ -415,6 +431,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     *m =
         (making){ .budget = budget,
                   .level = level,
+                  .with_halo = { .fd = -1 },
                   .first_list = trip_levels_first_list(params->format.halo, params->kinds, level) };
     trip_level_work *w = &m->work;
     w->params = params;
@@ -437,7 +454,7 @@ int trip_levels_make(const trip_levels_params *params, trip_budget *budget)
     trip_output files[2] = { { .fd = -1 }, { .fd = -1 } };
     making *m = trip_budget_take(budget, sizeof *m);
     uint64_t sheets = 0, before = 0;
-    int status = m ? 0 : fail_memory();
+    int status = m ? 0 : trip_level_fail_memory();
     for (unsigned level = 1; level <= params->levels; level++)
         sheets += (uint64_t)((params->dims[2] - 1) >> level) + 1;
     for (unsigned level = 1; level <= params->levels && status == 0; level++) {

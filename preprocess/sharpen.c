@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "format.h"
-#include "level_source.h"
 #include "report.h"
 
 /* Squares held besides the one at hand. */
@@ -18,13 +17,6 @@ struct trip_sharpen_square {
     uint16_t *known; /* all bits, or none where there is no voxel */
     uint16_t *values;
 };
-
-static int fail_memory(void)
-{
-    return trip_fail(
-        TRIP_ERROR, "brick", "levels",
-        "need more memory: give more with --memory, or leave them out with --levels 0");
-}
 
 static void *part(unsigned char *memory, size_t *at, size_t bytes)
 {
@@ -53,105 +45,20 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
 void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
                        trip_budget *budget)
 {
-    *s = (trip_sharpen){
-        .budget = budget, .file = file, .means = means, .edge_log2 = edge_log2, .sheet = UINT64_MAX
-    };
-    for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS_HELD; i++)
-        s->sheets[i].number = UINT64_MAX;
+    *s = (trip_sharpen){ .file = file, .edge_log2 = edge_log2, .sheet = UINT64_MAX };
+    trip_level_places_open(&s->places, file, means, edge_log2, budget);
 }
 
 void trip_sharpen_close(trip_sharpen *s)
 {
-    for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS_HELD; i++)
-        if (s->sheets[i].places)
-            trip_budget_release(s->budget, s->sheets[i].places,
-                                s->sheets[i].room * sizeof *s->sheets[i].places);
+    trip_level_places_close(&s->places);
     *s = (trip_sharpen){ 0 };
-}
-
-/* ---- where squares lie ---- */
-
-enum { LEAST_ROOM = 64 };
-
-/* Sheets, in arrays that are up to twice as long as what they hold, and one that is copied. */
-uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uint64_t voxels)
-{
-    uint64_t across = (uint64_t)(dims[0] - 1) >> edge_log2;
-    uint64_t squares = (across + 1) * (((uint64_t)(dims[1] - 1) >> edge_log2) + 1);
-    if (squares > voxels)
-        squares = voxels;
-    if (squares < LEAST_ROOM)
-        squares = LEAST_ROOM;
-    return (2 * TRIP_SHARPEN_SHEETS_HELD + 1) * squares * sizeof(trip_sharpen_place);
-}
-
-static trip_sharpen_sheet *sheet_of(trip_sharpen *s, uint64_t number)
-{
-    return &s->sheets[number % TRIP_SHARPEN_SHEETS_HELD];
-}
-
-static int add_place(trip_sharpen *s, trip_sharpen_sheet *sheet, trip_sharpen_place place)
-{
-    if (sheet->count == sheet->room) {
-        const size_t room = sheet->room ? 2 * sheet->room : LEAST_ROOM,
-                     size = sizeof *sheet->places;
-        trip_sharpen_place *places = trip_budget_take(s->budget, room * size);
-        if (!places)
-            return fail_memory();
-        if (sheet->count > 0)
-            memcpy(places, sheet->places, sheet->count * size);
-        trip_budget_release(s->budget, sheet->places, sheet->room * size);
-        sheet->places = places;
-        sheet->room = room;
-    }
-    sheet->places[sheet->count++] = place;
-    return 0;
-}
-
-/* Goes on in the file until all squares of sheets up to `last` are known; at least the next one's.
- */
-static int look_ahead(trip_sharpen *s, uint64_t last)
-{
-    int status = 0;
-    while (status == 0 && s->ahead < s->file->bytes) {
-        trip_sharpen_place place = { 0 };
-        status = trip_level_file_square(s->file, s->ahead, s->edge_log2, &place.key, &place.count);
-        const uint64_t number = place.key >> TRIP_TILE_MORTON_BITS;
-        if (status < 0 || number > last)
-            break;
-        trip_sharpen_sheet *sheet = sheet_of(s, number);
-        if (sheet->number != number)
-            sheet->count = 0;
-        sheet->number = number;
-        place.at = s->ahead + TRIP_LEVEL_SQUARE_BYTES;
-        s->ahead = place.at + trip_level_voxels_bytes(place.count, s->means);
-        status = add_place(s, sheet, place);
-    }
-    return status;
-}
-
-/* NULL: it has no voxels. */
-static const trip_sharpen_place *find_place(const trip_sharpen *s, uint64_t key)
-{
-    const uint64_t number = key >> TRIP_TILE_MORTON_BITS;
-    const trip_sharpen_sheet *sheet = &s->sheets[number % TRIP_SHARPEN_SHEETS_HELD];
-    size_t first = 0, past = sheet->number == number ? sheet->count : 0;
-    while (first < past) {
-        const size_t middle = first + (past - first) / 2;
-        if (sheet->places[middle].key == key)
-            return &sheet->places[middle];
-        if (sheet->places[middle].key < key)
-            first = middle + 1;
-        else
-            past = middle;
-    }
-    return NULL;
 }
 
 /* ---- squares ---- */
 
 /* `values`: of the lane, for what is read. */
-static int read_square(const trip_sharpen *s, const trip_sharpen_place *place,
+static int read_square(const trip_sharpen *s, const trip_level_place *place,
                        trip_coarse_value *values, trip_sharpen_square *to)
 {
     int status = trip_output_read(s->file, place->at, values, place->count * sizeof *values);
@@ -166,7 +73,7 @@ static int read_square(const trip_sharpen *s, const trip_sharpen_place *place,
     return status;
 }
 
-static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
+static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place *place,
                        const trip_sharpen_square **out)
 {
     trip_sharpen_square *square =
@@ -197,7 +104,7 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
     }
 }
 
-static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sharpen_place *place,
+static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place *place,
                       size_t row, size_t count, size_t column, size_t width, ptrdiff_t shift)
 {
     const trip_sharpen_square *other;
@@ -209,8 +116,7 @@ static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_sh
 
 /* Along u and v, within the square at hand and from those around it; and from the sheets before and
  * behind. */
-static int add_around(const trip_sharpen *s, trip_sharpen_lane *l,
-                      const trip_sharpen_place beside[6])
+static int add_around(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place beside[6])
 {
     const size_t edge = (size_t)1 << s->edge_log2, last = edge - 1;
     const ptrdiff_t down = (ptrdiff_t)edge, across = (ptrdiff_t)last;
@@ -242,7 +148,7 @@ static uint16_t sharpened(uint16_t value, int32_t sum)
 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
                     const trip_sharpen_neighbourhood *of)
 {
-    const trip_sharpen_place *place = &of->square;
+    const trip_level_place *place = &of->square;
     int status = read_square(s, place, l->values, &l->squares[0]);
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     if (status == 0)
@@ -261,39 +167,14 @@ int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
 static int next_sheet(trip_sharpen *s, uint64_t *first)
 {
     const uint64_t behind = s->sheet + TRIP_SHARPEN_SHEETS;
-    uint32_t count;
-    uint64_t key;
-    int status = 0;
-    *first = UINT64_MAX;
-    if (s->sheet != UINT64_MAX && sheet_of(s, behind)->number == behind) {
+    if (s->sheet != UINT64_MAX && trip_level_places_sheet(&s->places, behind)) {
         *first = behind;
-    } else if (s->ahead < s->file->bytes) {
-        status = trip_level_file_square(s->file, s->ahead, s->edge_log2, &key, &count);
-        *first = (key >> TRIP_TILE_MORTON_BITS) / TRIP_SHARPEN_SHEETS * TRIP_SHARPEN_SHEETS;
+        return 0;
     }
+    int status = trip_level_places_next(&s->places, first);
+    if (*first != UINT64_MAX)
+        *first = *first / TRIP_SHARPEN_SHEETS * TRIP_SHARPEN_SHEETS;
     return status;
-}
-
-static int64_t even_bits(uint64_t m)
-{
-    int64_t n = 0;
-    for (int bit = 0; bit < TRIP_TILE_MORTON_BITS / 2; bit++)
-        n |= (int64_t)(m >> 2 * bit & 1) << bit;
-    return n;
-}
-
-/* Where the square is that lies so much further. */
-static trip_sharpen_place beside(const trip_sharpen *s, uint64_t key, int64_t u, int64_t v,
-                                 int64_t sheet)
-{
-    u += even_bits(key & TILE_MASK);
-    v += even_bits((key & TILE_MASK) >> 1);
-    sheet += (int64_t)(key >> TRIP_TILE_MORTON_BITS);
-    const trip_sharpen_place *place = NULL;
-    if (u >= 0 && v >= 0 && sheet >= 0)
-        place = find_place(s, (uint64_t)sheet << TRIP_TILE_MORTON_BITS |
-                                  trip_morton((uint32_t)u, (uint32_t)v));
-    return place ? *place : (trip_sharpen_place){ 0 };
 }
 
 static void find_beside(const trip_sharpen *s, trip_sharpen_neighbourhood *of)
@@ -301,17 +182,16 @@ static void find_beside(const trip_sharpen *s, trip_sharpen_neighbourhood *of)
     const uint64_t key = of->square.key;
     for (int i = 0; i < 6; i++) {
         const int step = i % 2 ? 1 : -1;
-        of->beside[i] =
-            beside(s, key, i / 2 == 0 ? step : 0, i / 2 == 1 ? step : 0, i / 2 == 2 ? step : 0);
+        of->beside[i] = trip_level_place_beside(&s->places, key, i / 2 == 0 ? step : 0,
+                                                i / 2 == 1 ? step : 0, i / 2 == 2 ? step : 0);
     }
 }
 
 /* Of a sheet of the columns at hand the square that is next; NULL: there is none. */
-static const trip_sharpen_place *next_place(const trip_sharpen *s, unsigned i)
+static const trip_level_place *next_place(const trip_sharpen *s, unsigned i)
 {
-    const uint64_t number = s->sheet + i;
-    const trip_sharpen_sheet *sheet = &s->sheets[number % TRIP_SHARPEN_SHEETS_HELD];
-    return sheet->number == number && s->next[i] < sheet->count ? &sheet->places[s->next[i]] : NULL;
+    const trip_level_sheet *sheet = trip_level_places_sheet(&s->places, s->sheet + i);
+    return sheet && s->next[i] < sheet->count ? &sheet->places[s->next[i]] : NULL;
 }
 
 /* Where the next column lies in its sheets; UINT64_MAX: there is none in those at hand. */
@@ -319,7 +199,7 @@ static uint64_t next_morton(const trip_sharpen *s)
 {
     uint64_t least = UINT64_MAX;
     for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS && s->sheet != UINT64_MAX; i++) {
-        const trip_sharpen_place *place = next_place(s, i);
+        const trip_level_place *place = next_place(s, i);
         if (place && (place->key & TILE_MASK) < least)
             least = place->key & TILE_MASK;
     }
@@ -330,7 +210,7 @@ static void take_column(trip_sharpen *s, uint64_t morton, trip_sharpen_column *c
 {
     *column = (trip_sharpen_column){ .sheet = s->sheet, .morton = morton };
     for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS; i++) {
-        const trip_sharpen_place *place = next_place(s, i);
+        const trip_level_place *place = next_place(s, i);
         if (!place || (place->key & TILE_MASK) != morton)
             continue;
         column->squares[i].square = *place;
@@ -349,7 +229,7 @@ int trip_sharpen_take(trip_sharpen *s, trip_sharpen_column *column)
             return status;
         s->sheet = first;
         memset(s->next, 0, sizeof s->next);
-        status = look_ahead(s, first + TRIP_SHARPEN_SHEETS);
+        status = trip_level_places_look_ahead(&s->places, first + TRIP_SHARPEN_SHEETS);
         if (status < 0)
             return status;
     }

@@ -15,32 +15,20 @@
 #define TRIP_SHARPEN_H
 
 #include "coarse.h"
-#include "output.h"
+#include "level_places.h"
 
 /* An eighth would undo it for what is smooth, and would make more of noise than a tenth. */
 enum { TRIP_SHARPEN_PART = 8 };
 
 typedef struct trip_sharpen_square trip_sharpen_square;
 
-typedef struct trip_sharpen_place {
-    uint64_t key, at; /* in the file: of its voxels */
-    uint32_t count;
-} trip_sharpen_place;
-
-/* The squares of a sheet, by ascending key. */
-typedef struct trip_sharpen_sheet {
-    uint64_t number;
-    trip_sharpen_place *places;
-    size_t count, room;
-} trip_sharpen_sheet;
-
 /* Sheets of a column: the first is a multiple of that. Held are those before and behind, too. */
-enum { TRIP_SHARPEN_SHEETS = 8, TRIP_SHARPEN_SHEETS_HELD = TRIP_SHARPEN_SHEETS + 2 };
+enum { TRIP_SHARPEN_SHEETS = TRIP_LEVEL_SHEETS_HELD - 2 };
 
 /* A square, and those beside it, which have no voxels where the count is 0: along u, along v, in
  * the sheets before and behind. */
 typedef struct trip_sharpen_neighbourhood {
-    trip_sharpen_place square, beside[6];
+    trip_level_place square, beside[6];
 } trip_sharpen_neighbourhood;
 
 typedef struct trip_sharpen_column {
@@ -56,14 +44,11 @@ typedef struct trip_sharpen_lane {
 } trip_sharpen_lane;
 
 typedef struct trip_sharpen {
-    trip_budget *budget;
     const trip_output *file;
-    bool means; /* the file has them */
     unsigned edge_log2;
-    uint64_t ahead; /* in the file: the first square that is not in a sheet below */
-    trip_sharpen_sheet sheets[TRIP_SHARPEN_SHEETS_HELD]; /* by number, modulo their number */
-    uint64_t sheet;                                      /* the first of the columns at hand */
-    size_t next[TRIP_SHARPEN_SHEETS];                    /* square of each of their sheets */
+    trip_level_places places;
+    uint64_t sheet;                   /* the first of the columns at hand */
+    size_t next[TRIP_SHARPEN_SHEETS]; /* square of each of their sheets */
 } trip_sharpen;
 
 /* Of a file with squares of 2^edge_log2 voxels, with means or without. The file is complete and
@@ -71,9 +56,6 @@ typedef struct trip_sharpen {
 void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
                        trip_budget *budget);
 void trip_sharpen_close(trip_sharpen *s);
-
-/* What it takes of the budget later, at most, of a level of at most so many voxels. */
-uint64_t trip_sharpen_later_bytes(const int64_t dims[3], unsigned edge_log2, uint64_t voxels);
 
 /* Lays out a lane in memory of so many bytes, zeroed and aligned to 64; with NULL it computes these
  * only. */

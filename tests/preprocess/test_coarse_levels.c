@@ -7,7 +7,7 @@
 #include "mean.h"
 #include "reader.h"
 
-enum { NX = 150, NY = 70, NZ = 41, N = NX * NY * NZ, LEAST = 200 };
+enum { NX = 300, NY = 70, NZ = 41, N = NX * NY * NZ, LEAST = 200 };
 
 static uint8_t bytes[N];
 
@@ -39,7 +39,7 @@ static void make_bytes(uint64_t seed, unsigned rare)
 {
     uint64_t random = seed;
     for (int i = 0; i < N; i++) {
-        int x = i % NX - 60, y = i / NX % NY - 30, z = i / NX / NY - 21;
+        int x = i % NX - 260, y = i / NX % NY - 30, z = i / NX / NY - 21;
         bool kept = x * x + y * y + z * z < 300 || test_random(&random) % rare == 0;
         bytes[i] =
             (uint8_t)(kept ? LEAST + test_random(&random) % 56 : test_random(&random) % LEAST);
@@ -116,17 +116,89 @@ static void expect_mean(const trip_mean_scale *scale, const cube *c, unsigned co
         assert_int_equal(code & (TRIP_MEAN_SHARES - 1), TRIP_MEAN_SHARES - 1);
 }
 
-/* The cube's mean of values, and an eighth of how much more it is than each of the six beside it
- * that have one. */
-static double sharp_value(const int64_t at[3], unsigned level, int axis, double own)
+/* What is interpolated, of a voxel of level 1 or 2, before it is sharpened. */
+typedef struct base {
+    bool kept, there;
+    double value, least; /* codes; the least is of a kept one: of the voxels known in it, or the
+                            voxels of level 1 that have none kept */
+} base;
+
+enum { MOST_LEVEL = 2, MOST = (NX / 2 + 1) * (NY / 2 + 1) * (NZ / 2 + 1) };
+
+static base bases[1 + MOST_LEVEL][MOST];
+
+static int64_t size_of(int axis, unsigned level)
 {
-    double sum = own;
+    return (((int64_t[]){ NX, NY, NZ }[axis] - 1) >> level) + 1;
+}
+
+/* NULL: beyond the grid. */
+static base *base_at(int64_t x, int64_t y, int64_t z, unsigned level)
+{
+    if (x < 0 || y < 0 || z < 0 || x >= size_of(0, level) || y >= size_of(1, level) ||
+        z >= size_of(2, level))
+        return NULL;
+    return &bases[level][(z * size_of(1, level) + y) * size_of(0, level) + x];
+}
+
+static double least_in(const int64_t at[3], unsigned level)
+{
+    double least = INFINITY;
+    for (int n = 0; n < 8; n++) {
+        const int64_t x = 2 * at[0] + n % 2, y = 2 * at[1] + n / 2 % 2, z = 2 * at[2] + n / 4;
+        const base *below = level > 1 ? base_at(x, y, z, level - 1) : NULL;
+        if (below && below->there)
+            least = fmin(least, below->kept ? below->least : below->value);
+        if (level == 1 && x < NX && y < NY && z < NZ && known[(z * NY + y) * NX + x])
+            least = fmin(least, 85.0 * (258 + bytes[(z * NY + y) * NX + x]));
+    }
+    return least;
+}
+
+/* A voxel of level 2 that covers none known, beside some that cover kept ones, has the least of
+ * those. */
+static void add_halo(const int64_t at[3], unsigned level, base *b)
+{
+    double least = INFINITY;
+    for (int n = 0; n < 27; n++) {
+        const base *beside =
+            base_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1, level);
+        if (beside && beside->kept)
+            least = fmin(least, beside->least);
+    }
+    if (level > 1 && !b->there && least < INFINITY)
+        *b = (base){ .there = true, .value = least };
+}
+
+static void find_bases(void)
+{
+    for (unsigned level = 1; level <= MOST_LEVEL; level++)
+        for (int pass = 0; pass < 2; pass++) {
+            int64_t at[3];
+            for (at[2] = 0; at[2] < size_of(2, level); at[2]++)
+                for (at[1] = 0; at[1] < size_of(1, level); at[1]++)
+                    for (at[0] = 0; at[0] < size_of(0, level); at[0]++) {
+                        base *b = base_at(at[0], at[1], at[2], level);
+                        const cube c = sum_cube(at, level, 0);
+                        if (pass == 0)
+                            *b = (base){ c.kept > 0, c.known > 0, c.value, least_in(at, level) };
+                        else
+                            add_halo(at, level, b);
+                    }
+        }
+}
+
+/* Its value, and an eighth of how much more it is than each of the six beside it that have one. */
+static double sharp_value(const int64_t at[3], unsigned level)
+{
+    const base *own = base_at(at[0], at[1], at[2], level);
+    double sum = own->value;
     for (int n = 0; n < 6; n++) {
         int64_t to[3] = { at[0], at[1], at[2] };
         to[n / 2] += n % 2 ? 1 : -1;
-        cube beside = sum_cube(to, level, axis);
-        if (beside.known > 0)
-            sum += (own - beside.value) / 8;
+        const base *beside = base_at(to[0], to[1], to[2], level);
+        if (beside && beside->there)
+            sum += (own->value - beside->value) / 8;
     }
     return fmin(65535, fmax(0, sum));
 }
@@ -155,11 +227,12 @@ static uint64_t check_list(const trip_dataset *d, const trip_list *list)
             at[(list->axis + 2) % 3] = run.v + (int64_t)trip_voxel_v(voxels[i]);
             cube c = sum_cube(at, list->level, list->axis);
             unsigned code = trip_voxel_code(voxels[i]);
+            const base *b = base_at(at[0], at[1], at[2], list->level);
             if (list->kind == TRIP_KIND_MEANS)
                 expect_mean(&scale, &c, code, list->level);
             else
-                assert_true(fabs(code - sharp_value(at, list->level, list->axis, c.value)) < 85);
-            assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : c.known > 0);
+                assert_true(fabs(code - sharp_value(at, list->level)) < 85);
+            assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : b && b->there);
         }
         records += run.count;
     }
@@ -167,15 +240,15 @@ static uint64_t check_list(const trip_dataset *d, const trip_list *list)
     return records;
 }
 
-/* How many voxels of a level cover one kept, or known. */
+/* How many voxels of a level cover one kept, or have a value. */
 static uint64_t count_cubes(const trip_list *list)
 {
     uint64_t count = 0;
     for (int64_t n = 0; n < list->dims[0] * list->dims[1] * list->dims[2]; n++) {
         const int64_t at[3] = { n % list->dims[0], n / list->dims[0] % list->dims[1],
                                 n / list->dims[0] / list->dims[1] };
-        cube c = sum_cube(at, list->level, 0);
-        count += list->kind == TRIP_KIND_MEANS ? c.kept > 0 : c.known > 0;
+        const base *b = base_at(at[0], at[1], at[2], list->level);
+        count += list->kind == TRIP_KIND_MEANS ? b->kept : b->there;
     }
     return count;
 }
@@ -188,6 +261,7 @@ static void check_data_set(const char *name, unsigned levels, unsigned lists)
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
     assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
     assert_int_equal(d->list_count, 6 + lists * levels);
+    find_bases();
     for (unsigned i = 6; i < d->list_count; i++) {
         const trip_list *list = &d->lists[i];
         uint64_t records = check_list(d, list);
@@ -206,8 +280,8 @@ static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
     for (int sparse = 0; sparse < 2; sparse++) {
         make_bytes(7, sparse ? 2000 : 3);
         trip_brick_summary s =
-            brick_to("a.trip", (trip_brick_params){ .tile_voxels = 64, .threads = 2 });
-        assert_int_equal(s.levels, 2); /* 150 voxels: 75, 38 */
+            brick_to("a.trip", (trip_brick_params){ .tile_voxels = 64, .levels = 2, .threads = 2 });
+        assert_int_equal(s.levels, 2);
         assert_true(s.level_bytes > 0 && s.level_bytes < s.bytes);
         check_data_set("a.trip", 2, 6);
     }
@@ -252,9 +326,9 @@ static void levels_are_of_what_they_are_for(void **state)
 {
     (void)state;
     make_bytes(11, 100);
-    brick_to("both.trip", (trip_brick_params){ 0 });
-    brick_to("pre.trip", (trip_brick_params){ .levels_for = TRIP_LEVELS_FOR_PRE });
-    brick_to("post.trip", (trip_brick_params){ .levels_for = TRIP_LEVELS_FOR_POST });
+    brick_to("both.trip", (trip_brick_params){ .levels = 2 });
+    brick_to("pre.trip", (trip_brick_params){ .levels = 2, .levels_for = TRIP_LEVELS_FOR_PRE });
+    brick_to("post.trip", (trip_brick_params){ .levels = 2, .levels_for = TRIP_LEVELS_FOR_POST });
     expect_same_file("both.trip/x1.means", "pre.trip/x1.means");
     expect_same_file("both.trip/y2.mean-normals", "pre.trip/y2.mean-normals");
     expect_same_file("both.trip/x1.values", "post.trip/x1.values");
@@ -276,9 +350,9 @@ static void levels_can_be_left_out_and_stop_at_one_voxel(void **state)
     assert_int_equal(s.level_bytes, 0);
     assert_false(test_exists("a.trip/x1.means"));
     s = brick_to("a.trip", (trip_brick_params){ .levels = 24 });
-    assert_int_equal(s.levels, 8); /* 2^8 voxels are more than 150 */
+    assert_int_equal(s.levels, 9); /* 2^9 voxels are more than 300 */
     s = brick_to("a.trip", (trip_brick_params){ .no_halo = true });
-    assert_int_equal(s.levels, 2);
+    assert_int_equal(s.levels, 3); /* 300 voxels: 150, 75, 38 */
     assert_true(test_exists("a.trip/x1.means"));
     assert_false(test_exists("a.trip/x1.values"));
 }
@@ -298,7 +372,7 @@ static void normals_are_those_of_the_faces(void **state)
     assert_int_equal(trip_dataset_open(&d, test_path("a.trip"), budget), 0);
     const trip_list *list = trip_dataset_find(d, 2, 1, TRIP_KIND_MEANS);
     assert_non_null(list);
-    assert_int_equal(list->records, 2 * 75 * 35);
+    assert_int_equal(list->records, 2 * 150 * 35);
     uint32_t *normals = malloc(list->plane_bytes[1]);
     assert_int_equal(pread(list->plane_fd[1], normals, list->plane_bytes[1], 0),
                      list->plane_bytes[1]);
