@@ -17,7 +17,7 @@
 #include "coarse.h"
 #include "level_places.h"
 
-/* An eighth would undo it for what is smooth, and would make more of noise than a tenth. */
+/* An eighth undoes it for what is smooth. */
 enum { TRIP_SHARPEN_PART = 8 };
 
 typedef struct trip_sharpen_square trip_sharpen_square;
