@@ -323,6 +323,15 @@ static void on_levels_progress(void *user, uint64_t done, uint64_t total)
     trip_brick_input_progress(&b->in, "levels", done, total);
 }
 
+/* Whether there is more of the volume's range above the envelope than below it. */
+static bool is_hidden_above(const brick *b)
+{
+    const trip_envelope *e = &b->in.envelope;
+    const trip_tally *t = b->in.tally;
+    return e->count > 0 && t->value_max - (double)e->intervals[e->count - 1].hi >
+                               (double)e->intervals[0].lo - t->value_min;
+}
+
 /* Of what level 0 took memory for nothing is needed any more. */
 static int make_levels(brick *b)
 {
@@ -339,6 +348,7 @@ static int make_levels(brick *b)
                              .levels = b->levels,
                              .value_min = b->in.tally->value_min,
                              .value_max = b->in.tally->value_max,
+                             .hidden_above = is_hidden_above(b),
                              .folder = b->temporary.partial_path,
                              .writer = b->writer,
                              .spill = b->temporary.spill,

@@ -14,7 +14,10 @@ void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *ou
 {
     out->known = eighth(s->known);
     out->value = (uint16_t)((s->value + s->known / 2) / s->known);
-    out->least = s->kept ? (uint16_t)(UINT16_MAX - s->below) : TRIP_COARSE_NONE;
+    out->around = s->below > UINT16_MAX - TRIP_COARSE_ALL_KEPT ? (uint16_t)(UINT16_MAX - s->below)
+                                                               : TRIP_COARSE_ALL_KEPT;
+    if (!s->kept)
+        out->around = TRIP_COARSE_NONE_KEPT;
 }
 
 void trip_coarse_mean_clear(trip_coarse_mean_sum *s)

@@ -13,10 +13,15 @@ typedef struct trip_coarse_value {
     uint8_t u, v;   /* in its square of the sheet, along x and y */
     uint16_t known; /* the part of its voxels of level 0 that have a value: kept ones and halo */
     uint16_t value; /* their mean code */
-    uint16_t least; /* of the codes known; TRIP_COARSE_NONE unless some of its voxels were kept */
+    /* Where some of its voxels were kept, the least code of those that were not, turned round
+     * (trip_coarse_turned()), for voxels beside it that have no value; or one of these. */
+    uint16_t around;
 } trip_coarse_value;
 
-enum { TRIP_COARSE_NONE = UINT16_MAX };
+enum {
+    TRIP_COARSE_NONE_KEPT = UINT16_MAX,
+    TRIP_COARSE_ALL_KEPT = UINT16_MAX - 1, /* of those known */
+};
 
 /* What its splat needs. */
 typedef struct trip_coarse_mean {
@@ -26,37 +31,45 @@ typedef struct trip_coarse_mean {
     uint32_t normal;   /* packed: of those kept, see below */
 } trip_coarse_mean;
 
+/* Codes are turned round where what is not kept lies above what is, so that what shows least has
+ * the least. */
+static inline uint16_t trip_coarse_turned(uint16_t code, bool round)
+{
+    return round ? (uint16_t)(UINT16_MAX - code) : code;
+}
+
 /* Sums over the voxels of one coarse voxel; all zero before the first. */
 typedef struct trip_coarse_value_sum {
     uint64_t value;
     uint32_t known;
-    uint16_t below; /* how far the least code lies below UINT16_MAX */
+    uint16_t below; /* how far `around` lies below UINT16_MAX, of what was not kept; 0: nothing */
     bool kept;
 } trip_coarse_value_sum;
 
-static inline void trip_coarse_value_add_least(trip_coarse_value_sum *s, uint16_t least, bool kept)
+static inline void trip_coarse_value_add_around(trip_coarse_value_sum *s, uint16_t around)
 {
-    const uint16_t below = (uint16_t)(UINT16_MAX - least);
+    const uint16_t below = (uint16_t)(UINT16_MAX - around);
     s->below = below > s->below ? below : s->below;
-    s->kept |= kept;
 }
 
-/* Of the value itself, its `u` and `v` aside. */
-static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value)
+/* A voxel of the level below. */
+static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value,
+                                         bool round)
 {
-    const bool kept = value->least != TRIP_COARSE_NONE;
+    const bool kept = value->around != TRIP_COARSE_NONE_KEPT;
     s->known += value->known;
     s->value += (uint64_t)value->known * value->value;
-    trip_coarse_value_add_least(s, kept ? value->least : value->value, kept);
+    s->kept |= kept;
+    trip_coarse_value_add_around(s, kept ? value->around : trip_coarse_turned(value->value, round));
 }
 
-/* Some voxels of level 0 at once: the sum of their codes and the least of them. */
+/* Some voxels of level 0 at once: the sum of their codes. */
 static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_t count,
-                                               uint32_t codes, uint16_t least, bool kept)
+                                               uint32_t codes, bool kept)
 {
     s->known += count * TRIP_COARSE_ALL;
     s->value += (uint64_t)codes * TRIP_COARSE_ALL;
-    trip_coarse_value_add_least(s, least, kept);
+    s->kept |= kept;
 }
 
 /* All but `u` and `v`, of a sum of some. */

@@ -9,17 +9,18 @@
 /* Squares held, in memory that is cleared once. */
 enum { HELD = 64 };
 
-/* By row, TRIP_COARSE_NONE where nothing is to be added beside. */
+/* By row; TRIP_COARSE_NONE_KEPT where there is no voxel, either. */
 typedef struct held_square {
     uint64_t key;
     bool held;
-    uint16_t *least;
+    uint16_t *around;
 } held_square;
 
 typedef struct adding {
     trip_level_places places;
     trip_output *to;
     const int64_t *dims;
+    bool round; /* `around` is turned round */
     unsigned edge_log2;
     trip_budget *budget;
     unsigned char *memory;
@@ -55,7 +56,7 @@ static size_t lay_out(adding *a, unsigned char *memory)
     a->rows = part(memory, &at, more * sizeof *a->rows);
     for (int i = 0; i < HELD; i++)
         a->squares[i] =
-            (held_square){ .least = part(memory, &at, plane * sizeof *a->squares[i].least) };
+            (held_square){ .around = part(memory, &at, plane * sizeof *a->squares[i].around) };
     return at;
 }
 
@@ -140,9 +141,9 @@ static int hold(adding *a, const trip_level_place *place, const held_square **ou
     int status = read_voxels(a, place, a->read);
     s->key = place->key;
     s->held = status == 0;
-    memset(s->least, 255, sizeof *s->least << 2 * a->edge_log2);
+    memset(s->around, 255, sizeof *s->around << 2 * a->edge_log2);
     for (uint32_t i = 0; i < place->count && status == 0; i++)
-        s->least[((size_t)a->read[i].v << a->edge_log2) + a->read[i].u] = a->read[i].least;
+        s->around[((size_t)a->read[i].v << a->edge_log2) + a->read[i].u] = a->read[i].around;
     return status;
 }
 
@@ -159,7 +160,7 @@ static void take_near(adding *a, const held_square *s, int u, int v)
     const size_t first_v = v < 0 ? edge - 1 : 0, past_v = v > 0 ? 1 : edge;
     const size_t to_u = u < 0 ? 0 : u > 0 ? edge + 1 : 1, to_v = v < 0 ? 0 : v > 0 ? edge + 1 : 1;
     for (size_t y = first_v; y < past_v; y++) {
-        const uint16_t *from = s->least + y * edge;
+        const uint16_t *from = s->around + y * edge;
         uint16_t *to = a->near + (to_v + y - first_v) * across + to_u;
         for (size_t x = first_u; x < past_u; x++)
             to[x - first_u] = lesser(to[x - first_u], from[x]);
@@ -219,10 +220,12 @@ static uint32_t merge(adding *a, uint64_t key, uint32_t own)
             const uint16_t least = a->near[y * edge + x];
             if (next < own && a->read[next].u == x && a->read[next].v == y)
                 a->values[count++] = a->read[next++];
-            else if (least != TRIP_COARSE_NONE)
-                a->values[count++] = (trip_coarse_value){
-                    .u = (uint8_t)x, .v = (uint8_t)y, .value = least, .least = TRIP_COARSE_NONE
-                };
+            else if (least < TRIP_COARSE_ALL_KEPT)
+                a->values[count++] =
+                    (trip_coarse_value){ .u = (uint8_t)x,
+                                         .v = (uint8_t)y,
+                                         .value = trip_coarse_turned(least, a->round),
+                                         .around = TRIP_COARSE_NONE_KEPT };
         }
     return count;
 }
@@ -274,10 +277,10 @@ static int add_sheets(adding *a)
     return status;
 }
 
-int trip_level_halo_add(const trip_output *from, bool means, trip_output *to, const int64_t dims[3],
-                        unsigned edge_log2, trip_budget *budget)
+int trip_level_halo_add(const trip_output *from, bool means, bool round, trip_output *to,
+                        const int64_t dims[3], unsigned edge_log2, trip_budget *budget)
 {
-    adding a = { .to = to, .dims = dims, .edge_log2 = edge_log2, .budget = budget };
+    adding a = { .to = to, .dims = dims, .round = round, .edge_log2 = edge_log2, .budget = budget };
     trip_level_places_open(&a.places, from, means, edge_log2, budget);
     a.bytes = lay_out(&a, NULL);
     a.memory = trip_budget_take(budget, a.bytes);

@@ -105,14 +105,15 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
     const uint32_t corner = trip_square_corner(of);
     const size_t first = place_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
     uint32_t sums[16] = { 0 };
-    uint16_t codes[64], least[16];
+    uint16_t codes[64], around[16];
     const uint16_t *code = codes;
     trip_square_codes(of, codes);
-    memset(least, 255, sizeof least);
+    memset(around, 255, sizeof around);
     for (uint64_t rest = of->mask; rest; rest &= rest - 1, code++) {
         const int n = __builtin_ctzll(rest) / 4;
+        const uint16_t turned = trip_coarse_turned(*code, w->params->hidden_above);
         sums[n] += *code;
-        least[n] = *code < least[n] ? *code : least[n];
+        around[n] = turned < around[n] ? turned : around[n];
     }
     const uint64_t twos = of->mask - (of->mask >> 1 & UINT64_C(0x5555555555555555));
     uint64_t counts = (twos & UINT64_C(0x3333333333333333)) + /* four bits each */
@@ -122,8 +123,9 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
         if ((counts & 15) == 0)
             continue;
         touch(l, at);
-        trip_coarse_value_add_whole(&l->value_sums[at], counts & 15, sums[n], least[n],
-                                    square->kept);
+        trip_coarse_value_add_whole(&l->value_sums[at], counts & 15, sums[n], square->kept);
+        if (!square->kept)
+            trip_coarse_value_add_around(&l->value_sums[at], around[n]);
     }
 }
 
@@ -177,7 +179,7 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         const trip_coarse_value *value = &l->values_below[i];
         const place p = place_of(w, square, value->u, value->v);
         touch(l, p.at);
-        trip_coarse_value_add(&l->value_sums[p.at], value);
+        trip_coarse_value_add(&l->value_sums[p.at], value, w->params->hidden_above);
         if (!l->means_below || !l->means_below[i].kept)
             continue;
         if (w->format.normals)

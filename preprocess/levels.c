@@ -332,8 +332,9 @@ static int run_lanes(making *m, trip_work work)
 
 static int add_halo(making *m)
 {
-    int status = trip_level_halo_add(m->file, m->work.params->kinds.means, &m->with_halo, m->dims,
-                                     m->work.edge_log2, m->budget);
+    const trip_levels_params *p = m->work.params;
+    int status = trip_level_halo_add(m->file, p->kinds.means, p->hidden_above, &m->with_halo,
+                                     m->dims, m->work.edge_log2, m->budget);
     return status == 0 ? trip_output_flush(&m->with_halo) : status;
 }
 

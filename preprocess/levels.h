@@ -28,6 +28,7 @@ typedef struct trip_levels_params {
     trip_affine index_to_world;
     unsigned levels;
     double value_min, value_max; /* of the volume */
+    bool hidden_above;           /* what is not kept lies mostly above what is, not below */
     const char *folder;          /* for temporary files */
     trip_writer *writer;         /* with the lists of trip_levels_lists() */
     trip_spill *spill;           /* whose segments are not needed any more */

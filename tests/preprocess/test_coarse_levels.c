@@ -60,8 +60,10 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
     p.output = path;
     if (!p.levels_for && !p.no_halo)
         p.levels_for = TRIP_LEVELS_FOR_BOTH;
-    p.ranges = &high;
-    p.range_count = 1;
+    if (p.range_count == 0) {
+        p.ranges = &high;
+        p.range_count = 1;
+    }
     p.replace = true;
     p.volume = (trip_volume_params){ .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" };
     if (trip_brick(&p, &s) != 0)
@@ -119,8 +121,7 @@ static void expect_mean(const trip_mean_scale *scale, const cube *c, unsigned co
 /* What is interpolated, of a voxel of level 1 or 2, before it is sharpened. */
 typedef struct base {
     bool kept, there;
-    double value, least; /* codes; the least is of a kept one: of the voxels known in it, or the
-                            voxels of level 1 that have none kept */
+    double value, around; /* codes; the latter the least of what is not kept */
 } base;
 
 enum { MOST_LEVEL = 2, MOST = (NX / 2 + 1) * (NY / 2 + 1) * (NZ / 2 + 1) };
@@ -141,6 +142,8 @@ static base *base_at(int64_t x, int64_t y, int64_t z, unsigned level)
     return &bases[level][(z * size_of(1, level) + y) * size_of(0, level) + x];
 }
 
+/* The least of what was not kept in it: of the halo, or of level 1 what voxels have around, or
+ * their value where none is kept. */
 static double least_in(const int64_t at[3], unsigned level)
 {
     double least = INFINITY;
@@ -148,15 +151,16 @@ static double least_in(const int64_t at[3], unsigned level)
         const int64_t x = 2 * at[0] + n % 2, y = 2 * at[1] + n / 2 % 2, z = 2 * at[2] + n / 4;
         const base *below = level > 1 ? base_at(x, y, z, level - 1) : NULL;
         if (below && below->there)
-            least = fmin(least, below->kept ? below->least : below->value);
-        if (level == 1 && x < NX && y < NY && z < NZ && known[(z * NY + y) * NX + x])
+            least = fmin(least, below->kept ? below->around : below->value);
+        if (level == 1 && x < NX && y < NY && z < NZ && known[(z * NY + y) * NX + x] &&
+            !is_kept(x, y, z))
             least = fmin(least, 85.0 * (258 + bytes[(z * NY + y) * NX + x]));
     }
     return least;
 }
 
-/* A voxel of level 2 that covers none known, beside some that cover kept ones, has the least of
- * those. */
+/* A voxel of level 2 that covers none known, beside some that cover kept ones, has the least that
+ * these have around. */
 static void add_halo(const int64_t at[3], unsigned level, base *b)
 {
     double least = INFINITY;
@@ -164,7 +168,7 @@ static void add_halo(const int64_t at[3], unsigned level, base *b)
         const base *beside =
             base_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1, level);
         if (beside && beside->kept)
-            least = fmin(least, beside->least);
+            least = fmin(least, beside->around);
     }
     if (level > 1 && !b->there && least < INFINITY)
         *b = (base){ .there = true, .value = least };
@@ -287,6 +291,60 @@ static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
     }
 }
 
+/* Of level 2 along X, the voxels that cover nothing known: none may show. */
+static uint64_t check_added(const char *name, unsigned shown_from, unsigned shown_to)
+{
+    static uint64_t words[TRIP_BLOCK_WORDS_MAX];
+    static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
+    trip_dataset *d;
+    trip_budget *budget;
+    trip_selection all;
+    trip_run run;
+    uint64_t added = 0;
+    assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
+    assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
+    const trip_list *list = trip_dataset_find(d, 0, 2, TRIP_KIND_VALUES);
+    const trip_block_form form = trip_block_form_of(&d->header, list->kind);
+    assert_int_equal(trip_selection_create_whole(&all, d, list, false, d->budget), 0);
+    for (trip_run_iterator it = trip_run_begin(&all); trip_run_next(&it, &run);) {
+        size_t size = 8 * (size_t)run.words;
+        assert_int_equal(pread(list->plane_fd[0], words, size, (off_t)run.at[0]), size);
+        trip_block block = trip_block_make(&form, run.count, run.words, words, NULL);
+        trip_block_voxels(&block, 0, run.count, voxels);
+        for (uint32_t i = 0; i < run.count; i++) {
+            const int64_t at[3] = { run.sheet, run.u + (int64_t)trip_voxel_u(voxels[i]),
+                                    run.v + (int64_t)trip_voxel_v(voxels[i]) };
+            const unsigned code = trip_voxel_code(voxels[i]);
+            if (sum_cube(at, 2, 0).known > 0)
+                continue;
+            assert_true(code < 85 * (258 + shown_from) || code > 85 * (258 + shown_to));
+            added++;
+        }
+    }
+    trip_selection_destroy(&all, d->budget);
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+    return added;
+}
+
+static void what_is_added_about_kept_voxels_does_not_show(void **state)
+{
+    static const trip_value_range low = { 0, 255 - LEAST };
+    trip_brick_params p = { .levels = 2 };
+    (void)state;
+    make_bytes(12, 2000);
+    brick_to("a.trip", p);
+    const uint64_t added = check_added("a.trip", LEAST, 255);
+    assert_true(added > 100);
+    for (int i = 0; i < N; i++)
+        bytes[i] = (uint8_t)(255 - bytes[i]); /* what is known remains so */
+    test_write("v.raw", bytes, sizeof bytes);
+    p.ranges = &low;
+    p.range_count = 1;
+    brick_to("a.trip", p);
+    assert_int_equal(check_added("a.trip", 0, 255 - LEAST), added);
+}
+
 static void tiles_of_any_size_have_levels(void **state)
 {
     (void)state;
@@ -392,6 +450,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(coarse_voxels_have_the_means_of_those_they_cover,
                                         test_begin, test_end),
+        cmocka_unit_test_setup_teardown(what_is_added_about_kept_voxels_does_not_show, test_begin,
+                                        test_end),
         cmocka_unit_test_setup_teardown(tiles_of_any_size_have_levels, test_begin, test_end),
         cmocka_unit_test_setup_teardown(memory_threads_and_slices_make_no_difference, test_begin,
                                         test_end),
