@@ -377,7 +377,7 @@ static void print_text(const data_set *d)
     if (space_of(d->source.root))
         print_anatomy(info, space_of(d->source.root));
     print_range("values", info->value_min, info->value_max);
-    print_range("stored as", info->code_lo, info->code_hi);
+    print_range("codes for", info->code_lo, info->code_hi);
     printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);
     printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
            100.0 * (double)info->kept / voxels);

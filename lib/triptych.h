@@ -115,7 +115,7 @@ typedef struct triptych_info {
     int64_t first[3], last[3];   /* voxels kept along i, j, k */
     double lo[3], hi[3];         /* box of those in world space, from edge to edge */
     double value_min, value_max; /* of the volume */
-    double code_lo, code_hi;     /* values of the lowest and the highest code stored */
+    double code_lo, code_hi;     /* values of codes 0 and 65535 (FORMAT.md) */
     uint64_t voxels;             /* of the volume */
     uint64_t kept;               /* of those: not what no function given to `brick` shows */
     uint64_t halo;               /* neighbours of those, for interpolation */
