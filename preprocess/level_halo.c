@@ -6,7 +6,7 @@
 #include "format.h"
 #include "report.h"
 
-/* Squares held, in memory that is cleared once. */
+/* Squares held. */
 enum { HELD = 64 };
 
 /* By row; TRIP_COARSE_NONE_KEPT where there is no voxel, either. */
@@ -38,25 +38,18 @@ static size_t edge_of(const adding *a)
     return (size_t)1 << a->edge_log2;
 }
 
-static void *part(unsigned char *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? memory + *at : NULL;
-    *at += (bytes + 63) & ~(size_t)63;
-    return p;
-}
-
 /* With NULL it computes the bytes only. */
 static size_t lay_out(adding *a, unsigned char *memory)
 {
     const size_t plane = edge_of(a) * edge_of(a), more = (edge_of(a) + 2) * (edge_of(a) + 2);
     size_t at = 0;
-    a->read = part(memory, &at, plane * sizeof *a->read);
-    a->values = part(memory, &at, plane * sizeof *a->values);
-    a->near = part(memory, &at, more * sizeof *a->near);
-    a->rows = part(memory, &at, more * sizeof *a->rows);
+    a->read = trip_level_carve(memory, &at, plane * sizeof *a->read);
+    a->values = trip_level_carve(memory, &at, plane * sizeof *a->values);
+    a->near = trip_level_carve(memory, &at, more * sizeof *a->near);
+    a->rows = trip_level_carve(memory, &at, more * sizeof *a->rows);
     for (int i = 0; i < HELD; i++)
-        a->squares[i] =
-            (held_square){ .around = part(memory, &at, plane * sizeof *a->squares[i].around) };
+        a->squares[i] = (held_square){ .around = trip_level_carve(
+                                           memory, &at, plane * sizeof *a->squares[i].around) };
     return at;
 }
 

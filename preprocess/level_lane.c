@@ -4,13 +4,6 @@
 
 #include "format.h"
 
-static void *carve(unsigned char *base, size_t *used, size_t bytes)
-{
-    size_t at = *used;
-    *used = at + ((bytes + 63) & ~(size_t)63);
-    return base ? base + at : NULL;
-}
-
 size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsigned producer,
                             unsigned char *memory)
 {
@@ -19,25 +12,26 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     const size_t squares = (size_t)TRIP_LEVEL_SOURCES << 2 * (w->edge_log2 + 1 - below_log2);
     size_t used = 0;
     *l = (trip_level_lane){ .producer = producer, .box.tables = &w->tables };
-    l->squares = carve(memory, &used, squares * sizeof *l->squares);
-    l->value_sums = carve(memory, &used, plane * sizeof *l->value_sums);
-    l->values = carve(memory, &used, plane * sizeof *l->values);
-    l->touched = carve(memory, &used, plane / 8);
+    l->squares = trip_level_carve(memory, &used, squares * sizeof *l->squares);
+    l->value_sums = trip_level_carve(memory, &used, plane * sizeof *l->value_sums);
+    l->values = trip_level_carve(memory, &used, plane * sizeof *l->values);
+    l->touched = trip_level_carve(memory, &used, plane / 8);
     if (w->params->kinds.means) {
-        l->mean_sums = carve(memory, &used, plane * sizeof *l->mean_sums);
-        l->means = carve(memory, &used, plane * sizeof *l->means);
-        l->box.normals = carve(memory, &used, plane * sizeof(uint32_t));
+        l->mean_sums = trip_level_carve(memory, &used, plane * sizeof *l->mean_sums);
+        l->means = trip_level_carve(memory, &used, plane * sizeof *l->means);
+        l->box.normals = trip_level_carve(memory, &used, plane * sizeof(uint32_t));
     }
     const size_t sheets = w->params->kinds.values ? TRIP_SHARPEN_SHEETS : 1;
-    l->box.values = carve(memory, &used, sheets * plane * sizeof(uint32_t));
+    l->box.values = trip_level_carve(memory, &used, sheets * plane * sizeof(uint32_t));
     for (int axis = 0; axis < 3; axis++)
-        l->box.bits[axis] = carve(memory, &used, (axis == 2 ? sheets : edge) * plane / 8);
+        l->box.bits[axis] =
+            trip_level_carve(memory, &used, (axis == 2 ? sheets : edge) * plane / 8);
     if (w->lists)
-        l->run = carve(memory, &used, trip_list_buffer_bytes());
+        l->run = trip_level_carve(memory, &used, trip_list_buffer_bytes());
     else
-        l->values_below = carve(memory, &used, plane * sizeof *l->values_below);
+        l->values_below = trip_level_carve(memory, &used, plane * sizeof *l->values_below);
     if (!w->lists && w->params->kinds.means)
-        l->means_below = carve(memory, &used, plane * sizeof *l->means_below);
+        l->means_below = trip_level_carve(memory, &used, plane * sizeof *l->means_below);
     if (w->format.halo)
         used += trip_sharpen_lane_make(&l->sharpen, w->edge_log2, memory ? memory + used : NULL);
     return used;

@@ -47,6 +47,15 @@ void trip_level_source_close(trip_level_source *s);
  * copy of the source says where they are, and any thread may read them. */
 int trip_level_source_next(trip_level_source *s);
 
+/* The next part of some memory, aligned to 64, where *used of it is; with NULL it is counted only.
+ */
+static inline void *trip_level_carve(unsigned char *memory, size_t *used, size_t bytes)
+{
+    const size_t at = *used;
+    *used = at + ((bytes + 63) & ~(size_t)63);
+    return memory ? memory + at : NULL;
+}
+
 /* Reports that there is no memory for levels. */
 int trip_level_fail_memory(void);
 

@@ -18,24 +18,17 @@ struct trip_sharpen_square {
     uint16_t *values;
 };
 
-static void *part(unsigned char *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? memory + *at : NULL;
-    *at += (bytes + 63) & ~(size_t)63;
-    return p;
-}
-
 size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned char *memory)
 {
     const size_t plane = (size_t)1 << 2 * edge_log2;
     size_t at = 0;
-    l->values = part(memory, &at, plane * sizeof *l->values);
-    l->beside = part(memory, &at, plane * sizeof *l->beside);
-    l->sums = part(memory, &at, plane * sizeof *l->sums);
-    l->squares = part(memory, &at, (1 + HELD) * sizeof *l->squares);
+    l->values = trip_level_carve(memory, &at, plane * sizeof *l->values);
+    l->beside = trip_level_carve(memory, &at, plane * sizeof *l->beside);
+    l->sums = trip_level_carve(memory, &at, plane * sizeof *l->sums);
+    l->squares = trip_level_carve(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
-        uint16_t *known = part(memory, &at, plane * sizeof *known);
-        uint16_t *values = part(memory, &at, plane * sizeof *values);
+        uint16_t *known = trip_level_carve(memory, &at, plane * sizeof *known);
+        uint16_t *values = trip_level_carve(memory, &at, plane * sizeof *values);
         if (memory)
             l->squares[i] = (trip_sharpen_square){ .known = known, .values = values };
     }

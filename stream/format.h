@@ -126,13 +126,16 @@ static_assert(sizeof(trip_file_slab) == 32, "slab size");
 static_assert(sizeof(trip_file_brick) == 24, "brick size");
 static_assert(sizeof(trip_file_run) == 4, "run size");
 
-/* A voxel in memory: byte 0 u within the tile, byte 1 v within the tile, bytes 2-3 the 16-bit code.
- * An 8-bit code c of the file stands for (c + TRIP_CODE_FIRST) TRIP_CODE_STEP. */
+/* Codes that 8 bits tell apart: a byte c of the file stands for (c + TRIP_CODE_FIRST)
+ * TRIP_CODE_STEP.
+ */
 enum {
     TRIP_CODE_STEP = 85,   /* of the 65536 codes there are 771 steps, */
     TRIP_CODE_FIRST = 258, /* of which as many lie below those of 8 bits as above */
 };
 
+/* A voxel in memory: byte 0 u within the tile, byte 1 v within the tile, bytes 2-3 the 16-bit code.
+ */
 static inline uint32_t trip_voxel_pack(unsigned u, unsigned v, unsigned code)
 {
     return (uint32_t)u | (uint32_t)v << 8 | (uint32_t)code << 16;

@@ -207,14 +207,15 @@ static double sharp_value(const int64_t at[3], unsigned level)
     return fmin(65535, fmax(0, sum));
 }
 
-/* Visits every record of a list: counts those that are right. */
-static uint64_t check_list(const trip_dataset *d, const trip_list *list)
+/* Of each record of a list: where it is, and its code. Returns how many there are. */
+static uint64_t visit(const trip_dataset *d, const trip_list *list,
+                      void (*each)(const trip_dataset *d, const trip_list *list,
+                                   const int64_t at[3], unsigned code, void *user),
+                      void *user)
 {
     static uint64_t words[TRIP_BLOCK_WORDS_MAX];
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
     const trip_block_form form = trip_block_form_of(&d->header, list->kind);
-    const trip_mean_scale scale = trip_mean_scale_make(d->header.value_min, d->header.value_max,
-                                                       d->header.code_lo, d->header.code_hi);
     trip_selection all;
     trip_run run;
     uint64_t records = 0;
@@ -229,19 +230,27 @@ static uint64_t check_list(const trip_dataset *d, const trip_list *list)
             at[list->axis] = run.sheet;
             at[(list->axis + 1) % 3] = run.u + (int64_t)trip_voxel_u(voxels[i]);
             at[(list->axis + 2) % 3] = run.v + (int64_t)trip_voxel_v(voxels[i]);
-            cube c = sum_cube(at, list->level, list->axis);
-            unsigned code = trip_voxel_code(voxels[i]);
-            const base *b = base_at(at[0], at[1], at[2], list->level);
-            if (list->kind == TRIP_KIND_MEANS)
-                expect_mean(&scale, &c, code, list->level);
-            else
-                assert_true(fabs(code - sharp_value(at, list->level)) < 85);
-            assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : b && b->there);
+            each(d, list, at, trip_voxel_code(voxels[i]), user);
         }
         records += run.count;
     }
     trip_selection_destroy(&all, d->budget);
     return records;
+}
+
+static void check_record(const trip_dataset *d, const trip_list *list, const int64_t at[3],
+                         unsigned code, void *user)
+{
+    const trip_mean_scale scale = trip_mean_scale_make(d->header.value_min, d->header.value_max,
+                                                       d->header.code_lo, d->header.code_hi);
+    const cube c = sum_cube(at, list->level, list->axis);
+    const base *b = base_at(at[0], at[1], at[2], list->level);
+    (void)user;
+    if (list->kind == TRIP_KIND_MEANS)
+        expect_mean(&scale, &c, code, list->level);
+    else
+        assert_true(fabs(code - sharp_value(at, list->level)) < 85);
+    assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : b && b->there);
 }
 
 /* How many voxels of a level cover one kept, or have a value. */
@@ -268,7 +277,7 @@ static void check_data_set(const char *name, unsigned levels, unsigned lists)
     find_bases();
     for (unsigned i = 6; i < d->list_count; i++) {
         const trip_list *list = &d->lists[i];
-        uint64_t records = check_list(d, list);
+        uint64_t records = visit(d, list, check_record, NULL);
         assert_true(records > 0);
         if (list->axis == 0)
             assert_int_equal(records, count_cubes(list));
@@ -291,40 +300,35 @@ static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
     }
 }
 
-/* Of level 2 along X, the voxels that cover nothing known: none may show. */
+/* Voxels that cover nothing known: none may show. */
+typedef struct added {
+    unsigned shown_from, shown_to;
+    uint64_t count;
+} added;
+
+static void check_added_record(const trip_dataset *d, const trip_list *list, const int64_t at[3],
+                               unsigned code, void *user)
+{
+    added *a = user;
+    (void)d;
+    if (sum_cube(at, list->level, 0).known > 0)
+        return;
+    assert_true(code < 85 * (258 + a->shown_from) || code > 85 * (258 + a->shown_to));
+    a->count++;
+}
+
+/* Those of level 2 along X. */
 static uint64_t check_added(const char *name, unsigned shown_from, unsigned shown_to)
 {
-    static uint64_t words[TRIP_BLOCK_WORDS_MAX];
-    static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
+    added a = { shown_from, shown_to, 0 };
     trip_dataset *d;
     trip_budget *budget;
-    trip_selection all;
-    trip_run run;
-    uint64_t added = 0;
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
     assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
-    const trip_list *list = trip_dataset_find(d, 0, 2, TRIP_KIND_VALUES);
-    const trip_block_form form = trip_block_form_of(&d->header, list->kind);
-    assert_int_equal(trip_selection_create_whole(&all, d, list, false, d->budget), 0);
-    for (trip_run_iterator it = trip_run_begin(&all); trip_run_next(&it, &run);) {
-        size_t size = 8 * (size_t)run.words;
-        assert_int_equal(pread(list->plane_fd[0], words, size, (off_t)run.at[0]), size);
-        trip_block block = trip_block_make(&form, run.count, run.words, words, NULL);
-        trip_block_voxels(&block, 0, run.count, voxels);
-        for (uint32_t i = 0; i < run.count; i++) {
-            const int64_t at[3] = { run.sheet, run.u + (int64_t)trip_voxel_u(voxels[i]),
-                                    run.v + (int64_t)trip_voxel_v(voxels[i]) };
-            const unsigned code = trip_voxel_code(voxels[i]);
-            if (sum_cube(at, 2, 0).known > 0)
-                continue;
-            assert_true(code < 85 * (258 + shown_from) || code > 85 * (258 + shown_to));
-            added++;
-        }
-    }
-    trip_selection_destroy(&all, d->budget);
+    visit(d, trip_dataset_find(d, 0, 2, TRIP_KIND_VALUES), check_added_record, &a);
     trip_dataset_close(d);
     trip_budget_destroy(budget);
-    return added;
+    return a.count;
 }
 
 static void what_is_added_about_kept_voxels_does_not_show(void **state)
@@ -334,15 +338,15 @@ static void what_is_added_about_kept_voxels_does_not_show(void **state)
     (void)state;
     make_bytes(12, 2000);
     brick_to("a.trip", p);
-    const uint64_t added = check_added("a.trip", LEAST, 255);
-    assert_true(added > 100);
+    const uint64_t count = check_added("a.trip", LEAST, 255);
+    assert_true(count > 100);
     for (int i = 0; i < N; i++)
         bytes[i] = (uint8_t)(255 - bytes[i]); /* what is known remains so */
     test_write("v.raw", bytes, sizeof bytes);
     p.ranges = &low;
     p.range_count = 1;
     brick_to("a.trip", p);
-    assert_int_equal(check_added("a.trip", 0, 255 - LEAST), added);
+    assert_int_equal(check_added("a.trip", 0, 255 - LEAST), count);
 }
 
 static void tiles_of_any_size_have_levels(void **state)
