@@ -44,12 +44,6 @@ INLINE vh vh_is_missing(vh a)
     return (vh)(a == TRIP_CPU_CODE_MISSING);
 }
 
-/* (a - b) / 2, rounded down. */
-INLINE vh vh_half_difference(vh a, vh b)
-{
-    return (vh)((vhu)(a >> 1) - (vhu)(b >> 1) - (vhu)(~a & b & 1));
-}
-
 /* (a + b) / 2, rounded down. */
 INLINE vh vh_mean(vh a, vh b)
 {
@@ -66,6 +60,13 @@ INLINE vh vh_min(vh a, vh b)
 INLINE vh vh_max(vh a, vh b)
 {
     return (vh)_mm_max_epi16((__m128i)a, (__m128i)b);
+}
+
+/* (a - b) / 2, rounded down: the mean, rounded up, of a and -1 - b as the instruction has them. */
+INLINE vh vh_half_difference(vh a, vh b)
+{
+    const vh least = vh_set(INT16_MIN);
+    return (vh)_mm_avg_epu16((__m128i)(a ^ least), (__m128i)(b ^ ~least)) ^ least;
 }
 
 /* A bit for each number that is set. */
@@ -132,6 +133,12 @@ INLINE vh vh_min(vh a, vh b)
 INLINE vh vh_max(vh a, vh b)
 {
     return vh_select((vh)(b > a), a, b);
+}
+
+/* (a - b) / 2, rounded down. */
+INLINE vh vh_half_difference(vh a, vh b)
+{
+    return (vh)((vhu)(a >> 1) - (vhu)(b >> 1) - (vhu)(~a & b & 1));
 }
 
 INLINE unsigned vh_bits(vh m)
@@ -266,6 +273,19 @@ static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, 
     }
 }
 
+/* The voxels before and behind eight of them, along u, v and the sheets. */
+typedef struct neighbours {
+    vh before[3], behind[3];
+} neighbours;
+
+INLINE bool some_is_missing(const neighbours *n)
+{
+    vh least = vh_min(n->before[0], n->behind[0]);
+    for (int a = 1; a < 3; a++)
+        least = vh_min(least, vh_min(n->before[a], n->behind[a]));
+    return vh_bits(vh_is_missing(least)) != 0;
+}
+
 /* Central differences; where a neighbour is missing, the difference to the other. */
 INLINE vh differences(vh codes, vh below, vh above)
 {
@@ -296,12 +316,17 @@ static void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares, const tri
                 memcpy(first + 1, at, 7 * sizeof *first);
                 to_left = first;
             }
-            vh here = vh_load(at);
-            vh_store_3((int16_t *)&raster->gradients[i],
-                       differences(here, vh_load(to_left), vh_load(at + 1)),
-                       differences(here, vh_load(before), vh_load(at + TRIP_CPU_RASTER_STRIDE)),
-                       differences(here, vh_load(sheet_before->codes + i),
-                                   vh_load(sheet_behind->codes + i)));
+            const neighbours n = {
+                { vh_load(to_left), vh_load(before), vh_load(sheet_before->codes + i) },
+                { vh_load(at + 1), vh_load(at + TRIP_CPU_RASTER_STRIDE),
+                  vh_load(sheet_behind->codes + i) },
+            };
+            const bool lacks = some_is_missing(&n);
+            vh d[3];
+            for (int a = 0; a < 3; a++)
+                d[a] = lacks ? differences(vh_load(at), n.before[a], n.behind[a])
+                             : vh_half_difference(n.behind[a], n.before[a]);
+            vh_store_3((int16_t *)&raster->gradients[i], d[0], d[1], d[2]);
         }
     }
 }

@@ -15,6 +15,9 @@
 /* Of the memory that is left, what the frame goes on with besides. */
 enum { LEFT_OVER = 4, LEFT_OVER_OF_WINDOWS = 16 };
 
+/* What a processor's last cache holds, or more. */
+enum { CACHE_BYTES = 8 << 20 };
+
 static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
 {
     return &s->store.sheets[s->held[i]];
@@ -551,16 +554,27 @@ static int finish_row(trip_cpu_sheets *s)
     return status;
 }
 
+/* Whether the sheets held are drawn before another begins: all that there is room for, or as many
+ * as stay in a processor's cache with their slices, so that panes need not wait for memory. */
+static bool are_enough(const trip_cpu_sheets *s)
+{
+    const int fewest = trip_cpu_sheets_at_hand(s->of->frame) + 3;
+    const uint64_t rasters = s->store.rasters - 1 - s->store.free_count;
+    const uint64_t bytes =
+        rasters * (uint64_t)s->of->frame->settings->slices * sizeof(trip_cpu_voxels);
+    return s->count >= s->most || (s->count >= fewest && bytes > CACHE_BYTES);
+}
+
 /* The sheet that the next runs are of: those held are complete. */
 static int begin_sheet(trip_cpu_sheets *s, int64_t number)
 {
     const bool ends_row = s->count > 0 && sheet_of(s, s->count - 1)->number + s->way != number;
     int status = 0;
-    if (ends_row || s->count >= s->most || s->open_sheets == 0)
+    if (ends_row || are_enough(s) || s->open_sheets == 0)
         decode_runs(s);
     if (ends_row)
         status = finish_row(s);
-    else if (s->count >= s->most)
+    else if (are_enough(s))
         status = draw_complete(s, s->count, false);
     if (status)
         return status;
