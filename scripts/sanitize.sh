@@ -4,7 +4,8 @@
 # left out of the first, and why, is in tests/CMakeLists.txt; of the second, OpenVDB and GL, which
 # none of its tests use. The first runs with intercept_tls_get_addr=0 (CMakePresets.json): otherwise
 # the search for leaks takes the place of a library's thread-local data from a header that glibc no
-# longer writes, and now and then reads at a wild address.
+# longer writes, and now and then reads at a wild address. The second runs with die_after_fork=0:
+# some tests start the bricker's threads in a forked child, to kill it.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -16,5 +17,4 @@ ctest --preset asan -j "$(nproc)" -LE unsanitized
 
 cmake --preset tsan
 cmake --build --preset tsan --target threaded_tests
-# Some tests start the bricker's threads in a forked child, to kill it.
-TSAN_OPTIONS=die_after_fork=0 ctest --preset tsan -j "$(nproc)" -L threads
+ctest --preset tsan -j "$(nproc)" -L threads

@@ -316,7 +316,7 @@ typedef struct trip_cpu_kernels {
     void (*sheet_gradients)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                             const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
                             const trip_cpu_voxels *sheet_behind);
-    /* The voxels of the squares' cells between two rasters, with their gradients or without;
+    /* The squares' voxels between two rasters, with their gradients or without;
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);

@@ -43,10 +43,9 @@ typedef struct pane_path {
     int32_t base[2][SLICES_ROOM];
     float first[2][SLICES_ROOM];
     float along[SLICES_ROOM];
-    float
-        near[TRIP_CPU_SEGMENTS + 1]; /* the same from the first slice: exact however far the eye */
-    float sheets[TRIP_CPU_SEGMENTS]; /* of a segment, how long it is */
-    double slope[2], start[2];       /* of the pane's corner */
+    float middle[TRIP_CPU_SEGMENTS + 1]; /* the same from the grid's middle, however far the eye */
+    float sheets[TRIP_CPU_SEGMENTS];     /* of a segment, how long it is */
+    double slope[2], start[2];           /* of the pane's corner */
     /* Linear in the place within the pane: at its corner, and a pixel along x and y. */
     float toward[3];      /* the ray along the list's axis, of length 1 or so at the corner */
     float aside[2][3];    /* the ray along u and v, less the corner's slope times `toward` */
@@ -55,7 +54,7 @@ typedef struct pane_path {
     float world_length;   /* world units over a sheet, where `world` and `toward` are 1 */
     float depth;          /* z over a sheet where `toward` is 1 */
     float gradient[3][3]; /* as the view's, of sums of weights 2^WEIGHT_LOG2 */
-    /* How far inside each half-space a ray is at the first slice, in perspective times the length
+    /* How far inside each half-space a ray is at the grid's middle, in perspective times the length
      * of `toward`, and by how much that grows over a sheet the pass's way, likewise. */
     float clip_at[TRIP_CLIP_MOST][3], clip_toward[TRIP_CLIP_MOST][3];
     /* Where spacing is uneven positions are places, from the grid's first voxel; else NULL. */
@@ -181,9 +180,10 @@ INLINE double dot_list(const double a[4], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Likewise of what is cut away; `along` is the first slice's. */
-static void find_clip(const trip_cpu_sheet_view *view, int x, int y, double along, pane_path *path)
+/* Likewise of what is cut away. */
+static void find_clip(const trip_cpu_sheet_view *view, int x, int y, pane_path *path)
 {
+    const double along = from_start(view, view->middle);
     double turns = view->ortho ? 0 : 1, corner[3], start[3];
     for (int i = 0; i < 3; i++) {
         double beside = x * view->rx[i] + y * view->ry[i];
@@ -229,7 +229,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
     for (unsigned n = 0; n <= g->segments; n++) {
         double along = from_start(view, g->slices[n].coordinate);
         path->along[n] = (float)along;
-        path->near[n] = (float)(g->slices[n].coordinate - g->slices[0].coordinate);
+        path->middle[n] = (float)(g->slices[n].coordinate - view->middle);
         if (n > 0)
             path->sheets[n - 1] =
                 (float)fabs(g->slices[n].coordinate - g->slices[n - 1].coordinate);
@@ -245,7 +245,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
         for (int i = 0; i < 3; i++)
             path->gradient[k][i] = view->gradient[k][i] * (1.0f / (1 << WEIGHT_LOG2));
     find_forms(view, x, y, path);
-    find_clip(view, x, y, from_start(view, g->slices[0].coordinate), path);
+    find_clip(view, x, y, path);
 }
 
 /* ---- which segments may show ---- */
@@ -490,6 +490,8 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 #define RASTER_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 #define GRADIENTS_FROM ((int32_t)(offsetof(trip_cpu_voxels, gradients) / sizeof(int16_t)))
 
+#include "cpu/kernels/making_tmpl.h"
+
 /* What a patch passes. */
 typedef struct patch_path {
     uint64_t segments; /* in which something may show */
@@ -519,21 +521,27 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
         (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
 
-/* The segments in which a square that the pane meets may show. */
-static uint64_t pane_segments(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                              const pane_path *path, int x, int y)
+/* What a pane passes. */
+typedef struct pane_segments {
+    uint64_t some;    /* in which a square may show */
+    uint64_t made;    /* of these, those of whose ends all that rays take is made */
+    cell_boxes boxes; /* what rays meet of them */
+} pane_segments;
+
+static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                          const pane_path *path, int x, int y, pane_segments *out)
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
-    uint64_t segments = 0;
-    cell_boxes slices, boxes;
+    cell_boxes slices;
+    out->some = 0;
+    out->made = g->slices[0].making ? 0 : UINT64_MAX;
     find_boxes(g, path, &r, 0, g->segments, &slices);
     if (!some_square_of(g, g->some, 0, both_boxes(&slices, 0, g->segments)))
-        return 0;
-    find_segment_boxes(0, g->segments - 1, &slices, &boxes);
+        return;
+    find_segment_boxes(0, g->segments - 1, &slices, &out->boxes);
     for (unsigned n = 0; n < g->segments; n++)
-        if (some_square_of(g, g->visible[n], 0, box_of_segment(&boxes, n)))
-            segments |= UINT64_C(1) << n;
-    return segments;
+        if (some_square_of(g, g->visible[n], 0, box_of_segment(&out->boxes, n)))
+            out->some |= UINT64_C(1) << n;
 }
 
 /* Of the pane's segments, of which there are some. */
@@ -577,7 +585,7 @@ typedef struct stamp_rays {
     vf depth;              /* z over a sheet, and at the eye */
     vf depth_at_start;
     vm along;    /* they go the pass's way */
-    vf from, to; /* what of them is not cut away: sheets from the first slice, the pass's way */
+    vf from, to; /* what of them is not cut away: sheets from the middle, the pass's way */
     vf to_eye[3];
     light_way way; /* of a light that is not at a place */
 } stamp_rays;
@@ -963,7 +971,7 @@ typedef struct remnant {
 INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
                           const pane_path *path, unsigned n)
 {
-    const float from = (float)view->direction * path->near[n];
+    const float from = (float)view->direction * path->middle[n];
     const vf inverse = v_set(1 / path->sheets[n]), zero = v_set(0), one = v_set(1);
     const vf first = v_min(one, v_max(zero, (l->from - v_set(from)) * inverse));
     const vf last = v_min(one, v_max(zero, (l->to - v_set(from)) * inverse));
@@ -1152,8 +1160,8 @@ INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_
 }
 
 static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, const patch_path *area, const stamp_rays *l,
-                       float *stamp)
+                       const pane_path *path, pane_segments *passed, const patch_path *area,
+                       const stamp_rays *l, float *stamp)
 {
     uint64_t segments = area->segments;
     vf pixel[CHANNELS];
@@ -1168,6 +1176,10 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         ends[i].wide = &places[i];
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
+        if (!(passed->made >> n & 1)) {
+            make_segment(g, view->shading, box_of_segment(&passed->boxes, n), n);
+            passed->made |= UINT64_C(1) << n;
+        }
         if (is_wide(g)) {
             if (sampled != n || !in_the_same_cells(g, n, &ends[n % 2]))
                 wide_sample_at(view, g, path, l, n, n, &ends[n % 2]);
@@ -1204,7 +1216,7 @@ INLINE unsigned patch_stamp(unsigned place, unsigned i)
 }
 
 static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, uint64_t segments, int x, int y, unsigned place,
+                       const pane_path *path, pane_segments *passed, int x, int y, unsigned place,
                        float *pixels)
 {
     bool open = false;
@@ -1213,7 +1225,8 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     if (!open)
         return;
     patch_path area;
-    find_patch(view, g, path, segments, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8, &area);
+    find_patch(view, g, path, passed->some, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8,
+               &area);
     if (!area.segments)
         return;
     for (unsigned i = 0; i < PATCH_STAMPS; i++) {
@@ -1226,7 +1239,7 @@ static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (g->windowed)
             l.along = in_window(g, path, &l);
         if (vm_any(l.along))
-            draw_stamp(view, g, path, &area, &l, stamp);
+            draw_stamp(view, g, path, passed, &area, &l, stamp);
     }
 }
 
@@ -1236,9 +1249,10 @@ static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group
     pane_path path = { .base = { { 0 } } };
     uint64_t open = 0;
     find_path(view, g, x, y, &path);
-    const uint64_t segments = pane_segments(view, g, &path, x, y);
-    for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64 && segments; place++)
-        draw_patch(view, g, &path, segments, x, y, place, pixels);
+    pane_segments passed;
+    find_segments(view, g, &path, x, y, &passed);
+    for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64 && passed.some; place++)
+        draw_patch(view, g, &path, &passed, x, y, place, pixels);
     for (unsigned i = 0; i < STAMPS; i++)
         if (stamp_is_open(pixels + STAMP_FLOATS * i))
             open |= UINT64_C(1) << (i / STAMPS_ACROSS * STAMP_ROWS / 4 * 8 + i % STAMPS_ACROSS);

@@ -52,8 +52,11 @@ typedef struct trip_cpu_voxels {
 /* Codes of a pool of rasters are counted in 32 bits. */
 #define TRIP_CPU_RASTERS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 
-/* A raster is divided into 8 x 8 squares, a bit each, row by row. */
+/* A raster is divided into 8 x 8 squares, a bit each, row by row. Those at its right and its lower
+ * edge have the first column and row beyond it, too. */
 #define TRIP_CPU_SQUARES_ACROSS (TRIP_CPU_RASTER / 8)
+#define TRIP_CPU_COLUMN_0 UINT64_C(0x0101010101010101)
+#define TRIP_CPU_COLUMN_7 UINT64_C(0x8080808080808080)
 
 /* What the cells that start in a square lie between at one sheet, as biased codes; least > most
  * where there are none. */
@@ -73,7 +76,21 @@ typedef struct trip_cpu_cells {
 typedef struct trip_cpu_slice {
     const int32_t *rasters;
     double coordinate; /* along the list's axis: a place, where spacing is uneven */
+    const struct trip_cpu_making *making; /* NULL: all of it is there */
 } trip_cpu_slice;
+
+/* Gradients of a sheet, and all voxels of a slice between two, are made square by square, when a
+ * ray first meets one, by the thread that draws it: what is hidden or transparent is not made, and
+ * what is made is in that processor's cache. */
+typedef struct trip_cpu_making {
+    const int32_t *rasters;
+    _Atomic uint64_t *begun, *made; /* squares, of rasters that are there */
+    /* Of a sheet: those before and behind it in index order; NULL where there is none. */
+    const int32_t *before, *behind;
+    /* Of a slice: the sheets on both sides, and weights as of sheet_between(). */
+    const struct trip_cpu_making *from, *to;
+    int32_t weights;
+} trip_cpu_making;
 
 /* Of a segment, with kernels of 64 voxels: the sheets from one before it to one behind, by
  * ascending index. NULL: it is not there, and its voxels count as missing ones do; beyond the grid
@@ -112,7 +129,7 @@ typedef struct trip_cpu_integrals {
 #define TRIP_CPU_SEGMENTS 64
 
 typedef struct trip_cpu_group {
-    const trip_cpu_voxels *pool;
+    trip_cpu_voxels *pool;
     int64_t first_u, first_v; /* voxels: of the grid of rasters */
     int32_t across, down;
     unsigned segments;
@@ -121,6 +138,8 @@ typedef struct trip_cpu_group {
      * cells, of rasters that have some. */
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
     const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];
+    const uint64_t *needed[TRIP_CPU_SEGMENTS]; /* squares with voxels that rays may take there */
+    bool leaps; /* rays may light themselves at a sheet from beyond these */
     /* The squares whose cells all have their eight corners, and the rasters of the sheets that
      * these are of; for data without a halo, where cells that show may lack some. */
     bool without_halo;
@@ -147,6 +166,7 @@ typedef struct trip_cpu_sheet_view {
     float saturation; /* trip_cpu_saturation() */
     double direction; /* 1: ascending; -1 */
     double eye[3], r0[3], rx[3], ry[3];
+    double middle;        /* of the grid along the sheets: what is cut away is counted from there */
     double steepest;      /* rays move at most so far along u or v from one sheet to the next */
     double world[3][3];   /* row, column: index_to_world of u, v, sheet, over voxel_world */
     float gradient[3][3]; /* from differences of codes to half of world space, over gradient_full */

@@ -1,6 +1,7 @@
 /* Kernels that prepare the rasters of sheets: ranges of codes, gradients, slices between sheets.
  * Included by table_tmpl.h after simd_tmpl.h. A vector here is of eight numbers of 16 bits, a row
- * of a square; tests/render/test_cpu_sheets.c holds every instruction set to the same numbers. */
+ * of a square; tests/render/test_cpu_sheets.c holds every instruction set to the same numbers. What
+ * is called from more places than one is not inlined, so that profilers tell what it takes. */
 #ifndef TRIP_CPU_SLICE_H
 #define TRIP_CPU_SLICE_H
 
@@ -296,9 +297,11 @@ INLINE vh differences(vh codes, vh below, vh above)
     return vh_select(no_below | no_above, vh_half_difference(above, below), one_sided);
 }
 
-static void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
-                            const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
-                            const trip_cpu_voxels *sheet_behind)
+static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares,
+                                                      const trip_cpu_voxels *left,
+                                                      const trip_cpu_voxels *above,
+                                                      const trip_cpu_voxels *sheet_before,
+                                                      const trip_cpu_voxels *sheet_behind)
 {
     /* The voxels before a row's first and a column's first are those of the neighbours. */
     int16_t first[8];
@@ -336,41 +339,57 @@ INLINE vh mean_or_between(vh a, vh b, int32_t weights)
     return weights == (8192 << 16 | 8192) ? vh_mean(a, b) : vh_between(a, b, weights);
 }
 
-INLINE void codes_between(const int16_t *from, const int16_t *to, int32_t weights, int16_t *out)
+/* Of eight voxels from `at` on. */
+INLINE void voxels_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
+                           int32_t weights, bool gradients, trip_cpu_voxels *out)
 {
-    vh a = vh_load(from), b = vh_load(to);
-    vh_store(out, vh_select(vh_is_missing(a) | vh_is_missing(b), mean_or_between(a, b, weights),
-                            vh_set(TRIP_CPU_CODE_MISSING)));
+    vh a = vh_load(from->codes + at), b = vh_load(to->codes + at);
+    vh_store(out->codes + at,
+             vh_select(vh_is_missing(a) | vh_is_missing(b), mean_or_between(a, b, weights),
+                       vh_set(TRIP_CPU_CODE_MISSING)));
+    const int16_t *c = from->gradients[at].along, *d = to->gradients[at].along;
+    for (int i = 0; i < 24 && gradients; i += 8)
+        vh_store(out->gradients[at].along + i,
+                 mean_or_between(vh_load(c + i), vh_load(d + i), weights));
 }
 
-/* Of nine voxels. */
-INLINE void gradients_between(const trip_cpu_gradient *from, const trip_cpu_gradient *to,
-                              int32_t weights, trip_cpu_gradient *out)
+INLINE int16_t number_between(int16_t a, int16_t b, int32_t weights)
 {
-    static const int first[] = { 0, 8, 16, 27 - 8 };
-    const int16_t *a = (const int16_t *)from, *b = (const int16_t *)to;
-    for (int i = 0; i < 4; i++)
-        vh_store((int16_t *)out + first[i],
-                 mean_or_between(vh_load(a + first[i]), vh_load(b + first[i]), weights));
+    return (int16_t)((a * (weights & 0xffff) + b * (weights >> 16)) >> 14);
+}
+
+/* Of one. */
+INLINE void voxel_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
+                          int32_t weights, bool gradients, trip_cpu_voxels *out)
+{
+    const int16_t a = from->codes[at], b = to->codes[at];
+    const bool missing = a == TRIP_CPU_CODE_MISSING || b == TRIP_CPU_CODE_MISSING;
+    out->codes[at] = missing ? TRIP_CPU_CODE_MISSING : number_between(a, b, weights);
+    for (int i = 0; i < 3 && gradients; i++)
+        out->gradients[at].along[i] =
+            number_between(from->gradients[at].along[i], to->gradients[at].along[i], weights);
 }
 
 INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to,
                             uint64_t squares, int32_t weights, bool gradients, trip_cpu_voxels *out)
 {
+    const int last = TRIP_CPU_SQUARES_ACROSS - 1;
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
-        int at = square_first(__builtin_ctzll(rest));
-        for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE) {
-            for (int i = at; i < at + 2; i++)
-                codes_between(from->codes + i, to->codes + i, weights, out->codes + i);
-            if (gradients)
-                gradients_between(from->gradients + at, to->gradients + at, weights,
-                                  out->gradients + at);
+        const int square = __builtin_ctzll(rest);
+        const int rows = square / TRIP_CPU_SQUARES_ACROSS == last ? 9 : 8;
+        int at = square_first(square);
+        for (int row = 0; row < rows; row++, at += TRIP_CPU_RASTER_STRIDE) {
+            voxels_between(from, to, at, weights, gradients, out);
+            if (square % TRIP_CPU_SQUARES_ACROSS == last)
+                voxel_between(from, to, at + 8, weights, gradients, out);
         }
     }
 }
 
-static void sheet_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
-                          int32_t weights, bool gradients, trip_cpu_voxels *out)
+static __attribute__((noinline)) void sheet_between(const trip_cpu_voxels *from,
+                                                    const trip_cpu_voxels *to, uint64_t squares,
+                                                    int32_t weights, bool gradients,
+                                                    trip_cpu_voxels *out)
 {
     if (weights == (8192 << 16 | 8192))
         squares_between(from, to, squares, 8192 << 16 | 8192, gradients, out);

@@ -102,6 +102,8 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         .point_light = s->point_light && !s->headlight,
         .saturation = trip_cpu_saturation(s),
         .direction = descending ? -1 : 1,
+        .middle = trip_coordinates_place(&frame->data->coordinates, axis,
+                                         0.5 * ((double)frame->data->header.dims[axis] - 1)),
         .steepest = trip_cpu_pass_steepest(s),
     };
     by_list(view, c->eye, view->eye);

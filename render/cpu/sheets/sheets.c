@@ -122,11 +122,19 @@ static uint64_t rasters_in(const trip_cpu_rasters *all)
     return (uint64_t)((all->last[0] - all->first[0] + 1) * (all->last[1] - all->first[1] + 1));
 }
 
+/* Sheets in a row when an interval is drawn: one before it, it, what it depends on behind it, and
+ * one that has begun. */
+static int in_a_row(const trip_frame *frame)
+{
+    static_assert(4 + TRIP_SHEET_REACH_MOST - 1 == (int)TRIP_CPU_AT_HAND_MOST, "need.h");
+    return 4 + trip_cpu_sheets_about(frame);
+}
+
 /* As many sheets at a time as fit beside twice the rasters that are needed. */
 static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const trip_cpu_need *need,
                        uint64_t room)
 {
-    const unsigned fewest = (unsigned)trip_cpu_sheets_at_hand(s->of->frame) + 1;
+    const unsigned fewest = (unsigned)in_a_row(s->of->frame) + 1;
     s->slice_rasters = need->of_sheet * (uint64_t)s->of->frame->settings->slices;
     const uint64_t least = need->rasters + s->slice_rasters;
     const uint64_t most = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
@@ -207,15 +215,15 @@ static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
     const trip_cpu_rasters all = rasters_of_layer(layer);
     const uint64_t grid = rasters_in(&all);
     const int64_t reach = reach_of(s->of->frame);
-    const int at_hand = trip_cpu_sheets_at_hand(s->of->frame);
+    const int sheets = in_a_row(s->of->frame);
     trip_cpu_windows_release(&s->windows, s->store.budget);
     uint64_t left = trip_budget_left_bytes(s->store.budget) + trip_cpu_store_held_bytes(&s->store);
     uint64_t room = left / LEFT_OVER * (LEFT_OVER - 1);
     s->windows.used = false;
-    trip_cpu_need need = { .rasters = (uint64_t)at_hand * grid, .of_sheet = grid };
+    trip_cpu_need need = { .rasters = (uint64_t)sheets * grid, .of_sheet = grid };
     if (fit_sheets(s, &all, &need, room))
         return 0;
-    int status = trip_cpu_need_find(&need, layer, grid, at_hand, s->store.budget);
+    int status = trip_cpu_need_find(&need, layer, grid, sheets, s->store.budget);
     if (status || fit_sheets(s, &all, &need, room))
         return status;
     trip_cpu_store_release(&s->store);
@@ -249,8 +257,12 @@ bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to)
 
 bool trip_cpu_sheets_leap(const trip_cpu_sheets *s)
 {
-    return s->view.coordinates || is_wide(s) ||
-           s->view.steepest > 0.999 * s->of->frame->settings->slices;
+    return trip_cpu_sheets_at_once(s) || s->view.steepest > 0.999 * s->of->frame->settings->slices;
+}
+
+bool trip_cpu_sheets_at_once(const trip_cpu_sheets *s)
+{
+    return s->view.coordinates || is_wide(s);
 }
 
 /* Of complete sheets: ranges, and what may show between them. */
@@ -276,7 +288,8 @@ static void find_visible(trip_cpu_sheets *s, int complete)
     trip_cpu_store_find_visible(&s->store, work, count, s->function);
 }
 
-/* Gradients of the first sheets to held[last]; those of some may be there from before. */
+/* Gradients of the first sheets to held[last], or what they will be made of; those of some may be
+ * there from before. */
 static void find_gradients(trip_cpu_sheets *s, int last, int complete)
 {
     trip_cpu_sheet_work work[TRIP_CPU_SHEETS_MAX] = { 0 };
@@ -286,16 +299,23 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
         const trip_cpu_sheet *before = i > 0 ? sheet_of(s, i - 1) : NULL;
         const trip_cpu_sheet *after = i + 1 < complete ? sheet_of(s, i + 1) : NULL;
         if (!sheet->shaded)
-            work[count++] = (trip_cpu_sheet_work){
-                .sheet = sheet,
-                .other = s->way > 0 ? before : after,
-                .third = s->way > 0 ? after : before,
-                .needed = sheet->needed,
-                .needed_before = before ? before->needed : NULL,
-                .everywhere = trip_cpu_sheets_leap(s),
-            };
+            work[count++] = (trip_cpu_sheet_work){ .sheet = sheet,
+                                                   .other = s->way > 0 ? before : after,
+                                                   .third = s->way > 0 ? after : before };
     }
-    trip_cpu_store_find_gradients(&s->store, work, count);
+    trip_cpu_sheets_find_gradients(s, work, count);
+}
+
+void trip_cpu_sheets_find_gradients(trip_cpu_sheets *s, const trip_cpu_sheet_work *work,
+                                    unsigned count)
+{
+    if (s->view.shading && trip_cpu_sheets_at_once(s))
+        trip_cpu_store_find_gradients(&s->store, work, count);
+    for (unsigned i = 0; i < count; i++) {
+        trip_cpu_making *m = &work[i].sheet->making;
+        m->before = work[i].other ? work[i].other->rasters : NULL;
+        m->behind = work[i].third ? work[i].third->rasters : NULL;
+    }
 }
 
 /* Those of the sheet at a number, which is next to held[i]; beyond the grid its own. */
@@ -334,13 +354,15 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index
         const trip_cpu_sheet *from = sheet_of(s, i);
         g->visible[g->segments] = from->visible;
         g->cells[g->segments] = from->cells;
+        g->needed[g->segments] = from->needed;
         g->whole[g->segments] = from->whole;
         if (is_wide(s))
             s->about[g->segments] = about_of(s, i);
         g->sheets[g->segments][0] = from->rasters;
         g->sheets[g->segments++][1] = sheet_of(s, i + 1)->rasters;
     }
-    g->slices[g->segments] = (trip_cpu_slice){ at->rasters, coordinate };
+    g->slices[g->segments] = (trip_cpu_slice){ at->rasters, coordinate,
+                                               trip_cpu_sheets_at_once(s) ? NULL : &at->making };
 }
 
 /* Slices of a group, which are cut once all of them have rasters. */
@@ -360,11 +382,15 @@ static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutti
         add_slice(s, from, index, i, first);
         return true;
     }
+    const int32_t weight = (int32_t)lrint(part * 16384);
     const trip_cpu_sheet_work w = {
-        .sheet = slice, .other = from, .third = to, .needed = from->needed, .part = part
+        .sheet = slice, .other = from, .third = to, .weights = weight << 16 | (16384 - weight)
     };
     if (!trip_cpu_store_take_slice(&s->store, &w))
         return false;
+    slice->making.from = &from->making;
+    slice->making.to = &to->making;
+    slice->making.weights = w.weights;
     cut->work[cut->count++] = w;
     add_slice(s, slice, index, i, first);
     return true;
@@ -471,6 +497,7 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
                                  .across = store->across,
                                  .down = store->down,
                                  .about = is_wide(s) ? s->about : NULL,
+                                 .leaps = trip_cpu_sheets_leap(s),
                                  .without_halo = s->of->frame->data->header.halo == 0,
                                  .windowed = s->windows.used,
                                  .lo = { given.lo[0], given.lo[1] },
@@ -482,7 +509,10 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
             break;
         first = false;
     }
-    trip_cpu_store_cut(&s->store, cut.work, cut.count);
+    if (trip_cpu_sheets_at_once(s))
+        trip_cpu_store_cut(&s->store, cut.work, cut.count);
+    else
+        trip_cpu_store_clear_slices(&s->store, cut.work, cut.count);
     draw_panes(s);
     trip_cpu_open_squares_forget(s);
     while (cut.count > 0)
@@ -498,14 +528,13 @@ static int draw_complete(trip_cpu_sheets *s, int complete, bool all)
     if (last <= s->front)
         return 0;
     find_visible(s, complete);
-    if (s->view.shading)
-        find_gradients(s, last + kept < complete ? last + kept : last, complete);
+    find_gradients(s, last + kept < complete ? last + kept : last, complete);
     while (last > s->front) {
         const int before = s->front;
         trip_cpu_sheets_draw_some(s, last);
         if (s->front == before)
             return too_many_voxels();
-        const int drop = s->front > kept ? s->front - kept : 0;
+        const int drop = s->front > 1 ? s->front - 1 : 0;
         drop_first(s, drop);
         last -= drop;
         int status = trip_frame_poll();
@@ -558,7 +587,7 @@ static int finish_row(trip_cpu_sheets *s)
  * as stay in a processor's cache with their slices, so that panes need not wait for memory. */
 static bool are_enough(const trip_cpu_sheets *s)
 {
-    const int fewest = trip_cpu_sheets_at_hand(s->of->frame) + 3;
+    const int fewest = in_a_row(s->of->frame) + 2;
     const uint64_t rasters = s->store.rasters - 1 - s->store.free_count;
     const uint64_t bytes =
         rasters * (uint64_t)s->of->frame->settings->slices * sizeof(trip_cpu_voxels);

@@ -59,5 +59,11 @@ bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to);
 /* Whether the ends of a segment may lie in cells that do not touch. Then something may show between
  * two cells in neither of which anything does. */
 bool trip_cpu_sheets_leap(const trip_cpu_sheets *s);
+/* Whether all that rays may take of sheets and slices is made before any is drawn, in place of when
+ * they first meet it: of uneven spacing, and with kernels of 64 voxels. */
+bool trip_cpu_sheets_at_once(const trip_cpu_sheets *s);
+/* Gradients, or what they will be made of, of sheets with those beside them. */
+void trip_cpu_sheets_find_gradients(trip_cpu_sheets *s, const trip_cpu_sheet_work *work,
+                                    unsigned count);
 
 #endif

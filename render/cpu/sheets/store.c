@@ -8,10 +8,6 @@
 #include "field.h"
 #include "report.h"
 
-/* Of a raster's squares, a bit each; COLUMN_0 also the first cell of each square of a row. */
-#define COLUMN_0 UINT64_C(0x0101010101010101)
-#define COLUMN_7 UINT64_C(0x8080808080808080)
-
 static const size_t raster_bytes = sizeof(trip_cpu_voxels);
 
 /* ---- memory ---- */
@@ -62,6 +58,16 @@ static void *part(char *memory, size_t *at, size_t bytes)
     return p;
 }
 
+/* Returns where it ends. */
+static size_t lay_out_making(trip_cpu_sheet *sheet, char *memory, size_t at, size_t grid)
+{
+    trip_cpu_making *m = &sheet->making;
+    m->rasters = sheet->rasters;
+    m->begun = part(memory, &at, grid * sizeof *m->begun);
+    m->made = part(memory, &at, grid * sizeof *m->made);
+    return at;
+}
+
 static size_t lay_out(trip_cpu_store *s, char *memory)
 {
     size_t at = 0, grid = trip_cpu_store_grid(s);
@@ -75,9 +81,13 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
         sheet->edges = part(memory, &at, grid * sizeof *sheet->edges);
         sheet->needed = part(memory, &at, grid * sizeof *sheet->needed);
+        at = lay_out_making(sheet, memory, at, grid);
     }
-    for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++)
-        s->slices[i].rasters = part(memory, &at, grid * sizeof *s->slices[i].rasters);
+    for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++) {
+        trip_cpu_sheet *slice = &s->slices[i];
+        slice->rasters = part(memory, &at, grid * sizeof *slice->rasters);
+        at = lay_out_making(slice, memory, at, grid);
+    }
     s->some = part(memory, &at, grid * sizeof *s->some);
     s->open = part(memory, &at, grid * sizeof *s->open);
     return at;
@@ -175,6 +185,8 @@ bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at)
     sheet->rasters[at] = s->free[--s->free_count];
     if (sheet->filled)
         atomic_store_explicit(&sheet->filled[at], 0, memory_order_relaxed);
+    atomic_store_explicit(&sheet->making.begun[at], 0, memory_order_relaxed);
+    atomic_store_explicit(&sheet->making.made[at], 0, memory_order_relaxed);
     return true;
 }
 
@@ -407,7 +419,7 @@ static uint64_t squares_with(uint64_t cells)
     cells |= cells >> 4;
     cells |= cells >> 2;
     cells |= cells >> 1;
-    return ((cells & COLUMN_0) * UINT64_C(0x0102040810204080)) >> 56;
+    return ((cells & TRIP_CPU_COLUMN_0) * UINT64_C(0x0102040810204080)) >> 56;
 }
 
 /* A segment moves less than a voxel along u and v: both of its ends lie in cells that touch the one
@@ -418,8 +430,9 @@ static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells)
         const uint64_t *row = cells->rows + i, last = row[6] | row[7];
         const uint64_t all = row[0] | row[1] | row[2] | row[3] | row[4] | row[5] | last;
         edges[TRIP_CPU_ALL] |= squares_with(all) << i;
-        edges[TRIP_CPU_LEFT] |= squares_with(all & COLUMN_0) << i;
-        edges[TRIP_CPU_RIGHT] |= squares_with(all & (COLUMN_7 | COLUMN_7 >> 1)) << i;
+        edges[TRIP_CPU_LEFT] |= squares_with(all & TRIP_CPU_COLUMN_0) << i;
+        edges[TRIP_CPU_RIGHT] |= squares_with(all & (TRIP_CPU_COLUMN_7 | TRIP_CPU_COLUMN_7 >> 1))
+                                 << i;
         edges[TRIP_CPU_ABOVE] |= squares_with(row[0]) << i;
         edges[TRIP_CPU_BELOW] |= squares_with(last) << i;
     }
@@ -486,10 +499,10 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
 static uint64_t beside(const trip_cpu_edges *e, int edge)
 {
     const uint64_t *here = e[0], *before = e[-1], *behind = e[1];
-    return here[edge] | ((here[edge] & here[TRIP_CPU_LEFT]) >> 1 & ~COLUMN_7) |
-           ((here[edge] & here[TRIP_CPU_RIGHT]) << 1 & ~COLUMN_0) |
-           ((before[edge] & before[TRIP_CPU_RIGHT]) >> 7 & COLUMN_0) |
-           ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & COLUMN_7);
+    return here[edge] | ((here[edge] & here[TRIP_CPU_LEFT]) >> 1 & ~TRIP_CPU_COLUMN_7) |
+           ((here[edge] & here[TRIP_CPU_RIGHT]) << 1 & ~TRIP_CPU_COLUMN_0) |
+           ((before[edge] & before[TRIP_CPU_RIGHT]) >> 7 & TRIP_CPU_COLUMN_0) |
+           ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & TRIP_CPU_COLUMN_7);
 }
 
 /* Outermost rasters have no squares that may show. With uneven spacing a segment may reach across
@@ -515,9 +528,6 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
 static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    const uint64_t before = w->needed_before ? w->needed_before[at] : 0;
-    const uint64_t behind = w->needed ? w->needed[at] : 0;
-    const uint64_t squares = w->everywhere ? UINT64_MAX : before | behind;
     const size_t across = (size_t)s->across;
     const trip_cpu_uneven_raster r = {
         .raster = raster_at(s, w->sheet, at),
@@ -529,10 +539,10 @@ static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, si
                    (s->first_v + (int64_t)(at / across)) * TRIP_CPU_RASTER, w->sheet->number },
         .axis = s->axis,
     };
-    if (squares && trip_coordinates_uneven(s->coordinates))
-        trip_cpu_uneven_gradients(s->coordinates, &r, squares);
-    else if (squares)
-        s->kernels->sheet_gradients(r.raster, squares, r.left, r.above, r.sheet_before,
+    if (trip_coordinates_uneven(s->coordinates))
+        trip_cpu_uneven_gradients(s->coordinates, &r);
+    else
+        s->kernels->sheet_gradients(r.raster, UINT64_MAX, r.left, r.above, r.sheet_before,
                                     r.sheet_behind);
 }
 
@@ -550,7 +560,7 @@ bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
     for (int32_t v = 1; v < s->down - 1; v++)
         for (int32_t u = 1; u < s->across - 1; u++) {
             size_t at = (size_t)v * (size_t)s->across + (size_t)u;
-            if (!w->other->rasters[at] || !w->third->rasters[at] || !w->needed[at])
+            if (!w->other->rasters[at] || !w->third->rasters[at] || !w->other->needed[at])
                 continue;
             if (!trip_cpu_store_take(s, w->sheet, at)) {
                 trip_cpu_store_drop(s, w->sheet);
@@ -560,14 +570,21 @@ bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
     return true;
 }
 
+static void clear_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+{
+    trip_cpu_store_clear(job->store, w->sheet->rasters[at]);
+}
+
+void trip_cpu_store_clear_slices(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
+{
+    run_work(&(work_job){ .store = s, .work = work, .each = clear_raster }, count);
+}
+
 static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
-    int32_t to = (int32_t)lrint(w->part * 16384);
-    trip_cpu_store_clear(s, w->sheet->rasters[at]);
-    s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), w->needed[at],
-                              to << 16 | (16384 - to), w->other->shaded,
-                              raster_at(s, w->sheet, at));
+    s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), UINT64_MAX,
+                              w->weights, w->other->shaded, raster_at(s, w->sheet, at));
 }
 
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)

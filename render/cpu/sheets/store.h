@@ -33,7 +33,8 @@ typedef struct trip_cpu_sheet {
     uint64_t *whole;                /* squares whose cells all have eight corners */
     trip_cpu_edges *edges;          /* these squares by edges */
     uint64_t *needed;               /* squares of which segments that may show take voxels */
-    bool prepared, shaded;          /* ranges are there; gradients are */
+    trip_cpu_making making;         /* but for frames whose sheets and slices are made at once */
+    bool prepared, shaded;          /* ranges are there; all gradients are */
 } trip_cpu_sheet;
 
 enum {
@@ -120,11 +121,8 @@ typedef struct trip_cpu_sheet_work {
      */
     const trip_cpu_sheet *before, *behind;
     trip_kernel kernel;
-    /* Squares that are needed: of gradients on both sides of the sheet, NULL where there is
-     * nothing; of slices between the sheets. */
-    const uint64_t *needed, *needed_before;
-    bool everywhere; /* gradients: of all squares; cells: all about those that may show */
-    double part;     /* of slices: the weight of `third` */
+    bool everywhere; /* cells: all squares about those that may show are needed */
+    int32_t weights; /* of slices: as of trip_cpu_making */
 } trip_cpu_sheet_work;
 
 /* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
@@ -134,13 +132,15 @@ void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, 
  * corners, of squares about which the function shows something. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
-/* Gradients of prepared sheets' voxels, where they are needed or everywhere. */
+/* All gradients of prepared sheets' voxels. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
 /* Rasters for a slice between two sheets, where they are needed. False when the pool is full; then
  * it is empty. */
 bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
-/* The voxels of slices. */
+/* All voxels of slices are missing; or are made. */
+void trip_cpu_store_clear_slices(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                 unsigned count);
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
 
 #endif

@@ -40,18 +40,13 @@ static trip_cpu_gradient gradient_of(const trip_coordinates *c, const trip_cpu_u
     return g;
 }
 
-void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r,
-                               uint64_t squares)
+void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r)
 {
     const double unit = trip_cpu_gradient_unit(c);
-    for (uint64_t rest = squares; rest; rest &= rest - 1) {
-        const int square = __builtin_ctzll(rest);
-        for (int n = 0; n < 64; n++) {
-            const int u = square % TRIP_CPU_SQUARES_ACROSS * 8 + n % 8;
-            const int v = square / TRIP_CPU_SQUARES_ACROSS * 8 + n / 8;
+    for (int v = 0; v < TRIP_CPU_RASTER; v++)
+        for (int u = 0; u < TRIP_CPU_RASTER; u++) {
             const int at = v * TRIP_CPU_RASTER_STRIDE + u;
             if (r->raster->codes[at] != TRIP_CPU_CODE_MISSING)
                 r->raster->gradients[at] = gradient_of(c, r, u, v, unit);
         }
-    }
 }

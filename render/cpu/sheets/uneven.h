@@ -20,8 +20,7 @@ typedef struct trip_cpu_uneven_raster {
     int axis;         /* of its list */
 } trip_cpu_uneven_raster;
 
-/* Of the squares' voxels, as sheet_gradients() finds those of even spacing. */
-void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r,
-                               uint64_t squares);
+/* Of its voxels, as sheet_gradients() finds those of even spacing. */
+void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r);
 
 #endif

@@ -201,7 +201,7 @@ static int last_about(const trip_cpu_windows *w, int beyond)
 static void find_interval(trip_cpu_sheets *s)
 {
     const trip_cpu_windows *w = &s->windows;
-    const bool up = s->way > 0, leap = trip_cpu_sheets_leap(s);
+    const bool up = s->way > 0;
     const int taken = w->about - 1, last = last_about(w, taken), last_loaded = w->count - 1;
     trip_cpu_sheet *sheets = s->store.sheets, *a = &sheets[w->from];
     trip_cpu_sheet_work work[TRIP_CPU_AT_HAND_MOST] = { 0 };
@@ -213,9 +213,6 @@ static void find_interval(trip_cpu_sheets *s)
             .sheet = &sheets[i],
             .other = up ? before : behind,
             .third = up ? behind : before,
-            .needed = i == w->from ? a->needed : NULL,
-            .needed_before = i == w->from + 1 ? a->needed : NULL,
-            .everywhere = leap,
         };
     }
     trip_cpu_store_prepare(&s->store, work, count);
@@ -225,11 +222,10 @@ static void find_interval(trip_cpu_sheets *s)
         .before = taken > 0 && w->from > 0 ? a - 1 : NULL,
         .behind = taken > 0 && w->from + 1 < last_loaded ? a + 2 : NULL,
         .kernel = s->view.kernel,
-        .everywhere = leap,
+        .everywhere = trip_cpu_sheets_leap(s),
     };
     trip_cpu_store_find_visible(&s->store, &cells, 1, s->function);
-    if (s->view.shading)
-        trip_cpu_store_find_gradients(&s->store, work, count);
+    trip_cpu_sheets_find_gradients(s, work, count);
 }
 
 /* Rays that start beside all windows are of the outermost. */

@@ -1,0 +1,126 @@
+/* Makes squares of sheets and slices when rays first meet them (trip_cpu_making): included by
+ * sheet_tmpl.h. Each square is made by one thread; others that need it wait. Slices wait for
+ * sheets, and a square of a sheet for those to the right and below at most, so that none waits for
+ * itself. */
+#ifndef TRIP_CPU_MAKING_H
+#define TRIP_CPU_MAKING_H
+
+#include <sched.h>
+#include <stdatomic.h>
+#include <string.h>
+
+#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/slice_tmpl.h"
+
+static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients,
+                         size_t at, uint64_t squares);
+
+/* The raster in which all is missing where there is no sheet. */
+INLINE trip_cpu_voxels *raster_of(const trip_cpu_group *g, const int32_t *rasters, size_t at)
+{
+    return g->pool + (rasters ? rasters[at] : 0);
+}
+
+/* Of squares at the right edge, the first column of the raster beside; at the lower edge, the first
+ * row of that below; of the last, the voxel between. */
+static void repeat_gradients(const trip_cpu_group *g, const trip_cpu_making *m, size_t at,
+                             uint64_t squares)
+{
+    enum { ACROSS = TRIP_CPU_SQUARES_ACROSS, SIDE = TRIP_CPU_RASTER };
+    const uint64_t right = (squares & TRIP_CPU_COLUMN_7) >> (ACROSS - 1);
+    const uint64_t below = squares >> ACROSS * (ACROSS - 1);
+    const size_t down = (size_t)g->across;
+    trip_cpu_gradient *to = raster_of(g, m->rasters, at)->gradients;
+    if (right && m->rasters[at + 1]) {
+        const trip_cpu_gradient *from = raster_of(g, m->rasters, at + 1)->gradients;
+        make_squares(g, m, true, at + 1, right);
+        for (int v = 0; v < SIDE; v++)
+            if (right >> v / 8 * ACROSS & 1)
+                to[v * TRIP_CPU_RASTER_STRIDE + SIDE] = from[v * TRIP_CPU_RASTER_STRIDE];
+    }
+    to += SIDE * TRIP_CPU_RASTER_STRIDE;
+    if (below && m->rasters[at + down]) {
+        const trip_cpu_gradient *from = raster_of(g, m->rasters, at + down)->gradients;
+        make_squares(g, m, true, at + down, below);
+        for (int u = 0; u < SIDE; u += 8)
+            if (below >> u / 8 & 1)
+                memcpy(to + u, from + u, 8 * sizeof *to);
+    }
+    if (squares >> (ACROSS * ACROSS - 1) && m->rasters[at + down + 1]) {
+        make_squares(g, m, true, at + down + 1, 1);
+        to[SIDE] = raster_of(g, m->rasters, at + down + 1)->gradients[0];
+    }
+}
+
+/* Of a raster, by one thread. */
+static void make(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients, size_t at,
+                 uint64_t squares)
+{
+    trip_cpu_voxels *raster = raster_of(g, m->rasters, at);
+    if (!m->from) {
+        sheet_gradients(raster, squares, raster_of(g, m->rasters, at - 1),
+                        raster_of(g, m->rasters, at - (size_t)g->across),
+                        raster_of(g, m->before, at), raster_of(g, m->behind, at));
+        repeat_gradients(g, m, at, squares);
+        return;
+    }
+    if (gradients) {
+        make_squares(g, m->from, true, at, squares);
+        make_squares(g, m->to, true, at, squares);
+    }
+    sheet_between(raster_of(g, m->from->rasters, at), raster_of(g, m->to->rasters, at), squares,
+                  m->weights, gradients, raster);
+}
+
+static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients,
+                         size_t at, uint64_t squares)
+{
+    const uint64_t to_make = squares & ~atomic_load_explicit(&m->made[at], memory_order_acquire);
+    if (!to_make)
+        return;
+    const uint64_t own =
+        to_make & ~atomic_fetch_or_explicit(&m->begun[at], to_make, memory_order_relaxed);
+    if (own) {
+        make(g, m, gradients, at, own);
+        atomic_fetch_or_explicit(&m->made[at], own, memory_order_release);
+    }
+    while (to_make & ~atomic_load_explicit(&m->made[at], memory_order_acquire))
+        sched_yield();
+}
+
+/* The squares with voxels from the first column and row to the last. */
+INLINE uint64_t squares_from_to(int32_t u0, int32_t u1, int32_t v0, int32_t v1)
+{
+    const uint64_t columns = (2u << (u1 >> 3)) - (1u << (u0 >> 3));
+    const uint64_t rows = UINT64_MAX << (v0 >> 3) * 8 & UINT64_MAX >> (56 - (v1 >> 3) * 8);
+    return columns * TRIP_CPU_COLUMN_0 & rows;
+}
+
+/* A sheet has its codes from the start. */
+static void make_slice(const trip_cpu_group *g, bool gradients, unsigned slice, size_t at,
+                       uint64_t squares, uint64_t needed)
+{
+    const trip_cpu_making *m = g->slices[slice].making;
+    if (m->rasters[at] && (gradients || m->from))
+        make_squares(g, m, gradients, at, g->leaps && !m->from ? squares : squares & needed);
+}
+
+/* What rays that meet cells of a box take of a segment's ends: of a raster's last cells, what it
+ * has of those beside it. */
+static void make_segment(const trip_cpu_group *g, bool gradients, cell_box box, unsigned segment)
+{
+    const int log2 = TRIP_CPU_RASTER_LOG2, last = TRIP_CPU_RASTER - 1;
+    for (int32_t v = box.lo[1]; v <= box.hi[1]; v = (v | last) + 1) {
+        const int32_t end_v = lesser_of(v | last, box.hi[1] + 1);
+        for (int32_t u = box.lo[0]; u <= box.hi[0]; u = (u | last) + 1) {
+            const int32_t end_u = lesser_of(u | last, box.hi[0] + 1);
+            const size_t at = (size_t)(v >> log2) * (size_t)g->across + (size_t)(u >> log2);
+            const uint64_t squares =
+                squares_from_to(u & last, end_u & last, v & last, end_v & last);
+            for (unsigned n = segment; n <= segment + 1; n++)
+                make_slice(g, gradients, n, at, squares, g->needed[segment][at]);
+        }
+    }
+}
+
+#endif
