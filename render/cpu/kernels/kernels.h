@@ -310,13 +310,13 @@ typedef struct trip_cpu_kernels {
      * (biased): none that lacks a corner, and none of other squares. */
     void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                         int16_t least, int16_t most, trip_cpu_cells *out);
-    /* Gradients of the squares' voxels. Beside the raster lie those to the left of it and above, of
-     * the same sheet, and those of the sheets before and behind in index order. Codes alone are
-     * read. */
+    /* Gradients of the squares' voxels that are there. Beside the raster lie those to the left of
+     * it and above, of the same sheet, and those of the sheets before and behind in index order.
+     * Codes alone are read. */
     void (*sheet_gradients)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                             const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
                             const trip_cpu_voxels *sheet_behind);
-    /* The squares' voxels between two rasters, with their gradients or without;
+    /* The squares' voxels between two rasters, with gradients of those that are there or without;
      * `weights` is w << 16 | 2^14 - w, w that of `to`. A voxel is missing where either is. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);

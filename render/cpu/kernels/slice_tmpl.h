@@ -279,6 +279,11 @@ typedef struct neighbours {
     vh before[3], behind[3];
 } neighbours;
 
+INLINE bool all_are_missing(vh codes)
+{
+    return vh_bits(vh_is_missing(codes)) == 0xff;
+}
+
 INLINE bool some_is_missing(const neighbours *n)
 {
     vh least = vh_min(n->before[0], n->behind[0]);
@@ -312,6 +317,8 @@ static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, u
             int i = v * TRIP_CPU_RASTER_STRIDE + u;
             const int16_t *at = raster->codes + i;
             const int16_t *to_left = at - 1, *before = at - TRIP_CPU_RASTER_STRIDE;
+            if (all_are_missing(vh_load(at)))
+                continue;
             if (v == 0)
                 before = above->codes + 63 * TRIP_CPU_RASTER_STRIDE + u;
             if (u == 0) {
@@ -344,9 +351,10 @@ INLINE void voxels_between(const trip_cpu_voxels *from, const trip_cpu_voxels *t
                            int32_t weights, bool gradients, trip_cpu_voxels *out)
 {
     vh a = vh_load(from->codes + at), b = vh_load(to->codes + at);
-    vh_store(out->codes + at,
-             vh_select(vh_is_missing(a) | vh_is_missing(b), mean_or_between(a, b, weights),
-                       vh_set(TRIP_CPU_CODE_MISSING)));
+    vh codes = vh_select(vh_is_missing(a) | vh_is_missing(b), mean_or_between(a, b, weights),
+                         vh_set(TRIP_CPU_CODE_MISSING));
+    vh_store(out->codes + at, codes);
+    gradients = gradients && !all_are_missing(codes);
     const int16_t *c = from->gradients[at].along, *d = to->gradients[at].along;
     for (int i = 0; i < 24 && gradients; i += 8)
         vh_store(out->gradients[at].along + i,
