@@ -1087,7 +1087,8 @@ INLINE void set_light(const trip_cpu_sheet_view *view, stamp_rays *l)
 {
     for (int k = 0; k < 3; k++)
         l->way.light[k] = view->headlight ? l->to_eye[k] : v_set(view->light[k]);
-    set_half(&l->way, l->to_eye);
+    if (!view->headlight) /* else it is that way, too */
+        set_half(&l->way, l->to_eye);
 }
 
 INLINE vf form_of(const float form[3], vf x, vf y)
