@@ -355,10 +355,11 @@ INLINE void voxels_between(const trip_cpu_voxels *from, const trip_cpu_voxels *t
                          vh_set(TRIP_CPU_CODE_MISSING));
     vh_store(out->codes + at, codes);
     gradients = gradients && !all_are_missing(codes);
-    const int16_t *c = from->gradients[at].along, *d = to->gradients[at].along;
+    const int16_t *c = (const int16_t *)&from->gradients[at];
+    const int16_t *d = (const int16_t *)&to->gradients[at];
+    int16_t *numbers = (int16_t *)&out->gradients[at];
     for (int i = 0; i < 24 && gradients; i += 8)
-        vh_store(out->gradients[at].along + i,
-                 mean_or_between(vh_load(c + i), vh_load(d + i), weights));
+        vh_store(numbers + i, mean_or_between(vh_load(c + i), vh_load(d + i), weights));
 }
 
 INLINE int16_t number_between(int16_t a, int16_t b, int32_t weights)
