@@ -15,7 +15,7 @@
 /* Of the memory that is left, what the frame goes on with besides. */
 enum { LEFT_OVER = 4, LEFT_OVER_OF_WINDOWS = 16 };
 
-/* What a processor's last cache holds, or more. */
+/* What a processor's last cache holds at least. */
 enum { CACHE_BYTES = 8 << 20 };
 
 static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
@@ -365,7 +365,7 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index
                                                trip_cpu_sheets_at_once(s) ? NULL : &at->making };
 }
 
-/* Slices of a group, which are cut once all of them have rasters. */
+/* Slices of a group, which are cleared or cut once all of them have rasters. */
 typedef struct cutting {
     trip_cpu_sheet_work work[TRIP_CPU_SLICES_MAX];
     unsigned count;
@@ -383,14 +383,12 @@ static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutti
         return true;
     }
     const int32_t weight = (int32_t)lrint(part * 16384);
-    const trip_cpu_sheet_work w = {
-        .sheet = slice, .other = from, .third = to, .weights = weight << 16 | (16384 - weight)
-    };
+    const trip_cpu_sheet_work w = { .sheet = slice, .other = from, .third = to };
     if (!trip_cpu_store_take_slice(&s->store, &w))
         return false;
     slice->making.from = &from->making;
     slice->making.to = &to->making;
-    slice->making.weights = w.weights;
+    slice->making.weights = weight << 16 | (16384 - weight);
     cut->work[cut->count++] = w;
     add_slice(s, slice, index, i, first);
     return true;
@@ -584,7 +582,8 @@ static int finish_row(trip_cpu_sheets *s)
 }
 
 /* Whether the sheets held are drawn before another begins: all that there is room for, or as many
- * as stay in a processor's cache with their slices, so that panes need not wait for memory. */
+ * as stay in a processor's cache with their slices. Of large ones these are few, so that what they
+ * hide of the next is known early. */
 static bool are_enough(const trip_cpu_sheets *s)
 {
     const int fewest = in_a_row(s->of->frame) + 2;

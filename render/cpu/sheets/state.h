@@ -48,11 +48,12 @@ struct trip_cpu_sheets {
 /* How many sheets on each side of an interval its picture depends on: for gradients, and with
  * kernels of 64 voxels for values. */
 int trip_cpu_sheets_about(const trip_frame *frame);
-/* Sheets at hand when an interval is drawn: what it depends on, and one that has begun. */
+/* Sheets that an interval's picture depends on, its own two among them. */
 int trip_cpu_sheets_at_hand(const trip_frame *frame);
 
 /* Draws from held[front] on, at most to held[last], and moves `front` along: not at all when not
- * one interval fits the memory. What is visible, and gradients, were found. */
+ * one interval fits the memory. What is visible was found, and gradients or what they
+ * will be made of. */
 void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last);
 /* Whether something between two sheets lies before the eye; of the first, `to` is the farther. */
 bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to);

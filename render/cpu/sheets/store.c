@@ -584,7 +584,8 @@ static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t
 {
     const trip_cpu_store *s = job->store;
     s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), UINT64_MAX,
-                              w->weights, w->other->shaded, raster_at(s, w->sheet, at));
+                              w->sheet->making.weights, w->other->shaded,
+                              raster_at(s, w->sheet, at));
 }
 
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)

@@ -122,7 +122,6 @@ typedef struct trip_cpu_sheet_work {
     const trip_cpu_sheet *before, *behind;
     trip_kernel kernel;
     bool everywhere; /* cells: all squares about those that may show are needed */
-    int32_t weights; /* of slices: as of trip_cpu_making */
 } trip_cpu_sheet_work;
 
 /* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
