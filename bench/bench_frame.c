@@ -76,8 +76,8 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     if (f->occluder)
         *f->occluder = count ? NULL : f->renderer;
     double start = bench_now_ms();
-    int status = trip_plan_make(&plan, f->session->data, camera, &settings, f->session->table,
-                                f->session->budget);
+    int status = trip_plan_make_next(&plan, f->session->data, camera, &settings, f->session->table,
+                                     session_classified(f->session, 0), NULL, f->session->budget);
     if (status)
         return status;
     double planned = bench_now_ms();

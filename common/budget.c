@@ -24,7 +24,7 @@
 #define TRIP_BUDGET_ON_HEAP 0
 #endif
 
-enum { ALIGNMENT_BYTES = 4096, LARGE_BYTES = 2 << 20 };
+enum { ALIGNMENT_BYTES = 4096, SMALL_BYTES = 64 << 10, LARGE_BYTES = 2 << 20 };
 
 struct trip_budget {
     uint64_t limit_bytes;
@@ -62,12 +62,19 @@ uint64_t trip_budget_peak_bytes(const trip_budget *b)
     return atomic_load_explicit(&b->peak_bytes, memory_order_relaxed);
 }
 
-/* Pages straight from the system: zeroed without being touched, and given back on release; large
- * ones where it has them, since direct reads into these take far fewer pieces. Under
- * AddressSanitizer heap memory, so that it watches the borders and finds what is not released. */
+/* Small memory, which every frame takes and releases, is of the heap: to give pages back to the
+ * system interrupts all threads. Under AddressSanitizer all is, so that it watches the borders and
+ * finds what is not released. */
+static bool is_on_heap(size_t bytes)
+{
+    return TRIP_BUDGET_ON_HEAP || bytes <= SMALL_BYTES;
+}
+
+/* Else pages straight from the system: zeroed without being touched, and given back on release;
+ * large ones where it has them, since direct reads into these take far fewer pieces. */
 static void *map_pages(size_t bytes)
 {
-    if (TRIP_BUDGET_ON_HEAP) {
+    if (is_on_heap(bytes)) {
         void *memory = aligned_alloc(ALIGNMENT_BYTES, bytes);
         return memory ? memset(memory, 0, bytes) : NULL;
     }
@@ -81,7 +88,7 @@ static void *map_pages(size_t bytes)
 
 static void unmap_pages(void *memory, size_t bytes)
 {
-    if (TRIP_BUDGET_ON_HEAP)
+    if (is_on_heap(bytes))
         free(memory);
     else
         munmap(memory, bytes);

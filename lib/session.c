@@ -10,6 +10,8 @@
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 
+enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MOST };
+
 /* Whether values which show were left out of some part, where the caller wants that in place of a
  * warning. */
 static bool find_missing(const session *s, const trip_tf *tf, const session_look *look)
@@ -90,7 +92,7 @@ int session_read_text(session *s)
     return status;
 }
 
-trip_classification *session_classified(session *s, unsigned level)
+trip_classification *session_classified(const session *s, unsigned level)
 {
     return &s->classified[level];
 }
@@ -107,8 +109,8 @@ int session_use_function(session *s, const session_look *look)
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
     int status = session_read_text(s);
-    for (int i = 0; i <= TRIP_DATASET_LEVELS_MOST; i++)
-        trip_classification_forget_form(&s->classified[i]);
+    for (int i = 0; i < LEVELS; i++)
+        trip_classification_forget_table(&s->classified[i]);
     trip_mean_tables_release(&s->mean_tables, s->budget);
     if (!status && !s->table)
         status = take_table(s);
@@ -146,6 +148,9 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 {
     *s = (session){ .input = input };
     int status = trip_budget_create(&s->budget, memory_bytes);
+    s->classified = calloc(LEVELS, sizeof *s->classified);
+    if (!status && !s->classified)
+        status = trip_fail(TRIP_ERROR, "open", input, "out of memory");
     if (!status)
         status = open_part(s, input);
     if (!status)
@@ -166,7 +171,7 @@ int session_add_data(session *s, const char *input)
     }
     trip_dataset_join_close(s->joined);
     s->data = s->joined = joined;
-    memset(s->classified, 0, sizeof s->classified);
+    memset(s->classified, 0, LEVELS * sizeof *s->classified);
     trip_mean_tables_release(&s->mean_tables, s->budget);
     return 0;
 }
@@ -190,6 +195,7 @@ void session_close(session *s)
     }
     free(s->parts);
     free(s->texts);
+    free(s->classified);
     if (s->budget)
         trip_budget_destroy(s->budget);
     *s = (session){ 0 };

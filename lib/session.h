@@ -15,14 +15,13 @@ typedef struct session {
     trip_budget *budget;
     trip_dataset **parts; /* data sets that were opened, in this order */
     unsigned part_count;
-    trip_dataset *joined;      /* all of them as one; NULL where there is one */
-    trip_dataset *data;        /* that is drawn: that, or the one there is */
-    trip_dataset_text **texts; /* by part; NULL until they are wanted */
-    trip_dataset_text *text;   /* the first of these */
-    trip_tf_entry *table;      /* 65536 entries; the same */
-    /* Of frames before, by their level: a frame may have several. */
-    trip_classification classified[1 + TRIP_DATASET_LEVELS_MOST];
-    trip_mean_tables mean_tables; /* of coarse levels: they may be kept for the next frame */
+    trip_dataset *joined;            /* all of them as one; NULL where there is one */
+    trip_dataset *data;              /* that is drawn: that, or the one there is */
+    trip_dataset_text **texts;       /* by part; NULL until they are wanted */
+    trip_dataset_text *text;         /* the first of these */
+    trip_tf_entry *table;            /* 65536 entries; the same */
+    trip_classification *classified; /* of frames before, by level */
+    trip_mean_tables mean_tables;    /* of coarse levels: they may be kept for the next frame */
 } session;
 
 /* The transfer function; zero means the one kept in the data set, as it is. */
@@ -46,8 +45,9 @@ int session_use_function(session *s, const session_look *look);
 /* Between frames: keeps the tables of coarse levels where they are a small part of the memory that
  * is left. */
 void session_keep_tables(session *s);
-/* What is known of frames that are drawn from a level of its data with its function. */
-trip_classification *session_classified(session *s, unsigned level);
+/* What is known of frames that are drawn from a level of its data with its function, and is added
+ * to by each. */
+trip_classification *session_classified(const session *s, unsigned level);
 /* Both. Warns when the function shows values that were left out when the data set was made, with
  * the command that makes it anew. Close it also after a failure. */
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);

@@ -1,5 +1,6 @@
 #include "classification.h"
 
+#include <float.h>
 #include <math.h>
 
 #include "field.h"
@@ -63,7 +64,15 @@ void trip_classification_form(trip_classification *c, const trip_dataset *data, 
     c->has_form = true;
 }
 
-void trip_classification_forget_form(trip_classification *c)
+const trip_code_set *trip_classification_shown(trip_classification *c, const trip_tf_entry *table)
 {
-    c->has_form = false;
+    if (!c->has_shown)
+        trip_code_set_make(&c->shown, table, FLT_TRUE_MIN);
+    c->has_shown = true;
+    return &c->shown;
+}
+
+void trip_classification_forget_table(trip_classification *c)
+{
+    c->has_form = c->has_shown = false;
 }

@@ -25,7 +25,7 @@ typedef struct planning {
     trip_budget *budget;
     trip_classification *classified; /* by frames before */
     trip_brick_ranges *about;        /* post: of the lists along the axis at hand; else NULL */
-    trip_code_set shown;             /* by the table: */
+    trip_code_set shown;             /* by a table of a coarse level's: */
     const trip_tf_entry *shown_by;
 } planning;
 
@@ -198,9 +198,11 @@ static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t i
     }
 }
 
-/* The codes that a list shows. Most lists of a plan have one table. */
+/* The codes that a list shows, whose table is the plan's or a coarse level's. */
 static const trip_code_set *shown_by(planning *p, const trip_tf_entry *table)
 {
+    if (table == p->table)
+        return trip_classification_shown(p->classified, table);
     if (p->shown_by != table)
         trip_code_set_make(&p->shown, table, FLT_TRUE_MIN);
     p->shown_by = table;
@@ -749,6 +751,12 @@ uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t 
                                                (const int64_t[3]){ u, v, sheet })
                      : trip_clip_square(&planned->clip, list->axis, sheet, u, v);
     return drawn;
+}
+
+bool trip_plan_draws_all(const trip_plan *plan, const trip_list *list)
+{
+    const trip_plan_list *planned = &plan->lists[list->index];
+    return !planned->by_level && planned->clip.count == 0;
 }
 
 uint64_t trip_plan_splats(const trip_plan *plan)

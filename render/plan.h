@@ -96,6 +96,8 @@ bool trip_plan_halo_is_short(const trip_dataset *data, const trip_settings *sett
  * number, as in a block. */
 uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t sheet, int64_t u,
                           int64_t v);
+/* Whether that is all of them, of any square of the list. */
+bool trip_plan_draws_all(const trip_plan *plan, const trip_list *list);
 
 /* Selected in all lists. */
 uint64_t trip_plan_splats(const trip_plan *plan);

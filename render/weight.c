@@ -1,14 +1,19 @@
 #include "weight.h"
 
-/* fmax() without the call: nothing here is not a number. */
+/* fmax() and fmin() without the call: nothing here is not a number. */
 static double larger(double a, double b)
 {
     return a > b ? a : b;
 }
 
+static double smaller(double a, double b)
+{
+    return a < b ? a : b;
+}
+
 static double largest(trip_vec3 r)
 {
-    return fmax(fabs(r.x), fmax(fabs(r.y), fabs(r.z)));
+    return larger(fabs(r.x), larger(fabs(r.y), fabs(r.z)));
 }
 
 static int largest_axis(trip_vec3 r)
@@ -36,7 +41,7 @@ double trip_weight(const trip_settings *s, int axis_of_view, trip_vec3 ray, int 
     case TRIP_METHOD_MERGE:
         break;
     }
-    return fmax(0, trip_weight_signed(s, ray, axis));
+    return larger(0, trip_weight_signed(s, ray, axis));
 }
 
 int trip_weight_axis_of_view(const trip_camera *c)
@@ -75,8 +80,8 @@ trip_ray_bounds trip_ray_bounds_over(const trip_camera *c, const double from[2],
         if (c->ortho)
             continue;
         double x = trip_component(c->rx, a), y = trip_component(c->ry, a);
-        lo[a] += fmin(x * from[0], x * to[0]) + fmin(y * from[1], y * to[1]);
-        hi[a] += fmax(x * from[0], x * to[0]) + fmax(y * from[1], y * to[1]);
+        lo[a] += smaller(x * from[0], x * to[0]) + smaller(y * from[1], y * to[1]);
+        hi[a] += larger(x * from[0], x * to[0]) + larger(y * from[1], y * to[1]);
     }
     return trip_ray_bounds_of(lo, hi);
 }

@@ -49,12 +49,29 @@ static void keep_drawn(trip_cpu_worker *w, const trip_block *b, const trip_squar
     s->normals = s->normals ? normals : NULL;
 }
 
-trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, const trip_block *b,
-                                     const trip_run *run, const trip_square *at)
+trip_cpu_part_squares trip_cpu_part_squares_of(const trip_cpu *r, const trip_cpu_part *part)
 {
-    const uint32_t code_bytes = trip_square_code_bytes(at);
+    const trip_block *b = &part->block;
+    const bool all = trip_plan_draws_all(r->frame->plan, trip_batch_list(r->batch, part->run));
+    return (trip_cpu_part_squares){
+        .of = r,
+        .part = part,
+        .as_they_are =
+            all &&
+            may_read_behind(r->batch, TRIP_PLANE_VOXELS, (const unsigned char *)b->present,
+                            b->words * sizeof *b->present) &&
+            (!b->normals || may_read_behind(r->batch, TRIP_PLANE_NORMALS, b->normals,
+                                            (size_t)b->count * b->normal_bytes)),
+    };
+}
+
+trip_cpu_square trip_cpu_make_square(const trip_cpu_part_squares *of, trip_cpu_worker *w,
+                                     const trip_square *at)
+{
+    const trip_cpu *r = of->of;
+    const trip_run *run = of->part->run;
+    const trip_block *b = &of->part->block;
     const size_t normal = (size_t)at->first * b->normal_bytes;
-    const trip_list *list = trip_batch_list(r->batch, run);
     trip_cpu_square s = {
         .u = run->u + TRIP_CPU_SQUARE * (int)trip_cpu_square_u(at->number),
         .v = run->v + TRIP_CPU_SQUARE * (int)trip_cpu_square_v(at->number),
@@ -65,7 +82,11 @@ trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, cons
         .codes = at->codes,
         .normals = b->normals ? b->normals + normal : NULL,
     };
-    uint64_t drawn = trip_plan_square(r->frame->plan, list, s.sheet, s.u, s.v);
+    if (of->as_they_are)
+        return s;
+    const uint32_t code_bytes = trip_square_code_bytes(at);
+    uint64_t drawn =
+        trip_plan_square(r->frame->plan, trip_batch_list(r->batch, run), s.sheet, s.u, s.v);
     if (!(s.mask & drawn)) {
         s.mask = 0;
         return s;
@@ -94,8 +115,8 @@ static uint32_t cull_chunk(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk
         left -= part->voxels;
         skip = 0;
         if (r->frame->count)
-            trip_cpu_count_part(r, w, chunk, &block, part);
-        trip_cpu_cull(&culling, &block, part);
+            trip_cpu_count_part(r, w, chunk, part);
+        trip_cpu_cull(&culling, part);
         n += part->voxels > 0;
     }
     return n;
@@ -121,15 +142,15 @@ static void empty_staged(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
 static void project_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
                          const trip_cpu_part *part, uint32_t *staged)
 {
-    const trip_block block = trip_block_of(r->batch, part->run);
     bool reversed = r->batch->pass->descending;
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
-    const uint32_t count = trip_block_squares(&block, squares);
+    const uint32_t count = trip_block_squares(&part->block, squares);
+    const trip_cpu_part_squares of = trip_cpu_part_squares_of(r, part);
     for (uint32_t i = 0; i < count; i++) {
         const trip_square *at = &squares[reversed ? count - 1 - i : i];
         if (!trip_cpu_part_has(part, at->number))
             continue;
-        trip_cpu_square square = trip_cpu_make_square(r, w, &block, part->run, at);
+        trip_cpu_square square = trip_cpu_make_square(&of, w, at);
         if (square.mask == 0)
             continue;
         *staged = r->kernels->stage(&r->views[chunk->list], &square, reversed, &w->scratch.staged,

@@ -9,9 +9,17 @@
  */
 int trip_cpu_draw_batch(trip_cpu *r, const trip_batch *batch);
 
-/* A square of a run of the batch at hand, with room to be read about its bytes. Called by workers.
- */
-trip_cpu_square trip_cpu_make_square(const trip_cpu *r, trip_cpu_worker *w, const trip_block *b,
-                                     const trip_run *run, const trip_square *at);
+/* What holds for all squares of a part of the batch at hand. */
+typedef struct trip_cpu_part_squares {
+    const trip_cpu *of;
+    const trip_cpu_part *part;
+    bool as_they_are; /* all of their voxels are drawn, and there is room behind their bytes */
+} trip_cpu_part_squares;
+
+trip_cpu_part_squares trip_cpu_part_squares_of(const trip_cpu *r, const trip_cpu_part *part);
+
+/* One of them, with room to be read behind its bytes. Called by workers. */
+trip_cpu_square trip_cpu_make_square(const trip_cpu_part_squares *of, trip_cpu_worker *w,
+                                     const trip_square *at);
 
 #endif

@@ -65,15 +65,16 @@ static uint32_t count_reaching(const trip_cpu *r, const trip_cpu_view *view, tri
 }
 
 void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
-                         const trip_block *block, const trip_cpu_part *part)
+                         const trip_cpu_part *part)
 {
     const trip_cpu_view *view = &r->counted_views[chunk->list];
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
-    const uint32_t count = trip_block_squares(block, squares);
+    const uint32_t count = trip_block_squares(&part->block, squares);
+    const trip_cpu_part_squares of = trip_cpu_part_squares_of(r, part);
     for (uint32_t i = 0; i < count; i++) {
         if (!trip_cpu_part_has(part, squares[i].number))
             continue;
-        trip_cpu_square square = trip_cpu_make_square(r, w, block, part->run, &squares[i]);
+        trip_cpu_square square = trip_cpu_make_square(&of, w, &squares[i]);
         if (square.mask == 0)
             continue;
         uint32_t n = r->isa->stage(view, &square, false, &w->scratch.staged, 0);

@@ -13,6 +13,6 @@ int trip_cpu_begin_counting(trip_cpu *r);
 /* Adds those of a run's part to the chunk's counts: also what is occluded or transparent. Called by
  * the worker that fills the chunk. */
 void trip_cpu_count_part(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
-                         const trip_block *block, const trip_cpu_part *part);
+                         const trip_cpu_part *part);
 
 #endif

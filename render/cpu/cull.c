@@ -18,17 +18,17 @@ static uint64_t visible_squares(const trip_cpu_culling *c, const trip_run *run, 
     return c->kernels->squares(c->view, &where, c->mask->panes, c->lanes);
 }
 
-static uint32_t count_voxels(const trip_block *block, const trip_cpu_part *part)
+static uint32_t count_voxels(const trip_cpu_part *part)
 {
     uint32_t voxels = 0;
-    trip_cpu_walk w = trip_cpu_walk_begin(block, false);
+    trip_cpu_walk w = trip_cpu_walk_begin(&part->block, false);
     while (trip_cpu_walk_next(&w))
         if (part->squares[w.number / 64] >> w.number % 64 & 1)
             voxels += w.count;
     return voxels;
 }
 
-void trip_cpu_cull(const trip_cpu_culling *c, const trip_block *block, trip_cpu_part *part)
+void trip_cpu_cull(const trip_cpu_culling *c, trip_cpu_part *part)
 {
     const trip_run *run = part->run;
     if (!c->view->front_to_back || c->view->coordinates)
@@ -38,9 +38,9 @@ void trip_cpu_cull(const trip_cpu_culling *c, const trip_block *block, trip_cpu_
     if (occlusion == TRIP_CPU_OCCLUDED) {
         part->voxels = 0;
     } else if (occlusion == TRIP_CPU_PARTLY && part->voxels >= FEWEST) {
-        for (unsigned word = 0; word < block->present_words; word++)
+        for (unsigned word = 0; word < part->block.present_words; word++)
             if (part->squares[word])
                 part->squares[word] &= visible_squares(c, run, word);
-        part->voxels = count_voxels(block, part);
+        part->voxels = count_voxels(part);
     }
 }

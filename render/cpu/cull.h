@@ -15,6 +15,6 @@ typedef struct trip_cpu_culling {
 } trip_cpu_culling;
 
 /* Leaves in `part` only squares that may be visible, and counts their voxels. */
-void trip_cpu_cull(const trip_cpu_culling *culling, const trip_block *block, trip_cpu_part *part);
+void trip_cpu_cull(const trip_cpu_culling *culling, trip_cpu_part *part);
 
 #endif

@@ -5,7 +5,7 @@
 trip_cpu_part trip_cpu_part_make(const trip_run *run, const trip_block *block, bool reversed,
                                  uint32_t skip, uint32_t most)
 {
-    trip_cpu_part part = { .run = run };
+    trip_cpu_part part = { .run = run, .block = *block };
     if (skip == 0 && block->count <= most) {
         memcpy(part.squares, block->present, block->present_words * sizeof *block->present);
         part.voxels = block->count;

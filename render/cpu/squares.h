@@ -64,6 +64,7 @@ static inline int trip_cpu_square_v(unsigned number)
 /* What of a run is in a chunk: some of its squares, a bit each by Morton number. */
 typedef struct trip_cpu_part {
     const trip_run *run;
+    trip_block block; /* the run's */
     uint64_t squares[TRIP_BLOCK_PRESENT_MAX];
     uint32_t voxels;
 } trip_cpu_part;

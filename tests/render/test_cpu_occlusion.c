@@ -171,7 +171,7 @@ static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, 
     const trip_cpu_culling culling = { kernels, &r->looks.view, &r->looks.mask, &r->lanes };
     trip_cpu_part part = trip_cpu_part_make(&run, &r->block, false, 0, r->count);
     uint32_t staying = 0;
-    trip_cpu_cull(&culling, &r->block, &part);
+    trip_cpu_cull(&culling, &part);
     for (uint32_t i = 0; i < r->count; i++) {
         const double at[3] = { trip_voxel_u(r->voxels[i]), trip_voxel_v(r->voxels[i]), sheet };
         bool reached = reaches(&r->looks, at, x, y), stays = stays_in(&part, r->voxels[i]);

@@ -397,7 +397,7 @@ static void what_is_known_of_a_function_is_kept_from_plan_to_plan(void **state)
         if (i == 1) /* it is constant, and now a step */
             scene_colour(&s, 7000, 65535, 1, 1, 1, 0.5);
         if (i == 4)
-            trip_classification_forget_form(&known);
+            trip_classification_forget_table(&known);
         settings.effects.cueing = i == 2 ? 0.5 : 0;
         settings.kernel = i == 5 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_LINEAR;
         assert_int_equal(
