@@ -89,30 +89,49 @@ static trip_piece *find_piece(const trip_planner *p, trip_extent *e, const trip_
     return piece;
 }
 
-static trip_piece joined(const trip_piece *a, const trip_piece *b)
+static uint64_t lesser(uint64_t a, uint64_t b)
 {
-    trip_piece both = *a;
+    return a < b ? a : b;
+}
+
+static uint64_t greater(uint64_t a, uint64_t b)
+{
+    return a > b ? a : b;
+}
+
+/* What a piece takes more with another joined to it. */
+static size_t bytes_more(const trip_planner *p, const trip_piece *piece, const trip_piece *next)
+{
+    size_t bytes = 0;
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        bytes += paged_bytes(p, lesser(piece->low[plane], next->low[plane]),
+                             greater(piece->high[plane], next->high[plane]));
+    return bytes - piece_bytes(p, piece);
+}
+
+static void join(trip_piece *piece, const trip_piece *next)
+{
     for (int plane = 0; plane < TRIP_PLANES; plane++) {
-        both.low[plane] = a->low[plane] < b->low[plane] ? a->low[plane] : b->low[plane];
-        both.high[plane] = a->high[plane] > b->high[plane] ? a->high[plane] : b->high[plane];
+        piece->low[plane] = lesser(piece->low[plane], next->low[plane]);
+        piece->high[plane] = greater(piece->high[plane], next->high[plane]);
     }
-    return both;
 }
 
 /* Puts the next run into the extent; false when there is no room for it. */
 static bool place(trip_planner *p, trip_extent *e)
 {
-    trip_piece next = piece_of(p), *piece = find_piece(p, e, &next);
+    const trip_piece next = piece_of(p);
+    trip_piece *piece = find_piece(p, e, &next);
     unsigned most = p->one_piece ? 1 : TRIP_PIECES_MAX;
     if (!piece && e->piece_count == most)
         return false;
-    size_t old = piece ? piece_bytes(p, piece) : 0;
-    if (piece)
-        next = joined(piece, &next);
-    size_t bytes = e->bytes - old + piece_bytes(p, &next);
+    size_t bytes = e->bytes + (piece ? bytes_more(p, piece, &next) : piece_bytes(p, &next));
     if (bytes > p->slot_bytes && e->run_count > 0)
         return false;
-    *(piece ? piece : &e->pieces[e->piece_count++]) = next;
+    if (piece)
+        join(piece, &next);
+    else
+        e->pieces[e->piece_count++] = next;
     e->bytes = bytes;
     e->runs[e->run_count++] = p->run;
     e->records += p->run.count;

@@ -111,7 +111,7 @@ static uint32_t cull_chunk(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk
         const trip_run *run = &r->batch->runs[i];
         const trip_block block = trip_block_of(r->batch, run);
         trip_cpu_part *part = &w->parts[n];
-        *part = trip_cpu_part_make(run, &block, r->batch->pass->descending, skip, left);
+        trip_cpu_part_make(part, run, &block, r->batch->pass->descending, skip, left);
         left -= part->voxels;
         skip = 0;
         if (r->frame->count)

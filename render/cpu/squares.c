@@ -2,21 +2,24 @@
 
 #include <string.h>
 
-trip_cpu_part trip_cpu_part_make(const trip_run *run, const trip_block *block, bool reversed,
-                                 uint32_t skip, uint32_t most)
+void trip_cpu_part_make(trip_cpu_part *part, const trip_run *run, const trip_block *block,
+                        bool reversed, uint32_t skip, uint32_t most)
 {
-    trip_cpu_part part = { .run = run, .block = *block };
+    part->run = run;
+    part->block = *block;
     if (skip == 0 && block->count <= most) {
-        memcpy(part.squares, block->present, block->present_words * sizeof *block->present);
-        part.voxels = block->count;
-        return part;
+        for (unsigned i = 0; i < block->present_words; i++)
+            part->squares[i] = block->present[i];
+        part->voxels = block->count;
+        return;
     }
+    memset(part->squares, 0, sizeof part->squares);
+    part->voxels = 0;
     trip_cpu_walk w = trip_cpu_walk_begin(block, reversed);
     for (uint32_t i = 0; i < skip; i++)
         trip_cpu_walk_next(&w);
-    while (trip_cpu_walk_next(&w) && part.voxels + w.count <= most) {
-        part.squares[w.number / 64] |= UINT64_C(1) << w.number % 64;
-        part.voxels += w.count;
+    while (trip_cpu_walk_next(&w) && part->voxels + w.count <= most) {
+        part->squares[w.number / 64] |= UINT64_C(1) << w.number % 64;
+        part->voxels += w.count;
     }
-    return part;
 }

@@ -169,7 +169,8 @@ static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, 
 {
     trip_run run = { .count = r->count, .sheet = sheet };
     const trip_cpu_culling culling = { kernels, &r->looks.view, &r->looks.mask, &r->lanes };
-    trip_cpu_part part = trip_cpu_part_make(&run, &r->block, false, 0, r->count);
+    trip_cpu_part part;
+    trip_cpu_part_make(&part, &run, &r->block, false, 0, r->count);
     uint32_t staying = 0;
     trip_cpu_cull(&culling, &part);
     for (uint32_t i = 0; i < r->count; i++) {

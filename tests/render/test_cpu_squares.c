@@ -104,7 +104,8 @@ static void parts_of_a_run_hold_every_square_once(void **state)
         fill(f, 4 + (unsigned)i % 4, 2, 4);
         for (; voxels < f->count; skip += squares) {
             uint32_t most = 64 + (uint32_t)(test_random() * 500);
-            trip_cpu_part p = trip_cpu_part_make(&run, &f->block, reversed, skip, most);
+            trip_cpu_part p;
+            trip_cpu_part_make(&p, &run, &f->block, reversed, skip, most);
             squares = 0;
             for (unsigned w = 0; w < f->block.present_words; w++) {
                 assert_int_equal(p.squares[w] & (seen[w] | ~f->block.present[w]), 0);

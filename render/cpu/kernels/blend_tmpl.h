@@ -537,7 +537,10 @@ static void empty_group(trip_cpu_scratch *s)
             uint64_t *words = s->touched[band][first / 64];
             if (s->splats - first < 64)
                 memset(words + (s->splats - first), 0, (64 - (s->splats - first)) * sizeof *words);
-            s->any[band] |= union_of(words);
+            const uint64_t all = union_of(words);
+            if (all == 0)
+                continue;
+            s->any[band] |= all;
             transpose(words);
         }
     }

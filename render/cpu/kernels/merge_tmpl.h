@@ -159,28 +159,12 @@ static void pane_clear(const trip_cpu_view *view, int x, int y, bool alone, floa
     }
 }
 
-/* Whether something was drawn at a stamp: of a layer, in which it is what it lets through that
- * stands in place of opacity. */
-INLINE bool stamp_has_some(const float *stamp, bool layer)
-{
-    vf opacity = v_load(stamp + 3 * V);
-    vf some = v_abs(layer ? v_set(1) - opacity : opacity);
-    for (int c = 0; c < 3; c++)
-        some = some + v_abs(v_load(stamp + c * V));
-    return vm_any(v_gt(some, v_set(0)));
-}
-
 static void pane_merge(const trip_cpu_view *view, int x, int y, const float *pixels, bool first,
                        float *sum)
 {
     for (int b = 0; b < STAMPS; b++) {
         const float *stamp = pixels + STAMP_FLOATS * b;
         float *to = sum + STAMP_FLOATS * b;
-        if (!stamp_has_some(stamp, true)) {
-            for (int c = 0; c < CHANNELS && first; c++)
-                v_store(to + c * V, v_set(0));
-            continue;
-        }
         pixel_rays r = pixel_rays_at(view, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
         vf w = weight(view, view->axis, &r);
         w = w * w;
@@ -299,9 +283,8 @@ static void pane_finish(const trip_cpu_view *view, int x, int y, trip_cpu_conten
         int column = 4 * (b % STAMPS_ACROSS), line = STAMP_ROWS * (b / STAMPS_ACROSS);
         int columns = camera->width - x - column, lines = camera->height - y - line;
         size_t at = (size_t)line * width + (size_t)column;
-        vf out[CHANNELS] = { v_set(0) };
-        if (stamp_has_some(pixels + STAMP_FLOATS * b, content == TRIP_CPU_LAYER))
-            merged_stamp(view, x, y, b, content, pixels, out);
+        vf out[CHANNELS];
+        merged_stamp(view, x, y, b, content, pixels, out);
         if (TRIP_CPU_DEPTH)
             store_depths(depth + at, width, columns, lines,
                          mean_distance(view, x, y, (unsigned)b, out[CHANNELS - 1], out[3]));

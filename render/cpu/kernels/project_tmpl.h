@@ -274,15 +274,17 @@ INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
 INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length)
 {
     const float(*m)[3] = view->compact;
-    vf x = v_from_int(normal << 24 >> 24), y = v_from_int(normal << 16 >> 24);
-    vf z = v_from_int(v_shift_right(normal, 16) & 127);
-    v3 weak = { v_fma(v_set(m[0][0]), x, v_fma(v_set(m[0][1]), y, v_set(m[0][2]) * z)),
-                v_fma(v_set(m[1][0]), x, v_fma(v_set(m[1][1]), y, v_set(m[1][2]) * z)),
-                v_fma(v_set(m[2][0]), x, v_fma(v_set(m[2][1]), y, v_set(m[2][2]) * z)) };
+    vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
     vf p = v_fma(v_from_int(normal & 4095), v_set(1.0f / 4095), v_set(-0.5f));
     vf q = v_fma(v_from_int(v_shift_right(normal, 12) & 2047), v_set(1.0f / 2047), v_set(-0.5f));
-    v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) };
-    vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
+    v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) }, weak = strong;
+    if (!vm_all(is_strong)) {
+        vf x = v_from_int(normal << 24 >> 24), y = v_from_int(normal << 16 >> 24);
+        vf z = v_from_int(v_shift_right(normal, 16) & 127);
+        weak.x = v_fma(v_set(m[0][0]), x, v_fma(v_set(m[0][1]), y, v_set(m[0][2]) * z));
+        weak.y = v_fma(v_set(m[1][0]), x, v_fma(v_set(m[1][1]), y, v_set(m[1][2]) * z));
+        weak.z = v_fma(v_set(m[2][0]), x, v_fma(v_set(m[2][1]), y, v_set(m[2][2]) * z));
+    }
     return strong_or_weak(is_strong, strong, v_set(view->normal_full), weak, length);
 }
 
@@ -620,18 +622,17 @@ INLINE surface surface_of(const trip_cpu_view *view, v3 eye, v3 light, vi packed
     vf magnitude;
     v3 normal = view->normal_bytes == 3 ? unpack_compact_normal(view, packed, &magnitude)
                                         : unpack_normal(view, packed, &magnitude);
-    v3 half = eye;
     vf strength = v_min(v_set(1), magnitude), shining = strength;
-    vf to_light = dot(normal, eye);
+    vf to_light = dot(normal, eye), to_half = to_light;
     if (!s->headlight) {
-        half = unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z });
         vf to_eye = to_light * v_set((float)TRIP_FACING);
         to_light = dot(normal, light);
+        to_half = dot(normal, unit((v3){ light.x + eye.x, light.y + eye.y, light.z + eye.z }));
         shining = strength * v_min(v_set(1), v_max(v_set(0), to_light * to_eye));
     }
     vf diffuse = v_abs(to_light);
     /* Processors are slow with numbers below 2^-126, as a 24th power soon is. */
-    vf h2 = v_max(dot(normal, half) * dot(normal, half), v_set(0x1p-8f));
+    vf h2 = v_max(to_half * to_half, v_set(0x1p-8f));
     vf h8 = (h2 * h2) * (h2 * h2);
     static_assert((int)TRIP_SHININESS == 24, "the power below");
     return (surface){ .strength = strength,
