@@ -170,12 +170,12 @@ void trip_lod_parts_clip(const trip_lod_parts *parts, int part, trip_clip *clip)
 void trip_lod_parts_add(const trip_lod_parts *parts, const float *before, const float *picture,
                         bool done, size_t pixels, float *out)
 {
-    const double share = done ? parts->share : 0;
+    const float share = done ? (float)parts->share : 0;
     const bool mixes = parts->share > 0;
+    const float of_before = mixes ? 1 - share : 1;
     for (size_t i = 0; i < 4 * pixels; i += 4) {
-        const double of_picture = mixes ? share : 1 - (double)before[i + 3];
-        const double of_before = mixes ? 1 - share : 1;
+        const float of_picture = mixes ? share : 1 - before[i + 3];
         for (size_t c = 0; c < 4; c++)
-            out[i + c] = (float)(of_before * before[i + c] + of_picture * picture[i + c]);
+            out[i + c] = of_before * before[i + c] + of_picture * picture[i + c];
     }
 }

@@ -13,9 +13,12 @@ void trip_normalise(float *rgba, size_t pixels, const double background[4])
 
 void trip_put_behind(float *rgba, size_t pixels, const double background[4])
 {
+    float behind[4];
+    for (int c = 0; c < 4; c++)
+        behind[c] = (float)((c < 3 ? background[c] : 1) * background[3]);
     for (size_t i = 0; i < pixels; i++, rgba += 4) {
-        const double through = 1 - (double)rgba[3];
+        const float through = 1 - rgba[3];
         for (int c = 0; c < 4; c++)
-            rgba[c] += (float)(through * (c < 3 ? background[c] : 1) * background[3]);
+            rgba[c] += through * behind[c];
     }
 }

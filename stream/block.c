@@ -326,19 +326,63 @@ uint32_t trip_block_squares(const trip_block *b, trip_square squares[TRIP_BLOCK_
     return n;
 }
 
-/* What codes are above the least one. Four begin at a whole byte and take at most 8, which are read
- * of a copy, whatever lies behind. */
+/* Packed codes of a square, and room for four more to be read behind them. */
+typedef struct packed_codes {
+    unsigned char bytes[2 * 64 + sizeof(uint64_t)];
+} packed_codes;
+
+static void copy_codes(const trip_square *s, packed_codes *p)
+{
+    const uint32_t bytes = trip_square_code_bytes(s);
+    memcpy(p->bytes, s->codes, bytes);
+    memset(p->bytes + bytes, 0, sizeof(uint64_t));
+}
+
+/* What codes i to i + 3 are above the least one, the first lowest. Four begin at a whole byte and
+ * take at most 8. */
+INLINE uint64_t four_above(const packed_codes *p, uint32_t width, uint32_t i)
+{
+    const uint64_t most = (UINT64_C(1) << width) - 1;
+    uint64_t four;
+    memcpy(&four, p->bytes + i / 4 * width / 2, sizeof four);
+    return (four & most) | (four >> width & most) << 16 | (four >> 2 * width & most) << 32 |
+           (four >> 3 * width & most) << 48;
+}
+
+/* `with` is compiled for each width that there is. */
+#define WITH_WIDTH(width, with)                                                                    \
+    switch (width) {                                                                               \
+        OF_WIDTH(2, with);                                                                         \
+        OF_WIDTH(4, with);                                                                         \
+        OF_WIDTH(6, with);                                                                         \
+        OF_WIDTH(8, with);                                                                         \
+        OF_WIDTH(10, with);                                                                        \
+        OF_WIDTH(12, with);                                                                        \
+        OF_WIDTH(14, with);                                                                        \
+        OF_WIDTH(16, with);                                                                        \
+    default: /* all are the least */                                                               \
+        with(0);                                                                                   \
+    }
+#define OF_WIDTH(width, with)                                                                      \
+    case width:                                                                                    \
+        with(width);                                                                               \
+        break
+
+INLINE void unpack_as(uint32_t width, const packed_codes *p, uint32_t count, uint16_t above[64])
+{
+    for (uint32_t i = 0; i < count; i += 4) {
+        const uint64_t four = four_above(p, width, i);
+        memcpy(above + i, &four, sizeof four);
+    }
+}
+
 static void unpack_square(const trip_square *s, uint16_t above[64])
 {
-    unsigned char bytes[2 * 64 + sizeof(uint64_t)] = { 0 };
-    const uint32_t width = s->width, most = (1u << width) - 1;
-    memcpy(bytes, s->codes, trip_square_code_bytes(s));
-    for (uint32_t i = 0; i < s->count; i += 4) {
-        uint64_t four;
-        memcpy(&four, bytes + i / 4 * width / 2, sizeof four);
-        for (uint32_t k = 0; k < 4; k++)
-            above[i + k] = (uint16_t)(four >> k * width & most);
-    }
+    packed_codes p;
+    copy_codes(s, &p);
+#define UNPACK(width) unpack_as(width, &p, s->count, above)
+    WITH_WIDTH(s->width, UNPACK)
+#undef UNPACK
 }
 
 void trip_square_codes(const trip_square *s, uint16_t codes[64])
@@ -454,19 +498,42 @@ static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
            (most + TRIP_CODE_FIRST) * TRIP_CODE_STEP <= brick->code_max;
 }
 
+/* Whether no code is further above the least one: below 2^16 - 1. Of four at a time: the sum with
+ * what is left to 2^15 reaches that where one is, or it was there before. */
+INLINE bool are_at_most(uint32_t width, const packed_codes *p, uint32_t count, uint32_t most)
+{
+    const uint64_t each = UINT64_C(0x0001000100010001), top = 0x8000 * each;
+    const uint64_t rest = (0x7fff - (most & 0x7fff)) * each, high = most & 0x8000 ? top : 0;
+    uint64_t beyond = 0;
+    for (uint32_t i = 0; i < count; i += 4) {
+        uint64_t four = four_above(p, width, i);
+        if (count - i < 4)
+            four &= (UINT64_C(1) << 16 * (count - i)) - 1;
+        const uint64_t reaches = (four & ~top) + rest;
+        beyond |= (four & reaches) | (~high & (four | reaches));
+    }
+    return !(beyond & top);
+}
+
+static bool are_above_at_most(const trip_square *s, uint32_t most)
+{
+    packed_codes p;
+    bool all = true;
+    copy_codes(s, &p);
+#define COMPARE(width) all = are_at_most(width, &p, s->count, most)
+    WITH_WIDTH(s->width, COMPARE)
+#undef COMPARE
+    return all;
+}
+
 /* Codes are looked at where the width's bits could say more than the brick's range has. */
 static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
 {
-    uint16_t above[64];
-    uint32_t most = 0;
     if (s->least * s->step < brick->code_min)
         return false;
-    if ((s->least + (1u << s->width) - 1) * s->step <= brick->code_max)
-        return true;
-    unpack_square(s, above);
-    for (uint32_t i = 0; i < s->count; i++)
-        most = above[i] > most ? above[i] : most;
-    return (s->least + most) * s->step <= brick->code_max;
+    const uint32_t most = brick->code_max / s->step;
+    return s->least + (1u << s->width) - 1 <= most ||
+           (s->least <= most && are_above_at_most(s, most - s->least));
 }
 
 static bool are_codes_within(const trip_block *b, const trip_file_brick *brick)

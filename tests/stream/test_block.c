@@ -272,6 +272,43 @@ static void records_outside_their_brick_are_found(void **state)
             }
 }
 
+/* Codes that span so many bits, and the most of them. */
+static run *make_narrow_run(unsigned bits, double density, uint64_t seed, uint32_t *most)
+{
+    run *r = make_run(form_of(5, CODES), density, seed);
+    const uint32_t span = (1u << bits) - 1, least = (uint32_t)(seed * 977) % (65536 - span);
+    *most = 0;
+    for (uint32_t i = 0; i < r->count; i++) {
+        const uint32_t code = least + ((r->voxels[i] >> 16) & span);
+        r->voxels[i] = (r->voxels[i] & UINT16_MAX) | code << 16;
+        *most = code > *most ? code : *most;
+    }
+    r->words = trip_block_pack(&r->form, r->voxels, r->count, r->block);
+    r->brick.code_min = 0;
+    return r;
+}
+
+static void bounds_of_codes_are_exact_whatever_their_width(void **state)
+{
+    uint64_t random = 5;
+    (void)state;
+    for (unsigned bits = 0; bits <= 16; bits++)
+        for (uint64_t seed = 0; seed < 20; seed++) {
+            uint32_t most;
+            run *r = make_narrow_run(bits, seed % 2 ? 0.03 : 0.8, seed, &most);
+            const trip_block b = block_of(r);
+            for (int i = 0; i < 20; i++) {
+                const uint32_t by = (uint32_t)(fixture_random(&random) % (1u << bits));
+                const uint32_t bound = i == 0 ? most : i == 1 ? most - (most > 0) : most + 9 - by;
+                r->brick.code_max = (uint16_t)(bound > UINT16_MAX ? UINT16_MAX : bound);
+                if (most > r->brick.code_max)
+                    expect_fault(r, "outside its brick's range");
+                else
+                    assert_null(trip_block_check(&b, &r->brick));
+            }
+        }
+}
+
 static void masks_that_do_not_agree_with_the_run_are_found(void **state)
 {
     const trip_block_form f = form_of(6, CODES);
@@ -382,6 +419,7 @@ int main(void)
         cmocka_unit_test(a_number_of_words_fits_where_squares_can_hold_the_records),
         cmocka_unit_test(how_far_a_block_goes_follows_from_what_is_there),
         cmocka_unit_test(records_outside_their_brick_are_found),
+        cmocka_unit_test(bounds_of_codes_are_exact_whatever_their_width),
         cmocka_unit_test(masks_that_do_not_agree_with_the_run_are_found),
         cmocka_unit_test(forms_that_lead_astray_are_found),
         cmocka_unit_test(padding_that_is_not_zero_is_found),
