@@ -242,6 +242,8 @@ int session_make_reader(const session *s, trip_reader **out, const session_reade
         .skip_user = wanted->skip_user,
         .cache_bytes = wanted->cache ? (size_t)(left / 2) : 0,
     };
+    if (wanted->renderer)
+        params.runner = trip_renderer_runner(wanted->renderer);
     params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
     return trip_reader_create(out, s->data, &params, s->budget);
 }

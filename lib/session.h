@@ -58,8 +58,9 @@ typedef struct session_reader {
     trip_engine engine;
     unsigned planes; /* bit per trip_plane */
     int threads;
-    bool cache;              /* keep pages for the frames to come */
-    trip_renderer *renderer; /* whose memory the ring lies in where it has such; NULL: in none's */
+    bool cache; /* keep pages for the frames to come */
+    /* On whose threads blocks are checked, and in whose memory the ring lies where it has such. */
+    trip_renderer *renderer;
     bool (*skip)(void *user, const trip_selection *selection, const trip_run *run);
     void *skip_user;
 } session_reader;

@@ -180,13 +180,6 @@ static int load(trip_drawing *d)
     return status;
 }
 
-static void run_tasks(void *renderer, void (*task)(void *context, unsigned number), void *context,
-                      unsigned count)
-{
-    trip_renderer *r = renderer;
-    r->ops->run_tasks(r, task, context, count);
-}
-
 /* The lattice that is to be made next; NULL: none is left. */
 static trip_light_map *lattice_left(const trip_drawing *d)
 {
@@ -203,9 +196,8 @@ static trip_light_map *lattice_left(const trip_drawing *d)
 static int make_light(trip_drawing *d)
 {
     trip_light_map *map = lattice_left(d);
-    const trip_task_runner runner = { run_tasks, d->renderer };
-    return map ? trip_light_map_step(map, d->renderer->ops->run_tasks ? &runner : NULL)
-               : TRIP_FRAME_DONE;
+    const trip_task_runner runner = trip_renderer_runner(d->renderer);
+    return map ? trip_light_map_step(map, &runner) : TRIP_FRAME_DONE;
 }
 
 /* One piece of what is ready. */

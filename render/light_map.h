@@ -3,8 +3,8 @@
  * through that (light_sweep.h). Kept from frame to frame: a pass is read again when the data, the
  * transfer function or what is cut away has changed, the sweeps are made again when the light has.
  * Where spacing is uneven they lie over places
- * (coordinates.h). The lattices depend on the data's size and the settings alone. One thread; renderers read the
- * grids of a map that is complete. */
+ * (coordinates.h). The lattices depend on the data's size and the settings alone. One thread;
+ * renderers read the grids of a map that is complete. */
 #ifndef TRIP_LIGHT_MAP_H
 #define TRIP_LIGHT_MAP_H
 
@@ -39,8 +39,8 @@ void trip_light_map_destroy(trip_light_map *m);
 /* Takes the lattices and starts the reads; what is there from before and the same is kept, as far
  * as it was made. Fails (reported) where the lattices do not fit the memory given. */
 int trip_light_map_begin(trip_light_map *m, const trip_light_source *source);
-/* A piece of what is ready: a batch, or a layer, by `runner` (light_sweep.h; NULL: by the caller's
- * thread). trip_frame's TRIP_FRAME_* of what it has come to. */
+/* A piece of what is ready: a batch, or a layer, by `runner` (NULL: by the caller's thread).
+ * trip_frame's TRIP_FRAME_* of what it has come to. */
 int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
 /* Waits until there is something to do, at most for the timeout. */
 void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns);

@@ -270,14 +270,9 @@ static void find_nodes(trip_light_sweep *s)
     }
 }
 
-static void run(const trip_task_runner *runner, void (*task)(void *context, unsigned number),
-                trip_light_sweep *s, int rows)
+static unsigned bands_of(int rows)
 {
-    const unsigned bands = (unsigned)((rows + BAND_ROWS - 1) / BAND_ROWS);
-    if (runner)
-        runner->run(runner->user, task, s, bands);
-    for (unsigned band = 0; band < bands && !runner; band++)
-        task(s, band);
+    return (unsigned)((rows + BAND_ROWS - 1) / BAND_ROWS);
 }
 
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner)
@@ -285,8 +280,8 @@ bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner)
     if (!s->through)
         return false;
     if (s->layer > s->start || s->before > 0)
-        run(runner, attenuate, s, s->columns[1]);
+        trip_run_tasks(runner, attenuate, s, bands_of(s->columns[1]));
     find_nodes(s);
-    run(runner, give, s, s->nodes[1][1] - s->nodes[1][0]);
+    trip_run_tasks(runner, give, s, bands_of(s->nodes[1][1] - s->nodes[1][0]));
     return ++s->layer <= last_layer(s);
 }

@@ -13,13 +13,7 @@
 
 #include "budget.h"
 #include "light_grid.h"
-
-/* Does `count` tasks on any threads, and returns when all are done. */
-typedef struct trip_task_runner {
-    void (*run)(void *user, void (*task)(void *context, unsigned number), void *context,
-                unsigned count);
-    void *user;
-} trip_task_runner;
+#include "task_runner.h"
 
 typedef struct trip_light_sweep {
     const trip_light_grid *extinction; /* per world unit */

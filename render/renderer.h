@@ -10,6 +10,7 @@
 #include "reader.h"
 #include "report.h"
 #include "settings.h"
+#include "task_runner.h"
 #include "transfer_function.h"
 
 struct trip_field;
@@ -117,9 +118,9 @@ typedef struct trip_renderer_ops {
      * returns, nothing that the frame is drawn from is in use but the renderer's own memory, which
      * load() sees to. NULL: nothing is between the other calls. */
     void (*end_frame)(trip_renderer *r);
-    /* Does independent tasks on the renderer's threads, and returns when all are done; before
-     * begin_layer. NULL: it has one thread, the caller's. */
-    void (*run_tasks)(trip_renderer *r, void (*task)(void *context, unsigned number), void *context,
+    /* trip_task_runner.run, of which `user` is the renderer: on its threads, between other calls.
+     * NULL: it has none. */
+    void (*run_tasks)(void *renderer, void (*task)(void *context, unsigned number), void *context,
                       unsigned count);
     /* Of a list in the frame, by its number in the data set, once the picture was taken
      * (bytes_read is the caller's). */
@@ -132,6 +133,12 @@ struct trip_renderer {
     bool resident; /* since begin_frame: it has the frame's splats, and takes runs alone */
     bool software; /* what stands for a graphics device is the processor */
 };
+
+/* The renderer's threads. */
+static inline trip_task_runner trip_renderer_runner(trip_renderer *r)
+{
+    return (trip_task_runner){ r->ops->run_tasks, r };
+}
 
 int trip_reference_create(trip_renderer **out, trip_budget *budget);
 int trip_gl_create(trip_renderer **out, trip_budget *budget);

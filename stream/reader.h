@@ -7,6 +7,7 @@
 
 #include "block.h"
 #include "selection.h"
+#include "task_runner.h"
 
 #define TRIP_READER_PASSES_MAX 8
 
@@ -39,6 +40,8 @@ typedef struct trip_reader_params {
      * saturated pixels occlude it, and is left out. On the thread that calls begin and next. */
     bool (*skip)(void *user, const trip_selection *s, const trip_run *run);
     void *skip_user;
+    /* By which blocks are checked, called by the thread that calls next. */
+    trip_task_runner runner;
     /* For tests: given the bytes that a read has put at `data` from `offset` on and its result (a
      * count or -errno), returns the result to go on with; may wait, and change the bytes. Called on
      * any of the engine's threads. */

@@ -5,6 +5,7 @@
 #include "report.h"
 
 #include <assert.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -383,20 +384,48 @@ static int report_block(const trip_batch *b, const trip_run *run, const char *wh
                      block_offset(b->slot, run), why);
 }
 
+static const char *fault_of(const trip_batch *b, const trip_run *run)
+{
+    const trip_block block = trip_block_of(b, run);
+    return trip_block_check(&block, &trip_batch_list(b, run)->bricks[run->brick]);
+}
+
+/* Runs of a batch, in tasks of some each. */
+enum { CHECKED_AT_ONCE = 32 };
+
+typedef struct block_check {
+    const trip_batch *batch;
+    _Atomic size_t first; /* run at fault, of those found */
+} block_check;
+
+static void check_some(void *context, unsigned number)
+{
+    block_check *check = context;
+    const trip_batch *b = check->batch;
+    const size_t from = (size_t)number * CHECKED_AT_ONCE, end = from + CHECKED_AT_ONCE;
+    for (size_t i = from; i < end && i < b->run_count; i++) {
+        if (!fault_of(b, &b->runs[i]))
+            continue;
+        size_t first = atomic_load(&check->first);
+        while (i < first && !atomic_compare_exchange_weak(&check->first, &first, i))
+            ;
+        return;
+    }
+}
+
 /* What draws takes blocks as they are: those that do not agree with their bricks end here. Those of
  * a data set in memory were checked when it was loaded. */
 static int check_blocks(const trip_reader *r, const trip_batch *b)
 {
-    if (r->in_memory)
+    block_check check = { .batch = b, .first = b->run_count };
+    if (r->in_memory || !b->planes[TRIP_PLANE_VOXELS])
         return TRIP_OK;
-    for (size_t i = 0; i < b->run_count && b->planes[TRIP_PLANE_VOXELS]; i++) {
-        const trip_run *run = &b->runs[i];
-        const trip_block block = trip_block_of(b, run);
-        const char *why = trip_block_check(&block, &trip_batch_list(b, run)->bricks[run->brick]);
-        if (why)
-            return report_block(b, run, why);
-    }
-    return TRIP_OK;
+    trip_run_tasks(&r->params.runner, check_some, &check,
+                   (unsigned)((b->run_count + CHECKED_AT_ONCE - 1) / CHECKED_AT_ONCE));
+    if (check.first == b->run_count)
+        return TRIP_OK;
+    const trip_run *run = &b->runs[check.first];
+    return report_block(b, run, fault_of(b, run));
 }
 
 static void copy_borders(trip_reader *r, const trip_slot *s)

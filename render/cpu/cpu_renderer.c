@@ -295,10 +295,14 @@ static void run_task(void *context, unsigned number, unsigned thread)
     t->task(t->context, number);
 }
 
-static void run_tasks(trip_renderer *base, void (*task)(void *context, unsigned number),
-                      void *context, unsigned count)
+static void run_tasks(void *renderer, void (*task)(void *context, unsigned number), void *context,
+                      unsigned count)
 {
-    trip_cpu *r = (trip_cpu *)base;
+    trip_cpu *r = renderer;
+    if (r->blend_job.active) { /* the threads are at work, and it would have to wait for them */
+        trip_run_tasks(NULL, task, context, count);
+        return;
+    }
     tasks all = { task, context };
     trip_cpu_job job = { .run = run_task, .context = &all, .tasks = count };
     trip_cpu_pool_start(r->pool, &job);
