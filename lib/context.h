@@ -49,6 +49,7 @@ struct triptych {
     trip_lod_parts parts;   /* of the frame that is begun */
     int part;               /* of these the one that is drawn, */
     float *before;          /* and the picture of those before it, of the budget; else NULL */
+    size_t before_bytes;    /* what that takes; it may be kept for the next frame */
     triptych_frame_stats before_stats; /* theirs */
     trip_settings settings;            /* slices 0: by the view */
     triptych_clip clip;                /* as given; frames have it in drawn_settings */

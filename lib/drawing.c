@@ -41,8 +41,17 @@ static session drawn_session(const triptych *t)
     return s;
 }
 
+/* The picture of parts that are drawn. */
+static void drop_before(triptych *t)
+{
+    trip_budget_release(t->session.budget, t->before, t->before_bytes);
+    t->before = NULL;
+    t->before_bytes = 0;
+}
+
 void trip_context_drop_renderer(triptych *t)
 {
+    drop_before(t);
     trip_context_drop_reader(t);
     trip_context_drop_light(t);
     if (t->renderer)
@@ -205,22 +214,30 @@ static size_t pixels_drawn(const triptych *t)
     return (size_t)t->camera.width * (size_t)t->camera.height;
 }
 
-/* One picture, and another where a third is put behind both. */
-static size_t before_bytes(const triptych *t)
-{
-    return pixels_drawn(t) * 4 * sizeof *t->before * (t->parts.count > 2 ? 2 : 1);
-}
-
-/* Of a frame that is planned, before the reader takes its part of what is left. */
+/* Of a frame that is planned, before the reader takes its part of what is left: one picture, and
+ * another where a third part is put behind both. */
 static int take_before(triptych *t)
 {
-    if (t->parts.count == 1)
+    const size_t pictures = t->parts.count > 2 ? 2 : t->parts.count > 1;
+    const size_t bytes = pictures * pixels_drawn(t) * 4 * sizeof *t->before;
+    if (bytes != t->before_bytes)
+        drop_before(t);
+    if (bytes == t->before_bytes)
         return 0;
-    t->before = trip_budget_take(t->session.budget, before_bytes(t));
+    t->before = trip_budget_take(t->session.budget, bytes);
+    t->before_bytes = t->before ? bytes : 0;
     if (t->before)
         return 0;
     return trip_fail(TRIP_ERROR, "render", "levels",
                      "pictures of several levels do not fit the memory given; raise --memory");
+}
+
+/* Between frames it is kept where it is a small part of the memory that is left. */
+static void keep_small_before(triptych *t)
+{
+    enum { SMALL_PART = 8 };
+    if (t->before && t->before_bytes > trip_budget_left_bytes(t->session.budget) / SMALL_PART)
+        drop_before(t);
 }
 
 static int prepare(triptych *t)
@@ -447,13 +464,6 @@ static void end(triptych *t)
     t->begun = t->drawn = false;
 }
 
-static void drop_before(triptych *t)
-{
-    if (t->before)
-        trip_budget_release(t->session.budget, t->before, before_bytes(t));
-    t->before = NULL;
-}
-
 int triptych_begin(triptych *t)
 {
     trip_scope *before = trip_context_enter_anew(t);
@@ -625,7 +635,7 @@ void triptych_end(triptych *t)
 {
     trip_scope *before = trip_scope_enter(&t->scope); /* the error of the last call stays */
     end(t);
-    drop_before(t);
+    keep_small_before(t);
     trip_context_leave(before, 0);
 }
 
