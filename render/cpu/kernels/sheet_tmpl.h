@@ -697,6 +697,23 @@ INLINE void find_cells(const trip_cpu_group *g, const pane_path *path, unsigned 
         whole[a] = vi_within(c->whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_RASTER - 1);
 }
 
+/* Where cells lie in their rasters, and where these begin in the pool: 16-bit numbers. */
+INLINE vi place_in_raster(const vi whole[2])
+{
+    return (whole[1] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
+           (whole[0] & (TRIP_CPU_RASTER - 1));
+}
+
+INLINE vi raster_starts(const trip_cpu_group *g, const int32_t *rasters, const vi whole[2])
+{
+    vi raster = (whole[1] >> TRIP_CPU_RASTER_LOG2) * g->across + (whole[0] >> TRIP_CPU_RASTER_LOG2);
+    int32_t starts[V];
+    vi_store(starts, raster);
+    for (int i = 0; i < V; i++)
+        starts[i] = rasters[starts[i]] * RASTER_NUMBERS;
+    return vi_load(starts);
+}
+
 /* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
  * their gradients. With uneven spacing weights are set anew. */
 INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
@@ -715,14 +732,7 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
     } else {
         find_cells(g, path, n, c, whole);
     }
-    vi raster = (whole[1] >> TRIP_CPU_RASTER_LOG2) * g->across + (whole[0] >> TRIP_CPU_RASTER_LOG2);
-    vi in = (whole[1] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
-            (whole[0] & (TRIP_CPU_RASTER - 1));
-    int32_t starts[V];
-    vi_store(starts, raster);
-    for (int i = 0; i < V; i++)
-        starts[i] = g->slices[n].rasters[starts[i]] * RASTER_NUMBERS;
-    vi from = vi_load(starts);
+    vi in = place_in_raster(whole), from = raster_starts(g, g->slices[n].rasters, whole);
     s->gradient_at = from + (in * 3 + GRADIENTS_FROM);
     return from + in;
 }
@@ -750,31 +760,22 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 
 #include "cpu/kernels/wide_tmpl.h"
 
-/* Which rays at slice n are in cells of a segment that have all of their corners: a slice at a
- * sheet has those at that sheet only. */
-static vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
-                         unsigned n, unsigned segment)
+/* Which rays at slice n are in cells of a segment that have all of their corners. Of those at a
+ * sheet samples have these already, and slices between sheets lack what either lacks. */
+INLINE vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
+                         unsigned n, unsigned segment, vm open)
 {
-    corners c = cells_at(path, l, n);
-    vi whole[2], lack;
-    int32_t u[V], v[V];
-    find_cells(g, path, n, &c, whole);
-    vi_store(u, whole[0]);
-    vi_store(v, whole[1]);
-    for (int i = 0; i < V; i++) {
-        int32_t at = (v[i] >> TRIP_CPU_RASTER_LOG2) * g->across + (u[i] >> TRIP_CPU_RASTER_LOG2);
-        int32_t in = (v[i] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
-                     (u[i] & (TRIP_CPU_RASTER - 1));
-        bool missing = false;
-        for (int k = 0; k < 2; k++) {
-            const int16_t *top = g->pool[g->sheets[segment][k][at]].codes + in;
-            const int16_t *bottom = top + TRIP_CPU_RASTER_STRIDE;
-            missing |= top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
-                       bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
-        }
-        lack[i] = missing;
+    const int32_t *const *sheets = g->sheets[segment];
+    for (int k = 0; k < 2; k++) {
+        if (!is_wide(g) && g->slices[n].rasters != sheets[1 - k])
+            continue;
+        corners c = cells_at(path, l, n);
+        vi whole[2];
+        find_cells(g, path, n, &c, whole);
+        open = vm_and(open,
+                      has_corners(g, raster_starts(g, sheets[k], whole) + place_in_raster(whole)));
     }
-    return vi_is_0(lack);
+    return open;
 }
 
 /* ---- a segment ---- */
@@ -1013,8 +1014,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     if (view->ortho) /* what begins behind the eye's plane is left out */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
     if (gaps && vm_any(open))
-        open = vm_and(
-            open, vm_and(in_whole_cells(g, path, l, n, n), in_whole_cells(g, path, l, n + 1, n)));
+        open = in_whole_cells(g, path, l, n + 1, n, in_whole_cells(g, path, l, n, n, open));
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
