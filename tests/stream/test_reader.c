@@ -575,6 +575,58 @@ static void a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line(void **sta
     close_fixture(&f, d);
 }
 
+static void run_backwards(void *user, void (*task)(void *context, unsigned number), void *context,
+                          unsigned count)
+{
+    unsigned *most = user;
+    *most = count > *most ? count : *most;
+    while (count-- > 0)
+        task(context, count);
+}
+
+/* What is reported of a pass that some bricks of the index do not agree with. */
+static void report_of_pass(const fixture *f, trip_dataset *d, trip_task_runner runner, char *report,
+                           size_t room)
+{
+    const trip_reader_params params = { .planes = 3, .runner = runner };
+    fixture_voxel *out = calloc(f->count, sizeof *out);
+    trip_reader *r;
+    trip_selection s;
+    size_t n;
+    assert_int_equal(trip_reader_create(&r, d, &params, f->budget), TRIP_OK);
+    select_all(&s, d, 2, false);
+    fixture_catch_reports();
+    assert_int_equal(read_pass(r, &s, 0, out, &n), TRIP_ERROR);
+    snprintf(report, room, "%s", fixture_reports());
+    assert_non_null(strstr(report, "outside its brick's range"));
+    trip_selection_destroy(&s, f->budget);
+    trip_reader_destroy(r);
+    free(out);
+}
+
+/* The second and the last brick of list z have codes that they should not have. */
+static void of_blocks_at_fault_the_first_is_reported_whoever_checks_them(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    char alone[1024], by_others[1024];
+    unsigned tasks = 0;
+    (void)state;
+    open_fixture(&f, &d);
+    trip_file_brick *bricks = (trip_file_brick *)(uintptr_t)d->lists[2].bricks;
+    const uint64_t last = d->lists[2].brick_count - 1;
+    bricks[1].code_max--;
+    bricks[last].code_max--;
+    report_of_pass(&f, d, (trip_task_runner){ 0 }, alone, sizeof alone);
+    report_of_pass(&f, d, (trip_task_runner){ run_backwards, &tasks }, by_others, sizeof by_others);
+    assert_true(tasks > 1);
+    assert_string_equal(alone, by_others);
+    bricks[1].code_max++;
+    report_of_pass(&f, d, (trip_task_runner){ run_backwards, &tasks }, by_others, sizeof by_others);
+    assert_string_not_equal(alone, by_others);
+    close_fixture(&f, d);
+}
+
 static void refused_direct_reads_go_on_through_the_page_cache(void **state)
 {
     fixture f;
@@ -1258,6 +1310,7 @@ int main(void)
         cmocka_unit_test(with_runs_alone_nothing_is_read),
         cmocka_unit_test(more_passes_than_there_is_room_for_are_refused),
         cmocka_unit_test(a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line),
+        cmocka_unit_test(of_blocks_at_fault_the_first_is_reported_whoever_checks_them),
         cmocka_unit_test(refused_direct_reads_go_on_through_the_page_cache),
         cmocka_unit_test(a_second_pass_reads_only_what_the_cache_has_no_room_for),
         cmocka_unit_test(a_data_set_in_memory_is_handed_out_where_it_lies),
