@@ -17,6 +17,7 @@
 #include "json.h"
 #include "new_file.h"
 #include "report.h"
+#include "text.h"
 #include "transfer_function.h"
 
 enum { MOST_BYTES = 16 << 20, VERSION = 1 };
@@ -104,6 +105,22 @@ static void add_entries(cJSON *object, const trip_view_state *s, const entry *en
         cJSON_AddItemToObject(object, entries[i].key, value_of(s, &entries[i]));
 }
 
+/* The function's text, as comments may have it of bytes that are no UTF-8: each is a question mark,
+ * so that lines, whose length is bounded, are no longer when they are read again. */
+static void add_function_text(cJSON *root, const char *text)
+{
+    char *valid = strdup(text);
+    for (char *at = valid; at && *at;) {
+        const trip_text_character c = trip_text_next(at);
+        if (c.code == 0xfffd && c.bytes == 1)
+            *at = '?';
+        at += c.bytes;
+    }
+    if (valid)
+        cJSON_AddStringToObject(root, "function_text", valid);
+    free(valid);
+}
+
 char *trip_view_state_print(const trip_view_state *s, const char *data)
 {
     cJSON *root = cJSON_CreateObject();
@@ -112,7 +129,7 @@ char *trip_view_state_print(const trip_view_state *s, const char *data)
     if (s->has_navigation)
         add_entries(cJSON_AddObjectToObject(root, "camera"), s, ENTRIES(camera_entries));
     if (s->text)
-        cJSON_AddStringToObject(root, "function_text", s->text);
+        add_function_text(root, s->text);
     else if (s->function)
         cJSON_AddStringToObject(root, "function", s->function);
     if (s->heat)

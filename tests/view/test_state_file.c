@@ -116,6 +116,23 @@ static void what_is_kept_is_found_again_to_the_last_bit(void **state)
     trip_view_state_release(&kept);
 }
 
+/* In Latin-1, as files of functions may have it: lines have 1023 bytes at most. */
+static void functions_with_long_comments_that_are_no_utf8_are_kept(void **state)
+{
+    (void)state;
+    trip_view_state kept = usual(), found = usual();
+    char text[1100] = "0 0 0 0 0\n1 1 1 1 0.5 # ";
+    const size_t begun = strlen(text);
+    memset(text + begun, 0xe9, 1000);
+    kept.text = strdup(text);
+    assert_int_equal(trip_state_file_save(&kept, "/data/accents.trip"), 0);
+    assert_int_equal(trip_state_file_load(&found, "/data/accents.trip"), 1);
+    assert_int_equal(strlen(found.text), begun + 1000);
+    assert_memory_equal(found.text, text, begun);
+    trip_view_state_release(&found);
+    trip_view_state_release(&kept);
+}
+
 static void the_same_data_set_by_another_name_has_the_same_state(void **state)
 {
     (void)state;
@@ -209,6 +226,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_kept_is_found_again_to_the_last_bit),
+        cmocka_unit_test(functions_with_long_comments_that_are_no_utf8_are_kept),
         cmocka_unit_test(the_same_data_set_by_another_name_has_the_same_state),
         cmocka_unit_test(what_is_no_state_is_refused_whole),
         cmocka_unit_test(other_versions_and_data_sets_are_no_state),
