@@ -446,13 +446,6 @@ static uint64_t bits_within(const trip_file_brick *b, uint32_t corner)
            bits_below(rows_below, b->v_max + 1, v) & ~bits_below(rows_below, b->v_min, v);
 }
 
-/* Whether all of them do, as of most squares. */
-static bool is_within(const trip_file_brick *b, uint32_t corner)
-{
-    const uint32_t u = trip_voxel_u(corner), v = trip_voxel_v(corner);
-    return u >= b->u_min && u + 7 <= b->u_max && v >= b->v_min && v + 7 <= b->v_max;
-}
-
 static const char *check_places(const trip_block *b, const trip_file_brick *brick)
 {
     uint32_t records = 0;
@@ -465,8 +458,7 @@ static const char *check_places(const trip_block *b, const trip_file_brick *bric
         for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, mask++) {
             uint32_t corner = corner_of(64 * w + (uint32_t)__builtin_ctzll(bits));
             records += trip_bits_set(*mask);
-            if (!is_within(brick, corner))
-                outside |= *mask & ~bits_within(brick, corner);
+            outside |= *mask & ~bits_within(brick, corner);
             empty |= *mask == 0;
         }
     if (records != b->count)

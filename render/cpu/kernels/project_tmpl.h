@@ -274,17 +274,15 @@ INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
 INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length)
 {
     const float(*m)[3] = view->compact;
-    vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
+    vf x = v_from_int(normal << 24 >> 24), y = v_from_int(normal << 16 >> 24);
+    vf z = v_from_int(v_shift_right(normal, 16) & 127);
+    v3 weak = { v_fma(v_set(m[0][0]), x, v_fma(v_set(m[0][1]), y, v_set(m[0][2]) * z)),
+                v_fma(v_set(m[1][0]), x, v_fma(v_set(m[1][1]), y, v_set(m[1][2]) * z)),
+                v_fma(v_set(m[2][0]), x, v_fma(v_set(m[2][1]), y, v_set(m[2][2]) * z)) };
     vf p = v_fma(v_from_int(normal & 4095), v_set(1.0f / 4095), v_set(-0.5f));
     vf q = v_fma(v_from_int(v_shift_right(normal, 12) & 2047), v_set(1.0f / 2047), v_set(-0.5f));
-    v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) }, weak = strong;
-    if (!vm_all(is_strong)) {
-        vf x = v_from_int(normal << 24 >> 24), y = v_from_int(normal << 16 >> 24);
-        vf z = v_from_int(v_shift_right(normal, 16) & 127);
-        weak.x = v_fma(v_set(m[0][0]), x, v_fma(v_set(m[0][1]), y, v_set(m[0][2]) * z));
-        weak.y = v_fma(v_set(m[1][0]), x, v_fma(v_set(m[1][1]), y, v_set(m[1][2]) * z));
-        weak.z = v_fma(v_set(m[2][0]), x, v_fma(v_set(m[2][1]), y, v_set(m[2][2]) * z));
-    }
+    v3 strong = { p + q, p - q, v_set(1) - v_abs(p + q) - v_abs(p - q) };
+    vm is_strong = v_gt(v_from_int(normal & 0x800000), v_set(0));
     return strong_or_weak(is_strong, strong, v_set(view->normal_full), weak, length);
 }
 

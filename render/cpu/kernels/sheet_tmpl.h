@@ -760,8 +760,9 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 
 #include "cpu/kernels/wide_tmpl.h"
 
-/* Which rays at slice n are in cells of a segment that have all of their corners. Of those at a
- * sheet samples have these already, and slices between sheets lack what either lacks. */
+/* Which rays at slice n are in cells of a segment that have all of their corners. Those at the
+ * slice's own sheet were looked up for the sample, and slices between sheets lack what either
+ * lacks; with kernels of 64 voxels a slice has no values of its own, and both sheets count. */
 INLINE vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
                          unsigned n, unsigned segment, vm open)
 {
