@@ -93,33 +93,50 @@ static place place_of(const trip_level_work *w, const trip_level_source *square,
 #define CELLS4(n) CELL(n), CELL((n) + 1), CELL((n) + 2), CELL((n) + 3)
 static const uint8_t cells[16][2] = { CELLS4(0), CELLS4(4), CELLS4(8), CELLS4(12) };
 
+/* Each four bits of the result count those of the mask that are set. */
+static uint64_t counts_of(uint64_t mask)
+{
+    const uint64_t twos = mask - (mask >> 1 & UINT64_C(0x5555555555555555));
+    return (twos & UINT64_C(0x3333333333333333)) + (twos >> 2 & UINT64_C(0x3333333333333333));
+}
+
+/* The least code, turned round, of each four. */
+static void find_around(const trip_square *of, const uint16_t *codes, bool round,
+                        uint16_t around[16])
+{
+    memset(around, 255, 16 * sizeof *around);
+    for (uint64_t rest = of->mask; rest; rest &= rest - 1, codes++) {
+        const int n = __builtin_ctzll(rest) / 4;
+        const uint16_t turned = trip_coarse_turned(*codes, round);
+        around[n] = turned < around[n] ? turned : around[n];
+    }
+}
+
 static void add_values(trip_level_lane *l, const trip_level_work *w,
                        const trip_level_source *square, const trip_square *of)
 {
     const uint32_t corner = trip_square_corner(of);
     const size_t first = place_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
-    uint32_t sums[16] = { 0 };
+    uint32_t sums[65]; /* of the codes before each */
     uint16_t codes[64], around[16];
-    const uint16_t *code = codes;
     trip_square_codes(of, codes);
-    memset(around, 255, sizeof around);
-    for (uint64_t rest = of->mask; rest; rest &= rest - 1, code++) {
-        const int n = __builtin_ctzll(rest) / 4;
-        const uint16_t turned = trip_coarse_turned(*code, w->params->hidden_above);
-        sums[n] += *code;
-        around[n] = turned < around[n] ? turned : around[n];
-    }
-    const uint64_t twos = of->mask - (of->mask >> 1 & UINT64_C(0x5555555555555555));
-    uint64_t counts = (twos & UINT64_C(0x3333333333333333)) + /* four bits each */
-                      (twos >> 2 & UINT64_C(0x3333333333333333));
-    for (int n = 0; n < 16; n++, counts >>= 4) {
+    sums[0] = 0;
+    for (uint32_t i = 0; i < of->count; i++)
+        sums[i + 1] = sums[i] + codes[i];
+    if (!square->kept)
+        find_around(of, codes, w->params->hidden_above, around);
+    const uint64_t counts = counts_of(of->mask);
+    uint64_t some = (counts | counts >> 1 | counts >> 2) & UINT64_C(0x1111111111111111);
+    for (uint32_t before = 0; some; some &= some - 1) {
+        const int bit = __builtin_ctzll(some), n = bit / 4;
+        const uint32_t count = counts >> bit & 15;
         const size_t at = first + ((size_t)cells[n][1] << w->edge_log2) + cells[n][0];
-        if ((counts & 15) == 0)
-            continue;
         touch(l, at);
-        trip_coarse_value_add_whole(&l->value_sums[at], counts & 15, sums[n], square->kept);
+        trip_coarse_value_add_whole(&l->value_sums[at], count, sums[before + count] - sums[before],
+                                    square->kept);
         if (!square->kept)
             trip_coarse_value_add_around(&l->value_sums[at], around[n]);
+        before += count;
     }
 }
 
@@ -303,6 +320,23 @@ static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *vo
     return (voxel->value + step / 2) / step * step;
 }
 
+/* Puts the voxels of a square, which are sharpened, into the box. */
+static void put_values(trip_level_lane *l, const trip_level_work *w, uint32_t count, int sheet)
+{
+    const trip_coarse_value *voxels = l->sharpen.values;
+    uint8_t x[TRIP_TILE_MAX_EDGE];
+    for (uint32_t i = 0; i < count;) {
+        const uint8_t y = voxels[i].v;
+        uint32_t *row = l->box.values + trip_splat_box_row(&l->box, y, sheet);
+        unsigned n = 0;
+        for (; i < count && voxels[i].v == y && n < TRIP_TILE_MAX_EDGE; i++) {
+            row[voxels[i].u] = value_code(w, &voxels[i]);
+            x[n++] = voxels[i].u;
+        }
+        trip_splat_box_mark(&l->box, y, sheet, x, n);
+    }
+}
+
 int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
                                 const trip_sharpen *sharpen, const trip_sharpen_column *column)
 {
@@ -312,10 +346,8 @@ int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
         const trip_sharpen_neighbourhood *of = &column->squares[sheet];
         if (of->square.count > 0)
             status = trip_sharpen_do(sharpen, &l->sharpen, of);
-        for (uint32_t i = 0; i < of->square.count && status == 0; i++) {
-            const trip_coarse_value *voxel = &l->sharpen.values[i];
-            l->box.values[mark(l, voxel, sheet)] = value_code(w, voxel);
-        }
+        if (status == 0)
+            put_values(l, w, of->square.count, sheet);
     }
     for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS && status == 0; list++)
         status = emit(l, w, list);

@@ -9,15 +9,31 @@
 #include "level_lane.h"
 #include "report.h"
 
-enum { SOURCES = TRIP_LEVEL_SOURCES, FILE_BUFFER_BYTES = 1 << 16, PROGRESS_MS = 200 };
+enum { SOURCES = TRIP_LEVEL_SOURCES, PROGRESS_MS = 200 };
+
+/* Of the memory left, what the voxels of a level may take before they go to a file: a part, or the
+ * least that files are written with. */
+enum { FILE_PART = 8, FILE_BUFFER_BYTES = 1 << 16 };
+/* Squares that each lane may be ahead of the one whose turn it is. */
+enum { AHEAD = 2 };
 
 /* What a list builder takes besides its pieces. */
 #define BUILDER_BYTES ((uint64_t)3 << 20)
 /* Of a voxel of the level below, in the pieces of what is made of it. */
 #define PIECE_BYTES 64
 
-/* One level being made. Each thread takes the next square, makes it in its lane, and appends its
- * voxels to the file when those of the squares before are there. */
+/* A square that waits for its turn in the file, and memory for its voxels. */
+typedef struct made_square {
+    bool waits;
+    uint64_t key;
+    uint32_t count;
+    trip_coarse_value *values;
+    trip_coarse_mean *means;
+} made_square;
+
+/* One level being made. Each thread takes the next square and makes it in its lane. Voxels are
+ * appended to the file in the order of squares, by whichever thread has made the one whose turn it
+ * is, and then those that wait behind it. */
 typedef struct making {
     trip_level_work work; /* lanes read it only */
     trip_budget *budget;
@@ -34,11 +50,14 @@ typedef struct making {
     trip_level_lane *lanes;
     size_t lane_bytes; /* of each; the squares that it is at among them */
     unsigned char *memory;
+    made_square *made; /* `ahead` of them, the one of a square by its number */
+    unsigned ahead;
 
     pthread_mutex_t lock; /* guards all below, the sources, and what sharpening goes on from */
     pthread_cond_t turned;
     uint64_t taken;    /* squares */
-    uint64_t appended; /* the turn of the square of this number; its thread alone uses the file */
+    uint64_t appended; /* the turn of the square of this number */
+    bool appending;    /* a thread uses the file */
     uint64_t sheet;
     bool failed;
 } making;
@@ -141,6 +160,17 @@ static uint64_t late_bytes(const making *m)
     return bytes;
 }
 
+/* With NULL it computes the bytes only. */
+static size_t lay_out_made(const making *m, made_square *made, unsigned char *memory)
+{
+    const size_t plane = (size_t)1 << 2 * m->work.edge_log2;
+    size_t used = 0;
+    made->values = trip_level_carve(memory, &used, plane * sizeof *made->values);
+    if (m->work.params->kinds.means)
+        made->means = trip_level_carve(memory, &used, plane * sizeof *made->means);
+    return used;
+}
+
 /* As many as there are workers, or as there is memory for. */
 static int open_lanes(making *m)
 {
@@ -148,18 +178,27 @@ static int open_lanes(making *m)
     const uint64_t left = trip_budget_left_bytes(m->budget), late = late_bytes(m);
     unsigned count = trip_workers_count(p->workers);
     trip_level_lane lane;
-    m->lane_bytes = trip_level_lane_make(&lane, &m->work, 0, NULL);
-    while (count > 1 && count * (m->lane_bytes + sizeof lane) + late +
+    made_square square;
+    const size_t made_bytes = AHEAD * lay_out_made(m, &square, NULL);
+    const size_t own_bytes = trip_level_lane_make(&lane, &m->work, 0, NULL);
+    m->lane_bytes = own_bytes + made_bytes;
+    while (count > 1 && count * (m->lane_bytes + sizeof lane + AHEAD * sizeof square) + late +
                                 trip_list_builder_min_bytes(&m->work.format, count) >
                             left)
         count--;
     m->lane_count = count;
+    m->ahead = AHEAD * count;
     m->memory = trip_budget_take(m->budget, count * m->lane_bytes);
     m->lanes = trip_budget_take(m->budget, count * sizeof *m->lanes);
-    if (!m->memory || !m->lanes)
+    m->made = trip_budget_take(m->budget, m->ahead * sizeof *m->made);
+    if (!m->memory || !m->lanes || !m->made)
         return trip_level_fail_memory();
-    for (unsigned i = 0; i < count; i++)
-        trip_level_lane_make(&m->lanes[i], &m->work, i, m->memory + i * m->lane_bytes);
+    for (unsigned i = 0; i < count; i++) {
+        unsigned char *memory = m->memory + i * m->lane_bytes;
+        trip_level_lane_make(&m->lanes[i], &m->work, i, memory);
+        for (unsigned n = 0; n < AHEAD; n++)
+            lay_out_made(m, &m->made[i * AHEAD + n], memory + own_bytes + n * made_bytes / AHEAD);
+    }
     return 0;
 }
 
@@ -235,26 +274,38 @@ static int take_square(making *m, trip_level_lane *l)
     return status < 0 ? status : l->key != UINT64_MAX;
 }
 
-/* False: another lane has failed. */
-static bool await_turn(making *m, const trip_level_lane *l)
+/* Under the lock, which is let go while the file is used: as many as it is the turn of. */
+static int append_made(making *m)
 {
-    pthread_mutex_lock(&m->lock);
-    while (m->appended != l->number && !m->failed)
-        pthread_cond_wait(&m->turned, &m->lock);
-    const bool go = !m->failed;
-    pthread_mutex_unlock(&m->lock);
-    return go;
+    int status = 0;
+    for (;;) {
+        made_square *of = &m->made[m->appended % m->ahead];
+        if (!of->waits || m->appending || m->failed || status < 0)
+            return status;
+        m->appending = true;
+        pthread_mutex_unlock(&m->lock);
+        if (of->count > 0)
+            status = trip_level_file_append(m->file, of->key, of->values, of->means, of->count);
+        pthread_mutex_lock(&m->lock);
+        of->waits = m->appending = false;
+        m->appended++;
+        pthread_cond_broadcast(&m->turned);
+    }
 }
 
-static int append(making *m, const trip_level_lane *l, uint32_t count)
+/* Gives the voxels of the square at hand to the file, once no more than `ahead` wait; the lane goes
+ * on with other memory. */
+static int append(making *m, trip_level_lane *l, uint32_t count)
 {
-    if (!await_turn(m, l))
-        return 0;
-    int status =
-        count > 0 ? trip_level_file_append(m->file, l->key, l->values, l->means, count) : 0;
+    made_square *to = &m->made[l->number % m->ahead];
     pthread_mutex_lock(&m->lock);
-    m->appended++;
-    pthread_cond_broadcast(&m->turned);
+    while (l->number >= m->appended + m->ahead && !m->failed)
+        pthread_cond_wait(&m->turned, &m->lock);
+    const made_square spare = *to;
+    *to = (made_square){ true, l->key, count, l->values, l->means };
+    l->values = spare.values;
+    l->means = spare.means;
+    const int status = append_made(m);
     pthread_mutex_unlock(&m->lock);
     return status;
 }
@@ -265,10 +316,10 @@ static int make_square(making *m, trip_level_lane *l)
     for (unsigned i = 0; i < l->square_count && status == 0; i++)
         status = trip_level_lane_add(l, &m->work, &l->squares[i]);
     uint32_t count = status == 0 ? trip_level_lane_take(l, &m->work) : 0;
-    if (status == 0 && m->file)
-        status = append(m, l, count);
     if (status == 0 && l->means)
         status = trip_level_lane_emit_means(l, &m->work, l->key, count);
+    if (status == 0 && m->file)
+        status = append(m, l, count);
     return status == 0 ? poll() : status;
 }
 
@@ -377,21 +428,35 @@ static int open_file(making *m, const trip_output *below)
     return status;
 }
 
-/* A file without a name. */
-static int create_file(const making *m, trip_output *file)
+/* Of at most so many voxels, for each of which there may be a square. */
+static size_t file_buffer_bytes(const making *m, uint64_t voxels, bool means)
 {
-    return trip_output_create(file,
-                              &(trip_output_params){ .folder = m->work.params->folder,
-                                                     .name = TRIP_SPOOL_NAME,
-                                                     .buffer_bytes = FILE_BUFFER_BYTES,
-                                                     .unnamed = true },
-                              m->budget);
+    const uint64_t grid = (uint64_t)m->dims[0] * (uint64_t)m->dims[1] * (uint64_t)m->dims[2];
+    const uint64_t each = TRIP_LEVEL_SQUARE_BYTES + trip_level_voxels_bytes(1, means);
+    const uint64_t most = trip_budget_left_bytes(m->budget) / FILE_PART;
+    const uint64_t least = FILE_BUFFER_BYTES, all = (voxels < grid ? voxels : grid) * each;
+    uint64_t bytes = all < most ? all : most;
+    bytes -= bytes % least;
+    return bytes < least ? least : bytes;
+}
+
+/* A file without a name, in memory where there is enough. */
+static int create_file(const making *m, trip_output *file, uint64_t voxels, bool means)
+{
+    return trip_output_create(
+        file,
+        &(trip_output_params){ .folder = m->work.params->folder,
+                               .name = TRIP_SPOOL_NAME,
+                               .buffer_bytes = file_buffer_bytes(m, voxels, means),
+                               .unnamed = true },
+        m->budget);
 }
 
 static int open_sharpen(making *m)
 {
     const bool own = has_halo_of_its_own(m);
-    int status = own ? create_file(m, &m->with_halo) : 0;
+    /* A kept voxel has 26 beside it. */
+    int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
     trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file,
                       m->work.params->kinds.means && !own, m->work.edge_log2, m->budget);
     return status;
@@ -406,6 +471,8 @@ static void close_making(making *m)
         trip_level_source_close(&m->sources[i]);
     if (m->lanes)
         trip_budget_release(m->budget, m->lanes, m->lane_count * sizeof *m->lanes);
+    if (m->made)
+        trip_budget_release(m->budget, m->made, m->ahead * sizeof *m->made);
     if (m->memory)
         trip_budget_release(m->budget, m->memory, m->lane_count * m->lane_bytes);
     pthread_mutex_destroy(&m->lock);
@@ -417,7 +484,7 @@ static int make(making *m, const trip_output *below, trip_output *file)
     const bool halo = m->work.format.halo;
     int status = m->work.lists ? open_lists(m) : open_file(m, below);
     if (status == 0 && (m->level < m->work.params->levels || halo))
-        status = create_file(m, m->file = file);
+        status = create_file(m, m->file = file, records_below(m), m->work.params->kinds.means);
     if (status == 0 && halo)
         status = open_sharpen(m);
     if (status == 0)

@@ -1,8 +1,9 @@
 /* The coarse levels of a data set: each is made of the one below when that is written, from its
- * lists along Z or, above the first, from a file of its voxels. Two sheets are read
- * at a time, square by square, so that memory does not grow with the volume. The pieces go to a
- * list builder, which sorts them as those of level 0. Normals and how much of a voxel was kept,
- * which means alone call for, are read and added up only where there are lists of these. */
+ * lists along Z or, above the first, from a file of its voxels, which is in memory where there is
+ * enough. Two sheets are read at a time, square by square, so that no more memory is needed where
+ * the volume is larger. The pieces go to a list builder, which sorts them as those of level 0.
+ * Normals and how much of a voxel was kept, which means alone call for, are read and added up only
+ * where there are lists of these. */
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 

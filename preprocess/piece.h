@@ -28,7 +28,8 @@ static inline int trip_list_axis(unsigned list)
 }
 
 enum {
-    TRIP_TILE_MAX_SPLATS = 128 * 128,
+    TRIP_TILE_MAX_EDGE = 128,
+    TRIP_TILE_MAX_SPLATS = TRIP_TILE_MAX_EDGE * TRIP_TILE_MAX_EDGE,
     TRIP_TILE_MAX_WORDS = TRIP_TILE_MAX_SPLATS / 64,
     TRIP_TILE_MORTON_BITS = 40, /* tiles of a sheet: up to 2^20 a side */
 };

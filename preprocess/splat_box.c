@@ -14,7 +14,7 @@ void trip_splat_box_tables_fill(trip_splat_box_tables *t, const trip_piece_forma
 {
     t->edge = trip_splat_box_edge(f);
     t->words = (unsigned)(t->edge * t->edge / 64);
-    for (unsigned x = 0; x < 128; x++)
+    for (unsigned x = 0; x < TRIP_TILE_MAX_EDGE; x++)
         t->even_bits[x] = (uint16_t)trip_morton(x, 0);
     for (unsigned v = 0; v < (unsigned)t->edge; v++)
         for (unsigned u = 0; u < (unsigned)t->edge; u++) {

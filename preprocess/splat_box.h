@@ -10,9 +10,9 @@
 /* The same for all boxes. */
 typedef struct trip_splat_box_tables {
     int64_t edge;
-    unsigned words;                      /* 64-bit words of the bitmap of edge x edge voxels */
-    uint16_t even_bits[128];             /* Morton code of (x, 0) */
-    uint16_t u_of[TRIP_TILE_MAX_SPLATS]; /* the coordinates of a Morton code */
+    unsigned words;                         /* 64-bit words of the bitmap of edge x edge voxels */
+    uint16_t even_bits[TRIP_TILE_MAX_EDGE]; /* Morton code of (x, 0) */
+    uint16_t u_of[TRIP_TILE_MAX_SPLATS];    /* the coordinates of a Morton code */
     uint16_t v_of[TRIP_TILE_MAX_SPLATS];
 } trip_splat_box_tables;
 

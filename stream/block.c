@@ -163,24 +163,44 @@ size_t trip_block_codes_bytes(const trip_block *b)
 
 /* ---- packing ---- */
 
+/* The Morton numbers of some voxels; false when one is not in the tile. */
+static bool find_numbers(unsigned tile_log2, const uint32_t *voxels, uint32_t count,
+                         uint32_t *numbers)
+{
+    uint32_t outside = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        numbers[i] = number_of(voxels[i]);
+        outside |= numbers[i] >> 2 * tile_log2 | (voxels[i] & 0x8080);
+    }
+    return outside == 0;
+}
+
 /* Sets the bits of presence and masks; the number of squares, or 0 when voxels are not in order or
  * not in the tile. */
 static uint32_t pack_places(unsigned tile_log2, const uint32_t *voxels, uint32_t count,
                             uint64_t *present, uint64_t *masks)
 {
-    uint32_t squares = 0;
-    int64_t last = -1, last_square = -1;
-    for (uint32_t i = 0; i < count; i++) {
-        int64_t number = number_of(voxels[i]), square = number / 64;
-        if (number <= last || number >> 2 * tile_log2 || voxels[i] & 0x8080)
+    enum { AT_ONCE = 64 };
+    uint32_t numbers[AT_ONCE], squares = 0, last_square = UINT32_MAX, least = 0;
+    uint64_t mask = 0;
+    for (uint32_t first = 0; first < count; first += AT_ONCE) {
+        const uint32_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
+        if (!find_numbers(tile_log2, voxels + first, some, numbers))
             return 0;
-        if (square != last_square) {
-            present[square / 64] |= UINT64_C(1) << square % 64;
-            masks[squares++] = 0;
+        for (uint32_t i = 0; i < some; i++) {
+            const uint32_t number = numbers[i], square = number / 64;
+            if (number < least)
+                return 0;
+            if (square != last_square) {
+                present[square / 64] |= UINT64_C(1) << square % 64;
+                squares++;
+                mask = 0;
+            }
+            mask |= UINT64_C(1) << number % 64;
+            masks[squares - 1] = mask;
+            last_square = square;
+            least = number + 1;
         }
-        masks[squares - 1] |= UINT64_C(1) << number % 64;
-        last = number;
-        last_square = square;
     }
     return squares;
 }

@@ -53,12 +53,19 @@ static trip_flush_job *take(trip_flusher *f)
     return job;
 }
 
+static int do_job(const trip_flush_job *job)
+{
+    if (job->data)
+        return trip_flusher_write(job->fd, job->data, job->bytes, job->offset);
+    return fsync(job->fd) < 0 ? errno : 0;
+}
+
 static void *work(void *flusher)
 {
     trip_flusher *f = flusher;
     trip_flush_job *job;
     while ((job = take(f))) {
-        job->error = trip_flusher_write(job->fd, job->data, job->bytes, job->offset);
+        job->error = do_job(job);
         pthread_mutex_lock(&f->lock);
         job->pending = false;
         pthread_cond_broadcast(&f->done);

@@ -1,5 +1,6 @@
-/* Threads that write buffers to files while others fill the next ones. A job belongs to the flusher
- * from submit to wait; one thread submits and waits for a job. */
+/* Threads that write buffers to files while others fill the next ones, and see that files are on
+ * the disk. A job belongs to the flusher from submit to wait; one thread submits and waits for a
+ * job. */
 #ifndef TRIP_FLUSHER_H
 #define TRIP_FLUSHER_H
 
@@ -11,7 +12,7 @@ typedef struct trip_flusher trip_flusher;
 
 typedef struct trip_flush_job {
     int fd;
-    const void *data;
+    const void *data; /* NULL: what was written of the file goes to the disk */
     size_t bytes;
     uint64_t offset;
     struct trip_flush_job *next;

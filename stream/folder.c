@@ -17,8 +17,8 @@
 
 static bool is_own_file(const char *name)
 {
-    return !strcmp(name, TRIP_INDEX_NAME) || !strcmp(name, TRIP_SPOOL_NAME) ||
-           trip_plane_file_is_named(name);
+    return !strcmp(name, TRIP_INDEX_NAME) || trip_plane_file_is_named(name) ||
+           !strncmp(name, TRIP_SPOOL_PREFIX, strlen(TRIP_SPOOL_PREFIX));
 }
 
 /* Removes a data set; a folder that holds anything else stays. */

@@ -17,8 +17,9 @@ int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *wha
 int trip_folder_open_file(int *fd, int folder, const char *path, const char *name, int flags,
                           const char *what);
 
-/* Unnamed files have this name for the moment between their creation and their removal. */
-#define TRIP_SPOOL_NAME "spool"
+/* Unnamed files have such a name, of mkostemp(), between their creation and their removal. */
+#define TRIP_SPOOL_PREFIX "spool."
+#define TRIP_SPOOL_NAME TRIP_SPOOL_PREFIX "XXXXXX"
 
 typedef struct trip_folder {
     char *path;    /* the final name, without slashes at its end */

@@ -32,7 +32,25 @@ static unsigned char *filling(const trip_output *o)
     return o->buffer + o->filling * o->buffer_bytes;
 }
 
-static int open_file(trip_output *o, const trip_output_params *p)
+static int create_named(trip_output *o)
+{
+    o->fd = open(o->path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (o->fd < 0)
+        return trip_fail_errno("write", o->path, "cannot create");
+    if (o->flusher)
+        fcntl(o->fd, F_SETFL, O_DIRECT); /* where refused, through the page cache */
+    return TRIP_OK;
+}
+
+static int create_unnamed(trip_output *o)
+{
+    o->fd = mkostemp(o->path, O_CLOEXEC);
+    if (o->fd < 0)
+        return fail_write(o, 0, errno);
+    return unlink(o->path) < 0 ? trip_fail_errno("write", o->path, "cannot unlink") : TRIP_OK;
+}
+
+static int open_output(trip_output *o, const trip_output_params *p)
 {
     if (asprintf(&o->path, "%s/%s", p->folder, p->name) < 0) {
         o->path = NULL;
@@ -43,14 +61,7 @@ static int open_file(trip_output *o, const trip_output_params *p)
         return trip_fail(TRIP_ERROR, "write", o->path,
                          "no memory for a buffer of %zu bytes: give more with --memory",
                          memory_bytes(o));
-    o->fd = open(o->path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (o->fd < 0)
-        return trip_fail_errno("write", o->path, "cannot create");
-    if (p->unnamed && unlink(o->path) < 0)
-        return trip_fail_errno("write", o->path, "cannot unlink");
-    if (o->flusher)
-        fcntl(o->fd, F_SETFL, O_DIRECT); /* where refused, through the page cache */
-    return TRIP_OK;
+    return p->unnamed ? TRIP_OK : create_named(o);
 }
 
 int trip_output_create(trip_output *o, const trip_output_params *params, trip_budget *budget)
@@ -63,7 +74,7 @@ int trip_output_create(trip_output *o, const trip_output_params *params, trip_bu
                         .bytes = params->skip_bytes,
                         .page_bytes = params->page_bytes,
                         .checksums = params->checksums };
-    int status = open_file(o, params);
+    int status = open_output(o, params);
     if (status < 0)
         trip_output_close(o);
     return status;
@@ -82,7 +93,7 @@ static int append_checksums(trip_output *o)
     return TRIP_OK;
 }
 
-/* Waits for the buffer that is being written. */
+/* Waits for what the flusher does. */
 static int wait_written(trip_output *o)
 {
     int error = o->flusher ? trip_flusher_wait(o->flusher, &o->job) : 0;
@@ -106,11 +117,21 @@ static int send_buffer(trip_output *o)
     return TRIP_OK;
 }
 
+/* Only unnamed files are not there from the start. */
+static bool has_file(const trip_output *o)
+{
+    return o->fd >= 0;
+}
+
 /* What is left need not be whole sectors, so it goes through the page cache. */
 int trip_output_flush(trip_output *o)
 {
     uint64_t offset = o->bytes - o->used_bytes;
-    int status = o->page_bytes ? append_checksums(o) : TRIP_OK;
+    if (!has_file(o) && o->used_bytes < o->buffer_bytes)
+        return TRIP_OK;
+    int status = has_file(o) ? TRIP_OK : create_unnamed(o);
+    if (status == TRIP_OK && o->page_bytes)
+        status = append_checksums(o);
     if (status == TRIP_OK)
         status = wait_written(o);
     if (status < 0)
@@ -144,21 +165,35 @@ int trip_output_append(trip_output *o, const void *data, size_t bytes)
     return TRIP_OK;
 }
 
-int trip_output_read(const trip_output *o, uint64_t offset, void *data, size_t bytes)
+static int fail_read(const trip_output *o, int error)
+{
+    errno = error;
+    return trip_fail_errno("write", o->path, "cannot read back");
+}
+
+static int read_file(const trip_output *o, uint64_t offset, void *data, size_t bytes)
 {
     unsigned char *p = data;
     while (bytes > 0) {
         ssize_t n = pread(o->fd, p, bytes, (off_t)offset);
         if (n < 0 && errno == EINTR)
             continue;
-        if (n <= 0) {
-            errno = n == 0 ? EIO : errno;
-            return trip_fail_errno("write", o->path, "cannot read back");
-        }
+        if (n <= 0)
+            return fail_read(o, n == 0 ? EIO : errno);
         p += n;
         offset += (uint64_t)n;
         bytes -= (size_t)n;
     }
+    return TRIP_OK;
+}
+
+int trip_output_read(const trip_output *o, uint64_t offset, void *data, size_t bytes)
+{
+    if (has_file(o))
+        return read_file(o, offset, data, bytes);
+    if (offset > o->used_bytes || bytes > o->used_bytes - offset)
+        return fail_read(o, EIO);
+    memcpy(data, o->buffer + offset, bytes);
     return TRIP_OK;
 }
 
@@ -188,8 +223,20 @@ int trip_output_patch(trip_output *o, uint64_t offset, const void *data, size_t 
     return error ? fail_write(o, offset, error) : TRIP_OK;
 }
 
+int trip_output_start_sync(trip_output *o)
+{
+    int status = trip_output_flush(o);
+    if (status == TRIP_OK) {
+        o->job = (trip_flush_job){ .fd = o->fd, .offset = o->bytes };
+        trip_flusher_submit(o->flusher, &o->job);
+    }
+    return status;
+}
+
 int trip_output_sync(trip_output *o)
 {
+    if (o->flusher)
+        return wait_written(o);
     int status = trip_output_flush(o);
     if (status == TRIP_OK && fsync(o->fd) < 0)
         return fail_write(o, o->bytes, errno);

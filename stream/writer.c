@@ -476,17 +476,26 @@ static int check_summary(const trip_writer *w, const trip_writer_summary *s)
     return TRIP_OK;
 }
 
+static int for_planes(trip_list_writer *l, int (*what)(trip_output *))
+{
+    int status = TRIP_OK;
+    for (int plane = 0; plane < TRIP_PLANES && status == TRIP_OK; plane++)
+        if (l->planes_present >> plane & 1)
+            status = what(&l->planes[plane]);
+    return status;
+}
+
+/* All of them at once, since each waits for the disk. */
 static int sync_planes(trip_writer *w)
 {
     int status = TRIP_OK;
-    for (unsigned i = 0; i < w->list_count; i++) {
-        trip_list_writer *l = &w->lists[i];
+    for (unsigned i = 0; i < w->list_count && status == TRIP_OK; i++) {
+        status = trip_writer_end_slab(w, &w->lists[i]);
         if (status == TRIP_OK)
-            status = trip_writer_end_slab(w, l);
-        for (int plane = 0; plane < TRIP_PLANES; plane++)
-            if (status == TRIP_OK && l->planes_present >> plane & 1)
-                status = trip_output_sync(&l->planes[plane]);
+            status = for_planes(&w->lists[i], trip_output_start_sync);
     }
+    for (unsigned i = 0; i < w->list_count && status == TRIP_OK; i++)
+        status = for_planes(&w->lists[i], trip_output_sync);
     return status;
 }
 

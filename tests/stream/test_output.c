@@ -1,0 +1,179 @@
+/* Unnamed files: none stands on the disk before the buffer is full, and what is read back is the
+ * same before and after. Several outputs of a folder overflow at once. */
+#include "fixture.h"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include "folder.h"
+#include "output.h"
+
+enum { BUFFER_BYTES = 4096, OUTPUTS = 8, ROUNDS = 50 };
+
+typedef struct output_test {
+    char folder[32];
+    trip_budget *budget;
+} output_test;
+
+static void begin(output_test *t)
+{
+    strcpy(t->folder, "/tmp/test_output_XXXXXX");
+    assert_non_null(mkdtemp(t->folder));
+    assert_int_equal(trip_budget_create(&t->budget, 1 << 24), 0);
+}
+
+/* The folder is empty, whatever was written. */
+static void finish(output_test *t)
+{
+    assert_int_equal(rmdir(t->folder), 0);
+    trip_budget_destroy(t->budget);
+}
+
+static trip_output create(const output_test *t)
+{
+    trip_output o;
+    assert_int_equal(trip_output_create(&o,
+                                        &(trip_output_params){ .folder = t->folder,
+                                                               .name = TRIP_SPOOL_NAME,
+                                                               .buffer_bytes = BUFFER_BYTES,
+                                                               .unnamed = true },
+                                        t->budget),
+                     0);
+    return o;
+}
+
+/* Byte i of what all outputs are filled with. */
+static unsigned char pattern(size_t i)
+{
+    return (unsigned char)(i * 7 + i / 251);
+}
+
+static int append(trip_output *o, size_t bytes)
+{
+    unsigned char some[100];
+    int status = 0;
+    for (size_t left = bytes; left > 0 && status == 0;) {
+        const size_t n = left < sizeof some ? left : sizeof some, at = (size_t)o->bytes;
+        for (size_t i = 0; i < n; i++)
+            some[i] = pattern(at + i);
+        status = trip_output_append(o, some, n);
+        left -= n;
+    }
+    return status;
+}
+
+static bool holds(const trip_output *o, size_t at, size_t bytes)
+{
+    unsigned char *read = malloc(bytes);
+    bool same = read && trip_output_read(o, at, read, bytes) == 0;
+    for (size_t i = 0; i < bytes && same; i++)
+        same = read[i] == pattern(at + i);
+    free(read);
+    return same;
+}
+
+static void what_the_buffer_holds_is_no_file(void **state)
+{
+    output_test t;
+    (void)state;
+    begin(&t);
+    trip_output o = create(&t);
+    assert_int_equal(append(&o, BUFFER_BYTES - 1), 0);
+    assert_int_equal(trip_output_flush(&o), 0);
+    assert_int_equal(o.fd, -1);
+    assert_true(holds(&o, 0, BUFFER_BYTES - 1));
+    assert_true(holds(&o, 1000, 3095));
+    trip_output_close(&o);
+    finish(&t);
+}
+
+static void more_goes_to_a_file_and_reads_the_same(void **state)
+{
+    output_test t;
+    (void)state;
+    begin(&t);
+    trip_output o = create(&t);
+    assert_int_equal(append(&o, BUFFER_BYTES - 1), 0);
+    assert_int_equal(trip_output_flush(&o), 0);
+    assert_int_equal(append(&o, 3 * BUFFER_BYTES + 17), 0);
+    assert_int_equal(trip_output_flush(&o), 0);
+    assert_true(o.fd >= 0);
+    assert_int_equal(o.bytes, 4 * BUFFER_BYTES + 16);
+    assert_true(holds(&o, 0, 4 * BUFFER_BYTES + 16));
+    assert_true(holds(&o, BUFFER_BYTES - 5, 10));
+    trip_output_close(&o);
+    finish(&t);
+}
+
+static void what_was_not_written_cannot_be_read(void **state)
+{
+    output_test t;
+    unsigned char read[2];
+    (void)state;
+    begin(&t);
+    trip_output o = create(&t);
+    assert_int_equal(append(&o, 10), 0);
+    assert_true(trip_output_read(&o, 9, read, 2) < 0);
+    assert_true(trip_output_read(&o, UINT64_MAX, read, 2) < 0);
+    trip_output_close(&o);
+    finish(&t);
+}
+
+static void a_folder_that_is_gone_is_a_failure(void **state)
+{
+    output_test t;
+    (void)state;
+    begin(&t);
+    trip_output o = create(&t);
+    assert_int_equal(rmdir(t.folder), 0);
+    assert_int_equal(append(&o, BUFFER_BYTES - 1), 0);
+    assert_true(append(&o, 1) < 0);
+    trip_output_close(&o);
+    trip_budget_destroy(t.budget);
+}
+
+typedef struct overflowing {
+    trip_output output;
+    bool right;
+} overflowing;
+
+static void *overflow(void *arg)
+{
+    overflowing *o = arg;
+    o->right = append(&o->output, 5 * BUFFER_BYTES) == 0 && trip_output_flush(&o->output) == 0 &&
+               holds(&o->output, 0, 5 * BUFFER_BYTES);
+    return NULL;
+}
+
+static void outputs_of_a_folder_may_overflow_at_once(void **state)
+{
+    output_test t;
+    (void)state;
+    begin(&t);
+    for (int round = 0; round < ROUNDS; round++) {
+        overflowing all[OUTPUTS];
+        pthread_t threads[OUTPUTS];
+        for (int i = 0; i < OUTPUTS; i++)
+            all[i] = (overflowing){ .output = create(&t) };
+        for (int i = 0; i < OUTPUTS; i++)
+            assert_int_equal(pthread_create(&threads[i], NULL, overflow, &all[i]), 0);
+        for (int i = 0; i < OUTPUTS; i++) {
+            pthread_join(threads[i], NULL);
+            assert_true(all[i].right);
+            trip_output_close(&all[i].output);
+        }
+    }
+    finish(&t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_the_buffer_holds_is_no_file),
+        cmocka_unit_test(more_goes_to_a_file_and_reads_the_same),
+        cmocka_unit_test(what_was_not_written_cannot_be_read),
+        cmocka_unit_test(a_folder_that_is_gone_is_a_failure),
+        cmocka_unit_test(outputs_of_a_folder_may_overflow_at_once),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
