@@ -1,5 +1,7 @@
 #include "piece.h"
 
+#include "clones.h"
+
 #include <string.h>
 
 /* 64-bit masks with a bit for each word of the bitmap. */
@@ -73,7 +75,8 @@ void trip_piece_begin(trip_piece *p, const trip_piece_format *f, uint64_t key, u
         write_list(positions, f, splats, bitmap);
 }
 
-uint32_t trip_piece_positions(const trip_piece *p, const trip_piece_format *f, uint16_t *to)
+TRIP_ALSO_V3 uint32_t trip_piece_positions(const trip_piece *p, const trip_piece_format *f,
+                                           uint16_t *to)
 {
     if (p->words == 0) {
         memcpy(to, p + 1, (p->last + 1u) * sizeof *to);

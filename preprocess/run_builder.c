@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "clones.h"
 #include "format.h"
 #include "normal.h"
 #include "report.h"
@@ -100,7 +101,7 @@ static void scatter_piece(trip_run_builder *b, const trip_piece *p)
             b->magnitudes[b->positions[i]] = magnitudes[i];
 }
 
-void trip_run_builder_add(trip_run_builder *b, const trip_piece *p)
+TRIP_ALSO_V3 void trip_run_builder_add(trip_run_builder *b, const trip_piece *p)
 {
     if (!b->started && b->format.quantised) {
         add_first(b, p);
@@ -163,8 +164,8 @@ static uint32_t take_scattered(trip_run_builder *b, const trip_quantiser *q)
     return splats;
 }
 
-uint32_t trip_run_builder_take(trip_run_builder *b, const trip_quantiser *q,
-                               const uint32_t **voxels, const uint32_t **normals)
+TRIP_ALSO_V3 uint32_t trip_run_builder_take(trip_run_builder *b, const trip_quantiser *q,
+                                            const uint32_t **voxels, const uint32_t **normals)
 {
     b->started = false;
     *voxels = b->voxel_records;

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "clones.h"
 #include "format.h"
 #include "report.h"
 
@@ -136,8 +137,8 @@ static int emit_piece(const trip_splat_box *c, const trip_piece_format *f, unsig
     return 0;
 }
 
-int trip_splat_box_emit(const trip_splat_box *c, const trip_piece_format *f, unsigned list,
-                        const trip_piece_sink *sink)
+TRIP_ALSO_V3 int trip_splat_box_emit(const trip_splat_box *c, const trip_piece_format *f,
+                                     unsigned list, const trip_piece_sink *sink)
 {
     const unsigned words = c->tables->words;
     const int axis = trip_list_axis(list);

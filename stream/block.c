@@ -114,8 +114,8 @@ static uint32_t packed_bytes(const uint64_t *masks, uint32_t squares, const uint
     return bytes;
 }
 
-TRIP_AVX2_TOO uint32_t trip_block_end(const trip_block_form *f, const uint64_t *block,
-                                      uint32_t words)
+TRIP_ALSO_V3 uint32_t trip_block_end(const trip_block_form *f, const uint64_t *block,
+                                     uint32_t words)
 {
     const uint32_t present = trip_block_present_words(f->tile_log2);
     if (words < present)
@@ -131,8 +131,8 @@ TRIP_AVX2_TOO uint32_t trip_block_end(const trip_block_form *f, const uint64_t *
     return words < head ? head : head + code_words(packed_bytes(masks, squares, forms));
 }
 
-TRIP_AVX2_TOO trip_block trip_block_make(const trip_block_form *f, uint32_t records, uint32_t words,
-                                         const void *block, const void *normals)
+TRIP_ALSO_V3 trip_block trip_block_make(const trip_block_form *f, uint32_t records, uint32_t words,
+                                        const void *block, const void *normals)
 {
     trip_block b = { .count = records,
                      .words = words,
@@ -281,8 +281,8 @@ INLINE uint32_t pack_groups(const uint32_t *voxels, uint32_t step, const uint64_
     return head + code_words(bytes);
 }
 
-TRIP_AVX2_TOO uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels,
-                                       uint32_t count, uint64_t *block)
+TRIP_ALSO_V3 uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels,
+                                      uint32_t count, uint64_t *block)
 {
     unsigned present = trip_block_present_words(f->tile_log2);
     memset(block, 0, present * sizeof *block);
@@ -316,8 +316,8 @@ void trip_normals_pack(unsigned normal_bytes, const uint32_t *normals, uint32_t 
 
 /* ---- squares ---- */
 
-TRIP_AVX2_TOO uint32_t trip_block_squares(const trip_block *b,
-                                          trip_square squares[TRIP_BLOCK_SQUARES_MAX])
+TRIP_ALSO_V3 uint32_t trip_block_squares(const trip_block *b,
+                                         trip_square squares[TRIP_BLOCK_SQUARES_MAX])
 {
     const bool packed = b->code_bytes != 1;
     const uint32_t *forms = forms_of(b);
@@ -409,7 +409,7 @@ static void unpack_square(const trip_square *s, uint16_t above[64])
 #undef UNPACK
 }
 
-TRIP_AVX2_TOO void trip_square_codes(const trip_square *s, uint16_t codes[64])
+TRIP_ALSO_V3 void trip_square_codes(const trip_square *s, uint16_t codes[64])
 {
     const uint32_t least = s->least, step = s->step;
     if (s->width == 8) {
@@ -572,7 +572,7 @@ static bool are_codes_within(const trip_block *b, const trip_file_brick *brick)
     return within;
 }
 
-TRIP_AVX2_TOO const char *trip_block_check(const trip_block *b, const trip_file_brick *brick)
+TRIP_ALSO_V3 const char *trip_block_check(const trip_block *b, const trip_file_brick *brick)
 {
     const char *fault = check_places(b, brick);
     if (!fault)

@@ -1,5 +1,6 @@
 #include "slab.h"
 
+#include "clones.h"
 #include "report.h"
 
 #include <stdbool.h>
@@ -100,8 +101,9 @@ static void widen(trip_file_brick *b, const uint32_t *voxels, uint32_t count)
     b->code_max = (uint16_t)code_max;
 }
 
-const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
-                                     const uint32_t *voxels, uint32_t count, uint32_t words)
+TRIP_ALSO_V3 const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u,
+                                                  uint32_t tile_v, const uint32_t *voxels,
+                                                  uint32_t count, uint32_t words)
 {
     trip_slab_brick *b = find(s, sheet, tile_u, tile_v);
     if (!b)
