@@ -492,24 +492,6 @@ static const char *check_places(const trip_block *b, const trip_file_brick *bric
     return outside ? "a voxel is outside its brick's bounds" : NULL;
 }
 
-/* Whether the block ends where its parts do, and packed codes have widths that there are. */
-static const char *check_length(const trip_block *b)
-{
-    const uint32_t behind = b->present_words + b->squares,
-                   groups = count_groups(b->masks, b->squares);
-    const uint32_t *forms = forms_of(b);
-    const char *why = "a run's block has not the length of its codes";
-    if (b->code_bytes == 1)
-        return behind + code_words(b->count) == b->words ? NULL : why;
-    if (behind + form_words(groups) > b->words)
-        return why;
-    for (uint32_t i = 0; i < groups; i++)
-        if (width_of(forms[i]) > 16 || width_of(forms[i]) % 2)
-            return "codes have a width that there is not";
-    const uint32_t bytes = packed_bytes(b->masks, b->squares, forms);
-    return behind + form_words(groups) + code_words(bytes) == b->words ? NULL : why;
-}
-
 static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
 {
     const unsigned char *codes = trip_block_codes(b);
@@ -522,32 +504,16 @@ static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
            (most + TRIP_CODE_FIRST) * TRIP_CODE_STEP <= brick->code_max;
 }
 
-/* Whether no code is further above the least one: below 2^16 - 1. Of four at a time: the sum with
- * what is left to 2^15 reaches that where one is, or it was there before. */
-INLINE bool are_at_most(uint32_t width, const packed_codes *p, uint32_t count, uint32_t most)
-{
-    const uint64_t each = UINT64_C(0x0001000100010001), top = 0x8000 * each;
-    const uint64_t rest = (0x7fff - (most & 0x7fff)) * each, high = most & 0x8000 ? top : 0;
-    uint64_t beyond = 0;
-    for (uint32_t i = 0; i < count; i += 4) {
-        uint64_t four = four_above(p, width, i);
-        if (count - i < 4)
-            four &= (UINT64_C(1) << 16 * (count - i)) - 1;
-        const uint64_t reaches = (four & ~top) + rest;
-        beyond |= (four & reaches) | (~high & (four | reaches));
-    }
-    return !(beyond & top);
-}
-
+/* Whether no code is further above the least one. */
 static bool are_above_at_most(const trip_square *s, uint32_t most)
 {
-    packed_codes p;
-    bool all = true;
-    copy_codes(s, &p);
-#define COMPARE(width) all = are_at_most(width, &p, s->count, most)
-    WITH_WIDTH(s->width, COMPARE)
-#undef COMPARE
-    return all;
+    uint16_t above[64] = { 0 }, greatest = 0;
+    unpack_square(s, above);
+    for (uint32_t i = s->count; i % 4; i++) /* unpacked with those before */
+        above[i] = 0;
+    for (uint32_t i = 0; i < 64; i++)
+        greatest = above[i] > greatest ? above[i] : greatest;
+    return greatest <= most;
 }
 
 /* Codes are looked at where the width's bits could say more than the brick's range has. */
@@ -560,26 +526,45 @@ static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
            (s->least <= most && are_above_at_most(s, most - s->least));
 }
 
-static bool are_codes_within(const trip_block *b, const trip_file_brick *brick)
+static const char wrong_length[] = "a run's block has not the length of its codes",
+                  wrong_value[] = "a value is outside its brick's range";
+
+static const char *check_bytes(const trip_block *b, const trip_file_brick *brick)
 {
+    if (b->present_words + b->squares + code_words(b->count) != b->words)
+        return wrong_length;
+    return are_bytes_within(b, brick) ? NULL : wrong_value;
+}
+
+/* Codes are looked at once the widths are some that there are, and the block ends where they do. */
+static const char *check_packed(const trip_block *b, const trip_file_brick *brick)
+{
+    const uint32_t groups = count_groups(b->masks, b->squares),
+                   head = b->present_words + b->squares + form_words(groups);
+    const uint32_t *forms = forms_of(b);
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
-    if (b->code_bytes == 1)
-        return are_bytes_within(b, brick);
+    if (b->squares == 0 || head > b->words)
+        return wrong_length;
+    for (uint32_t i = 0; i < groups; i++)
+        if (width_of(forms[i]) > 16 || width_of(forms[i]) % 2)
+            return "codes have a width that there is not";
     const uint32_t count = trip_block_squares(b, squares);
-    bool within = true;
-    for (uint32_t i = 0; i < count && within; i++)
-        within = is_square_within(&squares[i], brick);
-    return within;
+    const trip_square *last = &squares[count - 1];
+    const unsigned char *end = last->codes + trip_square_code_bytes(last);
+    if (head + code_words((uint32_t)(end - squares[0].codes)) != b->words)
+        return wrong_length;
+    for (uint32_t i = 0; i < count; i++)
+        if (!is_square_within(&squares[i], brick))
+            return wrong_value;
+    return NULL;
 }
 
 TRIP_ALSO_V3 const char *trip_block_check(const trip_block *b, const trip_file_brick *brick)
 {
     const char *fault = check_places(b, brick);
-    if (!fault)
-        fault = check_length(b);
     if (fault)
         return fault;
-    return are_codes_within(b, brick) ? NULL : "a value is outside its brick's range";
+    return b->code_bytes == 1 ? check_bytes(b, brick) : check_packed(b, brick);
 }
 
 bool trip_block_is_padded(const trip_block *b)
