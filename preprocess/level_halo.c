@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clones.h"
 #include "format.h"
 #include "report.h"
 
@@ -176,7 +177,7 @@ static void widen(adding *a)
         }
 }
 
-static int find_near(adding *a, uint64_t key)
+TRIP_ALSO_V3 static int find_near(adding *a, uint64_t key)
 {
     int status = 0;
     memset(a->near, 255, sizeof *a->near * (edge_of(a) + 2) * (edge_of(a) + 2));

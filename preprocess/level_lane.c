@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "clones.h"
 #include "format.h"
 
 size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsigned producer,
@@ -201,8 +202,8 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
     return status;
 }
 
-int trip_level_lane_add(trip_level_lane *l, const trip_level_work *w,
-                        const trip_level_source *square)
+TRIP_ALSO_V3 int trip_level_lane_add(trip_level_lane *l, const trip_level_work *w,
+                                     const trip_level_source *square)
 {
     return w->lists ? add_run(l, w, square) : add_voxels(l, w, square);
 }
@@ -217,7 +218,7 @@ static void take_mean(const trip_level_lane *l, const trip_level_work *w, size_t
         mean->normal = normal_of(w, gradient);
 }
 
-uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_work *w)
+TRIP_ALSO_V3 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_work *w)
 {
     const size_t words = (size_t)1 << (2 * w->edge_log2 - 6), edge = (size_t)1 << w->edge_log2;
     uint32_t n = 0;
@@ -337,8 +338,9 @@ static void put_values(trip_level_lane *l, const trip_level_work *w, uint32_t co
     }
 }
 
-int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
-                                const trip_sharpen *sharpen, const trip_sharpen_column *column)
+TRIP_ALSO_V3 int trip_level_lane_emit_values(trip_level_lane *l, const trip_level_work *w,
+                                             const trip_sharpen *sharpen,
+                                             const trip_sharpen_column *column)
 {
     int status = 0;
     begin_squares(l, w, column->sheet, column->morton, TRIP_SHARPEN_SHEETS);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "clones.h"
 #include "format.h"
 #include "report.h"
 
@@ -138,8 +139,8 @@ static uint16_t sharpened(uint16_t value, int32_t sum)
     return (uint16_t)(to < 0 ? 0 : to > UINT16_MAX ? UINT16_MAX : to);
 }
 
-int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
-                    const trip_sharpen_neighbourhood *of)
+TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
+                                 const trip_sharpen_neighbourhood *of)
 {
     const trip_level_place *place = &of->square;
     int status = read_square(s, place, l->values, &l->squares[0]);
