@@ -158,16 +158,30 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
     }
 }
 
-static int add_run(trip_level_lane *l, const trip_level_work *w, const trip_level_source *square)
+/* Of the first run, and of those of its list right behind it. */
+static uint64_t words_together(const trip_level_source *squares, unsigned count)
+{
+    const uint64_t first = squares->run.at[TRIP_PLANE_VOXELS];
+    uint64_t words = 0;
+    for (unsigned i = 0; i < count && squares[i].cursor == squares->cursor &&
+                         squares[i].run.at[TRIP_PLANE_VOXELS] == first + 8 * words;
+         i++)
+        words += squares[i].run.run.words;
+    return words;
+}
+
+static int add_run(trip_level_lane *l, const trip_level_work *w, const trip_level_source *of,
+                   unsigned count)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     trip_block run;
-    int status = trip_list_cursor_read(square->cursor, &square->run, l->run, &run);
-    const uint32_t count = status == 0 ? trip_block_squares(&run, squares) : 0;
-    for (uint32_t i = 0; i < count; i++) {
-        add_values(l, w, square, &squares[i]);
-        if (l->mean_sums && square->kept)
-            add_means(l, w, square, &run, &squares[i]);
+    int status =
+        trip_list_cursor_read(of->cursor, &of->run, words_together(of, count), l->run, &run);
+    const uint32_t n = status == 0 ? trip_block_squares(&run, squares) : 0;
+    for (uint32_t i = 0; i < n; i++) {
+        add_values(l, w, of, &squares[i]);
+        if (l->mean_sums && of->kept)
+            add_means(l, w, of, &run, &squares[i]);
     }
     return status;
 }
@@ -203,9 +217,9 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
 }
 
 TRIP_ALSO_V3 int trip_level_lane_add(trip_level_lane *l, const trip_level_work *w,
-                                     const trip_level_source *square)
+                                     const trip_level_source *squares, unsigned count)
 {
-    return w->lists ? add_run(l, w, square) : add_voxels(l, w, square);
+    return w->lists ? add_run(l, w, squares, count) : add_voxels(l, w, squares);
 }
 
 static void take_mean(const trip_level_lane *l, const trip_level_work *w, size_t at,

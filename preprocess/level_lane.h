@@ -51,9 +51,9 @@ typedef struct trip_level_lane {
 size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsigned producer,
                             unsigned char *memory);
 
-/* Adds the voxels of the square that a source is at. */
+/* Adds the voxels of the square that the first of some sources is at; the others come next. */
 int trip_level_lane_add(trip_level_lane *l, const trip_level_work *w,
-                        const trip_level_source *square);
+                        const trip_level_source *squares, unsigned count);
 /* Turns what was added up into `values` and `means`; returns their number. */
 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_work *w);
 

@@ -314,7 +314,7 @@ static int make_square(making *m, trip_level_lane *l)
 {
     int status = 0;
     for (unsigned i = 0; i < l->square_count && status == 0; i++)
-        status = trip_level_lane_add(l, &m->work, &l->squares[i]);
+        status = trip_level_lane_add(l, &m->work, &l->squares[i], l->square_count - i);
     uint32_t count = status == 0 ? trip_level_lane_take(l, &m->work) : 0;
     if (status == 0 && l->means)
         status = trip_level_lane_emit_means(l, &m->work, l->key, count);

@@ -97,7 +97,7 @@ static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *bu
     if (status < 0)
         return status;
     while ((status = trip_list_cursor_next(cursor, &place)) > 0) {
-        status = trip_list_cursor_read(cursor, &place, buffer, &run);
+        status = trip_list_cursor_read(cursor, &place, 0, buffer, &run);
         if (status == 0 && trip_interrupted())
             status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
         if (status < 0)

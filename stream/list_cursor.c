@@ -6,7 +6,9 @@
 #include "writer_state.h"
 
 struct trip_list_buffer {
-    uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    const trip_list_writer *list; /* whose blocks it holds, from byte to byte of the plane */
+    uint64_t first, past;
+    uint64_t blocks[TRIP_BLOCK_WORDS_MAX];
     unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
 };
 
@@ -122,20 +124,38 @@ static int enter_slab(trip_list_cursor *c)
     return status;
 }
 
-int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place,
+/* The block of a run, and with it what fits of `words`. */
+static int fetch_block(const trip_list_writer *l, const trip_list_place *place, uint64_t words,
+                       trip_list_buffer *to, const uint64_t **block)
+{
+    const uint64_t at = place->at[TRIP_PLANE_VOXELS], own = 8 * (uint64_t)place->run.words;
+    int status = TRIP_OK;
+    if (to->list != l || at < to->first || at + own > to->past) {
+        const uint64_t wanted = 8 * words < sizeof to->blocks ? 8 * words : sizeof to->blocks;
+        const uint64_t bytes = wanted > own ? wanted : own;
+        status = trip_output_read(&l->planes[TRIP_PLANE_VOXELS], at, to->blocks, bytes);
+        to->list = status == TRIP_OK ? l : NULL;
+        to->first = at;
+        to->past = at + bytes;
+    }
+    *block = to->blocks + (at - to->first) / 8;
+    return status;
+}
+
+int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place, uint64_t words,
                           trip_list_buffer *to, trip_block *out)
 {
     const trip_list_writer *l = c->list;
     const trip_file_run *r = &place->run;
     const bool normals = c->normals;
-    int status = trip_output_read(&l->planes[TRIP_PLANE_VOXELS], place->at[TRIP_PLANE_VOXELS],
-                                  to->block, 8 * (size_t)r->words);
+    const uint64_t *block;
+    int status = fetch_block(l, place, words, to, &block);
     if (status == TRIP_OK && normals)
         status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], place->at[TRIP_PLANE_NORMALS],
                                   to->packed, (size_t)r->records * l->form.normal_bytes);
     if (status < 0)
         return status;
-    *out = trip_block_make(&l->form, r->records, r->words, to->block, normals ? to->packed : NULL);
+    *out = trip_block_make(&l->form, r->records, r->words, block, normals ? to->packed : NULL);
     if (!trip_block_words_fit(&l->form, r->records, r->words) ||
         trip_block_check(out, &place->brick))
         return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,

@@ -104,8 +104,10 @@ int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place);
 int trip_list_buffer_create(trip_list_buffer **out, const trip_writer *w, trip_budget *budget);
 void trip_list_buffer_destroy(trip_list_buffer *b, trip_budget *budget);
 uint64_t trip_list_buffer_bytes(void);
-/* The run there, checked, in the buffer; its normals NULL where they are not read. */
-int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place,
+/* The run there, checked, in the buffer; its normals NULL where they are not read. `words`: of its
+ * block and of those right behind it that will be read next into the same buffer, which are fetched
+ * with it; 0: none will be. */
+int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place, uint64_t words,
                           trip_list_buffer *to, trip_block *out);
 
 uint64_t trip_writer_bytes(const trip_writer *w);
