@@ -101,7 +101,7 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
 static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place *place,
                       size_t row, size_t count, size_t column, size_t width, ptrdiff_t shift)
 {
-    const trip_sharpen_square *other;
+    const trip_sharpen_square *other = NULL;
     int status = place->count > 0 ? hold_square(s, l, place, &other) : 0;
     if (status == 0 && place->count > 0)
         add_beside(s, l, other, row, count, column, width, shift);
