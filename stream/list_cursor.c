@@ -142,6 +142,12 @@ static int fetch_block(const trip_list_writer *l, const trip_list_place *place, 
     return status;
 }
 
+static int fail_changed(const trip_list_writer *l)
+{
+    return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,
+                     "is not what was written: the disk, or another program, changed it");
+}
+
 int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place, uint64_t words,
                           trip_list_buffer *to, trip_block *out)
 {
@@ -149,6 +155,8 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *plac
     const trip_file_run *r = &place->run;
     const bool normals = c->normals;
     const uint64_t *block;
+    if (!trip_block_words_fit(&l->form, r->records, r->words)) /* nor would the buffer do */
+        return fail_changed(l);
     int status = fetch_block(l, place, words, to, &block);
     if (status == TRIP_OK && normals)
         status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], place->at[TRIP_PLANE_NORMALS],
@@ -156,11 +164,7 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *plac
     if (status < 0)
         return status;
     *out = trip_block_make(&l->form, r->records, r->words, block, normals ? to->packed : NULL);
-    if (!trip_block_words_fit(&l->form, r->records, r->words) ||
-        trip_block_check(out, &place->brick))
-        return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,
-                         "is not what was written: the disk, or another program, changed it");
-    return TRIP_OK;
+    return trip_block_check(out, &place->brick) ? fail_changed(l) : TRIP_OK;
 }
 
 /* Goes on to the next run of the slab; true where *place is of one that is wanted. */
