@@ -10,6 +10,7 @@
 #include "measure.h"
 #include "report.h"
 #include "accuracy_report.h"
+#include "text.h"
 
 static int print_settings(void)
 {
@@ -39,7 +40,7 @@ static char *join(int argc, char **argv)
     fputs("triptych", f);
     for (int i = 0; i < argc; i++) {
         fputc(' ', f);
-        accuracy_write_word(f, argv[i]);
+        trip_text_write_word(f, argv[i]);
     }
     fclose(f);
     return text;

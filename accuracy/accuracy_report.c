@@ -100,23 +100,6 @@ int accuracy_report_write(const accuracy_report *r, const char *folder)
     return status;
 }
 
-void accuracy_write_word(FILE *f, const char *word)
-{
-    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-                                "_-+=.,/:@%";
-    if (*word && strspn(word, plain) == strlen(word)) {
-        fputs(word, f);
-        return;
-    }
-    fputc('\'', f);
-    for (; *word; word++)
-        if (*word == '\'')
-            fputs("'\\''", f);
-        else
-            fputc(*word, f);
-    fputc('\'', f);
-}
-
 static void write_point(FILE *f, const char *name, const double p[3])
 {
     fprintf(f, " --%s=%.17g,%.17g,%.17g", name, p[0], p[1], p[2]);

@@ -50,7 +50,5 @@ void accuracy_report_print(FILE *f, const accuracy_report *r);
 /* The options of `triptych render` for a view and for a row, as a shell takes them. */
 void accuracy_write_view(FILE *f, const accuracy_view *view);
 void accuracy_write_options(FILE *f, const accuracy_setting *s);
-/* A word of a command, quoted where a shell would take it apart. */
-void accuracy_write_word(FILE *f, const char *word);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "picture_data.h"
 #include "accuracy_report.h"
+#include "text.h"
 
 static const char style[] =
     "body{font:15px/1.45 system-ui,sans-serif;max-width:1180px;margin:24px auto;padding:0 16px;"
@@ -250,12 +251,12 @@ static void write_commands(FILE *f, const accuracy_report *r)
         if (row->state != ACCURACY_MEASURED || row->beside)
             continue;
         fputs("triptych render ", memory);
-        accuracy_write_word(memory, o->data[row->data]);
+        trip_text_write_word(memory, o->data[row->data]);
         fprintf(memory, " -o %s.exr $view1%s", row->setting.name,
                 o->shading ? "" : " --no-shading");
         if (o->tf) {
             fputs(" --tf ", memory);
-            accuracy_write_word(memory, o->tf);
+            trip_text_write_word(memory, o->tf);
         }
         fputc(' ', memory);
         accuracy_write_options(memory, &row->setting);

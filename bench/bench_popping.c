@@ -6,7 +6,6 @@
 #include "bench_view.h"
 #include "report.h"
 
-/* Draws all steps. */
 static int draw_steps(const session *s, const bench_scene *scene, const trip_settings *drawn,
                       bench_popping_changes *p)
 {

@@ -13,7 +13,7 @@ extern "C" {
 
 typedef struct trip_budget trip_budget;
 
-/* limit_bytes 0: trip_memory_available() / 4. */
+/* limit_bytes 0: trip_memory_available_bytes() / 4. */
 int trip_budget_create(trip_budget **out, uint64_t limit_bytes);
 void trip_budget_destroy(trip_budget *b);
 

@@ -36,9 +36,31 @@ static void keep_mode(const trip_new_file *f)
         (void)!fchmod(f->fd, old.st_mode & 0777);
 }
 
+/* Links of /proc, as /dev/stdout is one, stand for files that are open. */
+static bool leads_to_open_file(const char *path)
+{
+    static const char proc[] = "/proc/";
+    char target[sizeof proc];
+    const ssize_t length = readlink(path, target, sizeof target - 1);
+    return length == sizeof proc - 1 && memcmp(target, proc, sizeof proc - 1) == 0;
+}
+
+static int refuse_special(const char *what, const char *path)
+{
+    struct stat st;
+    if (leads_to_open_file(path) ||
+        (stat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode)))
+        return trip_fail(TRIP_ERROR, what, path,
+                         "is a device, a pipe or a socket, which a file cannot take the place of");
+    return 0;
+}
+
 int trip_new_file_begin(trip_new_file *f, const char *what, const char *path)
 {
     *f = (trip_new_file){ .what = what, .path = path, .fd = -1 };
+    int status = refuse_special(what, path);
+    if (status)
+        return status;
     errno = EEXIST;
     for (int i = 0; i < TRIES && f->fd < 0 && errno == EEXIST; i++) {
         if (!choose_name(f))
@@ -64,7 +86,7 @@ int trip_new_file_check(const char *what, const char *path)
         return trip_fail_errno(what, path, "cannot create a file in its folder");
     if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
         return trip_fail(TRIP_ERROR, what, path, "is a folder");
-    return 0;
+    return refuse_special(what, path);
 }
 
 int trip_new_file_finish(trip_new_file *f)

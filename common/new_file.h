@@ -1,7 +1,7 @@
 /* A file that gets its name only when it is complete; before, it has a random name in the same
  * folder. So a failure leaves an existing file as it was, and what a killed process leaves does not
  * disturb later runs. A file that is replaced passes on its mode; a symbolic link is replaced, not
- * followed. One thread. */
+ * followed; devices, pipes and sockets are not replaced. One thread. */
 #ifndef TRIP_NEW_FILE_H
 #define TRIP_NEW_FILE_H
 
@@ -17,7 +17,8 @@ typedef struct trip_new_file {
  * After a reported failure there is nothing to finish or to abandon. */
 int trip_new_file_begin(trip_new_file *f, const char *what, const char *path);
 /* Checks before long work that a file can be made there: reports a failure if the folder is missing
- * or not writable, or if the path is a folder's. Creates nothing. */
+ * or not writable, or if the path is that of a folder, a device, a pipe or a socket. Creates
+ * nothing. */
 int trip_new_file_check(const char *what, const char *path);
 /* Gives the file its name; a reported failure leaves nothing. */
 int trip_new_file_finish(trip_new_file *f);

@@ -37,6 +37,9 @@ unsigned trip_text_show(const char *text, trip_text_character c, char *shown);
 /* Writes a whole text in that form. */
 void trip_text_write(FILE *f, const char *text);
 
+/* As one word of a shell: in single quotes where it would be read as something else. */
+void trip_text_write_word(FILE *f, const char *word);
+
 /* The Levenshtein distance of two texts, in bytes; SIZE_MAX for texts of more than 63. */
 size_t trip_text_distance(const char *a, const char *b);
 

@@ -62,7 +62,8 @@ int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *h)
     int occurring = 0;
     for (int i = 0; i < BINS; i++)
         occurring += h->counts[i] > 0;
-    if (occurring <= 2 || !(range >= 1 && range < 16384)) /* a solid, or no labels */
+    const bool counts = fmax(fabs(h->value_min), fabs(h->value_max)) < 0x1p52; /* by ones */
+    if (occurring <= 2 || !(range >= 1 && range < 16384) || !counts) /* a solid, or no labels */
         return trip_tf_from_histogram(out, h);
     trip_tf_point *points = calloc(2 * (size_t)range + 4, sizeof *points);
     if (!points)

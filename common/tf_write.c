@@ -302,9 +302,11 @@ int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, ch
 {
     writer w = { 0 };
     size_t bytes = 0;
-    *text = format == TRIP_TF_TEXT ? trip_tf_to_text(tf) : NULL;
-    if (*text)
-        return TRIP_OK;
+    *text = NULL;
+    if (format == TRIP_TF_TEXT) {
+        *text = trip_tf_to_text(tf);
+        return *text ? TRIP_OK : trip_fail(TRIP_ERROR, TRIP_TF_STAGE, name, "out of memory");
+    }
     if (tf->normalised && format != TRIP_TF_PARAVIEW)
         return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, name,
                          "runs over the data's range, which this form cannot say; give the range "

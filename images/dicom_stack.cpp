@@ -478,7 +478,7 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool 
     slope = rescaled_alike ? h.slope : 1;
     inter = rescaled_alike ? h.inter : 0;
     frame_bytes_ = (uint64_t)h.width * (uint64_t)h.height * (h.allocated / 8);
-    frame_.take(budget, h.file, frame_bytes_ + 1); /* the decoder wants an even number */
+    frame_.take(budget, h.file, frame_bytes_ + 1); /* the decoder needs an even number */
 }
 
 void DicomStack::load(const std::string &file)

@@ -117,8 +117,8 @@ int trip_image_helper_start_netcdf(trip_image_helper **out, const char *what);
 void trip_image_helper_stop(trip_image_helper *h);
 
 /* The functions below return 0 or a reported failure. After one that is not an answer of the helper
- * itself (it is lost, silent or lies, or the user wants to stop), the helper is gone, and every
- * further request fails. */
+ * itself (it is lost, silent or sends what cannot be, or the work was interrupted), the helper is
+ * gone, and every further request fails. */
 
 /* `fd` goes along with the request unless it is -1, and stays the caller's. */
 int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, const char *path,

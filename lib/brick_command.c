@@ -7,20 +7,10 @@
 
 #include "text.h"
 
-/* A blank before it; in single quotes where a shell would read it as more than one word. */
 static void write_word(FILE *f, const char *word)
 {
-    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-                                "_-+=./,:@%";
     fputc(' ', f);
-    if (*word && strspn(word, plain) == strlen(word)) {
-        fputs(word, f);
-        return;
-    }
-    fputc('\'', f);
-    for (const char *c = word; *c; c++)
-        fputs(*c == '\'' ? "'\\''" : (char[]){ *c, 0 }, f);
-    fputc('\'', f);
+    trip_text_write_word(f, word);
 }
 
 /* The source beside the data set, where it is there; else the name alone. */

@@ -186,7 +186,7 @@ static void explain_heat(const triptych *t, FILE *out)
 void trip_context_explain_effects(const triptych *t, FILE *out)
 {
     const trip_effects *e = &t->drawn_settings.effects;
-    explain(t, "shadowing", TRIPTYCH_SHADOWS, e->shadows, out);
+    explain(t, "shadows", TRIPTYCH_SHADOWS, e->shadows, out);
     explain(t, "occlusion", TRIPTYCH_OCCLUSION, e->occlusion, out);
     explain(t, "emission", TRIPTYCH_EMISSION, e->emission, out);
     explain(t, "cueing", TRIPTYCH_CUEING, e->cueing > 0, out);

@@ -215,8 +215,8 @@ static void *const *take_slots(const session *s, const session_reader *wanted, u
 
 enum { SLOTS = 8, MOST_SLOTS = 16, MAX_SLOT_BYTES = 512 << 10 };
 
-/* Slots are handed out in order, so that one late read holds up the others: the more are on their
- * way, the less. But what is read ahead is read before it is known to be occluded. */
+/* Slots are handed out in order, so that one late read delays those behind it, and the less so the
+ * more reads are under way. But what is read ahead may turn out to be occluded. */
 static unsigned choose_slots(const session_reader *wanted, uint64_t ring_bytes, size_t plane_count)
 {
     bool fit = ring_bytes / MOST_SLOTS / plane_count >= MAX_SLOT_BYTES;

@@ -13,7 +13,7 @@
 typedef struct session {
     const char *input; /* the first data set, for messages */
     trip_budget *budget;
-    trip_dataset **parts; /* data sets that were opened, in this order */
+    trip_dataset **parts; /* the data sets that were opened, in this order */
     unsigned part_count;
     trip_dataset *joined;            /* all of them as one; NULL where there is one */
     trip_dataset *data;              /* that is drawn: that, or the one there is */

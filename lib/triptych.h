@@ -10,8 +10,9 @@
  *
  * One thread at a time uses a context, but for triptych_cancel(); any number of contexts may be
  * used by as many threads, and share nothing. Functions return 0 or a negative triptych_status, and
- * triptych_error() then says why. Parameters are plain structs in which zero means the default;
- * what they point to is needed during the call only.
+ * triptych_error() then says why. Parameters are plain structs in which zero means the default,
+ * but for triptych_settings, which begins as triptych_default_settings() has it; what they point to
+ * is needed during the call only.
  *
  * World space is the data's own (millimetres, metres, ...), as the volume's file says. Pictures are
  * floats: height rows of width pixels, row 0 at the top, each red, green, blue, alpha, multiplied
@@ -283,7 +284,8 @@ typedef enum triptych_show {
     TRIPTYCH_SHOW_PICTURE, /* the function */
     TRIPTYCH_SHOW_LISTS,   /* which list: x red, y green, z blue */
     TRIPTYCH_SHOW_MERGE,   /* the weights of the lists at each pixel, alike; nothing is read */
-    TRIPTYCH_SHOW_LEVELS, /* which level: white the finest, then blue, green, yellow, orange, red */
+    TRIPTYCH_SHOW_LEVELS,  /* which level: white the finest, then blue, green, yellow, orange, red
+                              and, of all beyond, violet */
 } triptych_show;
 
 /* Effects besides shading. What is not among them costs nothing. */
@@ -356,7 +358,7 @@ typedef struct triptych_settings {
                         the longest side, 8 to 1024, at least a voxel each */
 } triptych_settings;
 
-/* Classified by itself, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
+/* Classification auto, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
  * outward, rgba32f, h and saturation by the classification, kernel radius 2, shading by headlight,
  * black; values, linear, 1e-4, one ray a pixel; no effects, and where they are set scattering
  * alike, cueing 0.6, up to 2500 K, 128 cells. */
@@ -433,7 +435,7 @@ typedef struct triptych_hit {
 
 /* Of the view, function and data set, whatever was drawn; x and y in pixels from the picture's top
  * left corner, pixel centres at + 0.5, also beyond its edges. Reads the bricks along the ray. Not
- * while a frame is begun. */
+ * while a frame is begun, and not of grids with uneven spacing. */
 TRIPTYCH_API int triptych_probe(triptych *t, double x, double y, triptych_hit *out);
 
 /* ---- frames ---- */

@@ -14,7 +14,8 @@ extern "C" {
 
 typedef enum triptych_level_set {
     TRIPTYCH_LEVEL_SET_DEFAULT, /* filled */
-    TRIPTYCH_LEVEL_SET_FILLED,  /* dense inside, with a ramp one voxel wide */
+    TRIPTYCH_LEVEL_SET_FILLED,  /* dense inside; a ramp of 4 voxels, or of the stored band
+                                   where that is narrower */
     TRIPTYCH_LEVEL_SET_BAND,    /* densest at the surface */
 } triptych_level_set;
 
@@ -127,8 +128,9 @@ typedef struct triptych_brick_summary {
     uint64_t memory_bytes, peak_memory_bytes; /* that could be taken, and were */
 } triptych_brick_summary;
 
-/* Makes a data set of a volume: .nhdr, .nrrd, .nii, .vdb, .vol, raw data, DICOM, or slices by their
- * folder or a pattern of names. `options` and `summary` may be NULL. */
+/* Makes a data set of a volume: .nrrd, .nhdr, .nii (.gz, or .hdr with .img), .nc, .vdb, .vol, raw
+ * data, DICOM, or slices by their folder or a pattern of names. `options` and `summary` may be
+ * NULL. */
 TRIPTYCH_API int triptych_brick(triptych *t, const char *volume, const char *data_set,
                                 const triptych_brick_options *options,
                                 triptych_brick_summary *summary);

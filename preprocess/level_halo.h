@@ -1,9 +1,8 @@
-/* The halo of a coarse level's values. Where a coarse voxel covers voxels that were kept, cells all
- * about it may show, so that what is interpolated needs all 26 beside it; but the halo of level 0
- * reaches no farther than a voxel of level 0, and some of them cover none of it. These are added,
- * with a value that does not show: the least of `around` (coarse.h) in the voxels beside them that
- * cover kept ones. They are no part of the next level, in which they would count for something that
- * is not known. */
+/* The halo of a coarse level's values. Interpolation about a coarse voxel that covers kept voxels
+ * needs all 26 beside it. But the halo of level 0 reaches no farther than a voxel of level 0, and
+ * some of the 26 cover none of it. These are added, with a value that does not show: the least of
+ * `around` (coarse.h) in the voxels beside them that cover kept ones. They are no part of the next
+ * level, in which they would count for something that is not known. */
 #ifndef TRIP_LEVEL_HALO_H
 #define TRIP_LEVEL_HALO_H
 

@@ -1,6 +1,6 @@
-/* Makes the squares of a coarse level: adds up the voxels of the level below, and makes pieces of
- * what comes of that for the list builder. Each thread has a lane of its own; what lanes share does
- * not change while they work. */
+/* Makes the squares of a coarse level, here of 2^edge_log2 voxels along each side: adds up the
+ * voxels of the level below, and makes pieces of what comes of that for the list builder. Each
+ * thread has a lane of its own; what lanes share does not change while they work. */
 #ifndef TRIP_LEVEL_LANE_H
 #define TRIP_LEVEL_LANE_H
 

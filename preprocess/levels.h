@@ -2,8 +2,8 @@
  * lists along Z or, above the first, from a file of its voxels, which is in memory where there is
  * enough. Two sheets are read at a time, square by square, so that no more memory is needed where
  * the volume is larger. The pieces go to a list builder, which sorts them as those of level 0.
- * Normals and how much of a voxel was kept, which means alone call for, are read and added up only
- * where there are lists of these. */
+ * Normals and how much of a voxel was kept, which only lists of means need, are read and added up
+ * only where there are lists of these. */
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 
@@ -32,7 +32,7 @@ typedef struct trip_levels_params {
     bool hidden_above;           /* what is not kept lies mostly above what is, not below */
     const char *folder;          /* for temporary files */
     trip_writer *writer;         /* with the lists of trip_levels_lists() */
-    trip_spill *spill;           /* whose segments are not needed any more */
+    trip_spill *spill;           /* whose sequences are not needed any more */
     trip_workers *workers;
     /* Called now and then with how much of the work is done. */
     void (*progress)(void *user, uint64_t done, uint64_t total);

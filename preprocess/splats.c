@@ -11,7 +11,7 @@
 #include "splat_box.h"
 
 /* One thread's memory. The window is the box with one voxel around it where gradients or a halo are
- * wanted; its arrays are dense, x fastest. */
+ * made; its arrays are dense, x fastest. */
 typedef struct workspace {
     float *decoded;   /* of the window, as are the next four */
     uint8_t *active;  /* which voxels exist, in sparse volumes */

@@ -57,7 +57,7 @@ int trip_volume_check_dims(const char *path, const trip_volume_info *info);
 void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
                         size_t count, float *values);
 
-extern const trip_volume_reader trip_read_vdb;     /* read_vdb.c, vdb/ */
+extern const trip_volume_reader trip_read_vdb;     /* read_vdb.c, which loads vdb/ */
 extern const trip_volume_reader trip_read_nrrd;    /* read_nrrd.c */
 extern const trip_volume_reader trip_read_nifti;   /* read_nifti.c */
 extern const trip_volume_reader trip_read_netcdf;  /* read_netcdf.c */

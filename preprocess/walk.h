@@ -17,17 +17,17 @@ typedef struct trip_box {
 
 typedef struct trip_walk_params {
     int64_t slices;  /* of a portion of a dense volume */
-    bool read_ahead; /* read the next batch while the boxes of one are processed */
+    bool read_ahead; /* read the next portions while the boxes of some are processed */
     int64_t edge;    /* of a box along i and j: a power of two, at least that of a tile */
     int64_t height;  /* of a box along k: a power of two, at most `edge` */
     uint64_t skip;   /* how much of the volume is skipped at its start, counted as `done` below */
     uint64_t stride; /* after that, of `stride` batches the first is processed; 0: each is */
     /* Processes a box, on any of the workers' threads. Negative ends the walk with that status. */
     int (*box)(void *user, unsigned thread, const trip_box *box);
-    /* A batch of portions is finished: called on the calling thread while no box is processed.
-     * `done` counts slices of dense volumes and batches of sparse ones, `voxels` their voxels, both
-     * from the start of the volume with what was skipped. `done` does not depend on the memory or
-     * the threads. */
+    /* A batch, the portions that are in memory together, is finished: called on the calling thread
+     * while no box is processed. `done` counts slices of dense volumes and batches of sparse ones,
+     * `voxels` their voxels, both from the start of the volume with what was skipped. `done` does
+     * not depend on the memory or the threads. */
     int (*batch)(void *user, uint64_t done, uint64_t voxels);
     void *user;
     double *skip_seconds; /* grows by the time that the stride's skipping took; or NULL */

@@ -46,7 +46,7 @@ int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
 void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns);
 bool trip_light_map_is_complete(const trip_light_map *m);
 /* When its numbers came to be, once it is complete: no two lattices of a process that differ have
- * the same, so that who keeps a copy knows whether it is of this one. */
+ * the same, so that it says of a copy whether it is of this one. */
 uint64_t trip_light_map_made_ns(const trip_light_map *m);
 
 /* The means of extinction, once those are gathered. */

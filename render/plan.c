@@ -32,14 +32,20 @@ typedef struct planning {
 /* The sheets on one side of the eye, or all. */
 typedef enum sides { ALL, BEYOND, BELOW } sides;
 
+/* Whether the classification draws records of the list's kind. */
+static bool is_of(const trip_settings *s, const trip_list *list)
+{
+    const trip_kind_info *kind = trip_kind_of(list->kind);
+    return s->classify == TRIP_CLASSIFY_POST ? kind->lattice : kind->splatted;
+}
+
 static bool is_in_layer(const planning *p, const trip_list *list, int axis)
 {
-    if (list->axis != axis)
+    if (list->axis != axis || !is_of(p->settings, list))
         return false;
     if (p->settings->classify == TRIP_CLASSIFY_POST)
-        return list->level == 0 && trip_kind_of(list->kind)->lattice;
-    return trip_kind_of(list->kind)->splatted &&
-           (!trip_kind_of(list->kind)->coarse || trip_lod_concerns(&p->plan->lod, list));
+        return list->level == 0;
+    return !trip_kind_of(list->kind)->coarse || trip_lod_concerns(&p->plan->lod, list);
 }
 
 /* First sheet that is not below the eye, cut to [0, sheets]. */
@@ -680,14 +686,15 @@ static bool is_read(const trip_plan *plan, const trip_list *list)
     return false;
 }
 
-static const char *why_not_drawn(const trip_plan *plan, const trip_list *list)
+static const char *why_not_drawn(const trip_plan *plan, const trip_settings *s,
+                                 const trip_list *list)
 {
     if (plan->gathers)
         return "";
     if (trip_kind_of(list->kind)->coarse && !(plan->lod.level && list->level <= plan->lod.levels))
         return ": the finest level alone is drawn";
-    return trip_kind_of(list->kind)->splatted ? ": no ray of the view has weight in it"
-                                              : ": its records are not splatted";
+    return is_of(s, list) ? ": no ray of the view has weight in it"
+                          : ": its records are not splatted";
 }
 
 /* Reasons that not every frame has. */
@@ -704,13 +711,14 @@ static const char *rarer_reasons(const trip_plan_list *planned, char text[96])
     return text;
 }
 
-static void explain_list(const trip_plan *plan, const trip_list *list, FILE *out)
+static void explain_list(const trip_plan *plan, const trip_settings *s, const trip_list *list,
+                         FILE *out)
 {
     const trip_plan_list *planned = &plan->lists[list->index];
     char name[24], bytes[32], others[96];
     fprintf(out, "list %-6s ", trip_plan_list_name(list, name));
     if (!planned->drawn) {
-        fprintf(out, "not read%s\n", why_not_drawn(plan, list));
+        fprintf(out, "not read%s\n", why_not_drawn(plan, s, list));
         return;
     }
     uint64_t bytes_read = 0;
@@ -816,7 +824,7 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
         const trip_list *list = &data->lists[i];
         if (trip_dataset_parts(data) > 1 && (i == 0 || list[-1].part != list->part))
             fprintf(out, "data set    %s\n", list->path);
-        explain_list(plan, list, out);
+        explain_list(plan, settings, list, out);
     }
     for (int axis = 0; axis < 3; axis++)
         used += plan->layers[axis].pass_count > 0;

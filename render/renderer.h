@@ -114,9 +114,9 @@ typedef struct trip_renderer_ops {
      * layer.h has them, otherwise `depth` is NULL. The frame goes on as if it had not been called;
      * after its last batch it gives the picture. */
     int (*picture)(trip_renderer *r, float *rgba, float *depth);
-    /* The frame is over or given up, and waited for is no more than takes a moment: when it
-     * returns, nothing that the frame is drawn from is in use but the renderer's own memory, which
-     * load() sees to. NULL: nothing is between the other calls. */
+    /* The frame is over or given up. Waits a moment at most. When it returns, of what the frame is
+     * drawn from only the renderer's own memory may still be in use, for which load() waits. NULL:
+     * nothing is in use between the other calls. */
     void (*end_frame)(trip_renderer *r);
     /* trip_task_runner.run, of which `user` is the renderer: on its threads, between other calls.
      * NULL: it has none. */

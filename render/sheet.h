@@ -36,8 +36,7 @@
  *
  * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
  * below trip_settings_saturation() takes no more: its colour is divided by its opacity, which
- * becomes
- * 1. So no component is off by more than that, of colours from 0 to 1. */
+ * is then 1, so that no component is off by more than that, of colours from 0 to 1. */
 #ifndef TRIP_SHEET_H
 #define TRIP_SHEET_H
 

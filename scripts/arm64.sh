@@ -1,7 +1,7 @@
 #!/bin/sh
 # Builds for 64-bit ARM on another machine and passes the CPU renderer's tests in qemu, NEON's
 # kernels among them: minutes. Options go to ctest in place of the choice of those tests; where a
-# test starts a program, the kernel has to know qemu (binfmt_misc) and QEMU_LD_PREFIX name the
+# test starts a program, the kernel has to start qemu for it (binfmt_misc) and QEMU_LD_PREFIX name the
 # unpacked packages, build/arm64-sysroot.
 set -eu
 cd "$(dirname "$0")/.."

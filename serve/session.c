@@ -460,7 +460,7 @@ char *trip_session_status(trip_session *s)
     cJSON *root = cJSON_CreateObject();
     pthread_mutex_lock(&s->lock);
     trip_frames_status status = trip_frames_get_status(s->frames);
-    char *camera = trip_viewer_camera_options(&s->viewer);
+    char *camera = trip_viewer_options(&s->viewer);
     const trip_document *d = trip_viewer_document(&s->viewer);
     const triptych_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
     char effects[256];

@@ -413,7 +413,7 @@ TRIP_ALSO_V3 void trip_square_codes(const trip_square *s, uint16_t codes[64])
 {
     const uint32_t least = s->least, step = s->step;
     if (s->width == 8) {
-        unsigned char bytes[64]; /* a copy, which compilers then know to be apart */
+        unsigned char bytes[64]; /* a copy cannot overlap the output */
         memcpy(bytes, s->codes, s->count);
         for (uint32_t i = 0; i < s->count; i++)
             codes[i] = (uint16_t)((bytes[i] + least) * step);
@@ -567,6 +567,19 @@ TRIP_ALSO_V3 const char *trip_block_check(const trip_block *b, const trip_file_b
     return b->code_bytes == 1 ? check_bytes(b, brick) : check_packed(b, brick);
 }
 
+/* Whether the bits behind the last code of each square, in its last byte, are zero. */
+static bool are_squares_padded(const trip_block *b)
+{
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(b, squares);
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t bits = squares[i].count * squares[i].width;
+        if (bits % 8 && squares[i].codes[bits / 8] >> bits % 8)
+            return false;
+    }
+    return true;
+}
+
 bool trip_block_is_padded(const trip_block *b)
 {
     const unsigned char *end = (const unsigned char *)(b->present + b->words);
@@ -576,7 +589,7 @@ bool trip_block_is_padded(const trip_block *b)
     for (const unsigned char *at = trip_block_codes(b) + bytes; at < end; at++)
         if (*at)
             return false;
-    return !packed || groups % 2 == 0 || forms[groups] == 0;
+    return !packed || ((groups % 2 == 0 || forms[groups] == 0) && are_squares_padded(b));
 }
 
 /* ---- decoding ---- */

@@ -8,7 +8,7 @@
  *
  * - forms, with code_bytes 2: how the codes of a group of squares are packed. A group is as many
  *   squares, in order, as it takes to hold TRIP_GROUP_RECORDS records, or those that are left. A
- *   form has 32 bits: bits 0-15 the group's least code, bits 16-20 the width, an even number of
+ *   form has 32 bits: bits 0-15 the group's least code, bits 16-31 the width, an even number of
  *   bits from 0 to 16; padded to a multiple of 8 bytes;
  *
  * - codes, in the order of the bits: with code_bytes 1 a byte each; with 2 what each is above its
@@ -36,7 +36,8 @@ enum {
                            TRIP_BLOCK_SQUARES_MAX / 2 + TRIP_RUN_RECORDS_MAX / 4,
 };
 
-/* What the header says of all blocks, and a list's kind of its own. */
+/* What all blocks of a list have in common, by the header and the list's kind; not the forms of
+ * groups. */
 typedef struct trip_block_form {
     unsigned tile_log2, code_bytes, normal_bytes;
     bool steps; /* of 2 bytes: codes are whole steps, and these are what is packed */
@@ -106,7 +107,7 @@ trip_block trip_block_make(const trip_block_form *f, uint32_t records, uint32_t 
 
 /* Packs `count` voxels, at least 1, in Morton order of (u, v), all within the tile; there is room
  * for the tile's largest block. Returns the words; 0 when voxels are out of order or out of the
- * tile, or a code is none of those that the form has. */
+ * tile, or a code is none that such a block can hold. */
 uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *voxels, uint32_t count,
                          uint64_t *block);
 /* Packs normals from 32 bits each. */

@@ -21,7 +21,6 @@ const char *trip_plane_file_name(int axis, unsigned level, trip_kind kind, int p
 bool trip_plane_file_is_named(const char *name)
 {
     char own[32], *end;
-    errno = 0;
     unsigned long level = strtoul(name + (*name != 0), &end, 10);
     if (level > UINT32_MAX)
         return false;

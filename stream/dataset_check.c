@@ -14,7 +14,7 @@
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are read as they lie in memory");
 
-enum { TEXT_BYTES_MAX = 1 << 24, TABLES_PER_LIST = 3 + TRIP_FILE_PLANES };
+enum { TABLES_PER_LIST = 3 + TRIP_FILE_PLANES };
 
 static int fail_at(const char *where, uint64_t at, const char *why)
 {
@@ -54,8 +54,12 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
     if (h->index_bytes != file_bytes)
         return trip_fail(TRIP_ERROR, "open", where, "%llu bytes instead of the %llu in its header",
                          (unsigned long long)file_bytes, (unsigned long long)h->index_bytes);
-    if (h->reserved0 || !all_zero(h->reserved, sizeof h->reserved))
+    if (h->reserved0)
         return FAIL_FIELD(reserved0, "reserved bytes are not zero");
+    if (h->reserved1)
+        return FAIL_FIELD(reserved1, "reserved bytes are not zero");
+    if (!all_zero(h->reserved, sizeof h->reserved))
+        return FAIL_FIELD(reserved, "reserved bytes are not zero");
     return TRIP_OK;
 }
 
@@ -121,7 +125,7 @@ static int check_layout(const trip_file_header *h, const char *where)
         h->index_bytes - h->checksums_offset !=
             8 * page_count(h->checksums_offset - TRIP_HEADER_BYTES, h->page_log2))
         return FAIL_FIELD(checksums_offset, "the checksums are not where they must be");
-    if (h->text_bytes > TEXT_BYTES_MAX)
+    if (h->text_bytes > TRIP_TEXT_BYTES_MAX)
         return FAIL_FIELD(text_bytes, "the text is too long");
     return TRIP_OK;
 }

@@ -1,6 +1,7 @@
 #include "folder.h"
 
 #include "dataset.h"
+#include "errno_text.h"
 #include "remove_files.h"
 #include "report.h"
 
@@ -85,11 +86,16 @@ static bool exists(const char *path)
     return lstat(path, &st) == 0;
 }
 
-/* A replacement that was cut off between its two renames is undone. */
+/* A replacement that was cut off between its two renames is undone; one cut off after them is
+ * completed, since the old data set would be in the way of the next. With the lock. */
 static void restore_aside(const trip_folder *f)
 {
-    if (!exists(f->path) && is_dataset(f->aside))
+    if (!is_dataset(f->aside))
+        return;
+    if (!exists(f->path))
         rename(f->aside, f->path);
+    else if (is_dataset(f->path))
+        remove_dataset(f->aside);
 }
 
 static int check_target(const trip_folder *f)
@@ -268,14 +274,16 @@ int trip_folder_begin(trip_folder *f, const char *path, bool replace)
 {
     *f = (trip_folder){ .fd = -1, .replace = replace };
     int status = set_paths(f, path);
+    if (status == TRIP_OK)
+        status = check_target(f);
+    if (status == TRIP_OK)
+        status = open_partial(f);
     if (status == TRIP_OK) {
         restore_aside(f);
         status = check_target(f);
     }
-    if (status == TRIP_OK)
-        status = open_partial(f);
     if (status < 0)
-        free_folder(f);
+        trip_folder_close(f);
     return status;
 }
 
@@ -295,8 +303,10 @@ static int sync_parent(const trip_folder *f)
 
 static void remove_old(const trip_folder *f, const char *path)
 {
-    if (remove_dataset(path) < 0)
-        trip_warn(path, "the replaced %s could not be removed: %s", f->path, strerror(errno));
+    char reason[256];
+    if (remove_dataset(path) < 0 && errno != ENOENT)
+        trip_warn(path, "the replaced %s could not be removed: %s", f->path,
+                  trip_errno_text(errno, reason, sizeof reason));
 }
 
 static int replace_old(const trip_folder *f)
@@ -308,7 +318,7 @@ static int replace_old(const trip_folder *f)
     if (errno != EINVAL && errno != ENOSYS)
         return trip_fail_errno("write", f->path, "cannot replace");
     if (rename(f->path, f->aside) < 0)
-        return trip_fail_errno("write", f->path, "cannot rename");
+        return trip_fail_errno("write", f->aside, "cannot put the old data set there");
     if (rename(f->partial, f->path) < 0) {
         trip_fail_errno("write", f->path, "cannot replace");
         restore_aside(f);
@@ -318,7 +328,7 @@ static int replace_old(const trip_folder *f)
     return TRIP_OK;
 }
 
-/* The lock keeps other writers of this name out, so what exists() says holds. */
+/* The lock keeps other writers of this name out, so that what exists() says holds. */
 int trip_folder_commit(trip_folder *f)
 {
     if (fsync(f->fd) < 0 && errno != EINVAL)

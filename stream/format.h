@@ -28,6 +28,7 @@
 #define TRIP_FORMAT_VERSION 5
 #define TRIP_HEADER_BYTES 1024
 #define TRIP_LISTS_MAX 4096
+#define TRIP_TEXT_BYTES_MAX (UINT64_C(1) << 24)
 #define TRIP_RECORD_BYTES 4 /* of a voxel, and of a normal, in memory */
 #define TRIP_FILE_PLANES 4  /* places for planes in a list descriptor */
 

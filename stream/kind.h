@@ -1,5 +1,5 @@
 /* What kinds of records a list can hold. A kind is a row of a table of constants, which
- * says all that the code needs of a list's records: it does not branch on the kind itself. */
+ * says what decoding, culling and drawing need of a list's records. */
 #ifndef TRIP_KIND_H
 #define TRIP_KIND_H
 

@@ -6,7 +6,8 @@
  *              value to its largest
  *   bits 3-5   d, the mean depth: of the columns along the list's axis that hold kept voxels, what
  *              part is kept, (d + 1) / 8
- *   bits 0-2   c, the cover: which part of the columns that is, one of trip_mean_covers
+ *   bits 0-2   c, the cover: which part of the columns that is, 1/64, 1/32, 1/16, 1/8, 1/4,
+ *              1/2, 3/4 or 1
  *
  * so that with the extinction k of the mean and the length L of the cube along the axis the opacity
  * is

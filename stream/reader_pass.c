@@ -1,6 +1,7 @@
 /* Passes: extents are planned and requested as slots become free, and handed out in draw order. */
 #include "reader.h"
 
+#include "errno_text.h"
 #include "reader_state.h"
 #include "report.h"
 
@@ -337,8 +338,9 @@ static int report_fault(const trip_request *q)
                          at);
     if (q->fault == TRIP_REQUEST_SHORT)
         return trip_fail(TRIP_ERROR, "read", where, "byte %llu: the file ends early", at);
+    char reason[256];
     return trip_fail(TRIP_ERROR, "read", where, "byte %llu: cannot read: %s", at,
-                     strerrordesc_np(q->fault_errno));
+                     trip_errno_text(q->fault_errno, reason, sizeof reason));
 }
 
 static int check_slot(const trip_slot *s)

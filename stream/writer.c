@@ -456,6 +456,17 @@ static int check_records(const trip_writer *w)
     return TRIP_OK;
 }
 
+static int check_text(const trip_writer *w, const char *text)
+{
+    const uint64_t bytes = strlen(text);
+    if (bytes > TRIP_TEXT_BYTES_MAX)
+        return trip_fail(TRIP_ERROR, "write", w->folder.path,
+                         "the text about the volume has %llu bytes, of %llu at most: give fewer or "
+                         "simpler transfer functions",
+                         (unsigned long long)bytes, (unsigned long long)TRIP_TEXT_BYTES_MAX);
+    return TRIP_OK;
+}
+
 static int check_summary(const trip_writer *w, const trip_writer_summary *s)
 {
     uint64_t kept = records_of(w, 0, TRIP_KIND_VOXELS);
@@ -649,7 +660,10 @@ static int write_index(trip_writer *w, const char *text)
 
 int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary)
 {
+    const char *text = summary->text ? summary->text : "{}";
     int status = check_summary(w, summary);
+    if (status == TRIP_OK)
+        status = check_text(w, text);
     w->header.value_min = summary->value_min;
     w->header.value_max = summary->value_max;
     w->header.voxels = summary->voxels;
@@ -658,7 +672,7 @@ int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary)
     if (status == TRIP_OK)
         status = sync_planes(w);
     if (status == TRIP_OK)
-        status = write_index(w, summary->text ? summary->text : "{}");
+        status = write_index(w, text);
     if (status == TRIP_OK)
         status = trip_folder_commit(&w->folder);
     if (status == TRIP_OK)

@@ -1,9 +1,10 @@
 /* The thread that draws. It alone uses the library's context, of the one data set that is shown;
- * the window's thread says what it wants to see and takes what there is, and waits for neither.
- * What is wanted last counts: a frame under way is finished only where it is quick, so that motion
- * is seen, and given up otherwise. A frame of a view that just came is as small and coarse as it
- * has to be for its time; then the whole picture follows, which is that of `triptych render`, bit
- * for bit. Functions are for one thread, the window's, but for those of trip_frames_params. */
+ * the window's thread leaves the view to draw, takes the picture that is there, and waits for
+ * neither. What is wanted last counts: a frame under way is finished only where it is quick, so
+ * that motion is seen, and given up otherwise. A frame of a view that just came is as small and
+ * coarse as it has to be for its time; then the whole picture follows, which is that of `triptych
+ * render`, bit for bit. Functions are for one thread, the window's, but for those of
+ * trip_frames_params. */
 #ifndef TRIP_VIEW_FRAMES_H
 #define TRIP_VIEW_FRAMES_H
 

@@ -60,7 +60,7 @@ static void add_status(cJSON *root, const trip_frames_status *s)
 static void add_document(cJSON *root, trip_viewer *v)
 {
     const trip_document *d = trip_viewer_document(v);
-    char *camera = trip_viewer_camera_options(v);
+    char *camera = trip_viewer_options(v);
     cJSON_AddNumberToObject(root, "documents", v->count);
     if (d)
         cJSON_AddStringToObject(root, "input", d->input);

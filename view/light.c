@@ -135,15 +135,6 @@ static bool may_glow(const triptych_settings *s, const char *heat)
     return heat && s->effects & (TRIPTYCH_EMISSION | TRIPTYCH_EFFECTS_AUTO);
 }
 
-/* As one word of a shell. */
-static void put_word(FILE *out, const char *word)
-{
-    fputc('\'', out);
-    for (; *word; word++)
-        fputs(*word == '\'' ? "'\\''" : (char[2]){ *word }, out);
-    fputc('\'', out);
-}
-
 /* Where it is not the usual one, and some of the effects that it is of may run. */
 static void put_number(FILE *out, const char *option, double number, double usual, int some)
 {
@@ -169,7 +160,7 @@ static void put_effects(FILE *out, const triptych_settings *s, const char *heat)
         return;
     char lo[32], hi[32];
     fputs(" --emission ", out);
-    put_word(out, heat);
+    trip_text_write_word(out, heat);
     fprintf(out, " --temperature %s:%s", trip_text_from_double(s->kelvin[0], lo),
             trip_text_from_double(s->kelvin[1], hi));
 }

@@ -915,8 +915,8 @@ void draw_panel(trip_panel *p, trip_viewer *v)
     if (button(p, "Write picture"))
         trip_viewer_take_picture(v);
     ImGui::SameLine();
-    if (button(p, "Copy camera"))
-        trip_viewer_copy_camera(v);
+    if (button(p, "Copy options"))
+        trip_viewer_copy_options(v);
     ImGui::SameLine();
     if (button(p, "Keys"))
         v->keys = !v->keys;

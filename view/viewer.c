@@ -9,6 +9,7 @@
 #include "camera_text.h"
 #include "clipping.h"
 #include "light.h"
+#include "look_text.h"
 #include "state_file.h"
 
 enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
@@ -542,7 +543,7 @@ static void take_made(trip_viewer *v)
     v->changed |= d == trip_viewer_document(v);
 }
 
-char *trip_viewer_camera_options(trip_viewer *v)
+char *trip_viewer_options(trip_viewer *v)
 {
     const trip_document *d = navigable(v);
     if (!d)
@@ -551,9 +552,11 @@ char *trip_viewer_camera_options(trip_viewer *v)
     char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
     char *clip = trip_clipping_text(&s.clip), *light = trip_light_text(&s);
     char *effects = trip_effects_text(&s, trip_viewer_heat(d));
-    if (camera && clip && light && effects &&
-        asprintf(&text, "%s%s%s%s", camera, clip, light, effects) < 0)
+    char *look = trip_look_text(&s, d->edited ? NULL : d->function, d->opacity_scale);
+    if (camera && clip && light && effects && look &&
+        asprintf(&text, "%s%s%s%s%s", camera, clip, light, effects, look) < 0)
         text = NULL;
+    free(look);
     free(effects);
     free(camera);
     free(clip);
@@ -561,13 +564,16 @@ char *trip_viewer_camera_options(trip_viewer *v)
     return text;
 }
 
-void trip_viewer_copy_camera(trip_viewer *v)
+void trip_viewer_copy_options(trip_viewer *v)
 {
-    char *text = trip_viewer_camera_options(v);
+    const trip_document *d = trip_viewer_document(v);
+    char *text = trip_viewer_options(v);
     if (text && v->copy)
         v->copy(v->user, text);
     if (text)
-        trip_viewer_say(v, "copied: the camera, as options of triptych render");
+        trip_viewer_say(v, d->edited ? "copied, as options of triptych render, but for the "
+                                       "function, which is to be saved and given with --tf"
+                                     : "copied, as options of triptych render");
     free(text);
 }
 
@@ -641,7 +647,7 @@ static void press(trip_viewer *v, int key)
         trip_viewer_take_picture(v);
         break;
     case 'c':
-        trip_viewer_copy_camera(v);
+        trip_viewer_copy_options(v);
         break;
     case 'm':
         trip_viewer_mark(v);

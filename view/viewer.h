@@ -114,7 +114,7 @@ void trip_viewer_see_side(trip_viewer *v, triptych_side side);
 void trip_viewer_fit(trip_viewer *v);
 /* Writes the whole picture into the folder it was started in, under a name of its own. */
 void trip_viewer_take_picture(trip_viewer *v);
-void trip_viewer_copy_camera(trip_viewer *v);
+void trip_viewer_copy_options(trip_viewer *v);
 /* The present view and function become the next key of a path of the camera, for
  * `triptych render --path`, which is written into a file of its own in the same folder. */
 void trip_viewer_mark(trip_viewer *v);
@@ -122,8 +122,9 @@ void trip_viewer_mark(trip_viewer *v);
 void trip_viewer_set_function(trip_viewer *v, const char *function);
 /* Bricks the data set's volume again, with all values, while it is shown as it is. */
 void trip_viewer_brick_again(trip_viewer *v);
-/* The camera as options of `triptych render`, for free(); NULL: there is none. */
-char *trip_viewer_camera_options(trip_viewer *v);
+/* What is shown as options of `triptych render`, all but an edited function; for free(), NULL:
+ * there is none. */
+char *trip_viewer_options(trip_viewer *v);
 
 /* Where a picture of another view lies in the window, in clip coordinates, as trip_blit_draw()
  * takes them: as a plane through the point that was looked at. */

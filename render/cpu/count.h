@@ -1,5 +1,5 @@
-/* Exact counts of splats (trip_list_stats), for frames that want them: every voxel is projected
- * once more with a table in which all are visible. */
+/* Exact counts of splats (trip_list_stats), for frames whose `count` is set: every voxel is
+ * projected once more with a table in which all are visible. */
 #ifndef TRIP_CPU_COUNT_H
 #define TRIP_CPU_COUNT_H
 

@@ -94,6 +94,30 @@ static void a_link_is_replaced_and_what_it_points_to_stays(void **state)
     unlink("link");
 }
 
+/* Opened by others: to replace it would cut them off. */
+static void a_device_or_a_pipe_is_not_replaced(void **state)
+{
+    (void)state;
+    trip_new_file f;
+    struct stat st;
+    assert_int_equal(mkfifo("pipe", 0600), 0);
+    assert_int_equal(symlink("/proc/self/fd/1", "output"), 0);
+    const char *const paths[] = { "pipe", "output", "/dev/null" };
+    for (int i = 0; i < 3; i++) {
+        test_catch_reports();
+        assert_int_equal(trip_new_file_begin(&f, "write", paths[i]), TRIP_ERROR);
+        assert_one_report("is a device, a pipe or a socket");
+        test_catch_reports();
+        assert_int_equal(trip_new_file_check("write", paths[i]), TRIP_ERROR);
+        assert_one_report("is a device, a pipe or a socket");
+    }
+    assert_int_equal(lstat("pipe", &st), 0);
+    assert_true(S_ISFIFO(st.st_mode));
+    unlink("pipe");
+    unlink("output");
+    assert_int_equal(count_files(), 0);
+}
+
 static void a_text_is_written_whole_or_not_at_all(void **state)
 {
     (void)state;
@@ -141,6 +165,7 @@ int main(void)
         cmocka_unit_test(a_file_is_there_only_once_it_is_finished),
         cmocka_unit_test(what_is_replaced_hands_on_its_mode_and_stays_until_then),
         cmocka_unit_test(a_link_is_replaced_and_what_it_points_to_stays),
+        cmocka_unit_test(a_device_or_a_pipe_is_not_replaced),
         cmocka_unit_test(a_text_is_written_whole_or_not_at_all),
         cmocka_unit_test(files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way),
         cmocka_unit_test(what_cannot_be_written_is_one_report_and_leaves_nothing),

@@ -7,6 +7,20 @@ static trip_tf *labels(void)
     return tf;
 }
 
+/* Numbers so large that those beside them are more than one apart. */
+static void numbers_that_cannot_be_counted_are_no_labels(void **state)
+{
+    (void)state;
+    start(1e17, 1e17 + 1024);
+    for (int i = 0; i <= 1024; i += 16)
+        put(1e17 + i, 100);
+    trip_tf *tf = labels(), *usual;
+    assert_int_equal(trip_tf_from_histogram(&usual, &h), TRIP_OK);
+    assert_true(trip_tf_evaluate(tf, 1e17).opacity == trip_tf_evaluate(usual, 1e17).opacity);
+    trip_tf_destroy(usual);
+    trip_tf_destroy(tf);
+}
+
 static double difference(trip_rgba a, trip_rgba b)
 {
     return fabs(a.r - b.r) + fabs(a.g - b.g) + fabs(a.b - b.b);
@@ -90,6 +104,7 @@ static void a_binary_solid_is_solid(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_that_cannot_be_counted_are_no_labels),
         cmocka_unit_test(every_label_has_a_colour_of_its_own),
         cmocka_unit_test(a_code_beside_the_label_has_its_colour),
         cmocka_unit_test(every_whole_number_of_a_wide_range_has_a_place),

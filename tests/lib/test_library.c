@@ -1179,7 +1179,7 @@ static void measurements_keep_their_colours_unless_effects_are_asked_for(void **
     assert_int_equal(draw(t, rgba).effects, 0);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
-    assert_non_null(strstr(text, "shadowing   does not run: "));
+    assert_non_null(strstr(text, "shadows     does not run: "));
     assert_null(strstr(text, "light  "));
     free(text);
     triptych_end(t);

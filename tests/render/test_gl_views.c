@@ -1,7 +1,7 @@
 /* Every renderer against the reference on real data: three volumes that come with the project,
  * bricked here, from twelve views that are hard in different ways: the first from each, the others
- * from every second one in turn. No pixel may be off by more than
- * 1/255, nor the mean by 0.05/255. */
+ * from every second one in turn. No pixel may be off by
+ * more than 1/255, nor the mean by 0.05/255. */
 #include <stdlib.h>
 #include <string.h>
 

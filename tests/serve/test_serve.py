@@ -137,8 +137,9 @@ class Serve(program.ProgramTest):
         self.assertTrue((turned != picture).any())
         status, _, _ = self.ask("/function", "POST", name="bone")
         self.assertEqual(status, 204)
-        bone, number, _ = self.whole_picture(number)
+        bone, number, shown = self.whole_picture(number)
         self.assert_rendered(bone, there, "--tf", "bone")
+        self.assert_rendered(bone, shown)
         self.assertTrue(self.status()["exact"])
 
     def test_what_is_set_is_drawn(self):
@@ -163,8 +164,9 @@ class Serve(program.ProgramTest):
             status, _, data = self.ask("/set", "POST", name=name, value=value)
             self.assertEqual(status, 204, data)
             before = picture
-            picture, number, _ = self.whole_picture(number)
+            picture, number, shown = self.whole_picture(number)
             self.assert_rendered(picture, camera, *options)
+            self.assert_rendered(picture, shown)
             self.assertTrue((picture != before).any(), (name, value))
         for name, value in (
             ("classify", "x"), ("classify", ""), ("shading", "2"), ("h", "1"), ("h", "nan"),

@@ -390,6 +390,25 @@ static void padding_that_is_not_zero_is_found(void **state)
     assert_false(trip_block_is_padded(&one));
 }
 
+/* Between a square's last code and the next byte. */
+static void bits_behind_a_squares_codes_are_padding_too(void **state)
+{
+    (void)state;
+    run *r = make_run(form_of(4, STEPS), 0.3, 5); /* of 10 bits */
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const trip_block b = block_of(r);
+    const uint32_t count = trip_block_squares(&b, squares);
+    uint32_t i = 0;
+    while (i < count && squares[i].count * squares[i].width % 8 == 0)
+        i++;
+    assert_true(i < count && trip_block_is_padded(&b));
+    unsigned char *last = (unsigned char *)r->block +
+                          (squares[i].codes - (const unsigned char *)r->block) +
+                          squares[i].count * squares[i].width / 8;
+    *last |= 0x80;
+    assert_false(trip_block_is_padded(&b));
+}
+
 static void normals_are_packed_and_decoded(void **state)
 {
     const uint32_t normals[] = { 0x000000, 0x800000, 0xabcdef, 0x7fffff };
@@ -423,6 +442,7 @@ int main(void)
         cmocka_unit_test(masks_that_do_not_agree_with_the_run_are_found),
         cmocka_unit_test(forms_that_lead_astray_are_found),
         cmocka_unit_test(padding_that_is_not_zero_is_found),
+        cmocka_unit_test(bits_behind_a_squares_codes_are_padding_too),
         cmocka_unit_test(normals_are_packed_and_decoded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

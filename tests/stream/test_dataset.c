@@ -288,6 +288,7 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->header_bytes = 512, "header size");
     REFUSE(c.header->reserved[690] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");
+    REFUSE(c.header->reserved1 = 1, "reserved");
     REFUSE(c.header->coordinates_offset = 3, "the coordinates lie outside");
     REFUSE(c.header->coordinates_offset = UINT64_MAX - 7, "the coordinates lie outside");
     REFUSE(c.header->coordinates_offset = c.header->checksums_offset,

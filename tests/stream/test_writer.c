@@ -182,6 +182,22 @@ static void a_replacement_cut_off_between_its_two_renames_is_undone(void **state
     fixture_free(&f);
 }
 
+/* As where two folders cannot be exchanged in one step. */
+static void what_a_replacement_cut_off_after_them_left_is_in_nobodys_way(void **state)
+{
+    fixture f;
+    (void)state;
+    make_small(&f);
+    fixture_run_command("cp -r %s %s.replaced", f.path, f.path);
+    expect_refused(&f, f.path, "exists already");
+    fixture_run_command("test -d %s.replaced", f.path);
+    f.params.replace = true;
+    assert_int_equal(fixture_write(&f, f.path), TRIP_OK);
+    expect_sound(&f, f.path);
+    fixture_run_command("test ! -e %s.replaced && test ! -e %s.partial", f.path, f.path);
+    fixture_free(&f);
+}
+
 static void a_data_set_behind_a_link_is_replaced_and_the_link_stays(void **state)
 {
     fixture f;
@@ -487,6 +503,7 @@ int main(void)
         cmocka_unit_test(only_a_data_set_is_replaced),
         cmocka_unit_test(what_an_interrupted_run_left_is_removed),
         cmocka_unit_test(a_replacement_cut_off_between_its_two_renames_is_undone),
+        cmocka_unit_test(what_a_replacement_cut_off_after_them_left_is_in_nobodys_way),
         cmocka_unit_test(a_data_set_behind_a_link_is_replaced_and_the_link_stays),
         cmocka_unit_test(two_writers_of_one_name_do_not_mix),
         cmocka_unit_test(runs_out_of_order_or_place_are_refused),

@@ -116,7 +116,7 @@ static void effects_are_written_as_options_and_said_in_words(void **state)
     s.effects = TRIPTYCH_EFFECTS_AUTO;
     s.kelvin[1] = 1800.5;
     assert_effects(&s, "h",
-                   " --effects auto --anisotropy 0.5 --cueing 0.25 --light-cells 64 --emission 'h'"
+                   " --effects auto --anisotropy 0.5 --cueing 0.25 --light-cells 64 --emission h"
                    " --temperature 0:1800.5",
                    "what the data calls for, emission of h, 0 to 1800.5 K");
 }

@@ -1,5 +1,5 @@
 /* Kernels that blend projected splats into the pixels of a pane: included by table_tmpl.h after
- * simd.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the stamps of
+ * simd_tmpl.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the stamps of
  * pixels that they may touch, in their order; then stamp after stamp takes its splats, its pixels
  * all the while in registers. */
 #ifndef TRIP_CPU_BLEND_H

@@ -1,5 +1,5 @@
 /* Exponentials of a vector, as exactly as a footprint needs: included by table_tmpl.h after
- * simd.h. */
+ * simd_tmpl.h. */
 #ifndef TRIP_CPU_EXP_H
 #define TRIP_CPU_EXP_H
 

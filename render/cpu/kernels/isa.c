@@ -5,7 +5,7 @@
 
 #include "report.h"
 
-/* Once, so that the list below is complete when any thread sees it. */
+/* Once, before any thread reads the list below. */
 static const trip_cpu_kernels *runnable[5];
 
 __attribute__((constructor)) static void find_runnable(void)

@@ -221,7 +221,7 @@ typedef struct trip_cpu_scratch {
     uint32_t splats;
     int x, y;             /* of the pane's first pixel */
     float *pixels, *sums; /* of the pane; sums of its open sheet, where those are wanted */
-    void (*blend)(struct trip_cpu_scratch *s); /* the group, in order */
+    void (*blend)(struct trip_cpu_scratch *s); /* local[], in order */
     const trip_cpu_view *view;                 /* of the splats gathered, or of the layer */
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;
@@ -240,8 +240,8 @@ typedef uint32_t trip_cpu_project_kernel(const trip_cpu_view *view, const _Atomi
                                          const trip_cpu_staged *staged, uint32_t count,
                                          trip_cpu_lanes *lanes, trip_cpu_splat *out, float *depths);
 
-/* Composites a group's segments into a pane's pixels. Returns which of its texels are open, as
- * trip_cpu_mask has them. */
+/* Composites the segments of a group of slices into a pane's pixels. Returns which of its texels
+ * are open, as trip_cpu_mask has them. */
 typedef uint64_t trip_cpu_sheet_kernel(const trip_cpu_sheet_view *view, const trip_cpu_group *group,
                                        int x, int y, float *pixels);
 

@@ -1,5 +1,5 @@
 /* Kernels that decode squares of voxels and turn them into projected splats, V at a time: included
- * by table_tmpl.h after simd.h. Positions are computed in double precision from the voxel's
+ * by table_tmpl.h after simd_tmpl.h. Positions are computed in double precision from the voxel's
  * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
  * footprint in single. The few splats for whose numbers single does not do, near the plane of the
  * eye above all, are projected one by one by trip_cpu_project_scalar(). */

@@ -1,4 +1,4 @@
-/* Every kernel for one instruction set: each cpu_isa_*.c includes it once TRIP_SIMD is defined. */
+/* Every kernel for one instruction set: each isa_*.c includes it once TRIP_SIMD is defined. */
 #ifndef TRIP_CPU_TABLE_H
 #define TRIP_CPU_TABLE_H
 

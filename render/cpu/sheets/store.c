@@ -218,8 +218,8 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 static const uint16_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
-/* The codes of a square's records, stretched and biased; by copies, which compilers then know to be
- * apart. */
+/* The codes of a square's records, stretched and biased; by copies, which overlap nothing, so that
+ * the loops become vectors. */
 static void square_codes(const trip_square *at, trip_cpu_codes stretch, int16_t out[64])
 {
     uint16_t codes[64];

@@ -1,0 +1,71 @@
+#include "test.h"
+
+#include <stdlib.h>
+
+#include "look_text.h"
+
+static void assert_text(const triptych_settings *s, const char *function, double opacity_scale,
+                        const char *expected)
+{
+    char *text = trip_look_text(s, function, opacity_scale);
+    assert_string_equal(text, expected);
+    free(text);
+}
+
+static void what_is_as_usual_is_left_out(void **state)
+{
+    (void)state;
+    const triptych_settings s = triptych_default_settings();
+    assert_text(&s, NULL, 1, "");
+}
+
+static void a_function_is_one_word(void **state)
+{
+    (void)state;
+    const triptych_settings s = triptych_default_settings();
+    assert_text(&s, "bone", 1, " --tf bone");
+    assert_text(&s, "it's my.tf", 0.1, " --tf 'it'\\''s my.tf' --opacity-scale 0.1");
+}
+
+static void splats_and_values_have_options_of_their_own(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    s.slices = 3;
+    s.compositing = TRIPTYCH_BY_SHEET;
+    s.kernel_radius = 2.5;
+    assert_text(&s, NULL, 1, " --slices 3");
+    s.classify = TRIPTYCH_POST;
+    assert_text(&s, NULL, 1, " --classify post --slices 3");
+    s.classify = TRIPTYCH_PRE;
+    assert_text(&s, NULL, 1, " --classify pre --compositing sheet --kernel-radius 2.5");
+}
+
+static void what_the_panel_has_is_written(void **state)
+{
+    (void)state;
+    triptych_settings s = triptych_default_settings();
+    s.h = 0.25;
+    s.saturation = 0;
+    s.lod_px = 1.5;
+    s.samples = 2;
+    assert_text(&s, NULL, 1, " --h 0.25 --saturation 0 --lod 1.5 --samples 2");
+    s = triptych_default_settings();
+    s.method = TRIPTYCH_AXIS;
+    s.h = 0.25; /* of merge alone */
+    s.shading = 0;
+    s.show = TRIPTYCH_SHOW_LEVELS;
+    s.background[1] = 0.5;
+    assert_text(&s, NULL, 1, " --method axis --no-shading --show levels --background 0,0.5,0,1");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_as_usual_is_left_out),
+        cmocka_unit_test(a_function_is_one_word),
+        cmocka_unit_test(splats_and_values_have_options_of_their_own),
+        cmocka_unit_test(what_the_panel_has_is_written),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
