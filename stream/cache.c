@@ -36,9 +36,7 @@ struct trip_cache {
 
 static uint64_t plane_pages(const trip_dataset *d, const trip_list *list, int plane)
 {
-    uint64_t bytes = list->plane_bytes[plane];
-    uint64_t page = UINT64_C(1) << d->header.page_log2;
-    return bytes / page + (bytes % page != 0);
+    return trip_page_count(list->plane_bytes[plane], d->header.page_log2);
 }
 
 uint64_t trip_cache_full_bytes(const trip_dataset *d, unsigned planes)

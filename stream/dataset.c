@@ -1,6 +1,7 @@
 #include "dataset.h"
 
 #include "dataset_check.h"
+#include "read_at.h"
 #include "report.h"
 
 #include <errno.h>
@@ -77,21 +78,12 @@ static int open_file(const trip_dataset *d, int folder, const char *name, int *f
 
 static int read_at(int fd, const char *where, uint64_t offset, void *data, uint64_t bytes)
 {
-    unsigned char *p = data;
-    while (bytes > 0) {
-        size_t piece = bytes < 1 << 24 ? (size_t)bytes : 1 << 24;
-        ssize_t n = pread(fd, p, piece, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n < 0)
-            return trip_fail_errno("open", where, "cannot read");
-        if (n == 0)
-            return trip_fail(TRIP_ERROR, "open", where, "ends early, at byte %llu",
-                             (unsigned long long)offset);
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (uint64_t)n;
-    }
+    const ssize_t n = trip_read_at(fd, data, bytes, bytes, offset);
+    if (n < 0)
+        return trip_fail_errno("open", where, "cannot read");
+    if ((uint64_t)n < bytes)
+        return trip_fail(TRIP_ERROR, "open", where, "ends early, at byte %llu",
+                         (unsigned long long)(offset + (uint64_t)n));
     return TRIP_OK;
 }
 

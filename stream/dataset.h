@@ -92,9 +92,4 @@ const char *trip_list_plane_name(const trip_list *list, int plane, char *name);
 /* Whether some list's plane file is so named. */
 bool trip_plane_file_is_named(const char *name);
 
-static inline double trip_dataset_value(const trip_dataset *d, unsigned code)
-{
-    return d->header.code_lo + (d->header.code_hi - d->header.code_lo) * code / 65535.0;
-}
-
 #endif

@@ -98,11 +98,6 @@ static int check_grid(const trip_file_header *h, const char *where)
     return TRIP_OK;
 }
 
-static uint64_t page_count(uint64_t bytes, unsigned page_log2)
-{
-    return (bytes >> page_log2) + ((bytes & ((UINT64_C(1) << page_log2) - 1)) != 0);
-}
-
 static int check_layout(const trip_file_header *h, const char *where)
 {
     if (h->tile_log2 < 4 || h->tile_log2 > 7)
@@ -123,7 +118,7 @@ static int check_layout(const trip_file_header *h, const char *where)
     if (h->checksums_offset % 8 || h->checksums_offset < TRIP_HEADER_BYTES ||
         h->checksums_offset > h->index_bytes ||
         h->index_bytes - h->checksums_offset !=
-            8 * page_count(h->checksums_offset - TRIP_HEADER_BYTES, h->page_log2))
+            8 * trip_page_count(h->checksums_offset - TRIP_HEADER_BYTES, h->page_log2))
         return FAIL_FIELD(checksums_offset, "the checksums are not where they must be");
     if (h->text_bytes > TRIP_TEXT_BYTES_MAX)
         return FAIL_FIELD(text_bytes, "the text is too long");
@@ -273,7 +268,7 @@ static int check_list_head(sections *s, const trip_file_header *h, const trip_fi
                      sizeof(trip_file_run) * (uint64_t)h->slab_sheets, 8))
         return fail_at(where, at, "a table of the list lies outside the file");
     for (int plane = 0; plane < TRIP_FILE_PLANES; plane++) {
-        uint64_t pages = page_count(f->plane_bytes[plane], h->page_log2);
+        uint64_t pages = trip_page_count(f->plane_bytes[plane], h->page_log2);
         if (f->planes >> plane & 1
                 ? !add_section(s, h, f->page_checksums_offset[plane], pages, 8, 8)
                 : f->page_checksums_offset[plane] != 0)

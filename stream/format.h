@@ -160,4 +160,10 @@ static inline unsigned trip_voxel_code(uint32_t voxel)
 /* Interleaves the bits of u (even) and v (odd). */
 uint64_t trip_morton(uint32_t u, uint32_t v);
 
+/* Pages of a file of so many bytes; the last may be cut off. */
+static inline uint64_t trip_page_count(uint64_t bytes, unsigned page_log2)
+{
+    return (bytes >> page_log2) + ((bytes & ((UINT64_C(1) << page_log2) - 1)) != 0);
+}
+
 #endif

@@ -1,5 +1,6 @@
 #include "output.h"
 
+#include "read_at.h"
 #include "report.h"
 
 #include <errno.h>
@@ -173,17 +174,9 @@ static int fail_read(const trip_output *o, int error)
 
 static int read_file(const trip_output *o, uint64_t offset, void *data, size_t bytes)
 {
-    unsigned char *p = data;
-    while (bytes > 0) {
-        ssize_t n = pread(o->fd, p, bytes, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return fail_read(o, n == 0 ? EIO : errno);
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
+    const ssize_t n = trip_read_at(o->fd, data, bytes, bytes, offset);
+    if (n < 0 || (size_t)n < bytes)
+        return fail_read(o, n < 0 ? errno : EIO);
     return TRIP_OK;
 }
 
