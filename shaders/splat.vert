@@ -42,15 +42,15 @@ void cover(ivec4 pixels)
     gl_Position = vec4(corner * 2.0 / image - 1.0, 0.0, 1.0);
 }
 
-// What a code looks like. Those of means (stream/mean.h) are as long as edge.w says: their extinction
-// is that of the part of the cube that was kept.
+// What a code looks like. That of a mean (stream/mean.h) has the extinction of the part of the cube
+// that was kept.
 vec4 look_up(uint code)
 {
-    float length = float(edge.w);
+    float length = float(means.x);
     if (length <= 0.0)
         return table[code];
     const float covers[8] = float[](1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 1.0 / 8.0, 0.25, 0.5, 0.75, 1.0);
-    vec4 entry = table[((code >> 6) * 65535u + 511u) / 1023u];
+    vec4 entry = table[uint(floor(float(means.y) + float(means.z) * float(code >> 6) / 1023.0 + 0.5))];
     float cover = covers[code & 7u], depth_part = float((code >> 3 & 7u) + 1u) / 8.0;
     float thick = entry.a * depth_part * length;
     if (cover >= 1.0 || thick < 1e-4)

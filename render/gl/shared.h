@@ -81,8 +81,9 @@
     R4 screen; /* xy: the image's centre, pixels; zw: width, height */                               \
     R4 kernel; /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */                \
     R4 edge;   /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: step of codes;       \
-                  z: 1 / (2 erf(cutoff / sqrt 2)); w: of lists of means, the length of a voxel along \
-                  the axis, else 0 */                                                                \
+                  z: 1 / (2 erf(cutoff / sqrt 2)) */                                                 \
+    R4 means;  /* of lists of means: x: the length of a voxel along the axis, else 0; yz: lo and     \
+                  width of trip_mean_scale */                                                        \
     R4 parallel; /* the one footprint of a parallel view, or of FIXED: conic xx, xy, yy, amplitude   \
                   */                                                                                 \
     R4 parallel_size; /* its half extents in x and y, its radius in index space (FIXED: at depth     \

@@ -745,6 +745,45 @@ static void cells_that_lack_a_corner_are_empty_as_in_the_reference(void **state)
     }
 }
 
+/* All but the first sheet along Z, which is its halo. */
+static bool ramp_to_the_faces(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const bool halo = *(const bool *)user;
+    (void)gradient;
+    *code = 30000 + 800 * (unsigned)i + 700 * (unsigned)j + 600 * (unsigned)k;
+    return (k == 0) == halo;
+}
+
+/* What shows reaches the grid's faces. Beyond them is nothing, by whatever kernel. */
+static void nothing_shows_beyond_the_grids_faces(void **state)
+{
+    (void)state;
+    static const trip_kernel kernels[] = { TRIP_KERNEL_LINEAR, TRIP_KERNEL_CUBIC,
+                                           TRIP_KERNEL_GAUSSIAN };
+    bool no = false, yes = true;
+    const scene_part halo = {
+        .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = ramp_to_the_faces, .user = &yes
+    };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 13, 16, 11 },
+                                      .tile_voxels = 16,
+                                      .slab_sheets = 8,
+                                      .voxel = ramp_to_the_faces,
+                                      .user = &no,
+                                      .parts = &halo,
+                                      .part_count = 1 });
+    scene_colour(&s, 30000, 65535, 0.2, 0.5, 1, 0.05);
+    for (int n = 0; n < 3; n++)
+        for (int parallel = 0; parallel < 2; parallel++) {
+            trip_settings settings = post(2);
+            trip_camera_params view = scene_view(&s, trip_v3(1, 0.83, 0.61), 40, 40, 36);
+            view.ortho_height = parallel ? 28 : 0;
+            settings.kernel = kernels[n];
+            expect_as_in_the_reference(&s, &view, &settings);
+        }
+    scene_destroy(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -759,6 +798,7 @@ int main(void)
         cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
         cmocka_unit_test(labels_keep_their_colours),
         cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),
+        cmocka_unit_test(nothing_shows_beyond_the_grids_faces),
         cmocka_unit_test(cells_that_lack_a_corner_are_empty_as_in_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

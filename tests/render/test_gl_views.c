@@ -13,7 +13,7 @@
 enum { SIZE = 96, VIEWS = 12 };
 
 /* Bricks a volume of the project's and opens it as a scene, drawn as it would be by default. */
-static void open_volume(scene *s, const char *name)
+static void open_volume(scene *s, const char *name, trip_brick_levels_for levels_for)
 {
     char input[512];
     trip_brick_summary summary;
@@ -26,6 +26,7 @@ static void open_volume(scene *s, const char *name)
     snprintf(input, sizeof input, "%s/datasets/%s", TRIP_SOURCE_DIR, name);
     assert_int_equal(trip_brick(&(trip_brick_params){ .input = input,
                                                       .output = s->path,
+                                                      .levels_for = levels_for,
                                                       .memory_bytes = UINT64_C(1) << 30 },
                                 &summary),
                      0);
@@ -138,7 +139,7 @@ static void check_volume(const char *name, trip_classify classify, bool hard, in
 {
     scene s;
     tally tallies[4] = { { 0, 0, 0 } };
-    open_volume(&s, name);
+    open_volume(&s, name, TRIP_LEVELS_FOR_AUTO);
     if (hard)
         set_hard_contrast(&s);
     for (int i = first; i < VIEWS; i += TEST_BY_TURNS ? 4 : step)
@@ -187,6 +188,36 @@ static void views_classified_after_interpolation_agree_with_the_reference(void *
     check_volume("stent.nrrd", TRIP_CLASSIFY_POST, false, 1, 3);
 }
 
+/* Of 8 bits and of more: coarse levels, drawn as splats of means, but near the eye. */
+static void means_agree_with_the_reference(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "tooth.nhdr", "stent.nrrd" };
+    trip_settings settings = trip_settings_default();
+    const scene_renderer *all = scene_renderers();
+    settings.lod_px = 1000;
+    for (int n = 0; n < 2; n++) {
+        scene s;
+        tally tallies[4] = { { 0, 0, 0 } };
+        open_volume(&s, names[n], TRIP_LEVELS_FOR_PRE);
+        for (int i = 4; i < VIEWS; i += TEST_BY_TURNS ? 6 : 2) {
+            trip_camera_params view = make_view(&s, i);
+            scene_picture expected = scene_draw(&s, &all[0], &view, &settings);
+            uint64_t coarse = 0;
+            for (unsigned k = 0; k < s.data->list_count; k++)
+                coarse += s.data->lists[k].level > 0 ? expected.lists[k].splats_read : 0;
+            assert_true(coarse > 0);
+            for (int r = 1; all[r].name; r++) {
+                scene_picture p = scene_draw(&s, &all[r], &view, &settings);
+                add(&tallies[r], &expected, &p, views[i].name);
+                scene_picture_free(&p);
+            }
+            scene_picture_free(&expected);
+        }
+        scene_destroy(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -194,6 +225,7 @@ int main(void)
         cmocka_unit_test(views_of_a_stent_agree_with_the_reference),
         cmocka_unit_test(views_of_a_cloud_agree_with_the_reference),
         cmocka_unit_test(nearly_opaque_black_and_white_agrees_with_the_reference),
+        cmocka_unit_test(means_agree_with_the_reference),
         cmocka_unit_test(views_classified_after_interpolation_agree_with_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -32,8 +32,8 @@ INLINE bool take_tap(const trip_cpu_group *g, const int32_t *rasters, tap_line u
     return t->raster->codes[t->at] != TRIP_CPU_CODE_MISSING;
 }
 
-/* Those of one ray: u fastest, then v, then the sheets. False where the cell is empty. Outermost
- * rasters have no voxels. */
+/* Those of one ray: u fastest, then v, then the sheets. False where the cell is empty or beyond the
+ * grid. Outermost rasters have no voxels. */
 static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g, const wide_place *p,
                       int lane, tap taps[64])
 {
@@ -44,6 +44,8 @@ static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
     for (int a = 0; a < 2; a++) {
         const int32_t cell = p->cell[a][lane];
         if (cell < 1 || cell > size[a] - TRIP_KERNEL_TAPS)
+            return false;
+        if (cell + origin[a] < 0 || cell + origin[a] > view->voxels[a] - 2)
             return false;
         for (int i = 0; i < TRIP_KERNEL_TAPS; i++) {
             const double voxel =
