@@ -29,10 +29,14 @@ void accuracy_contexts_close(accuracy_contexts *c)
 /* What a context says of a failure, without "triptych: render: ". */
 static int keep_why(accuracy_contexts *c, int data, int renderer, triptych *t, int status)
 {
-    const char *why = triptych_error(t), *colon = strstr(why, ": ");
+    const char *why = triptych_error(t);
     if (status == TRIPTYCH_CANCELLED)
         return trip_fail(TRIP_INTERRUPTED, "accuracy", c->options->data[0], "interrupted");
-    snprintf(c->why[data][renderer], sizeof c->why[data][renderer], "%s", colon ? colon + 2 : why);
+    for (int i = 0; i < 2; i++) {
+        const char *colon = strstr(why, ": ");
+        why = colon ? colon + 2 : why;
+    }
+    snprintf(c->why[data][renderer], sizeof c->why[data][renderer], "%s", why);
     return TRIP_ERROR;
 }
 

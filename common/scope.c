@@ -29,6 +29,11 @@ void trip_scope_renew(trip_scope *s)
     __atomic_store_n(&s->reported, false, __ATOMIC_RELAXED);
 }
 
+void trip_scope_report_anew(trip_scope *s)
+{
+    __atomic_store_n(&s->reported, false, __ATOMIC_RELAXED);
+}
+
 int trip_interrupted(void)
 {
     for (const trip_scope *s = trip_scope_current(); s; s = s->around)

@@ -39,6 +39,9 @@ void trip_scope_cancel(trip_scope *s);
 /* Ends the cancelling, so that the scope can be used again; no thread may be working in it. */
 void trip_scope_renew(trip_scope *s);
 
+/* An interruption of its work that was reported is to be reported once more. */
+void trip_scope_report_anew(trip_scope *s);
+
 /* The outermost scope around the calling thread's has this flag, which is not set yet. */
 void trip_scope_heed(const volatile sig_atomic_t *signalled);
 /* The flag of the calling thread's scope or of one around it, for scopes that have none around them

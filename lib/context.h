@@ -86,6 +86,7 @@ struct triptych {
     bool rounding_checked; /* of the function and the settings that are set */
     bool has_stats;
     triptych_frame_stats stats;
+    char device[128]; /* whose text that has: the renderer may go before the data set */
     triptych_list_stats *list_stats; /* by the data set's lists, of the budget; NULL: not yet */
 
     trip_image_files files;

@@ -158,18 +158,18 @@ static void explain(const triptych *t, const char *name, int effect, bool runs, 
 
 static void explain_lattice(const triptych *t, FILE *out)
 {
-    const uint64_t *dims = t->session.data->header.dims;
-    const trip_light_grid grid = trip_light_grid_over(dims, t->drawn_settings.effects.cells, 1);
-    if (t->plan.gathers)
+    if (t->plan.gathers) {
         fprintf(out, "light       by an integral from each place, %s\n",
                 t->drawn_settings.effects.occlusion ? "and as many as there are directions"
                                                     : "towards the light");
-    else
-        fprintf(out, "light       %d x %d x %d nodes, one in %g voxels: %s\n", grid.nodes[0],
-                grid.nodes[1], grid.nodes[2], grid.spacing,
-                trip_light_map_is_complete(t->light)
-                    ? "kept from the frame before, nothing is read for it"
-                    : "one more list is read for it");
+        return;
+    }
+    const trip_light_grid *grid = trip_light_map_gathered(t->light);
+    fprintf(out, "light       %d x %d x %d nodes, one in %g voxels: %s\n", grid->nodes[0],
+            grid->nodes[1], grid->nodes[2], grid->spacing,
+            trip_light_map_is_complete(t->light)
+                ? "kept from the frame before, nothing is read for it"
+                : "one more list is read for it");
 }
 
 static void explain_heat(const triptych *t, FILE *out)

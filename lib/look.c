@@ -23,16 +23,22 @@ int trip_context_use_function(triptych *t, const triptych_function *f)
     return status;
 }
 
+/* More would make extinctions that are not finite. */
+#define OPACITY_SCALE_MOST 1e6
+
 static int check_function(const triptych_function *f)
 {
-    bool finite = isfinite(f->opacity_scale) && isfinite(f->window) && isfinite(f->level);
+    bool finite = isfinite(f->window) && isfinite(f->level);
     if (f->name && f->text)
         return trip_fail(TRIP_USAGE, "render", "function",
                          "is given by a name or as text, not both");
-    return finite && f->opacity_scale >= 0 && f->window >= 0
+    if (!(f->opacity_scale >= 0 && f->opacity_scale <= OPACITY_SCALE_MOST))
+        return trip_fail(TRIP_USAGE, "render", "function", "an opacity scale lies between 0 and %g",
+                         OPACITY_SCALE_MOST);
+    return finite && f->window >= 0
                ? 0
                : trip_fail(TRIP_USAGE, "render", "function",
-                           "opacity scale and window are finite and not below 0");
+                           "a window is finite and not below 0, and so is its level");
 }
 
 int triptych_set_function(triptych *t, const triptych_function *function)

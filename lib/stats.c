@@ -201,6 +201,8 @@ int trip_context_note_stats(triptych *t)
         return trip_fail(TRIP_ERROR, "render", t->name,
                          "the frame's statistics do not fit the memory given; raise --memory");
     t->stats = frame_stats(t);
+    snprintf(t->device, sizeof t->device, "%s", t->stats.device);
+    t->stats.device = t->device;
     if (t->part > 0)
         add_stats(&t->stats, &t->before_stats);
     for (unsigned i = 0; i < count; i++)

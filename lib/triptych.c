@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "camera.h"
 #include "context.h"
 #include "dataset_level.h"
 #include "report.h"
@@ -87,6 +88,7 @@ void triptych_cancel(triptych *t)
 trip_scope *trip_context_enter(triptych *t)
 {
     *t->error = 0;
+    trip_scope_report_anew(&t->scope);
     return trip_scope_enter(&t->scope);
 }
 
@@ -159,8 +161,10 @@ int triptych_new_picture(triptych *t, int width, int height, int channels, float
     trip_scope *before = trip_context_enter_anew(t);
     int status = trip_context_check_open(t);
     *pixels = NULL;
-    if (!status && (width < 1 || height < 1 || width > 99999 || height > 99999))
-        status = trip_fail(TRIP_USAGE, "render", "picture", "has 1 to 99999 pixels either way");
+    if (!status &&
+        (width < 1 || height < 1 || width > TRIP_PICTURE_MOST_PX || height > TRIP_PICTURE_MOST_PX))
+        status = trip_fail(TRIP_USAGE, "render", "picture", "has 1 to %d pixels either way",
+                           TRIP_PICTURE_MOST_PX);
     if (!status && channels != 1 && channels != 4)
         status = trip_fail(TRIP_USAGE, "render", "picture", "has 4 channels, or 1 for distances");
     if (!status)
@@ -219,7 +223,7 @@ static void close_data(triptych *t)
     session_close(&t->session);
     free(t->name);
     t->name = NULL;
-    t->open = t->has_function = t->has_view = t->levels_warned = false;
+    t->open = t->has_function = t->has_view = t->levels_warned = t->kernel_warned = false;
 }
 
 void triptych_close(triptych *t)
@@ -288,14 +292,21 @@ int triptych_add(triptych *t, const char *path)
 }
 
 /* The box of world space about voxels `first` to `last`, from edge to edge. */
+/* Where a voxel ends along an axis. */
+static double edge_of(const trip_coordinates *c, int axis, int64_t voxel, bool upper)
+{
+    const double half = 0.5 * trip_coordinates_width(c, axis, voxel);
+    return trip_coordinates_at(c, axis, voxel) + (upper ? half : -half);
+}
+
 static void find_box(const trip_dataset *d, triptych_info *out)
 {
     const trip_affine *m = &d->index_to_world;
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++)
-            p[a] = corner >> a & 1 ? trip_coordinates_at(&d->coordinates, a, out->last[a]) + 0.5
-                                   : trip_coordinates_at(&d->coordinates, a, out->first[a]) - 0.5;
+            p[a] = edge_of(&d->coordinates, a, corner >> a & 1 ? out->last[a] : out->first[a],
+                           corner >> a & 1);
         trip_vec3 world = trip_affine_point(m, trip_v3(p[0], p[1], p[2]));
         for (int a = 0; a < 3; a++) {
             double x = trip_component(world, a);

@@ -123,7 +123,7 @@ typedef struct triptych_info {
     uint64_t bytes, index_bytes; /* on disk: of everything, of the index */
     uint64_t
         checksum; /* of the index, which has those of all else: the same data, the same number */
-    unsigned format_version, lists, code_bytes, normal_bytes; /* 0: it cannot be shaded */
+    unsigned format_version, lists, code_bytes, normal_bytes; /* 0: splats are not shaded */
     double gradient_step[3], gradient_full;                   /* of normals of 3 bytes, of all */
     unsigned tile_voxels, slab_sheets, page_bytes;
     const char *notes; /* as its maker left them, JSON by `brick`; last until it is closed */
@@ -164,7 +164,7 @@ TRIPTYCH_API int triptych_get_histogram(triptych *t, triptych_histogram *out);
 
 typedef struct triptych_function {
     const char *name;     /* preset or file, as of --tf; default: the one kept in the data set */
-    double opacity_scale; /* multiplies extinction; default 1 */
+    double opacity_scale; /* multiplies extinction, up to 1e6; default 1 */
     double window, level; /* window > 0: stretched over level - window / 2 to level + window / 2 */
     int *left_out;        /* not NULL: set to 1 (else 0), in place of a warning, where values that
                              would show were not kept; the function is then not taken */
@@ -392,7 +392,7 @@ typedef enum triptych_side {
 
 /* All zero: all that the function shows, in a picture of 1024 x 1024. */
 typedef struct triptych_view {
-    int width, height;                      /* px, up to 99999; default 1024 */
+    int width, height;                      /* px, up to 65536; default 1024 */
     const double *eye, *look, *up;          /* world space, x, y, z; NULL: found */
     triptych_side side;                     /* that is seen, without an eye */
     double azimuth_degrees;                 /* from there round the object, to the right */

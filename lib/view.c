@@ -1,5 +1,6 @@
 #include "view.h"
 
+#include "camera.h"
 #include "outline.h"
 #include "report.h"
 #include "visible.h"
@@ -202,8 +203,9 @@ static int check(const triptych_view *o)
     const char *why = NULL;
     if (!isfinite(sum) || !are_finite(o->eye) || !are_finite(o->look) || !are_finite(o->up))
         why = "a number is not finite";
-    else if (o->width < 1 || o->height < 1 || o->width > 99999 || o->height > 99999)
-        why = "a picture has 1 to 99999 pixels either way";
+    else if (o->width < 1 || o->height < 1 || o->width > TRIP_PICTURE_MOST_PX ||
+             o->height > TRIP_PICTURE_MOST_PX)
+        why = "a picture has 1 to 65536 pixels either way";
     else if (o->up && !(trip_length(vector(o->up)) > 0))
         why = "the direction that is up is zero";
     else if (o->zoom < 0 || o->ortho_height < 0)

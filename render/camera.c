@@ -3,7 +3,6 @@
 #include "report.h"
 
 #define PI 3.14159265358979323846
-#define MAX_SIZE_PX 65536
 
 /* Orthonormal, right-handed with forward towards the scene: right x up = -forward. */
 typedef struct basis {
@@ -17,9 +16,10 @@ static bool finite3(trip_vec3 v)
 
 static int check_params(const trip_camera_params *p)
 {
-    if (p->width < 1 || p->height < 1 || p->width > MAX_SIZE_PX || p->height > MAX_SIZE_PX)
+    if (p->width < 1 || p->height < 1 || p->width > TRIP_PICTURE_MOST_PX ||
+        p->height > TRIP_PICTURE_MOST_PX)
         return trip_fail(TRIP_USAGE, "camera", "size", "%d x %d px is not between 1 and %d",
-                         p->width, p->height, MAX_SIZE_PX);
+                         p->width, p->height, TRIP_PICTURE_MOST_PX);
     if (!finite3(p->eye) || !finite3(p->look) || !finite3(p->up))
         return trip_fail(TRIP_USAGE, "camera", "eye, look, up", "not finite");
     if (p->ortho_height != 0 && !(isfinite(p->ortho_height) && p->ortho_height > 0))

@@ -4,11 +4,14 @@
  * volume gives the same picture bit for bit. Plain values; nothing here changes during a frame.
  *
  * Pixel coordinates: x to the right, y down, in pixels, (0, 0) the image's top left corner, so
- * pixel centres lie at + 0.5. The ray of pixel position p = (x, y) in index space is perspective:
- * origin eye,                    direction r(p) = r0 + x rx + y ry parallel:     origin eye + x rx
- * + y ry,      direction r0 The depth z of a point satisfies  point = origin + z * direction;
- * directions are scaled by a power of two so that the one at the image's centre has a length in
- * [sqrt(1/2), sqrt(2)), and depths are about the distance in voxels. */
+ * pixel centres lie at + 0.5. The ray of pixel position p = (x, y) in index space has
+ *
+ *     in perspective   origin eye,                  direction r(p) = r0 + x rx + y ry
+ *     in parallel      origin eye + x rx + y ry,    direction r0
+ *
+ * The depth z of a point satisfies  point = origin + z * direction;  directions are scaled by a
+ * power of two so that the one at the image's centre has a length in [sqrt(1/2), sqrt(2)), and
+ * depths are about the distance in voxels. */
 #ifndef TRIP_CAMERA_H
 #define TRIP_CAMERA_H
 
@@ -16,6 +19,9 @@
 #include <stdint.h>
 
 #include "geometry.h"
+
+/* Of a picture, along either side. */
+enum { TRIP_PICTURE_MOST_PX = 65536 };
 
 typedef struct trip_camera_params {
     trip_vec3 eye, look, up; /* world space */

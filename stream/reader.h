@@ -117,7 +117,7 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass);
  */
 int trip_reader_next(trip_reader *r, trip_batch *batch);
 /* Issues reads for free slots, and waits until trip_reader_next() would not wait, at most for the
- * timeout; UINT64_MAX: without end. False when the time is over. */
+ * timeout; UINT64_MAX: without end. False when the time is over or the work is interrupted. */
 bool trip_reader_await(trip_reader *r, uint64_t timeout_ns);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
 /* Ring length. */

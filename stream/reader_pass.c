@@ -11,6 +11,9 @@
 #include <string.h>
 #include <time.h>
 
+/* While it waits it looks so often whether the work was interrupted. */
+#define LOOK_NS UINT64_C(20000000)
+
 /* On an engine's thread: the last thing it does with the request. */
 static void request_done(trip_request *q)
 {
@@ -250,13 +253,17 @@ static struct timespec time_after(uint64_t timeout_ns)
 
 bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
 {
-    const struct timespec until = time_after(timeout_ns);
+    const uint64_t begin = now_ns();
     while (!r->failed) {
         fill_slots(r);
         if (has_answer(r))
             return true;
-        if (timeout_ns == 0 || !wait_for_slot(r, &until))
+        const uint64_t passed = now_ns() - begin;
+        if (passed >= timeout_ns || trip_interrupted())
             return false;
+        const uint64_t left = timeout_ns - passed;
+        const struct timespec until = time_after(left < LOOK_NS ? left : LOOK_NS);
+        wait_for_slot(r, &until);
     }
     return true;
 }
@@ -455,9 +462,11 @@ static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
 
 int trip_reader_next(trip_reader *r, trip_batch *batch)
 {
-    trip_reader_await(r, UINT64_MAX);
+    const bool answered = trip_reader_await(r, UINT64_MAX);
     if (r->failed)
         return r->failed;
+    if (!answered)
+        return trip_fail(TRIP_INTERRUPTED, "read", r->data->path, "interrupted");
     if (r->queue_count == 0 && r->pass == r->pass_count)
         return 0;
     if (r->queue_count == 0)

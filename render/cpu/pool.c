@@ -22,7 +22,7 @@ enum { LOOKS = 1000, YIELDS = 1500 };
 /* A job's tickets in one word, so that taking a task and knowing that its job is still the same are
  * one step: tasks, tasks given out, and a number that differs from one job in the slot to the next.
  */
-#define TICKET_BITS 20
+#define TICKET_BITS 24
 #define TICKET_MASK ((UINT64_C(1) << TICKET_BITS) - 1)
 #define NUMBER_ONE (UINT64_C(1) << 2 * TICKET_BITS)
 
@@ -188,6 +188,7 @@ int trip_cpu_pool_create(trip_cpu_pool **out, unsigned threads)
     pool->workers = calloc(pool->threads, sizeof *pool->workers);
     for (unsigned i = 1; i < pool->threads; i++) {
         if (!pool->workers || start_worker(pool, i)) {
+            threads = pool->threads;
             trip_cpu_pool_destroy(pool);
             return trip_fail(TRIP_ERROR, "render", "threads",
                              "cannot start %u threads; take fewer with --threads", threads);

@@ -121,7 +121,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .settings = frame->settings,
         .camera = frame->camera,
         .clip = &frame->plan->clip,
-        .shaded = frame->settings->shading && header->planes >> TRIP_PLANE_NORMALS & 1,
+        .shaded = frame->settings->shading && (frame->settings->field == TRIP_FIELD_VALUES ||
+                                               header->planes >> TRIP_PLANE_NORMALS & 1),
         .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
         .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };

@@ -1,9 +1,12 @@
 #include "quadrature.h"
 
+#include "scope.h"
+
 #include <math.h>
 
 /* After so many halvings a piece is too short to matter. */
-enum { MOST_HALVINGS = 40 };
+/* Pieces that were halved so often are few where all is well. */
+enum { MOST_HALVINGS = 40, POLLED_HALVINGS = 12 };
 
 /* How many times closer halves bring Simpson's rule to the integral of what is smooth. */
 #define CLOSER 15.0
@@ -108,15 +111,16 @@ static bool is_close(const trip_ray_sum *s, const piece *p, const part *finer, b
     double error = distance(&p->whole, finer) * (smooth ? 1 / CLOSER : 1);
     double length_share = (p->to->t - p->from->t) / s->length;
     double opacity_share = s->transmittance * (1 - finer->through);
-    return s->transmittance * error <= s->tolerance / 4 * (length_share + opacity_share);
+    return !(s->transmittance * error > s->tolerance / 4 * (length_share + opacity_share));
 }
 
-/* The nearer half first, so that what is added is behind all before. */
+/* The nearer half first, so that what is added is behind all before. Ends where the work is
+ * interrupted or a number is none, which no halving makes closer. */
 static void add(trip_ray_sum *s, const piece *p, int halvings, trip_ray_sampler sampler, void *user)
 {
     piece first, last;
     part finer;
-    if (trip_ray_sum_is_over(s))
+    if (trip_ray_sum_is_over(s) || (halvings >= POLLED_HALVINGS && trip_interrupted()))
         return;
     set_piece(&first, p->from, &p->middle, sampler, user);
     set_piece(&last, &p->middle, p->to, sampler, user);

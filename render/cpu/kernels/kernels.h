@@ -263,7 +263,7 @@ typedef struct trip_cpu_kernels {
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels; those with pixels in the image become splats, in
      * order. With `open`, a word a pane as in trip_cpu_mask, those over saturated texels alone may
-     * be left out; NULL: none are. `out` and `depths` have room for count + 16. Returns how many.
+     * be left out; NULL: none are. `out` and `depths` have room for count + 1. Returns how many.
      */
     trip_cpu_project_kernel *project, *project_effects; /* the latter of frames with effects */
 

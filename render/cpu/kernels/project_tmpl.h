@@ -794,14 +794,26 @@ static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged 
     return drawn;
 }
 
-/* Puts the geometry of such splats over what the lanes computed; their colours stay. */
-static void replace_scalar(trip_cpu_splat *out, const uint32_t row[V], unsigned lanes,
-                           const trip_cpu_splat splats[V])
+/* Whether the splat's c[] has an edge that long_depth() lowers it by. */
+static bool has_edge(const trip_cpu_view *view, const trip_cpu_splat *s)
+{
+    const bool thick = s->panes >> TRIP_CPU_PANES_THICK_SHIFT;
+    if (view->sums || (s->panes & TRIP_CPU_PANES_NEAR && trip_cpu_own_rays(view)))
+        return false;
+    return thick || view->rays == TRIP_CPU_STRETCHED;
+}
+
+/* Puts the geometry of such splats over what the lanes computed; their colours stay. The edge is
+ * that of the kernels' exponential, so that nothing is left where it ends. */
+static void replace_scalar(const trip_cpu_view *view, trip_cpu_splat *out, const uint32_t row[V],
+                           unsigned lanes, const trip_cpu_splat splats[V])
 {
     for (; lanes; lanes &= lanes - 1) {
         unsigned i = (unsigned)__builtin_ctz(lanes);
         trip_cpu_splat *s = out + row[i] / 16;
         trip_cpu_splat n = splats[i];
+        if (has_edge(view, &n))
+            n.c[TRIP_CPU_EDGE] = exp2_biased(v_set(n.c[TRIP_CPU_LEAST]))[0];
         n.r = s->r;
         n.g = s->g;
         n.b = s->b;
@@ -918,7 +930,7 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
     if (TRIP_CPU_DEPTH)
         store_depths_of(view, lanes, at, row, depths);
     if (scalar)
-        replace_scalar(out, row, scalar, replaced);
+        replace_scalar(view, out, row, scalar, replaced);
     return n;
 }
 

@@ -50,9 +50,10 @@ INLINE void put_sheet_behind(const trip_cpu_view *view, float *pixels, const pat
     add_behind(pixels, w, sum->r, target);
     add_behind(pixels + V, w, sum->g, target);
     add_behind(pixels + 2 * V, w, sum->b, target);
-    if (TRIP_CPU_DEPTH)
-        add_behind(pixels + TRIP_CHANNEL_DEPTH * V, w, sum->depth, TRIP_TARGET_RGBA32F);
     vf left = v_max(v_fnma(w, sum->t, t), v_set(0));
+    if (TRIP_CPU_DEPTH) /* of what is taken, as rounded: distances are divided by its sum */
+        add_behind(pixels + TRIP_CHANNEL_DEPTH * V, t - left,
+                   sum->depth / v_max(sum->t, v_set(0x1p-126f)), TRIP_TARGET_RGBA32F);
     if (target != TRIP_TARGET_RGBA32F)
         left = v_set(1) - kept(v_set(1) - left, target);
     v_store(pixels + 3 * V, left);

@@ -8,8 +8,9 @@
 #include "tint.h"
 #include "weight.h"
 
-/* Rays that move farther along u or v from sheet to sheet are not drawn: their weight in the list
- * is below 1 / STEEPEST, by w^2 less than a tenth of 1/255 of the picture. */
+/* Rays that move farther along u or v from sheet to sheet are not drawn where several lists are:
+ * their weight in the list is below 1 / STEEPEST, by w^2 less than a tenth of 1/255 of the picture.
+ */
 #define STEEPEST 64.0
 
 static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
@@ -76,9 +77,32 @@ static void set_tint(trip_cpu_sheet_view *view, const trip_frame *frame)
         view->tint[k] = (float)tint[k];
 }
 
-double trip_cpu_pass_steepest(const trip_settings *s)
+/* Of the view's rays along its axis; none crosses more than the grid. */
+static double steepest_of_view(const trip_frame *frame)
 {
-    double h = s->method == TRIP_METHOD_AXIS ? 0 : trip_weight_h(s);
+    const trip_camera *c = frame->camera;
+    const int axis = frame->plan->axis_of_view;
+    const uint64_t *dims = frame->data->header.dims;
+    const double grid = (double)(dims[0] + dims[1] + dims[2]);
+    const double along = trip_component(c->r0, axis);
+    double most = 0;
+    for (int i = 0; i < 4; i++) {
+        const trip_vec3 ray = trip_camera_ray(c, i & 1 ? c->width : 0, i & 2 ? c->height : 0);
+        const double r[3] = { ray.x, ray.y, ray.z };
+        if (!(r[axis] * along > 0))
+            return grid;
+        const double across = fmax(fabs(r[(axis + 1) % 3]), fabs(r[(axis + 2) % 3]));
+        most = fmax(most, across / fabs(r[axis]));
+    }
+    return fmin(grid, most);
+}
+
+double trip_cpu_pass_steepest(const trip_frame *frame)
+{
+    const trip_settings *s = frame->settings;
+    const double h = trip_weight_h(s);
+    if (s->method == TRIP_METHOD_AXIS)
+        return fmax(STEEPEST, steepest_of_view(frame));
     return h * STEEPEST > 1 ? 1 / h : STEEPEST;
 }
 
@@ -104,7 +128,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         .direction = descending ? -1 : 1,
         .middle = trip_coordinates_place(&frame->data->coordinates, axis,
                                          0.5 * ((double)frame->data->header.dims[axis] - 1)),
-        .steepest = trip_cpu_pass_steepest(s),
+        .steepest = trip_cpu_pass_steepest(frame),
     };
     by_list(view, c->eye, view->eye);
     by_list(view, c->r0, view->r0);

@@ -8,7 +8,7 @@
 #include "renderer.h"
 
 /* How far along u or v rays that are drawn move at most from one sheet to the next. */
-double trip_cpu_pass_steepest(const trip_settings *settings);
+double trip_cpu_pass_steepest(const trip_frame *frame);
 
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
                              bool descending, const trip_cpu_function *function);

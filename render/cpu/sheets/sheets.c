@@ -167,7 +167,7 @@ static bool is_wide(const trip_cpu_sheets *s)
 static int64_t reach_of(const trip_frame *frame)
 {
     const trip_coordinates *c = &frame->data->coordinates;
-    double voxels = trip_cpu_pass_steepest(frame->settings);
+    double voxels = trip_cpu_pass_steepest(frame);
     if (trip_coordinates_uneven(c))
         voxels = fmin(voxels * 2 * c->widest / c->nearest, 0x1p31);
     return ((int64_t)voxels + 4) / TRIP_CPU_RASTER + 1;
