@@ -143,10 +143,10 @@ static int open_builder(brick *b)
     return trip_list_builder_create(&b->builder, &p, b->in.budget);
 }
 
-static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
+static int reserve(void *user, unsigned thread, unsigned list, size_t bytes, void **memory)
 {
     const brick *b = user;
-    return trip_list_builder_reserve(b->builder, thread, list, bytes);
+    return trip_list_builder_reserve(b->builder, thread, list, bytes, memory);
 }
 
 static int open_splatter(brick *b)

@@ -253,9 +253,9 @@ TRIP_ALSO_V3 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_
 
 /* ---- pieces ---- */
 
-static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
+static int reserve(void *user, unsigned thread, unsigned list, size_t bytes, void **memory)
 {
-    return trip_list_builder_reserve(user, thread, list, bytes);
+    return trip_list_builder_reserve(user, thread, list, bytes, memory);
 }
 
 /* Begins a box of the voxels of a square, or of some one behind the other, none of which is marked
