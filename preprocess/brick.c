@@ -439,6 +439,9 @@ static int finish_output(brick *b)
                               text };
     int status = check_records(b);
     if (status == 0)
+        status =
+            trip_brick_temporary_note_output(&b->temporary, &b->in, trip_writer_folder(b->writer));
+    if (status == 0)
         status = trip_writer_finish(b->writer, &s);
     if (status == 0)
         b->writer = NULL;
@@ -484,7 +487,9 @@ static int prepare(brick *b)
 
 static int make(brick *b)
 {
-    int status = trip_brick_input_needs_scan(&b->in) ? scan(b) : 0;
+    int status = b->params->resume ? trip_folder_check(b->params->output, b->params->replace) : 0;
+    if (status == 0 && trip_brick_input_needs_scan(&b->in))
+        status = scan(b);
     if (status == 0)
         status = trip_brick_input_make_envelope(&b->in);
     if (status < 0)
