@@ -588,6 +588,47 @@ static void another_input_or_other_parameters_are_not_gone_on_with(void **state)
     assert_false(s.resumed);
 }
 
+/* Another file takes the name, with the same bytes: it has another inode. */
+static void replace_file(const char *name, const void *data, size_t size)
+{
+    test_write("new", data, size);
+    assert_int_equal(rename(test_path("new"), test_path(name)), 0);
+}
+
+/* The file that is named as the input stays as it is. */
+static void other_data_files_are_not_gone_on_with(void **state)
+{
+    (void)state;
+    static const char header[] = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 97 70 61\n"
+                                 "encoding: raw\ndata file: v.raw\n";
+    char input[128], files[128], places[512] = "";
+    trip_brick_params p = params_for("uint8", "a.trip");
+    trip_brick_summary s;
+    make_bytes();
+    for (int z = 0, used = 0; z < NZ; z++)
+        used += snprintf(places + used, sizeof places - (size_t)used, "%d\n", z * z);
+    test_write("v.nhdr", header, sizeof header - 1);
+    test_write("z.txt", places, strlen(places));
+    strcpy(input, test_path("v.nhdr"));
+    snprintf(files, sizeof files, ",,%s", test_path("z.txt"));
+    p.input = input;
+    p.volume = (trip_volume_params){ .coordinates = files };
+    p.keep_all = true;
+    p.slices = 4;
+    for (int i = 0; i < 2; i++) {
+        p.resume = false;
+        test_report[0] = 0;
+        run_killed(p, &(killer){ "read", 0.5 });
+        if (i == 0)
+            replace_file("v.raw", bytes, sizeof bytes);
+        else
+            replace_file("z.txt", places, strlen(places));
+        p.resume = true;
+        assert_true(trip_brick(&p, &s) < 0);
+        assert_non_null(strstr(test_report, "another input or other options"));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -625,6 +666,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(an_existing_data_set_stays_unless_it_is_to_be_replaced,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(killed_runs_go_on_and_end_in_the_same_bytes, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(other_data_files_are_not_gone_on_with, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(another_input_or_other_parameters_are_not_gone_on_with,
                                         test_begin, test_end),
