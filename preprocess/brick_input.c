@@ -19,15 +19,6 @@ static uint64_t count_voxels(const int64_t dims[3])
     return voxels;
 }
 
-static int check_dims(const trip_brick_input *in)
-{
-    for (int a = 0; a < 3; a++)
-        if (in->info->dims[a] > 1 << 24)
-            return trip_fail(TRIP_ERROR, "brick", in->params->input,
-                             "more than 16777216 voxels along an axis");
-    return 0;
-}
-
 static int set_region(trip_brick_input *in)
 {
     in->region = in->params->region;
@@ -81,7 +72,7 @@ static int open_volume(trip_brick_input *in)
         return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");
     trip_tally_clear(in->tally);
     in->memory_bytes = trip_budget_left_bytes(in->budget);
-    status = check_dims(in);
+    status = trip_volume_check_axes(p->input, in->info);
     return status == 0 ? set_region(in) : status;
 }
 

@@ -192,6 +192,15 @@ int trip_volume_check_dims(const char *path, const trip_volume_info *info)
                      info->dims[1], info->dims[2]);
 }
 
+int trip_volume_check_axes(const char *path, const trip_volume_info *info)
+{
+    for (int a = 0; a < 3; a++)
+        if (info->dims[a] > TRIP_VOLUME_AXIS_MOST)
+            return trip_fail(TRIP_ERROR, "read", path, "more than %" PRId64 " voxels along an axis",
+                             TRIP_VOLUME_AXIS_MOST);
+    return 0;
+}
+
 static int check_info(const trip_volume *v)
 {
     const trip_volume_info *info = &v->info;
