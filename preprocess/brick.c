@@ -108,7 +108,6 @@ static int open_writer(brick *b)
 {
     trip_writer_list lists[6 * (TRIP_LEVELS_MOST + 1)];
     b->coordinates = trip_brick_coordinates(&b->in);
-    const int levels = trip_coordinates_uneven(&b->coordinates) ? -1 : b->params->levels;
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
                              .code_bytes = b->codes.code_bytes,
@@ -119,7 +118,7 @@ static int open_writer(brick *b)
                              .coordinates = &b->coordinates,
                              .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
-    b->levels = trip_levels_count(p.dims, levels, 1u << b->format.tile_log2);
+    b->levels = trip_levels_count(p.dims, trip_brick_levels(&b->in), 1u << b->format.tile_log2);
     b->kinds = trip_levels_kinds(b->params->levels_for, b->format.halo);
     p.lists = lists;
     p.list_count =

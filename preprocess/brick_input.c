@@ -41,6 +41,21 @@ trip_coordinates trip_brick_coordinates(const trip_brick_input *in)
         along[0] ? (const double *const[3]){ along[0], along[1], along[2] } : NULL, in->info->dims);
 }
 
+int trip_brick_levels(const trip_brick_input *in)
+{
+    return in->info->coordinates[0] ? -1 : in->params->levels;
+}
+
+/* What was asked for and cannot be made is not left out. */
+static int check_levels(const trip_brick_input *in)
+{
+    if (in->params->levels <= 0 || trip_brick_levels(in) == in->params->levels)
+        return 0;
+    return trip_fail(TRIP_USAGE, "brick", in->params->input,
+                     "its voxels lie at uneven distances, and such grids have no coarse levels: "
+                     "leave out --levels");
+}
+
 trip_piece_format trip_brick_format(const trip_brick_params *p)
 {
     return (trip_piece_format){ .tile_log2 =
@@ -73,6 +88,8 @@ static int open_volume(trip_brick_input *in)
     trip_tally_clear(in->tally);
     in->memory_bytes = trip_budget_left_bytes(in->budget);
     status = trip_volume_check_axes(p->input, in->info);
+    if (status == 0)
+        status = check_levels(in);
     return status == 0 ? set_region(in) : status;
 }
 

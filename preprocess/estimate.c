@@ -148,10 +148,11 @@ static double piece_bytes(const trip_piece_format *f, unsigned list)
 }
 
 /* Bytes of all levels over those of the finest. */
-static double with_levels(const trip_brick_params *p, const int64_t dims[3], unsigned tile_voxels)
+static double with_levels(const trip_brick_input *in, unsigned tile_voxels)
 {
+    const trip_brick_params *p = in->params;
     const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
-    if (trip_levels_count(dims, p->levels, tile_voxels) == 0)
+    if (trip_levels_count(in->info->dims, trip_brick_levels(in), tile_voxels) == 0)
         return 1;
     return 1 + kinds.means * means_part + kinds.values * values_part;
 }
@@ -167,7 +168,7 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     e->bytes = (uint64_t)(3 *
                           ((double)e->kept * (mask_bytes + code + normal) +
                            (double)e->halo * (halo_mask_bytes + code)) *
-                          with_levels(in->params, in->info->dims, 1u << format->tile_log2));
+                          with_levels(in, 1u << format->tile_log2));
     e->temporary_bytes = pieces > 0.9 * (double)plan->list_bytes ? (uint64_t)pieces : 0;
     e->free_bytes = free_bytes(in->params->output);
 }
