@@ -301,7 +301,7 @@ int trip_brick_input_make_envelope(trip_brick_input *in)
 {
     const trip_brick_params *p = in->params;
     int status = is_envelope_automatic(p) ? add_automatic(in) : 0;
-    if (p->keep_all)
+    if (p->keep_all && status == 0)
         status = trip_envelope_add_all(&in->envelope);
     for (size_t i = 0; i < p->range_count && status == 0; i++)
         status = trip_envelope_add_range(&in->envelope, p->ranges[i].lo, p->ranges[i].hi);

@@ -129,8 +129,8 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
     }
     return trip_fail(TRIP_ERROR, "read", path,
                      "neither its content nor its name is of a known format (VDB, NRRD, NIfTI, "
-                     ".vol, images); for raw data, `triptych brick FILE --size X,Y,Z --type uint8` "
-                     "says what it is");
+                     "netCDF, .vol, images); for raw data, `triptych brick FILE --size X,Y,Z "
+                     "--type uint8` says what it is");
 }
 
 /* Sets the lengths of the index axes in world space and keeps their directions. */
