@@ -159,5 +159,7 @@ static inline unsigned trip_voxel_code(uint32_t voxel)
 
 /* Interleaves the bits of u (even) and v (odd). */
 uint64_t trip_morton(uint32_t u, uint32_t v);
+/* The even bits of a code side by side, which are its u; those of code >> 1 are its v. */
+uint32_t trip_morton_even(uint64_t code);
 
 #endif
