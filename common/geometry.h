@@ -19,6 +19,10 @@ typedef struct trip_affine {
     double m[3][4];
 } trip_affine;
 
+/* Voxels of these lengths in the world can be drawn: extinctions are floats per world unit. */
+#define TRIP_VOXEL_WORLD_LEAST 1e-32
+#define TRIP_VOXEL_WORLD_MOST 1e32
+
 static inline trip_vec3 trip_v3(double x, double y, double z)
 {
     return (trip_vec3){ x, y, z };

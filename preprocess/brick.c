@@ -108,7 +108,6 @@ static int open_writer(brick *b)
 {
     trip_writer_list lists[6 * (TRIP_LEVELS_MOST + 1)];
     b->coordinates = trip_brick_coordinates(&b->in);
-    const int levels = trip_coordinates_uneven(&b->coordinates) ? -1 : b->params->levels;
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
                              .code_bytes = b->codes.code_bytes,
@@ -119,7 +118,7 @@ static int open_writer(brick *b)
                              .coordinates = &b->coordinates,
                              .codes = trip_brick_codes_header(&b->codes) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
-    b->levels = trip_levels_count(p.dims, levels, 1u << b->format.tile_log2);
+    b->levels = trip_levels_count(p.dims, trip_brick_levels(&b->in), 1u << b->format.tile_log2);
     b->kinds = trip_levels_kinds(b->params->levels_for, b->format.halo);
     p.lists = lists;
     p.list_count =
@@ -143,10 +142,10 @@ static int open_builder(brick *b)
     return trip_list_builder_create(&b->builder, &p, b->in.budget);
 }
 
-static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
+static int reserve(void *user, unsigned thread, unsigned list, size_t bytes, void **memory)
 {
     const brick *b = user;
-    return trip_list_builder_reserve(b->builder, thread, list, bytes);
+    return trip_list_builder_reserve(b->builder, thread, list, bytes, memory);
 }
 
 static int open_splatter(brick *b)
@@ -439,6 +438,9 @@ static int finish_output(brick *b)
                               text };
     int status = check_records(b);
     if (status == 0)
+        status =
+            trip_brick_temporary_note_output(&b->temporary, &b->in, trip_writer_folder(b->writer));
+    if (status == 0)
         status = trip_writer_finish(b->writer, &s);
     if (status == 0)
         b->writer = NULL;
@@ -484,7 +486,9 @@ static int prepare(brick *b)
 
 static int make(brick *b)
 {
-    int status = trip_brick_input_needs_scan(&b->in) ? scan(b) : 0;
+    int status = b->params->resume ? trip_folder_check(b->params->output, b->params->replace) : 0;
+    if (status == 0 && trip_brick_input_needs_scan(&b->in))
+        status = scan(b);
     if (status == 0)
         status = trip_brick_input_make_envelope(&b->in);
     if (status < 0)

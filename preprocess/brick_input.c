@@ -19,15 +19,6 @@ static uint64_t count_voxels(const int64_t dims[3])
     return voxels;
 }
 
-static int check_dims(const trip_brick_input *in)
-{
-    for (int a = 0; a < 3; a++)
-        if (in->info->dims[a] > 1 << 24)
-            return trip_fail(TRIP_ERROR, "brick", in->params->input,
-                             "more than 16777216 voxels along an axis");
-    return 0;
-}
-
 static int set_region(trip_brick_input *in)
 {
     in->region = in->params->region;
@@ -48,6 +39,21 @@ trip_coordinates trip_brick_coordinates(const trip_brick_input *in)
     double *const *along = in->info->coordinates;
     return trip_coordinates_make(
         along[0] ? (const double *const[3]){ along[0], along[1], along[2] } : NULL, in->info->dims);
+}
+
+int trip_brick_levels(const trip_brick_input *in)
+{
+    return in->info->coordinates[0] ? -1 : in->params->levels;
+}
+
+/* What was asked for and cannot be made is not left out. */
+static int check_levels(const trip_brick_input *in)
+{
+    if (in->params->levels <= 0 || trip_brick_levels(in) == in->params->levels)
+        return 0;
+    return trip_fail(TRIP_USAGE, "brick", in->params->input,
+                     "its voxels lie at uneven distances, and such grids have no coarse levels: "
+                     "leave out --levels");
 }
 
 trip_piece_format trip_brick_format(const trip_brick_params *p)
@@ -81,7 +87,9 @@ static int open_volume(trip_brick_input *in)
         return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");
     trip_tally_clear(in->tally);
     in->memory_bytes = trip_budget_left_bytes(in->budget);
-    status = check_dims(in);
+    status = trip_volume_check_axes(p->input, in->info);
+    if (status == 0)
+        status = check_levels(in);
     return status == 0 ? set_region(in) : status;
 }
 
@@ -293,7 +301,7 @@ int trip_brick_input_make_envelope(trip_brick_input *in)
 {
     const trip_brick_params *p = in->params;
     int status = is_envelope_automatic(p) ? add_automatic(in) : 0;
-    if (p->keep_all)
+    if (p->keep_all && status == 0)
         status = trip_envelope_add_all(&in->envelope);
     for (size_t i = 0; i < p->range_count && status == 0; i++)
         status = trip_envelope_add_range(&in->envelope, p->ranges[i].lo, p->ranges[i].hi);

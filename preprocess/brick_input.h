@@ -26,9 +26,11 @@ typedef struct trip_brick_input {
     trip_envelope envelope;
 } trip_brick_input;
 
-/* The format of pieces for these parameters, with `quantised` not set yet. */
 trip_coordinates trip_brick_coordinates(const trip_brick_input *in);
+/* The parameter of that name, but that grids with uneven spacing have no coarse levels. */
+int trip_brick_levels(const trip_brick_input *in);
 
+/* The format of pieces for these parameters, with `quantised` not set yet. */
 trip_piece_format trip_brick_format(const trip_brick_params *p);
 
 /* Opens the volume and loads the transfer functions. */

@@ -70,9 +70,19 @@ bool trip_brick_temporary_has_ordered(const trip_brick_temporary *t)
 
 bool trip_brick_temporary_is_done(const trip_brick_temporary *t, const trip_brick_params *params)
 {
+    const trip_journal_output *output = trip_journal_get_output(t->journal);
     struct stat st;
-    return params->resume && !params->replace && trip_journal_get_start(t->journal) &&
-           stat(params->output, &st) == 0;
+    return output && !params->replace && stat(params->output, &st) == 0 &&
+           st.st_dev == output->device && st.st_ino == output->inode;
+}
+
+int trip_brick_temporary_note_output(trip_brick_temporary *t, const trip_brick_input *in,
+                                     int folder)
+{
+    struct stat st;
+    if (fstat(folder, &st) < 0)
+        return trip_fail_errno("brick", in->params->output, "cannot look at its folder");
+    return trip_journal_write_output(t->journal, &(trip_journal_output){ st.st_dev, st.st_ino });
 }
 
 int trip_brick_temporary_begin(trip_brick_temporary *t, const trip_brick_input *in)

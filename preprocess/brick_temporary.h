@@ -27,11 +27,16 @@ int trip_brick_temporary_open(trip_brick_temporary *t, const trip_brick_input *i
 
 /* Whether the interrupted run spilled pieces of the ordered list. */
 bool trip_brick_temporary_has_ordered(const trip_brick_temporary *t);
-/* Whether the interrupted run had completed its output, and only temporary files are left. */
+/* Whether the interrupted run had completed its output, which is still there, and only temporary
+ * files are left. Another data set of that name is none of this run's. */
 bool trip_brick_temporary_is_done(const trip_brick_temporary *t, const trip_brick_params *params);
 
 /* Begins the journal of a new run; that of a resumed one has begun. */
 int trip_brick_temporary_begin(trip_brick_temporary *t, const trip_brick_input *in);
+
+/* To be called when `folder`, of which this is a descriptor, is about to become the output. */
+int trip_brick_temporary_note_output(trip_brick_temporary *t, const trip_brick_input *in,
+                                     int folder);
 
 /* Decides, from the run's status, what remains after closing. Files remain for a run with `resume`
  * that was interrupted, and the partial data set's ordered list is moved to them; other runs that

@@ -190,6 +190,11 @@ static void add_source_options(cJSON *root, const trip_brick_params *p)
         add_option(options, "--tile=%u", p->tile_voxels);
     if (p->slab_sheets)
         add_option(options, "--slab-sheets=%u", p->slab_sheets);
+    if (p->levels)
+        add_option(options, "--levels=%d", p->levels > 0 ? p->levels : 0);
+    static const char *const levels_for[] = { NULL, "post", "pre", "both" };
+    if (p->levels_for && p->levels >= 0)
+        add_option(options, "--levels-for=%s", levels_for[p->levels_for]);
 }
 
 static const char *base_name(const char *path)

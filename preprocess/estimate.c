@@ -85,26 +85,38 @@ static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick
     e->halo = in->params->no_halo ? 0 : (uint64_t)(3 * scale * (double)t->borders);
 }
 
-/* Estimates the numbers of voxels from portions at regular distances in the volume, for at most
- * `limit_seconds` (0: no limit); the input's envelope is made. 1: *e has the numbers; 0: it took
- * too long. */
-static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
-                         double *skip_seconds, trip_brick_estimate *e)
+/* Seconds that all of the volume takes, after a scan from `begin` on into a tally, which took
+ * `skipping` of them to get past the rest. */
+static double seconds_for_all(const trip_brick_input *in, const trip_tally *t, double begin,
+                              double skipping)
 {
-    sampling s = { in, limit_seconds > 0 ? now_seconds() + limit_seconds : INFINITY };
+    double part = in->info->sparse ? 1 : (double)t->voxels / (double)in->grid_voxels;
+    return (now_seconds() - begin - skipping) / part + skipping;
+}
+
+/* Estimates the numbers of voxels from portions at regular distances in the volume, for at most
+ * `limit_seconds` (0: no limit), and adds the seconds that all of it takes to the estimate; the
+ * input's envelope is made. 1: *e has the numbers; 0: it took too long. */
+static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
+                         trip_brick_estimate *e)
+{
+    double begin = now_seconds(), skipping = 0;
+    sampling s = { in, limit_seconds > 0 ? begin + limit_seconds : INFINITY };
     const trip_scan_params scan = { .slices = slices_of(plan),
                                     .read_ahead = plan->read_ahead,
                                     .stride = stride_of(in, plan),
                                     .envelope = &in->envelope,
                                     .progress = on_progress,
                                     .user = &s,
-                                    .skip_seconds = skip_seconds };
+                                    .skip_seconds = &skipping };
     trip_tally *t = trip_budget_take(in->budget, sizeof *t);
     if (!t)
         return trip_fail(TRIP_ERROR, "brick", in->params->input, "needs more --memory");
     int status = trip_scan_volume(t, in->volume, in->params->input, in->workers, &scan, in->budget);
-    if (status == 0)
+    if (status == 0) {
         scale_up(in, t, e);
+        e->seconds += seconds_for_all(in, t, begin, skipping);
+    }
     trip_budget_release(in->budget, t, sizeof *t);
     if (status == STOPPED)
         return trip_volume_rewind(in->volume);
@@ -136,10 +148,11 @@ static double piece_bytes(const trip_piece_format *f, unsigned list)
 }
 
 /* Bytes of all levels over those of the finest. */
-static double with_levels(const trip_brick_params *p, const int64_t dims[3], unsigned tile_voxels)
+static double with_levels(const trip_brick_input *in, unsigned tile_voxels)
 {
+    const trip_brick_params *p = in->params;
     const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
-    if (trip_levels_count(dims, p->levels, tile_voxels) == 0)
+    if (trip_levels_count(in->info->dims, trip_brick_levels(in), tile_voxels) == 0)
         return 1;
     return 1 + kinds.means * means_part + kinds.values * values_part;
 }
@@ -155,7 +168,7 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     e->bytes = (uint64_t)(3 *
                           ((double)e->kept * (mask_bytes + code + normal) +
                            (double)e->halo * (halo_mask_bytes + code)) *
-                          with_levels(in->params, in->info->dims, 1u << format->tile_log2));
+                          with_levels(in, 1u << format->tile_log2));
     e->temporary_bytes = pieces > 0.9 * (double)plan->list_bytes ? (uint64_t)pieces : 0;
     e->free_bytes = free_bytes(in->params->output);
 }
@@ -180,32 +193,38 @@ static double seconds_per_byte(const char *output)
     return seconds;
 }
 
+/* In place of the scan of all values that precedes a run. */
+static int scan_sample(trip_brick_input *in, const trip_memory_plan *plan, trip_brick_estimate *e)
+{
+    double begin = now_seconds(), skipping = 0;
+    int status = trip_brick_input_scan(in, (trip_scan_params){ .slices = slices_of(plan),
+                                                               .read_ahead = plan->read_ahead,
+                                                               .stride = stride_of(in, plan),
+                                                               .skip_seconds = &skipping });
+    if (status == 0)
+        e->seconds += seconds_for_all(in, in->tally, begin, skipping);
+    return status;
+}
+
 static int estimate(trip_brick_input *in, trip_brick_estimate *e)
 {
     const trip_brick_params *p = in->params;
     trip_piece_format format = trip_brick_format(p);
     trip_memory_plan plan;
-    bool scan = trip_brick_input_needs_scan(in);
-    double begin = now_seconds(), skipping = 0;
     format.quantised = trip_brick_will_be_quantised(in);
     int status =
         trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
                               in->memory_bytes, p->slices);
-    if (status == 0 && scan)
-        status = trip_brick_input_scan(in, (trip_scan_params){ .slices = slices_of(&plan),
-                                                               .read_ahead = plan.read_ahead,
-                                                               .stride = stride_of(in, &plan),
-                                                               .skip_seconds = &skipping });
+    if (status == 0 && trip_brick_input_needs_scan(in))
+        status = scan_sample(in, &plan, e);
     if (status == 0)
         status = trip_brick_input_make_envelope(in);
     if (status == 0)
-        status = estimate_kept(in, &plan, 0, &skipping, e);
+        status = estimate_kept(in, &plan, 0, e);
     if (status < 0)
         return status;
-    double sampling_seconds = now_seconds() - begin - skipping;
-    double all = sampling_seconds * (double)stride_of(in, &plan) + skipping;
     estimate_sizes(in, &format, &plan, e);
-    e->seconds = all + (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
+    e->seconds += (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
     return 0;
 }
 
@@ -231,7 +250,7 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
         return 0;
     double seconds = check_seconds + check_seconds_per_voxel * (double)in->grid_voxels;
     bool all = in->params->keep_all && !in->info->sparse;
-    int status = all ? 1 : estimate_kept(in, plan, seconds, NULL, &e);
+    int status = all ? 1 : estimate_kept(in, plan, seconds, &e);
     if (status <= 0)
         return status;
     estimate_sizes(in, format, plan, &e);

@@ -3,26 +3,16 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/stat.h>
 #include <xxhash.h>
 
 #include "format.h"
 #include "levels.h"
 #include "report.h"
+#include "source.h"
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 13 };
-
-/* A file is identified by its name, length and time of change, a pattern by its text. */
-static void write_input(FILE *f, const trip_brick_params *p)
-{
-    struct stat st = { 0 };
-    if (stat(p->input, &st) != 0)
-        st.st_size = 0;
-    fprintf(f, "%s %jd %jd %ld\n", p->input, (intmax_t)st.st_size, (intmax_t)st.st_mtim.tv_sec,
-            st.st_mtim.tv_nsec);
-}
+enum { BRICKER_VERSION = 14 };
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
@@ -55,23 +45,40 @@ static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *fu
     }
 }
 
+static int fail_memory(const trip_brick_params *p)
+{
+    return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
+}
+
+/* The parameters after the input's name, for free(). */
+static int make_text(const trip_brick_params *p, const char *input, trip_tf *const *functions,
+                     char **out)
+{
+    size_t bytes;
+    FILE *f = open_memstream(out, &bytes);
+    if (!f)
+        return fail_memory(p);
+    fputs(input, f);
+    write_volume_params(f, &p->volume);
+    write_params(f, p, functions);
+    return fclose(f) == 0 ? 0 : fail_memory(p);
+}
+
 int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, uint64_t *out)
 {
+    trip_source source = { 0 };
+    trip_digest state;
     char *text = NULL;
-    size_t bytes = 0;
-    FILE *f = open_memstream(&text, &bytes);
-    if (f) {
-        write_input(f, p);
-        write_volume_params(f, &p->volume);
-        write_params(f, p, functions);
-    }
-    if (!f || fclose(f) != 0) {
-        free(text);
-        return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
-    }
-    *out = XXH64(text, bytes, 0);
+    int status = make_text(p, p->input, functions, &text);
+    if (status == 0)
+        status = trip_source_find(&source, p->input, &p->volume);
+    if (status == 0)
+        status = trip_source_digest_state(&source, text, &state);
+    if (status == 0)
+        *out = XXH64(state.text, sizeof state.text, 0);
+    trip_source_free(&source);
     free(text);
-    return 0;
+    return status;
 }
 
 static int load_functions(const trip_brick_params *p, trip_tf **functions)
@@ -82,23 +89,12 @@ static int load_functions(const trip_brick_params *p, trip_tf **functions)
     return status;
 }
 
-static int fail_memory(const trip_brick_params *p)
-{
-    return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
-}
-
 int trip_brick_options_text(const trip_brick_params *p, char **out)
 {
-    size_t bytes;
     trip_tf **functions = calloc(p->function_count + 1, sizeof *functions);
     int status = functions ? load_functions(p, functions) : fail_memory(p);
-    FILE *f = status == 0 ? open_memstream(out, &bytes) : NULL;
-    if (f) {
-        write_volume_params(f, &p->volume);
-        write_params(f, p, functions);
-    }
-    if (status == 0 && (!f || fclose(f) != 0))
-        status = fail_memory(p);
+    if (status == 0)
+        status = make_text(p, "", functions, out);
     for (size_t i = 0; functions && i < p->function_count; i++)
         trip_tf_destroy(functions[i]);
     free(functions);

@@ -18,7 +18,7 @@
 /* A record is never longer: no checkpoint adds that many sequences. */
 enum { RUN_BUFFER = 4096, RECORD_MOST_BYTES = 4 << 20 };
 
-enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2 };
+enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2, RECORD_OUTPUT = 3 };
 
 /* Precedes every record. That of a checkpoint ends with its new sequences. */
 typedef struct record_head {
@@ -33,9 +33,10 @@ struct trip_journal {
     trip_budget *budget;
     int file, runs_file;
     uint64_t offset; /* end of the valid records */
-    bool has_start, has_checkpoint;
+    bool has_start, has_checkpoint, has_output;
     trip_journal_start start;
     trip_checkpoint checkpoint;
+    trip_journal_output output;
     uint64_t recorded; /* sequences in the journal so far */
     uint64_t runs, ordered_splats;
     trip_run_record buffer[RUN_BUFFER];
@@ -205,14 +206,32 @@ static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *recor
     return taken;
 }
 
+/* It is the last record, and is cut off: a run that goes on has another output. */
+static int take_output(trip_journal *j, const void *record, uint64_t bytes)
+{
+    if (bytes != sizeof j->output)
+        return fail_false(j, "a record");
+    memcpy(&j->output, record, sizeof j->output);
+    j->has_output = true;
+    return 0;
+}
+
+static int take_record(trip_journal *j, trip_spill *spill, const record_head *head,
+                       const void *record)
+{
+    if (head->kind == RECORD_CHECKPOINT)
+        return take_checkpoint(j, spill, record, head->bytes);
+    return head->kind == RECORD_OUTPUT ? take_output(j, record, head->bytes)
+                                       : fail_false(j, "a record");
+}
+
 /* Reads checkpoints until one is cut off or needs data that are not there. */
 static int read_checkpoints(trip_journal *j, trip_spill *spill, void *record)
 {
     record_head head;
     int taken = 1;
     while (taken == 1 && read_record(j, j->offset, &head, record)) {
-        taken = head.kind == RECORD_CHECKPOINT ? take_checkpoint(j, spill, record, head.bytes)
-                                               : fail_false(j, "a record");
+        taken = take_record(j, spill, &head, record);
         if (taken == 1)
             j->offset += sizeof head + head.bytes;
     }
@@ -304,6 +323,11 @@ const trip_checkpoint *trip_journal_get_checkpoint(const trip_journal *j)
     return j->has_checkpoint ? &j->checkpoint : NULL;
 }
 
+const trip_journal_output *trip_journal_get_output(const trip_journal *j)
+{
+    return j->has_output ? &j->output : NULL;
+}
+
 int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_record *runs,
                            size_t count)
 {
@@ -363,4 +387,9 @@ int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const tri
         status = append_record(j, RECORD_CHECKPOINT, record, bytes);
     free(record);
     return status;
+}
+
+int trip_journal_write_output(trip_journal *j, const trip_journal_output *output)
+{
+    return append_record(j, RECORD_OUTPUT, output, sizeof *output);
 }

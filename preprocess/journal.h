@@ -27,6 +27,11 @@ typedef struct trip_checkpoint {
     trip_tally tally;                    /* of that part's values, unless scanned */
 } trip_checkpoint;
 
+/* Written before the data set takes its name: the folder that does. */
+typedef struct trip_journal_output {
+    uint64_t device, inode;
+} trip_journal_output;
+
 /* One run of the ordered list. */
 typedef struct trip_run_record {
     uint64_t key;
@@ -57,9 +62,10 @@ int trip_journal_open(trip_journal **out, trip_spill *spill, const trip_journal_
 void trip_journal_close(trip_journal *j);
 
 /* The records read back or written; NULL where there is none. The checkpoint is the last one that
- * was read back. */
+ * was read back, and the output is one that was. */
 const trip_journal_start *trip_journal_get_start(const trip_journal *j);
 const trip_checkpoint *trip_journal_get_checkpoint(const trip_journal *j);
+const trip_journal_output *trip_journal_get_output(const trip_journal *j);
 /* Reads back `count` runs from number `index` on, of those up to the checkpoint. */
 int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_record *runs,
                            size_t count);
@@ -68,5 +74,7 @@ int trip_journal_write_start(trip_journal *j, const trip_journal_start *start);
 int trip_journal_add_run(trip_journal *j, const trip_run_record *run);
 /* Fills in sequences, runs and ordered_splats; the caller fills the rest. */
 int trip_journal_write_checkpoint(trip_journal *j, trip_checkpoint *c, const trip_spill *spill);
+/* The last record. */
+int trip_journal_write_output(trip_journal *j, const trip_journal_output *output);
 
 #endif

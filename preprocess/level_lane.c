@@ -253,9 +253,9 @@ TRIP_ALSO_V3 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_
 
 /* ---- pieces ---- */
 
-static void *reserve(void *user, unsigned thread, unsigned list, size_t bytes)
+static int reserve(void *user, unsigned thread, unsigned list, size_t bytes, void **memory)
 {
-    return trip_list_builder_reserve(user, thread, list, bytes);
+    return trip_list_builder_reserve(user, thread, list, bytes, memory);
 }
 
 /* Begins a box of the voxels of a square, or of some one behind the other, none of which is marked
@@ -265,11 +265,9 @@ static void begin_squares(trip_level_lane *l, const trip_level_work *w, uint64_t
 {
     const int64_t edge = (int64_t)1 << w->edge_log2;
     const int64_t size[3] = { edge, edge, sheets };
-    int64_t lo[3] = { 0, 0, (int64_t)sheet };
-    for (int bit = 0; bit < TRIP_TILE_MORTON_BITS; bit++)
-        lo[bit % 2] |= (int64_t)(morton >> bit & 1) << bit / 2;
-    lo[0] <<= w->edge_log2;
-    lo[1] <<= w->edge_log2;
+    const int64_t lo[3] = { (int64_t)trip_morton_even(morton) << w->edge_log2,
+                            (int64_t)trip_morton_even(morton >> 1) << w->edge_log2,
+                            (int64_t)sheet };
     trip_splat_box_begin(&l->box, lo, size);
 }
 

@@ -111,10 +111,8 @@ static const trip_level_place *find_place(const trip_level_places *p, uint64_t k
 
 int64_t trip_level_key_square(uint64_t key, int axis)
 {
-    int64_t n = 0;
-    for (int bit = 0; bit < TRIP_TILE_MORTON_BITS / 2; bit++)
-        n |= (int64_t)(key >> (2 * bit + axis) & 1) << bit;
-    return n;
+    const uint64_t morton = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
+    return trip_morton_even(morton >> axis);
 }
 
 trip_level_place trip_level_place_beside(const trip_level_places *p, uint64_t key, int64_t u,

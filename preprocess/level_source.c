@@ -13,23 +13,14 @@ typedef struct square_header {
 } square_header;
 static_assert(sizeof(square_header) == TRIP_LEVEL_SQUARE_BYTES, "what precedes voxels");
 
-/* Every second bit of a Morton code, from bit 0. */
-static int64_t even_bits(uint64_t m)
-{
-    int64_t n = 0;
-    for (int bit = 0; bit < TRIP_TILE_MORTON_BITS / 2; bit++)
-        n |= (int64_t)(m >> 2 * bit & 1) << bit;
-    return n;
-}
-
 /* Says of the square that it is at, of a sheet and a Morton code, where in the next level it is. */
 static void place(trip_level_source *s, uint64_t sheet, uint64_t morton)
 {
     unsigned up = s->edge_log2 + 1 - s->tile_log2;
     uint64_t within = morton & ((UINT64_C(1) << 2 * up) - 1);
     s->key = sheet >> 1 << TRIP_TILE_MORTON_BITS | morton >> 2 * up;
-    s->u = even_bits(within) << s->tile_log2;
-    s->v = even_bits(within >> 1) << s->tile_log2;
+    s->u = (int64_t)trip_morton_even(within) << s->tile_log2;
+    s->v = (int64_t)trip_morton_even(within >> 1) << s->tile_log2;
     s->has = true;
 }
 

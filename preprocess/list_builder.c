@@ -159,8 +159,8 @@ static uint32_t spillable(const trip_list_builder *b)
     return chunks;
 }
 
-/* Under the lock: waits for a free chunk; TRIP_NO_CHUNK on failure. */
-static uint32_t take_chunk(trip_list_builder *b)
+/* Under the lock: waits for a free chunk. */
+static int take_chunk(trip_list_builder *b, uint32_t *chunk)
 {
     while (b->pool.free.first == TRIP_NO_CHUNK && b->status == 0) {
         if (b->jobs == 0 && spillable(b) == 0)
@@ -171,7 +171,9 @@ static uint32_t take_chunk(trip_list_builder *b)
         else
             pthread_cond_wait(&b->freed, &b->lock);
     }
-    return b->status < 0 ? TRIP_NO_CHUNK : trip_chain_pop(&b->pool, &b->pool.free);
+    if (b->status == 0)
+        *chunk = trip_chain_pop(&b->pool, &b->pool.free);
+    return b->status;
 }
 
 /* Under the lock. */
@@ -189,29 +191,31 @@ static void close_list(trip_list_builder *b, unsigned list)
         close_chunk(b, i, list);
 }
 
-static uint32_t open_chunk(trip_list_builder *b, unsigned producer, unsigned list)
+static int open_chunk(trip_list_builder *b, unsigned producer, unsigned list)
 {
+    uint32_t *chunk = &b->open[producer][list];
     pthread_mutex_lock(&b->lock);
     close_chunk(b, producer, list);
-    uint32_t chunk = take_chunk(b);
+    int status = take_chunk(b, chunk);
     pthread_mutex_unlock(&b->lock);
-    if (chunk != TRIP_NO_CHUNK)
-        b->pool.chunks[chunk].used_bytes = 0;
-    return b->open[producer][list] = chunk;
+    if (status == 0)
+        b->pool.chunks[*chunk].used_bytes = 0;
+    return status;
 }
 
-void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned list,
-                                size_t bytes)
+int trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned list, size_t bytes,
+                              void **memory)
 {
-    uint32_t chunk = b->open[producer][list];
+    const uint32_t *chunk = &b->open[producer][list];
+    int status = 0;
     assert(bytes <= b->pool.chunk_bytes);
-    if (chunk == TRIP_NO_CHUNK || b->pool.chunks[chunk].used_bytes + bytes > b->pool.chunk_bytes)
-        chunk = open_chunk(b, producer, list);
-    if (chunk == TRIP_NO_CHUNK)
-        return NULL;
-    void *at = trip_chunk_memory(&b->pool, chunk) + b->pool.chunks[chunk].used_bytes;
-    b->pool.chunks[chunk].used_bytes += (uint32_t)bytes;
-    return at;
+    if (*chunk == TRIP_NO_CHUNK || b->pool.chunks[*chunk].used_bytes + bytes > b->pool.chunk_bytes)
+        status = open_chunk(b, producer, list);
+    if (status < 0)
+        return status;
+    *memory = trip_chunk_memory(&b->pool, *chunk) + b->pool.chunks[*chunk].used_bytes;
+    b->pool.chunks[*chunk].used_bytes += (uint32_t)bytes;
+    return 0;
 }
 
 /* Under the lock. A spill is due when half of the memory is full, so that producers can fill the

@@ -46,11 +46,11 @@ void trip_list_builder_destroy(trip_list_builder *b);
  * batch. */
 trip_list_output *trip_list_builder_ordered(trip_list_builder *b);
 
-/* Memory for a piece of a list, aligned to 8 bytes; the piece has to be complete before the same
- * producer reserves again or the batch ends. Waits until there is memory. NULL after a failure,
- * which was reported. */
-void *trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned list,
-                                size_t bytes);
+/* *memory becomes room for a piece of a list, aligned to 8 bytes; the piece has to be complete
+ * before the same producer reserves again or the batch ends. Waits until there is memory. After a
+ * failure of the builder's own thread, which was reported, returns its status. */
+int trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned list, size_t bytes,
+                              void **memory);
 
 /* Ends a batch: all its pieces are complete, and no producer is active. `done` is the fraction of
  * the volume read so far. Returns 1 when trip_list_builder_spill() is due, 0 or a negative status.

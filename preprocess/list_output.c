@@ -2,6 +2,7 @@
 
 #include <stdatomic.h>
 
+#include "format.h"
 #include "report.h"
 
 /* An interruption is noticed after this many pieces. */
@@ -20,23 +21,13 @@ void trip_list_output_destroy(trip_list_output *o)
     o->builder = NULL;
 }
 
-/* Every second bit of a Morton code, from bit 0. */
-static uint32_t even_bits(uint64_t m)
-{
-    m &= UINT64_C(0x5555555555555555);
-    m = (m | m >> 1) & UINT64_C(0x3333333333333333);
-    m = (m | m >> 2) & UINT64_C(0x0f0f0f0f0f0f0f0f);
-    m = (m | m >> 4) & UINT64_C(0x00ff00ff00ff00ff);
-    m = (m | m >> 8) & UINT64_C(0x0000ffff0000ffff);
-    return (uint32_t)(m | m >> 16);
-}
-
 int trip_list_output_append(trip_list_output *o, uint64_t key, const uint32_t *voxels,
                             const uint32_t *normals, uint32_t splats)
 {
     uint64_t tile = key & ((UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1);
     int status = trip_writer_append(o->writer, o->list, (uint32_t)(key >> TRIP_TILE_MORTON_BITS),
-                                    even_bits(tile), even_bits(tile >> 1), voxels, normals, splats);
+                                    trip_morton_even(tile), trip_morton_even(tile >> 1), voxels,
+                                    normals, splats);
     atomic_fetch_add_explicit(&o->splats, splats, memory_order_relaxed);
     return status;
 }

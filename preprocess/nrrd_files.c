@@ -67,6 +67,11 @@ static bool split_pattern(char *pattern, int *width, bool *zeros, char **tail)
     return true;
 }
 
+static bool has_32_bits(int64_t n)
+{
+    return n >= -INT32_MAX && n <= INT32_MAX;
+}
+
 /* "PATTERN min max step [axes in each file]" */
 static int parse_pattern(const trip_nrrd_parser *p, trip_nrrd_header *h)
 {
@@ -77,7 +82,7 @@ static int parse_pattern(const trip_nrrd_parser *p, trip_nrrd_header *h)
     bool zeros;
     if (!split_pattern(pattern, &width, &zeros, &tail) || !trip_nrrd_parse_integer(&text, &from) ||
         !trip_nrrd_parse_integer(&text, &to) || !trip_nrrd_parse_integer(&text, &step) ||
-        step == 0 || llabs(from) > INT32_MAX || llabs(to) > INT32_MAX || llabs(step) > INT32_MAX ||
+        step == 0 || !has_32_bits(from) || !has_32_bits(to) || !has_32_bits(step) ||
         (*trip_nrrd_trim(text) && !trip_nrrd_parse_integer(&text, &each)) || *text)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE],
                               "\"data file\" with a %% must be \"name%%03d.raw first last step\"");

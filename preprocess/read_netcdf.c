@@ -391,20 +391,26 @@ static const variable *coordinates_of(const header *h, uint64_t dim)
     return NULL;
 }
 
+/* In pieces, between which an interruption is noticed. */
 static int read_coordinates(const header *h, int fd, const variable *v, double *values,
                             uint64_t count)
 {
+    unsigned char piece[PIECE_BYTES];
     const unsigned bytes = bytes_of(v);
     const uint64_t stride = has_records(h, v) ? h->record_bytes : bytes;
+    const uint64_t most = stride < sizeof piece ? sizeof piece / stride : 1;
     int status = 0;
-    for (uint64_t i = 0; i < count && !status; i++) {
-        unsigned char number[8];
+    for (uint64_t i = 0, n; i < count && !status; i += n) {
         uint64_t at;
+        n = count - i < most ? count - i : most;
         if (__builtin_mul_overflow(i, stride, &at) || __builtin_add_overflow(at, v->begin, &at) ||
             at > h->file_bytes)
             at = h->file_bytes;
-        status = read_at(fd, h->path, at, number, bytes);
-        values[i] = status ? 0 : v->slope * number_at(number, v->type) + v->inter;
+        status = trip_interrupted()
+                     ? trip_fail(TRIP_INTERRUPTED, "read", h->path, "interrupted")
+                     : read_at(fd, h->path, at, piece, (size_t)((n - 1) * stride + bytes));
+        for (uint64_t k = 0; k < n && !status; k++)
+            values[i + k] = v->slope * number_at(piece + k * stride, v->type) + v->inter;
     }
     return status;
 }
@@ -415,9 +421,12 @@ static int place_axis(const header *h, int fd, uint64_t dim, int axis, trip_volu
     const uint64_t count = (uint64_t)info->dims[axis];
     if (!v || count > h->file_bytes)
         return 0;
+    int status = trip_volume_check_axes(h->path, info);
+    if (status)
+        return status;
     double *values = calloc((size_t)count, sizeof *values);
-    int status = values ? read_coordinates(h, fd, v, values, count)
-                        : trip_fail(TRIP_ERROR, "read", h->path, "no memory for coordinates");
+    status = values ? read_coordinates(h, fd, v, values, count)
+                    : trip_fail(TRIP_ERROR, "read", h->path, "no memory for coordinates");
     if (!status)
         status = trip_volume_set_coordinates(info, axis, values, h->path);
     free(values);

@@ -84,11 +84,14 @@ static int open_variable(trip_helper_slices *s, const char *name, trip_image_net
 static int take_coordinates(trip_helper_slices *s, int axis, trip_volume_info *info)
 {
     const size_t bytes = (size_t)info->dims[axis] * sizeof(double);
+    int status = trip_volume_check_axes(s->path, info);
+    if (status < 0)
+        return status;
     double *values = trip_budget_take(s->budget, bytes);
     if (!values)
         return trip_fail(TRIP_ERROR, "read", s->path,
                          "its coordinates do not fit the memory given; raise --memory");
-    int status = trip_image_helper_receive(s->helper, values, bytes);
+    status = trip_image_helper_receive(s->helper, values, bytes);
     if (status == 0)
         status = trip_volume_set_coordinates(info, axis, values, s->path);
     trip_budget_release(s->budget, values, bytes);

@@ -333,12 +333,12 @@ static int check_tally(const trip_tally *t, const char *path)
     return 0;
 }
 
-static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *path,
-                     trip_workers *workers)
+static int walk_once(scan *s, trip_tally *out, trip_volume *volume, trip_workers *workers,
+                     uint64_t stride)
 {
     unsigned threads = trip_workers_count(workers);
     trip_walk_params walk = { .slices = s->params->slices,
-                              .stride = s->params->stride,
+                              .stride = stride,
                               .skip_seconds = s->params->skip_seconds,
                               .read_ahead = s->params->read_ahead,
                               .edge = SCAN_EDGE,
@@ -352,9 +352,16 @@ static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *
     int status = trip_walk(volume, workers, &walk);
     for (unsigned i = 0; i < threads; i++)
         trip_tally_add(out, &s->tallies[i]);
-    if (status == 0)
-        status = check_tally(out, path);
     return status == 0 ? trip_volume_rewind(volume) : status;
+}
+
+static int scan_with(scan *s, trip_tally *out, trip_volume *volume, const char *path,
+                     trip_workers *workers)
+{
+    int status = walk_once(s, out, volume, workers, s->params->stride);
+    if (status == 0 && out->finite == 0 && s->params->stride > 1)
+        status = walk_once(s, out, volume, workers, 1);
+    return status == 0 ? check_tally(out, path) : status;
 }
 
 int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, trip_workers *workers,

@@ -52,8 +52,9 @@ typedef struct trip_scan_params {
     double *skip_seconds; /* as in trip_walk_params */
 } trip_scan_params;
 
-/* Walks through the volume once and rewinds it. A volume without voxels or without a finite value
- * is a reported failure. */
+/* Walks through the volume once and rewinds it. Where a stride finds no finite value, all is read:
+ * a sample does not say that there is none. A volume without voxels or without a finite value is a
+ * reported failure. */
 int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, trip_workers *workers,
                      const trip_scan_params *params, trip_budget *budget);
 

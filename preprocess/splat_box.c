@@ -129,9 +129,10 @@ static int emit_piece(const trip_splat_box *c, const trip_piece_format *f, unsig
     uint32_t splats = gather_indices(c, trip_tile_words(f), t, indices);
     unsigned words = trip_piece_choose_words(f, splats, used);
     size_t bytes = trip_piece_layout(f, splats, words).bytes;
-    trip_piece *piece = sink->reserve(sink->user, sink->thread, list, bytes);
-    if (!piece)
-        return TRIP_ERROR;
+    void *piece;
+    int status = sink->reserve(sink->user, sink->thread, list, bytes, &piece);
+    if (status < 0)
+        return status;
     trip_piece_begin(piece, f, key_of(c, f->tile_log2, t), splats, words, t->bitmap);
     fill_piece(c, f, piece, indices, splats);
     return 0;

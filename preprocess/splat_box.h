@@ -31,9 +31,9 @@ typedef struct trip_splat_box {
     int64_t size[3];   /* of the box, in voxels */
 } trip_splat_box;
 
-/* Where pieces go: returns memory for one, aligned to 8 bytes, or NULL after a failure. */
+/* Where pieces go: *memory becomes room for one, aligned to 8 bytes. Returns a status. */
 typedef struct trip_piece_sink {
-    void *(*reserve)(void *user, unsigned thread, unsigned list, size_t bytes);
+    int (*reserve)(void *user, unsigned thread, unsigned list, size_t bytes, void **memory);
     void *user;
     unsigned thread;
 } trip_piece_sink;

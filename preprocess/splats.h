@@ -21,8 +21,8 @@ typedef struct trip_splat_params {
     const trip_compact_normals *compact;
     bool tally; /* count the values of all voxels, kept or not */
     unsigned threads;
-    /* Returns memory for a piece of a list, aligned to 8 bytes, or NULL after a failure. */
-    void *(*reserve)(void *user, unsigned thread, unsigned list, size_t bytes);
+    /* As in trip_piece_sink. */
+    int (*reserve)(void *user, unsigned thread, unsigned list, size_t bytes, void **memory);
     void *user;
 } trip_splat_params;
 

@@ -129,8 +129,8 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
     }
     return trip_fail(TRIP_ERROR, "read", path,
                      "neither its content nor its name is of a known format (VDB, NRRD, NIfTI, "
-                     ".vol, images); for raw data, `triptych brick FILE --size X,Y,Z --type uint8` "
-                     "says what it is");
+                     "netCDF, .vol, images); for raw data, `triptych brick FILE --size X,Y,Z "
+                     "--type uint8` says what it is");
 }
 
 /* Sets the lengths of the index axes in world space and keeps their directions. */
@@ -192,6 +192,29 @@ int trip_volume_check_dims(const char *path, const trip_volume_info *info)
                      info->dims[1], info->dims[2]);
 }
 
+int trip_volume_check_axes(const char *path, const trip_volume_info *info)
+{
+    for (int a = 0; a < 3; a++)
+        if (info->dims[a] > TRIP_VOLUME_AXIS_MOST)
+            return trip_fail(TRIP_ERROR, "read", path, "more than %" PRId64 " voxels along an axis",
+                             TRIP_VOLUME_AXIS_MOST);
+    return 0;
+}
+
+static int check_lengths(const trip_volume *v)
+{
+    const double(*m)[4] = v->info.index_to_world.m;
+    for (int a = 0; a < 3; a++) {
+        double length = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
+        if (!(length >= TRIP_VOXEL_WORLD_LEAST && length <= TRIP_VOXEL_WORLD_MOST))
+            return trip_fail(TRIP_ERROR, "read", v->path,
+                             "its voxels are %.3g world units long along %c, and %g to %g can be "
+                             "drawn; --spacing X,Y,Z may give the axes other lengths",
+                             length, "ijk"[a], TRIP_VOXEL_WORLD_LEAST, TRIP_VOXEL_WORLD_MOST);
+    }
+    return 0;
+}
+
 static int check_info(const trip_volume *v)
 {
     const trip_volume_info *info = &v->info;
@@ -207,7 +230,7 @@ static int check_info(const trip_volume *v)
         return trip_fail(TRIP_ERROR, "read", v->path,
                          "scales its values by %g and offsets them by %g, which loses them",
                          info->slope, info->inter);
-    return 0;
+    return check_lengths(v);
 }
 
 static int open_with_reader(trip_volume *v, const trip_volume_params *params)

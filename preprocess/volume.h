@@ -40,6 +40,9 @@ unsigned trip_scalar_bytes(trip_scalar type);
 int trip_scalar_from_name(const char *name);
 const char *trip_scalar_name(trip_scalar type);
 
+/* Voxels along an axis of a volume that is bricked, and of one with tables. */
+#define TRIP_VOLUME_AXIS_MOST (INT64_C(1) << 24)
+
 typedef struct trip_volume_info {
     int64_t dims[3]; /* voxels along i, j, k; each >= 1 */
     trip_affine index_to_world;
@@ -99,6 +102,8 @@ typedef struct trip_volume_portion {
 int trip_volume_open(trip_volume **out, const char *path, const trip_volume_params *params,
                      trip_budget *budget);
 const trip_volume_info *trip_volume_get_info(const trip_volume *v);
+/* Reports and returns negative where an axis has more than TRIP_VOLUME_AXIS_MOST voxels. */
+int trip_volume_check_axes(const char *path, const trip_volume_info *info);
 void trip_volume_close(trip_volume *v);
 
 /* Starts again from the first portion; all portions must have been released. */

@@ -181,7 +181,8 @@ static int read_one(void *user, int axis, const char *file)
 
 int trip_volume_read_coordinates(trip_volume_info *info, const char *files, const char *path)
 {
-    return each_file(files, read_one, &(reading){ info, path });
+    int status = trip_volume_check_axes(path, info);
+    return status == 0 ? each_file(files, read_one, &(reading){ info, path }) : status;
 }
 
 typedef struct listing {
@@ -222,7 +223,8 @@ int trip_volume_complete_coordinates(trip_volume_info *info, const char *path)
 {
     if (!info->coordinates[0] && !info->coordinates[1] && !info->coordinates[2])
         return 0;
-    for (int a = 0; a < 3; a++) {
+    int status = trip_volume_check_axes(path, info);
+    for (int a = 0; a < 3 && status == 0; a++) {
         const size_t count = (size_t)info->dims[a];
         if (info->coordinates[a])
             continue;
@@ -231,7 +233,7 @@ int trip_volume_complete_coordinates(trip_volume_info *info, const char *path)
         for (size_t i = 0; i < count; i++)
             info->coordinates[a][i] = (double)i;
     }
-    return 0;
+    return status;
 }
 
 void trip_volume_free_coordinates(trip_volume_info *info)

@@ -114,18 +114,14 @@ static void set_projection(trip_camera *c, const basis *b, double k, double scal
     c->to_y = trip_scale(trip_affine_transpose_vector(&c->index_to_world, y), across);
 }
 
-/* Extinctions are floats per world unit: voxels of these lengths have room there. */
-#define VOXEL_WORLD_LEAST 1e-32
-#define VOXEL_WORLD_MOST 1e32
-
 static int check_voxel(const trip_affine *m)
 {
     for (int a = 0; a < 3; a++) {
         double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
-        if (!(length >= VOXEL_WORLD_LEAST && length <= VOXEL_WORLD_MOST))
+        if (!(length >= TRIP_VOXEL_WORLD_LEAST && length <= TRIP_VOXEL_WORLD_MOST))
             return trip_fail(TRIP_USAGE, "camera", "index to world",
                              "voxels are %.3g world units long; %g to %g can be computed with",
-                             length, VOXEL_WORLD_LEAST, VOXEL_WORLD_MOST);
+                             length, TRIP_VOXEL_WORLD_LEAST, TRIP_VOXEL_WORLD_MOST);
     }
     return 0;
 }

@@ -159,6 +159,8 @@ static inline unsigned trip_voxel_code(uint32_t voxel)
 
 /* Interleaves the bits of u (even) and v (odd). */
 uint64_t trip_morton(uint32_t u, uint32_t v);
+/* The even bits of a code side by side, which are its u; those of code >> 1 are its v. */
+uint32_t trip_morton_even(uint64_t code);
 
 /* Pages of a file of so many bytes; the last may be cut off. */
 static inline uint64_t trip_page_count(uint64_t bytes, unsigned page_log2)

@@ -705,6 +705,11 @@ void trip_writer_abort(trip_writer *w)
     free(w);
 }
 
+int trip_writer_folder(const trip_writer *w)
+{
+    return w->folder.fd;
+}
+
 uint64_t trip_writer_bytes(const trip_writer *w)
 {
     uint64_t bytes = 0;

@@ -75,6 +75,8 @@ typedef struct trip_writer_summary {
 /* Fails when lists of a kind and level hold different numbers of records. On any failure call
  * abort. */
 int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary);
+/* A descriptor of the partial folder, which becomes the data set; owned by `w`. */
+int trip_writer_folder(const trip_writer *w);
 /* Removes the partial folder. Also frees `w`; finish frees it itself on success only. */
 void trip_writer_abort(trip_writer *w);
 

@@ -10,16 +10,17 @@
 
 #include "journal.h"
 
-enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEQUENCES, KINDS };
+enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEQUENCES, OUTPUT, KINDS };
 
 /* Records are long and mostly zero: the input gives how they begin, and after a byte of how many,
  * the sequences of a checkpoint before that. */
 static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t size)
 {
     size_t sequences = kind == CHECKPOINT_WITH_SEQUENCES && size ? data[0] % 8 : 0;
-    size_t body = kind == RAW     ? size
-                  : kind == START ? sizeof(trip_journal_start)
-                                  : sizeof(trip_checkpoint);
+    size_t body = kind == RAW      ? size
+                  : kind == START  ? sizeof(trip_journal_start)
+                  : kind == OUTPUT ? sizeof(trip_journal_output)
+                                   : sizeof(trip_checkpoint);
     size_t bytes = body + sequences * sizeof(trip_sequence);
     unsigned char *record = calloc(1, bytes + 1);
     if (sequences && size > 1 + sequences * sizeof(trip_sequence)) {
@@ -28,7 +29,9 @@ static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t siz
         size -= 1 + sequences * sizeof(trip_sequence);
     }
     memcpy(record, data, size < body ? size : body);
-    const uint64_t number = kind == CHECKPOINT_WITH_SEQUENCES ? CHECKPOINT : kind;
+    const uint64_t number = kind == CHECKPOINT_WITH_SEQUENCES ? CHECKPOINT
+                            : kind == OUTPUT                  ? 3
+                                                              : kind;
     const uint64_t head[3] = { number, bytes, XXH64(record, bytes, number) };
     fwrite(head, sizeof head, 1, f);
     fwrite(record, bytes, 1, f);

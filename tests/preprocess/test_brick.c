@@ -588,6 +588,101 @@ static void another_input_or_other_parameters_are_not_gone_on_with(void **state)
     assert_false(s.resumed);
 }
 
+/* As uneven coordinates of the slices. */
+static void write_squares(const char *name)
+{
+    char text[512];
+    int used = 0;
+    for (int z = 0; z < NZ; z++)
+        used += snprintf(text + used, sizeof text - (size_t)used, "%d\n", z * z);
+    test_write(name, text, (size_t)used);
+}
+
+/* The file that is named as the input stays as it is. */
+static void other_data_files_are_not_gone_on_with(void **state)
+{
+    (void)state;
+    static const char header[] = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 97 70 61\n"
+                                 "encoding: raw\ndata file: v.raw\n";
+    char input[128], files[128];
+    trip_brick_params p = params_for("uint8", "a.trip");
+    trip_brick_summary s;
+    make_bytes();
+    test_write("v.nhdr", header, sizeof header - 1);
+    write_squares("z.txt");
+    strcpy(input, test_path("v.nhdr"));
+    snprintf(files, sizeof files, ",,%s", test_path("z.txt"));
+    p.input = input;
+    p.volume = (trip_volume_params){ .coordinates = files };
+    p.keep_all = true;
+    p.slices = 4;
+    for (int i = 0; i < 2; i++) {
+        p.resume = false;
+        test_report[0] = 0;
+        run_killed(p, &(killer){ "read", 0.5 });
+        /* Another file takes the name, with the same bytes: it has another inode. */
+        if (i == 0)
+            test_write("new", bytes, sizeof bytes);
+        else
+            write_squares("new");
+        assert_int_equal(rename(test_path("new"), test_path(i == 0 ? "v.raw" : "z.txt")), 0);
+        p.resume = true;
+        assert_true(trip_brick(&p, &s) < 0);
+        assert_non_null(strstr(test_report, "another input or other options"));
+    }
+}
+
+static void what_levels_were_asked_for_is_told(void **state)
+{
+    (void)state;
+    const struct {
+        int levels;
+        trip_brick_levels_for levels_for;
+        const char *options;
+    } asked[] = {
+        { 0, TRIP_LEVELS_FOR_AUTO, "[\"--size=97,70,61\",\"--type=uint8\"]" },
+        { -1, TRIP_LEVELS_FOR_AUTO, "[\"--size=97,70,61\",\"--type=uint8\",\"--levels=0\"]" },
+        { 2, TRIP_LEVELS_FOR_BOTH,
+          "[\"--size=97,70,61\",\"--type=uint8\",\"--levels=2\","
+          "\"--levels-for=both\"]" },
+        { 0, TRIP_LEVELS_FOR_PRE, "[\"--size=97,70,61\",\"--type=uint8\",\"--levels-for=pre\"]" }
+    };
+    trip_brick_params p = params_for("uint8", "a.trip");
+    trip_brick_summary s;
+    make_bytes();
+    p.replace = true;
+    for (size_t i = 0; i < sizeof asked / sizeof *asked; i++) {
+        test_lists l;
+        p.levels = asked[i].levels;
+        p.levels_for = asked[i].levels_for;
+        assert_int_equal(trip_brick(&p, &s), 0);
+        test_read_lists("a.trip", &l);
+        assert_non_null(strstr(l.text, asked[i].options));
+        test_free_lists(&l);
+    }
+}
+
+static void levels_of_uneven_grids_are_refused(void **state)
+{
+    (void)state;
+    char files[128];
+    trip_brick_params p = params_for("uint8", "a.trip");
+    trip_brick_summary s;
+    trip_brick_estimate e;
+    make_bytes();
+    write_squares("z.txt");
+    snprintf(files, sizeof files, ",,%s", test_path("z.txt"));
+    p.volume.coordinates = files;
+    p.levels = 3;
+    assert_int_equal(trip_brick(&p, &s), TRIP_USAGE);
+    assert_non_null(strstr(test_report, "leave out --levels"));
+    assert_int_equal(trip_brick_estimate_make(&p, &e), TRIP_USAGE);
+    p.levels = 0;
+    p.levels_for = TRIP_LEVELS_FOR_BOTH;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(s.levels, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -626,8 +721,12 @@ int main(void)
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(killed_runs_go_on_and_end_in_the_same_bytes, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(other_data_files_are_not_gone_on_with, test_begin,
+                                        test_end),
         cmocka_unit_test_setup_teardown(another_input_or_other_parameters_are_not_gone_on_with,
                                         test_begin, test_end),
+        cmocka_unit_test_setup_teardown(what_levels_were_asked_for_is_told, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(levels_of_uneven_grids_are_refused, test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -147,6 +147,33 @@ static void bad_coordinates_are_refused(void **state)
     assert_refused_as(TRIP_USAGE, sample_file(), &four, "three files");
 }
 
+/* The data are a hole in the file. */
+static const char *write_hole(const char *name, const char *header, int64_t data_bytes)
+{
+    const char *path = write_bytes(name, header, strlen(header));
+    assert_int_equal(truncate(path, (off_t)strlen(header) + data_bytes), 0);
+    return path;
+}
+
+/* An axis without coordinates gets a table where another one has some. */
+static void no_table_is_made_of_an_axis_that_is_too_long(void **state)
+{
+    (void)state;
+    const int64_t voxels = TRIP_VOLUME_AXIS_MOST + 1;
+    char *files = option(write_text('x', "0 1 5"), "", "");
+    const trip_volume_params p = { .raw_dims = { 3, voxels, 1 },
+                                   .raw_type = "uint8",
+                                   .coordinates = files };
+    assert_refused_as(TRIP_ERROR, write_hole("long.raw", "", 3 * voxels), &p,
+                      "more than 16777216 voxels along an axis");
+    assert_refused(write_hole("long.nrrd",
+                              "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 3 16777217 1\n"
+                              "encoding: raw\ncoordinates 0:=0 1 5\n\n",
+                              3 * voxels),
+                   "more than 16777216 voxels along an axis");
+    free(files);
+}
+
 /* Place and index are one another's inverse, beyond the ends too. */
 static void places_and_indices_are_inverse(void **state)
 {
@@ -174,6 +201,7 @@ int main(void)
         cmocka_unit_test(coordinates_that_are_even_are_a_spacing),
         cmocka_unit_test(what_is_left_out_leaves_the_others_where_they_are),
         cmocka_unit_test(bad_coordinates_are_refused),
+        cmocka_unit_test(no_table_is_made_of_an_axis_that_is_too_long),
         cmocka_unit_test(places_and_indices_are_inverse),
     };
     return cmocka_run_group_tests_name("coordinates", tests, make_folder, remove_folder);

@@ -1,5 +1,7 @@
 #include "brick_files.h"
 
+#include <math.h>
+
 /* Values that grow along Z, so that a look at the first slices alone would mislead. */
 enum { NX = 64, NY = 48, NZ = 512, N = NX * NY * NZ };
 
@@ -83,6 +85,37 @@ static void without_normals_little_is_written(void **state)
     assert_int_equal(e.halo, 0);
 }
 
+/* Of 16 portions of 4 slices each, at regular distances, none has a value. */
+static void a_sample_without_values_says_nothing_of_the_volume(void **state)
+{
+    (void)state;
+    enum { SIDE = 16, AREA = SIDE * SIDE, DEPTH = 2000, FIRST = 44, SLICES = 8 };
+    static float floats[AREA * DEPTH];
+    trip_brick_params p = make_volume();
+    trip_brick_estimate e;
+    trip_brick_summary s;
+    for (int i = 0; i < AREA * DEPTH; i++)
+        floats[i] = i / AREA >= FIRST && i / AREA < FIRST + SLICES ? (float)(i % AREA) : NAN;
+    test_write("v.raw", floats, sizeof floats);
+    p.volume = (trip_volume_params){ .raw_dims = { SIDE, SIDE, DEPTH }, .raw_type = "float" };
+    for (int ranges = 0; ranges < 2; ranges++) {
+        p.ranges = &(trip_value_range){ 100, 200 };
+        p.range_count = (size_t)ranges;
+        p.most_bytes = 1 << 20; /* for which the run looks at a sample, too */
+        p.replace = true;
+        assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
+        assert_int_equal(trip_brick(&p, &s), 0);
+        assert_int_equal(e.voxels, AREA * DEPTH);
+        assert_int_equal(e.kept, s.kept);
+    }
+    for (int i = 0; i < AREA * DEPTH; i++)
+        floats[i] = NAN;
+    test_write("v.raw", floats, sizeof floats);
+    test_report[0] = 0;
+    assert_int_equal(trip_brick_estimate_make(&p, &e), TRIP_ERROR);
+    assert_non_null(strstr(test_report, "holds no finite value"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -91,6 +124,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(an_automatic_envelope_is_estimated_from_the_sample,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(temporary_data_is_foreseen_where_memory_is_short,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(a_sample_without_values_says_nothing_of_the_volume,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(without_normals_little_is_written, test_begin, test_end),
     };

@@ -11,7 +11,7 @@
 #include "journal.h"
 
 enum { NX = 128, NY = 96, NZ = 128, N = NX * NY * NZ };
-enum { START = 1, CHECKPOINT = 2, MOST_RECORDS = 16 };
+enum { START = 1, CHECKPOINT = 2, OUTPUT = 3, MOST_RECORDS = 16 };
 
 /* As journal.c lays it out. */
 typedef struct record {
@@ -577,6 +577,67 @@ static void what_an_interrupted_run_did_outlives_a_refusal_to_go_on(void **state
     assert_false(test_exists("a.trip.spill"));
 }
 
+/* As a run writes it that is killed when its output has just been completed. */
+static void add_output(uint64_t device, uint64_t inode)
+{
+    trip_journal_output *noted = malloc(sizeof *noted);
+    read_journal();
+    assert_true(record_count < MOST_RECORDS);
+    *noted = (trip_journal_output){ device, inode };
+    records[record_count++] = (record){ OUTPUT, sizeof *noted, 0, (void *)noted };
+    write_journal();
+    free_records();
+}
+
+static void expect_another_output(trip_brick_params p)
+{
+    trip_brick_summary s;
+    test_report[0] = 0;
+    assert_int_equal(trip_brick(&p, &s), TRIP_ERROR);
+    assert_non_null(strstr(test_report, "exists already"));
+    check_one_line();
+    assert_true(test_exists("a.trip.spill"));
+}
+
+static void only_the_output_that_the_run_completed_is_taken_for_done(void **state)
+{
+    (void)state;
+    trip_brick_params p = params(), other = p;
+    trip_brick_summary s;
+    struct stat st;
+    make_volume();
+    p.resume = p.replace = true;
+    other.tile_voxels = 32;
+    assert_int_equal(trip_brick(&other, &s), 0);
+    assert_int_equal(stat(output, &st), 0);
+    leave_killed_run(p);
+    p.replace = false;
+    expect_another_output(p);
+    add_output(st.st_dev, st.st_ino + 1);
+    expect_another_output(p);
+    add_output(st.st_dev, st.st_ino);
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(s.resumed);
+    assert_false(test_exists("a.trip.spill"));
+}
+
+static void a_run_that_replaces_goes_on_where_another_output_stands(void **state)
+{
+    (void)state;
+    trip_brick_params p = params(), other = p;
+    trip_brick_summary s;
+    make_volume();
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(rename(output, test_path("wanted.trip")), 0);
+    other.tile_voxels = 32;
+    assert_int_equal(trip_brick(&other, &s), 0);
+    p.resume = p.replace = true;
+    leave_killed_run(p);
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(s.resumed);
+    test_same_dataset("a.trip", "wanted.trip");
+}
+
 #define TEST(f) cmocka_unit_test_setup_teardown(f, test_begin, test_end)
 
 int main(void)
@@ -596,6 +657,8 @@ int main(void)
         TEST(what_is_no_longer_at_hand_is_made_again),
         TEST(a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more),
         TEST(what_an_interrupted_run_did_outlives_a_refusal_to_go_on),
+        TEST(only_the_output_that_the_run_completed_is_taken_for_done),
+        TEST(a_run_that_replaces_goes_on_where_another_output_stands),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -100,11 +100,12 @@ static void put_row(trip_list_builder *b, unsigned producer, unsigned axis, cons
         return;
     unsigned words = trip_piece_choose_words(&format, splats, used);
     trip_piece_parts parts = trip_piece_layout(&format, splats, words);
-    unsigned char *at = trip_list_builder_reserve(b, producer, axis, parts.bytes);
-    assert_non_null(at);
+    void *piece;
+    assert_int_equal(trip_list_builder_reserve(b, producer, axis, parts.bytes, &piece), 0);
+    unsigned char *at = piece;
     uint64_t key =
         (uint64_t)from[axis] << TRIP_TILE_MORTON_BITS | trip_morton(from[u] / 32, from[v] / 32);
-    trip_piece_begin((trip_piece *)(void *)at, &format, key, splats, words, bitmap);
+    trip_piece_begin(piece, &format, key, splats, words, bitmap);
     memcpy(at + parts.values, codes, splats * sizeof *codes);
     memcpy(at + parts.normals, normals, splats * sizeof *normals);
 }
@@ -246,6 +247,26 @@ static void damaged_temporary_data_is_a_failure(void **state)
     assert_false(test_exists("spill"));
 }
 
+/* The thread that spills is the one that sees the interruption. */
+static void who_waits_for_memory_learns_that_the_spill_was_interrupted(void **state)
+{
+    (void)state;
+    const run_params p = { trip_list_builder_min_bytes(&format, 1), 1, false, true, false };
+    building b;
+    void *piece;
+    int status;
+    open_building(&b, "a.trip", &p);
+    put_slice(&b, 0, 0);
+    trip_scope_cancel(trip_scope_current());
+    assert_int_equal(trip_list_builder_spill(b.builder, calloc(1, sizeof(trip_checkpoint))), 0);
+    do
+        status = trip_list_builder_reserve(b.builder, 0, 0, trip_piece_max_bytes(&format), &piece);
+    while (status == 0);
+    assert_int_equal(status, TRIP_INTERRUPTED);
+    trip_scope_renew(trip_scope_current());
+    close_building(&b);
+}
+
 static void a_spill_in_use_is_refused(void **state)
 {
     (void)state;
@@ -269,6 +290,8 @@ int main(void)
                                         test_end),
         cmocka_unit_test_setup_teardown(what_fits_is_not_spilled, test_begin, test_end),
         cmocka_unit_test_setup_teardown(damaged_temporary_data_is_a_failure, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(who_waits_for_memory_learns_that_the_spill_was_interrupted,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(a_spill_in_use_is_refused, test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -179,6 +179,75 @@ static void coordinates_become_places(void **state)
     }
 }
 
+/* One row of bytes, a hole in the file, and the squares of 0, 1, 2 ... as its coordinates. */
+static const char *write_row(uint32_t voxels, uint32_t squares)
+{
+    static const char *const names[] = { "z", "y", "x" };
+    static file f;
+    bytes square = { .count = 0 };
+    f = (file){ .form = 1 };
+    append(&f.b, "CDF\1\0\0\0", 8);
+    put_list(&f, 10, 3);
+    for (int i = 0; i < 3; i++) {
+        put_text(&f, names[i]);
+        put_count(&f, i < 2 ? 1 : voxels);
+    }
+    put_list(&f, 12, 0);
+    put_list(&f, 11, 2);
+    put_variable(&f, "x", (const int[]){ 2 }, 1);
+    put_list(&f, 12, 0);
+    end_variable(&f, 0, 4, 4 * (uint64_t)voxels);
+    put_variable(&f, "t", (const int[]){ 0, 1, 2 }, 3);
+    put_list(&f, 12, 0);
+    end_variable(&f, 1, 1, voxels);
+    begin_values(&f, 0);
+    const char *path = write_file("row.nc", &f.b);
+    FILE *row = fopen(path, "r+b");
+    append_word(&square, f.b.count + 4 * (uint64_t)voxels, 4, true);
+    fseek(row, (long)f.begin[1], SEEK_SET);
+    fwrite(square.data, 1, 4, row);
+    fseek(row, 0, SEEK_END);
+    for (uint32_t i = 0; i < squares; i++) {
+        square.count = 0;
+        append_value(&square, TRIP_I32, (int)(i * i), true);
+        fwrite(square.data, 1, 4, row);
+    }
+    assert_int_equal(fclose(row), 0);
+    assert_int_equal(truncate(path, (off_t)(f.b.count + 5 * (uint64_t)voxels)), 0);
+    return path;
+}
+
+/* More than are read at once. */
+static void many_coordinates_become_places(void **state)
+{
+    (void)state;
+    enum { MANY = 40000 };
+    trip_budget *budget;
+    trip_volume *v;
+    assert_int_equal(trip_budget_create(&budget, 64 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, write_row(MANY, MANY), NULL, budget), 0);
+    const double *x = trip_volume_get_info(v)->coordinates[0];
+    for (int i = 0; i < MANY; i++)
+        assert_true(fabs(x[i] - (double)i * i / (MANY - 1)) < 1e-9);
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+}
+
+static void too_many_coordinates_are_not_read(void **state)
+{
+    (void)state;
+    assert_refused(write_row((1 << 24) + 1, 0), "more than 16777216 voxels along an axis");
+}
+
+static void an_interruption_ends_the_reading_of_coordinates(void **state)
+{
+    (void)state;
+    const char *path = write_row(100, 100);
+    trip_scope_cancel(trip_scope_current());
+    assert_refused_as(TRIP_INTERRUPTED, path, NULL, "interrupted");
+    trip_scope_renew(trip_scope_current());
+}
+
 static void numbers_are_scaled_and_missing_ones_are_none(void **state)
 {
     (void)state;
@@ -248,6 +317,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_form_holds_the_sample),
         cmocka_unit_test(coordinates_become_places),
+        cmocka_unit_test(many_coordinates_become_places),
+        cmocka_unit_test(too_many_coordinates_are_not_read),
+        cmocka_unit_test(an_interruption_ends_the_reading_of_coordinates),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),
         cmocka_unit_test(a_header_takes_little_memory),

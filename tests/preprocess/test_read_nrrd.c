@@ -284,6 +284,7 @@ static void wrong_fields_are_refused_with_their_line(void **state)
         { "data file: %99d 1 7 1\n", "line 8: \"data file\" with a %" },
         { "data file: a%d 1 7 0\n", "line 8: \"data file\" with a %" },
         { "data file: a%d 1 7\n", "line 8: \"data file\" with a %" },
+        { "data file: a%d -9223372036854775808 1 1\n", "line 8: \"data file\" with a %" },
         { "data file: a%d 7 1 1\n", "counts no files" },
         { "data file: a%d 1 9 1\n", "cannot be shared out evenly to 9" },
         { "data file: a%d 1 2000000000 1\n", "more than 65536 data files" },

@@ -20,18 +20,19 @@ typedef struct bench {
     trip_quantiser quantiser;
     unsigned char *memory[TRIP_MOST_LISTS]; /* pieces, one after the other */
     size_t used[TRIP_MOST_LISTS];
+    int refusal; /* the status with which pieces are refused; 0: they are kept */
 } bench;
 
 enum { PIECE_MEMORY = 16 << 20 };
 
-static void *keep_piece(void *user, unsigned thread, unsigned list, size_t bytes)
+static int keep_piece(void *user, unsigned thread, unsigned list, size_t bytes, void **memory)
 {
     bench *b = user;
     (void)thread;
-    void *at = b->memory[list] + b->used[list];
+    *memory = b->memory[list] + b->used[list];
     assert_true(b->used[list] + bytes <= PIECE_MEMORY);
     b->used[list] += bytes;
-    return at;
+    return b->refusal;
 }
 
 static void open_bench(bench *b, const int64_t dims[3], const float *values, unsigned tile_log2,
@@ -65,7 +66,7 @@ static int next_batch(void *user, uint64_t batches, uint64_t voxels)
     return 0;
 }
 
-static void splat_all(bench *b, const trip_envelope *e, int64_t slices)
+static int try_splats(bench *b, const trip_envelope *e, int64_t slices)
 {
     trip_splat_params p = { .info = &b->info,
                             .envelope = e,
@@ -82,7 +83,12 @@ static void splat_all(bench *b, const trip_envelope *e, int64_t slices)
                               .batch = next_batch,
                               .user = b };
     assert_int_equal(trip_splatter_create(&b->splatter, &p, b->budget), 0);
-    assert_int_equal(trip_walk(b->volume, b->workers, &walk), 0);
+    return trip_walk(b->volume, b->workers, &walk);
+}
+
+static void splat_all(bench *b, const trip_envelope *e, int64_t slices)
+{
+    assert_int_equal(try_splats(b, e, slices), 0);
 }
 
 static void close_bench(bench *b)
@@ -257,6 +263,20 @@ static void without_a_border_of_what_is_kept_there_is_no_halo(void **state)
     }
 }
 
+static void the_status_with_which_a_piece_is_refused_ends_the_run(void **state)
+{
+    (void)state;
+    static const float values[8] = { 1, 2, 3, 4, 5, 6, 7, 8 };
+    trip_envelope e = { 0 };
+    bench b;
+    assert_int_equal(trip_envelope_add_all(&e), 0);
+    open_bench(&b, (const int64_t[3]){ 2, 2, 2 }, values, 6, true);
+    b.refusal = TRIP_INTERRUPTED;
+    assert_int_equal(try_splats(&b, &e, 2), TRIP_INTERRUPTED);
+    close_bench(&b);
+    trip_envelope_destroy(&e);
+}
+
 /* A rotation, a shear and unequal spacings. */
 static const trip_affine sheared = {
     { { 0.8, -0.3, 0.1, 5 }, { 0.5, 1.1, -0.2, -7 }, { 0.05, 0.4, 2.5, 11 } }
@@ -378,6 +398,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(every_kept_voxel_is_once_in_every_list, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(the_status_with_which_a_piece_is_refused_ends_the_run,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(the_halo_is_what_is_around_kept_voxels, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(without_a_border_of_what_is_kept_there_is_no_halo,

@@ -310,6 +310,21 @@ static void a_file_without_permission_is_named(void **state)
     assert_int_equal(seteuid(user), 0);
 }
 
+static void voxels_too_long_or_short_to_be_drawn_are_refused(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_volume(&b, TRIP_U8, false);
+    const char *raw = write_file("long.raw", &b);
+    const double lengths[] = { 1e300, 1e33, 1e-33, 1e-300 };
+    for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
+        const trip_volume_params p = { .raw_dims = { NX, NY, NZ },
+                                       .raw_type = "uint8",
+                                       .spacing = { 1, lengths[i], 1 } };
+        assert_refused_as(TRIP_ERROR, raw, &p, "world units long along j");
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -332,6 +347,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_read_that_fails_in_mid_volume_stays_failed, make_budget,
                                         end_budget),
         cmocka_unit_test(spacing_replaces_lengths_and_keeps_directions),
+        cmocka_unit_test(voxels_too_long_or_short_to_be_drawn_are_refused),
         cmocka_unit_test(options_of_another_format_are_wrong_usage),
         cmocka_unit_test(what_cannot_be_opened_is_named),
         cmocka_unit_test(a_file_without_permission_is_named),

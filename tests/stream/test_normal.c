@@ -208,7 +208,7 @@ static void compact_normals_of_what_is_not_finite_are_zero(void **state)
     assert_true(b[0] == 0 && b[1] == 0 && b[2] == 0);
 }
 
-static void morton_codes_interleave_all_bits(void **state)
+static void morton_codes_interleave_all_bits_and_give_them_back(void **state)
 {
     uint64_t random = 3;
     (void)state;
@@ -220,6 +220,8 @@ static void morton_codes_interleave_all_bits(void **state)
             assert_int_equal(m >> 2 * b & 1, u >> b & 1);
             assert_int_equal(m >> (2 * b + 1) & 1, v >> b & 1);
         }
+        assert_int_equal(trip_morton_even(m), u);
+        assert_int_equal(trip_morton_even(m >> 1), v);
     }
 }
 
@@ -235,7 +237,7 @@ int main(void)
         cmocka_unit_test(other_weak_gradients_come_back_within_half_a_step),
         cmocka_unit_test(strong_gradients_keep_their_direction_within_a_tenth_of_a_degree),
         cmocka_unit_test(compact_normals_of_what_is_not_finite_are_zero),
-        cmocka_unit_test(morton_codes_interleave_all_bits),
+        cmocka_unit_test(morton_codes_interleave_all_bits_and_give_them_back),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
