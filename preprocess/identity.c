@@ -12,7 +12,7 @@
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 15 };
+enum { BRICKER_VERSION = 16 };
 
 /* A file is identified by its name, length and time of change, a pattern by its text. */
 static void write_input(FILE *f, const trip_brick_params *p)
