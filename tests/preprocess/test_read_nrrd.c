@@ -185,6 +185,24 @@ static void lines_and_bytes_are_skipped(void **state)
     assert_holds_sample(write_file("skipgz.nhdr", &b), NULL, TRIP_U16);
 }
 
+/* Files without an end or without a writer, and long ones without lines. */
+static void looking_for_lines_ends(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 1\ndata file: /dev/zero\n");
+    assert_refused(write_file("endless.nhdr", &b), "not a regular file");
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 1\ndata file: lines.fifo\n");
+    assert_int_equal(mkfifo(path_of("lines.fifo"), 0666), 0);
+    assert_refused(write_file("pipe.nhdr", &b), "not a regular file");
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 1\ndata file: lines.raw\n");
+    write_bytes("lines.raw", "no line", 7);
+    assert_refused(write_file("lines.nhdr", &b), "lines to skip");
+    assert_interrupted(path_of("lines.nhdr"), NULL);
+}
+
 static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
 {
     (void)state;
@@ -562,6 +580,7 @@ int main(void)
         cmocka_unit_test(many_data_files_follow_one_another),
         cmocka_unit_test(a_pattern_counts_its_files),
         cmocka_unit_test(lines_and_bytes_are_skipped),
+        cmocka_unit_test(looking_for_lines_ends),
         cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
         cmocka_unit_test(spacings_and_directions_become_the_map),
         cmocka_unit_test(the_space_says_how_the_world_lies_in_the_patient),
