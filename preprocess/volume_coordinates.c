@@ -10,6 +10,7 @@
 #include "coordinates.h"
 #include "input_file.h"
 #include "report.h"
+#include "text.h"
 
 enum { LETTERS = 3 };
 static const char letters[LETTERS] = { 'x', 'y', 'z' };
@@ -132,9 +133,8 @@ static int next_number(text_file *f, double *value)
         else
             return -1;
     word[n] = 0;
-    char *end = word;
-    *value = n ? strtod(word, &end) : 0;
-    return n == 0 ? 0 : *end ? -1 : 1;
+    *value = 0;
+    return n == 0 ? 0 : trip_text_to_double(word, value) ? 1 : -1;
 }
 
 static int fail_to_read(const char *file)

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <sys/wait.h>
 
+#include "comma_locale.h"
 #include "coordinates.h"
 #include "volume_coordinates.h"
 
@@ -132,8 +133,8 @@ static void bad_coordinates_are_refused(void **state)
         { "0 1 2 3 3", "neither ascend nor descend" },
         { "0 1 3 2 5", "neither ascend nor descend" },
         { "1 1 1 1 1", "neither ascend nor descend" },
-        { "0 1 nan 3 5", "not finite" },
-        { "0 1 inf 3 5", "not finite" },
+        { "0 1 nan 3 5", "number 3 is none" },
+        { "0 1 inf 3 5", "number 3 is none" },
         { "-1e308 1 2 3 1.7e308", "neither ascend nor descend" },
         { "0 1e-9 2 3 5", "millionth" },
         { "0 1 two 3 5", "number 3 is none" },
@@ -148,6 +149,22 @@ static void bad_coordinates_are_refused(void **state)
     const trip_volume_params two = raw_params("a,b"), four = raw_params("a,b,c,d");
     assert_refused_as(TRIP_USAGE, sample_file(), &two, "three files");
     assert_refused_as(TRIP_USAGE, sample_file(), &four, "three files");
+}
+
+static void a_locale_with_decimal_commas_changes_nothing(void **state)
+{
+    (void)state;
+    need_comma_locale();
+    float values[VOXELS];
+    trip_volume_info info;
+    char *files = option(write_text('x', "0.5 2.5 4.5 6.5 8.5"), "", "");
+    const trip_volume_params p = raw_params(files);
+    const int status = read_volume(sample_file(), &p, 2, values, VOXELS, &info);
+    setlocale(LC_ALL, "C");
+    free(files);
+    assert_int_equal(status, 0);
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 2, 0, 0, 0.5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
 }
 
 /* A pipe is waited for, until an interruption. */
@@ -203,6 +220,7 @@ int main(void)
         cmocka_unit_test(coordinates_that_are_even_are_a_spacing),
         cmocka_unit_test(what_is_left_out_leaves_the_others_where_they_are),
         cmocka_unit_test(bad_coordinates_are_refused),
+        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(coordinates_may_come_through_a_pipe),
         cmocka_unit_test(places_and_indices_are_inverse),
     };

@@ -1,5 +1,7 @@
 #include "volume_files.h"
 
+#include "comma_locale.h"
+
 static const char *const nrrd_types[] = { "uint8",  "signed char", "unsigned short", "short",
                                           "uint32", "int",         "uint64",         "longlong",
                                           NULL,     "float",       "double" };
@@ -269,6 +271,24 @@ static void what_is_no_scalar_volume_is_refused(void **state)
                    "line 2: type \"block\"");
 }
 
+static void a_locale_with_decimal_commas_changes_nothing(void **state)
+{
+    (void)state;
+    const char *spacings = write_with_lines("commas.nrrd", "spacings: 0.5 NaN 3e0\n");
+    const char *directions =
+        write_with_lines("vectors.nrrd", "space: RAS\n"
+                                         "space directions: (0.5,0,0) ( 0 , 2.25, 0) (0,0,-1.5)\n"
+                                         "space origin: (-0.75,0,0)\n");
+    const char *uneven = write_with_lines("places.nrrd", "coordinates 0:=0.5 2.5 4.5 6.5 8.5\n");
+    need_comma_locale();
+    const trip_affine a = map_of(spacings), b = map_of(directions), c = map_of(uneven);
+    setlocale(LC_ALL, "C");
+    assert_map(&a, (const double[3][4]){ { 0.5, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 3, 0 } });
+    assert_map(&b,
+               (const double[3][4]){ { 0.5, 0, 0, -0.75 }, { 0, 2.25, 0, 0 }, { 0, 0, -1.5, 0 } });
+    assert_map(&c, (const double[3][4]){ { 2, 0, 0, 0.5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+}
+
 static void wrong_fields_are_refused_with_their_line(void **state)
 {
     (void)state;
@@ -277,6 +297,8 @@ static void wrong_fields_are_refused_with_their_line(void **state)
     } wrong[] = {
         { "spacings: 1 2\n", "line 8: \"spacings\" must be 3" },
         { "spacings: 1 2 x\n", "line 8: \"spacings\" must be 3" },
+        { "spacings: 0x1 1 1\n", "line 8: \"spacings\" must be 3" },
+        { "spacings: 1,5 1 1\n", "line 8: \"spacings\" must be 3" },
         { "spacings: 0 1 1\n", "singular" },
         { "spacings: inf 1 1\n", "singular or not finite" },
         { "axis mins: 1 2\n", "line 8: \"axis mins\" must be 3" },
@@ -591,6 +613,7 @@ int main(void)
         cmocka_unit_test(the_measurement_frame_changes_nothing),
         cmocka_unit_test(axes_of_size_one_are_dropped),
         cmocka_unit_test(what_is_no_scalar_volume_is_refused),
+        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(wrong_fields_are_refused_with_their_line),
         cmocka_unit_test(wrong_headers_are_refused),
         cmocka_unit_test(an_unknown_field_is_warned_of),
