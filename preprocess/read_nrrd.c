@@ -96,7 +96,8 @@ static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t 
         return status;
     }
     status = trip_file_size(source->path, &file_bytes);
-    if (status == 0 && file_bytes >= part_bytes)
+    if (status == 0 && file_bytes >= part_bytes &&
+        file_bytes - part_bytes >= source->offset_bytes) /* behind the header and skipped lines */
         source->offset_bytes = file_bytes - part_bytes;
     return status; /* a file too short is reported when it is opened */
 }

@@ -216,6 +216,27 @@ static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
     assert_holds_sample(write_file("tail.nhdr", &b), NULL, TRIP_U16);
 }
 
+/* Of a file that is cut off, the header is not taken for values; nor are lines to skip. */
+static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw", "byte skip: -1\n\n");
+    const size_t header = b.count;
+    append_volume(&b, TRIP_U16, false);
+    assert_holds_sample(write_file("whole.nrrd", &b), NULL, TRIP_U16);
+    assert_refused(write_bytes("cut.nrrd", b.data, b.count - 1), "are promised");
+    assert_refused(write_bytes("cut.nrrd", b.data, header), "are promised");
+    b.count = 0;
+    append_text(&b, "a line\n");
+    append_volume(&b, TRIP_U16, false);
+    write_bytes("lines.raw", b.data, b.count - 1);
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "raw",
+                  "line skip: 1\nbyte skip: -1\ndata file: lines.raw\n");
+    assert_refused(write_file("lines.nhdr", &b), "are promised");
+}
+
 static void spacings_and_directions_become_the_map(void **state)
 {
     (void)state;
@@ -604,6 +625,7 @@ int main(void)
         cmocka_unit_test(lines_and_bytes_are_skipped),
         cmocka_unit_test(looking_for_lines_ends),
         cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
+        cmocka_unit_test(a_byte_skip_of_minus_one_stays_behind_the_header),
         cmocka_unit_test(spacings_and_directions_become_the_map),
         cmocka_unit_test(the_space_says_how_the_world_lies_in_the_patient),
         cmocka_unit_test(an_unknown_space_is_warned_of),
