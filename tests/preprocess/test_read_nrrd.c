@@ -216,6 +216,38 @@ static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
     assert_holds_sample(write_file("tail.nhdr", &b), NULL, TRIP_U16);
 }
 
+/* What the report says that --spacing can do, it does; of what it cannot the report says nothing.
+ */
+static void lengths_that_are_none_can_be_given(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *line;
+        double x;
+    } none[] = { { "spacings: 0 0 0\n", 2 },
+                 { "spacings: inf 1 nan\n", 2 },
+                 { "space directions: (0,0,0) (0,5,0) (0,0,nan)\n", 2 },
+                 { "space: LAS\nspace directions: (inf,0,0) (0,5,0) (0,0,1)\n", -2 } };
+    const trip_volume_params p = { .spacing = { 2, 3, 4 } };
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; i++) {
+        float values[VOXELS];
+        trip_volume_info info = { .type = TRIP_U8 };
+        const char *path = write_with_lines("none.nrrd", none[i].line);
+        assert_refused(path, "; --spacing X,Y,Z gives");
+        assert_int_equal(read_volume(path, &p, 3, values, VOXELS, &info), 0);
+        assert_map(&info.index_to_world,
+                   (const double[3][4]){ { none[i].x, 0, 0, 0 }, { 0, 3, 0, 0 }, { 0, 0, 4, 0 } });
+    }
+    static const char *const others[] = { "space directions: (0,0,0) (0,0,5) (0,5,0)\n",
+                                          "space directions: (1,0,0) (2,0,0) (0,0,1)\n",
+                                          "space origin: (nan,0,0)\n" };
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        const char *path = write_with_lines("other.nrrd", others[i]);
+        assert_refused(path, "not finite\n");
+        assert_refused_as(TRIP_ERROR, path, &p, "not finite\n");
+    }
+}
+
 /* Of a file that is cut off, the header is not taken for values; nor are lines to skip. */
 static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
 {
@@ -625,6 +657,7 @@ int main(void)
         cmocka_unit_test(lines_and_bytes_are_skipped),
         cmocka_unit_test(looking_for_lines_ends),
         cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
+        cmocka_unit_test(lengths_that_are_none_can_be_given),
         cmocka_unit_test(a_byte_skip_of_minus_one_stays_behind_the_header),
         cmocka_unit_test(spacings_and_directions_become_the_map),
         cmocka_unit_test(the_space_says_how_the_world_lies_in_the_patient),
