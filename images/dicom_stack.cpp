@@ -25,6 +25,16 @@ namespace
 /* Elements longer than this stay in the file until they are read. */
 constexpr Uint32 lazy_bytes = 4096;
 
+/* value = slope * stored + inter */
+struct Rescale {
+    double slope, inter;
+
+    bool operator==(const Rescale &o) const
+    {
+        return slope == o.slope && inter == o.inter;
+    }
+};
+
 /* What a slice's file says besides its pixels; what it does not say is empty or NAN. */
 struct Header {
     std::string file;
@@ -33,7 +43,7 @@ struct Header {
     int64_t width = 0, height = 0, frames = 1;
     unsigned allocated = 0, stored = 0, high = 0; /* bits */
     bool is_signed = false;
-    double slope = 1, inter = 0;
+    std::vector<Rescale> rescales; /* of every frame, or one of all */
     trip_vec3 origin = { 0, 0, 0 };
     std::vector<trip_vec3> places;     /* of the first pixel, for every frame, or none */
     std::vector<double> rows;          /* directions of i, then j */
@@ -51,6 +61,14 @@ struct Header {
             trip_cross(trip_v3(rows[0], rows[1], rows[2]), trip_v3(rows[3], rows[4], rows[5])));
     }
 
+    const Rescale &rescale(Uint32 frame) const
+    {
+        return rescales.size() > 1 ? rescales[frame] : rescales[0];
+    }
+    bool all_rescaled(const Rescale &like) const
+    {
+        return std::count(rescales.begin(), rescales.end(), like) == (ptrdiff_t)rescales.size();
+    }
     bool same_pixels(const Header &o) const
     {
         return width == o.width && height == o.height && allocated == o.allocated &&
@@ -129,19 +147,27 @@ bool are_alike(const std::vector<double> &rows, const std::vector<double> &other
                       [](double a, double b) { return std::fabs(a - b) <= 1e-3; });
 }
 
-/* Of several frames each has an item of its own; there is nothing to go by unless all say where
- * they are. */
-std::vector<trip_vec3> get_frame_places(DcmItem &item, const Header &h)
+/* Of several frames each has an item of its own; none where not every frame has one. */
+std::vector<DcmItem *> get_frame_items(DcmItem &item, int64_t count)
 {
     DcmSequenceOfItems *frames = nullptr;
-    std::vector<trip_vec3> places;
+    std::vector<DcmItem *> items;
     if (item.findAndGetSequence(DCM_PerFrameFunctionalGroupsSequence, frames).bad() ||
-        (int64_t)frames->card() != h.frames)
+        (int64_t)frames->card() != count)
         return {};
     for (DcmObject *o = frames->nextInContainer(nullptr); o; o = frames->nextInContainer(o)) {
-        DcmItem *frame = dynamic_cast<DcmItem *>(o);
-        if (!frame)
+        items.push_back(dynamic_cast<DcmItem *>(o));
+        if (!items.back())
             return {};
+    }
+    return items;
+}
+
+/* There is nothing to go by unless all frames say where they are. */
+std::vector<trip_vec3> get_frame_places(const std::vector<DcmItem *> &frames, const Header &h)
+{
+    std::vector<trip_vec3> places;
+    for (DcmItem *frame : frames) {
         std::vector<double> rows = get_numbers(*frame, DCM_ImageOrientationPatient, 6, true);
         if (!rows.empty() && !are_alike(rows, h.rows))
             throw trip_slice_error(h.file, "has frames that are oriented differently");
@@ -151,6 +177,29 @@ std::vector<trip_vec3> get_frame_places(DcmItem &item, const Header &h)
         places.push_back(vector_of(place, 0));
     }
     return places;
+}
+
+/* What an item says, itself or in those within it; the rest as in `missing`. */
+Rescale get_rescale(DcmItem &item, bool nested, const Rescale &missing)
+{
+    return { get_number(item, DCM_RescaleSlope, nested, missing.slope),
+             get_number(item, DCM_RescaleIntercept, nested, missing.inter) };
+}
+
+/* A frame may say how it is rescaled, as may what all frames share, and the file itself. */
+std::vector<Rescale> get_rescales(DcmItem &item, const std::vector<DcmItem *> &frames, bool nested)
+{
+    DcmItem *shared = nullptr;
+    Rescale all = { 1, 0 };
+    if (frames.empty())
+        return { get_rescale(item, nested, all) };
+    if (item.findAndGetSequenceItem(DCM_SharedFunctionalGroupsSequence, shared).good() && shared)
+        all = get_rescale(*shared, true, all);
+    all = get_rescale(item, false, all);
+    std::vector<Rescale> rescales;
+    for (DcmItem *frame : frames)
+        rescales.push_back(get_rescale(*frame, true, all));
+    return rescales;
 }
 
 /* The directions of rows and columns are given together, and at right angles. */
@@ -169,11 +218,13 @@ void read_geometry(DcmItem &item, Header &h)
 {
     bool nested = h.frames > 1 || item.tagExists(DCM_SharedFunctionalGroupsSequence);
     OFString body;
+    const std::vector<DcmItem *> frames =
+        nested ? get_frame_items(item, h.frames) : std::vector<DcmItem *>();
     h.rows = get_numbers(item, DCM_ImageOrientationPatient, 6, nested);
     check_rows(h);
     std::vector<double> place = get_numbers(item, DCM_ImagePositionPatient, 3, nested);
     if (h.frames > 1)
-        h.places = get_frame_places(item, h);
+        h.places = get_frame_places(frames, h);
     else if (!place.empty())
         h.places.push_back(vector_of(place, 0));
     h.origin = place.empty() ? trip_v3(0, 0, 0) : vector_of(place, 0);
@@ -187,8 +238,7 @@ void read_geometry(DcmItem &item, Header &h)
     h.spacing = get_length(item, DCM_SpacingBetweenSlices, nested);
     if (std::isnan(h.spacing))
         h.spacing = get_length(item, DCM_SliceThickness, nested);
-    h.slope = get_number(item, DCM_RescaleSlope, nested, 1);
-    h.inter = get_number(item, DCM_RescaleIntercept, nested, 0);
+    h.rescales = get_rescales(item, frames, nested);
 }
 
 void check_header(const Header &h, unsigned samples)
@@ -201,8 +251,6 @@ void check_header(const Header &h, unsigned samples)
         h.stored > h.allocated || h.high + 1 < h.stored || h.high >= h.allocated)
         throw trip_slice_error(h.file, "has pixels of " + std::to_string(h.stored) + " bits in " +
                                            std::to_string(h.allocated) + ", which are not read");
-    if (h.slope == 0)
-        throw trip_slice_error(h.file, "has a rescale slope of 0");
 }
 
 /* Of at most 16 letters, digits, blanks and underscores, as the standard has it; of another form it
@@ -457,7 +505,7 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool 
             throw trip_slice_error(name, "belongs to another series than " + first.file);
         if (h.frames > 1 && files.names.size() > 1)
             throw trip_slice_error(name, "holds several frames, and is one of several files");
-        rescaled_alike = rescaled_alike && h.slope == first.slope && h.inter == first.inter;
+        rescaled_alike = rescaled_alike && h.all_rescaled(first.rescales[0]);
     }
     double squeeze = sort_slices(headers_, allow_gaps);
     if (headers_[0].frames > 1)
@@ -475,8 +523,8 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool 
               : h.allocated == 16 ? (h.is_signed ? TRIP_I16 : TRIP_U16)
                                   : (h.is_signed ? TRIP_I32 : TRIP_U32);
     type = rescaled_alike ? stored_ : TRIP_F32;
-    slope = rescaled_alike ? h.slope : 1;
-    inter = rescaled_alike ? h.inter : 0;
+    slope = rescaled_alike ? h.rescales[0].slope : 1;
+    inter = rescaled_alike ? h.rescales[0].inter : 0;
     frame_bytes_ = (uint64_t)h.width * (uint64_t)h.height * (h.allocated / 8);
     frame_.take(budget, h.file, frame_bytes_ + 1); /* the decoder needs an even number */
 }
@@ -517,12 +565,15 @@ void DicomStack::read(int64_t k, void *values)
 {
     const Header &h = headers_[headers_.size() > 1 ? (size_t)k : 0];
     size_t count = (size_t)(dims[0] * dims[1]);
-    read_frame(h, headers_.size() > 1 ? 0 : frames_.empty() ? (Uint32)k : frames_[(size_t)k]);
+    const Uint32 frame = headers_.size() > 1 ? 0 : frames_.empty() ? (Uint32)k : frames_[(size_t)k];
+    const Rescale &rescale = h.rescale(frame);
+    read_frame(h, frame);
     align_values(h, stored_, frame_.data(), count);
     if (type == stored_)
         std::memcpy(values, frame_.data(), frame_bytes_);
     else
-        trip_scalar_decode(stored_, false, h.slope, h.inter, frame_.data(), count, (float *)values);
+        trip_scalar_decode(stored_, false, rescale.slope, rescale.inter, frame_.data(), count,
+                           (float *)values);
 }
 
 } // namespace

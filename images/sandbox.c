@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/fs.h>
 #include <sched.h>
 #include <seccomp.h>
 #include <signal.h>
@@ -25,6 +26,15 @@
 
 /* Decoders' tables, file buffers and the stacks of their threads. */
 #define LIBRARIES_BYTES ((uint64_t)64 << 20)
+
+/* Calls that headers older than the kernel lack; x86-64 and 64-bit ARM have the same numbers for
+ * them. */
+enum {
+    CALL_FCHMODAT2 = 452,
+    CALL_SETXATTRAT = 463,
+    CALL_REMOVEXATTRAT = 466,
+    CALL_FILE_SETATTR = 469,
+};
 
 /* Never of use to a decoder. The names are libseccomp's, which passes over those that a machine
  * does not have. */
@@ -86,6 +96,10 @@ static const int denied[] = {
     SCMP_SYS(removexattr),
     SCMP_SYS(lremovexattr),
     SCMP_SYS(fremovexattr),
+    CALL_FCHMODAT2,
+    CALL_SETXATTRAT,
+    CALL_REMOVEXATTRAT,
+    CALL_FILE_SETATTR,
     /* the system */
     SCMP_SYS(mount),
     SCMP_SYS(umount2),
@@ -133,6 +147,19 @@ static bool deny_bits(scmp_filter_ctx filter, int call, unsigned argument, uint6
     return seccomp_rule_add_array(filter, SCMP_ACT_ERRNO(EPERM), call, 1, &has) == 0;
 }
 
+/* The flags of a file and its project, which a descriptor for reading is enough to change. */
+static bool deny_flags(scmp_filter_ctx filter)
+{
+    static const unsigned requests[] = { FS_IOC_SETFLAGS, FS_IOC_FSSETXATTR };
+    bool good = true;
+    for (size_t i = 0; i < sizeof requests / sizeof requests[0]; i++) {
+        struct scmp_arg_cmp is = SCMP_CMP64(1, SCMP_CMP_MASKED_EQ, UINT32_MAX, requests[i]);
+        good = good &&
+               seccomp_rule_add_array(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(ioctl), 1, &is) == 0;
+    }
+    return good;
+}
+
 /* Opening is for reading. openat2() hides its flags from filters and is said to be unknown. */
 static bool deny_writing(scmp_filter_ctx filter)
 {
@@ -168,7 +195,7 @@ bool trip_sandbox_enter(void)
     /* Also for the threads that libraries have started by now, where the kernel can. */
     if (filter)
         (void)seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1);
-    bool good = filter && deny_writing(filter) && deny_others(filter);
+    bool good = filter && deny_writing(filter) && deny_flags(filter) && deny_others(filter);
     for (size_t i = 0; good && i < sizeof denied / sizeof denied[0]; i++)
         good = deny(filter, denied[i]);
     good = good && seccomp_load(filter) == 0;

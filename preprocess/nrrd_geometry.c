@@ -5,6 +5,7 @@
 #include <strings.h>
 
 #include "nrrd_parser.h"
+#include "text.h"
 
 /* A space that headers name: how the axes of world space lie. */
 typedef struct space {
@@ -50,6 +51,33 @@ static space find_space(const trip_nrrd_parser *p)
     return (space){ 0 };
 }
 
+/* A number of `length` bytes. Of those that are not finite "nan" means unknown; a map that has one
+ * of them is refused later, or its spacing given. */
+static bool parse_number(const char *text, size_t length, double *v)
+{
+    static const struct {
+        const char *name;
+        double value;
+    } others[] = { { "nan", NAN }, { "inf", INFINITY }, { "-inf", -INFINITY } };
+    char word[64];
+    if (length >= sizeof word)
+        return false;
+    memcpy(word, text, length);
+    word[length] = '\0';
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        if (strcasecmp(word, others[i].name) == 0) {
+            *v = others[i].value;
+            return true;
+        }
+    return trip_text_to_double(word, v);
+}
+
+static bool parse_word(char **text, double *v)
+{
+    const char *word = trip_nrrd_next_word(text);
+    return parse_number(word, strlen(word), v);
+}
+
 /* "(x,y,z)", or "(x,y,z,t)" where the space has time, into v. */
 static bool parse_vector(char **text, const space *s, double v[4])
 {
@@ -58,11 +86,11 @@ static bool parse_vector(char **text, const space *s, double v[4])
     for (int i = 0; i < (s->has_time ? 4 : 3); i++) {
         if (*at != "(,,,"[i])
             return false;
-        char *end, *number = at + 1;
-        v[i] = strtod(number, &end);
-        if (end == number)
+        at += 1 + strspn(at + 1, " \t");
+        const size_t length = strcspn(at, " \t,)");
+        if (!parse_number(at, length, &v[i]))
             return false;
-        at = end + strspn(end, " \t");
+        at += length + strspn(at + length, " \t");
     }
     if (*at != ')')
         return false;
@@ -110,11 +138,7 @@ static int parse_numbers(const trip_nrrd_parser *p, trip_nrrd_field f, const cha
     char *text = p->values[f];
     for (int axis = 0; axis < p->axes; axis++) {
         v[axis] = NAN;
-        if (!text)
-            continue;
-        char *end, *word = trip_nrrd_next_word(&text);
-        v[axis] = strtod(word, &end);
-        if (end == word || *end)
+        if (text && !parse_word(&text, &v[axis]))
             return trip_nrrd_fail(p, p->lines[f], "\"%s\" must be %d numbers", name, p->axes);
     }
     return 0;
@@ -163,9 +187,7 @@ static int parse_coordinates(const trip_nrrd_parser *p, trip_nrrd_header *h, int
     if (text && (uint64_t)h->dims[a] <= strlen(text))
         h->coordinates[a] = calloc((size_t)h->dims[a], sizeof(double));
     for (int64_t i = 0; h->coordinates[a] && i < h->dims[a]; i++) {
-        char *end, *word = trip_nrrd_next_word(&text);
-        h->coordinates[a][i] = strtod(word, &end);
-        if (end == word || *end) {
+        if (!parse_word(&text, &h->coordinates[a][i])) {
             free(h->coordinates[a]);
             h->coordinates[a] = NULL;
         }

@@ -1,6 +1,8 @@
 /* NetCDF in its classic forms (CDF-1, CDF-2 and CDF-5): a variable of three dimensions or more, the
  * last of which are k, j and i; of those before, the first place. A dimension with a variable of
  * its own name has that for coordinates. What an attribute names as fill or missing is no value.
+ * Whole numbers have no sign where the attribute _Unsigned is "true": two of the forms have no type
+ * for such numbers.
  * Those of netCDF-4 are read_netcdf4.c's. Not by libnetcdf as these: nc_open() of 4.9.0 writes beyond
  * its memory and takes gigabytes for damaged files, and reads shortened ones as if they were whole. */
 #include <fcntl.h>
@@ -8,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -46,7 +49,8 @@ typedef struct variable {
     text name;
     unsigned dims;
     uint64_t dim[DIMS_MOST];
-    unsigned type;
+    int scalar;       /* trip_scalar; -1: characters */
+    bool is_unsigned; /* whatever the type is that the file says */
     uint64_t begin;
     double slope, inter, missing[2]; /* NaN: none */
 } variable;
@@ -125,9 +129,9 @@ static bool same_text(text a, text b)
 }
 
 /* A stored number. */
-static double number_at(const unsigned char *at, unsigned type)
+static double number_at(const unsigned char *at, int scalar)
 {
-    const unsigned bytes = trip_scalar_bytes((trip_scalar)scalar_of[type]);
+    const unsigned bytes = trip_scalar_bytes((trip_scalar)scalar);
     uint64_t bits = 0;
     for (unsigned i = 0; i < bytes; i++)
         bits = bits << 8 | at[i];
@@ -135,7 +139,7 @@ static double number_at(const unsigned char *at, unsigned type)
     double both;
     uint32_t half = (uint32_t)bits;
     const unsigned up = 64 - 8 * bytes;
-    switch (scalar_of[type]) {
+    switch (scalar) {
     case TRIP_F32:
         memcpy(&single, &half, sizeof single);
         return (double)single;
@@ -152,6 +156,11 @@ static double number_at(const unsigned char *at, unsigned type)
     }
 }
 
+static bool is_true(const unsigned char *at, uint64_t bytes)
+{
+    return bytes >= 4 && strncasecmp((const char *)at, "true", 4) == 0 && (bytes == 4 || !at[4]);
+}
+
 static void take_attribute(header *h, variable *v)
 {
     text name = take_text(h);
@@ -166,16 +175,18 @@ static void take_attribute(header *h, variable *v)
         return;
     }
     const unsigned char *values = take_bytes(h, bytes);
+    if (v && values && type == TYPE_CHAR && is_named(name, "_Unsigned"))
+        v->is_unsigned = is_true(values, bytes);
     if (!v || !values || count == 0 || type == TYPE_CHAR)
         return;
     if (is_named(name, "scale_factor"))
-        v->slope = number_at(values, type);
+        v->slope = number_at(values, scalar_of[type]);
     else if (is_named(name, "add_offset"))
-        v->inter = number_at(values, type);
+        v->inter = number_at(values, scalar_of[type]);
     else if (is_named(name, "_FillValue"))
-        v->missing[0] = number_at(values, type);
+        v->missing[0] = number_at(values, scalar_of[type]);
     else if (is_named(name, "missing_value"))
-        v->missing[1] = number_at(values, type);
+        v->missing[1] = number_at(values, scalar_of[type]);
 }
 
 static void take_attributes(header *h, variable *v)
@@ -194,6 +205,21 @@ static void take_dimension(header *h, dimension *d)
 /* What unwritten numbers of floats are filled with, where no attribute says another. */
 #define FILL_FLOAT 9.9692099683868690e+36
 
+static void take_type(header *h, variable *v)
+{
+    const uint64_t type = take_number(h, 4);
+    h->broken |= type == 0 || type >= TYPES;
+    v->scalar = h->broken ? -1 : scalar_of[type];
+    if ((v->scalar == TRIP_F32 || v->scalar == TRIP_F64) && isnan(v->missing[0]))
+        v->missing[0] = FILL_FLOAT;
+    if (!v->is_unsigned || v->scalar < 0)
+        return;
+    const trip_scalar bits = trip_scalar_unsigned((trip_scalar)v->scalar);
+    for (int i = 0; i < 2 && bits < TRIP_F16; i++)
+        v->missing[i] = trip_scalar_without_sign(bits, v->missing[i]);
+    v->scalar = (int)bits;
+}
+
 static void take_variable(header *h, variable *v)
 {
     v->name = take_text(h);
@@ -210,12 +236,9 @@ static void take_variable(header *h, variable *v)
     v->slope = 1;
     v->missing[0] = v->missing[1] = NAN;
     take_attributes(h, v);
-    v->type = (unsigned)take_number(h, 4);
+    take_type(h, v);
     take_count(h); /* of bytes, which follow from the rest */
     v->begin = take_number(h, h->far ? 8 : 4);
-    h->broken |= v->type == 0 || v->type >= TYPES;
-    if ((v->type == 5 || v->type == 6) && isnan(v->missing[0]))
-        v->missing[0] = FILL_FLOAT;
 }
 
 static uint64_t size_of(const header *h, uint64_t dim)
@@ -230,7 +253,7 @@ static bool has_records(const header *h, const variable *v)
 
 static unsigned bytes_of(const variable *v)
 {
-    return v->type == TYPE_CHAR ? 1 : trip_scalar_bytes((trip_scalar)scalar_of[v->type]);
+    return v->scalar < 0 ? 1 : trip_scalar_bytes((trip_scalar)v->scalar);
 }
 
 /* Of a record of a variable. */
@@ -352,7 +375,7 @@ static bool netcdf_probe(const char *path, const unsigned char *head, size_t byt
 static double volume_of(const header *h, const variable *v)
 {
     double values = 1;
-    if (v->dims < 3 || scalar_of[v->type] < 0)
+    if (v->dims < 3 || v->scalar < 0)
         return 0;
     for (unsigned i = v->dims - 3; i < v->dims; i++)
         values *= (double)size_of(h, v->dim[i]);
@@ -384,7 +407,7 @@ static const variable *coordinates_of(const header *h, uint64_t dim)
 {
     for (uint64_t i = 0; i < h->variable_count; i++) {
         const variable *v = &h->variables[i];
-        if (v->dims == 1 && v->dim[0] == dim && scalar_of[v->type] >= 0 &&
+        if (v->dims == 1 && v->dim[0] == dim && v->scalar >= 0 &&
             same_text(v->name, h->dims[dim].name))
             return v;
     }
@@ -410,7 +433,7 @@ static int read_coordinates(const header *h, int fd, const variable *v, double *
                      ? trip_fail(TRIP_INTERRUPTED, "read", h->path, "interrupted")
                      : read_at(fd, h->path, at, piece, (size_t)((n - 1) * stride + bytes));
         for (uint64_t k = 0; k < n && !status; k++)
-            values[i + k] = v->slope * number_at(piece + k * stride, v->type) + v->inter;
+            values[i + k] = v->slope * number_at(piece + k * stride, v->scalar) + v->inter;
     }
     return status;
 }
@@ -453,7 +476,7 @@ static int lay_out(const header *h, const variable *v, trip_volume_info *info, n
         uint64_t size = size_of(h, v->dim[v->dims - 1 - (unsigned)a]);
         info->dims[a] = size > INT64_MAX ? 0 : (int64_t)size;
     }
-    info->type = n->stored = (trip_scalar)scalar_of[v->type];
+    info->type = n->stored = (trip_scalar)v->scalar;
     info->slope = v->slope;
     info->inter = v->inter;
     int status = trip_volume_check_dims(h->path, info);

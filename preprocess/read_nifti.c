@@ -55,7 +55,8 @@ static bool nifti_probe(const char *path, const unsigned char *head, size_t byte
            ends_in(path, ".img");
 }
 
-/* The other file of a pair: ".hdr" and ".img" exchanged, the case and a ".gz" kept. */
+/* The other file of a pair: ".hdr" and ".img" exchanged, the case of each letter and a ".gz" kept.
+ */
 static char *partner(const char *path, const char *from, const char *to)
 {
     char *copy = strdup(path);
@@ -64,7 +65,11 @@ static char *partner(const char *path, const char *from, const char *to)
     size_t length = strlen(copy);
     if (strcasecmp(copy + length - 3, ".gz") == 0)
         length -= 3;
-    memcpy(copy + length - strlen(to), to, strlen(to));
+    char *suffix = copy + length - strlen(to);
+    for (size_t i = 0; to[i]; i++) {
+        const bool is_capital = suffix[i] >= 'A' && suffix[i] <= 'Z';
+        suffix[i] = (char)(is_capital ? to[i] - 'a' + 'A' : to[i]);
+    }
     return copy;
 }
 

@@ -40,21 +40,32 @@ static int read_header(const char *path, trip_nrrd_header *h)
     return status;
 }
 
+/* Bytes between checks for an interruption. */
+#define PATIENCE_BYTES (1 << 20)
+
 /* *offset becomes the byte after the next `lines` lines from byte `start` on. */
 static int skip_lines(const char *path, uint64_t start, int64_t lines, uint64_t *offset)
 {
+    uint64_t bytes;
+    int status = trip_file_size(path, &bytes); /* what has no end is refused */
+    if (status < 0)
+        return status;
     FILE *file = fopen(path, "rbe");
     if (!file)
         return trip_fail_errno("read", path, "cannot open");
     int64_t left = lines;
+    bool stopped = false;
     int c = fseeko(file, (off_t)start, SEEK_SET) == 0 ? 0 : EOF;
     *offset = start;
-    while (left > 0 && c != EOF) {
+    while (left > 0 && c != EOF && !stopped) {
+        stopped = (*offset - start) % PATIENCE_BYTES == 0 && trip_interrupted();
         c = getc_unlocked(file);
         *offset += c != EOF;
         left -= c == '\n';
     }
     fclose(file);
+    if (stopped)
+        return trip_fail(TRIP_INTERRUPTED, "read", path, "interrupted");
     if (left > 0)
         return trip_fail(TRIP_ERROR, "read", path, "ends within the %" PRId64 " lines to skip",
                          lines);
@@ -85,7 +96,8 @@ static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t 
         return status;
     }
     status = trip_file_size(source->path, &file_bytes);
-    if (status == 0 && file_bytes >= part_bytes)
+    if (status == 0 && file_bytes >= part_bytes &&
+        file_bytes - part_bytes >= source->offset_bytes) /* behind the header and skipped lines */
         source->offset_bytes = file_bytes - part_bytes;
     return status; /* a file too short is reported when it is opened */
 }

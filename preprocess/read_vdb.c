@@ -34,7 +34,8 @@ static int load_module(const trip_volume_reader **out)
 {
     static const trip_vdb_host host = { TRIP_VERSION,           (trip_fail),
                                         trip_budget_take,       trip_budget_release,
-                                        trip_budget_left_bytes, trip_format_bytes };
+                                        trip_budget_left_bytes, trip_format_bytes,
+                                        trip_interrupted };
     char path[PATH_MAX];
     if (!trip_companion_find(path, MODULE, TRIP_VDB_MODULE_BUILT, R_OK))
         return trip_fail(TRIP_ERROR, "read", MODULE,

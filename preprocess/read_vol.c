@@ -1,5 +1,8 @@
 /* .vol of the DGtal and VolGallery projects: header lines "Name: value" up to a line with a single
- * ".", then one zlib stream of X * Y * Z bytes (version 3), or the bytes themselves (version 2). */
+ * ".", then one zlib stream of X * Y * Z bytes (version 3), or the bytes themselves (version 2).
+ * Where no line says the version, the sizes come once more before the bytes, as integers of four
+ * bytes in the order of the machine that wrote them, and a line feed. Voxel-Size is the bytes of a
+ * voxel, of which there may be one; nothing says how far apart voxels are. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,16 +10,20 @@
 
 #include "byte_stream.h"
 #include "dense_file.h"
+#include "fail_line.h"
 #include "report.h"
 #include "volume_reader.h"
 
 #define LINE_BYTES 256
 #define LINES_MAX 200
 
+/* What comes before the voxels where no version is said. */
+enum { REPEATED_BYTES = 3 * 4 + 1 };
+
 typedef struct vol_header {
     int64_t dims[3], version;
-    double spacing;
-    uint64_t bytes; /* with the "." line */
+    bool has_version;
+    uint64_t bytes; /* of all that is before the voxels */
 } vol_header;
 
 /* Whether the file begins with one of the lines that headers begin with. */
@@ -32,49 +39,75 @@ static bool vol_probe(const char *path, const unsigned char *head, size_t bytes,
     return false;
 }
 
-static int fail_line(const char *path, int line, const char *why)
-{
-    char where[4200];
-    snprintf(where, sizeof where, "%s: line %d", path, line);
-    return trip_fail(TRIP_ERROR, "read", where, "%s", why);
-}
-
 /* Takes one "Name: value" line; other names are ignored. */
-static int take_field(vol_header *h, const char *line)
+static int take_field(vol_header *h, const char *path, int number, const char *line)
 {
     static const char *const axes[3] = { "X", "Y", "Z" };
     char name[32], value[64], *end = NULL;
     if (sscanf(line, "%31[^:]: %63s", name, value) != 2)
-        return -1;
+        return trip_fail_line("read", path, number, "not a \"Name: value\" line");
     for (int a = 0; a < 3; a++)
         if (strcmp(name, axes[a]) == 0)
             h->dims[a] = strtoll(value, &end, 10);
-    if (strcmp(name, "Version") == 0)
+    if (strcmp(name, "Version") == 0) {
         h->version = strtoll(value, &end, 10);
-    else if (strcmp(name, "Voxel-Size") == 0)
-        h->spacing = strtod(value, &end);
-    return end && (end == value || *end) ? -1 : 0;
+        h->has_version = true;
+    }
+    if (end && (end == value || *end))
+        return trip_fail_line("read", path, number, "%s must be a whole number", name);
+    const bool is_long = strcmp(name, "Lvoxel-Size") == 0;
+    if (is_long || (strcmp(name, "Voxel-Size") == 0 && strcmp(value, "1") != 0))
+        return trip_fail_line("read", path, number,
+                              "\"%s: %s\", its bytes a voxel: only .vol files of one byte a voxel "
+                              "can be read",
+                              name, value);
+    return 0;
+}
+
+/* Whether the three integers, of one byte order or the other, are the sizes. */
+static bool are_sizes(const unsigned char *at, const int64_t dims[3])
+{
+    bool little = true, big = true;
+    for (int a = 0; a < 3; a++, at += 4) {
+        little = little && dims[a] == ((int64_t)at[3] << 24 | at[2] << 16 | at[1] << 8 | at[0]);
+        big = big && dims[a] == ((int64_t)at[0] << 24 | at[1] << 16 | at[2] << 8 | at[3]);
+    }
+    return little || big;
+}
+
+static int take_repeated_sizes(vol_header *h, const char *path, FILE *file)
+{
+    unsigned char repeated[REPEATED_BYTES];
+    if (fread(repeated, 1, sizeof repeated, file) != sizeof repeated ||
+        !are_sizes(repeated, h->dims) || repeated[REPEATED_BYTES - 1] != '\n')
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "has no \"Version\", so that its sizes and a line feed would have to "
+                         "follow its header, which they do not");
+    h->bytes += REPEATED_BYTES;
+    return 0;
 }
 
 static int read_header(const char *path, FILE *file, vol_header *h)
 {
     char line[LINE_BYTES];
-    *h = (vol_header){ .spacing = 1, .version = 2 };
+    *h = (vol_header){ .version = 2 };
     for (int n = 1; n <= LINES_MAX; n++) {
         if (!fgets(line, sizeof line, file))
-            return fail_line(path, n, "the file ends within the header");
+            return trip_fail_line("read", path, n, "the file ends within the header");
         size_t length = strcspn(line, "\r\n");
         if (!line[length])
-            return fail_line(path, n, "not a line of a .vol header");
+            return trip_fail_line("read", path, n, "not a line of a .vol header");
         line[length] = '\0';
         if (strcmp(line, ".") == 0) {
             h->bytes = (uint64_t)ftello(file);
-            return 0;
+            return h->has_version ? 0 : take_repeated_sizes(h, path, file);
         }
-        if (take_field(h, line) < 0)
-            return fail_line(path, n, "not a \"Name: value\" line");
+        int status = take_field(h, path, n, line);
+        if (status < 0)
+            return status;
     }
-    return fail_line(path, LINES_MAX, "the header has no end, a line with a single \".\"");
+    return trip_fail_line("read", path, LINES_MAX,
+                          "the header has no end, a line with a single \".\"");
 }
 
 static int vol_open(const char *path, const trip_volume_params *params, trip_budget *budget,
@@ -95,8 +128,6 @@ static int vol_open(const char *path, const trip_volume_params *params, trip_bud
                          ".vol version %" PRId64 " is not known, only 2 and 3 are", h.version);
     memcpy(info->dims, h.dims, sizeof info->dims);
     info->type = TRIP_U8;
-    for (int a = 0; a < 3; a++)
-        info->index_to_world.m[a][a] = h.spacing;
     trip_byte_source source = { .path = path,
                                 .encoding = h.version == 3 ? TRIP_BYTES_ZLIB : TRIP_BYTES_PLAIN,
                                 .offset_bytes = h.bytes };

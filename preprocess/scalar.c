@@ -70,6 +70,27 @@ unsigned trip_scalar_bytes(trip_scalar type)
     return scalars[type].bytes;
 }
 
+trip_scalar trip_scalar_unsigned(trip_scalar type)
+{
+    switch (type) {
+    case TRIP_I8:
+        return TRIP_U8;
+    case TRIP_I16:
+        return TRIP_U16;
+    case TRIP_I32:
+        return TRIP_U32;
+    case TRIP_I64:
+        return TRIP_U64;
+    default:
+        return type;
+    }
+}
+
+double trip_scalar_without_sign(trip_scalar type, double value)
+{
+    return value < 0 ? value + ldexp(1, 8 * (int)trip_scalar_bytes(type)) : value;
+}
+
 const char *trip_scalar_name(trip_scalar type)
 {
     return scalars[type].name;

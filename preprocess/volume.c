@@ -133,14 +133,43 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
                      "--type uint8` says what it is");
 }
 
-/* Sets the lengths of the index axes in world space and keeps their directions. */
+/* Of an index axis in world space; 0: it has no direction. */
+static double axis_length(const trip_affine *m, int a)
+{
+    const double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
+    return isfinite(length) ? length : 0;
+}
+
+/* Whether every index axis that has a direction lies along the same axis of the world. */
+static bool lies_straight(const trip_affine *m)
+{
+    for (int a = 0; a < 3; a++)
+        for (int row = 0; row < 3 && axis_length(m, a) > 0; row++)
+            if (row != a && m->m[row][a] != 0)
+                return false;
+    return true;
+}
+
+/* Sets the lengths of the index axes in world space and keeps their directions. One that has none
+ * lies along the same axis of the world if the others do. */
 static void override_spacing(trip_affine *m, const double spacing[3])
 {
+    const bool straight = lies_straight(m);
     for (int a = 0; a < 3; a++) {
-        double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
+        const double length = axis_length(m, a), sign = m->m[a][a] < 0 ? -1 : 1;
         for (int row = 0; row < 3 && length > 0; row++)
             m->m[row][a] *= spacing[a] / length;
+        for (int row = 0; row < 3 && length == 0 && straight; row++)
+            m->m[row][a] = row == a ? sign * spacing[a] : 0;
     }
+}
+
+/* Whether a map would have an inverse if its axes had other lengths. */
+static bool lacks_lengths_alone(trip_affine m)
+{
+    trip_affine inverse;
+    override_spacing(&m, (const double[3]){ 1, 1, 1 });
+    return trip_affine_invert(&m, &inverse);
 }
 
 /* Whether world space is the grid's own but for the lengths of its axes and its origin. */
@@ -224,8 +253,10 @@ static int check_info(const trip_volume *v)
         return status;
     if (!trip_affine_invert(&info->index_to_world, &inverse))
         return trip_fail(TRIP_ERROR, "read", v->path,
-                         "its map from voxels to space is singular or not finite; --spacing X,Y,Z "
-                         "may give the axes other lengths");
+                         "its map from voxels to space is singular or not finite%s",
+                         lacks_lengths_alone(info->index_to_world)
+                             ? "; --spacing X,Y,Z gives the axes other lengths"
+                             : "");
     if (!isfinite(info->slope) || info->slope == 0 || !isfinite(info->inter))
         return trip_fail(TRIP_ERROR, "read", v->path,
                          "scales its values by %g and offsets them by %g, which loses them",

@@ -36,6 +36,11 @@ typedef enum trip_scalar {
 } trip_scalar;
 
 unsigned trip_scalar_bytes(trip_scalar type);
+/* The type whose values have the same bits and no sign; of floats and unsigned types their own. */
+trip_scalar trip_scalar_unsigned(trip_scalar type);
+/* What the bits of a whole number stand for in an unsigned type: of a negative one more than it is
+ * by 2 to the power of the type's bits. */
+double trip_scalar_without_sign(trip_scalar type, double value);
 /* "uint8", "int16", "float", "double", "half", ... and their common aliases; -1 when unknown. */
 int trip_scalar_from_name(const char *name);
 const char *trip_scalar_name(trip_scalar type);

@@ -5,9 +5,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "coordinates.h"
+#include "input_file.h"
 #include "report.h"
+#include "text.h"
 
 enum { LETTERS = 3 };
 static const char letters[LETTERS] = { 'x', 'y', 'z' };
@@ -96,34 +99,59 @@ static bool is_between(int c)
     return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == ',' || c == ';';
 }
 
+/* A file that is read in order; it may be a pipe. */
+typedef struct text_file {
+    int fd;
+    size_t used, count;
+    bool failed; /* errno says why */
+    char bytes[1 << 14];
+} text_file;
+
+/* EOF at the end, or after a failure. */
+static int next_byte(text_file *f)
+{
+    if (f->used == f->count) {
+        const ssize_t n = f->failed ? -1 : trip_input_read(f->fd, f->bytes, sizeof f->bytes);
+        f->failed = n < 0;
+        f->used = 0;
+        f->count = n > 0 ? (size_t)n : 0;
+    }
+    return f->used < f->count ? (unsigned char)f->bytes[f->used++] : EOF;
+}
+
 /* The next number of a file; 0: there is none, -1: what is there is none. */
-static int next_number(FILE *f, double *value)
+static int next_number(text_file *f, double *value)
 {
     char word[64];
     size_t n = 0;
     int c;
-    while (is_between(c = fgetc(f)))
+    while (is_between(c = next_byte(f)))
         continue;
-    for (; c != EOF && !is_between(c); c = fgetc(f))
+    for (; c != EOF && !is_between(c); c = next_byte(f))
         if (n < sizeof word - 1)
             word[n++] = (char)c;
         else
             return -1;
     word[n] = 0;
-    char *end = word;
-    *value = n ? strtod(word, &end) : 0;
-    return n == 0 ? 0 : *end ? -1 : 1;
+    *value = 0;
+    return n == 0 ? 0 : trip_text_to_double(word, value) ? 1 : -1;
 }
 
-static int read_numbers(FILE *f, const char *file, double *values, int64_t count)
+static int fail_to_read(const char *file)
+{
+    return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "read", file, "interrupted")
+                              : trip_fail_errno("read", file, "cannot read");
+}
+
+static int read_numbers(text_file *f, const char *file, double *values, int64_t count)
 {
     double beyond;
     for (int64_t i = 0; i <= count; i++) {
         int got = next_number(f, i < count ? &values[i] : &beyond);
+        if (f->failed)
+            return fail_to_read(file);
         if (got < 0)
             return trip_fail(TRIP_ERROR, "read", file, "number %" PRId64 " is none", i + 1);
-        if (ferror(f))
-            return trip_fail_errno("read", file, "cannot read");
         if (got != (i < count))
             return trip_fail(TRIP_ERROR, "read", file,
                              "has %s than the %" PRId64 " coordinates of its axis",
@@ -138,11 +166,11 @@ static int read_axis(trip_volume_info *info, int axis, const char *file, const c
     double *values = calloc((size_t)count, sizeof *values);
     if (!values)
         return trip_fail(TRIP_ERROR, "read", file, "out of memory");
-    FILE *f = fopen(file, "re");
-    int status =
-        f ? read_numbers(f, file, values, count) : trip_fail_errno("read", file, "cannot open");
-    if (f)
-        fclose(f);
+    text_file f = { .fd = trip_input_open(file) };
+    int status = f.fd >= 0 ? read_numbers(&f, file, values, count)
+                           : trip_fail_errno("read", file, "cannot open");
+    if (f.fd >= 0)
+        close(f.fd);
     if (!status)
         status = trip_volume_set_coordinates(info, axis, values, path);
     free(values);

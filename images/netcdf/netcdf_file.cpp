@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <netcdf.h>
+#include <strings.h>
 
 #include "volume_reader.h"
 
@@ -39,6 +40,26 @@ void take_attribute(int group, int variable, const char *name, double &value)
     std::vector<double> all(count);
     check(nc_get_att_double(group, variable, name, all.data()));
     value = all[0];
+}
+
+/* Whether the attribute _Unsigned is the text "true", as characters or as one string. */
+bool is_unsigned(int group, int variable)
+{
+    nc_type type;
+    size_t count;
+    std::string text;
+    if (nc_inq_att(group, variable, "_Unsigned", &type, &count) != NC_NOERR || count > 8)
+        return false;
+    if (type == NC_CHAR) {
+        text.resize(count);
+        check(nc_get_att_text(group, variable, "_Unsigned", &text[0]));
+    } else if (type == NC_STRING && count == 1) {
+        char *held = nullptr;
+        check(nc_get_att_string(group, variable, "_Unsigned", &held));
+        text = held ? held : "";
+        nc_free_string(1, &held);
+    }
+    return strcasecmp(text.c_str(), "true") == 0;
 }
 
 std::vector<int> dimensions_of(int group, int variable)
@@ -144,6 +165,11 @@ void trip_netcdf_file::set_type(int type)
     take_attribute(group_, variable_, "missing_value", missing_[1]);
     if ((type == NC_FLOAT || type == NC_DOUBLE) && std::isnan(missing_[0]))
         missing_[0] = NC_FILL_DOUBLE;
+    if (is_unsigned(group_, variable_) && stored_ < TRIP_F16) {
+        stored_ = trip_scalar_unsigned((trip_scalar)stored_);
+        for (double &missing : missing_)
+            missing = trip_scalar_without_sign((trip_scalar)stored_, missing);
+    }
     decoded_ = !std::isnan(missing_[0]) || !std::isnan(missing_[1]);
     about.type = decoded_ ? TRIP_F32 : stored_;
 }
@@ -165,8 +191,12 @@ void trip_netcdf_file::place(int axis, int dimension)
                 check(nc_get_var_double(group, number, coordinates.data() + before));
                 take_attribute(group, number, "scale_factor", slope);
                 take_attribute(group, number, "add_offset", inter);
-                for (size_t i = before; i < coordinates.size(); i++)
-                    coordinates[i] = slope * coordinates[i] + inter;
+                const trip_scalar held = (trip_scalar)scalar_of[type];
+                const bool without = held < TRIP_F16 && is_unsigned(group, number);
+                for (size_t i = before; i < coordinates.size(); i++) {
+                    double &at = coordinates[i];
+                    at = slope * (without ? trip_scalar_without_sign(held, at) : at) + inter;
+                }
                 about.placed |= 1 << axis;
                 return;
             }

@@ -47,3 +47,8 @@ const char *trip_format_bytes(uint64_t bytes, char *text)
 {
     return host->format_bytes(bytes, text);
 }
+
+int trip_interrupted(void)
+{
+    return host->interrupted();
+}

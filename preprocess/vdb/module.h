@@ -21,6 +21,7 @@ typedef struct trip_vdb_host {
     void (*release)(trip_budget *budget, void *memory, size_t bytes);
     uint64_t (*left_bytes)(const trip_budget *budget);
     const char *(*format_bytes)(uint64_t bytes, char *text);
+    int (*interrupted)(void);
 } trip_vdb_host;
 
 /* The module's one symbol, TRIP_VDB_ENTRY. NULL: of another version. The table is kept. */

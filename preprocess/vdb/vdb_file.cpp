@@ -113,6 +113,8 @@ trip_vdb_fd::~trip_vdb_fd()
 size_t trip_vdb_fd::read_some(void *to, size_t bytes, int64_t offset) const
 {
     for (;;) {
+        if (trip_interrupted())
+            throw trip_vdb_error("interrupted", TRIP_INTERRUPTED);
         ssize_t n = ::pread(fd_, to, bytes, offset);
         if (n > 0)
             return (size_t)n;

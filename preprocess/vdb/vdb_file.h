@@ -30,7 +30,8 @@ class trip_vdb_fd
     trip_vdb_fd(const trip_vdb_fd &) = delete;
     trip_vdb_fd &operator=(const trip_vdb_fd &) = delete;
     ~trip_vdb_fd();
-    /* As pread(2), but throws on errors and on the end of the file. */
+    /* As pread(2), but throws on errors, on the end of the file, and where the work of the thread
+     * is interrupted: reading is what opening and decoding take their time for. */
     size_t read_some(void *to, size_t bytes, int64_t offset) const;
     int64_t size() const
     {

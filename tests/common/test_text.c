@@ -3,7 +3,8 @@
 #include "text.h"
 
 #include <float.h>
-#include <locale.h>
+
+#include "comma_locale.h"
 
 static void decimal_numbers_are_read(void **state)
 {
@@ -60,36 +61,10 @@ static void written_numbers_are_short(void **state)
     assert_string_equal(trip_text_from_double(-1000, text), "-1000");
 }
 
-/* Compiled here, since few machines have one installed. */
-static bool set_locale_with_commas(const char *folder)
-{
-    char command[128];
-    snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 %s/de_DE.UTF-8", folder);
-    setenv("LOCPATH", folder, 1);
-    bool set = system(command) == 0 && setlocale(LC_ALL, "de_DE.UTF-8");
-    unsetenv("LOCPATH");
-    return set;
-}
-
-static void remove_folder(const char *folder)
-{
-    char command[64];
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    assert_int_equal(system(command), 0);
-}
-
 static void a_locale_with_decimal_commas_changes_nothing(void **state)
 {
     (void)state;
-    char folder[] = "/tmp/trip-locale-XXXXXX";
-    assert_non_null(mkdtemp(folder));
-    const bool set = set_locale_with_commas(folder);
-    remove_folder(folder);
-    if (!set) {
-        print_message("skipped: no locale with decimal commas can be compiled\n");
-        skip();
-    }
-    assert_string_equal(localeconv()->decimal_point, ",");
+    need_comma_locale();
     char text[32];
     double value = 0;
     bool read = trip_text_to_double("1.5", &value);

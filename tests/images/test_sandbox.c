@@ -2,14 +2,17 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/fs.h>
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -58,6 +61,7 @@ static int try_what_is_denied(void)
 {
     char *argv[] = { (char[]){ "true" }, NULL };
     pid_t pid;
+    int there = open("there", O_RDONLY), flags[16] = { 0 };
     const bool all[] = {
         refused(execve("/bin/true", argv, environ)),
         posix_spawn(&pid, "/bin/true", NULL, NULL, argv, environ) != 0,
@@ -75,6 +79,12 @@ static int try_what_is_denied(void)
         refused(mkdir("new", 0777)),
         refused(chmod("there", 0)),
         refused(truncate("there", 0)),
+        refused(syscall(452, AT_FDCWD, "there", 0, 0)),                 /* fchmodat2 */
+        refused(syscall(463, AT_FDCWD, "there", 0, "user.a", NULL, 0)), /* setxattrat */
+        refused(syscall(466, AT_FDCWD, "there", 0, "user.a")),          /* removexattrat */
+        refused(syscall(469, AT_FDCWD, "there", NULL, 0, 0)),           /* file_setattr */
+        refused(ioctl(there, FS_IOC_SETFLAGS, flags)),
+        refused(ioctl(there, FS_IOC_FSSETXATTR, flags)),
         refused(kill(getppid(), 0)),
         refused(unshare(CLONE_NEWUSER)),
     };

@@ -36,6 +36,33 @@ static inline void assert_placed(const char *path, const char *name)
     trip_budget_destroy(budget);
 }
 
+/* Of variables whose attribute says that they have no sign, while their type has one. */
+static inline int unsigned_x_place(int i)
+{
+    return 100 + 25 * i;
+}
+
+/* Its numbers, stored as `type`, have no sign; where one is -7 by that type it has no value, if any
+ * are missing. x lies where such bytes say. */
+static inline void assert_unsigned(const char *path, trip_scalar type, bool missing)
+{
+    const double beyond = type == TRIP_I8 ? 256 : 65536;
+    float values[VOXELS];
+    trip_volume_info info;
+    int none = 0;
+    assert_int_equal(read_volume(path, NULL, 2, values, VOXELS, &info), 0);
+    assert_int_equal(info.type, missing ? TRIP_F32 : type == TRIP_I8 ? TRIP_U8 : TRIP_U16);
+    for (int v = 0; v < VOXELS; v++) {
+        const int stored = sample(type, v % NX, v / NX % NY, v / NX / NY);
+        const bool is_none = missing && stored == -7;
+        none += is_none;
+        assert_true(is_none ? isnan(values[v]) : values[v] == stored + (stored < 0 ? beyond : 0));
+    }
+    assert_true(missing == (none > 0));
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 25, 0, 0, 100 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
+}
+
 /* Its numbers stand for twice as much, and 3; where one is 5 it has no value. */
 static inline void assert_scaled(const char *path, trip_scalar type)
 {

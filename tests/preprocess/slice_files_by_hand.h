@@ -168,6 +168,7 @@ static inline void append_exr(bytes *b, trip_scalar type, int k)
 typedef struct dicom {
     const char *series, *number, *position, *orientation, *spacing, *thickness, *slope, *inter;
     const char *frames;
+    const char *const *frame_slopes, *const *frame_places; /* of each frame, or NULL */
     unsigned stored, shift; /* bits that hold the value, and unused ones below; 0: all, none */
     trip_scalar type;
 } dicom;
@@ -175,7 +176,7 @@ typedef struct dicom {
 static inline void append_element(bytes *b, unsigned group, unsigned element, const char *vr,
                                   const void *data, size_t count)
 {
-    bool is_long = strcmp(vr, "OW") == 0 || strcmp(vr, "OB") == 0;
+    bool is_long = strcmp(vr, "OW") == 0 || strcmp(vr, "OB") == 0 || strcmp(vr, "SQ") == 0;
     size_t padded = (count + 1) & ~(size_t)1;
     append_u16(b, group);
     append_u16(b, element);
@@ -199,6 +200,42 @@ static inline void append_dicom_u16(bytes *b, unsigned group, unsigned element, 
 {
     unsigned char data[2] = { (unsigned char)value, (unsigned char)(value >> 8) };
     append_element(b, group, element, "US", data, 2);
+}
+
+/* One of a sequence's items. */
+static inline void append_item(bytes *b, const bytes *item)
+{
+    append_u16(b, 0xfffe);
+    append_u16(b, 0xe000);
+    append_u32(b, item->count);
+    append(b, item->data, item->count);
+}
+
+/* A sequence of one item. */
+static inline void append_group(bytes *b, unsigned group, unsigned element, const bytes *item)
+{
+    bytes items = { .count = 0 };
+    append_item(&items, item);
+    append_element(b, group, element, "SQ", items.data, items.count);
+}
+
+/* What each frame says, in an item of its own. */
+static inline void append_frame_groups(bytes *b, const dicom *d, int count)
+{
+    bytes frames = { .count = 0 };
+    for (int k = 0; k < count; k++) {
+        bytes frame = { .count = 0 }, place = { .count = 0 }, scale = { .count = 0 };
+        if (d->frame_places) {
+            append_dicom_text(&place, 0x20, 0x32, "DS", d->frame_places[k]);
+            append_group(&frame, 0x20, 0x9113, &place);
+        }
+        if (d->frame_slopes) {
+            append_dicom_text(&scale, 0x28, 0x1053, "DS", d->frame_slopes[k]);
+            append_group(&frame, 0x28, 0x9145, &scale);
+        }
+        append_item(&frames, &frame);
+    }
+    append_element(b, 0x5200, 0x9230, "SQ", frames.data, frames.count);
 }
 
 /* Slices [first, first + count), one where `frames` is NULL. Explicit, little-endian. */
@@ -229,6 +266,8 @@ static inline void append_dicom(bytes *b, const dicom *d, int first, int count)
     append_dicom_u16(b, 0x28, 0x103, is_signed(d->type));
     append_dicom_text(b, 0x28, 0x1052, "DS", d->inter);
     append_dicom_text(b, 0x28, 0x1053, "DS", d->slope);
+    if (d->frame_slopes || d->frame_places)
+        append_frame_groups(b, d, count);
     for (int k = first; k < first + count; k++)
         for (int j = 0; j < NY; j++)
             for (int i = 0; i < NX; i++) {

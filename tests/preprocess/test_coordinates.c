@@ -1,6 +1,10 @@
 /* Where voxels lie, from text files, and what is made of it. */
 #include "volume_files.h"
 
+#include <fcntl.h>
+#include <sys/wait.h>
+
+#include "comma_locale.h"
 #include "coordinates.h"
 #include "volume_coordinates.h"
 
@@ -129,8 +133,8 @@ static void bad_coordinates_are_refused(void **state)
         { "0 1 2 3 3", "neither ascend nor descend" },
         { "0 1 3 2 5", "neither ascend nor descend" },
         { "1 1 1 1 1", "neither ascend nor descend" },
-        { "0 1 nan 3 5", "not finite" },
-        { "0 1 inf 3 5", "not finite" },
+        { "0 1 nan 3 5", "number 3 is none" },
+        { "0 1 inf 3 5", "number 3 is none" },
         { "-1e308 1 2 3 1.7e308", "neither ascend nor descend" },
         { "0 1e-9 2 3 5", "millionth" },
         { "0 1 two 3 5", "number 3 is none" },
@@ -174,6 +178,48 @@ static void no_table_is_made_of_an_axis_that_is_too_long(void **state)
     free(files);
 }
 
+static void a_locale_with_decimal_commas_changes_nothing(void **state)
+{
+    (void)state;
+    need_comma_locale();
+    float values[VOXELS];
+    trip_volume_info info;
+    char *files = option(write_text('x', "0.5 2.5 4.5 6.5 8.5"), "", "");
+    const trip_volume_params p = raw_params(files);
+    const int status = read_volume(sample_file(), &p, 2, values, VOXELS, &info);
+    setlocale(LC_ALL, "C");
+    free(files);
+    assert_int_equal(status, 0);
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 2, 0, 0, 0.5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+}
+
+/* A pipe is waited for, until an interruption. */
+static void coordinates_may_come_through_a_pipe(void **state)
+{
+    (void)state;
+    char fifo[300];
+    snprintf(fifo, sizeof fifo, "%s", path_of("x.fifo"));
+    assert_int_equal(mkfifo(fifo, 0666), 0);
+    char *files = option(fifo, "", "");
+    const trip_volume_params p = raw_params(files);
+    assert_interrupted(sample_file(), &p);
+    pid_t child = fork();
+    if (child == 0) {
+        int to = open(fifo, O_WRONLY);
+        _exit(write(to, "5 7 9 1", 7) == 7 && write(to, "1 13", 4) == 4 ? 0 : 1);
+    }
+    trip_volume *v;
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, sample_file(), &p, budget), 0);
+    assert_map(&trip_volume_get_info(v)->index_to_world,
+               (const double[3][4]){ { 2, 0, 0, 5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+    assert_int_equal(waitpid(child, NULL, 0), child);
+    trip_volume_close(v);
+    trip_budget_destroy(budget);
+    free(files);
+}
+
 /* Place and index are one another's inverse, beyond the ends too. */
 static void places_and_indices_are_inverse(void **state)
 {
@@ -202,6 +248,8 @@ int main(void)
         cmocka_unit_test(what_is_left_out_leaves_the_others_where_they_are),
         cmocka_unit_test(bad_coordinates_are_refused),
         cmocka_unit_test(no_table_is_made_of_an_axis_that_is_too_long),
+        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
+        cmocka_unit_test(coordinates_may_come_through_a_pipe),
         cmocka_unit_test(places_and_indices_are_inverse),
     };
     return cmocka_run_group_tests_name("coordinates", tests, make_folder, remove_folder);

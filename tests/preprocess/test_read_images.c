@@ -306,6 +306,40 @@ static void dicom_slices_rescaled_differently_become_floats(void **state)
     }
 }
 
+/* Frames are stored from the last place to the first, each with a slope of its own. */
+static void dicom_frames_are_rescaled_each_by_its_own_slope(void **state)
+{
+    (void)state;
+    static const char *const slopes[NZ] = { "1", "2", "3", "4", "5", "6", "7" };
+    static const char *const places[NZ] = { "0\\0\\6", "0\\0\\5", "0\\0\\4", "0\\0\\3",
+                                            "0\\0\\2", "0\\0\\1", "0\\0\\0" };
+    const dicom d = { .type = TRIP_U16,
+                      .frames = "7",
+                      .orientation = "1\\0\\0\\0\\1\\0",
+                      .inter = "5",
+                      .frame_slopes = slopes,
+                      .frame_places = places };
+    float values[VOXELS];
+    trip_volume_info info;
+    write_dicom("frames.dcm", &d, 0, NZ);
+    assert_int_equal(read_volume(path_of("frames.dcm"), NULL, 2, values, VOXELS, &info), 0);
+    assert_int_equal(info.type, TRIP_F32);
+    for (int v = 0; v < VOXELS; v++) {
+        int frame = NZ - 1 - v / NX / NY;
+        int stored = sample(TRIP_U16, v % NX, v / NX % NY, frame);
+        assert_true(values[v] == (float)((frame + 1) * stored + 5));
+    }
+}
+
+static void dicom_frames_rescaled_alike_keep_their_type(void **state)
+{
+    (void)state;
+    static const char *const slopes[NZ] = { "2", "2", "2", "2", "2", "2", "2" };
+    const dicom d = { .type = TRIP_I16, .frames = "7", .inter = "-5", .frame_slopes = slopes };
+    write_dicom("alike.dcm", &d, 0, NZ);
+    assert_sample(path_of("alike.dcm"), TRIP_I16, TRIP_I16, 2, -5, 0);
+}
+
 static void dicom_slices_that_do_not_belong_together_are_refused(void **state)
 {
     (void)state;
@@ -462,6 +496,8 @@ int main(void)
         cmocka_unit_test(dicom_without_positions_says_nothing_of_the_patient),
         cmocka_unit_test(dicom_bits_are_taken_from_where_they_are),
         cmocka_unit_test(dicom_slices_rescaled_differently_become_floats),
+        cmocka_unit_test(dicom_frames_are_rescaled_each_by_its_own_slope),
+        cmocka_unit_test(dicom_frames_rescaled_alike_keep_their_type),
         cmocka_unit_test(dicom_slices_that_do_not_belong_together_are_refused),
         cmocka_unit_test(slices_that_do_not_fit_or_are_missing_are_refused),
         cmocka_unit_test(wrong_patterns_are_refused),

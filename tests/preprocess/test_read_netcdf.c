@@ -38,19 +38,27 @@ static void put_float_attribute(file *f, const char *name, int value)
     append_value(&f->b, TRIP_F32, value, true);
 }
 
+static void put_unsigned_attribute(file *f)
+{
+    put_text(f, "_Unsigned");
+    put(&f->b, 2, 4);
+    put_text(f, "true");
+}
+
 /* What a file has besides the sample volume (netcdf_files.h). */
 typedef struct contents {
     int form;
     bool records;     /* z has as many as there are records */
     bool coordinates; /* of x and z (netcdf_files.h) */
     bool scaled;      /* t stands for twice as much, and 3 */
-    bool missing;     /* where t is 5 it has no value */
-    int type;         /* of t: 3 int16, 5 float */
+    bool missing;     /* where t is 5, of no sign -7, it has no value */
+    bool is_unsigned; /* t and x, then a byte, have no sign */
+    int type;         /* of t: 1 int8, 3 int16, 5 float */
 } contents;
 
 static trip_scalar scalar_of(const contents *c)
 {
-    return c->type == 5 ? TRIP_F32 : TRIP_I16;
+    return c->type == 5 ? TRIP_F32 : c->type == 1 ? TRIP_I8 : TRIP_I16;
 }
 
 static void put_variable(file *f, const char *name, const int *dims, unsigned count)
@@ -103,19 +111,23 @@ static void put_header(file *f, const contents *c)
     put_text(f, "a test");
     put_list(f, 11, c->coordinates ? 3 : 1);
     put_variable(f, "t", volume, 3);
-    put_list(f, 12, (c->scaled ? 2 : 0) + (c->missing ? 1 : 0));
+    put_list(f, 12, (c->scaled ? 2 : 0) + (c->missing ? 1 : 0) + (c->is_unsigned ? 1 : 0));
     if (c->scaled) {
         put_float_attribute(f, "scale_factor", 2);
         put_float_attribute(f, "add_offset", 3);
     }
     if (c->missing)
-        put_float_attribute(f, "missing_value", 5);
+        put_float_attribute(f, "missing_value", c->is_unsigned ? -7 : 5);
+    if (c->is_unsigned)
+        put_unsigned_attribute(f);
     end_variable(f, 0, c->type, VOXELS * each);
     if (!c->coordinates)
         return;
     put_variable(f, "x", &x, 1);
-    put_list(f, 12, 0);
-    end_variable(f, 1, 6, NX * 8);
+    put_list(f, 12, c->is_unsigned ? 1 : 0);
+    if (c->is_unsigned)
+        put_unsigned_attribute(f);
+    end_variable(f, 1, c->is_unsigned ? 1 : 6, c->is_unsigned ? 8 : NX * 8);
     put_variable(f, "z", &z, 1);
     put_list(f, 12, 0);
     end_variable(f, 2, 4, NZ * 4);
@@ -136,7 +148,11 @@ static const char *write_contents(const char *name, const contents *c)
     if (c->coordinates) {
         begin_values(&f, 1);
         for (int i = 0; i < NX; i++)
-            append_value(&f.b, TRIP_F64, x_place(i), true);
+            if (c->is_unsigned)
+                append_value(&f.b, TRIP_U8, unsigned_x_place(i), true);
+            else
+                append_value(&f.b, TRIP_F64, x_place(i), true);
+        pad(&f);
     }
     begin_values(&f, 0);
     if (!c->records) {
@@ -259,6 +275,20 @@ static void numbers_are_scaled_and_missing_ones_are_none(void **state)
     }
 }
 
+static void what_is_said_to_have_no_sign_has_none(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 8; n++) {
+        const contents c = { .form = 1,
+                             .records = n & 1,
+                             .coordinates = true,
+                             .missing = n & 2,
+                             .is_unsigned = true,
+                             .type = n & 4 ? 3 : 1 };
+        assert_unsigned(write_contents("e.nc", &c), scalar_of(&c), c.missing);
+    }
+}
+
 static void a_variable_is_chosen_by_name(void **state)
 {
     (void)state;
@@ -321,6 +351,7 @@ int main(void)
         cmocka_unit_test(too_many_coordinates_are_not_read),
         cmocka_unit_test(an_interruption_ends_the_reading_of_coordinates),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
+        cmocka_unit_test(what_is_said_to_have_no_sign_has_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),
         cmocka_unit_test(a_header_takes_little_memory),
         cmocka_unit_test(any_damage_is_read_or_refused),

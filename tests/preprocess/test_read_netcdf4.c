@@ -23,15 +23,28 @@ typedef struct contents {
     bool inside;      /* t lies in the group "g" */
     bool coordinates; /* of x and z (netcdf_files.h) */
     bool scaled;      /* t stands for twice as much, and 3 */
-    bool missing;     /* where t is 5 it has no value */
+    bool missing;     /* where t is 5, of no sign -7, it has no value */
+    int no_sign;      /* 1: t and x, then a byte, have none; 2: as a string says */
 } contents;
 
-static void put_coordinates(int file, int x, int z)
+static void put_no_sign(int file, int variable, int no_sign)
+{
+    if (no_sign == 1)
+        assert_int_equal(nc_put_att_text(file, variable, "_Unsigned", 4, "true"), 0);
+    if (no_sign == 2)
+        assert_int_equal(
+            nc_put_att_string(file, variable, "_Unsigned", 1, &(const char *){ "true" }), 0);
+}
+
+static void put_coordinates(int file, int x, int z, int no_sign)
 {
     int variable;
-    assert_int_equal(nc_def_var(file, "x", NC_DOUBLE, 1, &x, &variable), 0);
-    for (size_t i = 0; i < NX; i++)
-        assert_int_equal(nc_put_var1_int(file, variable, &i, &(int){ x_place((int)i) }), 0);
+    assert_int_equal(nc_def_var(file, "x", no_sign ? NC_BYTE : NC_DOUBLE, 1, &x, &variable), 0);
+    for (size_t i = 0; i < NX; i++) {
+        const int place = no_sign ? (signed char)unsigned_x_place((int)i) : x_place((int)i);
+        assert_int_equal(nc_put_var1_int(file, variable, &i, &place), 0);
+    }
+    put_no_sign(file, variable, no_sign);
     assert_int_equal(nc_def_var(file, "z", NC_INT, 1, &z, &variable), 0);
     for (size_t k = 0; k < NZ; k++)
         assert_int_equal(nc_put_var1_int(file, variable, &k, &(int){ z_place((int)k) }), 0);
@@ -65,15 +78,17 @@ static const char *write_contents(const char *name, const contents *c)
             nc_put_att_float(group, variable, "add_offset", NC_FLOAT, 1, &(float){ 3 }), 0);
     }
     if (c->missing)
-        assert_int_equal(
-            nc_put_att_double(group, variable, "missing_value", NC_DOUBLE, 1, &(double){ 5 }), 0);
+        assert_int_equal(nc_put_att_double(group, variable, "missing_value", NC_DOUBLE, 1,
+                                           &(double){ c->no_sign ? -7 : 5 }),
+                         0);
+    put_no_sign(group, variable, c->no_sign);
     for (size_t v = 0; v < VOXELS; v++) {
         const size_t at[4] = { 0, v / NX / NY, v / NX % NY, v % NX };
         const int value = sample(scalar_of[c->type], (int)at[3], (int)at[2], (int)at[1]);
         assert_int_equal(nc_put_var1_int(group, variable, at + first, &value), 0);
     }
     if (c->coordinates)
-        put_coordinates(file, dims[3], dims[1]);
+        put_coordinates(file, dims[3], dims[1], c->no_sign);
     assert_int_equal(nc_close(file), 0);
     return path;
 }
@@ -112,6 +127,19 @@ static void numbers_are_scaled_and_missing_ones_are_none(void **state)
             .type = n / 2 ? NC_FLOAT : NC_SHORT, .chunks = n % 2, .scaled = true, .missing = true
         };
         assert_scaled(write_contents("c.nc", &c), scalar_of[c.type]);
+    }
+}
+
+static void what_is_said_to_have_no_sign_has_none(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 8; n++) {
+        const contents c = { .type = n & 1 ? NC_SHORT : NC_BYTE,
+                             .chunks = n & 2,
+                             .coordinates = true,
+                             .missing = n & 4,
+                             .no_sign = n & 2 ? 2 : 1 };
+        assert_unsigned(write_contents("j.nc", &c), scalar_of[c.type], c.missing);
     }
 }
 
@@ -302,6 +330,7 @@ int main(void)
         cmocka_unit_test(every_type_holds_the_sample),
         cmocka_unit_test(coordinates_become_places),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
+        cmocka_unit_test(what_is_said_to_have_no_sign_has_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),
         cmocka_unit_test(what_is_no_whole_file_is_refused),
         cmocka_unit_test(any_damage_is_read_or_refused),

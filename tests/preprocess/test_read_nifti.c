@@ -169,6 +169,23 @@ static void pairs_are_read_by_either_name(void **state)
     assert_refused(path_of("pair.hdr"), "pair.img: cannot open");
 }
 
+static void pairs_keep_the_case_of_their_names(void **state)
+{
+    (void)state;
+    static const char *const names[][2] = { { "BRAIN.HDR", "BRAIN.IMG" },
+                                            { "Brain.Hdr", "Brain.Img" } };
+    nifti n = sample_header(1, TRIP_U16, false);
+    n.pair = true;
+    bytes head = { .count = 0 }, values = { .count = 0 };
+    append_header(&head, &n);
+    append_volume(&values, TRIP_U16, false);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        write_file(names[i][1], &values);
+        assert_holds_sample(write_file(names[i][0], &head), NULL, TRIP_U16);
+        assert_holds_sample(path_of(names[i][1]), NULL, TRIP_U16);
+    }
+}
+
 static void extensions_before_the_values_are_passed_over(void **state)
 {
     (void)state;
@@ -398,6 +415,7 @@ int main(void)
         cmocka_unit_test(every_type_is_read_in_both_versions_and_byte_orders),
         cmocka_unit_test(gzipped_files_are_read),
         cmocka_unit_test(pairs_are_read_by_either_name),
+        cmocka_unit_test(pairs_keep_the_case_of_their_names),
         cmocka_unit_test(extensions_before_the_values_are_passed_over),
         cmocka_unit_test(slope_and_inter_scale_the_values),
         cmocka_unit_test(a_slope_of_zero_or_nan_means_none),

@@ -1,5 +1,7 @@
 #include "volume_files.h"
 
+#include "comma_locale.h"
+
 static const char *const nrrd_types[] = { "uint8",  "signed char", "unsigned short", "short",
                                           "uint32", "int",         "uint64",         "longlong",
                                           NULL,     "float",       "double" };
@@ -185,6 +187,24 @@ static void lines_and_bytes_are_skipped(void **state)
     assert_holds_sample(write_file("skipgz.nhdr", &b), NULL, TRIP_U16);
 }
 
+/* Files without an end or without a writer, and long ones without lines. */
+static void looking_for_lines_ends(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 1\ndata file: /dev/zero\n");
+    assert_refused(write_file("endless.nhdr", &b), "not a regular file");
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 1\ndata file: lines.fifo\n");
+    assert_int_equal(mkfifo(path_of("lines.fifo"), 0666), 0);
+    assert_refused(write_file("pipe.nhdr", &b), "not a regular file");
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "raw", "line skip: 1\ndata file: lines.raw\n");
+    write_bytes("lines.raw", "no line", 7);
+    assert_refused(write_file("lines.nhdr", &b), "lines to skip");
+    assert_interrupted(path_of("lines.nhdr"), NULL);
+}
+
 static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
 {
     (void)state;
@@ -194,6 +214,59 @@ static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
     write_file("tail.raw", &data);
     append_header(&b, TRIP_U16, false, "raw", "byte skip: -1\ndata file: tail.raw\n");
     assert_holds_sample(write_file("tail.nhdr", &b), NULL, TRIP_U16);
+}
+
+/* What the report says that --spacing can do, it does; of what it cannot the report says nothing.
+ */
+static void lengths_that_are_none_can_be_given(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *line;
+        double x;
+    } none[] = { { "spacings: 0 0 0\n", 2 },
+                 { "spacings: inf 1 nan\n", 2 },
+                 { "space directions: (0,0,0) (0,5,0) (0,0,nan)\n", 2 },
+                 { "space: LAS\nspace directions: (inf,0,0) (0,5,0) (0,0,1)\n", -2 } };
+    const trip_volume_params p = { .spacing = { 2, 3, 4 } };
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; i++) {
+        float values[VOXELS];
+        trip_volume_info info = { .type = TRIP_U8 };
+        const char *path = write_with_lines("none.nrrd", none[i].line);
+        assert_refused(path, "; --spacing X,Y,Z gives");
+        assert_int_equal(read_volume(path, &p, 3, values, VOXELS, &info), 0);
+        assert_map(&info.index_to_world,
+                   (const double[3][4]){ { none[i].x, 0, 0, 0 }, { 0, 3, 0, 0 }, { 0, 0, 4, 0 } });
+    }
+    static const char *const others[] = { "space directions: (0,0,0) (0,0,5) (0,5,0)\n",
+                                          "space directions: (1,0,0) (2,0,0) (0,0,1)\n",
+                                          "space origin: (nan,0,0)\n" };
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        const char *path = write_with_lines("other.nrrd", others[i]);
+        assert_refused(path, "not finite\n");
+        assert_refused_as(TRIP_ERROR, path, &p, "not finite\n");
+    }
+}
+
+/* Of a file that is cut off, the header is not taken for values; nor are lines to skip. */
+static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw", "byte skip: -1\n\n");
+    const size_t header = b.count;
+    append_volume(&b, TRIP_U16, false);
+    assert_holds_sample(write_file("whole.nrrd", &b), NULL, TRIP_U16);
+    assert_refused(write_bytes("cut.nrrd", b.data, b.count - 1), "are promised");
+    assert_refused(write_bytes("cut.nrrd", b.data, header), "are promised");
+    b.count = 0;
+    append_text(&b, "a line\n");
+    append_volume(&b, TRIP_U16, false);
+    write_bytes("lines.raw", b.data, b.count - 1);
+    b.count = 0;
+    append_header(&b, TRIP_U16, false, "raw",
+                  "line skip: 1\nbyte skip: -1\ndata file: lines.raw\n");
+    assert_refused(write_file("lines.nhdr", &b), "are promised");
 }
 
 static void spacings_and_directions_become_the_map(void **state)
@@ -251,6 +324,24 @@ static void what_is_no_scalar_volume_is_refused(void **state)
                    "line 2: type \"block\"");
 }
 
+static void a_locale_with_decimal_commas_changes_nothing(void **state)
+{
+    (void)state;
+    const char *spacings = write_with_lines("commas.nrrd", "spacings: 0.5 NaN 3e0\n");
+    const char *directions =
+        write_with_lines("vectors.nrrd", "space: RAS\n"
+                                         "space directions: (0.5,0,0) ( 0 , 2.25, 0) (0,0,-1.5)\n"
+                                         "space origin: (-0.75,0,0)\n");
+    const char *uneven = write_with_lines("places.nrrd", "coordinates 0:=0.5 2.5 4.5 6.5 8.5\n");
+    need_comma_locale();
+    const trip_affine a = map_of(spacings), b = map_of(directions), c = map_of(uneven);
+    setlocale(LC_ALL, "C");
+    assert_map(&a, (const double[3][4]){ { 0.5, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 3, 0 } });
+    assert_map(&b,
+               (const double[3][4]){ { 0.5, 0, 0, -0.75 }, { 0, 2.25, 0, 0 }, { 0, 0, -1.5, 0 } });
+    assert_map(&c, (const double[3][4]){ { 2, 0, 0, 0.5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+}
+
 static void wrong_fields_are_refused_with_their_line(void **state)
 {
     (void)state;
@@ -259,6 +350,8 @@ static void wrong_fields_are_refused_with_their_line(void **state)
     } wrong[] = {
         { "spacings: 1 2\n", "line 8: \"spacings\" must be 3" },
         { "spacings: 1 2 x\n", "line 8: \"spacings\" must be 3" },
+        { "spacings: 0x1 1 1\n", "line 8: \"spacings\" must be 3" },
+        { "spacings: 1,5 1 1\n", "line 8: \"spacings\" must be 3" },
         { "spacings: 0 1 1\n", "singular" },
         { "spacings: inf 1 1\n", "singular or not finite" },
         { "axis mins: 1 2\n", "line 8: \"axis mins\" must be 3" },
@@ -563,7 +656,10 @@ int main(void)
         cmocka_unit_test(many_data_files_follow_one_another),
         cmocka_unit_test(a_pattern_counts_its_files),
         cmocka_unit_test(lines_and_bytes_are_skipped),
+        cmocka_unit_test(looking_for_lines_ends),
         cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
+        cmocka_unit_test(lengths_that_are_none_can_be_given),
+        cmocka_unit_test(a_byte_skip_of_minus_one_stays_behind_the_header),
         cmocka_unit_test(spacings_and_directions_become_the_map),
         cmocka_unit_test(the_space_says_how_the_world_lies_in_the_patient),
         cmocka_unit_test(an_unknown_space_is_warned_of),
@@ -573,6 +669,7 @@ int main(void)
         cmocka_unit_test(the_measurement_frame_changes_nothing),
         cmocka_unit_test(axes_of_size_one_are_dropped),
         cmocka_unit_test(what_is_no_scalar_volume_is_refused),
+        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(wrong_fields_are_refused_with_their_line),
         cmocka_unit_test(wrong_headers_are_refused),
         cmocka_unit_test(an_unknown_field_is_warned_of),

@@ -27,6 +27,7 @@ extern "C" {
 }
 
 #include "report.h"
+#include "scope.h"
 
 namespace
 {
@@ -618,6 +619,30 @@ std::string small_file(uint32_t compression)
     return file.bytes();
 }
 
+/* Both read the file, and look for an interruption before each piece. */
+void an_interruption_ends_opening_and_decoding(void **)
+{
+    openvdb::initialize();
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(2);
+    fill_scattered(*grid);
+    File file({ grid });
+    Volume whole(file);
+    assert_int_equal(whole.status, 0);
+    const trip_volume_portion portion = whole.portions()[0];
+    std::vector<float> values((size_t)(portion.size[0] * portion.size[1] * portion.size[2]));
+    trip_scope cancelled = {};
+    trip_scope *before = trip_scope_enter(&cancelled);
+    trip_scope_cancel(&cancelled);
+    expect_line();
+    Volume v(file);
+    assert_int_equal(v.status, TRIP_INTERRUPTED);
+    assert_one_line("interrupted");
+    assert_int_equal(trip_read_vdb.decode(whole.state, &portion, portion.origin, portion.size,
+                                          values.data(), nullptr),
+                     TRIP_INTERRUPTED);
+    trip_scope_enter(before);
+}
+
 void a_truncated_file_is_refused(void **)
 {
     const std::string whole =
@@ -678,6 +703,7 @@ int main()
         cmocka_unit_test(what_cannot_be_drawn_is_refused),
         cmocka_unit_test(memory_that_does_not_suffice_is_refused_first),
         cmocka_unit_test(many_threads_decode_at_once),
+        cmocka_unit_test(an_interruption_ends_opening_and_decoding),
         cmocka_unit_test(a_truncated_file_is_refused),
         cmocka_unit_test(a_corrupted_file_does_no_harm),
     };

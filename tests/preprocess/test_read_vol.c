@@ -30,8 +30,35 @@ static void version_2_is_plain(void **state)
     char text[512];
     snprintf(text, sizeof text, "%sVersion: 2\n.\n", header);
     assert_holds_sample(write_vol("b.vol", text, false), NULL, TRIP_U8);
+}
+
+/* What follows a header without a version: the sizes, in either byte order, and a line feed. */
+static bytes unversioned(bool big, int depth, char end)
+{
+    bytes b = { .count = 0 };
+    append_text(&b, header);
+    append_text(&b, ".\n");
+    append_word(&b, NX, 4, big);
+    append_word(&b, NY, 4, big);
+    append_word(&b, (uint64_t)depth, 4, big);
+    append(&b, &end, 1);
+    append_volume(&b, TRIP_U8, false);
+    return b;
+}
+
+static void without_a_version_the_sizes_come_twice(void **state)
+{
+    (void)state;
+    for (int big = 0; big < 2; big++) {
+        const bytes b = unversioned(big, NZ, '\n');
+        assert_holds_sample(write_file("c.vol", &b), NULL, TRIP_U8);
+    }
+    char text[512];
     snprintf(text, sizeof text, "%s.\n", header);
-    assert_holds_sample(write_vol("c.vol", text, false), NULL, TRIP_U8);
+    assert_refused(write_vol("c.vol", text, false), "has no \"Version\"");
+    const bytes other = unversioned(false, NZ + 1, '\n'), unended = unversioned(false, NZ, ' ');
+    assert_refused(write_file("c.vol", &other), "has no \"Version\"");
+    assert_refused(write_file("c.vol", &unended), "has no \"Version\"");
 }
 
 static void lines_may_end_in_carriage_returns(void **state)
@@ -41,16 +68,20 @@ static void lines_may_end_in_carriage_returns(void **state)
                         NULL, TRIP_U8);
 }
 
-static void voxel_size_becomes_the_map(void **state)
+/* Voxel-Size is not how far apart voxels are, and voxels of four bytes are not taken for bytes. */
+static void voxels_of_several_bytes_are_refused(void **state)
 {
     (void)state;
     float values[VOXELS];
     trip_volume_info info;
-    const char *path =
-        write_vol("e.vol", "X: 5\nY: 4\nZ: 7\nVoxel-Size: 0.25\nVersion: 3\n.\n", true);
+    const char *path = write_vol("e.vol", "X: 5\nY: 4\nZ: 7\nVoxel-Size: 1\nVersion: 3\n.\n", true);
     assert_int_equal(read_volume(path, NULL, 2, values, VOXELS, &info), 0);
     assert_map(&info.index_to_world,
-               (const double[3][4]){ { 0.25, 0, 0, 0 }, { 0, 0.25, 0, 0 }, { 0, 0, 0.25, 0 } });
+               (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
+    assert_refused(write_vol("e.vol", "X: 5\nY: 4\nZ: 7\nVoxel-Size: 2\nVersion: 3\n.\n", true),
+                   "line 4: \"Voxel-Size: 2\"");
+    assert_refused(write_vol("e.vol", "X: 5\nY: 4\nZ: 7\nLvoxel-Size: 4\nVersion: 3\n.\n", true),
+                   "line 4: \"Lvoxel-Size: 4\"");
 }
 
 static void wrong_headers_are_refused(void **state)
@@ -67,8 +98,8 @@ static void wrong_headers_are_refused(void **state)
         { "X: 5\nY: four\nZ: 7\nVersion: 3\n.\n", "line 2" },
         { "X: 5\nY\nZ: 7\nVersion: 3\n.\n", "line 2" },
         { "X: 5\nY: 4\nZ: 7\nVersion: 4\n.\n", "version 4" },
-        { "X: 5\nY: 4\nZ: 7\nVoxel-Size: 0\nVersion: 3\n.\n", "singular" },
-        { "X: 5\nY: 4\nZ: 7\nVoxel-Size: nan\nVersion: 3\n.\n", "not finite" },
+        { "X: 5\nY: 4\nZ: 7\nVoxel-Size: 0\nVersion: 3\n.\n", "line 4" },
+        { "X: 5\nY: 4\nZ: 7\nVoxel-Size: nan\nVersion: 3\n.\n", "line 4" },
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
         assert_refused(write_vol("wrong.vol", wrong[i].text, true), wrong[i].report);
@@ -94,6 +125,9 @@ static void a_file_cut_anywhere_is_refused(void **state)
     append_volume(&values, TRIP_U8, false);
     append_text(&b, text);
     append_zlib(&b, &values);
+    for (size_t length = 0; length < b.count; length++)
+        assert_true(survives(write_bytes("cut.vol", b.data, length), NULL));
+    b = unversioned(false, NZ, '\n');
     for (size_t length = 0; length < b.count; length++)
         assert_true(survives(write_bytes("cut.vol", b.data, length), NULL));
 }
@@ -126,7 +160,8 @@ int main(void)
         cmocka_unit_test(version_3_is_a_zlib_stream),
         cmocka_unit_test(version_2_is_plain),
         cmocka_unit_test(lines_may_end_in_carriage_returns),
-        cmocka_unit_test(voxel_size_becomes_the_map),
+        cmocka_unit_test(without_a_version_the_sizes_come_twice),
+        cmocka_unit_test(voxels_of_several_bytes_are_refused),
         cmocka_unit_test(wrong_headers_are_refused),
         cmocka_unit_test(a_header_without_end_is_refused),
         cmocka_unit_test(a_file_cut_anywhere_is_refused),

@@ -85,6 +85,20 @@ static void every_half_decodes_to_its_value(void **state)
     }
 }
 
+static void bits_without_a_sign_stand_for_more(void **state)
+{
+    (void)state;
+    static const trip_scalar types[][2] = { { TRIP_I8, TRIP_U8 },   { TRIP_I16, TRIP_U16 },
+                                            { TRIP_I32, TRIP_U32 }, { TRIP_I64, TRIP_U64 },
+                                            { TRIP_U8, TRIP_U8 },   { TRIP_F32, TRIP_F32 } };
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
+        assert_int_equal(trip_scalar_unsigned(types[i][0]), types[i][1]);
+    assert_true(trip_scalar_without_sign(TRIP_I8, -1) == 255);
+    assert_true(trip_scalar_without_sign(TRIP_I8, 7) == 7);
+    assert_true(trip_scalar_without_sign(TRIP_U64, -1024) == 18446744073709550592.0);
+    assert_true(isnan(trip_scalar_without_sign(TRIP_U16, NAN)));
+}
+
 static void scaling_is_rounded_once(void **state)
 {
     (void)state;
@@ -116,6 +130,7 @@ int main(void)
         cmocka_unit_test(every_type_decodes_in_both_byte_orders),
         cmocka_unit_test(extremes_of_the_integers_survive),
         cmocka_unit_test(every_half_decodes_to_its_value),
+        cmocka_unit_test(bits_without_a_sign_stand_for_more),
         cmocka_unit_test(scaling_is_rounded_once),
         cmocka_unit_test(non_finite_values_pass_through),
     };

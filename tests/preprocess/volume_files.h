@@ -21,6 +21,7 @@
 #include <zlib.h>
 
 #include "report.h"
+#include "scope.h"
 #include "volume.h"
 
 /* The sample volume. */
@@ -273,6 +274,16 @@ static inline void assert_refused_as(int status, const char *path, const trip_vo
 static inline void assert_refused(const char *path, const char *text)
 {
     assert_refused_as(TRIP_ERROR, path, NULL, text);
+}
+
+/* Work that is cancelled ends with one line that says so. */
+static inline void assert_interrupted(const char *path, const trip_volume_params *params)
+{
+    trip_scope cancelled = { .around = NULL };
+    trip_scope *before = trip_scope_enter(&cancelled);
+    trip_scope_cancel(&cancelled);
+    assert_refused_as(TRIP_INTERRUPTED, path, params, "interrupted");
+    trip_scope_enter(before);
 }
 
 /* Whatever the bytes: either read or refused with a single line, never a crash; used for
