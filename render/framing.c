@@ -154,6 +154,8 @@ static int fit_from(const fitting *t, trip_vec3 axis, double distance, fit *own)
             break;
         trip_reach wanted[2];
         double values[2], inverse = 1 / own->half + (distance - own->distance) / slope;
+        if (!(inverse > 0 && isfinite(inverse))) /* as where one side is a pixel wide */
+            break;
         want_fit(t, axis, 1 / inverse, wanted);
         int status = reach_of(t, wanted, 2, values);
         if (status)

@@ -418,6 +418,8 @@ static double shares_at(const trip_light_map *m, int axis, int node)
     double sum = 0;
     if (m->shares[axis].sums)
         return m->shares[axis].sums[node];
+    if (middle >= spacing - 1 && middle + spacing - 1 <= last)
+        return (double)spacing; /* all of them are in the grid */
     for (int64_t i = middle - spacing + 1; i < middle + spacing; i++)
         if (i >= 0 && i <= last)
             sum +=

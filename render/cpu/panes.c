@@ -3,35 +3,30 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cpu/layout.h"
 #include "cpu/sheets/sheets.h"
 #include "report.h"
 #include "weight.h"
 
 /* ---- memory ---- */
 
-static void *part(char *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? memory + *at : NULL;
-    *at += (bytes + 63) & ~(size_t)63;
-    return p;
-}
-
 static size_t lay_out(trip_cpu *r, char *memory)
 {
     size_t at = 0, panes = trip_cpu_pane_count(r);
-    r->pixels = part(memory, &at, panes * trip_cpu_pane_floats(r) * sizeof *r->pixels);
-    r->sums = part(memory, &at, panes * trip_cpu_pane_floats(r) * sizeof *r->sums);
+    r->pixels =
+        trip_cpu_take_array(memory, &at, panes * trip_cpu_pane_floats(r) * sizeof *r->pixels);
+    r->sums = trip_cpu_take_array(memory, &at, panes * trip_cpu_pane_floats(r) * sizeof *r->sums);
     r->open_sheets = NULL;
     if (r->has_open_sheets)
-        r->open_sheets =
-            part(memory, &at, panes * TRIP_CPU_SHEET_FLOATS(r->channels) * sizeof *r->open_sheets);
-    r->states = part(memory, &at, panes);
-    r->axes = part(memory, &at, panes);
-    r->mask.panes = part(memory, &at, panes * sizeof *r->mask.panes);
-    r->portions = part(memory, &at, 4 * panes * sizeof *r->portions);
+        r->open_sheets = trip_cpu_take_array(
+            memory, &at, panes * TRIP_CPU_SHEET_FLOATS(r->channels) * sizeof *r->open_sheets);
+    r->states = trip_cpu_take_array(memory, &at, panes);
+    r->axes = trip_cpu_take_array(memory, &at, panes);
+    r->mask.panes = trip_cpu_take_array(memory, &at, (panes + 1) * sizeof *r->mask.panes);
+    r->portions = trip_cpu_take_array(memory, &at, 4 * panes * sizeof *r->portions);
     /* Splats are also counted for the pane beyond the last, diagonally. */
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
-        r->workers[i].sorting.counts = part(
+        r->workers[i].sorting.counts = trip_cpu_take_array(
             memory, &at, (panes + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
     return at;
 }

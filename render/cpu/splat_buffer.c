@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "cpu/layout.h"
 #include "report.h"
 
 /* Room for a splat's places in the panes' orders, on average; chunks whose splats are so wide that
@@ -11,22 +12,15 @@ enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_BUCKET = 4, SMALLEST_CHUNK = 64 };
 /* Places that are written together. */
 enum { AT_A_TIME = 16 };
 
-static void *part(char *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? memory + *at : NULL;
-    *at += (bytes + 63) & ~(size_t)63;
-    return p;
-}
-
 /* Lays the arrays out in `memory`, or only counts when it is NULL. */
 static size_t lay_out(trip_cpu_buffer *f, char *memory)
 {
     size_t at = 0;
-    f->splats = part(memory, &at, (size_t)f->capacity * sizeof *f->splats);
-    f->order = part(memory, &at, (size_t)f->order_capacity * sizeof *f->order);
-    f->buckets = part(memory, &at, (size_t)f->bucket_capacity * sizeof *f->buckets);
-    f->chunks = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->chunks);
-    f->unsorted = part(memory, &at, (size_t)f->chunk_capacity * sizeof *f->unsorted);
+    f->splats = trip_cpu_take_array(memory, &at, (size_t)f->capacity * sizeof *f->splats);
+    f->order = trip_cpu_take_array(memory, &at, (size_t)f->order_capacity * sizeof *f->order);
+    f->buckets = trip_cpu_take_array(memory, &at, (size_t)f->bucket_capacity * sizeof *f->buckets);
+    f->chunks = trip_cpu_take_array(memory, &at, (size_t)f->chunk_capacity * sizeof *f->chunks);
+    f->unsorted = trip_cpu_take_array(memory, &at, (size_t)f->chunk_capacity * sizeof *f->unsorted);
     return at;
 }
 

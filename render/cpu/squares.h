@@ -53,7 +53,7 @@ static inline bool trip_cpu_walk_next(trip_cpu_walk *w)
 /* Where a square lies in its tile, in squares, by its Morton number. */
 static inline int trip_cpu_square_u(unsigned number)
 {
-    return (int)((number & 1) | (number >> 1 & 2) | (number >> 2 & 4) | (number >> 3 & 8));
+    return (int)trip_morton_even(number);
 }
 
 static inline int trip_cpu_square_v(unsigned number)

@@ -82,10 +82,7 @@ static void copy_planes(trip_gl_batch *b, const trip_batch *batch)
 /* u and v in the tile of a square's corner, by its Morton number. */
 static uint32_t corner_of(uint32_t number)
 {
-    uint32_t at[2] = { 0, 0 };
-    for (unsigned bit = 0; bit < 8; bit++)
-        at[bit % 2] |= (number >> bit & 1) << (bit / 2 + 3);
-    return at[0] | at[1] << 16;
+    return 8 * (trip_morton_even(number) | trip_morton_even(number >> 1) << 16);
 }
 
 /* The filling of squares and positions. */

@@ -237,7 +237,7 @@ int trip_gl_check(const trip_gl_context *c, const char *where)
 {
     GLenum error = glGetError();
     if (error == GL_CONTEXT_LOST || (c->robust && glGetGraphicsResetStatus() != GL_NO_ERROR))
-        return trip_fail(TRIP_ERROR, "gl", where, "the driver has lost the context; draw again");
+        return trip_fail(TRIP_ERROR, "gl", where, "the driver has lost the context: start the program again");
     if (error == GL_NO_ERROR)
         return TRIP_OK;
     for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; i++)

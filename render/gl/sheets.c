@@ -148,9 +148,8 @@ static GLuint groups_over(int length)
 /* u and v in the tile of a square's corner, by its Morton number. */
 static void corner_of(uint32_t number, uint32_t at[2])
 {
-    at[0] = at[1] = 0;
-    for (unsigned bit = 0; bit < 8; bit++)
-        at[bit % 2] |= (number >> bit & 1) << (bit / 2 + 3);
+    at[0] = 8 * trip_morton_even(number);
+    at[1] = 8 * trip_morton_even(number >> 1);
 }
 
 /* The squares of a run, whose codes are at `codes` of the slot's; returns how many. */

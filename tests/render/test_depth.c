@@ -237,6 +237,27 @@ static void renderers_have_the_reference_s_depths_and_their_own_colours(void **s
     check_blobs(NULL, &settings);
 }
 
+/* So faint that what a sheet takes is rounded away from what is let through: no distance lies
+ * before or behind the volume. */
+static void faint_sheets_are_where_they_are(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { N, N, N }, .voxel = one_slab });
+    scene_colour(&s, 1, 1, 1, 1, 1, 3e-8);
+    trip_settings settings = with_depth();
+    settings.compositing = TRIP_COMPOSITING_SHEET;
+    trip_camera_params view = scene_view(&s, trip_v3(0.8, 0.9, 1), 60, 40, 48);
+    for (const scene_renderer *r = scene_renderers(); r->name; r++) {
+        scene_picture p = scene_draw(&s, r, &view, &settings);
+        for (int i = 0; i < p.width * p.height; i++)
+            if (!isinf(p.depth[i]) && !(p.depth[i] > 30 && p.depth[i] < 90))
+                fail_msg("%s: pixel %d lies %g away", r->name, i, (double)p.depth[i]);
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
 static void depths_take_no_rounded_target(void **state)
 {
     (void)state;
@@ -257,6 +278,7 @@ int main(void)
         cmocka_unit_test(two_half_transparent_sheets_are_at_their_weighted_mean),
         cmocka_unit_test(where_nothing_is_seen_is_infinitely_far),
         cmocka_unit_test(renderers_have_the_reference_s_depths_and_their_own_colours),
+        cmocka_unit_test(faint_sheets_are_where_they_are),
         cmocka_unit_test(depths_take_no_rounded_target),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,7 +1,10 @@
 /* Grids with uneven spacing (coordinates.h): the integral against closed forms, sheets by all
  * renderers against the integral, and splats by the others against the reference. */
+#include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "test.h"
+
+#include <stdlib.h>
 
 enum { EDGE = 20 };
 
@@ -355,6 +358,49 @@ static void all_draw_the_splats_of_the_reference(void **state)
 
 /* Exact kernels, whatever they are drawn as, and near ones, whose rays each have their own length
  * in each kernel's index space. */
+static bool in_the_middle(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 65535;
+    return i == EDGE / 2 && j == EDGE / 2 && k == EDGE / 2;
+}
+
+/* However thick a splat is. */
+static void nothing_is_left_outside_a_support(void **state)
+{
+    (void)state;
+    uneven u;
+    scene s;
+    make_uneven(&u, 3);
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .coordinates = &u.coordinates,
+                                      .tile_voxels = 16,
+                                      .voxel = in_the_middle });
+    s.table[65535] = (trip_tf_entry){ 1, 1, 1, 1e6F };
+    trip_settings settings = splats();
+    trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 30, 40);
+    view.ortho_height = 9;
+    scene_picture expected = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+        scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
+        int outside = 0, left = 0;
+        for (int i = 0; i < 40 * 40; i++)
+            if (expected.rgba[4 * i + 3] == 0) {
+                outside++;
+                left += p.rgba[4 * i + 3] > 0;
+            }
+        assert_true(outside > 100 && outside < 1500);
+        if (left > 0)
+            fail_msg("%s: %d of %d pixels outside are not empty", (*isa)->isa, left, outside);
+        scene_picture_free(&p);
+    }
+    unsetenv("TRIPTYCH_ISA");
+    scene_picture_free(&expected);
+    scene_destroy(&s);
+}
+
 static void gl_draws_exact_and_near_kernels(void **state)
 {
     (void)state;
@@ -554,6 +600,7 @@ int main(void)
         cmocka_unit_test(slices_come_to_the_integral),
         cmocka_unit_test(splats_have_the_mass_of_their_voxels),
         cmocka_unit_test(all_draw_the_splats_of_the_reference),
+        cmocka_unit_test(nothing_is_left_outside_a_support),
         cmocka_unit_test(gl_draws_exact_and_near_kernels),
         cmocka_unit_test(all_draw_the_sheets_of_the_reference),
         cmocka_unit_test(what_a_segment_leaps_over_is_seen),

@@ -9,7 +9,7 @@
 
 /* The texels of four panes, two by two, that each lane's support may touch. */
 typedef struct texels {
-    vi pane;              /* the first; 0 in lanes without pixels */
+    vi pane;              /* the first; in lanes without pixels any, or that beyond the last */
     vi columns;           /* bits: eight of the first pane, eight of the one to the right */
     vi top, bottom;       /* rows, counted from the first pane's */
     vi any_right, across; /* 1 and a row of panes where the support goes there, else 0 */

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "cpu/layout.h"
 #include "cpu/sheets/uneven.h"
 #include "cpu/squares.h"
 #include "field.h"
@@ -51,20 +52,13 @@ static bool take_voxels(trip_cpu_store *s, uint64_t least, uint64_t wanted)
     return s->voxels != NULL;
 }
 
-static void *part(char *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? memory + *at : NULL;
-    *at += (bytes + 63) & ~(size_t)63;
-    return p;
-}
-
 /* Returns where it ends. */
 static size_t lay_out_making(trip_cpu_sheet *sheet, char *memory, size_t at, size_t grid)
 {
     trip_cpu_making *m = &sheet->making;
     m->rasters = sheet->rasters;
-    m->begun = part(memory, &at, grid * sizeof *m->begun);
-    m->made = part(memory, &at, grid * sizeof *m->made);
+    m->begun = trip_cpu_take_array(memory, &at, grid * sizeof *m->begun);
+    m->made = trip_cpu_take_array(memory, &at, grid * sizeof *m->made);
     return at;
 }
 
@@ -73,23 +67,23 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
     size_t at = 0, grid = trip_cpu_store_grid(s);
     for (unsigned i = 0; i < s->sheet_room; i++) {
         trip_cpu_sheet *sheet = &s->sheets[i];
-        sheet->rasters = part(memory, &at, grid * sizeof *sheet->rasters);
-        sheet->ranges = part(memory, &at, grid * sizeof *sheet->ranges);
-        sheet->filled = part(memory, &at, grid * sizeof *sheet->filled);
-        sheet->visible = part(memory, &at, grid * sizeof *sheet->visible);
-        sheet->whole = part(memory, &at, grid * sizeof *sheet->whole);
-        sheet->cells = part(memory, &at, grid * sizeof *sheet->cells);
-        sheet->edges = part(memory, &at, grid * sizeof *sheet->edges);
-        sheet->needed = part(memory, &at, grid * sizeof *sheet->needed);
+        sheet->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->rasters);
+        sheet->ranges = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->ranges);
+        sheet->filled = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->filled);
+        sheet->visible = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->visible);
+        sheet->whole = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->whole);
+        sheet->cells = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->cells);
+        sheet->edges = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->edges);
+        sheet->needed = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->needed);
         at = lay_out_making(sheet, memory, at, grid);
     }
     for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++) {
         trip_cpu_sheet *slice = &s->slices[i];
-        slice->rasters = part(memory, &at, grid * sizeof *slice->rasters);
+        slice->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *slice->rasters);
         at = lay_out_making(slice, memory, at, grid);
     }
-    s->some = part(memory, &at, grid * sizeof *s->some);
-    s->open = part(memory, &at, grid * sizeof *s->open);
+    s->some = trip_cpu_take_array(memory, &at, grid * sizeof *s->some);
+    s->open = trip_cpu_take_array(memory, &at, grid * sizeof *s->open);
     return at;
 }
 
