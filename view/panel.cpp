@@ -495,10 +495,10 @@ bool draw_light(trip_panel *p, trip_document *d)
 {
     triptych_settings *s = &d->settings;
     bool changed = false;
-    if (d->info.normal_bytes)
+    if (d->info.normal_bytes || s->classify != TRIPTYCH_PRE)
         changed |= check(p, "Shading", &s->shading);
     else
-        ImGui::TextDisabled("No normals: it cannot be shaded.");
+        ImGui::TextDisabled("No normals: splats cannot be shaded.");
     changed |= check(p, "Light from the eye", &s->headlight); /* which lights effects, too */
     if (!s->headlight)
         changed |= draw_light_place(p, d);

@@ -241,6 +241,29 @@ static void cubic_goes_through_a_parabola_and_linear_through_its_chords(void **s
     scene_destroy(&s);
 }
 
+/* By their differences, so that it does not matter whether there are normals for splats. */
+static void values_are_lit_without_stored_normals(void **state)
+{
+    (void)state;
+    scene_picture pictures[3]; /* of the last light is off */
+    for (int i = 0; i < 3; i++) {
+        scene s;
+        scene_create(&s, &(scene_params){
+                             .dims = { EDGE, EDGE, EDGE }, .voxel = parabola, .normals = i == 0 });
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ 0.5F, 0.5F, 0.5F, 2.0F * (float)code / 65535 };
+        trip_settings settings = exact(1e-4);
+        settings.shading = i < 2;
+        trip_camera_params view = scene_view(&s, trip_v3(0.2, 1, 0.1), 60, 20, 5);
+        pictures[i] = integrate(&s, &view, &settings);
+        scene_destroy(&s);
+    }
+    assert_memory_equal(pictures[0].rgba, pictures[1].rgba, sizeof(float[4 * 25]));
+    assert_true(scene_difference(&pictures[1], &pictures[2]) > 0.05);
+    for (int i = 0; i < 3; i++)
+        scene_picture_free(&pictures[i]);
+}
+
 /* A ball of radius *user in the middle of a cube: values fall outwards by 0.05 a voxel, the surface
  * at one half. */
 static double ball(const double *radius, int i, int j, int k, double gradient[3])
@@ -695,6 +718,7 @@ int main(void)
         cmocka_unit_test(what_is_nearer_covers_what_is_behind),
         cmocka_unit_test(a_narrow_peak_of_the_function_is_not_missed),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
+        cmocka_unit_test(values_are_lit_without_stored_normals),
         cmocka_unit_test(cubic_goes_through_a_parabola_and_linear_through_its_chords),
         cmocka_unit_test(a_ball_shines_where_the_light_falls_on_what_is_seen),
         cmocka_unit_test(a_lit_ball_has_its_colours_the_closer_the_finer_it_is),
