@@ -6,6 +6,7 @@
 
 #include "brick_memory.h"
 #include "brick_text.h"
+#include "format.h"
 #include "normal.h"
 #include "report.h"
 
@@ -93,6 +94,32 @@ static int open_volume(trip_brick_input *in)
     return status == 0 ? set_region(in) : status;
 }
 
+/* Of a text as JSON has it, in which an end of a line takes two. */
+static uint64_t bytes_of(const trip_tf *tf)
+{
+    char *text = trip_tf_to_text(tf);
+    uint64_t bytes = 0;
+    for (const char *c = text; c && *c; c++)
+        bytes += *c == '\n' ? 2 : 1;
+    free(text);
+    return bytes;
+}
+
+/* Whether the text of a data set has room for them; the first stands there twice. */
+static int check_functions(const trip_brick_input *in)
+{
+    const uint64_t room = TRIP_TEXT_BYTES_MAX - (1 << 20); /* beside the histogram and the rest */
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < in->params->function_count; i++)
+        bytes += bytes_of(in->functions[i]) * (i == 0 ? 2 : 1);
+    return bytes <= room ? 0
+                         : trip_fail(TRIP_USAGE, "brick", in->params->input,
+                                     "the transfer functions take %" PRIu64
+                                     " bytes, and a data set has room for %" PRIu64
+                                     ": give fewer, or simpler ones",
+                                     bytes, room);
+}
+
 static int load_functions(trip_brick_input *in)
 {
     size_t count = in->params->function_count;
@@ -102,7 +129,7 @@ static int load_functions(trip_brick_input *in)
     int status = 0;
     for (size_t i = 0; i < count && status == 0; i++)
         status = trip_tf_load(&in->functions[i], in->params->functions[i]);
-    return status;
+    return status == 0 ? check_functions(in) : status;
 }
 
 int trip_brick_input_open(trip_brick_input *in, const trip_brick_params *params)

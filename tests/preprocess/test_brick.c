@@ -109,6 +109,30 @@ static void a_transfer_function_keeps_what_it_shows(void **state)
     test_free_lists(&l);
 }
 
+/* Before a voxel is read. */
+static void functions_that_a_data_set_has_no_room_for_are_refused(void **state)
+{
+    (void)state;
+    trip_brick_summary s;
+    const char *const functions[] = { test_path("f.tf"), test_path("f.tf"), test_path("f.tf") };
+    trip_brick_params p = params_for("uint8", "a.trip");
+    FILE *f = fopen(functions[0], "w");
+    assert_non_null(f);
+    fputs("values data\n", f);
+    for (int i = 0; i < 65536; i++)
+        fprintf(f,
+                "%.17g 0.12345678901234567 0.12345678901234567 0.12345678901234567 "
+                "0.12345678901234567\n",
+                i * 0.1234567);
+    assert_int_equal(fclose(f), 0);
+    p.functions = functions;
+    p.function_count = 3;
+    make_bytes();
+    assert_int_equal(trip_brick(&p, &s), TRIP_USAGE);
+    assert_non_null(strstr(test_report, "give fewer, or simpler ones"));
+    assert_false(test_exists("a.trip"));
+}
+
 static void without_an_envelope_something_is_kept_and_a_function_stored(void **state)
 {
     (void)state;
@@ -695,6 +719,8 @@ int main(void)
                                         test_end),
         cmocka_unit_test_setup_teardown(a_transfer_function_keeps_what_it_shows, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(functions_that_a_data_set_has_no_room_for_are_refused,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(without_an_envelope_something_is_kept_and_a_function_stored,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(codes_of_floats_are_of_the_range_of_all_values, test_begin,
