@@ -9,6 +9,7 @@
 #include "flight.h"
 #include "library.h"
 #include "piped_function.h"
+#include "render_files.h"
 #include "render_options.h"
 #include "render_stats.h"
 #include "render_view.h"
@@ -181,22 +182,6 @@ static void close_drawing(drawing *d)
     cached_volume_close(&d->volume);
 }
 
-enum { PATH_BYTES = 4096 };
-
-/* Of several, image.png -> image-007.png. */
-static int image_path(const drawing *d, const char *output, int index, char path[PATH_BYTES])
-{
-    const char *extension = strrchr(output, '.');
-    size_t bytes = PATH_BYTES;
-    int length = d->o.orbit || d->o.path
-                     ? snprintf(path, bytes, "%.*s-%03d%s", (int)(extension - output), output,
-                                index, extension)
-                     : snprintf(path, bytes, "%s", output);
-    if (length < 0 || (size_t)length >= bytes)
-        return trip_fail(TRIP_USAGE, "render", output, "the name is too long");
-    return 0;
-}
-
 /* A view of the orbit or the path. */
 static int set_frame(drawing *d, int index)
 {
@@ -240,12 +225,12 @@ static int draw_planned(drawing *d, int index)
 static int write_image(void *user, triptych *t, int index, const float *rgba, const float *depth)
 {
     const drawing *d = user;
-    char path[PATH_BYTES];
-    int status = d->video ? 0 : image_path(d, d->o.output, index, path);
+    char path[RENDER_FILE_BYTES];
+    int status = d->video ? 0 : render_file_name(&d->o, d->o.output, index, path);
     if (!status && !d->video)
         status = triptych_write(t, path, d->o.width, d->o.height, rgba);
     if (!status && depth)
-        status = image_path(d, d->o.depth, index, path);
+        status = render_file_name(&d->o, d->o.depth, index, path);
     if (!status && depth)
         status = triptych_write_depth(t, path, d->o.width, d->o.height, depth);
     return status;
@@ -255,12 +240,12 @@ static int write_image(void *user, triptych *t, int index, const float *rgba, co
 static int finish_image(void *user, triptych *t, int index, const float *rgba)
 {
     const drawing *d = user;
-    char path[PATH_BYTES];
+    char path[RENDER_FILE_BYTES];
     int status = d->video ? video_add(d->video, rgba) : 0;
-    if (!status && !d->video)
-        status = image_path(d, d->o.output, index, path);
+    if (!status)
+        status = render_file_name(&d->o, d->o.output, index, path);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
-        status = render_stats_summary(d->video ? d->o.output : path, &d->o, t, stdout);
+        status = render_stats_summary(path, &d->o, t, stdout);
     return status;
 }
 
@@ -369,14 +354,13 @@ static int count_images(drawing *d, int images)
     return status;
 }
 
-/* What can be known before any work: that the program can write what it is to draw. */
-static int check_output(drawing *d)
+/* That the program can write pictures of these kinds. */
+static int check_kinds(drawing *d)
 {
     const render_options *o = &d->o;
     bool is_video = video_is_named(o->output);
-    int status = is_video ? video_check(o->output, o->width, o->height)
-                          : triptych_prepare_write(d->t, o->output, o->depth);
-    return status ? status : render_options_check_outputs(o);
+    return is_video ? video_check(o->output, o->width, o->height)
+                    : triptych_prepare_write(d->t, o->output, o->depth);
 }
 
 int trip_command_render(int argc, char **argv)
@@ -386,9 +370,11 @@ int trip_command_render(int argc, char **argv)
     if (!status)
         status = create_context(&d);
     if (!status)
-        status = check_output(&d);
+        status = check_kinds(&d);
     if (!status)
         status = sequence_load(&d.sequence, &d.o);
+    if (!status)
+        status = render_files_check(&d.sequence, d.t);
     if (!status)
         status = piped_function_keep(&d.function, d.t, &d.o.function.name);
     if (!status)

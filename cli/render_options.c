@@ -4,12 +4,10 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 #include "cached_volume.h"
 #include "clip_options.h"
 #include "geometry.h"
-#include "new_file.h"
 #include "effects_options.h"
 #include "options.h"
 #include "quality_options.h"
@@ -1020,21 +1018,4 @@ int render_options_parse(render_options *o, int argc, char **argv)
     p = (parse){ .o = o, .again = true };
     argv[0] = name;
     return trip_options_parse(&argp, argc, argv, &p);
-}
-
-/* What is written to as it is: devices, pipes and links. */
-static bool is_special(const char *path)
-{
-    struct stat st;
-    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
-}
-
-int render_options_check_outputs(const render_options *o)
-{
-    int status = trip_new_file_check("write", o->output);
-    if (!status && o->depth)
-        status = trip_new_file_check("write", o->depth);
-    if (!status && o->stats && strcmp(o->stats, "-") && !is_special(o->stats))
-        status = trip_new_file_check("write", o->stats);
-    return status;
 }

@@ -191,9 +191,10 @@ class Paths(program.ProgramTest):
     def test_a_video_has_the_pixels_of_the_pictures(self):
         path = self.path(key(0, 0), key(1, 60))
         for more in (["--path", path], ["--path", path, "--in-flight", "1"]):
-            self.works(
+            run = self.works(
                 *("render", "v.trip", "-o", "a.mp4", *SIZE, *more), env=self.with_encoder
             )
+            self.assertEqual(run.stdout.count(b"a.mp4: 40 x 30, "), 5)
             with open("a.mp4", "rb") as f:
                 video = numpy.frombuffer(f.read(), numpy.uint8).reshape(5, 30, 40, 3)
             given = open("given").read().split("\n")
