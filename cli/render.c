@@ -34,16 +34,20 @@ typedef struct drawing {
     trip_progress progress;
 } drawing;
 
-/* What is kept of a volume: what is shown by default, and what the function shows besides, so that
- * nothing is missing; everything where a window moves it, so that the next window finds it in the
- * cache. */
-static triptych_brick_options brick_options(const render_options *o, const triptych_function *look)
+/* What is kept of a volume: what is shown by default, and what functions show besides, so that
+ * nothing is missing; everything where a window moves them, so that the next window finds it in the
+ * cache. Without a sequence: what is shown by default alone. */
+static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
 {
     enum { MOST_THREADS = 256 };
     triptych_brick_options options = o->volume;
-    options.keep_all = look->window > 0;
-    options.functions = &look->name;
-    options.function_count = look->name && !options.keep_all ? 1 : 0;
+    options.keep_all = shown && o->function.window > 0;
+    if (shown && !options.keep_all) {
+        options.functions = shown->names;
+        options.function_count = shown->name_count;
+        options.ranges = shown->ranges;
+        options.range_count = shown->range_count;
+    }
     options.automatic = 1;
     if (o->settings.classify == TRIPTYCH_PRE && render_options_have_levels(&o->settings))
         options.levels_for = TRIPTYCH_LEVELS_FOR_BOTH;
@@ -55,7 +59,7 @@ static triptych_brick_options brick_options(const render_options *o, const tript
 static int brick_volume(drawing *d)
 {
     const render_options *o = &d->o;
-    const triptych_brick_options wanted = brick_options(o, &o->function);
+    const triptych_brick_options wanted = brick_options(o, &d->sequence);
     int status = cached_volume_open(&d->volume, d->t, o->input, &wanted);
     trip_progress_end(&d->progress);
     if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
@@ -79,12 +83,13 @@ static int open_data(drawing *d, const char *path)
 }
 
 /* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
- * function shows; 0: it does not. */
+ * function shows; 0: it does not, or there are several. */
 static int open_usual(drawing *d)
 {
     triptych_function look = d->o.function;
-    const triptych_brick_options usual = brick_options(&d->o, &(triptych_function){ 0 });
-    int missing = 0, status = look.name || look.window > 0
+    const triptych_brick_options usual = brick_options(&d->o, NULL);
+    const bool other = look.name || look.window > 0;
+    int missing = 0, status = other && !sequence_has_functions(&d->sequence)
                                   ? cached_volume_find(&d->volume, d->t, d->o.input, &usual)
                                   : 0;
     trip_progress_end(&d->progress);
@@ -160,7 +165,9 @@ static int take_pictures(drawing *d)
 static int open_drawing(drawing *d)
 {
     const triptych_view view = render_view(&d->o);
-    int status = open_input(d);
+    int status = sequence_find_shown(&d->sequence);
+    if (!status)
+        status = open_input(d);
     if (!status)
         status = take_pictures(d);
     if (!status && !d->o.path)

@@ -160,6 +160,23 @@ class Paths(program.ProgramTest):
             )
         self.assertNotEqual(frames[2], frames[3])
 
+    def test_a_volume_is_bricked_for_the_functions_of_a_path(self):
+        cache = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
+        program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
+        faint, clear = "1 1 0 0 0\n60 1 0 0 0.3\n200 1 0 0 0\n", "0 0 0 0 0\n255 1 1 1 0.5\n"
+        program.write("clear.tf", clear.encode())
+        options = key(0, 0, function_text=faint), key(0.25, 9, function="clear.tf")
+        path = self.path(*options)
+        run = program.call("brick", "ball.nrrd", "-o", "all.trip", "-q", "--keep-all")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for volume in "ball.nrrd", "all.trip":
+            said = self.works("render", volume, "--path", path, "--no-shading", *SIZE, "-o",
+                              f"{volume}.exr", env=cache)
+            self.assertEqual(said.stderr, "")
+        for frame in "000", "001":
+            numpy.testing.assert_allclose(*(program.read_exr(f"{v}-{frame}.exr")
+                                            for v in ("ball.nrrd", "all.trip")), atol=0.02)
+
     def test_bad_paths_are_refused_by_name(self):
         good = key(0, 0)
         for path, says in (
