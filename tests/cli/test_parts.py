@@ -141,6 +141,20 @@ class Parts(program.ProgramTest):
         self.leaves_nothing(2, "render", self.halves[0], "v.nrrd", "-o", "x.png", says="v.nrrd: ")
         self.leaves_nothing(2, "render", *self.halves, "--error", 1, "-o", "x.png", says="--error")
 
+    def test_regions_that_overlap_are_refused_for_every_classification(self):
+        self.make("low.trip", "--region", ":22,:,:")
+        self.make("corner.trip", "--region", "20:21,:,:")
+        for parts in (
+            ["whole.trip", "whole.trip"],
+            ["low.trip", self.halves[1]],
+            [*self.halves, "corner.trip"],
+            [*self.octants, "whole.trip"],
+        ):
+            for classify in "pre", "post":
+                run = self.leaves_nothing(1, "render", *parts, "-o", "x.png", *SIZE, "--classify",
+                                          classify, says=f"open: {parts[-1]}: overlaps ")
+                self.assertIn("drawn twice", run.stderr)
+
     def test_damage_is_found_in_the_data_set_that_has_it(self):
         shutil.rmtree("bad.trip", ignore_errors=True)
         shutil.copytree(self.halves[1], "bad.trip")
