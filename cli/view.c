@@ -326,15 +326,14 @@ static int parse(view_options *o, int argc, char **argv)
     return status ? status : trip_option_check_effects(&o->params.settings, o->params.heat);
 }
 
-/* A data set that cannot be opened is found here, before there is a window. */
+/* An input or a function that cannot be taken is found here, before there is a window. */
 static int check_inputs(const view_options *o)
 {
     triptych *t = NULL;
     const triptych_resources resources = { .memory_bytes = o->params.memory_bytes };
     int status = library_create(&t, NULL);
     for (int i = 0; i < o->params.count && !status; i++)
-        if (!cached_volume_wanted(o->inputs[i]))
-            status = triptych_open(t, o->inputs[i], &resources);
+        status = shown_volume_check(&o->volume, t, o->inputs[i], &resources);
     if (!status)
         status = library_check_heat(t, o->params.heat, &resources);
     triptych_destroy(t);

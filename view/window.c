@@ -289,6 +289,18 @@ static void play_save(void *user, const char *path)
     trip_frames_save(w->frames, path);
 }
 
+static int play_saved(void *user)
+{
+    const window *w = user;
+    const trip_frames_status status = trip_frames_get_status(w->frames);
+    char line[sizeof status.message + 16];
+    if (!status.unsaved)
+        return 0;
+    snprintf(line, sizeof line, "triptych: %s", status.message);
+    trip_report_line(line);
+    return TRIP_ERROR;
+}
+
 static int play_report(void *user, const char *path)
 {
     window *w = user;
@@ -297,8 +309,9 @@ static int play_report(void *user, const char *path)
 
 static int play(window *w)
 {
-    const trip_player_window methods = { w,         play_event, play_rests, play_has_size,
-                                         play_find, play_shoot, play_save,  play_report };
+    const trip_player_window methods = { w,          play_event, play_rests, play_has_size,
+                                         play_find,  play_shoot, play_save,  play_saved,
+                                         play_report };
     if (!w->plays || w->shot)
         return 0;
     w->player.width = w->viewer.width;
@@ -504,7 +517,7 @@ static int pass(window *w)
         glfwWaitEventsTimeout(0.008);
     else
         glfwWaitEventsTimeout(sleep_seconds);
-    return 0;
+    return status;
 }
 
 static int run(window *w)

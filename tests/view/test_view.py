@@ -451,6 +451,20 @@ class View(program.ProgramTest):
         with open("bad", "w") as f:
             f.write("jump\n")
         self.fails(1, "view", "--script=bad", says="line 1", env=self.screen.environment)
+        with open("README.md", "w") as f:
+            f.write("# No volume")
+        for arguments in ["README.md"], ["noise.trip", "--tf=nope"], ["noise.nrrd", "--tf=nope"]:
+            self.fails(1, "view", *arguments,
+                       says="nope" if "--tf=nope" in arguments else "README.md",
+                       env=self.screen.environment)
+
+    def test_files_that_cannot_be_written_end_a_script_with_a_line(self):
+        for event in "screenshot", "picture", "status":
+            said = self.view(f"wait\n{event} missing/x.png\nstatus after.json\n", "noise.trip",
+                             status=1)
+            self.assertTrue(program.LINE.fullmatch(said), said)
+            self.assertIn("missing/x.png", said)
+            self.assertFalse(os.path.exists("after.json"))
 
     def test_a_signal_ends_it(self):
         os.mkfifo("here")
