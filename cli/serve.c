@@ -1,7 +1,6 @@
 /* triptych serve: a data set -> a server for a browser on this machine. */
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "clip_options.h"
 #include "commands.h"
@@ -206,25 +205,15 @@ static int choose_settings(serve_options *o)
     return status;
 }
 
-/* Of a volume, which is bricked while its page is there, no more than that it is missing. */
-static int check_data(const trip_serve_params *p, triptych *t, const triptych_resources *resources)
+/* An input or a function that cannot be taken is found here, before anybody looks. */
+static int check_input(const serve_options *o)
 {
-    if (cached_volume_wanted(p->input))
-        return access(p->input, R_OK) == 0 || strpbrk(p->input, "*?[%")
-                   ? 0
-                   : trip_fail_errno("read", p->input, "cannot open");
-    int status = triptych_open(t, p->input, resources);
-    return status ? status : triptych_set_function(t, &(triptych_function){ .name = p->function });
-}
-
-/* A data set or function that cannot be taken is found here, before anybody looks. */
-static int check_input(const trip_serve_params *p)
-{
+    const trip_serve_params *p = &o->params;
     triptych *t = NULL;
     const triptych_resources resources = { .memory_bytes = p->memory_bytes };
     int status = library_create(&t, NULL);
     if (!status)
-        status = check_data(p, t, &resources);
+        status = shown_volume_check(&o->volume, t, p->input, &resources);
     if (!status)
         status = library_check_heat(t, p->heat, &resources);
     triptych_destroy(t);
@@ -269,6 +258,6 @@ int trip_command_serve(int argc, char **argv)
     if (!status)
         status = trip_option_check_effects(&o.params.settings, o.params.heat);
     if (!status)
-        status = check_input(&o.params);
+        status = check_input(&o);
     return trip_exit_status(status ? status : trip_serve_run(&o.params));
 }
