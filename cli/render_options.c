@@ -947,6 +947,23 @@ static int check(parse *p)
     return 0;
 }
 
+/* Options of the settings that reports measure, but for the renderer, by which one is chosen. */
+static void note_measurable(int key, quality_options *q)
+{
+    static const int keys[] = { KEY_CLASSIFY,      KEY_COMPOSITING, KEY_SLICES,    KEY_LOD,
+                                KEY_MAX_BYTES,     KEY_MAX_MS,      KEY_METHOD,    KEY_H,
+                                KEY_SATURATION,    KEY_WEIGHTS,     KEY_NORMALISE, KEY_TRAVERSAL,
+                                KEY_KERNEL_RADIUS, KEY_LOW_PASS,    KEY_FLATTEN,   KEY_TARGET,
+                                KEY_SUBMIT,        KEY_KERNEL,      KEY_FIELD,     KEY_TOLERANCE,
+                                KEY_SAMPLES };
+    bool measured = false;
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        measured = measured || keys[i] == key;
+    for (size_t row = 0; measured && row < sizeof options / sizeof *options; row++)
+        if (options[row].key == key)
+            q->measurable = options[row].name;
+}
+
 static error_t parse_key(int key, char *arg, struct argp_state *state)
 {
     parse *p = state->input;
@@ -974,6 +991,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     default:
         break;
     }
+    note_measurable(key, &p->quality);
     int status = parse_volume(key, arg, &p->o->volume);
     if (status == ARGP_ERR_UNKNOWN)
         status = parse_view(key, arg, p);

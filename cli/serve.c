@@ -133,6 +133,7 @@ static int parse_rest(int key, char *arg, serve_options *o)
         status = trip_option_classify(arg, 3, &which);
         o->classify = (triptych_classify)which;
         o->classify_given = true;
+        o->quality.measurable = "classify";
         return status;
     case KEY_CLIP_BOX:
         return trip_option_clip_box(arg, &p->settings.clip);

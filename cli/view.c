@@ -186,6 +186,7 @@ static int parse_look(int key, char *arg, view_options *o)
         status = trip_option_classify(arg, 3, &which);
         o->classify = (triptych_classify)which;
         o->classify_given = true;
+        o->quality.measurable = "classify";
         return status;
     case KEY_CLIP_BOX:
         o->params.settings_given = true;
