@@ -261,7 +261,8 @@ typedef struct parse {
     quality_options quality;
     bool h, saturation, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
-    bool slices, compositing;
+    bool slices, compositing, classify;
+    bool levels;           /* --lod, --max-bytes or --max-ms */
     bool kernel, integral; /* options of the integral renderer */
     bool again;            /* over settings that --quality or --error has chosen */
     bool footprint;        /* --kernel of splats, --low-pass or --flatten */
@@ -465,6 +466,7 @@ static int parse_method(int key, char *arg, parse *p)
         p->quality.report = arg;
         return 0;
     case KEY_CLASSIFY:
+        p->classify = true;
         status = trip_option_classify(arg, 3, &which);
         s->classify = (triptych_classify)which;
         return status;
@@ -478,10 +480,13 @@ static int parse_method(int key, char *arg, parse *p)
     case KEY_FLATTEN:
         return parse_footprint(key, arg, p);
     case KEY_LOD:
+        p->levels = true;
         return trip_option_number("--lod", arg, 0, 1000, &s->lod_px);
     case KEY_MAX_BYTES:
+        p->levels = true;
         return parse_max_bytes(arg, s);
     case KEY_MAX_MS:
+        p->levels = true;
         return trip_option_number("--max-ms", arg, 1e-3, 1e9, &s->max_ms);
     case KEY_SLICES:
         p->slices = true;
@@ -705,6 +710,9 @@ static int check_depth(const render_options *o)
         return 0;
     if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_option_fail("--depth", "does not apply to --renderer integral");
+    if (o->settings.show == TRIPTYCH_SHOW_MERGE)
+        return trip_option_fail("--depth", "does not go with --show merge, which shows nothing of "
+                                           "the volume");
     if (o->settings.target != TRIPTYCH_RGBA32F)
         return trip_option_fail("--depth", "goes with --target rgba32f");
     if (o->settings.samples > 1)
@@ -726,6 +734,11 @@ static int check_integral(parse *p)
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");
+    if (integral && p->classify && o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
+        return trip_option_fail("--classify", "does not apply to --renderer integral");
+    if (integral && p->slices)
+        return trip_option_fail("--slices", "does not apply to --renderer integral, which has no "
+                                            "sheets");
     if (integral && p->saturation)
         return trip_option_fail("--saturation", "does not apply to --renderer integral, whose "
                                                 "--tolerance bounds what is left out");
@@ -824,8 +837,6 @@ static int check_classify(const parse *p)
         return trip_option_fail("--kernel", "applies to --classify post and --renderer integral");
     if (o->settings.classify == TRIPTYCH_PRE)
         return p->slices ? trip_option_fail("--slices", "applies to --classify post only") : 0;
-    if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_option_fail("--classify", "does not apply to --renderer integral");
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
         return trip_option_fail("--traversal", "is outward with --classify post");
     if (o->settings.method == TRIPTYCH_IMAGE)
@@ -866,6 +877,10 @@ static int check_more(const parse *p)
                                     TRIP_ONE_VOLUME "; what is drawn together are data sets "
                                                     "(triptych brick --region)");
     }
+    if (o->more_count && p->levels)
+        return trip_option_fail("--lod, --max-bytes, --max-ms",
+                                "do not apply to several data sets, of which the finest level is "
+                                "drawn");
     if (o->more_count && p->quality.error > 0)
         return trip_option_fail("--error", "takes settings that were measured on one data set");
     return 0;
@@ -879,13 +894,9 @@ static int check(parse *p)
         return trip_option_fail("VOLUME", "none given: `triptych render VOLUME -o PICTURE.png`");
     if (!o->output)
         return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
-    const triptych_brick_options *v = &o->volume;
-    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->coordinates || v->axes ||
-         v->allow_gaps) &&
-        !cached_volume_wanted(o->input))
-        return trip_option_fail(o->input, "is a data set: --grid, --level-set, --spacing, "
-                                          "--coordinates, --axes and --allow-gaps are for volumes");
-    int status = check_more(p);
+    int status = trip_option_check_volume(&o->volume, o->input);
+    if (!status)
+        status = check_more(p);
     if (!status)
         status = check_view(p);
     if (!status)

@@ -174,6 +174,14 @@ static int parse_volume(int key, char *arg, serve_options *o)
     }
 }
 
+static int check(const serve_options *o)
+{
+    if (!o->params.input)
+        return trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+    int status = trip_option_check_volume(&o->volume.options, o->params.input);
+    return status ? status : quality_options_check(&o->quality);
+}
+
 static error_t parse_key(int key, char *arg, struct argp_state *state)
 {
     serve_options *o = state->input;
@@ -185,8 +193,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         p->input = arg;
         return 0;
     case ARGP_KEY_END:
-        return p->input ? quality_options_check(&o->quality)
-                        : trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+        return check(o);
     default:
         return parse_volume(key, arg, o);
     }

@@ -251,6 +251,15 @@ static int parse_volume(int key, char *arg, view_options *o)
     }
 }
 
+/* How volumes are read is for some input, or for what is opened later. */
+static int check_volume(const view_options *o)
+{
+    bool volumes = o->params.count == 0;
+    for (int i = 0; i < o->params.count; i++)
+        volumes = volumes || cached_volume_wanted(o->inputs[i]);
+    return volumes ? 0 : trip_option_check_volume(&o->volume.options, o->inputs[0]);
+}
+
 static int check(const view_options *o)
 {
     const triptych_view *v = &o->params.start;
@@ -263,7 +272,8 @@ static int check(const view_options *o)
         return trip_option_fail("--error", "is of one data set: name it");
     if (o->params.heat && o->params.count != 1)
         return trip_option_fail("--emission", "is of one data set: name it");
-    return quality_options_check(&o->quality);
+    int status = check_volume(o);
+    return status ? status : quality_options_check(&o->quality);
 }
 
 static int choose_settings(view_options *o)

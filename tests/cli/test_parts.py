@@ -113,12 +113,14 @@ class Parts(program.ProgramTest):
         self.assertGreater(counted[0]["x"]["splats_drawn"], 1000)
         self.assertEqual(counted[0], counted[1])
 
-    def test_the_plan_names_the_data_sets_and_draws_no_levels(self):
-        text = self.works("render", *self.halves, "-o", "a.exr", *SIZE, "--explain", "--lod", 4)
+    def test_the_plan_names_the_data_sets_which_are_drawn_without_levels(self):
+        text = self.works("render", *self.halves, "-o", "a.exr", *SIZE, "--explain", "--quality",
+                          "draft")
         text = text.stdout.decode()
         for half in self.halves:
             self.assertIn(f"data set    {half}\n", text)
-        self.assertIn("levels      do not run", text)
+        for levels in "--lod=4", "--max-bytes=64M", "--max-ms=5":
+            self.leaves_nothing(2, "render", *self.halves, "-o", "x.png", levels, says="--lod")
 
     def test_what_does_not_go_together_is_refused_by_name(self):
         program.write_nrrd("moved.nrrd", self.volume, geometry="space origin: (1,2,3)\n"
