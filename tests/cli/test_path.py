@@ -180,7 +180,8 @@ class Paths(program.ProgramTest):
     def test_bad_paths_are_refused_by_name(self):
         good = key(0, 0)
         for path, says in (
-            ("{", "path.json: is not a path"),
+            ("{", "path.json: line 1: the text ends"),
+            ([good | {"zoom": 3}], 'key 1: there is no "zoom"'),
             ('{"triptych_path": 9, "keys": []}', "is of version 9"),
             ([good, good], "key 2: is not later"),
             ([good | {"fov": "wide"}], 'key 1: "fov"'),
