@@ -1,6 +1,7 @@
 /* triptych render: data set -> plan -> reader -> renderer -> merge -> image files or a video. */
 #include "commands.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,6 +33,7 @@ typedef struct drawing {
     video *video;    /* NULL: pictures are written */
     render_stats *stats;
     trip_progress progress;
+    int empty; /* pictures that show nothing */
 } drawing;
 
 /* What is kept of a volume: what is shown by default, and what functions show besides, so that
@@ -243,12 +245,37 @@ static int write_image(void *user, triptych *t, int index, const float *rgba, co
     return status;
 }
 
+/* Whether all that is to be seen is what lies behind the volume. */
+static bool is_empty(const render_options *o, const float *rgba)
+{
+    const double *ground = o->settings.background;
+    const size_t pixels = (size_t)o->width * (size_t)o->height;
+    double most = 0;
+    for (size_t i = 0; i < 4 * pixels && most < 1e-6; i++)
+        most = fabs((double)rgba[i] - (i % 4 < 3 ? ground[i % 4] : 1) * ground[3]);
+    return most < 1e-6;
+}
+
+static void warn_of_empty(const drawing *d)
+{
+    const int frames = d->sequence.frames;
+    char which[64] = "the picture shows";
+    if (frames > 1)
+        snprintf(which, sizeof which, "%d of %d pictures show", d->empty, frames);
+    if (d->empty)
+        trip_warn(d->o.output,
+                  "%s nothing but the background: the view, what is cut away and the function "
+                  "decide what is to be seen",
+                  which);
+}
+
 /* What follows in the order of the frames. */
 static int finish_image(void *user, triptych *t, int index, const float *rgba)
 {
-    const drawing *d = user;
+    drawing *d = user;
     char path[RENDER_FILE_BYTES];
     int status = d->video ? video_add(d->video, rgba) : 0;
+    d->empty += is_empty(&d->o, rgba);
     if (!status)
         status = render_file_name(&d->o, d->o.output, index, path);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
@@ -388,6 +415,8 @@ int trip_command_render(int argc, char **argv)
         status = open_drawing(&d);
     if (!status)
         status = draw_images(&d);
+    if (!status)
+        warn_of_empty(&d);
     if (!status && d.stats)
         status = render_stats_describe(d.stats, &d.o, d.t);
     if (!status && d.o.count)
