@@ -1,6 +1,7 @@
 """Regions of a volume, each a data set of its own, are drawn in one picture as the whole is."""
 import itertools
 import os
+import resource
 import shutil
 
 import numpy
@@ -156,6 +157,11 @@ class Parts(program.ProgramTest):
                 run = self.leaves_nothing(1, "render", *parts, "-o", "x.png", *SIZE, "--classify",
                                           classify, says=f"open: {parts[-1]}: overlaps ")
                 self.assertIn("drawn twice", run.stderr)
+
+    def test_as_many_files_are_open_as_the_system_allows(self):
+        limits = (24, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
+        self.works("render", *self.octants, "-o", "a.exr", *SIZE,
+                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, limits))
 
     def test_damage_is_found_in_the_data_set_that_has_it(self):
         shutil.rmtree("bad.trip", ignore_errors=True)
