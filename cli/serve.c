@@ -247,7 +247,8 @@ int trip_command_serve(int argc, char **argv)
             "it is interrupted. A moving view is sent as JPEG, as large as its time allows; at "
             "rest the picture that `triptych render` draws is sent as PNG. It listens to 127.0.0.1 "
             "alone and answers addresses with its token alone; to look from another machine, "
-            "forward the port by ssh -L. A volume is bricked into a cache first, which `triptych "
+            "forward the port by ssh -L, to the same number there. A volume is bricked into a "
+            "cache first, which `triptych "
             "cache` lists and clears.",
     };
     serve_options o = {

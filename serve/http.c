@@ -190,7 +190,9 @@ static enum MHD_Result handle(void *user, struct MHD_Connection *c, const char *
         return MHD_YES;
     }
     if (!is_own_host(s, c))
-        return refuse(c, 403, "this is another host");
+        return refuse(c, 403,
+                      "this is another host or port: ssh -L has to forward a port of the same "
+                      "number");
     if (!same_token(s->token, MHD_lookup_connection_value(c, MHD_GET_ARGUMENT_KIND, "token")))
         return refuse(c, 403, "the address is without its token");
     if (!strcmp(method, "GET"))

@@ -293,7 +293,9 @@ class Serve(program.ProgramTest):
             for token in (None, "", "0" * 32, self.token[:-1], self.token.upper() + "x"):
                 self.assertEqual(self.ask(path, token=token)[0], 403, (path, token))
         for host in ("evil.example", f"evil.example:{self.port}", f"127.0.0.1:{self.port + 1}"):
-            self.assertEqual(self.ask("/", headers={"Host": host})[0], 403)
+            status, _, said = self.ask("/", headers={"Host": host})
+            self.assertEqual(status, 403)
+            self.assertIn(b"ssh -L has to forward a port of the same number", said)
         self.assertEqual(self.ask("/", headers={"Host": f"localhost:{self.port}"})[0], 200)
         listening = open("/proc/net/tcp", encoding="ascii").read().split("\n")[1:]
         places = [l.split()[1] for l in listening if l and l.split()[3] == "0A"]
