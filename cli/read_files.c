@@ -33,6 +33,17 @@ int read_files_add(read_files *r, const char *path)
     return 0;
 }
 
+int read_files_add_function(read_files *r, const char *name)
+{
+    const char *part = name ? strrchr(name, '#') : NULL;
+    char *file = part ? strndup(name, (size_t)(part - name)) : NULL;
+    int status = read_files_add(r, name);
+    if (!status)
+        status = read_files_add(r, file);
+    free(file);
+    return status;
+}
+
 static int add_found(void *user, const char *path)
 {
     return read_files_add(user, path);

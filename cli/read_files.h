@@ -17,6 +17,9 @@ typedef struct read_files {
 
 /* A file that is read, by any of its names; nothing where there is none, or for NULL. */
 int read_files_add(read_files *r, const char *path);
+/* A transfer function as options have it: a file, one of several in a file, "FILE#NAME", or a
+ * preset, which is nothing; the same for NULL. */
+int read_files_add_function(read_files *r, const char *name);
 /* A data set, or a volume that is read so. The context stays as it is. */
 int read_files_add_data(read_files *r, triptych *t, const char *input,
                         const triptych_brick_options *options);

@@ -53,11 +53,14 @@ static int add_read(read_files *r, const sequence *s, triptych *t)
     int status = read_files_add_data(r, t, o->input, &o->volume);
     for (int i = 0; i < o->more_count && !status; i++)
         status = read_files_add(r, o->more[i]);
-    const char *const others[] = { o->heat, o->function.name, o->path };
-    for (size_t i = 0; i < sizeof others / sizeof *others && !status; i++)
-        status = read_files_add(r, others[i]);
+    if (!status)
+        status = read_files_add(r, o->heat);
+    if (!status)
+        status = read_files_add(r, o->path);
+    if (!status)
+        status = read_files_add_function(r, o->function.name);
     for (size_t i = 0; i < s->path.count && !status; i++)
-        status = read_files_add(r, s->path.keys[i].function);
+        status = read_files_add_function(r, s->path.keys[i].function);
     return status;
 }
 

@@ -10,6 +10,7 @@
 #include "library.h"
 #include "options.h"
 #include "quality_options.h"
+#include "read_files.h"
 #include "report.h"
 #include "shown_volume.h"
 #include "view.h"
@@ -100,6 +101,7 @@ typedef struct view_options {
     quality_options quality;
     bool classify_given;
     triptych_classify classify;
+    read_files read; /* what a script may not write */
     shown_volume volume;
 } view_options;
 
@@ -337,8 +339,25 @@ static int parse(view_options *o, int argc, char **argv)
     return status ? status : trip_option_check_effects(&o->params.settings, o->params.heat);
 }
 
+static int note_read(view_options *o, triptych *t)
+{
+    int status = read_files_add(&o->read, o->params.script);
+    if (!status)
+        status = read_files_add(&o->read, o->params.heat);
+    if (!status)
+        status = read_files_add_function(&o->read, o->params.function);
+    for (int i = 0; i < o->params.count && !status; i++)
+        status = read_files_add_data(&o->read, t, o->inputs[i], &o->volume.options);
+    return status;
+}
+
+static int check_output(void *user, const char *path)
+{
+    return read_files_check(user, path);
+}
+
 /* An input or a function that cannot be taken is found here, before there is a window. */
-static int check_inputs(const view_options *o)
+static int check_inputs(view_options *o)
 {
     triptych *t = NULL;
     const triptych_resources resources = { .memory_bytes = o->params.memory_bytes };
@@ -347,6 +366,8 @@ static int check_inputs(const view_options *o)
         status = shown_volume_check(&o->volume, t, o->inputs[i], &resources);
     if (!status)
         status = library_check_heat(t, o->params.heat, &resources);
+    if (!status && o->params.script)
+        status = note_read(o, t);
     triptych_destroy(t);
     return status;
 }
@@ -365,6 +386,8 @@ int trip_command_view(int argc, char **argv)
     o.volume.options.memory_bytes = o.params.memory_bytes;
     o.volume.options.threads = o.params.threads;
     o.params.user = &o.volume;
+    o.params.check_output = check_output;
+    o.params.check_user = &o.read;
     o.params.find = shown_volume_find;
     o.params.make = shown_volume_make;
     o.params.release = shown_volume_release;
@@ -372,6 +395,7 @@ int trip_command_view(int argc, char **argv)
         status = check_inputs(&o);
     if (!status)
         status = trip_view_run(&o.params);
+    read_files_release(&o.read);
     free(o.inputs);
     return trip_exit_status(status);
 }

@@ -546,10 +546,34 @@ static void close_window(window *w)
     glfwTerminate();
 }
 
+static int check_outputs(const trip_view_params *p, const trip_script *script)
+{
+    int status = 0;
+    for (size_t i = 0; i < script->count && !status && p->check_output; i++) {
+        const trip_event *e = &script->events[i];
+        if (e->kind == TRIP_EVENT_SCREENSHOT || e->kind == TRIP_EVENT_PICTURE ||
+            e->kind == TRIP_EVENT_STATUS)
+            status = p->check_output(p->check_user, e->text);
+    }
+    return status;
+}
+
+static int load_script(window *w)
+{
+    const trip_view_params *p = w->params;
+    trip_script *script = &w->player.script;
+    int status = p->script ? trip_script_load(script, p->script) : 0;
+    if (!status)
+        status = check_outputs(p, script);
+    if (status)
+        trip_script_free(script);
+    return status;
+}
+
 int trip_view_run(const trip_view_params *params)
 {
     window w = { .params = params, .plays = params->script };
-    int status = params->script ? trip_script_load(&w.player.script, params->script) : 0;
+    int status = load_script(&w);
     if (status)
         return status;
     if (!glfwInit())

@@ -142,6 +142,7 @@ class Trouble(program.ProgramTest):
             ["slices/s-%03d.tif", "-o", "slices/s-002.tif"],
             ["slices/s-%03d.tif", "-o", "slices/s.tif", "--orbit", "3"],
             ["small.trip", "-o", "a.png", "--tf", "grey.tf", "--stats", "grey.tf"],
+            ["small.trip", "-o", "a.png", "--tf", "grey.tf#one", "--stats", "grey.tf"],
             ["small.trip", "-o", "a.png", "--tf", "link.tf", "--stats", "../%s/grey.tf"
              % os.path.basename(os.getcwd())],
             ["small.trip", "-o", "a.png", "--path", "path.json", "--stats", "path.json"],
