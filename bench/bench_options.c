@@ -414,6 +414,9 @@ static int check(parse *p)
         if (p->given & t->refused & BIT(options[i].key))
             return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
                              options[i].name);
+    if (o->input && !strcmp(t->name, "levels") && p->given & (OF_LEVELS | BIT(KEY_PLOT)))
+        return trip_option_fail("--field, --finest, --plot",
+                                "of this table are for what is sampled without a data set");
     if (!(p->given & BIT(KEY_OCCLUDED)))
         o->draw_occluded = t->draw_occluded;
     fill_defaults(o, t);

@@ -3,7 +3,8 @@
 #ifndef TRIP_CLI_INTERRUPT_H
 #define TRIP_CLI_INTERRUPT_H
 
-/* Installs handlers for SIGINT and SIGTERM, which interrupt what works in the calling thread's
+/* Installs handlers for SIGINT, SIGTERM and, unless it is ignored as by nohup, SIGHUP (a terminal
+ * that is gone), which interrupt what works in the calling thread's
  * scope and in those that are made there from then on. A second signal ends the process at once.
  * Writing beyond a limit on file sizes becomes an error (EFBIG) instead of the end of the process.
  * Called again, it forgets a signal. */

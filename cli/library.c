@@ -15,10 +15,8 @@ static void pass_message(void *user, const char *line)
 
 static const char *things_of(const char *stage)
 {
-    static const char *const splats[] = { "draw", "count", "merge" };
-    for (size_t i = 0; i < sizeof splats / sizeof *splats; i++)
-        if (!strcmp(stage, splats[i]))
-            return "splats";
+    if (!strcmp(stage, "count") || !strcmp(stage, "merge"))
+        return "splats";
     if (!strcmp(stage, "integrate"))
         return "pixels";
     return strcmp(stage, "look") ? "voxels" : "bytes";

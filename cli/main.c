@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "report.h"
@@ -58,9 +59,20 @@ static int finish(int exit_status)
     return exit_status;
 }
 
+/* Each data set that is drawn takes a file for each of its lists. */
+static void allow_open_files(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+        limit.rlim_cur = limit.rlim_max;
+        setrlimit(RLIMIT_NOFILE, &limit);
+    }
+}
+
 int main(int argc, char **argv)
 {
     hold_standard_streams();
+    allow_open_files();
     if (argc < 2)
         return trip_exit_status(
             trip_fail(TRIP_USAGE, "usage", "command", "none given; `triptych --help` lists them"));

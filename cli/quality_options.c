@@ -28,6 +28,11 @@ int quality_options_check(const quality_options *q)
     if (q->given && q->error > 0)
         return trip_option_fail("--error", "finds settings, and so does --quality: give one or the "
                                            "other");
+    if (q->measurable && q->error > 0)
+        return trip_fail(
+            TRIP_USAGE, "usage", "--error",
+            "finds settings that were measured, --%s among them: give one or the other",
+            q->measurable);
     if (q->report && !(q->error > 0))
         return trip_option_fail("--report", "is what --error takes settings from: give that");
     return 0;

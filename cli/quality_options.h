@@ -13,6 +13,8 @@ typedef struct quality_options {
     triptych_quality quality;
     double error;       /* 0: not given */
     const char *report; /* NULL: NAME.accuracy beside the data */
+    /* An option that was given of those that a report has measured, "classify"; NULL: none. */
+    const char *measurable;
     /* Once used for a volume: the data set that the report is of; "": not known, or no volume. */
     char measured[ACCURACY_CHECKSUM_BYTES];
 } quality_options;

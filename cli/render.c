@@ -1,6 +1,7 @@
 /* triptych render: data set -> plan -> reader -> renderer -> merge -> image files or a video. */
 #include "commands.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +10,7 @@
 #include "flight.h"
 #include "library.h"
 #include "piped_function.h"
+#include "render_files.h"
 #include "render_options.h"
 #include "render_stats.h"
 #include "render_view.h"
@@ -31,18 +33,23 @@ typedef struct drawing {
     video *video;    /* NULL: pictures are written */
     render_stats *stats;
     trip_progress progress;
+    int empty; /* pictures that show nothing */
 } drawing;
 
-/* What is kept of a volume: what is shown by default, and what the function shows besides, so that
- * nothing is missing; everything where a window moves it, so that the next window finds it in the
- * cache. */
-static triptych_brick_options brick_options(const render_options *o, const triptych_function *look)
+/* What is kept of a volume: what is shown by default, and what functions show besides, so that
+ * nothing is missing; everything where a window moves them, so that the next window finds it in the
+ * cache. Without a sequence: what is shown by default alone. */
+static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
 {
     enum { MOST_THREADS = 256 };
     triptych_brick_options options = o->volume;
-    options.keep_all = look->window > 0;
-    options.functions = &look->name;
-    options.function_count = look->name && !options.keep_all ? 1 : 0;
+    options.keep_all = shown && o->function.window > 0;
+    if (shown && !options.keep_all) {
+        options.functions = shown->names;
+        options.function_count = shown->name_count;
+        options.ranges = shown->ranges;
+        options.range_count = shown->range_count;
+    }
     options.automatic = 1;
     if (o->settings.classify == TRIPTYCH_PRE && render_options_have_levels(&o->settings))
         options.levels_for = TRIPTYCH_LEVELS_FOR_BOTH;
@@ -54,7 +61,7 @@ static triptych_brick_options brick_options(const render_options *o, const tript
 static int brick_volume(drawing *d)
 {
     const render_options *o = &d->o;
-    const triptych_brick_options wanted = brick_options(o, &o->function);
+    const triptych_brick_options wanted = brick_options(o, &d->sequence);
     int status = cached_volume_open(&d->volume, d->t, o->input, &wanted);
     trip_progress_end(&d->progress);
     if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
@@ -78,12 +85,13 @@ static int open_data(drawing *d, const char *path)
 }
 
 /* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
- * function shows; 0: it does not. */
+ * function shows; 0: it does not, or there are several. */
 static int open_usual(drawing *d)
 {
     triptych_function look = d->o.function;
-    const triptych_brick_options usual = brick_options(&d->o, &(triptych_function){ 0 });
-    int missing = 0, status = look.name || look.window > 0
+    const triptych_brick_options usual = brick_options(&d->o, NULL);
+    const bool other = look.name || look.window > 0;
+    int missing = 0, status = other && !sequence_has_functions(&d->sequence)
                                   ? cached_volume_find(&d->volume, d->t, d->o.input, &usual)
                                   : 0;
     trip_progress_end(&d->progress);
@@ -159,7 +167,9 @@ static int take_pictures(drawing *d)
 static int open_drawing(drawing *d)
 {
     const triptych_view view = render_view(&d->o);
-    int status = open_input(d);
+    int status = sequence_find_shown(&d->sequence);
+    if (!status)
+        status = open_input(d);
     if (!status)
         status = take_pictures(d);
     if (!status && !d->o.path)
@@ -179,22 +189,6 @@ static void close_drawing(drawing *d)
         triptych_close(d->t); /* the pictures too */
     }
     cached_volume_close(&d->volume);
-}
-
-enum { PATH_BYTES = 4096 };
-
-/* Of several, image.png -> image-007.png. */
-static int image_path(const drawing *d, const char *output, int index, char path[PATH_BYTES])
-{
-    const char *extension = strrchr(output, '.');
-    size_t bytes = PATH_BYTES;
-    int length = d->o.orbit || d->o.path
-                     ? snprintf(path, bytes, "%.*s-%03d%s", (int)(extension - output), output,
-                                index, extension)
-                     : snprintf(path, bytes, "%s", output);
-    if (length < 0 || (size_t)length >= bytes)
-        return trip_fail(TRIP_USAGE, "render", output, "the name is too long");
-    return 0;
 }
 
 /* A view of the orbit or the path. */
@@ -240,27 +234,52 @@ static int draw_planned(drawing *d, int index)
 static int write_image(void *user, triptych *t, int index, const float *rgba, const float *depth)
 {
     const drawing *d = user;
-    char path[PATH_BYTES];
-    int status = d->video ? 0 : image_path(d, d->o.output, index, path);
+    char path[RENDER_FILE_BYTES];
+    int status = d->video ? 0 : render_file_name(&d->o, d->o.output, index, path);
     if (!status && !d->video)
         status = triptych_write(t, path, d->o.width, d->o.height, rgba);
     if (!status && depth)
-        status = image_path(d, d->o.depth, index, path);
+        status = render_file_name(&d->o, d->o.depth, index, path);
     if (!status && depth)
         status = triptych_write_depth(t, path, d->o.width, d->o.height, depth);
     return status;
 }
 
+/* Whether all that is to be seen is what lies behind the volume. */
+static bool is_empty(const render_options *o, const float *rgba)
+{
+    const double *ground = o->settings.background;
+    const size_t pixels = (size_t)o->width * (size_t)o->height;
+    double most = 0;
+    for (size_t i = 0; i < 4 * pixels && most < 1e-6; i++)
+        most = fabs((double)rgba[i] - (i % 4 < 3 ? ground[i % 4] : 1) * ground[3]);
+    return most < 1e-6;
+}
+
+static void warn_of_empty(const drawing *d)
+{
+    const int frames = d->sequence.frames;
+    char which[64] = "the picture shows";
+    if (frames > 1)
+        snprintf(which, sizeof which, "%d of %d pictures show", d->empty, frames);
+    if (d->empty)
+        trip_warn(d->o.output,
+                  "%s nothing but the background: the view, what is cut away and the function "
+                  "decide what is to be seen",
+                  which);
+}
+
 /* What follows in the order of the frames. */
 static int finish_image(void *user, triptych *t, int index, const float *rgba)
 {
-    const drawing *d = user;
-    char path[PATH_BYTES];
+    drawing *d = user;
+    char path[RENDER_FILE_BYTES];
     int status = d->video ? video_add(d->video, rgba) : 0;
-    if (!status && !d->video)
-        status = image_path(d, d->o.output, index, path);
+    d->empty += is_empty(&d->o, rgba);
+    if (!status)
+        status = render_file_name(&d->o, d->o.output, index, path);
     if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
-        status = render_stats_summary(d->video ? d->o.output : path, &d->o, t, stdout);
+        status = render_stats_summary(path, &d->o, t, stdout);
     return status;
 }
 
@@ -369,14 +388,13 @@ static int count_images(drawing *d, int images)
     return status;
 }
 
-/* What can be known before any work: that the program can write what it is to draw. */
-static int check_output(drawing *d)
+/* That the program can write pictures of these kinds. */
+static int check_kinds(drawing *d)
 {
     const render_options *o = &d->o;
     bool is_video = video_is_named(o->output);
-    int status = is_video ? video_check(o->output, o->width, o->height)
-                          : triptych_prepare_write(d->t, o->output, o->depth);
-    return status ? status : render_options_check_outputs(o);
+    return is_video ? video_check(o->output, o->width, o->height)
+                    : triptych_prepare_write(d->t, o->output, o->depth);
 }
 
 int trip_command_render(int argc, char **argv)
@@ -386,15 +404,19 @@ int trip_command_render(int argc, char **argv)
     if (!status)
         status = create_context(&d);
     if (!status)
-        status = check_output(&d);
+        status = check_kinds(&d);
     if (!status)
         status = sequence_load(&d.sequence, &d.o);
+    if (!status)
+        status = render_files_check(&d.sequence, d.t);
     if (!status)
         status = piped_function_keep(&d.function, d.t, &d.o.function.name);
     if (!status)
         status = open_drawing(&d);
     if (!status)
         status = draw_images(&d);
+    if (!status)
+        warn_of_empty(&d);
     if (!status && d.stats)
         status = render_stats_describe(d.stats, &d.o, d.t);
     if (!status && d.o.count)

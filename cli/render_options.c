@@ -4,12 +4,10 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 #include "cached_volume.h"
 #include "clip_options.h"
 #include "geometry.h"
-#include "new_file.h"
 #include "effects_options.h"
 #include "options.h"
 #include "quality_options.h"
@@ -263,7 +261,8 @@ typedef struct parse {
     quality_options quality;
     bool h, saturation, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
-    bool slices, compositing;
+    bool slices, compositing, classify;
+    bool levels;           /* --lod, --max-bytes or --max-ms */
     bool kernel, integral; /* options of the integral renderer */
     bool again;            /* over settings that --quality or --error has chosen */
     bool footprint;        /* --kernel of splats, --low-pass or --flatten */
@@ -467,6 +466,7 @@ static int parse_method(int key, char *arg, parse *p)
         p->quality.report = arg;
         return 0;
     case KEY_CLASSIFY:
+        p->classify = true;
         status = trip_option_classify(arg, 3, &which);
         s->classify = (triptych_classify)which;
         return status;
@@ -480,10 +480,13 @@ static int parse_method(int key, char *arg, parse *p)
     case KEY_FLATTEN:
         return parse_footprint(key, arg, p);
     case KEY_LOD:
+        p->levels = true;
         return trip_option_number("--lod", arg, 0, 1000, &s->lod_px);
     case KEY_MAX_BYTES:
+        p->levels = true;
         return parse_max_bytes(arg, s);
     case KEY_MAX_MS:
+        p->levels = true;
         return trip_option_number("--max-ms", arg, 1e-3, 1e9, &s->max_ms);
     case KEY_SLICES:
         p->slices = true;
@@ -707,6 +710,9 @@ static int check_depth(const render_options *o)
         return 0;
     if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_option_fail("--depth", "does not apply to --renderer integral");
+    if (o->settings.show == TRIPTYCH_SHOW_MERGE)
+        return trip_option_fail("--depth", "does not go with --show merge, which shows nothing of "
+                                           "the volume");
     if (o->settings.target != TRIPTYCH_RGBA32F)
         return trip_option_fail("--depth", "goes with --target rgba32f");
     if (o->settings.samples > 1)
@@ -728,6 +734,11 @@ static int check_integral(parse *p)
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
         return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
                                            "source; give the volume in its place");
+    if (integral && p->classify && o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
+        return trip_option_fail("--classify", "does not apply to --renderer integral");
+    if (integral && p->slices)
+        return trip_option_fail("--slices", "does not apply to --renderer integral, which has no "
+                                            "sheets");
     if (integral && p->saturation)
         return trip_option_fail("--saturation", "does not apply to --renderer integral, whose "
                                                 "--tolerance bounds what is left out");
@@ -826,8 +837,6 @@ static int check_classify(const parse *p)
         return trip_option_fail("--kernel", "applies to --classify post and --renderer integral");
     if (o->settings.classify == TRIPTYCH_PRE)
         return p->slices ? trip_option_fail("--slices", "applies to --classify post only") : 0;
-    if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_option_fail("--classify", "does not apply to --renderer integral");
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
         return trip_option_fail("--traversal", "is outward with --classify post");
     if (o->settings.method == TRIPTYCH_IMAGE)
@@ -868,6 +877,10 @@ static int check_more(const parse *p)
                                     TRIP_ONE_VOLUME "; what is drawn together are data sets "
                                                     "(triptych brick --region)");
     }
+    if (o->more_count && p->levels)
+        return trip_option_fail("--lod, --max-bytes, --max-ms",
+                                "do not apply to several data sets, of which the finest level is "
+                                "drawn");
     if (o->more_count && p->quality.error > 0)
         return trip_option_fail("--error", "takes settings that were measured on one data set");
     return 0;
@@ -881,13 +894,9 @@ static int check(parse *p)
         return trip_option_fail("VOLUME", "none given: `triptych render VOLUME -o PICTURE.png`");
     if (!o->output)
         return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
-    const triptych_brick_options *v = &o->volume;
-    if ((v->grid || v->level_set || v->spacing[0] > 0 || v->coordinates || v->axes ||
-         v->allow_gaps) &&
-        !cached_volume_wanted(o->input))
-        return trip_option_fail(o->input, "is a data set: --grid, --level-set, --spacing, "
-                                          "--coordinates, --axes and --allow-gaps are for volumes");
-    int status = check_more(p);
+    int status = trip_option_check_volume(&o->volume, o->input);
+    if (!status)
+        status = check_more(p);
     if (!status)
         status = check_view(p);
     if (!status)
@@ -949,6 +958,23 @@ static int check(parse *p)
     return 0;
 }
 
+/* Options of the settings that reports measure, but for the renderer, by which one is chosen. */
+static void note_measurable(int key, quality_options *q)
+{
+    static const int keys[] = { KEY_CLASSIFY,      KEY_COMPOSITING, KEY_SLICES,    KEY_LOD,
+                                KEY_MAX_BYTES,     KEY_MAX_MS,      KEY_METHOD,    KEY_H,
+                                KEY_SATURATION,    KEY_WEIGHTS,     KEY_NORMALISE, KEY_TRAVERSAL,
+                                KEY_KERNEL_RADIUS, KEY_LOW_PASS,    KEY_FLATTEN,   KEY_TARGET,
+                                KEY_SUBMIT,        KEY_KERNEL,      KEY_FIELD,     KEY_TOLERANCE,
+                                KEY_SAMPLES };
+    bool measured = false;
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        measured = measured || keys[i] == key;
+    for (size_t row = 0; measured && row < sizeof options / sizeof *options; row++)
+        if (options[row].key == key)
+            q->measurable = options[row].name;
+}
+
 static error_t parse_key(int key, char *arg, struct argp_state *state)
 {
     parse *p = state->input;
@@ -976,6 +1002,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     default:
         break;
     }
+    note_measurable(key, &p->quality);
     int status = parse_volume(key, arg, &p->o->volume);
     if (status == ARGP_ERR_UNKNOWN)
         status = parse_view(key, arg, p);
@@ -1020,21 +1047,4 @@ int render_options_parse(render_options *o, int argc, char **argv)
     p = (parse){ .o = o, .again = true };
     argv[0] = name;
     return trip_options_parse(&argp, argc, argv, &p);
-}
-
-/* What is written to as it is: devices, pipes and links. */
-static bool is_special(const char *path)
-{
-    struct stat st;
-    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
-}
-
-int render_options_check_outputs(const render_options *o)
-{
-    int status = trip_new_file_check("write", o->output);
-    if (!status && o->depth)
-        status = trip_new_file_check("write", o->depth);
-    if (!status && o->stats && strcmp(o->stats, "-") && !is_special(o->stats))
-        status = trip_new_file_check("write", o->stats);
-    return status;
 }

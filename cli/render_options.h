@@ -58,8 +58,6 @@ typedef struct render_options {
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int render_options_parse(render_options *o, int argc, char **argv);
-/* What cannot be written at the end, before any work: 0, or TRIP_ERROR once reported. */
-int render_options_check_outputs(const render_options *o);
 /* Whether pictures are to be drawn by coarse levels. */
 bool render_options_have_levels(const triptych_settings *s);
 

@@ -360,8 +360,8 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
     if (status)
         return status;
     trip_text_write(out, path);
-    fprintf(out, ": %d x %d, %.2f million splats, %s read, %.2f s\n", o->width, o->height,
-            (double)frame.splats * 1e-6, trip_format_bytes(frame.bytes_read, text),
-            frame.ms * 1e-3);
+    fprintf(out, ": %d x %d, %.2f million %s, %s read, %.2f s\n", o->width, o->height,
+            (double)frame.splats * 1e-6, frame.classify == TRIPTYCH_PRE ? "splats" : "voxels",
+            trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     return 0;
 }

@@ -1,5 +1,6 @@
 #include "sequence.h"
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,10 +11,73 @@ int sequence_load(sequence *s, const render_options *o)
 {
     s->o = o;
     s->frames = o->orbit ? o->orbit : 1;
-    if (!o->path)
-        return 0;
-    int status = trip_camera_path_load(&s->path, o->path);
-    s->frames = trip_camera_path_frames(&s->path);
+    int status = o->path ? trip_camera_path_load(&s->path, o->path) : 0;
+    if (!status && o->path)
+        s->frames = trip_camera_path_frames(&s->path);
+    return status;
+}
+
+bool sequence_has_functions(const sequence *s)
+{
+    for (size_t i = 0; i < s->path.count; i++)
+        if (s->path.keys[i].function || s->path.keys[i].text)
+            return true;
+    return false;
+}
+
+static int parse_text(const sequence *s, const char *text, trip_tf **out)
+{
+    int status = trip_tf_parse(out, s->o->path, text, strlen(text));
+    if (!status && trip_tf_is_normalised(*out))
+        return trip_fail(TRIP_ERROR, "path", s->o->path,
+                         "\"function_text\" is over the data's range, not in data units");
+    return status;
+}
+
+/* ---- what functions show ---- */
+
+static int fail_memory(void)
+{
+    return trip_fail(TRIP_ERROR, "render", "function", "out of memory");
+}
+
+static void add_name(sequence *s, const char *name)
+{
+    bool known = false;
+    for (size_t i = 0; i < s->name_count; i++)
+        known = known || !strcmp(s->names[i], name);
+    if (!known)
+        s->names[s->name_count++] = name;
+}
+
+static int add_range(sequence *s, const char *text)
+{
+    double span[2];
+    trip_tf *tf = NULL;
+    int status = parse_text(s, text, &tf);
+    if (!status && trip_tf_visible_span(tf, -DBL_MAX, DBL_MAX, span))
+        s->ranges[s->range_count++] = (triptych_range){ span[0], span[1] };
+    trip_tf_destroy(tf);
+    return status;
+}
+
+int sequence_find_shown(sequence *s)
+{
+    const char *text = NULL;
+    int status = 0;
+    s->names = calloc(s->path.count + 1, sizeof *s->names);
+    s->ranges = calloc(s->path.count + 1, sizeof *s->ranges);
+    if (!s->names || !s->ranges)
+        return fail_memory();
+    if (s->o->function.name)
+        add_name(s, s->o->function.name);
+    for (size_t i = 0; i < s->path.count && !status; i++) {
+        const trip_path_key *key = &s->path.keys[i];
+        if (key->function)
+            add_name(s, key->function);
+        if (key->text && !(text && !strcmp(text, key->text))) /* as most keys have that before */
+            status = add_range(s, text = key->text);
+    }
     return status;
 }
 
@@ -60,14 +124,6 @@ static int find_cameras(sequence *s, triptych *t)
 
 /* ---- functions ---- */
 
-static bool has_functions(const sequence *s)
-{
-    for (size_t i = 0; i < s->path.count; i++)
-        if (s->path.keys[i].function || s->path.keys[i].text)
-            return true;
-    return false;
-}
-
 /* A preset, a file or, without a name, the data set's own, in data units. */
 static int find_function(triptych *t, const char *name, trip_tf **out)
 {
@@ -76,15 +132,6 @@ static int find_function(triptych *t, const char *name, trip_tf **out)
     if (!status)
         status = trip_tf_parse(out, name ? name : "data set", text, strlen(text));
     free(text);
-    return status;
-}
-
-static int parse_text(const sequence *s, const char *text, trip_tf **out)
-{
-    int status = trip_tf_parse(out, s->o->path, text, strlen(text));
-    if (!status && trip_tf_is_normalised(*out))
-        return trip_fail(TRIP_ERROR, "path", s->o->path,
-                         "\"function_text\" is over the data's range, not in data units");
     return status;
 }
 
@@ -97,23 +144,20 @@ static triptych_function look_of(const sequence *s, const char *text)
 }
 
 /* Taken once, so that it is warned of. */
-static int try_function(const sequence *s, triptych *t, const trip_tf *tf)
+static int try_function(const sequence *s, triptych *t, const trip_path_key *key)
 {
-    char *text = trip_tf_to_text(tf);
-    const triptych_function f = look_of(s, text);
-    int status = text ? triptych_set_function(t, &f)
-                      : trip_fail(TRIP_ERROR, "render", "function", "out of memory");
-    free(text);
-    return status;
+    triptych_function f = look_of(s, key->text);
+    f.name = key->function;
+    return triptych_set_function(t, &f);
 }
 
 static int find_functions(sequence *s, triptych *t)
 {
-    if (!has_functions(s))
+    if (!sequence_has_functions(s))
         return 0;
     s->functions = calloc(s->path.count + 1, sizeof *s->functions);
     if (!s->functions)
-        return trip_fail(TRIP_ERROR, "render", "function", "out of memory");
+        return fail_memory();
     int status = find_function(t, s->o->function.name, &s->functions[0]);
     for (size_t i = 0; i < s->path.count && !status; i++) {
         const trip_path_key *key = &s->path.keys[i];
@@ -123,7 +167,7 @@ static int find_functions(sequence *s, triptych *t)
         else if (key->text)
             status = parse_text(s, key->text, own);
         if (!status && *own)
-            status = try_function(s, t, *own);
+            status = try_function(s, t, key);
     }
     return status;
 }
@@ -138,7 +182,7 @@ static int mix_text(const sequence *s, int frame, char **text)
     *text = status ? NULL : trip_tf_to_text(between ? between : from);
     trip_tf_destroy(between);
     if (!status && !*text)
-        return trip_fail(TRIP_ERROR, "render", "function", "out of memory");
+        return fail_memory();
     return status;
 }
 
@@ -177,6 +221,8 @@ void sequence_release(sequence *s)
     for (size_t i = 0; s->functions && i <= s->path.count; i++)
         trip_tf_destroy(s->functions[i]);
     free(s->functions);
+    free(s->names);
+    free(s->ranges);
     free(s->cameras);
     trip_camera_path_release(&s->path);
 }

@@ -1,7 +1,6 @@
 /* triptych serve: a data set -> a server for a browser on this machine. */
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "clip_options.h"
 #include "commands.h"
@@ -134,6 +133,7 @@ static int parse_rest(int key, char *arg, serve_options *o)
         status = trip_option_classify(arg, 3, &which);
         o->classify = (triptych_classify)which;
         o->classify_given = true;
+        o->quality.measurable = "classify";
         return status;
     case KEY_CLIP_BOX:
         return trip_option_clip_box(arg, &p->settings.clip);
@@ -174,6 +174,14 @@ static int parse_volume(int key, char *arg, serve_options *o)
     }
 }
 
+static int check(const serve_options *o)
+{
+    if (!o->params.input)
+        return trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+    int status = trip_option_check_volume(&o->volume.options, o->params.input);
+    return status ? status : quality_options_check(&o->quality);
+}
+
 static error_t parse_key(int key, char *arg, struct argp_state *state)
 {
     serve_options *o = state->input;
@@ -185,8 +193,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         p->input = arg;
         return 0;
     case ARGP_KEY_END:
-        return p->input ? quality_options_check(&o->quality)
-                        : trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+        return check(o);
     default:
         return parse_volume(key, arg, o);
     }
@@ -206,25 +213,15 @@ static int choose_settings(serve_options *o)
     return status;
 }
 
-/* Of a volume, which is bricked while its page is there, no more than that it is missing. */
-static int check_data(const trip_serve_params *p, triptych *t, const triptych_resources *resources)
+/* An input or a function that cannot be taken is found here, before anybody looks. */
+static int check_input(const serve_options *o)
 {
-    if (cached_volume_wanted(p->input))
-        return access(p->input, R_OK) == 0 || strpbrk(p->input, "*?[%")
-                   ? 0
-                   : trip_fail_errno("read", p->input, "cannot open");
-    int status = triptych_open(t, p->input, resources);
-    return status ? status : triptych_set_function(t, &(triptych_function){ .name = p->function });
-}
-
-/* A data set or function that cannot be taken is found here, before anybody looks. */
-static int check_input(const trip_serve_params *p)
-{
+    const trip_serve_params *p = &o->params;
     triptych *t = NULL;
     const triptych_resources resources = { .memory_bytes = p->memory_bytes };
     int status = library_create(&t, NULL);
     if (!status)
-        status = check_data(p, t, &resources);
+        status = shown_volume_check(&o->volume, t, p->input, &resources);
     if (!status)
         status = library_check_heat(t, p->heat, &resources);
     triptych_destroy(t);
@@ -250,7 +247,8 @@ int trip_command_serve(int argc, char **argv)
             "it is interrupted. A moving view is sent as JPEG, as large as its time allows; at "
             "rest the picture that `triptych render` draws is sent as PNG. It listens to 127.0.0.1 "
             "alone and answers addresses with its token alone; to look from another machine, "
-            "forward the port by ssh -L. A volume is bricked into a cache first, which `triptych "
+            "forward the port by ssh -L, to the same number there. A volume is bricked into a "
+            "cache first, which `triptych "
             "cache` lists and clears.",
     };
     serve_options o = {
@@ -269,6 +267,6 @@ int trip_command_serve(int argc, char **argv)
     if (!status)
         status = trip_option_check_effects(&o.params.settings, o.params.heat);
     if (!status)
-        status = check_input(&o.params);
+        status = check_input(&o);
     return trip_exit_status(status ? status : trip_serve_run(&o.params));
 }

@@ -7,6 +7,7 @@
 
 #include "quality_options.h"
 #include "report.h"
+#include "transfer_function.h"
 
 /* Of volumes whose files are larger, at least, a version of so many voxels is made first. */
 #define LARGE_BYTES (UINT64_C(8) << 20)
@@ -20,6 +21,36 @@ static triptych_brick_options options_of(const shown_volume *s, bool keep_all)
     wanted.automatic = !keep_all;
     wanted.keep_all = keep_all;
     return wanted;
+}
+
+static int pass_file(void *user, const char *path)
+{
+    (void)user, (void)path;
+    return 0;
+}
+
+static int check_volume(const shown_volume *s, triptych *t, const char *volume)
+{
+    trip_tf *tf = NULL;
+    int status = triptych_list_files(t, volume, &s->options, pass_file, NULL);
+    if (!status && access(volume, R_OK) != 0 && !strpbrk(volume, "*?[%"))
+        status = trip_fail_errno("read", volume, "cannot open");
+    if (!status && s->function)
+        status = trip_tf_load(&tf, s->function);
+    trip_tf_destroy(tf);
+    return status;
+}
+
+int shown_volume_check(const shown_volume *s, triptych *t, const char *input,
+                       const triptych_resources *resources)
+{
+    if (cached_volume_wanted(input))
+        return check_volume(s, t, input);
+    int status = triptych_open(t, input, resources);
+    if (!status) /* warnings are for whoever looks */
+        status = library_set_function_quietly(t, &(triptych_function){ .name = s->function });
+    triptych_close(t);
+    return status;
 }
 
 /* The folder that it lies in, with the last slash, for free(). */

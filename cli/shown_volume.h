@@ -18,6 +18,12 @@ typedef struct shown_volume {
     cached_volume cached; /* zeroed at first */
 } shown_volume;
 
+/* What can be known before anything is shown: that a data set opens and takes the function, that a
+ * volume is there in a format that is known, and that there is such a function. The context has
+ * none open before and after. */
+int shown_volume_check(const shown_volume *s, triptych *t, const char *input,
+                       const triptych_resources *resources);
+
 /* As trip_frames_params.find and release have them; `user` is a shown_volume. */
 int shown_volume_find(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                       const char **path);

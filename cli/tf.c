@@ -12,6 +12,7 @@
 #include "library.h"
 #include "new_file.h"
 #include "options.h"
+#include "read_files.h"
 #include "report.h"
 #include "text.h"
 
@@ -159,11 +160,24 @@ static int convert_in(triptych *t, const options *o, triptych_form form, char **
     return status ? status : triptych_convert(t, &c, text);
 }
 
+/* Of a data set or a volume; a function's own file may be what it is converted into. */
+static int check_replaced(triptych *t, const char *in, const char *out)
+{
+    read_files r = { 0 };
+    int status = is_function(in) ? 0 : read_files_add_data(&r, t, in, NULL);
+    if (!status)
+        status = read_files_check(&r, out);
+    read_files_release(&r);
+    return status;
+}
+
 static int make_text(const options *o, triptych_form form, char **text)
 {
     triptych *t = NULL;
     trip_progress progress = trip_progress_start(false);
     int status = library_create(&t, &progress);
+    if (!status && o->action == CONVERT && strcmp(o->words[2], "-"))
+        status = check_replaced(t, o->words[1], o->words[2]);
     if (!status)
         status = convert_in(t, o, form, text);
     trip_progress_end(&progress);

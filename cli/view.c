@@ -10,6 +10,7 @@
 #include "library.h"
 #include "options.h"
 #include "quality_options.h"
+#include "read_files.h"
 #include "report.h"
 #include "shown_volume.h"
 #include "view.h"
@@ -100,6 +101,7 @@ typedef struct view_options {
     quality_options quality;
     bool classify_given;
     triptych_classify classify;
+    read_files read; /* what a script may not write */
     shown_volume volume;
 } view_options;
 
@@ -186,6 +188,7 @@ static int parse_look(int key, char *arg, view_options *o)
         status = trip_option_classify(arg, 3, &which);
         o->classify = (triptych_classify)which;
         o->classify_given = true;
+        o->quality.measurable = "classify";
         return status;
     case KEY_CLIP_BOX:
         o->params.settings_given = true;
@@ -250,6 +253,15 @@ static int parse_volume(int key, char *arg, view_options *o)
     }
 }
 
+/* How volumes are read is for some input, or for what is opened later. */
+static int check_volume(const view_options *o)
+{
+    bool volumes = o->params.count == 0;
+    for (int i = 0; i < o->params.count; i++)
+        volumes = volumes || cached_volume_wanted(o->inputs[i]);
+    return volumes ? 0 : trip_option_check_volume(&o->volume.options, o->inputs[0]);
+}
+
 static int check(const view_options *o)
 {
     const triptych_view *v = &o->params.start;
@@ -262,7 +274,8 @@ static int check(const view_options *o)
         return trip_option_fail("--error", "is of one data set: name it");
     if (o->params.heat && o->params.count != 1)
         return trip_option_fail("--emission", "is of one data set: name it");
-    return quality_options_check(&o->quality);
+    int status = check_volume(o);
+    return status ? status : quality_options_check(&o->quality);
 }
 
 static int choose_settings(view_options *o)
@@ -326,17 +339,35 @@ static int parse(view_options *o, int argc, char **argv)
     return status ? status : trip_option_check_effects(&o->params.settings, o->params.heat);
 }
 
-/* A data set that cannot be opened is found here, before there is a window. */
-static int check_inputs(const view_options *o)
+static int note_read(view_options *o, triptych *t)
+{
+    int status = read_files_add(&o->read, o->params.script);
+    if (!status)
+        status = read_files_add(&o->read, o->params.heat);
+    if (!status)
+        status = read_files_add_function(&o->read, o->params.function);
+    for (int i = 0; i < o->params.count && !status; i++)
+        status = read_files_add_data(&o->read, t, o->inputs[i], &o->volume.options);
+    return status;
+}
+
+static int check_output(void *user, const char *path)
+{
+    return read_files_check(user, path);
+}
+
+/* An input or a function that cannot be taken is found here, before there is a window. */
+static int check_inputs(view_options *o)
 {
     triptych *t = NULL;
     const triptych_resources resources = { .memory_bytes = o->params.memory_bytes };
     int status = library_create(&t, NULL);
     for (int i = 0; i < o->params.count && !status; i++)
-        if (!cached_volume_wanted(o->inputs[i]))
-            status = triptych_open(t, o->inputs[i], &resources);
+        status = shown_volume_check(&o->volume, t, o->inputs[i], &resources);
     if (!status)
         status = library_check_heat(t, o->params.heat, &resources);
+    if (!status && o->params.script)
+        status = note_read(o, t);
     triptych_destroy(t);
     return status;
 }
@@ -355,6 +386,8 @@ int trip_command_view(int argc, char **argv)
     o.volume.options.memory_bytes = o.params.memory_bytes;
     o.volume.options.threads = o.params.threads;
     o.params.user = &o.volume;
+    o.params.check_output = check_output;
+    o.params.check_user = &o.read;
     o.params.find = shown_volume_find;
     o.params.make = shown_volume_make;
     o.params.release = shown_volume_release;
@@ -362,6 +395,7 @@ int trip_command_view(int argc, char **argv)
         status = check_inputs(&o);
     if (!status)
         status = trip_view_run(&o.params);
+    read_files_release(&o.read);
     free(o.inputs);
     return trip_exit_status(status);
 }

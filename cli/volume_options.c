@@ -1,6 +1,7 @@
 #include "volume_options.h"
 
 #include "anatomy.h"
+#include "cached_volume.h"
 #include "options.h"
 
 int trip_option_grid(const char *name, const char **grid)
@@ -35,4 +36,14 @@ int trip_option_axes(const char *text, const char **axes)
     *axes = text;
     return trip_anatomy_axes_valid(text) ? 0
                                          : trip_option_fail("--axes", "takes " TRIP_ANATOMY_AXES);
+}
+
+int trip_option_check_volume(const triptych_brick_options *v, const char *input)
+{
+    const bool given =
+        v->grid || v->level_set || v->spacing[0] > 0 || v->coordinates || v->axes || v->allow_gaps;
+    return given && !cached_volume_wanted(input)
+               ? trip_option_fail(input, "is a data set: --grid, --level-set, --spacing, "
+                                         "--coordinates, --axes and --allow-gaps are for volumes")
+               : 0;
 }

@@ -13,5 +13,7 @@ int trip_option_level_set(const char *text, triptych_level_set *mode);
 int trip_option_spacing(const char *text, double spacing[3]);
 /* "PIR". */
 int trip_option_axes(const char *text, const char **axes);
+/* Refuses what these say where the input is a data set, which has it fixed. */
+int trip_option_check_volume(const triptych_brick_options *v, const char *input);
 
 #endif

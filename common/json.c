@@ -57,7 +57,7 @@ int trip_json_parse(trip_json *out, const char *text, const char *path, trip_bud
                          "its text takes %llu MiB of memory: give more with --memory",
                          (unsigned long long)(bytes >> 20) + 1);
     out->bytes = budget ? bytes : 0;
-    out->root = cJSON_Parse(text);
+    out->root = cJSON_ParseWithOpts(text, &out->end, false);
     return TRIP_OK;
 }
 

@@ -12,6 +12,7 @@ struct cJSON;
 
 typedef struct trip_json {
     struct cJSON *root; /* NULL where the text is not JSON */
+    const char *end;    /* in the text: behind its value, or where it is not JSON */
     trip_budget *budget;
     uint64_t bytes; /* charged to it */
 } trip_json;

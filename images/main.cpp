@@ -231,8 +231,10 @@ void set_up_threads()
 
 int main()
 {
-    /* Ctrl-C goes to the whole group; the other end decides what becomes of a request. */
+    /* Ctrl-C, and the end of a terminal, go to the whole group; the other end decides what becomes
+     * of a request. */
     std::signal(SIGINT, SIG_IGN);
+    std::signal(SIGHUP, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN); /* a write that fails says so itself */
     (void)trip_sandbox_enter(); /* where the kernel can */

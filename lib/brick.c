@@ -258,6 +258,29 @@ int triptych_identify(triptych *t, const char *volume, const triptych_brick_opti
     return trip_context_leave(before, status);
 }
 
+static int list_files(const char *volume, const triptych_brick_options *o,
+                      int (*found)(void *user, const char *path), void *user)
+{
+    const trip_volume_params params = volume_params(o);
+    const char *fault = fault_of_volume(o);
+    trip_source source = { 0 };
+    if (fault)
+        return trip_fail(TRIP_USAGE, "read", volume, "%s", fault);
+    int status = trip_source_find(&source, volume, &params);
+    for (size_t i = 0; i < source.count && status >= 0; i++)
+        status = found(user, source.files[i].path);
+    trip_source_free(&source);
+    return status < 0 ? status : 0;
+}
+
+int triptych_list_files(triptych *t, const char *volume, const triptych_brick_options *options,
+                        int (*found)(void *user, const char *path), void *user)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_brick_options usual = { 0 };
+    return trip_context_leave(before, list_files(volume, options ? options : &usual, found, user));
+}
+
 static int use_source(triptych *t, const char *path, const triptych_brick_options *o)
 {
     const trip_volume_params params = volume_params(o);

@@ -13,6 +13,13 @@ static void write_word(FILE *f, const char *word)
     trip_text_write_word(f, word);
 }
 
+static void write_volume(FILE *f, const char *volume)
+{
+    if (*volume == '-')
+        fputs(" --", f);
+    write_word(f, volume);
+}
+
 /* The source beside the data set, where it is there; else the name alone. */
 static void write_source(FILE *f, const char *path, const char *source)
 {
@@ -25,14 +32,12 @@ static void write_source(FILE *f, const char *path, const char *source)
     bool near = access(source, F_OK) != 0 && length > 0 &&
                 asprintf(&beside, "%.*s%s", (int)length, path, source) >= 0 &&
                 access(beside, F_OK) == 0;
-    if (*source == '-' && !near)
-        fputs(" --", f);
-    write_word(f, near ? beside : source);
+    write_volume(f, near ? beside : source);
     free(beside);
 }
 
-char *brick_command(const trip_dataset_text *text, const char *path, const char *tf,
-                    const double *range)
+char *brick_command(const trip_dataset_text *text, const char *path, const char *volume,
+                    const char *tf, const double *range)
 {
     char *command = NULL, *option = NULL, lo[32], hi[32];
     size_t bytes;
@@ -50,9 +55,13 @@ char *brick_command(const trip_dataset_text *text, const char *path, const char 
         write_word(f, option);
         free(option);
     }
-    fputs(" --force -o", f);
-    write_word(f, path);
-    write_source(f, path, source);
+    if (volume) {
+        write_volume(f, volume); /* without a name for the data set, which is called after it */
+    } else {
+        fputs(" --force -o", f);
+        write_word(f, path);
+        write_source(f, path, source);
+    }
     if (fclose(f) == 0)
         return command;
     free(command);

@@ -25,6 +25,13 @@ static bool find_missing(const session *s, const trip_tf *tf, const session_look
     return missing;
 }
 
+/* Else it stands for a volume, whose name the user knows it by. */
+static bool is_named_by_path(const session *s, unsigned part)
+{
+    const char *path = s->parts[part]->path;
+    return part || strncmp(s->input, path, strlen(path)) == 0;
+}
+
 static void warn_of_culled_values(const session *s, unsigned part, const trip_tf *tf,
                                   const session_look *look)
 {
@@ -33,8 +40,10 @@ static void warn_of_culled_values(const session *s, unsigned part, const trip_tf
     if (voxels < 1)
         return;
     double span[2];
+    const bool named = look->window == 0 && !look->tf_text;
     trip_tf_visible_span(tf, s->data->header.value_min, s->data->header.value_max, span);
-    char *command = brick_command(s->texts[part], input, look->tf, look->window > 0 ? span : NULL);
+    char *command = brick_command(s->texts[part], input, is_named_by_path(s, part) ? NULL : input,
+                                  look->tf, named ? NULL : span);
     trip_warn(input,
               "the transfer function shows about %.0f voxels with values from %g to %g that were "
               "left out when the data set was made; to have them: %s",

@@ -166,6 +166,13 @@ TRIPTYCH_API int triptych_identify(triptych *t, const char *volume,
                                    const triptych_brick_options *options,
                                    uint64_t most_content_bytes, triptych_identity *out);
 
+/* Calls `found` with the path of every file that a volume is read from; of a folder or a pattern
+ * perhaps with some more. Of `options`, which may be NULL, only how it is read counts. What `found`
+ * returns below 0 ends it, and is returned. */
+TRIPTYCH_API int triptych_list_files(triptych *t, const char *volume,
+                                     const triptych_brick_options *options,
+                                     int (*found)(void *user, const char *path), void *user);
+
 /* Whether a type is one of triptych_brick_options.raw_type. */
 TRIPTYCH_API int triptych_is_raw_type(const char *name);
 

@@ -1,5 +1,7 @@
 #include "view.h"
 
+#include <math.h>
+
 #include "camera.h"
 #include "outline.h"
 #include "report.h"
@@ -18,6 +20,35 @@ static bool is_fitted(const triptych_view *o)
     return !(o->eye && o->look);
 }
 
+/* The axis that a grid has a single slice along; -1: none. */
+static int slice_axis(const trip_dataset *d)
+{
+    int axis = -1, singles = 0;
+    for (int a = 0; a < 3; a++)
+        if (d->header.dims[a] == 1) {
+            axis = a;
+            singles++;
+        }
+    return singles == 1 ? axis : -1;
+}
+
+/* A single slice faces the viewer, as a picture: rows from the left to the right, and up is what
+ * comes next to what is up of the object, or else to its front. */
+static void face_slice(trip_camera_framing *f, const trip_dataset *d, int axis)
+{
+    const trip_affine *m = &d->index_to_world;
+    const trip_vec3 right = trip_affine_vector(m, axis == 0 ? trip_v3(0, 1, 0) : trip_v3(1, 0, 0));
+    trip_vec3 up = trip_affine_vector(m, axis == 2 ? trip_v3(0, 1, 0) : trip_v3(0, 0, 1));
+    const trip_vec3 above = trip_length(f->up) > 0 ? f->up : trip_v3(0, 0, 1);
+    const trip_vec3 front = trip_length(f->front) > 0 ? f->front : trip_v3(0, -1, 0);
+    const double rises = trip_dot(trip_normalize(up), trip_normalize(above));
+    if ((fabs(rises) > 0.5 ? rises : trip_dot(up, front)) < 0)
+        up = trip_scale(up, -1);
+    f->up = trip_normalize(up);
+    f->front = trip_normalize(trip_cross(right, up));
+    f->view = TRIP_VIEW_FRONT;
+}
+
 static trip_camera_framing framing_of(const triptych_view *o, const session *s)
 {
     trip_camera_framing f = {
@@ -33,6 +64,9 @@ static trip_camera_framing framing_of(const triptych_view *o, const session *s)
         .turntable = o->turntable,
     };
     trip_dataset_text_frame(s->text, s->data, &f);
+    const int slice = slice_axis(s->data);
+    if (slice >= 0 && !o->up && o->side == TRIPTYCH_SIDE_DEFAULT)
+        face_slice(&f, s->data, slice);
     if (o->up)
         trip_framing_set_up(&f, vector(o->up));
     return f;

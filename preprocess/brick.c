@@ -267,7 +267,8 @@ static int check_tally(brick *b)
             b->params->input,
             "every voxel there is has the value %g: there is nothing to see but their outline",
             t->value_min);
-    for (size_t i = 0; i < b->params->function_count; i++)
+    /* What is kept for functions beside the automatic one is drawn by them, which warns of them. */
+    for (size_t i = 0; i < b->params->function_count && !b->params->automatic; i++)
         trip_tf_check_range(b->in.functions[i], t->value_min, t->value_max, b->params->input);
     return 0;
 }

@@ -190,7 +190,9 @@ static enum MHD_Result handle(void *user, struct MHD_Connection *c, const char *
         return MHD_YES;
     }
     if (!is_own_host(s, c))
-        return refuse(c, 403, "this is another host");
+        return refuse(c, 403,
+                      "this is another host or port: ssh -L has to forward a port of the same "
+                      "number");
     if (!same_token(s->token, MHD_lookup_connection_value(c, MHD_GET_ARGUMENT_KIND, "token")))
         return refuse(c, 403, "the address is without its token");
     if (!strcmp(method, "GET"))
@@ -251,6 +253,7 @@ static void say_address(const server *s, const trip_serve_params *params)
 int trip_serve_run(const trip_serve_params *params)
 {
     server s = { .session = trip_session_start(params) };
+    char line[600];
     if (!s.session)
         return trip_fail(TRIP_ERROR, "serve", params->input, "out of memory or threads");
     int status = make_token(&s);
@@ -258,8 +261,11 @@ int trip_serve_run(const trip_serve_params *params)
         status = listen_here(&s, params->port);
     if (!status)
         say_address(&s, params);
-    while (!status && !trip_interrupted())
+    while (!status && !trip_interrupted()) {
         trip_session_tick(s.session, TICK_SECONDS);
+        if (trip_session_take_failure(s.session, line, sizeof line))
+            trip_report_line(line);
+    }
     trip_session_end(s.session);
     if (s.daemon)
         MHD_stop_daemon(s.daemon);

@@ -29,6 +29,8 @@ struct trip_session {
     uint64_t came;       /* under news_lock: how often */
     bool ended;          /* the same */
     uint64_t seen;       /* of `came`, by the thread that ticks */
+    uint64_t told;       /* of the frames' messages, the last failure among them, by the same */
+    const char *given;   /* the function of the command line, or NULL */
 };
 
 static void wake(void *user)
@@ -76,7 +78,7 @@ static void show(trip_session *s, const trip_serve_params *p)
     trip_viewer *v = &s->viewer;
     trip_viewer_init(v, s->frames);
     v->settings = p->settings;
-    v->function = p->function;
+    v->function = s->given = p->function;
     v->heat = p->heat;
     v->opacity_scale = 1;
     v->fresh = true; /* what a window showed, with its panel, is another thing */
@@ -158,13 +160,14 @@ void trip_session_tick(trip_session *s, double seconds)
     pthread_mutex_unlock(&s->lock);
 }
 
-/* Of those that a script can have. */
+/* Of those that a script can have: no key that ends or writes something, or makes room for the
+ * panel that a window has. */
 static bool is_allowed(const trip_event *e)
 {
-    bool writes = e->kind == TRIP_EVENT_KEY && e->code < 128 && strchr("pqcm", e->code);
+    bool other = e->kind == TRIP_EVENT_KEY && e->code < 128 && strchr("pqcmt", e->code);
     bool size = e->kind == TRIP_EVENT_RESIZE &&
                 (e->x < LEAST_SIDE || e->x > MOST_SIDE || e->y < LEAST_SIDE || e->y > MOST_SIDE);
-    return e->kind <= TRIP_EVENT_RESIZE && e->kind != TRIP_EVENT_TEXT && !writes && !size;
+    return e->kind <= TRIP_EVENT_RESIZE && e->kind != TRIP_EVENT_TEXT && !other && !size;
 }
 
 static void act(trip_session *s, const trip_script *script)
@@ -214,7 +217,7 @@ static const char *preset(const char *name)
 
 bool trip_session_set_function(trip_session *s, const char *name)
 {
-    const char *known = *name ? preset(name) : NULL;
+    const char *known = s->given && !strcmp(name, s->given) ? s->given : preset(name);
     if (*name && !known)
         return false;
     pthread_mutex_lock(&s->lock);
@@ -455,6 +458,16 @@ static void add_light(cJSON *root, const trip_document *d)
     cJSON_AddNumberToObject(light, "distance", c.distance);
 }
 
+bool trip_session_take_failure(trip_session *s, char *line, size_t bytes)
+{
+    const trip_frames_status status = trip_frames_get_status(s->frames);
+    const bool fresh = status.failed && status.messages != s->told;
+    if (fresh)
+        snprintf(line, bytes, "triptych: %s", status.message);
+    s->told = status.messages;
+    return fresh;
+}
+
 char *trip_session_status(trip_session *s)
 {
     cJSON *root = cJSON_CreateObject();
@@ -469,10 +482,13 @@ char *trip_session_status(trip_session *s)
         add_light(root, d);
     if (d)
         add_switches(root, d);
+    cJSON_AddStringToObject(root, "function", d && d->function ? d->function : "");
+    cJSON_AddNumberToObject(root, "opacity", d ? d->opacity_scale : 1);
     pthread_mutex_unlock(&s->lock);
     cJSON_AddBoolToObject(root, "exact", status.exact);
     cJSON_AddBoolToObject(root, "failed", status.failed);
     cJSON_AddStringToObject(root, "message", status.message);
+    cJSON_AddNumberToObject(root, "messages", (double)status.messages);
     cJSON_AddStringToObject(root, "stage", status.stage);
     cJSON_AddNumberToObject(root, "done", status.done);
     cJSON_AddStringToObject(root, "camera", camera ? camera : "");

@@ -21,7 +21,8 @@ void trip_session_tick(trip_session *s, double seconds);
 /* Events as lines of a script of the viewer (script.h): of the pointer, keys, and sizes. False
  * where some are none of these, or none at all; nothing happens then. */
 bool trip_session_do(trip_session *s, const char *text, size_t bytes);
-/* A built-in function; false where there is none of the name. "": the data set's own. */
+/* A built-in function, or that of the command line; false where there is none of the name. "": the
+ * data set's own. */
 bool trip_session_set_function(trip_session *s, const char *name);
 
 /* A setting by its name, as the page has them: classify, method, h, shading, light (head, or
@@ -42,6 +43,9 @@ typedef struct trip_session_picture {
 /* Waits for a picture other than `number`, at most so long; false: there is none. */
 bool trip_session_await(trip_session *s, uint64_t number, double seconds,
                         trip_session_picture *out);
+
+/* What failed since the last call, as a line without its end; false: nothing did. */
+bool trip_session_take_failure(trip_session *s, char *line, size_t bytes);
 
 /* What goes on, as JSON, for free(); NULL without memory. */
 char *trip_session_status(trip_session *s);

@@ -44,6 +44,66 @@ static unsigned count_lists(trip_dataset *const *parts, unsigned count)
     return lists;
 }
 
+static bool meet(unsigned a_min, unsigned a_max, unsigned b_min, unsigned b_max)
+{
+    return a_min <= b_max && b_min <= a_max;
+}
+
+/* Whether bricks of one place may have a voxel in common, which has one value in both. */
+static bool bricks_meet(const trip_file_brick *a, const trip_file_brick *b)
+{
+    return meet(a->u_min, a->u_max, b->u_min, b->u_max) &&
+           meet(a->v_min, a->v_max, b->v_min, b->v_max) &&
+           meet(a->sheet_min, a->sheet_max, b->sheet_min, b->sheet_max) &&
+           meet(a->code_min, a->code_max, b->code_min, b->code_max);
+}
+
+/* Of slabs of one number; bricks lie in the order of their places. */
+static bool slabs_meet(const trip_list *a, const trip_file_slab *in_a, const trip_list *b,
+                       const trip_file_slab *in_b)
+{
+    const trip_file_brick *p = a->bricks + in_a->first_brick, *p_end = p + in_a->brick_count;
+    const trip_file_brick *q = b->bricks + in_b->first_brick, *q_end = q + in_b->brick_count;
+    while (p < p_end && q < q_end) {
+        const uint64_t at_p = trip_morton(p->tile_u, p->tile_v);
+        const uint64_t at_q = trip_morton(q->tile_u, q->tile_v);
+        if (at_p == at_q && bricks_meet(p, q))
+            return true;
+        p += at_p <= at_q;
+        q += at_q <= at_p;
+    }
+    return false;
+}
+
+/* Whether data sets on one grid may both keep some voxel, by the bounds of their bricks: never so
+ * of boxes of the grid that do not overlap. */
+static bool overlap(const trip_dataset *first, const trip_dataset *second)
+{
+    const trip_list *a = trip_dataset_find(first, 0, 0, TRIP_KIND_VOXELS);
+    const trip_list *b = trip_dataset_find(second, 0, 0, TRIP_KIND_VOXELS);
+    for (uint64_t i = 0, j = 0; a && b && i < a->slab_count && j < b->slab_count;) {
+        const trip_file_slab *p = &a->slabs[i], *q = &b->slabs[j];
+        if (p->slab == q->slab && slabs_meet(a, p, b, q))
+            return true;
+        i += p->slab <= q->slab;
+        j += q->slab <= p->slab;
+    }
+    return false;
+}
+
+/* Those before were joined before. */
+static int check_overlap(trip_dataset *const *parts, unsigned count)
+{
+    const trip_dataset *last = parts[count - 1];
+    for (unsigned p = 0; p + 1 < count; p++)
+        if (overlap(parts[p], last))
+            return trip_fail(TRIP_ERROR, "open", last->path,
+                             "overlaps %s, and what both have would be drawn twice: regions that "
+                             "are drawn together have no voxel in common",
+                             parts[p]->path);
+    return TRIP_OK;
+}
+
 static int check(trip_dataset *const *parts, unsigned count)
 {
     for (unsigned p = 1; p < count; p++) {
@@ -58,7 +118,7 @@ static int check(trip_dataset *const *parts, unsigned count)
         return trip_fail(TRIP_ERROR, "open", parts[count - 1]->path,
                          "has more lists, with those before it, than the %d there may be",
                          TRIP_LISTS_MAX);
-    return TRIP_OK;
+    return check_overlap(parts, count);
 }
 
 static void add_lists(trip_dataset *d, const trip_dataset *part, unsigned number)

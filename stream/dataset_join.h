@@ -7,8 +7,9 @@
 
 #include "dataset.h"
 
-/* Fails (reported, with the name of the data set that does not go with the first) where they have
- * different grids, codes, normals or tiles, or more lists in all than one may have. */
+/* Fails (reported, with the name of the data set that does not go with the others) where they have
+ * different grids, codes, normals or tiles, or more lists in all than one may have, or where the
+ * last keeps voxels that one before it keeps: those before have been joined before. */
 int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned count,
                       trip_budget *budget);
 void trip_dataset_join_close(trip_dataset *d);

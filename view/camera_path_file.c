@@ -1,6 +1,7 @@
 /* Paths of the camera as JSON, and its files. */
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include "camera_path.h"
 #include "clipping.h"
 #include "exact_json.h"
+#include "fail_line.h"
 #include "input_file.h"
 #include "json.h"
 #include "new_file.h"
@@ -92,6 +94,38 @@ static int fail_at(const char *name, size_t key, const char *why)
 static const cJSON *item_of(const cJSON *object, const char *key)
 {
     return cJSON_GetObjectItemCaseSensitive(object, key);
+}
+
+/* Parts that nobody knows are likely misspelt; in which part of the path says `where`. */
+static int check_members(const cJSON *object, const char *const *known, const char *name,
+                         const char *where)
+{
+    const cJSON *member;
+    cJSON_ArrayForEach(member, object)
+    {
+        int which = 0;
+        while (known[which] && strcmp(known[which], member->string))
+            which++;
+        if (!known[which])
+            return trip_fail(TRIP_ERROR, "path", name, "%sthere is no \"%s\"", where,
+                             member->string);
+        if (item_of(object, member->string) != member)
+            return trip_fail(TRIP_ERROR, "path", name, "%sthere are two \"%s\"", where,
+                             member->string);
+    }
+    return 0;
+}
+
+static int check_key_members(const cJSON *key, const char *name, size_t number)
+{
+    static const char *const of_key[] = { "seconds", "eye",      "look",          "up",   "fov",
+                                          "ortho",   "function", "function_text", "clip", NULL };
+    static const char *const of_clip[] = { "box", "voxels", "planes", NULL };
+    char where[48];
+    snprintf(where, sizeof where, "key %zu: ", number + 1);
+    int status = check_members(key, of_key, name, where);
+    snprintf(where, sizeof where, "key %zu, \"clip\": ", number + 1);
+    return status ? status : check_members(item_of(key, "clip"), of_clip, name, where);
 }
 
 /* What is wrong with a key's view, or NULL. */
@@ -192,8 +226,10 @@ static int read_keys(trip_camera_path *p, const cJSON *keys, const char *name)
     {
         size_t number = p->count;
         const char *fault = read_key(p, key);
-        if (fault)
-            return fail_at(name, number, fault);
+        const int status =
+            fault ? fail_at(name, number, fault) : check_key_members(key, name, number);
+        if (status)
+            return status;
     }
     return 0;
 }
@@ -212,17 +248,37 @@ static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
                          MOST_FPS);
     if (loop && !trip_exact_read(loop, 1e-3, MOST_SECONDS, &p->loop_seconds))
         return trip_fail(TRIP_ERROR, "path", name, "\"loop\" is not a time above 0");
+    static const char *const known[] = { "triptych_path", "frames_per_second", "loop", "keys",
+                                         NULL };
     int status = read_keys(p, item_of(root, "keys"), name);
+    if (!status)
+        status = check_members(root, known, name, "");
     if (!status && trip_camera_path_frames(p) == TRIP_CAMERA_PATH_FRAMES)
         return trip_fail(TRIP_ERROR, "path", name, "is %d frames long, or longer",
                          TRIP_CAMERA_PATH_FRAMES);
     return status;
 }
 
+/* That the text is one value of JSON, and nothing more. */
+static int check_text(const trip_json *json, const char *name, const char *text)
+{
+    const char *end = json->end + (json->root ? strspn(json->end, " \t\r\n") : 0);
+    long line = 1;
+    for (const char *c = text; c < end; c++)
+        line += *c == '\n';
+    if (!json->root)
+        return trip_fail_line("path", name, line,
+                              *end ? "is not JSON from here on"
+                                   : "the text ends before what it began");
+    return *end ? trip_fail_line("path", name, line, "there is more behind the path's end") : 0;
+}
+
 int trip_camera_path_parse(trip_camera_path *p, const char *name, const char *text)
 {
     trip_json json;
     int status = trip_json_parse(&json, text, name, NULL);
+    if (!status)
+        status = check_text(&json, name, text);
     if (!status)
         status = read_root(p, json.root, name);
     trip_json_free(&json);

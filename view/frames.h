@@ -89,6 +89,7 @@ typedef struct trip_frames_status {
     bool exact;                 /* the picture is the one that is wanted, whole */
     bool failed;                /* for the reason `message` */
     bool left_out;              /* the function shows values that were not kept */
+    bool unsaved;               /* the last file of trip_frames_save() could not be written */
     bool rests;                 /* nothing more comes: the picture is exact, or has failed */
     char message[512];          /* of the last failure or warning; "" */
     uint64_t messages;          /* how many there were */

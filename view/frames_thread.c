@@ -649,6 +649,7 @@ static int save(trip_frames *f)
     int status = f->whole ? write_picture(f, path)
                           : trip_fail(TRIP_ERROR, "view", path, "there is no picture to write");
     pthread_mutex_lock(&f->lock);
+    f->status.unsaved = status != 0;
     if (f->save && !strcmp(f->save, path)) {
         free(f->save);
         f->save = NULL;

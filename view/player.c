@@ -141,7 +141,7 @@ static int play(trip_player *p, const trip_player_window *w, const trip_event *e
     case TRIP_EVENT_PICTURE:
         if (p->phase++ == 0)
             w->save(w->user, e->text);
-        return !w->rests(w->user);
+        return w->rests(w->user) ? w->saved(w->user) : 1;
     case TRIP_EVENT_STATUS:
         return w->report(w->user, e->text);
     case TRIP_EVENT_RANDOM:

@@ -32,6 +32,7 @@ typedef struct trip_player_window {
     bool (*find)(void *user, const char *label, double box[4]);
     void (*shoot)(void *user, const char *path); /* the window, when it is next drawn */
     void (*save)(void *user, const char *path);  /* the picture */
+    int (*saved)(void *user); /* once it rests: 0, or a failure to save that, reported */
     int (*report)(void *user, const char *path); /* the status */
 } trip_player_window;
 

@@ -35,6 +35,10 @@ typedef struct trip_view_params {
     int (*make)(void *user, triptych *t, const char *input,
                 bool keep_all); /* NULL: nothing is made */
     void (*release)(void *user);
+    /* Of each file that the script writes, before anything is shown: 0, or a reported failure.
+     * NULL: any may be written. */
+    int (*check_output)(void *user, const char *path);
+    void *check_user;
 } trip_view_params;
 
 /* Until the window is closed: 0, or a reported failure. */

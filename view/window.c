@@ -289,6 +289,18 @@ static void play_save(void *user, const char *path)
     trip_frames_save(w->frames, path);
 }
 
+static int play_saved(void *user)
+{
+    const window *w = user;
+    const trip_frames_status status = trip_frames_get_status(w->frames);
+    char line[sizeof status.message + 16];
+    if (!status.unsaved)
+        return 0;
+    snprintf(line, sizeof line, "triptych: %s", status.message);
+    trip_report_line(line);
+    return TRIP_ERROR;
+}
+
 static int play_report(void *user, const char *path)
 {
     window *w = user;
@@ -297,8 +309,9 @@ static int play_report(void *user, const char *path)
 
 static int play(window *w)
 {
-    const trip_player_window methods = { w,         play_event, play_rests, play_has_size,
-                                         play_find, play_shoot, play_save,  play_report };
+    const trip_player_window methods = { w,          play_event, play_rests, play_has_size,
+                                         play_find,  play_shoot, play_save,  play_saved,
+                                         play_report };
     if (!w->plays || w->shot)
         return 0;
     w->player.width = w->viewer.width;
@@ -504,7 +517,7 @@ static int pass(window *w)
         glfwWaitEventsTimeout(0.008);
     else
         glfwWaitEventsTimeout(sleep_seconds);
-    return 0;
+    return status;
 }
 
 static int run(window *w)
@@ -533,10 +546,34 @@ static void close_window(window *w)
     glfwTerminate();
 }
 
+static int check_outputs(const trip_view_params *p, const trip_script *script)
+{
+    int status = 0;
+    for (size_t i = 0; i < script->count && !status && p->check_output; i++) {
+        const trip_event *e = &script->events[i];
+        if (e->kind == TRIP_EVENT_SCREENSHOT || e->kind == TRIP_EVENT_PICTURE ||
+            e->kind == TRIP_EVENT_STATUS)
+            status = p->check_output(p->check_user, e->text);
+    }
+    return status;
+}
+
+static int load_script(window *w)
+{
+    const trip_view_params *p = w->params;
+    trip_script *script = &w->player.script;
+    int status = p->script ? trip_script_load(script, p->script) : 0;
+    if (!status)
+        status = check_outputs(p, script);
+    if (status)
+        trip_script_free(script);
+    return status;
+}
+
 int trip_view_run(const trip_view_params *params)
 {
     window w = { .params = params, .plays = params->script };
-    int status = params->script ? trip_script_load(&w.player.script, params->script) : 0;
+    int status = load_script(&w);
     if (status)
         return status;
     if (!glfwInit())

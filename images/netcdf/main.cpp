@@ -83,8 +83,10 @@ void answer_one(Session &session)
 
 int main()
 {
-    /* Ctrl-C goes to the whole group; the other end decides what becomes of a request. */
+    /* Ctrl-C, and the end of a terminal, go to the whole group; the other end decides what becomes
+     * of a request. */
     std::signal(SIGINT, SIG_IGN);
+    std::signal(SIGHUP, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     (void)trip_sandbox_enter(); /* where the kernel can */
     Session session;

@@ -36,6 +36,22 @@ class DefaultView(program.ProgramTest):
         for name in "tooth.nhdr", "stent.nrrd", "wdas_cloud_sixteenth.vdb", "densityAndHeat.vdb":
             self.check(name)
 
+    def test_a_single_slice_is_seen_from_the_front_as_a_picture(self):
+        picture = numpy.full((30, 40), 90, "u1")
+        picture[:10, :12], picture[15, 20] = 250, 0  # bright at the top on the left
+        for name, shape in ("k", (1, 30, 40)), ("j", (30, 1, 40)), ("i", (30, 40, 1)):
+            upright = picture if name == "k" else picture[::-1]  # k goes up
+            program.write_nrrd(f"{name}.nrrd", upright.reshape(shape))
+            self.works("brick", f"{name}.nrrd", "-o", "a.trip", "-q", "--force", "--keep-all")
+            drawn = self.picture("a.trip", "--size=120x120", "--tf=grey", "--no-shading",
+                                 "--opacity-scale=50")[..., 0]
+            rows, columns = numpy.nonzero(drawn > 0.05)
+            height, width = numpy.ptp(rows) + 1, numpy.ptp(columns) + 1
+            self.assertLess(abs(height / width - 30 / 40), 0.06, name)
+            rows, columns = numpy.nonzero(drawn > 0.6 * drawn.max())
+            self.assertLess(rows.max(), 62, name)
+            self.assertLess(columns.max(), 55, name)
+
     def test_wide_and_tall_pictures(self):
         self.works(
             "brick", os.path.join(program.DATASETS, "tooth.nhdr"), "-o", "a.trip", "-q", "--force"

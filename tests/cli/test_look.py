@@ -169,10 +169,37 @@ class Look(program.ProgramTest):
         run = self.works("render", "chest.trip", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
         self.assertEqual(run.stderr, "")
 
+    def test_a_volume_is_warned_of_once(self):
+        cache = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
+        for _ in "bricked", "found":
+            run = self.works("render", "ball.nrrd", "-o", "a.png", "--size=20x20", "--tf", "ct-bone",
+                             env=cache)
+            self.assertEqual(run.stderr.count("are hardly Hounsfield units"), 1)
+
     def test_a_function_that_shows_nothing_says_so(self):
         program.write("nothing.tf", b"300 1 1 1 0\n400 1 1 1 1\n")
         run = self.works("render", "ball.trip", "-o", "a.png", "--size=20x20", "--tf=nothing.tf")
         self.assertIn("shows nothing of the values from 0 to 200", run.stderr)
+
+    def test_a_picture_of_nothing_says_so(self):
+        ground = ("--size=20x20", "--background=0.5,0.2,0.1,0.5", "-o", "a.png")
+        nothing = "nothing but the background"
+        for options in (
+            ["--clip-box=1e4,1e4,1e4,2e4,2e4,2e4"],
+            ["--eye=500,500,500", "--look=900,900,900"],
+            ["--eye=500,500,500", "--look=900,900,900", "--renderer=integral"],
+            ["--eye=500,500,500", "--look=900,900,900", "--renderer=reference", "--classify=pre"],
+        ):
+            run = self.works("render", "ball.trip", *ground, *options)
+            self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
+            self.assertIn(f"warning: a.png: the picture shows {nothing}", run.stderr)
+        self.assertEqual(self.works("render", "ball.trip", *ground).stderr, "")
+        away = dict(triptych_path=1, frames_per_second=1, keys=[
+            dict(seconds=s, eye=[9.5, -90, 9.5], look=look, up=[0, 0, 1], fov=30)
+            for s, look in ((0, [9.5, 9.5, 9.5]), (1, [900, -90.5, 9.5]))])
+        program.write("away.json", json.dumps(away).encode())
+        run = self.works("render", "ball.trip", *ground, "--path=away.json")
+        self.assertIn(f"warning: a.png: 1 of 2 pictures show {nothing}", run.stderr)
 
     def test_volumes_are_told_apart(self):
         self.assertEqual(self.kind("chest.nrrd"), "ct")

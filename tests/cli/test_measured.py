@@ -218,6 +218,11 @@ class Measured(program.ProgramTest):
         self.assertIn("classify    pre", said.stdout.decode())
         self.assertEqual(self.stats("cube.trip", *VIEW[:-2])["classify"], "post")
 
+    def test_what_post_draws_is_called_voxels(self):
+        for classify, what in ("pre", "splats"), ("post", "voxels"):
+            run = self.works("render", "cube.trip", "-o", "a.png", "--size=9x9", "--classify", classify)
+            self.assertIn(f" million {what}, ".encode(), run.stdout)
+
     def test_compositing_is_in_the_plan_and_the_stats(self):
         stats = self.stats("cube.trip", *VIEW, "--compositing", "sheet")
         self.assertEqual((stats["classify"], stats["compositing"]), ("pre", "sheet"))

@@ -256,6 +256,20 @@ class Options(program.ProgramTest):
                 render + ["--emission=heat.trip"],
                 render + ["--temperature=0:2000"],
                 render + ["--max-bytes=1M", "--renderer=integral"],
+                render + ["--classify=pre", "--renderer=integral"],
+                render + ["--classify=post", "--renderer=integral"],
+                render + ["--slices=4", "--renderer=integral"],
+                render + ["--depth=d.tif", "--show=merge"],
+                render + ["--error=1", "--slices=4"],
+                render + ["--classify=pre", "--error=1"],
+                render + ["--error=1", "--samples=2"],
+                ["render", "a.trip", "b.trip", "-o", "a.png", "--lod=8"],
+                ["render", "a.trip", "b.trip", "-o", "a.png", "--max-bytes=1M"],
+                ["render", "a.trip", "b.trip", "-o", "a.png", "--max-ms=5"],
+                *([command, "a.trip", option] for command in ("view", "serve") for option in (
+                    "--axes=PIR", "--grid=foo", "--spacing=4,1,1", "--coordinates=a,b,c",
+                    "--level-set=band", "--allow-gaps")),
+                *([command, "a.trip", "--error=1", "--classify=pre"] for command in ("view", "serve")),
                 render + ["--max-ms=5", "--renderer=integral"],
                 render + ["--field=source", "--renderer=integral"],
                 render + ["--field=splats", "--kernel=cubic", "--renderer=integral"],
@@ -273,6 +287,11 @@ class Options(program.ProgramTest):
                 ["render", "a.trip", "-o", "folder/"],
             ]
         )
+
+    def test_what_is_refused_is_named(self):
+        render = ["render", "a.trip", "-o", "a.png"]
+        self.fails(2, *render, "--slices=4", "--renderer=integral", says="--slices: ")
+        self.fails(2, *render, "--error=1", "--slices=4", says="--slices among them")
 
     def test_every_value_works(self):
         render = ["--size=24x20"]

@@ -1,6 +1,7 @@
 """Regions of a volume, each a data set of its own, are drawn in one picture as the whole is."""
 import itertools
 import os
+import resource
 import shutil
 
 import numpy
@@ -113,12 +114,14 @@ class Parts(program.ProgramTest):
         self.assertGreater(counted[0]["x"]["splats_drawn"], 1000)
         self.assertEqual(counted[0], counted[1])
 
-    def test_the_plan_names_the_data_sets_and_draws_no_levels(self):
-        text = self.works("render", *self.halves, "-o", "a.exr", *SIZE, "--explain", "--lod", 4)
+    def test_the_plan_names_the_data_sets_which_are_drawn_without_levels(self):
+        text = self.works("render", *self.halves, "-o", "a.exr", *SIZE, "--explain", "--quality",
+                          "draft")
         text = text.stdout.decode()
         for half in self.halves:
             self.assertIn(f"data set    {half}\n", text)
-        self.assertIn("levels      do not run", text)
+        for levels in "--lod=4", "--max-bytes=64M", "--max-ms=5":
+            self.leaves_nothing(2, "render", *self.halves, "-o", "x.png", levels, says="--lod")
 
     def test_what_does_not_go_together_is_refused_by_name(self):
         program.write_nrrd("moved.nrrd", self.volume, geometry="space origin: (1,2,3)\n"
@@ -140,6 +143,25 @@ class Parts(program.ProgramTest):
             self.assertIn(why, run.stderr)
         self.leaves_nothing(2, "render", self.halves[0], "v.nrrd", "-o", "x.png", says="v.nrrd: ")
         self.leaves_nothing(2, "render", *self.halves, "--error", 1, "-o", "x.png", says="--error")
+
+    def test_regions_that_overlap_are_refused_for_every_classification(self):
+        self.make("low.trip", "--region", ":22,:,:")
+        self.make("corner.trip", "--region", "20:21,:,:")
+        for parts in (
+            ["whole.trip", "whole.trip"],
+            ["low.trip", self.halves[1]],
+            [*self.halves, "corner.trip"],
+            [*self.octants, "whole.trip"],
+        ):
+            for classify in "pre", "post":
+                run = self.leaves_nothing(1, "render", *parts, "-o", "x.png", *SIZE, "--classify",
+                                          classify, says=f"open: {parts[-1]}: overlaps ")
+                self.assertIn("drawn twice", run.stderr)
+
+    def test_as_many_files_are_open_as_the_system_allows(self):
+        limits = (24, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
+        self.works("render", *self.octants, "-o", "a.exr", *SIZE,
+                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, limits))
 
     def test_damage_is_found_in_the_data_set_that_has_it(self):
         shutil.rmtree("bad.trip", ignore_errors=True)

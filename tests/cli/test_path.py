@@ -160,10 +160,28 @@ class Paths(program.ProgramTest):
             )
         self.assertNotEqual(frames[2], frames[3])
 
+    def test_a_volume_is_bricked_for_the_functions_of_a_path(self):
+        cache = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
+        program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
+        faint, clear = "1 1 0 0 0\n60 1 0 0 0.3\n200 1 0 0 0\n", "0 0 0 0 0\n255 1 1 1 0.5\n"
+        program.write("clear.tf", clear.encode())
+        options = key(0, 0, function_text=faint), key(0.25, 9, function="clear.tf")
+        path = self.path(*options)
+        run = program.call("brick", "ball.nrrd", "-o", "all.trip", "-q", "--keep-all")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for volume in "ball.nrrd", "all.trip":
+            said = self.works("render", volume, "--path", path, "--no-shading", *SIZE, "-o",
+                              f"{volume}.exr", env=cache)
+            self.assertEqual(said.stderr, "")
+        for frame in "000", "001":
+            numpy.testing.assert_allclose(*(program.read_exr(f"{v}-{frame}.exr")
+                                            for v in ("ball.nrrd", "all.trip")), atol=0.02)
+
     def test_bad_paths_are_refused_by_name(self):
         good = key(0, 0)
         for path, says in (
-            ("{", "path.json: is not a path"),
+            ("{", "path.json: line 1: the text ends"),
+            ([good | {"zoom": 3}], 'key 1: there is no "zoom"'),
             ('{"triptych_path": 9, "keys": []}', "is of version 9"),
             ([good, good], "key 2: is not later"),
             ([good | {"fov": "wide"}], 'key 1: "fov"'),
@@ -191,9 +209,10 @@ class Paths(program.ProgramTest):
     def test_a_video_has_the_pixels_of_the_pictures(self):
         path = self.path(key(0, 0), key(1, 60))
         for more in (["--path", path], ["--path", path, "--in-flight", "1"]):
-            self.works(
+            run = self.works(
                 *("render", "v.trip", "-o", "a.mp4", *SIZE, *more), env=self.with_encoder
             )
+            self.assertEqual(run.stdout.count(b"a.mp4: 40 x 30, "), 5)
             with open("a.mp4", "rb") as f:
                 video = numpy.frombuffer(f.read(), numpy.uint8).reshape(5, 30, 40, 3)
             given = open("given").read().split("\n")

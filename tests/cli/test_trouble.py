@@ -2,6 +2,7 @@
 One line, exit status 1, and nothing under the final name."""
 import json
 import os
+import pathlib
 import resource
 import shutil
 import signal
@@ -107,6 +108,68 @@ class Trouble(program.ProgramTest):
         self.assertTrue(os.path.islink("a-link"))
 
     # Disk
+
+    def refused(self, *arguments, says):
+        """render, which leaves all files as they are."""
+        def files():
+            found = [os.path.join(f, n) for f, _, names in os.walk(".") for n in names]
+            return {n: pathlib.Path(n).read_bytes() for n in found if "cloud" not in n}
+
+        before = files()
+        self.fails(2, "render", *arguments, says=says)
+        self.assertEqual(files(), before, arguments)
+
+    def test_what_is_read_is_not_replaced(self):
+        os.makedirs("slices", exist_ok=True)
+        volume = program.noise((4, 20, 20))
+        for k, image in enumerate(volume):
+            program.write_tiff(f"slices/s-{k:03d}.tif", image)
+        program.write_exr("volume.exr", volume[0].astype("f4"))
+        program.write_raw("data.raw", volume)
+        program.write("detached.nhdr", b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 20 4\n"
+                                       b"encoding: raw\ndata file: data.raw\n\n")
+        program.write("grey.tf", b"0 0 0 0 0\n255 1 1 1 1\n")
+        key = dict(eye=[9, 50, 9], look=[9, 9, 9], up=[0, 0, 1], fov=30)
+        path = dict(triptych_path=1, keys=[dict(key, seconds=0, function="grey.tf")])
+        program.write("path.json", json.dumps(path).encode())
+        os.symlink("grey.tf", "link.tf")
+        read = "is read, and would be replaced"
+        for arguments in (
+            ["volume.exr", "-o", "volume.exr"],
+            ["volume.exr", "-o", "a.png", "--depth", "./volume.exr"],
+            ["detached.nhdr", "-o", "a.png", "--stats", "data.raw"],
+            ["slices", "-o", "slices/s-000.tif"],
+            ["slices/s-%03d.tif", "-o", "slices/s-002.tif"],
+            ["slices/s-%03d.tif", "-o", "slices/s.tif", "--orbit", "3"],
+            ["small.trip", "-o", "a.png", "--tf", "grey.tf", "--stats", "grey.tf"],
+            ["small.trip", "-o", "a.png", "--tf", "grey.tf#one", "--stats", "grey.tf"],
+            ["small.trip", "-o", "a.png", "--tf", "link.tf", "--stats", "../%s/grey.tf"
+             % os.path.basename(os.getcwd())],
+            ["small.trip", "-o", "a.png", "--path", "path.json", "--stats", "path.json"],
+            ["small.trip", "-o", "a.png", "--path", "path.json", "--stats", "grey.tf"],
+        ):
+            self.refused(*arguments, says=read)
+        among = "would lie among the files that are read"
+        self.refused("small.trip", "-o", "a.png", "--stats", "small.trip/index.trip", says=among)
+        self.refused("slices", "-o", "slices/picture.png", says=among)
+        self.refused("small.trip", "-o", "small.trip/picture.png", says=among)
+        self.refused("slices/*.tif", "-o", "slices/picture.tif", says="one of the slices")
+        self.fails(2, "tf", "convert", "small.nrrd", "small.nrrd", "--force", "--format", "tf",
+                   says=read)
+        self.works("tf", "convert", "grey.tf", "grey.tf", "--force")
+
+    def test_no_two_results_have_one_name(self):
+        for arguments in (
+            ["-o", "a.exr", "--depth", "a.exr"],
+            ["-o", "a.exr", "--depth", "./a.exr"],
+            ["-o", "a.png", "--stats", "a.png"],
+            ["-o", "a.exr", "--depth", "b.exr", "--stats", "b.exr"],
+            ["-o", "a.exr", "--depth", "small.trip/../a.exr", "--orbit", "2"],
+            ["-o", "a.png", "--orbit", "2", "--stats", "a-001.png"],
+        ):
+            self.refused("small.trip", *arguments, says="is to be written twice")
+        self.works("render", "small.trip", "--size", "9x9", "-o", "a.png", "--orbit", "2",
+                   "--stats", "a.png")
 
     def test_full_disk(self):
         if not ROOT:

@@ -136,6 +136,24 @@ static void first_signal_sets_a_flag(void **state)
     assert_false(trip_interrupted());
     raise(SIGTERM);
     assert_true(trip_interrupted());
+    trip_interrupt_install();
+    raise(SIGHUP);
+    assert_true(trip_interrupted());
+    trip_interrupt_install();
+}
+
+static void a_hangup_that_is_ignored_stays_so(void **state)
+{
+    (void)state;
+    signal(SIGHUP, SIG_IGN);
+    trip_interrupt_install();
+    raise(SIGHUP);
+    assert_false(trip_interrupted());
+    raise(SIGINT);
+    raise(SIGHUP);
+    assert_true(trip_interrupted());
+    trip_interrupt_install();
+    signal(SIGHUP, SIG_DFL);
 }
 
 static void a_signal_interrupts_scopes_that_point_to_its_flag_alone(void **state)
@@ -345,6 +363,7 @@ int main(void)
         cmocka_unit_test(reporting_leaves_errno_alone),
         cmocka_unit_test(without_a_sink_lines_go_to_stderr),
         cmocka_unit_test(first_signal_sets_a_flag),
+        cmocka_unit_test(a_hangup_that_is_ignored_stays_so),
         cmocka_unit_test(a_signal_interrupts_scopes_that_point_to_its_flag_alone),
         cmocka_unit_test(an_interruption_is_told_once),
         cmocka_unit_test(a_scope_takes_the_lines_of_its_threads_alone),

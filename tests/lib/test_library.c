@@ -604,6 +604,29 @@ static void volumes_are_identified_by_content_and_by_state(void **state)
     assert_int_equal(system("rm -r identity identity_4x4x4_uint8.raw"), 0);
 }
 
+static int count_file(void *user, const char *path)
+{
+    int *left = user;
+    assert_non_null(strstr(path, "listed_4x4x4_uint8.raw"));
+    return --*left < 0 ? TRIPTYCH_ERROR : 0;
+}
+
+static void the_files_of_a_volume_are_listed(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    const char *volume = "listed_4x4x4_uint8.raw";
+    int left = 1;
+    write_volume(volume, 64, 1);
+    assert_int_equal(triptych_list_files(t, volume, NULL, count_file, &left), TRIPTYCH_OK);
+    assert_int_equal(left, 0);
+    assert_int_equal(triptych_list_files(t, volume, NULL, count_file, &left), TRIPTYCH_ERROR);
+    assert_fails(t, triptych_list_files(t, "none.nrrd", NULL, count_file, &left), TRIPTYCH_ERROR,
+                 "none.nrrd");
+    triptych_destroy(t);
+    assert_int_equal(remove(volume), 0);
+}
+
 static void what_fails_says_why_and_the_context_goes_on(void **state)
 {
     (void)state;
@@ -1216,6 +1239,7 @@ int main(void)
         cmocka_unit_test(progress_goes_by_stages),
         cmocka_unit_test(bricking_says_what_it_made),
         cmocka_unit_test(volumes_are_identified_by_content_and_by_state),
+        cmocka_unit_test(the_files_of_a_volume_are_listed),
         cmocka_unit_test(what_fails_says_why_and_the_context_goes_on),
         cmocka_unit_test(a_kernel_too_small_to_be_smooth_is_warned_of_once),
         cmocka_unit_test(messages_go_to_whoever_takes_them),

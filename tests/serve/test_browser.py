@@ -187,7 +187,66 @@ class InBrowser(program.ProgramTest):
             "(document.getElementById('function'))"
         )
         before = self.exact(before)
-        self.assertEqual(self.status()["camera"], cameras[-1])
+        self.assertEqual(self.status()["camera"], cameras[-1] + " --tf bone")
+
+    def key(self, kind, key, code, modifiers=0):
+        self.browser.call("Input.dispatchKeyEvent", type=kind, key=key, code=code,
+                          modifiers=modifiers)
+
+    def sent(self):
+        """The lines of events since the last call, once they have all gone."""
+        for _ in range(1000):
+            if self.browser.value("!sending && !events.length"):
+                return self.browser.value("log.splice(0)")
+            time.sleep(0.01)
+        raise AssertionError("events do not go")
+
+    def test_what_is_held_is_let_go(self):
+        self.exact()
+        self.browser.value("log = []; kept = put; put = line => { log.push(line); kept(line); };")
+        self.key("keyDown", "w", "KeyW")
+        self.key("keyDown", "Control", "ControlLeft", 2)
+        self.key("keyUp", "w", "KeyW", 2)
+        self.key("keyUp", "Control", "ControlLeft")
+        self.assertEqual(self.sent(), ["hold w", "let w +control"])
+        self.key("keyDown", "d", "KeyD")
+        self.mouse("mousePressed", 200, 100, button="left", buttons=1, clickCount=1)
+        self.browser.value("dispatchEvent(new Event('blur'))")
+        self.key("keyUp", "d", "KeyD")
+        self.mouse("mouseReleased", 200, 100, button="left", clickCount=1)
+        lines = [line for line in self.sent() if not line.startswith("move")]
+        self.assertEqual(lines, ["hold d", "press left", "let d", "release left"])
+        for kind in "keyDown", "keyUp":
+            self.key(kind, "t", "KeyT")
+        self.assertEqual(self.sent(), [])
+        self.browser.value("put = kept")
+        self.exact()
+
+    def test_a_page_that_is_loaded_anew_shows_what_is_drawn_and_warnings(self):
+        before = self.exact()
+        chosen = "[document.getElementById('function').value, " \
+                 "+document.querySelector('[data-set=opacity]').value]"
+        for name, power in ("ct-bone", -0.5), ("", 0):
+            self.browser.value(
+                f"(s => {{ s.value = '{name}'; s.dispatchEvent(new Event('change')); }})"
+                "(document.getElementById('function'))")
+            before = self.exact(before)
+            self.browser.value(f"set('opacity', String(10 ** {power}))")
+            before = self.exact(before)
+            self.browser.call("Page.reload")
+            self.exact()
+            for _ in range(1000):
+                if self.browser.value(chosen) == [name, power]:
+                    break
+                time.sleep(0.01)
+            self.assertEqual(self.browser.value(chosen), [name, power])
+            for _ in range(300):
+                said = self.browser.value("document.getElementById('state').textContent")
+                if "Hounsfield" in said:
+                    break
+                time.sleep(0.01)
+            self.assertIn("Hounsfield", said)
+        self.browser.value("noted = -NOTE_MS; say('exact')")  # which covers what others point at
 
 
 if __name__ == "__main__":

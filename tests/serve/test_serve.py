@@ -260,6 +260,10 @@ class Serve(program.ProgramTest):
         self.assertEqual(run.returncode, 0, run.stderr)
         with open("r.png", "rb") as f:
             numpy.testing.assert_array_equal(read_png(data)[..., :3], read_png(f.read())[..., :3])
+        self.assertEqual(self.ask("/function", "POST", name="grey")[0], 204)
+        while "left out" not in self.status()["message"]:
+            time.sleep(0.02)
+        self.assertIn("to have them: triptych brick --tf grey v.nhdr", self.status()["message"])
 
     def test_nothing_new_is_waited_for(self):
         self.do("resize 40 30")
@@ -289,7 +293,9 @@ class Serve(program.ProgramTest):
             for token in (None, "", "0" * 32, self.token[:-1], self.token.upper() + "x"):
                 self.assertEqual(self.ask(path, token=token)[0], 403, (path, token))
         for host in ("evil.example", f"evil.example:{self.port}", f"127.0.0.1:{self.port + 1}"):
-            self.assertEqual(self.ask("/", headers={"Host": host})[0], 403)
+            status, _, said = self.ask("/", headers={"Host": host})
+            self.assertEqual(status, 403)
+            self.assertIn(b"ssh -L has to forward a port of the same number", said)
         self.assertEqual(self.ask("/", headers={"Host": f"localhost:{self.port}"})[0], 200)
         listening = open("/proc/net/tcp", encoding="ascii").read().split("\n")[1:]
         places = [l.split()[1] for l in listening if l and l.split()[3] == "0A"]
@@ -300,7 +306,7 @@ class Serve(program.ProgramTest):
         before = set(os.listdir("."))
         for body in (
             "screenshot x.png", "picture x.png", "status x.json", "drop v.trip", "close", "wait",
-            "sleep 100000", "random 1000000 1", "type abc", "key q", "hold p", "key m", "key c", "resize 99999 10",
+            "sleep 100000", "random 1000000 1", "type abc", "key q", "hold p", "key m", "key c", "key t", "resize 99999 10",
             "resize 1 1", "nonsense", "move 1 nan", "move 0 0\n" * 1001, "\0", "move 1 1\nkey q",
         ):
             self.assertEqual(self.ask("/events", "POST", body)[0], 400, body)
@@ -322,6 +328,34 @@ class Serve(program.ProgramTest):
             connection.close()
         self.assertEqual(self.ask("/")[0], 200)
         self.assertEqual(set(os.listdir(".")), before)
+        self.assertIsNone(self.server.poll())
+
+    def test_the_status_has_the_function_and_the_opacity_that_are_drawn(self):
+        self.tearDown()
+        program.write("own.tf", b"0 0 0 0 0\n255 1 1 1 1\n")
+        self.serve("v.trip", "--tf", "own.tf")
+
+        def drawn():
+            status = self.status()
+            return status["function"], status["opacity"]
+
+        self.assertEqual(drawn(), ("own.tf", 1))
+        for name in "bone", "", "own.tf":
+            self.assertEqual(self.ask("/function", "POST", name=name)[0], 204)
+            self.assertEqual(drawn(), (name, 1))
+        self.assertEqual(self.ask("/set", "POST", name="opacity", value="0.25")[0], 204)
+        self.assertEqual(drawn(), ("own.tf", 0.25))
+
+    def test_what_fails_later_is_a_line_on_stderr(self):
+        self.tearDown()
+        program.write("short.nrrd", b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\n"
+                                    b"encoding: raw\n\nshort")
+        self.serve("short.nrrd")
+        while not self.status()["failed"]:
+            time.sleep(0.01)
+        line = self.server.stderr.readline().decode()
+        self.assertTrue(program.LINE.fullmatch(line), line)
+        self.assertIn("short.nrrd", line)
         self.assertIsNone(self.server.poll())
 
     def test_an_interruption_is_its_end(self):
@@ -350,6 +384,9 @@ class Serve(program.ProgramTest):
         self.fails(2, "serve")
         self.fails(2, "serve", "v.trip", "--port", "65536")
         self.fails(1, "serve", "v.trip", "--tf", "no.tf")
+        self.fails(1, "serve", "v.nhdr", "--tf", "no.tf", says="no.tf")
+        program.write("README.md", b"# No volume")
+        self.fails(1, "serve", "README.md", says="README.md")
         self.fails(2, "serve", "v.trip", "--effects", "emission", says="--emission HEAT.trip")
         self.fails(2, "serve", "v.trip", "--emission", "heat.trip", says="--effects emission")
         self.fails(1, "serve", "v.trip", "--effects", "auto", "--emission", "no.trip", says="no.trip")

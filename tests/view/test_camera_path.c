@@ -241,7 +241,16 @@ static void what_is_no_path_is_refused_by_its_key(void **state)
     trip_camera_path p = { 0 };
     assert_int_equal(trip_camera_path_parse(&p, "f", PATH(KEY("0", "\"fov\": 30"))), 0);
     trip_camera_path_release(&p);
-    assert_refused("", "is not a path");
+    assert_refused("", "line 1: the text ends");
+    assert_refused("{\n\"triptych_path\": 1,\n\"keys\": [", "line 3: the text ends");
+    assert_refused("{\n\"triptych_path\": 1,\n\"keys\"; []}\n", "line 3: is not JSON");
+    assert_refused(PATH(KEY("0", "\"fov\": 30")) "\n\n}", "line 3: there is more");
+    assert_refused(PATH(KEY("0", "\"fov\": 30, \"zoom\": 3")), "key 1: there is no \"zoom\"");
+    assert_refused(PATH(KEY("0", "\"fov\": 30, \"clip\": {\"boxes\": []}")),
+                   "key 1, \"clip\": there is no \"boxes\"");
+    assert_refused(PATH(KEY("0", "\"fov\": 30, \"fov\": 40")), "key 1: there are two \"fov\"");
+    assert_refused("{\"looop\": 3, \"triptych_path\": 1, \"keys\": [" KEY("0", "\"fov\": 3") "]}",
+                   "there is no \"looop\"");
     assert_refused("[]", "is not a path");
     assert_refused("{\"triptych_path\": 2}", "is of version 2");
     assert_refused("{\"triptych_path\": 1}", "has not 1 to");

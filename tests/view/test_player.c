@@ -11,7 +11,7 @@
 typedef struct fake {
     trip_event events[64];
     int count, restful, looks; /* rests after so many questions; a control is found after so many */
-    bool resized;
+    bool resized, unsaved;
     const char *shot, *saved, *reported;
 } fake;
 
@@ -54,6 +54,12 @@ static void save(void *user, const char *path)
     ((fake *)user)->saved = path;
 }
 
+static int saved(void *user)
+{
+    const fake *f = user;
+    return f->unsaved ? -1 : 0;
+}
+
 static int report(void *user, const char *path)
 {
     ((fake *)user)->reported = path;
@@ -62,7 +68,7 @@ static int report(void *user, const char *path)
 
 static trip_player_window window_of(fake *f)
 {
-    return (trip_player_window){ f, send, rests, has_size, find, shoot, save, report };
+    return (trip_player_window){ f, send, rests, has_size, find, shoot, save, saved, report };
 }
 
 static trip_player load(const char *text)
@@ -136,6 +142,21 @@ static void a_control_that_never_comes_ends_the_script(void **state)
     trip_script_free(&p.script);
 }
 
+static void a_picture_that_cannot_be_written_ends_the_script(void **state)
+{
+    (void)state;
+    for (int unsaved = 0; unsaved < 2; unsaved++) {
+        fake f = { .restful = 2, .unsaved = unsaved };
+        const trip_player_window w = window_of(&f);
+        trip_player p = load("picture x.png\n");
+        assert_int_equal(trip_player_step(&p, &w, 1), 1);
+        assert_string_equal(f.saved, "x.png");
+        assert_int_equal(trip_player_step(&p, &w, 2), 1);
+        assert_int_equal(trip_player_step(&p, &w, 3), unsaved ? -1 : 1);
+        trip_script_free(&p.script);
+    }
+}
+
 static void chances_are_the_same_for_the_same_seed_and_end_nothing(void **state)
 {
     (void)state;
@@ -161,6 +182,7 @@ int main(void)
         cmocka_unit_test(waiting_and_sleeping_take_until_they_are_over),
         cmocka_unit_test(a_control_is_pressed_where_it_has_come_to_lie),
         cmocka_unit_test(a_control_that_never_comes_ends_the_script),
+        cmocka_unit_test(a_picture_that_cannot_be_written_ends_the_script),
         cmocka_unit_test(chances_are_the_same_for_the_same_seed_and_end_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -451,6 +451,32 @@ class View(program.ProgramTest):
         with open("bad", "w") as f:
             f.write("jump\n")
         self.fails(1, "view", "--script=bad", says="line 1", env=self.screen.environment)
+        with open("README.md", "w") as f:
+            f.write("# No volume")
+        for arguments in ["README.md"], ["noise.trip", "--tf=nope"], ["noise.nrrd", "--tf=nope"]:
+            self.fails(1, "view", *arguments,
+                       says="nope" if "--tf=nope" in arguments else "README.md",
+                       env=self.screen.environment)
+
+    def test_a_script_replaces_nothing_that_is_shown(self):
+        with open("noise.nrrd", "rb") as f:
+            before = f.read()
+        for inputs, output in (["noise.nrrd"], "noise.nrrd"), (["noise.trip"], "noise.trip/x.png"):
+            for event in "screenshot", "picture", "status":
+                said = self.view(f"{event} {output}\n", *inputs, status=2)
+                self.assertTrue(program.LINE.fullmatch(said), said)
+                self.assertIn(output, said)
+        with open("noise.nrrd", "rb") as f:
+            self.assertEqual(f.read(), before)
+        self.assertFalse(os.path.exists("noise.trip/x.png"))
+
+    def test_files_that_cannot_be_written_end_a_script_with_a_line(self):
+        for event in "screenshot", "picture", "status":
+            said = self.view(f"wait\n{event} missing/x.png\nstatus never.json\n", "noise.trip",
+                             status=1)
+            self.assertTrue(program.LINE.fullmatch(said), said)
+            self.assertIn("missing/x.png", said)
+            self.assertFalse(os.path.exists("never.json"))
 
     def test_a_signal_ends_it(self):
         os.mkfifo("here")

@@ -1,0 +1,119 @@
+#include "read_files.h"
+
+#include <fnmatch.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "cached_volume.h"
+#include "options.h"
+#include "report.h"
+
+struct read_file {
+    dev_t device;
+    ino_t inode;
+};
+
+int read_files_add(read_files *r, const char *path)
+{
+    struct stat st;
+    if (!path || stat(path, &st) != 0 || (!S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode)))
+        return 0;
+    if (r->count == r->room) {
+        const size_t room = r->room ? 2 * r->room : 16;
+        struct read_file *files = reallocarray(r->files, room, sizeof *files);
+        if (!files)
+            return trip_fail(TRIP_ERROR, "read", path, "no memory to note its name");
+        r->files = files;
+        r->room = room;
+    }
+    r->files[r->count++] = (struct read_file){ st.st_dev, st.st_ino };
+    return 0;
+}
+
+int read_files_add_function(read_files *r, const char *name)
+{
+    const char *part = name ? strrchr(name, '#') : NULL;
+    char *file = part ? strndup(name, (size_t)(part - name)) : NULL;
+    int status = read_files_add(r, name);
+    if (!status)
+        status = read_files_add(r, file);
+    free(file);
+    return status;
+}
+
+static int add_found(void *user, const char *path)
+{
+    return read_files_add(user, path);
+}
+
+static bool is_folder(const char *path)
+{
+    struct stat st;
+    return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
+}
+
+int read_files_add_data(read_files *r, triptych *t, const char *input,
+                        const triptych_brick_options *options)
+{
+    if (!cached_volume_wanted(input))
+        return read_files_add(r, input);
+    int status = is_folder(input) ? read_files_add(r, input) : 0;
+    r->pattern = strpbrk(input, "*?[") ? input : NULL;
+    return status ? status : triptych_list_files(t, input, options, add_found, r);
+}
+
+void read_files_release(read_files *r)
+{
+    free(r->files);
+    *r = (read_files){ 0 };
+}
+
+static bool has(const read_files *r, const char *path)
+{
+    struct stat st;
+    bool found = false;
+    if (stat(path, &st) != 0)
+        return false;
+    for (size_t i = 0; i < r->count && !found; i++)
+        found = r->files[i].device == st.st_dev && r->files[i].inode == st.st_ino;
+    return found;
+}
+
+/* The folder that a file lies in; false where its name is too long. */
+static bool folder_of(const char *path, char folder[PATH_MAX])
+{
+    const char *slash = strrchr(path, '/');
+    int length = slash ? snprintf(folder, PATH_MAX, "%.*s", (int)(slash + 1 - path), path)
+                       : snprintf(folder, PATH_MAX, ".");
+    return length < PATH_MAX;
+}
+
+int read_files_check(const read_files *r, const char *output)
+{
+    char folder[PATH_MAX];
+    if (is_folder(output)) /* that no file takes its place is known elsewhere */
+        return 0;
+    if (has(r, output))
+        return trip_option_fail(output, "is read, and would be replaced: give another name");
+    if (folder_of(output, folder) && has(r, folder))
+        return trip_option_fail(output, "would lie among the files that are read: give the name of "
+                                        "another folder");
+    if (r->pattern && fnmatch(r->pattern, output, FNM_PATHNAME | FNM_PERIOD) == 0)
+        return trip_option_fail(output, "would be one of the slices that are read: give a name "
+                                        "that does not fit their pattern");
+    return 0;
+}
+
+bool read_files_are_one(const char *a, const char *b)
+{
+    char folder_a[PATH_MAX], folder_b[PATH_MAX];
+    struct stat at_a, at_b;
+    const char *slash_a = strrchr(a, '/'), *slash_b = strrchr(b, '/');
+    if (strcmp(slash_a ? slash_a + 1 : a, slash_b ? slash_b + 1 : b) != 0)
+        return false;
+    return folder_of(a, folder_a) && folder_of(b, folder_b) && stat(folder_a, &at_a) == 0 &&
+           stat(folder_b, &at_b) == 0 && at_a.st_dev == at_b.st_dev && at_a.st_ino == at_b.st_ino;
+}

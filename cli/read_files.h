@@ -1,0 +1,35 @@
+/* What a command reads, held against what it is to write: a name that is given twice by mistake
+ * must not cost what stands there. One thread. */
+#ifndef TRIP_CLI_READ_FILES_H
+#define TRIP_CLI_READ_FILES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "triptych_brick.h"
+
+/* Zeroed at first. */
+typedef struct read_files {
+    struct read_file *files; /* and folders */
+    size_t count, room;
+    const char *pattern; /* of slices, the caller's; NULL: none */
+} read_files;
+
+/* A file that is read, by any of its names; nothing where there is none, or for NULL. */
+int read_files_add(read_files *r, const char *path);
+/* A transfer function as options have it: a file, one of several in a file, "FILE#NAME", or a
+ * preset, which is nothing; the same for NULL. */
+int read_files_add_function(read_files *r, const char *name);
+/* A data set, or a volume that is read so. The context stays as it is. */
+int read_files_add_data(read_files *r, triptych *t, const char *input,
+                        const triptych_brick_options *options);
+void read_files_release(read_files *r);
+
+/* TRIP_USAGE, once reported, where `output` would take the place of something that is read, or come
+ * among the files of a data set or the slices of a volume. */
+int read_files_check(const read_files *r, const char *output);
+
+/* Whether two files that are to be written get one name; neither need be there. */
+bool read_files_are_one(const char *a, const char *b);
+
+#endif
