@@ -113,7 +113,8 @@ class Trouble(program.ProgramTest):
         """render, which leaves all files as they are."""
         def files():
             found = [os.path.join(f, n) for f, _, names in os.walk(".") for n in names]
-            return {n: pathlib.Path(n).read_bytes() for n in found if "cloud" not in n}
+            return {n: pathlib.Path(n).read_bytes() for n in found
+                    if os.path.isfile(n) and "cloud" not in n}
 
         before = files()
         self.fails(2, "render", *arguments, says=says)
