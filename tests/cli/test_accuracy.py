@@ -319,8 +319,10 @@ class Accuracy(program.ProgramTest):
         with open("usual.trip/index.trip", "rb") as f:
             (checksum,) = struct.unpack_from("<Q", f.read(24), 16)
         os.makedirs("usual", exist_ok=True)
+        # Without levels of splats: where these were the fastest, others would be bricked for them.
+        rows = [row for row in self.report["rows"] if "lod" not in row["name"]]
         with open("usual/accuracy.json", "w", encoding="utf-8") as f:
-            json.dump({**self.report, "checksum": f"{checksum:016x}"}, f)
+            json.dump({**self.report, "rows": rows, "checksum": f"{checksum:016x}"}, f)
         volume = ["render", "a.nrrd", *size[:4], "--error", "255", "--report"]
         cache = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
         self.works(*volume, "usual", env=cache)
