@@ -91,13 +91,19 @@ static bool folder_of(const char *path, char folder[PATH_MAX])
     return length < PATH_MAX;
 }
 
+int read_files_check_replaced(const read_files *r, const char *output)
+{
+    return !is_folder(output) && has(r, output) /* of folders that is known elsewhere */
+               ? trip_option_fail(output, "is read, and would be replaced: give another name")
+               : 0;
+}
+
 int read_files_check(const read_files *r, const char *output)
 {
     char folder[PATH_MAX];
-    if (is_folder(output)) /* that no file takes its place is known elsewhere */
-        return 0;
-    if (has(r, output))
-        return trip_option_fail(output, "is read, and would be replaced: give another name");
+    int status = read_files_check_replaced(r, output);
+    if (status || is_folder(output))
+        return status;
     if (folder_of(output, folder) && has(r, folder))
         return trip_option_fail(output, "would lie among the files that are read: give the name of "
                                         "another folder");

@@ -28,6 +28,8 @@ void read_files_release(read_files *r);
 /* TRIP_USAGE, once reported, where `output` would take the place of something that is read, or come
  * among the files of a data set or the slices of a volume. */
 int read_files_check(const read_files *r, const char *output);
+/* The same of what it would take the place of alone. */
+int read_files_check_replaced(const read_files *r, const char *output);
 
 /* Whether two files that are to be written get one name; neither need be there. */
 bool read_files_are_one(const char *a, const char *b);

@@ -160,13 +160,14 @@ static int convert_in(triptych *t, const options *o, triptych_form form, char **
     return status ? status : triptych_convert(t, &c, text);
 }
 
-/* Of a data set or a volume; a function's own file may be what it is converted into. */
+/* Of a data set or a volume, beside whose slices it may lie; a function's own file may be what it
+ * is converted into. */
 static int check_replaced(triptych *t, const char *in, const char *out)
 {
     read_files r = { 0 };
     int status = is_function(in) ? 0 : read_files_add_data(&r, t, in, NULL);
     if (!status)
-        status = read_files_check(&r, out);
+        status = is_dataset(in) ? read_files_check(&r, out) : read_files_check_replaced(&r, out);
     read_files_release(&r);
     return status;
 }
