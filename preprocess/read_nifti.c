@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 
 #include <nifti2_io.h>
 
@@ -55,8 +56,8 @@ static bool nifti_probe(const char *path, const unsigned char *head, size_t byte
            ends_in(path, ".img");
 }
 
-/* The other file of a pair: ".hdr" and ".img" exchanged, the case of each letter and a ".gz" kept.
- */
+/* The other file of a pair: ".hdr" and ".img" exchanged, a ".gz" kept, and the case of each letter,
+ * or small letters where there is no such file. */
 static char *partner(const char *path, const char *from, const char *to)
 {
     char *copy = strdup(path);
@@ -70,6 +71,8 @@ static char *partner(const char *path, const char *from, const char *to)
         const bool is_capital = suffix[i] >= 'A' && suffix[i] <= 'Z';
         suffix[i] = (char)(is_capital ? to[i] - 'a' + 'A' : to[i]);
     }
+    if (access(copy, F_OK) != 0)
+        memcpy(suffix, to, strlen(to));
     return copy;
 }
 
