@@ -2,11 +2,11 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "new_file.h"
 #include "options.h"
 #include "read_files.h"
+#include "render_stats.h"
 #include "report.h"
 #include "video.h"
 
@@ -23,17 +23,11 @@ int render_file_name(const render_options *o, const char *output, int frame,
     return 0;
 }
 
-/* What is written to as it is: devices, pipes and links. */
-static bool is_special(const char *path)
-{
-    struct stat st;
-    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
-}
-
 /* The file of --stats, where it gets one of its own. */
 static const char *stats_file(const render_options *o)
 {
-    return o->stats && strcmp(o->stats, "-") && !is_special(o->stats) ? o->stats : NULL;
+    return o->stats && strcmp(o->stats, "-") && !render_stats_is_special(o->stats) ? o->stats
+                                                                                   : NULL;
 }
 
 static int check_folders(const render_options *o)

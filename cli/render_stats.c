@@ -201,17 +201,16 @@ static bool write_text(FILE *f, const char *text)
     return fclose(f) == 0 && good;
 }
 
-/* Devices, pipes and links are written to and stay what they are. */
-static bool is_special(const char *path)
+bool render_stats_is_special(const char *path)
 {
     struct stat st;
-    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode);
+    return lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
 }
 
 static int write_file(const char *path, const char *text)
 {
     trip_new_file file;
-    if (is_special(path))
+    if (render_stats_is_special(path))
         return write_text(fopen(path, "we"), text) ? 0
                                                    : trip_fail_errno("write", path, "cannot write");
     int status = trip_new_file_begin(&file, "write", path);

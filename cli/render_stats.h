@@ -5,6 +5,7 @@
 #ifndef TRIP_RENDER_STATS_H
 #define TRIP_RENDER_STATS_H
 
+#include <stdbool.h>
 #include <stdio.h>
 
 #include "render_options.h"
@@ -19,6 +20,8 @@ int render_stats_add_frame(render_stats *s, triptych *t);
 int render_stats_add_count(render_stats *s, int index, triptych *t);
 /* What drew the frames and the memory it took: once they are drawn, before they are counted. */
 int render_stats_describe(render_stats *s, const render_options *o, triptych *t);
+/* What is written to as it is, and stays what it is: devices, pipes and links. */
+bool render_stats_is_special(const char *path);
 /* Writes the JSON to the file of --stats, by another name and a rename, or to stdout. */
 int render_stats_write(render_stats *s, const render_options *o);
 
@@ -29,7 +32,8 @@ int render_stats_explain_plan(triptych *t, FILE *out);
 int render_stats_explain_cost(triptych *t, FILE *out);
 /* The exact counts of its lists, a line each. */
 int render_stats_explain_count(triptych *t, FILE *out);
-/* "image.png: 1024 x 1024, 1.2 million splats, 34 MB read, 0.32 s" */
+/* "image.png: 1024 x 1024, 1.2 million splats, 34 MB read, 0.32 s"; voxels, where values are
+ * interpolated */
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out);
 
 #endif
