@@ -21,13 +21,15 @@ static void put(double out[3], trip_vec3 v)
 static triptych_hit hit_of(const trip_ray_probe *probe, const trip_ray_hit *found)
 {
     const trip_file_header *h = &probe->data->header;
-    trip_vec3 index = trip_add(probe->origin, trip_scale(probe->direction, found->z));
+    trip_vec3 place = trip_add(probe->origin, trip_scale(probe->direction, found->z));
     triptych_hit hit = { .opacity = found->opacity,
                          .value = h->code_lo + (h->code_hi - h->code_lo) * found->code / 65535,
                          .depth = found->z * probe->world_per_z,
                          .depth_first = found->first_z * probe->world_per_z };
-    put(hit.index, index);
-    put(hit.position, trip_affine_point(&probe->data->index_to_world, index));
+    for (int a = 0; a < 3; a++)
+        hit.index[a] =
+            trip_coordinates_index(&probe->data->coordinates, a, trip_component(place, a));
+    put(hit.position, trip_affine_point(&probe->data->index_to_world, place));
     return hit;
 }
 
@@ -55,9 +57,6 @@ static int prepare(triptych *t, double x, double y, trip_camera *camera)
     int status = trip_context_check_idle(t, true);
     if (!status && !(isfinite(x) && isfinite(y)))
         status = trip_fail(TRIP_USAGE, "render", "probe", "the place is not finite");
-    if (!status && trip_coordinates_uneven(&t->session.data->coordinates))
-        status = trip_fail(TRIP_USAGE, "render", "probe",
-                           "places are found in grids with even spacing alone");
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status)

@@ -435,7 +435,7 @@ typedef struct triptych_hit {
 
 /* Of the view, function and data set, whatever was drawn; x and y in pixels from the picture's top
  * left corner, pixel centres at + 0.5, also beyond its edges. Reads the bricks along the ray. Not
- * while a frame is begun, and not of grids with uneven spacing. */
+ * while a frame is begun. */
 TRIPTYCH_API int triptych_probe(triptych *t, double x, double y, triptych_hit *out);
 
 /* ---- frames ---- */

@@ -23,11 +23,18 @@ static int longest_axis(trip_vec3 v)
     return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
 }
 
+static const trip_coordinates *places(const samples *s)
+{
+    return &s->probe->data->coordinates;
+}
+
 /* Where the ray meets a sheet. */
 static double z_of(const samples *s, double sheet)
 {
     const trip_ray_probe *p = s->probe;
-    return (sheet - trip_component(p->origin, s->axis)) / trip_component(p->direction, s->axis);
+    return (trip_coordinates_place(places(s), s->axis, sheet) -
+            trip_component(p->origin, s->axis)) /
+           trip_component(p->direction, s->axis);
 }
 
 /* There, a coordinate by the list's own: 0 is u, 1 is v. */
@@ -35,7 +42,9 @@ static double across(const samples *s, double sheet, int which)
 {
     const trip_ray_probe *p = s->probe;
     int axis = (s->axis + 1 + which) % 3;
-    return trip_component(p->origin, axis) + z_of(s, sheet) * trip_component(p->direction, axis);
+    return trip_coordinates_index(places(s), axis,
+                                  trip_component(p->origin, axis) +
+                                      z_of(s, sheet) * trip_component(p->direction, axis));
 }
 
 /* Narrows [from, to] to where o + z d lies in [lo, hi]. */
@@ -60,12 +69,14 @@ static void find_sheets(samples *s)
     if (!list)
         return;
     for (int a = 0; a < 3; a++)
-        narrow(trip_component(p->origin, a), trip_component(p->direction, a), -0.5,
-               (double)list->dims[a] - 0.5, &from, &to);
+        narrow(trip_component(p->origin, a), trip_component(p->direction, a),
+               trip_coordinates_place(places(s), a, -0.5),
+               trip_coordinates_place(places(s), a, (double)list->dims[a] - 0.5), &from, &to);
     if (!(from <= to))
         return;
     double o = trip_component(p->origin, s->axis), d = trip_component(p->direction, s->axis);
-    double lo = fmin(o + from * d, o + to * d), hi = fmax(o + from * d, o + to * d);
+    double lo = trip_coordinates_index(places(s), s->axis, fmin(o + from * d, o + to * d));
+    double hi = trip_coordinates_index(places(s), s->axis, fmax(o + from * d, o + to * d));
     const double last = (double)(list->dims[s->axis] - 1);
     s->first = (int64_t)fmin(fmax(round(lo), 0), last);
     s->count = (int64_t)fmin(fmax(round(hi), 0), last) - s->first + 1;

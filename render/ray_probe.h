@@ -15,11 +15,11 @@ typedef struct trip_ray_probe {
     trip_reader *reader; /* of voxels, no pass under way */
     trip_budget *budget;
     const trip_tf_entry *table; /* as filled for the data set */
-    /* Index space: origin + z * direction, z >= 0, is on the ray, whose pieces of z = 1 are so many
-     * world units long. */
+    /* Index space, places where spacing is uneven (coordinates.h): origin + z * direction, z >= 0,
+     * is on the ray, whose pieces of z = 1 are so many world units long. */
     trip_vec3 origin, direction;
     double world_per_z;
-    trip_clip clip; /* index space: only what is inside counts */
+    trip_clip clip; /* in the same: only what is inside counts */
 } trip_ray_probe;
 
 typedef struct trip_ray_hit {

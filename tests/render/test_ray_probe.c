@@ -123,6 +123,44 @@ static void a_lone_voxel_reaches_half_way_to_its_neighbours(void **state)
     scene_destroy(&s);
 }
 
+/* Voxels whose distances grow in proportion along x, halve along y and are even along z. */
+static void voxels_lie_where_the_tables_say(void **state)
+{
+    (void)state;
+    double x[NX], y[NY], z[NZ];
+    for (int i = 0; i < NX; i++)
+        x[i] = (double)i * i / (NX - 1);
+    for (int j = 0; j < NY; j++)
+        y[j] = (NY - 1) * (1 - exp2(-j / 20.0)) / (1 - exp2(-(NY - 1) / 20.0));
+    for (int k = 0; k < NZ; k++)
+        z[k] = k;
+    y[NY - 1] = NY - 1;
+    const trip_coordinates uneven =
+        trip_coordinates_make((const double *const[]){ x, y, z }, (const int64_t[]){ NX, NY, NZ });
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { NX, NY, NZ },
+                                      .tile_voxels = 16,
+                                      .slab_sheets = 4,
+                                      .voxel = wall,
+                                      .coordinates = &uneven });
+    scene_colour(&s, 50000, 50000, 1, 1, 1, 0.1);
+    /* From midway between voxels 9 and 10 to midway between 19 and 20. */
+    const double from = (9.0 * 9 + 10 * 10) / 2 / (NX - 1),
+                 to = (19.0 * 19 + 20 * 20) / 2 / (NX - 1);
+    const double tau = (double)s.table[50000].extinction,
+                 opacity = 1 - exp(-tau * 0.5 * (to - from));
+    trip_ray_hit hit = find(&s, trip_v3(-5, 12.3, 7.6), trip_v3(1, 0, 0), 0.5);
+    assert_close(hit.opacity, opacity, 1e-12);
+    assert_close(hit.first_z, 5 + from, 1e-12);
+    assert_close(hit.z, 5 + from - log(1 - opacity / 2) / (tau * 0.5), 1e-12);
+    /* Aslant, by sheets along y. */
+    hit = find(&s, trip_v3(-1, -4, 7.6), trip_v3(0.5, 1, 0.1), 1);
+    assert_true(hit.opacity > 0);
+    assert_close(-1 + 0.5 * hit.first_z, from, 0.5 * (y[1] - y[0]));
+    assert_close(hit.code, 50000, 0);
+    scene_destroy(&s);
+}
+
 static void nothing_is_behind_the_eye_or_beside_the_grid(void **state)
 {
     (void)state;
@@ -143,6 +181,7 @@ int main(void)
         cmocka_unit_test(a_wall_is_hit_where_half_of_what_it_takes_is_lost),
         cmocka_unit_test(values_are_interpolated_whatever_the_tiles),
         cmocka_unit_test(a_lone_voxel_reaches_half_way_to_its_neighbours),
+        cmocka_unit_test(voxels_lie_where_the_tables_say),
         cmocka_unit_test(nothing_is_behind_the_eye_or_beside_the_grid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
