@@ -40,14 +40,15 @@ vec4 unpack_normal(uint normal)
 #endif
 
 #if defined(SHADED) || defined(SHADOWS)
-// World space, of what lies in a direction from the eye in list axes.
+// World space, of what lies in a direction from the eye in list axes; 0 of what is at the eye.
 vec3 towards_eye(vec3 from_eye)
 {
 #ifdef PARALLEL
     return to_eye.xyz;
 #else
-    return -normalize(world_0.xyz * from_eye.x + world_1.xyz * from_eye.y +
-                      world_2.xyz * from_eye.z);
+    vec3 way = vec3(world_0.xyz) * from_eye.x + vec3(world_1.xyz) * from_eye.y +
+               vec3(world_2.xyz) * from_eye.z;
+    return -way / max(length(way), 1e-30);
 #endif
 }
 

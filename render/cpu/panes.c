@@ -211,6 +211,13 @@ static bool is_to_merge(const trip_cpu *r, uint32_t pane)
     return r->states[pane] & TRIP_CPU_PANE_BEGUN && !trip_cpu_is_alone(r, pane);
 }
 
+/* What is alone has sheets that the layer's view is to end. */
+static bool is_to_end(const trip_cpu *r, uint32_t pane)
+{
+    return r->open_sheets && r->states[pane] & TRIP_CPU_PANE_BEGUN &&
+           r->axes[pane] == 1u << r->view.axis;
+}
+
 /* The layer's pixels, with the open sheet. */
 static const float *layer_of_pane(const trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
@@ -227,6 +234,13 @@ static void merge_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
     r->kernels->pane_merge(&r->view, trip_cpu_pane_x(r, pane), trip_cpu_pane_y(r, pane),
                            layer_of_pane(r, w, pane), first, pane_sum(r, pane));
     r->states[pane] = TRIP_CPU_PANE_MERGED;
+}
+
+static void end_sheets(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
+{
+    memcpy(trip_cpu_pane_pixels(r, pane), layer_of_pane(r, w, pane),
+           trip_cpu_pane_floats(r) * sizeof *w->layer);
+    r->kernels->sheet_clear(trip_cpu_pane_sheet(r, pane));
 }
 
 /* The sum with the layer being drawn in it. */
@@ -262,9 +276,14 @@ static void finish_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 static void merge_row(void *context, unsigned task, unsigned thread)
 {
     trip_cpu *r = context;
-    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++)
-        if (!trip_interrupted() && is_to_merge(r, t))
+    for (uint32_t t = task * r->mask.grid.across; t < (task + 1) * r->mask.grid.across; t++) {
+        if (trip_interrupted())
+            return;
+        if (is_to_merge(r, t))
             merge_pane(r, &r->workers[thread], t);
+        else if (is_to_end(r, t))
+            end_sheets(r, &r->workers[thread], t);
+    }
 }
 
 static void finish_row(void *context, unsigned task, unsigned thread)
@@ -287,7 +306,7 @@ void trip_cpu_merge_layer(trip_cpu *r)
     bool merge = false;
     trip_cpu_finish_blending(r);
     for (uint32_t t = 0; t < trip_cpu_pane_count(r) && !merge; t++)
-        merge = is_to_merge(r, t);
+        merge = is_to_merge(r, t) || is_to_end(r, t);
     if (merge)
         for_each_row(r, merge_row);
 }

@@ -322,11 +322,13 @@ static int begin_layer(trip_renderer *base, int axis)
     int status = end_passes(base);
     if (!status)
         status = trip_gl_target_begin_layer(&r->target, axis, !whole, sums_sheets(r));
+    if (status)
+        return status; /* more of the layer before may be to come, its last sheet with it */
     trip_gl_sums_begin_layer(&r->sums, axis);
     glDisable(GL_BLEND);
     glDisable(GL_STENCIL_TEST);
     glBindVertexArray(r->vertex_array);
-    if (!status && !whole)
+    if (!whole)
         status = mask_region(r, axis);
     if (status)
         return status;

@@ -72,8 +72,11 @@ INLINE void put_sheet_over(float *pixels, const patch *sum, trip_target target)
     add_over(pixels, sum, sum->r, keep, w, target);
     add_over(pixels + V, sum, sum->g, keep, w, target);
     add_over(pixels + 2 * V, sum, sum->b, keep, w, target);
-    if (TRIP_CPU_DEPTH)
-        add_over(pixels + TRIP_CHANNEL_DEPTH * V, sum, sum->depth, keep, w, TRIP_TARGET_RGBA32F);
+    if (TRIP_CPU_DEPTH) { /* by what is taken: distances are divided by its sum */
+        vf mean = sum->depth / v_max(sum->t, v_set(0x1p-126f));
+        add_over(pixels + TRIP_CHANNEL_DEPTH * V, sum, mean, keep, v_set(1) - keep,
+                 TRIP_TARGET_RGBA32F);
+    }
     vf left = t * keep;
     if (target != TRIP_TARGET_RGBA32F)
         left = v_set(1) - kept(v_set(1) - left, target);
