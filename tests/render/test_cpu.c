@@ -130,11 +130,12 @@ static void every_method_and_traversal_agrees_with_the_reference(void **state)
     scene s;
     cpu_scenes_blobs(&s, 16, NULL);
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.9, -0.8), 60, 50, 70);
-    for (int i = 0; i < 12; i++) {
+    for (int i = 0; i < 24; i++) {
         trip_settings settings = trip_settings_default();
         settings.method = (trip_method)(i % 3);
         settings.traversal = i / 3 % 2 ? TRIP_TRAVERSAL_ASCENDING : TRIP_TRAVERSAL_OUTWARD;
-        settings.h = i < 6 ? 0 : 0.95;
+        settings.h = i / 6 % 2 ? 0.95 : 0;
+        settings.compositing = i < 12 ? TRIP_COMPOSITING_SPLAT : TRIP_COMPOSITING_SHEET;
         view.ortho_height = i % 4 == 3 ? 50 : 0;
         compare(&s, &view, &settings);
     }

@@ -134,6 +134,26 @@ static void every_method_and_traversal_agrees_with_the_reference(void **state)
     compare("merge, h 0", &s, &view, &settings);
     settings.traversal = TRIP_TRAVERSAL_ASCENDING;
     compare("ascending, back to front", &s, &view, &settings);
+    settings.traversal = TRIP_TRAVERSAL_OUTWARD;
+    settings.compositing = TRIP_COMPOSITING_SHEET;
+    view.width = view.height = 400; /* which layers wait for one another */
+    compare("summed by sheets", &s, &view, &settings);
+    scene_destroy(&s);
+}
+
+/* Its splat covers the picture, and light comes to it from nowhere. */
+static void a_voxel_at_the_eye_is_lit_as_by_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 60, 40);
+    trip_settings settings = trip_settings_default();
+    view.eye = trip_affine_point(&cubes, trip_v3(5, 14, 13));
+    compare("light from the eye", &s, &view, &settings);
+    settings.headlight = false;
+    settings.light_direction = trip_normalize(trip_v3(1, -2, 1));
+    compare("directional light", &s, &view, &settings);
     scene_destroy(&s);
 }
 
@@ -651,6 +671,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_form_of_submission_gives_the_same_picture_and_counts),
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
+        cmocka_unit_test(a_voxel_at_the_eye_is_lit_as_by_the_reference),
         cmocka_unit_test(grids_that_are_not_cubic_agree_with_the_reference),
         cmocka_unit_test(light_and_kernel_settings_agree_with_the_reference),
         cmocka_unit_test(supports_larger_than_sprites_are_drawn_as_triangles),

@@ -29,7 +29,8 @@ static inline float trip_cpu_saturation(const trip_settings *s)
 #define TRIP_CPU_CODE_MISSING INT16_MIN
 #define TRIP_CPU_CODE_LEAST (INT16_MIN + 1)
 
-/* The differences of codes an index along u, v and the sheets, rounded down. */
+/* Half of the differences of codes an index along u, v and the sheets, rounded down: of two voxels
+ * that lie beside one another codes may differ by 16 bits. */
 typedef struct trip_cpu_gradient {
     int16_t along[3];
 } trip_cpu_gradient;

@@ -77,16 +77,6 @@ INLINE unsigned vh_bits(vh m)
 }
 
 /* Sums and differences that end at the greatest and least number. */
-INLINE vh vh_adds(vh a, vh b)
-{
-    return (vh)_mm_adds_epi16((__m128i)a, (__m128i)b);
-}
-
-INLINE vh vh_subs(vh a, vh b)
-{
-    return (vh)_mm_subs_epi16((__m128i)a, (__m128i)b);
-}
-
 /* (a (16384 - w) + b w) / 16384, rounded down; `weights` is w << 16 | 16384 - w. */
 INLINE vh vh_between(vh a, vh b, int32_t weights)
 {
@@ -148,25 +138,6 @@ INLINE unsigned vh_bits(vh m)
     for (unsigned i = 0; i < 8; i++)
         bits |= (unsigned)(m[i] & 1) << i;
     return bits;
-}
-
-INLINE int16_t within_16_bits(int x)
-{
-    return (int16_t)(x < INT16_MIN ? INT16_MIN : x > INT16_MAX ? INT16_MAX : x);
-}
-
-INLINE vh vh_adds(vh a, vh b)
-{
-    for (int i = 0; i < 8; i++)
-        a[i] = within_16_bits(a[i] + b[i]);
-    return a;
-}
-
-INLINE vh vh_subs(vh a, vh b)
-{
-    for (int i = 0; i < 8; i++)
-        a[i] = within_16_bits(a[i] - b[i]);
-    return a;
 }
 
 INLINE vh vh_between(vh a, vh b, int32_t weights)
@@ -292,14 +263,14 @@ INLINE bool some_is_missing(const neighbours *n)
     return vh_bits(vh_is_missing(least)) != 0;
 }
 
-/* Central differences; where a neighbour is missing, the difference to the other. */
+/* Half of central differences; where a neighbour is missing, of the difference to the other. */
 INLINE vh differences(vh codes, vh below, vh above)
 {
     vh no_below = vh_is_missing(below), no_above = vh_is_missing(above);
     below = vh_select(no_below, below, codes);
     above = vh_select(no_above, above, codes);
-    vh one_sided = vh_adds(vh_subs(above, codes), vh_subs(codes, below));
-    return vh_select(no_below | no_above, vh_half_difference(above, below), one_sided);
+    vh half = vh_half_difference(above, below);
+    return vh_select(no_below | no_above, half >> 1, half);
 }
 
 static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares,
@@ -335,7 +306,7 @@ static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, u
             vh d[3];
             for (int a = 0; a < 3; a++)
                 d[a] = lacks ? differences(vh_load(at), n.before[a], n.behind[a])
-                             : vh_half_difference(n.behind[a], n.before[a]);
+                             : vh_half_difference(n.behind[a], n.before[a]) >> 1;
             vh_store_3((int16_t *)&raster->gradients[i], d[0], d[1], d[2]);
         }
     }

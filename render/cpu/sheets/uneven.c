@@ -2,7 +2,7 @@
 
 double trip_cpu_gradient_unit(const trip_coordinates *c)
 {
-    return trip_coordinates_uneven(c) ? fmax(c->nearest, 1.0 / 64) : 1;
+    return 0.5 * (trip_coordinates_uneven(c) ? fmax(c->nearest, 1.0 / 64) : 1);
 }
 
 /* The codes of a voxel and of its neighbours along one axis. */

@@ -6,10 +6,10 @@
 #include "coordinates.h"
 #include "cpu/kernels/sheets.h"
 
-/* What a gradient of one code over a unit of place is as it is kept, in 16 bits: what the nearest
- * voxels are apart, since steeper than over those no difference is; but at least 1/64, so that a
- * few that are nearer leave others their precision, and steeper ones count as so steep. 1 where
- * spacing is even. */
+/* What a gradient of one code over a unit of place is as it is kept, in 16 bits: half of what the
+ * nearest voxels are apart, since steeper than over those no difference is; but of at least 1/64,
+ * so that a few that are nearer leave others their precision, and steeper ones count as so steep.
+ * Half where spacing is even. */
 double trip_cpu_gradient_unit(const trip_coordinates *c);
 
 /* A raster and what lies beside it, as for the kernel sheet_gradients(). */
