@@ -31,6 +31,9 @@ QUICK_PROGRAM = os.environ["TRIP_QUICK_PROGRAM"]
 GENERATE = os.environ["TRIP_GENERATE"]
 DATASETS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "datasets")
 SANITIZED = bool(os.environ.get("TRIP_SANITIZE"))
+# Mesa finds the shaders that it has compiled where it always does, whatever cache a test has.
+os.environ.setdefault("MESA_SHADER_CACHE_DIR",
+                      os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
 SWITCHED_OFF = os.environ.get("TRIP_SWITCHED_OFF", "").split()  # "GL", "OPENVDB"
 GL = () if "GL" in SWITCHED_OFF else ("gl",)  # for lists of renderers
 if "OPENVDB" in SWITCHED_OFF:
@@ -85,10 +88,13 @@ def call(*arguments, timeout=60, **options):
 
 
 class ProgramTest(unittest.TestCase):
-    """Each class works in a folder of its own, the current one."""
+    """Each class works in a folder of its own, the current one, and bricks into a cache of its own."""
 
     @classmethod
     def setUpClass(cls):
+        cache = tempfile.TemporaryDirectory(prefix="trip-cache-")
+        cls.addClassCleanup(cache.cleanup)
+        os.environ["XDG_CACHE_HOME"] = cache.name
         cls.folder = tempfile.mkdtemp(prefix="trip-cli-")
         os.chdir(cls.folder)
 

@@ -242,22 +242,14 @@ class Serve(program.ProgramTest):
 
     def test_a_volume_is_bricked_and_shown(self):
         self.tearDown()
-        environment = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
-        self.server = program.start("serve", "v.nhdr", "--memory", "128M", "--threads", "2",
-                                    env=environment)
-        self.address = self.server.stdout.readline().decode().strip()
-        url = urllib.parse.urlsplit(self.address)
-        self.host, self.port = url.hostname, url.port
-        self.token = urllib.parse.parse_qs(url.query)["token"][0]
+        self.serve("v.nhdr")
         self.do("resize 40 30")
         while not self.status()["exact"]:
             self.assertFalse(self.status()["failed"], self.status())
             time.sleep(0.02)
         status, headers, data = self.ask("/picture", after=0)
         self.assertEqual(headers["X-Whole"], "1")
-        run = program.call("render", "v.nhdr", "-o", "r.png",
-                           *shlex.split(self.status()["camera"]), env=environment)
-        self.assertEqual(run.returncode, 0, run.stderr)
+        self.works("render", "v.nhdr", "-o", "r.png", *shlex.split(self.status()["camera"]))
         with open("r.png", "rb") as f:
             numpy.testing.assert_array_equal(read_png(data)[..., :3], read_png(f.read())[..., :3])
         self.assertEqual(self.ask("/function", "POST", name="grey")[0], 204)
@@ -364,7 +356,6 @@ class Serve(program.ProgramTest):
         self.assertEqual(self.server.wait(60), 0)
 
     def test_a_volume_s_report_is_of_its_data_set(self):
-        os.environ["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "v.nhdr", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
         program.write_report("other", None)

@@ -333,7 +333,6 @@ class View(program.ProgramTest):
         self.assertEqual(self.status()["documents"], 3)
 
     def test_a_volume_is_bricked_and_shown(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         seen, = self.pictures("wait\npicture seen.exr\nstatus status.json\n", ["seen"], "ball.nrrd")
         self.assertTrue(self.status()["exact"], self.status())
         self.works("render", "ball.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
@@ -341,7 +340,6 @@ class View(program.ProgramTest):
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
     def test_a_volume_s_report_is_of_its_data_set(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "ball.nrrd", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
         program.write_report("other", None)
@@ -356,7 +354,6 @@ class View(program.ProgramTest):
                 self.assertIn("the report is of another data set", status["message"])
 
     def test_a_large_volume_is_shown_by_samples_until_it_is_bricked(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         program.write_nrrd("large.nrrd", program.ball((204, 204, 204), radius=0.5))
         self.view("wait\npicture seen.exr\nwait\nstatus status.json\n", "large.nrrd")
         self.works("render", "large.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
@@ -368,7 +365,6 @@ class View(program.ProgramTest):
         self.assertEqual(self.works("cache", "list").stdout.count(b"large"), 2)
 
     def test_values_that_were_not_kept_are_bricked_again(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "noise.nrrd", "-o", "part.trip", "--range=200:255")
         self.view("wait\npicture before.exr\nclick 0.5 Brick again with all values\nwait\n"
                   "picture after.exr\nstatus status.json\n", "part.trip", "--tf=grey")
