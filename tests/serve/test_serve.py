@@ -280,6 +280,10 @@ class Serve(program.ProgramTest):
         self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
         self.assertNotIn(b"http", page.replace(b"<!doctype html>", b""))
 
+    def test_what_is_automatic_is_called_so_as_on_the_command_line(self):
+        _, _, page = self.ask("/")
+        self.assertIn(b'<option value="auto">auto</option>', page)
+
     def test_only_this_machine_with_the_token_is_answered(self):
         for path in ("/", "/picture", "/status", "/presets", "/nothing"):
             for token in (None, "", "0" * 32, self.token[:-1], self.token.upper() + "x"):

@@ -230,7 +230,8 @@ class View(program.ProgramTest):
                     "click 0.2 h",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
                     "click 0.4 Samples", "click 0.5 Classify\nclick 0.5 After interpolation",
-                    "click 0.9 Slices",
+                    "click 0.9 Slices", "click 0.5 Classify\nclick 0.5 Auto",
+                    "click 0.5 Classify\nclick 0.5 After interpolation",
                     "click 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\n"
                     "click 0.4 i from", "click 0.6 j to", "click 0.3 k from",
                     "click 0.5 Add plane", "click 0.6 Plane 1", "click 0.5 Flip 1",
