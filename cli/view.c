@@ -10,7 +10,7 @@
 #include "library.h"
 #include "options.h"
 #include "quality_options.h"
-#include "read_files.h"
+#include "read_data.h"
 #include "report.h"
 #include "shown_volume.h"
 #include "view.h"
