@@ -122,7 +122,10 @@ static const struct argp_option options[] = {
       "or "
       "a video",
       1 },
-    { "fps", KEY_FPS, "N", 0, "Images a second of a video (default: the path's, else 30)", 1 },
+    { "fps", KEY_FPS, "N", 0,
+      "Images a second of a video; a path takes as long with more of them (default: the path's, "
+      "else 30)",
+      1 },
     { NULL, 0, NULL, 0, "Look:", 2 },
     { "tf", KEY_TF, "NAME|FILE", 0,
       "Transfer function (default: kept in the data set): auto, ct, mr, fog, labels or simulation, "
