@@ -244,17 +244,18 @@ def write_raw(path, volume):
     write(path, volume.tobytes())
 
 
-def write_report(folder, data_set):
+def write_report(folder, data_set, classify="post", levels_for="auto"):
     """As `triptych accuracy` makes it, of one setting; checksum 0 where no data set is given."""
     checksum = 0
     if data_set:
         with open(os.path.join(data_set, "index.trip"), "rb") as f:
             (checksum,) = struct.unpack_from("<Q", f.read(24), 16)
     os.makedirs(folder, exist_ok=True)
-    row = {"name": "one", "options": {"renderer": "cpu"}, "ms": 1, "total": {"worst_percentile_99": 1}}
+    row = {"name": "one", "options": {"renderer": "cpu", "classify": classify}, "ms": 1,
+           "total": {"worst_percentile_99": 1}}
     with open(os.path.join(folder, "accuracy.json"), "w", encoding="utf-8") as f:
-        json.dump({"triptych_accuracy": 1, "checksum": f"{checksum:016x}", "shading": True,
-                   "rows": [row]}, f)
+        json.dump({"triptych_accuracy": 1, "checksum": f"{checksum:016x}",
+                   "levels_for": levels_for, "shading": True, "rows": [row]}, f)
 
 
 def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little", geometry=None):

@@ -362,8 +362,9 @@ class Serve(program.ProgramTest):
     def test_a_volume_s_report_is_of_its_data_set(self):
         self.works("brick", "v.nhdr", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
+        program.write_report("splats", "usual.trip", classify="pre")
         program.write_report("other", None)
-        for report in "usual", "other":
+        for report in "usual", "splats", "other":
             self.tearDown()
             self.serve("v.nhdr", "--error", "255", "--report", report)
             status = self.status()

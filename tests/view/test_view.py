@@ -343,8 +343,9 @@ class View(program.ProgramTest):
     def test_a_volume_s_report_is_of_its_data_set(self):
         self.works("brick", "ball.nrrd", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
+        program.write_report("splats", "usual.trip", classify="pre")
         program.write_report("other", None)
-        for report in "usual", "other":
+        for report in "usual", "splats", "other":
             self.view(f"wait\ndrop {os.path.abspath('noise.nrrd')}\nwait\nstatus {report}.json\n"
                       "key tab\nwait\nstatus status.json\n",
                       "ball.nrrd", "--error=255", f"--report={report}")
