@@ -112,6 +112,17 @@ static int check_data(const cJSON *root, const char *path, const accuracy_wanted
     return w->checksum && checksum ? accuracy_check_data(checksum, w->checksum, path) : 0;
 }
 
+static void read_levels(const cJSON *root, accuracy_found *out)
+{
+    static const char *const names[] = { "auto", "post", "pre", "both" };
+    const char *name = text_of(root, "levels_for");
+    for (int i = 0; name && i < 4; i++)
+        if (!strcmp(name, names[i])) {
+            out->says_levels = true;
+            out->levels_for = (triptych_levels_for)i;
+        }
+}
+
 static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
                   accuracy_found *out)
 {
@@ -141,6 +152,7 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
     *out = best;
     const char *checksum = text_of(root, "checksum");
     snprintf(out->checksum, sizeof out->checksum, "%s", checksum ? checksum : "");
+    read_levels(root, out);
     return 0;
 }
 

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "setting.h"
+#include "triptych_brick.h"
 
 /* triptych_info.checksum as reports have it. */
 enum { ACCURACY_CHECKSUM_BYTES = 17 };
@@ -23,6 +24,8 @@ typedef struct accuracy_found {
     accuracy_setting setting;
     double error, ms;
     char checksum[ACCURACY_CHECKSUM_BYTES]; /* of the report's data set; "": it names none */
+    bool says_levels;                       /* whether the report says which that */
+    triptych_levels_for levels_for;         /* was bricked with */
 } accuracy_found;
 
 /* `path` is a report's folder or its accuracy.json. out->setting.settings has what the report says

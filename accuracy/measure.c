@@ -1,5 +1,6 @@
 #include "measure.h"
 
+#include <cjson/cJSON.h>
 #include <fnmatch.h>
 #include <math.h>
 #include <stdarg.h>
@@ -11,6 +12,7 @@
 #include "bench_progress.h"
 #include "contexts.h"
 #include "flip.h"
+#include "json.h"
 #include "picture_data.h"
 #include "report.h"
 #include "ssim.h"
@@ -188,6 +190,24 @@ static bool has_levels(triptych *t, const triptych_settings *settings)
     return triptych_count_levels(t, settings->classify, &levels) == 0 && levels > 0;
 }
 
+/* What the data set was bricked with, by its notes. */
+static void note_levels(accuracy_measured *m, const char *notes)
+{
+    static const char option[] = "--levels-for=";
+    const cJSON *one;
+    trip_json json = { 0 };
+    snprintf(m->levels_for, sizeof m->levels_for, "auto");
+    if (trip_json_parse(&json, notes, m->options->data[0], NULL) != 0)
+        return;
+    cJSON_ArrayForEach(one, cJSON_GetObjectItemCaseSensitive(json.root, "source_options"))
+    {
+        const char *text = cJSON_GetStringValue(one);
+        if (text && !strncmp(text, option, sizeof option - 1))
+            snprintf(m->levels_for, sizeof m->levels_for, "%s", text + sizeof option - 1);
+    }
+    trip_json_free(&json);
+}
+
 /* What says nothing here. */
 static int leave_out_idle(sweep *s)
 {
@@ -200,6 +220,7 @@ static int leave_out_idle(sweep *s)
     if (status || triptych_get_info(t, &info))
         return status ? status : TRIP_ERROR;
     s->m->checksum = info.checksum;
+    note_levels(s->m, info.notes);
     for (int i = 0; i < s->m->row_count; i++) {
         accuracy_row *row = &s->m->rows[i];
         const int64_t *n = info.dims;

@@ -56,7 +56,8 @@ typedef struct accuracy_measured {
     int view_count; /* done */
     char *truth;    /* picture of the first view */
     double seconds;
-    uint64_t checksum; /* of the first data set, triptych_info */
+    uint64_t checksum;  /* of the first data set, triptych_info */
+    char levels_for[8]; /* what it was bricked with, as of `triptych brick --levels-for` */
 } accuracy_measured;
 
 int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder);

@@ -120,6 +120,7 @@ static void add_facts(cJSON *root, const accuracy_report *r)
     cJSON_AddStringToObject(root, "command", r->command);
     cJSON_AddStringToObject(root, "data_set", o->data[0]);
     cJSON_AddStringToObject(root, "checksum", checksum);
+    cJSON_AddStringToObject(root, "levels_for", r->m->levels_for);
     cJSON_AddItemToObject(root, "source",
                           o->source ? cJSON_CreateString(o->source) : cJSON_CreateNull());
     cJSON_AddItemToObject(root, "transfer_function",

@@ -7,6 +7,8 @@
 
 #include "bench_sample.h"
 #include "bench_tables.h"
+#include "new_file.h"
+#include "read_files.h"
 
 static const struct {
     const char *name;
@@ -86,6 +88,23 @@ static int measure_data(bench_options *o, size_t table, bench_report *r)
     return status;
 }
 
+/* That a plot can be written at the end, and replaces nothing that is read. */
+static int check_plot(const bench_options *o)
+{
+    read_files r = { 0 };
+    if (!o->plot)
+        return 0;
+    int status = trip_new_file_check("bench", o->plot);
+    if (!status)
+        status = read_files_add(&r, o->input);
+    if (!status)
+        status = read_files_add_function(&r, o->tf);
+    if (!status)
+        status = read_files_check(&r, o->plot);
+    read_files_release(&r);
+    return status;
+}
+
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
@@ -111,6 +130,8 @@ int trip_bench(int argc, char **argv)
     bench_report *report = NULL;
     join(argc, argv, command, sizeof command);
     int status = bench_options_parse(&o, argc, argv);
+    if (!status)
+        status = check_plot(&o);
     if (!status && o.in_short && !o.json)
         print_tables();
     if (!status)

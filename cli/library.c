@@ -15,7 +15,7 @@ static void pass_message(void *user, const char *line)
 
 static const char *things_of(const char *stage)
 {
-    if (!strcmp(stage, "count") || !strcmp(stage, "merge"))
+    if (!strcmp(stage, "splat") || !strcmp(stage, "count") || !strcmp(stage, "merge"))
         return "splats";
     if (!strcmp(stage, "integrate"))
         return "pixels";

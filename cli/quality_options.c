@@ -68,6 +68,13 @@ int quality_options_check_data(const char *measured, triptych *t, const char *vo
     return status ? status : accuracy_check_data(measured, checksum, volume);
 }
 
+triptych_levels_for quality_options_levels(const quality_options *q, bool coarse_splats)
+{
+    return q->says_levels  ? q->levels_for
+           : coarse_splats ? TRIPTYCH_LEVELS_FOR_BOTH
+                           : TRIPTYCH_LEVELS_FOR_AUTO;
+}
+
 static int use_report(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
                       triptych_renderer *renderer, bool slow_too)
 {
@@ -93,6 +100,8 @@ static int use_report(quality_options *q, const quality_drawn *drawn, triptych_s
         *s = found.setting.settings;
         *renderer = found.setting.renderer;
         snprintf(q->measured, sizeof q->measured, "%s", checksum[0] ? "" : found.checksum);
+        q->says_levels = found.says_levels;
+        q->levels_for = found.levels_for;
         trip_note("--error", "%s, measured to be off by %.2f, in %.1f ms", found.setting.name,
                   found.error, found.ms);
     }

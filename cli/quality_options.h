@@ -17,6 +17,8 @@ typedef struct quality_options {
     const char *measurable;
     /* Once used for a volume: the data set that the report is of; "": not known, or no volume. */
     char measured[ACCURACY_CHECKSUM_BYTES];
+    bool says_levels; /* the report, what that was bricked with: */
+    triptych_levels_for levels_for;
 } quality_options;
 
 /* The keys are KEY_QUALITY, KEY_ERROR and KEY_REPORT. */
@@ -56,6 +58,10 @@ typedef struct quality_drawn {
 
 /* Of a volume, once its data set is open: fails where `measured` is another, and not "". */
 int quality_options_check_data(const char *measured, triptych *t, const char *volume);
+
+/* The coarse levels that a volume is bricked with for settings once chosen: the measured data
+ * set's; where there is none, both kinds if splats are to be drawn by coarse ones. */
+triptych_levels_for quality_options_levels(const quality_options *q, bool coarse_splats);
 
 /* Changes settings as the options say, and with --error the renderer where it is auto. Prints what
  * --error has chosen. */

@@ -7,7 +7,6 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "cached_volume.h"
 #include "options.h"
 #include "report.h"
 
@@ -44,25 +43,10 @@ int read_files_add_function(read_files *r, const char *name)
     return status;
 }
 
-static int add_found(void *user, const char *path)
-{
-    return read_files_add(user, path);
-}
-
 static bool is_folder(const char *path)
 {
     struct stat st;
     return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
-}
-
-int read_files_add_data(read_files *r, triptych *t, const char *input,
-                        const triptych_brick_options *options)
-{
-    if (!cached_volume_wanted(input))
-        return read_files_add(r, input);
-    int status = is_folder(input) ? read_files_add(r, input) : 0;
-    r->pattern = strpbrk(input, "*?[") ? input : NULL;
-    return status ? status : triptych_list_files(t, input, options, add_found, r);
 }
 
 void read_files_release(read_files *r)

@@ -6,8 +6,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "triptych_brick.h"
-
 /* Zeroed at first. */
 typedef struct read_files {
     struct read_file *files; /* and folders */
@@ -15,14 +13,12 @@ typedef struct read_files {
     const char *pattern; /* of slices, the caller's; NULL: none */
 } read_files;
 
-/* A file that is read, by any of its names; nothing where there is none, or for NULL. */
+/* A file or a folder that is read, a data set among these, by any of its names; nothing where there
+ * is none, or for NULL. Volumes: read_data.h. */
 int read_files_add(read_files *r, const char *path);
 /* A transfer function as options have it: a file, one of several in a file, "FILE#NAME", or a
  * preset, which is nothing; the same for NULL. */
 int read_files_add_function(read_files *r, const char *name);
-/* A data set, or a volume that is read so. The context stays as it is. */
-int read_files_add_data(read_files *r, triptych *t, const char *input,
-                        const triptych_brick_options *options);
 void read_files_release(read_files *r);
 
 /* TRIP_USAGE, once reported, where `output` would take the place of something that is read, or come

@@ -51,8 +51,7 @@ static triptych_brick_options brick_options(const render_options *o, const seque
         options.range_count = shown->range_count;
     }
     options.automatic = 1;
-    if (o->settings.classify == TRIPTYCH_PRE && render_options_have_levels(&o->settings))
-        options.levels_for = TRIPTYCH_LEVELS_FOR_BOTH;
+    options.levels_for = o->levels_for;
     options.memory_bytes = o->memory_bytes;
     options.threads = (unsigned)(o->threads < MOST_THREADS ? o->threads : MOST_THREADS);
     return options;

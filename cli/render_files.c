@@ -5,7 +5,7 @@
 
 #include "new_file.h"
 #include "options.h"
-#include "read_files.h"
+#include "read_data.h"
 #include "render_stats.h"
 #include "report.h"
 #include "video.h"

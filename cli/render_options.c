@@ -122,7 +122,10 @@ static const struct argp_option options[] = {
       "or "
       "a video",
       1 },
-    { "fps", KEY_FPS, "N", 0, "Images a second of a video (default: the path's, else 30)", 1 },
+    { "fps", KEY_FPS, "N", 0,
+      "Images a second of a video; a path takes as long with more of them (default: the path's, "
+      "else 30)",
+      1 },
     { NULL, 0, NULL, 0, "Look:", 2 },
     { "tf", KEY_TF, "NAME|FILE", 0,
       "Transfer function (default: kept in the data set): auto, ct, mr, fog, labels or simulation, "
@@ -699,7 +702,8 @@ static int check_sequence(const parse *p)
     return check_path(p);
 }
 
-bool render_options_have_levels(const triptych_settings *s)
+/* Whether pictures are to be drawn by coarse levels. */
+static bool have_levels(const triptych_settings *s)
 {
     return s->lod_px > 0 || s->max_bytes > 0 || s->max_ms > 0;
 }
@@ -748,7 +752,7 @@ static int check_integral(parse *p)
     if (integral && o->settings.show != TRIPTYCH_SHOW_PICTURE)
         return trip_option_fail("--show", "does not apply to --renderer integral, which has no "
                                           "lists and no levels");
-    if (integral && render_options_have_levels(&o->settings))
+    if (integral && have_levels(&o->settings))
         return trip_option_fail(
             "--lod, --max-bytes, --max-ms",
             "do not apply to --renderer integral, which draws the finest level");
@@ -789,7 +793,7 @@ static int choose_renderer(parse *p)
         return trip_option_fail("--weights", "vertex goes with --compositing splat");
     if (image && (p->compositing || s->traversal != TRIPTYCH_OUTWARD))
         return trip_option_fail("--method", "image goes without --compositing and --traversal");
-    if ((image || fixed) && render_options_have_levels(s))
+    if ((image || fixed) && have_levels(s))
         return trip_option_fail(image ? "--method image" : "--kernel fixed",
                                 "goes without --lod, --max-bytes and --max-ms");
     if (reference && o->renderer != TRIPTYCH_RENDERER_AUTO &&
@@ -955,6 +959,8 @@ static int check(parse *p)
     const char *extension = strrchr(o->output, '.');
     if (!p->background && extension && !strcasecmp(extension, ".exr"))
         memset(o->settings.background, 0, sizeof o->settings.background);
+    const bool coarse_splats = o->settings.classify == TRIPTYCH_PRE && have_levels(&o->settings);
+    o->levels_for = quality_options_levels(&p->quality, coarse_splats);
     return 0;
 }
 
@@ -1044,7 +1050,7 @@ int render_options_parse(render_options *o, int argc, char **argv)
         return status;
     *o = chosen;
     memcpy(o->measured, p.quality.measured, sizeof o->measured);
-    p = (parse){ .o = o, .again = true };
+    p = (parse){ .o = o, .again = true, .quality = p.quality };
     argv[0] = name;
     return trip_options_parse(&argp, argc, argv, &p);
 }

@@ -54,11 +54,9 @@ typedef struct render_options {
     int threads;           /* 0: the default */
     bool explain, count;
     char measured[ACCURACY_CHECKSUM_BYTES]; /* the data set that --error has to be of, or "" */
+    triptych_levels_for levels_for;         /* that a volume is bricked with */
 } render_options;
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int render_options_parse(render_options *o, int argc, char **argv);
-/* Whether pictures are to be drawn by coarse levels. */
-bool render_options_have_levels(const triptych_settings *s);
-
 #endif

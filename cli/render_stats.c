@@ -351,6 +351,14 @@ int render_stats_explain_count(triptych *t, FILE *out)
     return each_list(t, explain_counted, out);
 }
 
+/* What was read, a record each. */
+static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
+{
+    const bool splats = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? o->field == RENDER_FIELD_SPLATS
+                                                                  : frame->classify == TRIPTYCH_PRE;
+    return splats ? "splats" : "voxels";
+}
+
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out)
 {
     char text[32];
@@ -360,7 +368,7 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
         return status;
     trip_text_write(out, path);
     fprintf(out, ": %d x %d, %.2f million %s, %s read, %.2f s\n", o->width, o->height,
-            (double)frame.splats * 1e-6, frame.classify == TRIPTYCH_PRE ? "splats" : "voxels",
+            (double)frame.splats * 1e-6, things_read(o, &frame),
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     return 0;
 }

@@ -7,14 +7,27 @@
 #include "library.h"
 #include "report.h"
 
+/* At another rate a path has as many seconds, and so other frames. */
+static int load_path(sequence *s)
+{
+    const double fps = s->o->fps;
+    int status = trip_camera_path_load(&s->path, s->o->path);
+    if (status)
+        return status;
+    if (fps > 0)
+        s->path.frames_per_second = fps;
+    s->frames = trip_camera_path_frames(&s->path);
+    return fps > 0 && s->frames == TRIP_CAMERA_PATH_FRAMES
+               ? trip_fail(TRIP_USAGE, "usage", "--fps", "makes the path %d frames long, or longer",
+                           TRIP_CAMERA_PATH_FRAMES)
+               : 0;
+}
+
 int sequence_load(sequence *s, const render_options *o)
 {
     s->o = o;
     s->frames = o->orbit ? o->orbit : 1;
-    int status = o->path ? trip_camera_path_load(&s->path, o->path) : 0;
-    if (!status && o->path)
-        s->frames = trip_camera_path_frames(&s->path);
-    return status;
+    return o->path ? load_path(s) : 0;
 }
 
 bool sequence_has_functions(const sequence *s)

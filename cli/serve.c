@@ -206,8 +206,9 @@ static int choose_settings(serve_options *o)
     int status = quality_options_use(&o->quality, &drawn, &p->settings, &p->renderer, false);
     if (o->classify_given)
         p->settings.classify = o->classify;
-    if (p->settings.classify == TRIPTYCH_PRE) /* moving views are then drawn by coarse splats */
-        o->volume.options.levels_for = TRIPTYCH_LEVELS_FOR_BOTH;
+    /* By which moving views are then drawn. */
+    const bool coarse_splats = p->settings.classify == TRIPTYCH_PRE;
+    o->volume.options.levels_for = quality_options_levels(&o->quality, coarse_splats);
     o->volume.measured_volume = drawn.input;
     o->volume.measured = o->quality.error > 0 ? o->quality.measured : NULL;
     return status;

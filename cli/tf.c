@@ -12,7 +12,7 @@
 #include "library.h"
 #include "new_file.h"
 #include "options.h"
-#include "read_files.h"
+#include "read_data.h"
 #include "report.h"
 #include "text.h"
 

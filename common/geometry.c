@@ -46,6 +46,20 @@ double trip_affine_determinant(const trip_affine *a)
            m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
+bool trip_affine_is_similarity(const trip_affine *a)
+{
+    const double size = cbrt(fabs(trip_affine_determinant(a))), unit = size * size;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
+            double dot = 0;
+            for (int k = 0; k < 3; k++)
+                dot += a->m[k][i] * a->m[k][j];
+            if (fabs(dot - (i == j ? unit : 0)) > 1e-9 * unit)
+                return false;
+        }
+    return true;
+}
+
 bool trip_affine_invert(const trip_affine *a, trip_affine *out)
 {
     const double(*m)[4] = a->m;

@@ -89,6 +89,9 @@ trip_vec3 trip_affine_vector(const trip_affine *a, trip_vec3 v);
 trip_vec3 trip_affine_transpose_vector(const trip_affine *a, trip_vec3 n);
 trip_affine trip_affine_multiply(const trip_affine *a, const trip_affine *b);
 double trip_affine_determinant(const trip_affine *a);
+/* Whether it is made of a rotation, which may be mirrored, and one scale: a voxel is as long every
+ * way. */
+bool trip_affine_is_similarity(const trip_affine *a);
 /* False when the map is singular or not finite. */
 bool trip_affine_invert(const trip_affine *a, trip_affine *out);
 

@@ -1,6 +1,5 @@
 #include "text.h"
 
-#include <locale.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -35,11 +34,16 @@ bool trip_text_to_double(const char *text, double *out)
     return true;
 }
 
+locale_t trip_text_use_points(void)
+{
+    pthread_once(&c_locale_once, make_c_locale);
+    return uselocale(c_locale);
+}
+
 const char *trip_text_from_double(double value, char *text)
 {
     char *end = NULL;
-    pthread_once(&c_locale_once, make_c_locale);
-    locale_t before = uselocale(c_locale);
+    locale_t before = trip_text_use_points();
     for (int digits = 15; digits <= 17; digits++) {
         snprintf(text, 32, "%.*g", digits, value);
         if (to_double(text, &end) == value)

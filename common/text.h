@@ -3,6 +3,7 @@
 #ifndef TRIP_TEXT_H
 #define TRIP_TEXT_H
 
+#include <locale.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -14,6 +15,10 @@ bool trip_text_to_double(const char *text, double *out);
 
 /* The shortest text that reads back as the same number, into `text` (at least 32 bytes). */
 const char *trip_text_from_double(double value, char *text);
+
+/* Numbers that this thread prints have decimal points from here on, until what is returned is given
+ * to uselocale(). */
+locale_t trip_text_use_points(void);
 
 /* A character of a text. Printable are all characters of valid UTF-8 but for those that terminals
  * act on: control characters, also those of two bytes, line separators, and marks that change the

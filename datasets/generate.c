@@ -12,6 +12,7 @@
 #include "interrupt.h"
 #include "new_file.h"
 #include "report.h"
+#include "text.h"
 #include "write_vdb.h"
 
 enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, SLICES = 8 };
@@ -231,8 +232,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
             argp_error(state, "--type: '%s' is not uint8, uint16 or float", arg);
         return 0;
     case 'd':
-        j->detail = strtod(arg, &end);
-        if (*end || !(j->detail > 0 && j->detail < 1e6))
+        if (!trip_text_to_double(arg, &j->detail) || !(j->detail > 0 && j->detail < 1e6))
             argp_error(state, "--detail: '%s' is not a positive number", arg);
         return 0;
     case 'j':

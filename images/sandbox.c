@@ -178,7 +178,7 @@ static bool deny_others(scmp_filter_ctx filter)
     static const int signals[] = { SCMP_SYS(kill), SCMP_SYS(tgkill), SCMP_SYS(rt_sigqueueinfo),
                                    SCMP_SYS(rt_tgsigqueueinfo) };
     struct scmp_arg_cmp no_thread = SCMP_CMP64(0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, 0);
-    struct scmp_arg_cmp other = SCMP_CMP64(0, SCMP_CMP_NE, (uint64_t)getpid());
+    struct scmp_arg_cmp other = SCMP_CMP64(0, SCMP_CMP_NE, (uint64_t)getpid(), 0);
     bool good = seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0) == 0 &&
                 seccomp_rule_add_array(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(clone), 1,
                                        &no_thread) == 0 &&

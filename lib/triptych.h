@@ -57,8 +57,8 @@ TRIPTYCH_API const char *triptych_error(const triptych *t);
 TRIPTYCH_API void triptych_set_messages(triptych *t, void (*take)(void *user, const char *line),
                                         void *user);
 /* Calls `show` now and then during long work, on the calling thread: how much of a stage is done.
- * Stages are "draw" and "count" (of splats), "integrate" (of pixels), and those of
- * triptych_brick.h. NULL: no calls. */
+ * Stages are "draw" (of voxels, post), "splat" and "count" (of splats, pre), "integrate" (of
+ * pixels), and those of triptych_brick.h. NULL: no calls. */
 TRIPTYCH_API void triptych_set_progress(triptych *t,
                                         void (*show)(void *user, const char *stage, uint64_t done,
                                                      uint64_t total),

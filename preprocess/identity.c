@@ -9,6 +9,7 @@
 #include "levels.h"
 #include "report.h"
 #include "source.h"
+#include "text.h"
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
@@ -59,8 +60,10 @@ static int make_text(const trip_brick_params *p, const char *input, trip_tf *con
     if (!f)
         return fail_memory(p);
     fputs(input, f);
+    locale_t before = trip_text_use_points();
     write_volume_params(f, &p->volume);
     write_params(f, p, functions);
+    uselocale(before);
     return fclose(f) == 0 ? 0 : fail_memory(p);
 }
 

@@ -6,10 +6,15 @@
 #include "light_shares.h"
 #include "report.h"
 
-enum { CODES = 65536, SLOTS = 4, SLOT_BYTES = 256 << 10 };
+enum {
+    CODES = 65536,
+    SLOTS = 4,
+    SLOT_BYTES = 256 << 10,
+    PIECE_NODES = 1 << 16, /* that a step averages or clears: less than a millisecond */
+};
 
 /* What is to be done next. */
-typedef enum stage { GATHER, SWEEP_REACHED, SWEEP_OPEN, COMPLETE } stage;
+typedef enum stage { GATHER, AVERAGE, SWEEP_REACHED, SWEEP_OPEN, COMPLETE } stage;
 
 struct trip_light_map {
     trip_budget *budget;
@@ -31,13 +36,15 @@ struct trip_light_map {
     double *memory;
     trip_light_grid extinction, reached, open;
     size_t nodes, open_nodes;
-    trip_light_shares shares[3]; /* while it gathers, where spacing is uneven */
+    trip_light_shares shares[3]; /* while it gathers and averages, where spacing is uneven */
 
     stage stage;
-    trip_reader *reader;        /* while it gathers; else NULL */
+    trip_reader *reader;        /* while it gathers and averages; else NULL */
     trip_selection *selections; /* then: room for all lists of the data set */
     unsigned list_count;
     trip_pass pass;
+    size_t averaged; /* rows of nodes */
+    size_t cleared;  /* nodes of the grid that is swept next */
     trip_light_sweep sweep;
     bool sweeping;
     int part;         /* direction of `open`, or region of a light at a place, being swept */
@@ -64,6 +71,7 @@ static void stop_gathering(trip_light_map *m)
         trip_selection_destroy(&m->selections[i], m->budget);
     trip_budget_release(m->budget, m->selections, m->list_count * sizeof *m->selections);
     m->selections = NULL;
+    m->averaged = 0;
     m->pass = (trip_pass){ 0 };
     for (int a = 0; a < 3; a++)
         trip_light_shares_destroy(&m->shares[a], m->budget);
@@ -74,6 +82,7 @@ static void stop_sweeping(trip_light_map *m)
     trip_light_sweep_end(&m->sweep);
     m->sweeping = false;
     m->part = 0;
+    m->cleared = 0;
 }
 
 static void drop_open(trip_light_map *m)
@@ -331,7 +340,7 @@ int trip_light_map_begin(trip_light_map *m, const trip_light_source *s)
         return status;
     const bool same = take_light(m, s);
     m->has_reached &= same;
-    if (m->stage != GATHER && !(same && m->stage == next_stage(m))) {
+    if (m->stage > AVERAGE && !(same && m->stage == next_stage(m))) {
         stop_sweeping(m);
         m->stage = next_stage(m);
     }
@@ -427,22 +436,32 @@ static double shares_at(const trip_light_map *m, int axis, int node)
     return sum;
 }
 
-/* Sums into means, as floats, each before what is still to be read. */
-static void finish_gathering(trip_light_map *m)
+/* A row's sums into means, as floats, each before what is still to be read. */
+static void average_row(trip_light_map *m, size_t row)
 {
     const trip_light_grid *g = &m->extinction;
-    size_t n = 0;
-    for (int k = 0; k < g->nodes[2]; k++)
-        for (int j = 0; j < g->nodes[1]; j++) {
-            double row = shares_at(m, 2, k) * shares_at(m, 1, j);
-            for (int i = 0; i < g->nodes[0]; i++, n++) {
-                double sum;
-                memcpy(&sum, &m->memory[n], sizeof sum);
-                float mean = sum > 0 ? (float)(sum / (row * shares_at(m, 0, i))) : 0;
-                memcpy(&g->at[n], &mean, sizeof mean);
-            }
-        }
-    stop_gathering(m);
+    const int j = (int)(row % (size_t)g->nodes[1]), k = (int)(row / (size_t)g->nodes[1]);
+    const double shares = shares_at(m, 2, k) * shares_at(m, 1, j);
+    size_t n = row * (size_t)g->nodes[0];
+    for (int i = 0; i < g->nodes[0]; i++, n++) {
+        double sum;
+        memcpy(&sum, &m->memory[n], sizeof sum);
+        float mean = sum > 0 ? (float)(sum / (shares * shares_at(m, 0, i))) : 0;
+        memcpy(&g->at[n], &mean, sizeof mean);
+    }
+}
+
+/* A piece. */
+static int average(trip_light_map *m)
+{
+    const size_t row_nodes = (size_t)m->extinction.nodes[0], rows = m->nodes / row_nodes;
+    for (size_t done = 0; done < PIECE_NODES && m->averaged < rows; done += row_nodes)
+        average_row(m, m->averaged++);
+    if (m->averaged == rows) {
+        stop_gathering(m);
+        m->stage = next_stage(m);
+    }
+    return TRIP_FRAME_MORE;
 }
 
 static int gather(trip_light_map *m)
@@ -469,8 +488,7 @@ static int gather(trip_light_map *m)
         m->stats.bytes_read = read.bytes_read;
         m->stats.reads = read.reads;
     }
-    finish_gathering(m);
-    m->stage = next_stage(m);
+    m->stage = AVERAGE;
     return TRIP_FRAME_MORE;
 }
 
@@ -485,13 +503,26 @@ static bool begin_sweep(trip_light_map *m)
                           : trip_light_sweep_begin(&m->sweep, m->light, m->budget);
 }
 
-/* The first time, the grid starts from 0. */
+/* Of the stage. */
+static trip_light_grid *swept_grid(trip_light_map *m)
+{
+    return m->stage == SWEEP_OPEN ? &m->open : &m->reached;
+}
+
+/* The grid starts from 0: a piece of that; false where nothing is left to clear. */
+static bool clear(trip_light_map *m)
+{
+    const size_t left = trip_light_grid_count(swept_grid(m)) - m->cleared;
+    const size_t count = left < PIECE_NODES ? left : PIECE_NODES;
+    memset(swept_grid(m)->at + m->cleared, 0, count * sizeof *m->reached.at);
+    m->cleared += count;
+    return count > 0;
+}
+
 static int start_sweep(trip_light_map *m)
 {
     bool open = m->stage == SWEEP_OPEN;
-    trip_light_grid *out = open ? &m->open : &m->reached;
-    if (m->part == 0)
-        memset(out->at, 0, (open ? m->open_nodes : m->nodes) * sizeof *out->at);
+    trip_light_grid *out = swept_grid(m);
     m->sweep = (trip_light_sweep){ .extinction = &m->extinction,
                                    .out = out,
                                    .weight = open ? 1.0 / TRIP_OPEN_DIRECTIONS : 1,
@@ -511,6 +542,8 @@ static int sweep_count(const trip_light_map *m)
 /* A layer. */
 static int sweep(trip_light_map *m, const trip_task_runner *runner)
 {
+    if (clear(m))
+        return TRIP_FRAME_MORE;
     int status = m->sweeping ? 0 : start_sweep(m);
     if (status)
         return status;
@@ -521,6 +554,7 @@ static int sweep(trip_light_map *m, const trip_task_runner *runner)
     if (++m->part < sweep_count(m))
         return TRIP_FRAME_MORE;
     m->part = 0;
+    m->cleared = 0;
     m->has_reached |= m->stage == SWEEP_REACHED;
     m->has_open |= m->stage == SWEEP_OPEN;
     m->stage = next_stage(m);
@@ -532,8 +566,10 @@ int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner)
     const uint64_t start = trip_frame_now_ns();
     if (m->stage == COMPLETE)
         return TRIP_FRAME_DONE;
-    bool gathers = m->stage == GATHER;
-    int status = gathers ? gather(m) : sweep(m, runner);
+    const bool gathers = m->stage <= AVERAGE;
+    int status = m->stage == GATHER    ? gather(m)
+                 : m->stage == AVERAGE ? average(m)
+                                       : sweep(m, runner);
     m->made_ns = trip_frame_now_ns();
     double ms = (double)(m->made_ns - start) * 1e-6;
     m->stats.gather_ms += gathers ? ms : 0;

@@ -785,6 +785,11 @@ uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *dat
     return bytes;
 }
 
+bool trip_plan_is_of_values(const trip_plan *plan, const trip_settings *s)
+{
+    return plan->gathers ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;
+}
+
 static void explain_shading(const trip_plan *plan, const trip_dataset *data, const trip_settings *s,
                             FILE *out)
 {
@@ -792,8 +797,7 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
                         : s->point_light ? "from the place given"
                                          : "from the direction given";
     char bytes[32];
-    bool of_values =
-        plan->gathers ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;
+    const bool of_values = trip_plan_is_of_values(plan, s);
     if (of_values && s->shading)
         fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
     else if (of_values)

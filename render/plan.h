@@ -99,6 +99,9 @@ uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t 
 /* Whether that is all of them, of any square of the list. */
 bool trip_plan_draws_all(const trip_plan *plan, const trip_list *list);
 
+/* Whether a frame is of interpolated values: not of splats. */
+bool trip_plan_is_of_values(const trip_plan *plan, const trip_settings *settings);
+
 /* Selected in all lists. */
 uint64_t trip_plan_splats(const trip_plan *plan);
 

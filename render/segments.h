@@ -28,6 +28,12 @@ typedef struct trip_segment {
     double rgb[3];     /* weighted by extinction */
 } trip_segment;
 
+/* The integral from 0 to 1 of the product of two functions that are linear between these values. */
+static inline double trip_segment_product(double a0, double a1, double b0, double b1)
+{
+    return (a0 * (2 * b0 + b1) + a1 * (b0 + 2 * b1)) / 6;
+}
+
 /* `table` has TRIP_SEGMENT_CODES entries and outlives it. */
 void trip_segments_make(trip_segments *s, const trip_tf_entry *table);
 

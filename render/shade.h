@@ -34,6 +34,13 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 
+/* So that squares of 65536 times it are floats: gradients that are steeper still are as well lit.
+ */
+static inline double trip_shade_within_floats(double x)
+{
+    return fmin(1e12, fmax(-1e12, x));
+}
+
 /* What is the same for all gradients at a point: unit vectors in world space, that to a light which
  * is at the very point zero. Along a ray from the eye it does not change, but for a light that is
  * at a place. */

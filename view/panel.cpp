@@ -516,7 +516,7 @@ bool draw_light(trip_panel *p, trip_document *d)
 bool draw_quality(trip_panel *p, trip_document *d)
 {
     triptych_settings *s = &d->settings;
-    static const char *const classes[] = { "Before splatting", "After interpolation", "By itself" };
+    static const char *const classes[] = { "Before splatting", "After interpolation", "Auto" };
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
     bool changed = choose(p, "Classify", &s->classify, classes, 3);
     if (s->classify != TRIPTYCH_PRE) {

@@ -230,15 +230,15 @@ static int parse_file(parser *p)
 static int parse_click(parser *p)
 {
     char *label = NULL;
-    const double part = strtod(p->words[1], &label);
+    const char *part = strtok_r(p->words[1], " \t", &label);
+    trip_event e = { .kind = TRIP_EVENT_CLICK };
+    if (!trip_text_to_double(part, &e.x) || !(e.x >= 0 && e.x <= 1))
+        return fail_at(p, "`%.40s` is not how far along a control, 0 to 1", part);
     label += strspn(label, " \t");
-    if (label == p->words[1] || !(part >= 0 && part <= 1) || !*label)
-        return fail_at(p, "`%.40s` is not how far along, 0 to 1, and a control's label",
-                       p->words[1]);
-    char *text = strdup(label);
-    if (!text)
-        return fail_at(p, "out of memory");
-    return add(p, (trip_event){ .kind = TRIP_EVENT_CLICK, .x = part, .text = text });
+    if (!*label)
+        return fail_at(p, "a control's label is missing after how far along it");
+    e.text = strdup(label);
+    return e.text ? add(p, e) : fail_at(p, "out of memory");
 }
 
 enum { REST = -1 }; /* in place of a count: the rest of the line */

@@ -29,21 +29,6 @@ static void set_along(double out[4], const trip_cpu_view *view, trip_vec3 to)
     out[3] = -trip_dot(to, camera->eye);
 }
 
-static bool is_similarity(const trip_affine *a)
-{
-    double size = cbrt(fabs(trip_affine_determinant(a)));
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            double dot = 0;
-            for (int k = 0; k < 3; k++)
-                dot += a->m[k][i] * a->m[k][j];
-            if (fabs(dot - (i == j) * size * size) > 1e-9 * size * size)
-                return false;
-        }
-    }
-    return true;
-}
-
 /* |a + x b + y c|^2, as ray2 in trip_cpu_view. */
 static void set_form(float out[6], trip_vec3 a, trip_vec3 b, trip_vec3 c)
 {
@@ -72,7 +57,7 @@ static void set_forms(trip_cpu_view *view)
 static void set_rays(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
-    bool alike = is_similarity(&camera->index_to_world);
+    bool alike = trip_affine_is_similarity(&camera->index_to_world);
     bool usual = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
     usual |= view->sums;
     view->stretch_varies = !(camera->ortho || alike);

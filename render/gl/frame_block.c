@@ -228,21 +228,6 @@ void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *i
         to[i] = (float)from[i];
 }
 
-/* Whether index-to-world is a rotation and one scale, so that a voxel is as long every way. */
-static bool is_isotropic(const trip_camera *c)
-{
-    const double(*m)[4] = c->index_to_world.m;
-    double unit = c->voxel_world * c->voxel_world;
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j <= i; j++) {
-            double dot = m[0][i] * m[0][j] + m[1][i] * m[1][j] + m[2][i] * m[2][j];
-            if (fabs(dot - (i == j ? unit : 0)) > 1e-9 * unit)
-                return false;
-        }
-    }
-    return true;
-}
-
 unsigned trip_gl_frame_placed(const trip_settings *settings)
 {
     const trip_effects *e = &settings->effects;
@@ -257,7 +242,7 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
     unsigned effects = uneven ? TRIP_GL_UNEVEN : 0;
     if (camera->ortho)
         effects |= TRIP_GL_PARALLEL;
-    else if (uneven || !is_isotropic(camera))
+    else if (uneven || !trip_affine_is_similarity(&camera->index_to_world))
         effects |= TRIP_GL_ANISOTROPIC;
     bool normals = frame->plan->planes & 1u << TRIP_PLANE_NORMALS;
     if (normals && s->shading)

@@ -4,6 +4,7 @@
 
 #include "gl/shared.h"
 #include "report.h"
+#include "segments.h"
 
 enum { CODES = 65536, SUMS_BYTES = CODES * sizeof(struct trip_gl_sum) };
 
@@ -47,18 +48,12 @@ static void fill_entries(struct trip_gl_sum *sums, const trip_tf_entry *table, d
     }
 }
 
-/* The integral from 0 to 1 of the product of two functions that are linear between these values. */
-static double product(double a0, double a1, double b0, double b1)
-{
-    return (a0 * (2 * b0 + b1) + a1 * (b0 + 2 * b1)) / 6;
-}
-
 /* From a code to the next: of extinction times each component of colour, and of extinction. */
 static void integrate_step(const struct trip_gl_sum *at, double out[4])
 {
     const float *a = at[0].entry, *b = at[1].entry;
     for (int i = 0; i < 3; i++)
-        out[i] = product(a[3], b[3], a[i], b[i]);
+        out[i] = trip_segment_product(a[3], b[3], a[i], b[i]);
     out[3] = 0.5 * ((double)a[3] + b[3]);
 }
 

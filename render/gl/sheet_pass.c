@@ -54,13 +54,6 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
     v->slope[1] = usable ? w : 0;
 }
 
-/* So that squares of 65536 times it are floats: gradients that are steeper still are as well lit.
- */
-static double within_floats(double x)
-{
-    return fmin(1e12, fmax(-1e12, x));
-}
-
 /* The map from differences of codes, list axes, to world space is the inverse transpose of the
  * index's. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
@@ -74,8 +67,9 @@ static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
     trip_affine_invert(&frame->data->index_to_world, &to_index); /* it was checked on opening */
     for (int i = 0; i < 3; i++) {
         const double *row = to_index.m[(v->axis + i) % 3];
-        *columns[i] = linear(within_floats(unit * row[0]), within_floats(unit * row[1]),
-                             within_floats(unit * row[2]), 0);
+        *columns[i] =
+            linear(trip_shade_within_floats(unit * row[0]), trip_shade_within_floats(unit * row[1]),
+                   trip_shade_within_floats(unit * row[2]), 0);
     }
 }
 

@@ -10,6 +10,7 @@
 #include "report.h"
 #include "shade.h"
 #include "splat.h"
+#include "text.h"
 
 static const struct {
     const char *vertex, *fragment, *compute;
@@ -57,11 +58,9 @@ static void write_effects(FILE *out, unsigned effects)
             fprintf(out, "#define %s\n", names[i].name);
 }
 
-static int write_defines(const trip_gl_variant *variant, char *text, size_t bytes)
+static void write_defines(FILE *out, const trip_gl_variant *variant)
 {
-    FILE *out = fmemopen(text, bytes, "w");
-    if (!out)
-        return trip_fail(TRIP_ERROR, "gl", "shaders", "out of memory");
+    locale_t before = trip_text_use_points();
     if (passes[variant->pass].in_double)
         fprintf(out, "#define TRIP_DOUBLE\n");
     fprintf(out, "#define METHOD %d\n#define LAYERS %u\n", (int)variant->method, variant->layers);
@@ -76,16 +75,17 @@ static int write_defines(const trip_gl_variant *variant, char *text, size_t byte
                 "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"
                 "#define SHININESS %f\n#define FACING %f\n",
                 TRIP_AMBIENT, TRIP_DIFFUSE, TRIP_SPECULAR, TRIP_SHININESS, TRIP_FACING);
-    fclose(out);
-    return TRIP_OK;
+    uselocale(before);
 }
 
 static int build(const trip_gl_variant *variant, GLuint *program)
 {
     char defines[1536] = "";
-    int status = write_defines(variant, defines, sizeof defines);
-    if (status)
-        return status;
+    FILE *out = fmemopen(defines, sizeof defines, "w");
+    if (!out)
+        return trip_fail(TRIP_ERROR, "gl", "shaders", "out of memory");
+    write_defines(out, variant);
+    fclose(out);
     return trip_gl_program_build(program, &(trip_gl_program_source){
                                               .vertex = passes[variant->pass].vertex,
                                               .fragment = passes[variant->pass].fragment,

@@ -156,6 +156,33 @@ static void a_report_of_another_data_set_is_refused(void **state)
     assert_string_equal(own, cases[0].wanted);
 }
 
+static void a_report_says_what_levels_its_data_set_was_bricked_with(void **state)
+{
+    (void)state;
+    const struct {
+        const char *text;
+        bool says;
+        triptych_levels_for levels_for;
+    } cases[] = { { "\"levels_for\":\"auto\",", true, TRIPTYCH_LEVELS_FOR_AUTO },
+                  { "\"levels_for\":\"both\",", true, TRIPTYCH_LEVELS_FOR_BOTH },
+                  { "\"levels_for\":\"all\",", false, TRIPTYCH_LEVELS_FOR_AUTO },
+                  { "\"levels_for\":3,", false, TRIPTYCH_LEVELS_FOR_AUTO },
+                  { "", false, TRIPTYCH_LEVELS_FOR_AUTO } };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[512];
+        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        snprintf(
+            text, sizeof text,
+            "{\"triptych_accuracy\":1,\"data_set\":\"a.trip\",\"shading\":true,%s\"rows\":[" ROW(
+                "a", "1", "1", "") "]}",
+            cases[i].text);
+        assert_int_equal(
+            accuracy_fastest_in(text, "a.json", &(accuracy_wanted){ .error = 9 }, &found), 0);
+        assert_int_equal(found.says_levels, cases[i].says);
+        assert_int_equal(found.levels_for, cases[i].levels_for);
+    }
+}
+
 static void a_report_lies_beside_the_data(void **state)
 {
     (void)state;
@@ -179,6 +206,7 @@ int main(void)
         cmocka_unit_test(the_fastest_below_the_error_is_taken),
         cmocka_unit_test(what_is_no_report_is_refused),
         cmocka_unit_test(a_report_of_another_data_set_is_refused),
+        cmocka_unit_test(a_report_says_what_levels_its_data_set_was_bricked_with),
         cmocka_unit_test(a_report_lies_beside_the_data),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

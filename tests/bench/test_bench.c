@@ -288,6 +288,31 @@ static void assert_a_plot(const char *path, const char *label)
     assert_true(!strncmp(text, "<svg ", 5) && strstr(text, "</svg>\n") && strstr(text, label));
 }
 
+static void a_plot_takes_the_place_of_nothing_that_is_read(void **state)
+{
+    (void)state;
+    static const char function[] = "0 0 0 0 0\n255 1 1 1 0.5\n";
+    const char *const plots[] = { "f.tf", "./f.tf", "block.trip/index.trip", "block.trip/new.svg",
+                                  "missing/new.svg" };
+    const char *const says[] = { "is read, and would be replaced", "is read, and would be replaced",
+                                 "among the files that are read", "among the files that are read",
+                                 "cannot create" };
+    program_run r;
+    char text[64];
+    FILE *f = fopen("f.tf", "w");
+    assert_true(f && fputs(function, f) >= 0 && fclose(f) == 0);
+    for (int i = 0; i < 5; i++) {
+        program_call(&r, "bench popping block.trip --size 8x8 --tf f.tf --plot %s", plots[i]);
+        assert_fails(&r, i < 4 ? 2 : 1);
+        assert_non_null(strstr(r.err, says[i]));
+        assert_int_equal(r.out[0], 0);
+    }
+    program_read("f.tf", text, sizeof text);
+    assert_string_equal(text, function);
+    program_call(&r, "info block.trip");
+    assert_works(&r);
+}
+
 /* The first row is what the others are compared with. */
 static void forms_compares_what_the_papers_do_with_the_usual_picture(void **state)
 {
@@ -542,6 +567,7 @@ int main(void)
             without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
         cmocka_unit_test(forms_compares_what_the_papers_do_with_the_usual_picture),
         cmocka_unit_test(popping_is_of_axis_alone),
+        cmocka_unit_test(a_plot_takes_the_place_of_nothing_that_is_read),
         cmocka_unit_test(levels_of_a_plain_block_are_near_the_finest),
         cmocka_unit_test(levels_without_a_data_set_samples_an_object_and_plots_it),
         cmocka_unit_test(flight_ends_with_the_picture_of_render_and_counts_each_picture_once),

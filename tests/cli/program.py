@@ -31,6 +31,9 @@ QUICK_PROGRAM = os.environ["TRIP_QUICK_PROGRAM"]
 GENERATE = os.environ["TRIP_GENERATE"]
 DATASETS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "datasets")
 SANITIZED = bool(os.environ.get("TRIP_SANITIZE"))
+# Mesa finds the shaders that it has compiled where it always does, whatever cache a test has.
+os.environ.setdefault("MESA_SHADER_CACHE_DIR",
+                      os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
 SWITCHED_OFF = os.environ.get("TRIP_SWITCHED_OFF", "").split()  # "GL", "OPENVDB"
 GL = () if "GL" in SWITCHED_OFF else ("gl",)  # for lists of renderers
 if "OPENVDB" in SWITCHED_OFF:
@@ -85,10 +88,13 @@ def call(*arguments, timeout=60, **options):
 
 
 class ProgramTest(unittest.TestCase):
-    """Each class works in a folder of its own, the current one."""
+    """Each class works in a folder of its own, the current one, and bricks into a cache of its own."""
 
     @classmethod
     def setUpClass(cls):
+        cache = tempfile.TemporaryDirectory(prefix="trip-cache-")
+        cls.addClassCleanup(cache.cleanup)
+        os.environ["XDG_CACHE_HOME"] = cache.name
         cls.folder = tempfile.mkdtemp(prefix="trip-cli-")
         os.chdir(cls.folder)
 
@@ -238,17 +244,18 @@ def write_raw(path, volume):
     write(path, volume.tobytes())
 
 
-def write_report(folder, data_set):
+def write_report(folder, data_set, classify="post", levels_for="auto"):
     """As `triptych accuracy` makes it, of one setting; checksum 0 where no data set is given."""
     checksum = 0
     if data_set:
         with open(os.path.join(data_set, "index.trip"), "rb") as f:
             (checksum,) = struct.unpack_from("<Q", f.read(24), 16)
     os.makedirs(folder, exist_ok=True)
-    row = {"name": "one", "options": {"renderer": "cpu"}, "ms": 1, "total": {"worst_percentile_99": 1}}
+    row = {"name": "one", "options": {"renderer": "cpu", "classify": classify}, "ms": 1,
+           "total": {"worst_percentile_99": 1}}
     with open(os.path.join(folder, "accuracy.json"), "w", encoding="utf-8") as f:
-        json.dump({"triptych_accuracy": 1, "checksum": f"{checksum:016x}", "shading": True,
-                   "rows": [row]}, f)
+        json.dump({"triptych_accuracy": 1, "checksum": f"{checksum:016x}",
+                   "levels_for": levels_for, "shading": True, "rows": [row]}, f)
 
 
 def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little", geometry=None):

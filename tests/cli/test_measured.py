@@ -218,9 +218,11 @@ class Measured(program.ProgramTest):
         self.assertIn("classify    pre", said.stdout.decode())
         self.assertEqual(self.stats("cube.trip", *VIEW[:-2])["classify"], "post")
 
-    def test_what_post_draws_is_called_voxels(self):
-        for classify, what in ("pre", "splats"), ("post", "voxels"):
-            run = self.works("render", "cube.trip", "-o", "a.png", "--size=9x9", "--classify", classify)
+    def test_what_is_of_values_is_called_voxels(self):
+        integral = "--renderer=integral"
+        for *how, what in (["--classify=pre", "splats"], ["--classify=post", "voxels"],
+                           [integral, "voxels"], [integral, "--field=splats", "splats"]):
+            run = self.works("render", "cube.trip", "-o", "a.png", "--size=9x9", *how)
             self.assertIn(f" million {what}, ".encode(), run.stdout)
 
     def test_compositing_is_in_the_plan_and_the_stats(self):

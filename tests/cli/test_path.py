@@ -161,7 +161,6 @@ class Paths(program.ProgramTest):
         self.assertNotEqual(frames[2], frames[3])
 
     def test_a_volume_is_bricked_for_the_functions_of_a_path(self):
-        cache = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
         program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
         faint, clear = "1 1 0 0 0\n60 1 0 0 0.3\n200 1 0 0 0\n", "0 0 0 0 0\n255 1 1 1 0.5\n"
         program.write("clear.tf", clear.encode())
@@ -171,7 +170,7 @@ class Paths(program.ProgramTest):
         self.assertEqual(run.returncode, 0, run.stderr)
         for volume in "ball.nrrd", "all.trip":
             said = self.works("render", volume, "--path", path, "--no-shading", *SIZE, "-o",
-                              f"{volume}.exr", env=cache)
+                              f"{volume}.exr")
             self.assertEqual(said.stderr, "")
         for frame in "000", "001":
             numpy.testing.assert_allclose(*(program.read_exr(f"{v}-{frame}.exr")
@@ -231,6 +230,22 @@ class Paths(program.ProgramTest):
         self.assertEqual(given[given.index("-framerate") + 1], "12.5")
         self.assertEqual(os.path.getsize("a.webm"), 3 * 3600)
         os.remove("a.webm")
+
+    def test_more_images_a_second_of_a_path_are_seen_in_the_same_time(self):
+        path = self.path(key(0, 0), key(1, 60))
+        videos = []
+        for options, rate, frames in ([], "4", 5), (["--fps", "8"], "8", 9):
+            self.works("render", "v.trip", "-o", "a.mp4", *SIZE, "--path", path, *options,
+                       env=self.with_encoder)
+            given = open("given").read().split("\n")
+            self.assertEqual(given[given.index("-framerate") + 1], rate)
+            with open("a.mp4", "rb") as f:
+                videos.append(numpy.frombuffer(f.read(), numpy.uint8).reshape(frames, 30, 40, 3))
+        self.assertTrue((videos[1][::2] == videos[0]).all())
+        self.assertTrue((videos[1][1::2] != videos[0][1:]).any())
+        path = self.path(key(0, 0), key(200, 60))
+        self.leaves_nothing(2, "render", "v.trip", "-o", "b.mp4", "--path", path, "--fps", "600",
+                            env=self.with_encoder, says="100000 frames")
 
     @unittest.skipUnless(shutil.which("ffmpeg") and shutil.which("ffprobe"), "no ffmpeg")
     def test_a_video_shows_the_pictures_in_order(self):

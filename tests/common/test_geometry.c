@@ -45,6 +45,23 @@ static void determinant_is_the_volume_of_a_voxel(void **state)
     assert_close(trip_affine_determinant(&turned), 24, 1e-12);
 }
 
+static void similar_maps_turn_mirror_and_scale_alike(void **state)
+{
+    (void)state;
+    const trip_affine turns = { { { 0.6, -0.8, 0, 5 }, { 0.8, 0.6, 0, -9 }, { 0, 0, -1, 2 } } };
+    for (double size = 1e-9; size < 1e10; size *= 1e6) {
+        trip_affine a = turns;
+        for (int i = 0; i < 9; i++)
+            a.m[i / 3][i % 3] *= size;
+        assert_true(trip_affine_is_similarity(&a));
+        a.m[2][2] *= 1 + 1e-6;
+        assert_false(trip_affine_is_similarity(&a));
+        a.m[2][2] = size;
+        a.m[0][2] = 1e-6 * size; /* sheared */
+        assert_false(trip_affine_is_similarity(&a));
+    }
+}
+
 static void inverse_undoes_a_sheared_map(void **state)
 {
     (void)state;
@@ -80,6 +97,7 @@ int main(void)
         cmocka_unit_test(points_move_and_vectors_do_not),
         cmocka_unit_test(product_applies_the_right_map_first),
         cmocka_unit_test(determinant_is_the_volume_of_a_voxel),
+        cmocka_unit_test(similar_maps_turn_mirror_and_scale_alike),
         cmocka_unit_test(inverse_undoes_a_sheared_map),
         cmocka_unit_test(singular_and_infinite_maps_have_no_inverse),
         cmocka_unit_test(gradients_map_by_the_transpose),

@@ -65,14 +65,20 @@ static void a_locale_with_decimal_commas_changes_nothing(void **state)
 {
     (void)state;
     need_comma_locale();
-    char text[32];
+    char text[32], points[8], commas[8];
     double value = 0;
     bool read = trip_text_to_double("1.5", &value);
     trip_text_from_double(2.5, text);
+    locale_t before = trip_text_use_points();
+    snprintf(points, sizeof points, "%.1f", 3.5);
+    uselocale(before);
+    snprintf(commas, sizeof commas, "%.1f", 3.5);
     setlocale(LC_ALL, "C");
     assert_true(read);
     assert_true(value == 1.5);
     assert_string_equal(text, "2.5");
+    assert_string_equal(points, "3.5");
+    assert_string_equal(commas, "3,5");
 }
 
 static void check_character(const char *text, uint32_t code, unsigned bytes, bool printable)

@@ -494,7 +494,7 @@ static void functions_are_listed_and_converted(void **state)
 }
 
 typedef struct stages {
-    int draws, reads, others;
+    int draws, splats, reads, others;
 } stages;
 
 static void note_stage(void *user, const char *stage, uint64_t done, uint64_t total)
@@ -502,6 +502,7 @@ static void note_stage(void *user, const char *stage, uint64_t done, uint64_t to
     stages *s = user;
     assert_true(done <= total);
     s->draws += !strcmp(stage, "draw");
+    s->splats += !strcmp(stage, "splat");
     s->reads += !strcmp(stage, "read");
     s->others++;
 }
@@ -518,7 +519,13 @@ static void progress_goes_by_stages(void **state)
     assert_true(seen.reads > 0 && seen.draws == 0);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
-    assert_true(seen.draws > 0);
+    assert_true(seen.draws > 0 && seen.splats == 0);
+    triptych_settings s = triptych_default_settings();
+    s.classify = TRIPTYCH_PRE;
+    seen = (stages){ 0 };
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
+    assert_true(seen.splats > 0 && seen.draws == 0);
     assert_fails(t, triptych_brick(t, VOLUME, "progress.trip", NULL, &summary), TRIPTYCH_ERROR,
                  "progress.trip");
     triptych_destroy(t);

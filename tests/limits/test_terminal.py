@@ -57,14 +57,14 @@ class Terminal(limits.Test):
                 "1500x1500", "--kernel-radius", "3", "--tf", "preset:xray"]
 
     def test_a_long_frame_shows_rate_and_time_left_and_ctrl_c_ends_it(self):
-        line = rb"draw +\d+ %  [\d.]+ million voxels/s  \d+:\d\d left"
+        line = rb"splat +\d+ %  [\d.]+ million splats/s  \d+:\d\d left"
         status, shown = self.on_terminal(self.slow_frame(), line, b"\x03")
         self.assertEqual(status, 1, shown)
         self.assertRegex(shown, r"triptych: render: [^\n]*interrupted" + END)
         self.assertEqual([n for n in os.listdir(self.folder) if n.startswith("p.")], [])
 
     def test_a_second_ctrl_c_ends_it_at_once(self):
-        status, shown = self.on_terminal(self.slow_frame(), rb"draw", b"\x03\x03")
+        status, shown = self.on_terminal(self.slow_frame(), rb"splat", b"\x03\x03")
         self.assertIn(status, (1, -signal.SIGINT), shown)
         self.assertFalse(os.path.exists(self.picture))
 

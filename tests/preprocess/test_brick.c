@@ -5,7 +5,10 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include "comma_locale.h"
+#include "identity.h"
 #include "normal.h"
+
 enum { NX = 97, NY = 70, NZ = 61, N = NX * NY * NZ };
 
 static uint8_t bytes[N];
@@ -686,6 +689,24 @@ static void what_levels_were_asked_for_is_told(void **state)
     }
 }
 
+static void a_locale_with_decimal_commas_makes_no_other_data_set(void **state)
+{
+    (void)state;
+    char *points = NULL, *commas = NULL;
+    trip_brick_params p = params_for("uint8", "a.trip");
+    p.ranges = (const trip_value_range[]){ { 60.3, 255 } };
+    p.range_count = 1;
+    p.volume.spacing[0] = 0.7;
+    assert_int_equal(trip_brick_options_text(&p, &points), 0);
+    need_comma_locale();
+    const int status = trip_brick_options_text(&p, &commas);
+    setlocale(LC_ALL, "C");
+    assert_int_equal(status, 0);
+    assert_string_equal(commas, points);
+    free(commas);
+    free(points);
+}
+
 static void levels_of_uneven_grids_are_refused(void **state)
 {
     (void)state;
@@ -752,6 +773,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(another_input_or_other_parameters_are_not_gone_on_with,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(what_levels_were_asked_for_is_told, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(a_locale_with_decimal_commas_makes_no_other_data_set,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(levels_of_uneven_grids_are_refused, test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

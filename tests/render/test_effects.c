@@ -633,6 +633,11 @@ static void run_backwards(void *user, void (*task)(void *context, unsigned numbe
         task(context, count);
 }
 
+static void assert_same_lattice(const trip_light_grid *a, const trip_light_grid *b)
+{
+    assert_memory_equal(a->at, b->at, trip_light_grid_count(a) * sizeof *a->at);
+}
+
 static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
 {
     (void)state;
@@ -655,13 +660,56 @@ static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
             trip_light_map_await(maps[n], UINT64_MAX);
         assert_true(trip_light_map_is_complete(maps[n]));
     }
-    const trip_light_grid *open[2] = { trip_light_map_open(maps[0]), trip_light_map_open(maps[1]) };
-    const trip_light_grid *lit[2] = { trip_light_map_reached(maps[0]),
-                                      trip_light_map_reached(maps[1]) };
-    assert_memory_equal(open[0]->at, open[1]->at,
-                        trip_light_grid_count(open[0]) * sizeof *open[0]->at);
-    assert_memory_equal(lit[0]->at, lit[1]->at, trip_light_grid_count(lit[0]) * sizeof *lit[0]->at);
+    assert_same_lattice(trip_light_map_open(maps[0]), trip_light_map_open(maps[1]));
+    assert_same_lattice(trip_light_map_reached(maps[0]), trip_light_map_reached(maps[1]));
     assert_true(tasks > 1000);
+    trip_light_map_destroy(maps[0]);
+    trip_light_map_destroy(maps[1]);
+    scene_destroy(&s);
+}
+
+/* Means are made and lattices cleared up to so many nodes in a step; what a frame that is given up
+ * has left of that, the next one does. */
+static void a_lattice_of_many_nodes_takes_many_steps(void **state)
+{
+    (void)state;
+    enum { NODES = 80, COUNT = NODES * NODES * NODES, OPEN_NODES = NODES / 2 + 1 };
+    enum { PIECES = 8, OPEN_PIECES = 2 }; /* of 65536 nodes or so */
+    scene s;
+    trip_light_map *maps[2];
+    const trip_clip none = { 0 };
+    scene_create(&s, &(scene_params){ .dims = { NODES, NODES, NODES }, .tile_voxels = 64 });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)FOG };
+    trip_settings settings = scene_with_shadows(trip_v3(0.3, -0.8, 0.5));
+    settings.effects.cells = NODES;
+    settings.effects.occlusion = true;
+    const trip_light_source source = {
+        .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
+    };
+    int averages = 0, sweeps = 0;
+    for (int n = 0; n < 2; n++) {
+        assert_int_equal(trip_light_map_create(&maps[n], s.budget), 0);
+        assert_int_equal(trip_light_map_begin(maps[n], &source), 0);
+        while (trip_light_map_step(maps[n], NULL) > 0) {
+            const trip_light_stats stats = trip_light_map_stats(maps[n]);
+            averages += n == 0 && stats.bytes_read > 0 && stats.sweep_ms == 0;
+            sweeps += n == 0 && stats.sweep_ms > 0;
+            if (n == 1)
+                assert_int_equal(trip_light_map_begin(maps[n], &source), 0);
+            trip_light_map_await(maps[n], UINT64_MAX);
+        }
+    }
+    /* The first comes once all has been read. */
+    assert_int_equal(averages, 1 + PIECES);
+    assert_int_equal(sweeps, PIECES + NODES + OPEN_PIECES + OPEN_NODES * TRIP_OPEN_DIRECTIONS);
+    const trip_light_grid *means = trip_light_map_gathered(maps[0]);
+    assert_int_equal(trip_light_grid_count(means), COUNT);
+    for (size_t n = 0; n < COUNT; n++)
+        assert_close(means->at[n], FOG, 1e-8);
+    assert_same_lattice(means, trip_light_map_gathered(maps[1]));
+    assert_same_lattice(trip_light_map_reached(maps[0]), trip_light_map_reached(maps[1]));
+    assert_same_lattice(trip_light_map_open(maps[0]), trip_light_map_open(maps[1]));
     trip_light_map_destroy(maps[0]);
     trip_light_map_destroy(maps[1]);
     scene_destroy(&s);
@@ -748,6 +796,7 @@ int main(void)
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),
         cmocka_unit_test(a_renderer_without_effects_refuses_them),
         cmocka_unit_test(whoever_does_the_tasks_the_lattice_has_the_same_bits),
+        cmocka_unit_test(a_lattice_of_many_nodes_takes_many_steps),
         cmocka_unit_test(a_lattice_that_does_not_fit_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

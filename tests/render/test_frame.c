@@ -103,7 +103,7 @@ static void bytes_and_splats_are_counted_for_each_list(void **state)
 static void keep_progress(void *user, const char *stage, uint64_t splats, uint64_t total)
 {
     uint64_t *last = user;
-    assert_string_equal(stage, "draw");
+    assert_string_equal(stage, "splat");
     assert_true(splats > last[0] && splats <= total);
     last[0] = splats;
     last[1] = total;

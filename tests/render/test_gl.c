@@ -12,6 +12,8 @@
 #include "splat.h"
 #include "test.h"
 
+#include "comma_locale.h"
+
 static const scene_renderer reference = { "reference", trip_reference_create, 0 };
 static const scene_renderer gl = { "gl", trip_gl_create, 1.0 / 255 };
 
@@ -655,6 +657,23 @@ static void a_missing_shader_is_reported(void **state)
     scene_destroy(&s);
 }
 
+static void shaders_are_the_same_in_a_locale_with_decimal_commas(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 40, 32);
+    trip_settings settings = trip_settings_default();
+    scene_picture expected = scene_draw(&s, &gl, &view, &settings);
+    need_comma_locale();
+    scene_picture got = scene_draw(&s, &gl, &view, &settings);
+    setlocale(LC_ALL, "C");
+    assert_memory_equal(got.rgba, expected.rgba, 32 * 32 * 4 * sizeof *got.rgba);
+    scene_picture_free(&expected);
+    scene_picture_free(&got);
+    scene_destroy(&s);
+}
+
 /* Exit status 77 where there is no OpenGL 4.5 by EGL; the line printed says why. */
 static bool has_gl(void)
 {
@@ -685,6 +704,7 @@ int main(void)
         cmocka_unit_test(what_does_not_fit_is_refused_and_the_next_frame_draws),
         cmocka_unit_test(a_shader_that_does_not_compile_is_named_with_its_line),
         cmocka_unit_test(a_missing_shader_is_reported),
+        cmocka_unit_test(shaders_are_the_same_in_a_locale_with_decimal_commas),
     };
     if (!has_gl())
         return 77;

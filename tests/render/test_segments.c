@@ -162,6 +162,15 @@ static void a_rough_function_is_what_many_small_steps_add_up_to(void **state)
     }
 }
 
+/* t (1 - t) has the integral 1/6, t^2 1/3. */
+static void products_of_linear_functions_are_integrated_exactly(void **state)
+{
+    (void)state;
+    assert_close(trip_segment_product(0, 1, 1, 0), 1.0 / 6, 1e-16);
+    assert_close(trip_segment_product(0, 1, 0, 1), 1.0 / 3, 1e-16);
+    assert_close(trip_segment_product(2, 2, 1, 4), 5, 1e-15);
+}
+
 static void one_code_is_the_function_between_entries(void **state)
 {
     (void)state;
@@ -183,6 +192,7 @@ int main(void)
         cmocka_unit_test(a_step_counts_for_what_is_beyond_it),
         cmocka_unit_test(a_peak_of_one_code_is_counted_whole_wherever_it_is),
         cmocka_unit_test(a_rough_function_is_what_many_small_steps_add_up_to),
+        cmocka_unit_test(products_of_linear_functions_are_integrated_exactly),
         cmocka_unit_test(one_code_is_the_function_between_entries),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -242,22 +242,14 @@ class Serve(program.ProgramTest):
 
     def test_a_volume_is_bricked_and_shown(self):
         self.tearDown()
-        environment = dict(os.environ, XDG_CACHE_HOME=os.path.abspath("cache"))
-        self.server = program.start("serve", "v.nhdr", "--memory", "128M", "--threads", "2",
-                                    env=environment)
-        self.address = self.server.stdout.readline().decode().strip()
-        url = urllib.parse.urlsplit(self.address)
-        self.host, self.port = url.hostname, url.port
-        self.token = urllib.parse.parse_qs(url.query)["token"][0]
+        self.serve("v.nhdr")
         self.do("resize 40 30")
         while not self.status()["exact"]:
             self.assertFalse(self.status()["failed"], self.status())
             time.sleep(0.02)
         status, headers, data = self.ask("/picture", after=0)
         self.assertEqual(headers["X-Whole"], "1")
-        run = program.call("render", "v.nhdr", "-o", "r.png",
-                           *shlex.split(self.status()["camera"]), env=environment)
-        self.assertEqual(run.returncode, 0, run.stderr)
+        self.works("render", "v.nhdr", "-o", "r.png", *shlex.split(self.status()["camera"]))
         with open("r.png", "rb") as f:
             numpy.testing.assert_array_equal(read_png(data)[..., :3], read_png(f.read())[..., :3])
         self.assertEqual(self.ask("/function", "POST", name="grey")[0], 204)
@@ -287,6 +279,10 @@ class Serve(program.ProgramTest):
         self.assertTrue(headers["Content-Type"].startswith("text/html"))
         self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
         self.assertNotIn(b"http", page.replace(b"<!doctype html>", b""))
+
+    def test_what_is_automatic_is_called_so_as_on_the_command_line(self):
+        _, _, page = self.ask("/")
+        self.assertIn(b'<option value="auto">auto</option>', page)
 
     def test_only_this_machine_with_the_token_is_answered(self):
         for path in ("/", "/picture", "/status", "/presets", "/nothing"):
@@ -364,11 +360,11 @@ class Serve(program.ProgramTest):
         self.assertEqual(self.server.wait(60), 0)
 
     def test_a_volume_s_report_is_of_its_data_set(self):
-        os.environ["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "v.nhdr", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
+        program.write_report("splats", "usual.trip", classify="pre")
         program.write_report("other", None)
-        for report in "usual", "other":
+        for report in "usual", "splats", "other":
             self.tearDown()
             self.serve("v.nhdr", "--error", "255", "--report", report)
             status = self.status()

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include "comma_locale.h"
 #include "script.h"
 
 static trip_script parse(const char *text)
@@ -114,6 +115,36 @@ static void files_and_texts_are_the_rest_of_the_line(void **state)
     trip_script_free(&s);
 }
 
+static void a_click_has_a_place_and_a_label(void **state)
+{
+    (void)state;
+    trip_script s = parse("click 0.25 Level of detail\nclick 1\t h  \n");
+    assert_int_equal(s.count, 2);
+    assert_int_equal(s.events[0].kind, TRIP_EVENT_CLICK);
+    assert_true(s.events[0].x == 0.25 && s.events[1].x == 1);
+    assert_string_equal(s.events[0].text, "Level of detail");
+    assert_string_equal(s.events[1].text, "h");
+    trip_script_free(&s);
+    assert_refused("click half Slices", "`half` is not how far along a control");
+    assert_refused("click 1.5 Slices", "`1.5` is not how far along a control");
+    assert_refused("click 0.5", "label is missing");
+    assert_refused("click", "takes 1 words");
+}
+
+static void a_locale_with_decimal_commas_changes_nothing(void **state)
+{
+    (void)state;
+    trip_script s;
+    const char *text = "move 10.5 20\nclick 0.25 Slices\n";
+    need_comma_locale();
+    const int status = trip_script_parse(&s, "test", text, strlen(text));
+    setlocale(LC_ALL, "C");
+    assert_int_equal(status, 0);
+    assert_true(s.events[0].x == 10.5 && s.events[1].x == 0.25);
+    assert_string_equal(s.events[1].text, "Slices");
+    trip_script_free(&s);
+}
+
 static void what_is_no_event_is_refused_by_its_line(void **state)
 {
     (void)state;
@@ -175,6 +206,8 @@ int main(void)
         cmocka_unit_test(keys_are_pressed_and_released),
         cmocka_unit_test(a_drag_goes_in_steps),
         cmocka_unit_test(files_and_texts_are_the_rest_of_the_line),
+        cmocka_unit_test(a_click_has_a_place_and_a_label),
+        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(what_is_no_event_is_refused_by_its_line),
         cmocka_unit_test(scripts_are_bounded),
         cmocka_unit_test(a_script_is_read_from_a_file),

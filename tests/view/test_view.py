@@ -230,7 +230,8 @@ class View(program.ProgramTest):
                     "click 0.2 h",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
                     "click 0.4 Samples", "click 0.5 Classify\nclick 0.5 After interpolation",
-                    "click 0.9 Slices",
+                    "click 0.9 Slices", "click 0.5 Classify\nclick 0.5 Auto",
+                    "click 0.5 Classify\nclick 0.5 After interpolation",
                     "click 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\n"
                     "click 0.4 i from", "click 0.6 j to", "click 0.3 k from",
                     "click 0.5 Add plane", "click 0.6 Plane 1", "click 0.5 Flip 1",
@@ -333,7 +334,6 @@ class View(program.ProgramTest):
         self.assertEqual(self.status()["documents"], 3)
 
     def test_a_volume_is_bricked_and_shown(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         seen, = self.pictures("wait\npicture seen.exr\nstatus status.json\n", ["seen"], "ball.nrrd")
         self.assertTrue(self.status()["exact"], self.status())
         self.works("render", "ball.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
@@ -341,11 +341,11 @@ class View(program.ProgramTest):
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
     def test_a_volume_s_report_is_of_its_data_set(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "ball.nrrd", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
+        program.write_report("splats", "usual.trip", classify="pre")
         program.write_report("other", None)
-        for report in "usual", "other":
+        for report in "usual", "splats", "other":
             self.view(f"wait\ndrop {os.path.abspath('noise.nrrd')}\nwait\nstatus {report}.json\n"
                       "key tab\nwait\nstatus status.json\n",
                       "ball.nrrd", "--error=255", f"--report={report}")
@@ -356,7 +356,6 @@ class View(program.ProgramTest):
                 self.assertIn("the report is of another data set", status["message"])
 
     def test_a_large_volume_is_shown_by_samples_until_it_is_bricked(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         program.write_nrrd("large.nrrd", program.ball((204, 204, 204), radius=0.5))
         self.view("wait\npicture seen.exr\nwait\nstatus status.json\n", "large.nrrd")
         self.works("render", "large.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
@@ -368,7 +367,6 @@ class View(program.ProgramTest):
         self.assertEqual(self.works("cache", "list").stdout.count(b"large"), 2)
 
     def test_values_that_were_not_kept_are_bricked_again(self):
-        os.environ["XDG_CACHE_HOME"] = self.screen.environment["XDG_CACHE_HOME"] = os.path.abspath("cache")
         self.works("brick", "noise.nrrd", "-o", "part.trip", "--range=200:255")
         self.view("wait\npicture before.exr\nclick 0.5 Brick again with all values\nwait\n"
                   "picture after.exr\nstatus status.json\n", "part.trip", "--tf=grey")

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <xxhash.h>
 
+#include "segments.h"
+
 enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MOST, LOG2_MOST = 2 };
 
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
@@ -59,18 +61,13 @@ static double component(const trip_tf_entry *e, int i)
     return i == 0 ? e->r : i == 1 ? e->g : e->b;
 }
 
-/* The integral from 0 to 1 of the product of two functions that are linear between these values. */
-static double product(double a0, double a1, double b0, double b1)
-{
-    return (a0 * (2 * b0 + b1) + a1 * (b0 + 2 * b1)) / 6;
-}
-
 /* From one code to the next: of extinction, and of extinction times each component of colour. */
 static void step(const trip_tf_entry *a, const trip_tf_entry *b, double out[4])
 {
     out[0] = 0.5 * ((double)a->extinction + b->extinction);
     for (int i = 0; i < 3; i++)
-        out[1 + i] = product(a->extinction, b->extinction, component(a, i), component(b, i));
+        out[1 + i] =
+            trip_segment_product(a->extinction, b->extinction, component(a, i), component(b, i));
 }
 
 /* The nearest whole number of one that is not negative. */

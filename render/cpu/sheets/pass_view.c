@@ -19,13 +19,6 @@ static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
         out[i] = trip_component(v, (view->axis + 1 + i) % 3);
 }
 
-/* So that squares of 65536 times it are floats: gradients that are steeper still are as well lit.
- */
-static float within_floats(double x)
-{
-    return (float)fmin(1e12, fmax(-1e12, x));
-}
-
 /* World-space gradients from those of index space: the inverse transpose of the map. Differences
  * are of codes, by the store's unit, lengths over that of full shading; half of it, for what takes
  * the sum of two. */
@@ -45,7 +38,8 @@ static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, tri
         m[0][0] * adjugate[0][0] + m[0][1] * adjugate[0][1] + m[0][2] * adjugate[0][2];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
-            view->gradient[i][k] = within_floats(unit * adjugate[i][k] / determinant);
+            view->gradient[i][k] =
+                (float)trip_shade_within_floats(unit * adjugate[i][k] / determinant);
 }
 
 static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
