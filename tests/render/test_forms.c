@@ -163,6 +163,68 @@ static void gl_draws_the_references_sprites(void **state)
     }
 }
 
+/* A voxel at the eye has no depth and no place in the picture. */
+static void a_sprite_at_the_eye_is_not_drawn(void **state)
+{
+    (void)state;
+    const pair p = { { 11, 13, 9 }, { 20, 17, 14 } };
+    scene s;
+    make_pair(&s, &p, 5);
+    trip_settings settings = plain();
+    settings.footprint = TRIP_FOOTPRINT_FIXED;
+    settings.sprite_px = 20;
+    const scene_renderer *r = scene_renderers();
+    for (; (r = next_with(r, "reference", "gl"))->name; r++) {
+        for (int i = 0; i < 12; i++) {
+            trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 9, 100, SIZE);
+            view.eye = trip_v3(11, 13, 9);
+            view.look = trip_v3(20.1 + 0.17 * i, 17.3, 14.7 - 0.31 * i);
+            scene_picture drawn = scene_draw(&s, r, &view, &settings);
+            double most[2] = { 0 };
+            for (int k = 0; k < SIZE * SIZE; k++)
+                for (int c = 0; c < 2; c++)
+                    most[c] = fmax(most[c], (double)drawn.rgba[4 * k + 2 * c]);
+            assert_true(most[0] == 0 && most[1] > 0.1);
+            scene_picture_free(&drawn);
+        }
+    }
+    scene_destroy(&s);
+}
+
+/* The eye a little behind the voxel, which lies on the ray through (30, 40): the sprite is there.
+ */
+static void a_sprite_just_before_the_eye_is_drawn_where_it_lies(void **state)
+{
+    (void)state;
+    const pair p = { { 11, 13, 9 }, { 20, 17, 14 } };
+    scene s;
+    make_pair(&s, &p, 5);
+    trip_settings settings = plain();
+    settings.footprint = TRIP_FOOTPRINT_FIXED;
+    settings.sprite_px = 9;
+    const scene_renderer *r = scene_renderers();
+    for (; (r = next_with(r, "reference", "gl"))->name; r++) {
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0.6, -0.3), 9, 100, SIZE);
+        trip_camera c = camera_of(&s, &view);
+        trip_vec3 way = trip_sub(view.look, view.eye);
+        view.eye = trip_sub(trip_v3(11, 13, 9), trip_scale(trip_camera_ray(&c, 30, 40), 1e-5));
+        view.look = trip_add(view.eye, way);
+        scene_picture drawn = scene_draw(&s, r, &view, &settings);
+        double sum = 0, x = 0, y = 0;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            double red = (double)drawn.rgba[4 * k];
+            sum += red;
+            x += red * (k % SIZE + 0.5);
+            y += red * (k / SIZE + 0.5);
+        }
+        assert_true(sum > 1);
+        assert_close(x / sum, 30, 0.01);
+        assert_close(y / sum, 40, 0.01);
+        scene_picture_free(&drawn);
+    }
+    scene_destroy(&s);
+}
+
 /* ---- weights of vertices ---- */
 
 /* Whether a voxel that dense is opaque there. */
@@ -396,6 +458,8 @@ int main(void)
         cmocka_unit_test(every_sprite_has_that_size),
         cmocka_unit_test(in_parallel_views_of_cubes_nothing_changes),
         cmocka_unit_test(gl_draws_the_references_sprites),
+        cmocka_unit_test(a_sprite_at_the_eye_is_not_drawn),
+        cmocka_unit_test(a_sprite_just_before_the_eye_is_drawn_where_it_lies),
         cmocka_unit_test(weights_are_interpolated_between_the_corners_of_the_last_splat),
         cmocka_unit_test(the_sheets_of_one_splat_add_up_to_it),
         cmocka_unit_test(splats_are_cut_by_planes_of_equal_depth),
