@@ -297,6 +297,26 @@ static void weights_are_interpolated_between_the_corners_of_the_last_splat(void 
     scene_destroy(&s);
 }
 
+/* In dense fog no pixel is left empty by a layer whose weight comes from corners far beside it. */
+static void weights_of_splats_about_the_eye_leave_no_holes(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 24, 24, 24 } });
+    s.table[65535] = (trip_tf_entry){ 1, 1, 1, 5 };
+    trip_settings settings = plain();
+    settings.vertex_weights = true;
+    for (int i = 0; i < 6; i++) {
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0.3 * i - 0.8, 0.4), 0.3 + i, 100, 40);
+        settings.traversal = i % 2 ? TRIP_TRAVERSAL_ASCENDING : TRIP_TRAVERSAL_OUTWARD;
+        scene_picture drawn = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+        for (int k = 0; k < 40 * 40; k++)
+            assert_close(drawn.rgba[4 * k + 3], 1, 1e-3);
+        scene_picture_free(&drawn);
+    }
+    scene_destroy(&s);
+}
+
 /* ---- image-aligned sheets ---- */
 
 static trip_settings by_image(void)
@@ -461,6 +481,7 @@ int main(void)
         cmocka_unit_test(a_sprite_at_the_eye_is_not_drawn),
         cmocka_unit_test(a_sprite_just_before_the_eye_is_drawn_where_it_lies),
         cmocka_unit_test(weights_are_interpolated_between_the_corners_of_the_last_splat),
+        cmocka_unit_test(weights_of_splats_about_the_eye_leave_no_holes),
         cmocka_unit_test(the_sheets_of_one_splat_add_up_to_it),
         cmocka_unit_test(splats_are_cut_by_planes_of_equal_depth),
         cmocka_unit_test(no_list_shows),
