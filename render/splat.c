@@ -165,6 +165,16 @@ double trip_splat_fixed_radius_px(const trip_settings *settings)
                  settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_CUTOFF * TRIP_LOW_PASS_PX);
 }
 
+/* Of the angle between the axis of view and the ray through a point; 1 in parallel views. */
+static double cosine_off_axis(const trip_camera *camera, trip_vec3 from_eye)
+{
+    trip_vec3 way = trip_affine_vector(&camera->index_to_world, from_eye);
+    return camera->ortho ? 1 : trip_dot(camera->world_forward, trip_normalize(way));
+}
+
+/* The projection is a scaling by |v'c - E| / |vc - E| of what lies across the ray, and makes that
+ * longer by one over the cosine, the plane of the picture being slanted; the paper's has no such
+ * factor. */
 double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *settings,
                             trip_vec3 middle)
 {
@@ -173,7 +183,8 @@ double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *sett
     if (!camera->ortho && !(trip_dot(camera->forward, from_eye) > 0))
         return 0;
     trip_ray_space j = trip_ray_space_at(camera, from_eye);
-    return 2 * TRIP_CUTOFF * sqrt(sqrt(trip_covariance_integrated(&kernel, &j).det));
+    double area = sqrt(trip_covariance_integrated(&kernel, &j).det);
+    return 2 * TRIP_CUTOFF * sqrt(area * cosine_off_axis(camera, from_eye));
 }
 
 /* A splat in perspective of fixed size; false behind the eye, and where it is so near that its

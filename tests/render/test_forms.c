@@ -78,6 +78,36 @@ static void a_sprite_is_as_large_as_the_sphere_in_the_middle(void **state)
     scene_destroy(&s);
 }
 
+/* W b |v'c - E| / |vc - E| in world space, of a point that the view does not look at; of cubes, and
+ * of cells that are longer one way, across which all rays here run. */
+static void off_the_axis_a_sprite_has_the_papers_size(void **state)
+{
+    (void)state;
+    trip_settings settings = plain();
+    for (int i = 0; i < 12; i++) {
+        const double longer = i % 2 ? 3 : 1, degrees = 6 * i;
+        trip_affine map = trip_affine_identity();
+        map.m[2][2] = longer;
+        const trip_vec3 eye = { 2, 3, 4 * longer }, ahead = trip_v3(0.6, 0.8, 0);
+        trip_camera_params view = { .eye = eye,
+                                    .look = trip_add(eye, ahead),
+                                    .up = { 0, 0, 1 },
+                                    .fov_degrees = 40,
+                                    .width = 90,
+                                    .height = 60 };
+        trip_camera c;
+        assert_int_equal(trip_camera_make(&c, &view, &map), 0);
+        double angle = degrees * PI / 180, plane = 1 / tan(20 * PI / 180); /* 2 units high */
+        trip_vec3 aside = trip_v3(-0.8, 0.6, 0);
+        trip_vec3 from_eye =
+            trip_scale(trip_add(trip_scale(ahead, cos(angle)), trip_scale(aside, sin(angle))), 35);
+        double projected = plane / cos(angle), b = 2 * sqrt(longer);
+        trip_vec3 middle = trip_add(eye, from_eye);
+        middle.z /= longer;
+        assert_close(trip_splat_sprite_px(&c, &settings, middle), 60 * b * projected / 35, 1e-9);
+    }
+}
+
 /* Near and far voxels are as large, and as deep in their middle as the exact ones would be. */
 static void every_sprite_has_that_size(void **state)
 {
@@ -475,6 +505,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sprite_is_as_large_as_the_sphere_in_the_middle),
+        cmocka_unit_test(off_the_axis_a_sprite_has_the_papers_size),
         cmocka_unit_test(every_sprite_has_that_size),
         cmocka_unit_test(in_parallel_views_of_cubes_nothing_changes),
         cmocka_unit_test(gl_draws_the_references_sprites),
