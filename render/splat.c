@@ -214,7 +214,19 @@ static bool is_affine(const trip_splat_frame *f, trip_vec3 ray, const trip_ray_s
     return TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE * trip_dot(ray, ray) >= apart2;
 }
 
-/* Conic, amplitude and bounds by the affine map at the centre, which is known. */
+/* Of a flat kernel that Swan's scaling enlarges, which may be many times more than the round one:
+ * S' is within the round kernel's S times as much, and no ray r of the view's plane has
+ * |r_c| / |r| above |r_c| |forward|. */
+static double scaled_radius(const trip_splat_frame *f, const trip_covariance2 *exact,
+                            const trip_covariance2 *wide, double ray2)
+{
+    double scale = sqrt(wide->det / exact->det);
+    double slant2 = f->camera.ortho ? 1 : ray2 * trip_dot(f->camera.forward, f->camera.forward);
+    return f->sigma * sqrt(f->cutoff2 * scale * slant2);
+}
+
+/* Conic, amplitude and bounds by the affine map at the centre, which is known, and the radius where
+ * it is not that of the round kernel. */
 static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
                        const trip_flattening *flat, trip_splat *s)
 {
@@ -222,6 +234,8 @@ static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
     trip_covariance2 exact = trip_covariance_integrated(&kernel, j);
     trip_covariance2 wide = low_passed(f, &exact), conic = trip_covariance2_inverse(&wide);
     double half_x = sqrt(f->cutoff2 * wide.xx), half_y = sqrt(f->cutoff2 * wide.yy);
+    if (f->low_pass == TRIP_LOW_PASS_UNIFORM && flat->share > 0)
+        s->radius = scaled_radius(f, &exact, &wide, s->ray2);
     s->affine = true;
     s->ray2 = 1;
     s->conic_xx = conic.xx;

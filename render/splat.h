@@ -81,7 +81,8 @@
  * gradient_full) (shade.h), so that where there is no surface it stays round. It keeps its
  * integral: footprint' stretch = stretch(x, y) / (2 pi sigma^2) sqrt(|S of the round kernel| /
  * |S'|) ... Near splats in perspective stay round; bounds on what a splat reaches are those of
- * round ones.
+ * round ones, but with settings.low_pass uniform, which makes what is seen edge-on up to s times as
+ * large as it would make a round kernel: then all bricks before the eye are drawn.
  *
  * With uneven spacing (coordinates.h) a voxel's kernel is as wide along each axis as the voxel is,
  * trip_coordinates_width(): all of the above is in an index space of its own, in which that is 1
