@@ -38,6 +38,12 @@ static double behind_eye(const trip_camera *camera, const trip_settings *setting
     return behind * (1 + 1e-9);
 }
 
+/* Flat kernels seen edge-on are scaled up to any size (splat.h), by the reference alone. */
+static bool reaches_anywhere(const trip_settings *settings)
+{
+    return settings->low_pass == TRIP_LOW_PASS_UNIFORM && settings->flatten > 1;
+}
+
 trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
                          int axis_of_view, const trip_code_set *shown, trip_brick_ranges *about)
@@ -59,7 +65,9 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .sides = { side(camera, camera->to_x, 0.5, 1), side(camera, camera->to_y, 0.5, 1),
                    side(camera, camera->to_x, camera->width - 0.5, -1),
                    side(camera, camera->to_y, camera->height - 0.5, -1) },
-        .radius2 = fixed ? 0 : room * radius * radius,
+        .radius2 = reaches_anywhere(settings) ? INFINITY
+                   : fixed                    ? 0
+                                              : room * radius * radius,
         /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
          * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. Of fixed footprints all there
          * is. */

@@ -286,7 +286,8 @@ static void put_fragment(const reference *r, pixel *p, const double fragment[TRI
 }
 
 /* The weights of the corners of a splat's bounds, left and right above, then below: below 0 where
- * the list has none. False where no corner has any. */
+ * the list has none. False where no corner has any. Not of near splats, whose bounds may span the
+ * picture: linear from corner to corner, a weight is far from that of a ray between them. */
 static bool weigh_corners(const reference *r, const trip_splat *s, double weights[4])
 {
     bool some = false;
@@ -307,6 +308,17 @@ static double weight_within(const trip_splat *s, const double w[4], double x, do
     if (u + v <= 1)
         return fmax(0, w[0] + u * (w[1] - w[0]) + v * (w[2] - w[0]));
     return fmax(0, w[3] + (1 - u) * (w[2] - w[3]) + (1 - v) * (w[1] - w[3]));
+}
+
+/* What a splat sets the weight of the layer to at a pixel. */
+static double vertex_weight(const reference *r, const trip_splat *s, const double corners[4],
+                            double x, double y)
+{
+    const trip_frame *frame = r->frame;
+    if (!s->near)
+        return weight_within(s, corners, x, y);
+    return trip_weight(frame->settings, frame->plan->axis_of_view,
+                       trip_camera_ray(frame->camera, x, y), r->axis);
 }
 
 /* Of a pixel in the support. */
@@ -334,9 +346,9 @@ static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
     const bool by_vertices = r->frame->settings->vertex_weights;
     trip_pixels columns = trip_pixels_within(s->x0, s->x1, camera->width);
     trip_pixels rows = trip_pixels_within(s->y0, s->y1, camera->height);
-    double weights[4];
+    double corners[4] = { 0 };
     bool touched = false;
-    if (by_vertices && !weigh_corners(r, s, weights))
+    if (by_vertices && !s->near && !weigh_corners(r, s, corners))
         return false;
     r->rows.first = rows.first < r->rows.first ? rows.first : r->rows.first;
     r->rows.last = rows.last > r->rows.last ? rows.last : r->rows.last;
@@ -348,7 +360,7 @@ static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
                 continue;
             touched = true;
             if (by_vertices)
-                p->weight = weight_within(s, weights, x + 0.5, y + 0.5);
+                p->weight = vertex_weight(r, s, corners, x + 0.5, y + 0.5);
             draw_pixel(r, s, voxel, x, y, fragment, extinction);
         }
     }

@@ -165,6 +165,16 @@ double trip_splat_fixed_radius_px(const trip_settings *settings)
                  settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_CUTOFF * TRIP_LOW_PASS_PX);
 }
 
+/* Of the angle between the axis of view and the ray through a point; 1 in parallel views. */
+static double cosine_off_axis(const trip_camera *camera, trip_vec3 from_eye)
+{
+    trip_vec3 way = trip_affine_vector(&camera->index_to_world, from_eye);
+    return camera->ortho ? 1 : trip_dot(camera->world_forward, trip_normalize(way));
+}
+
+/* The projection is a scaling by |v'c - E| / |vc - E| of what lies across the ray, and makes that
+ * longer by one over the cosine, the plane of the picture being slanted; the paper's has no such
+ * factor. */
 double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *settings,
                             trip_vec3 middle)
 {
@@ -173,7 +183,8 @@ double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *sett
     if (!camera->ortho && !(trip_dot(camera->forward, from_eye) > 0))
         return 0;
     trip_ray_space j = trip_ray_space_at(camera, from_eye);
-    return 2 * TRIP_CUTOFF * sqrt(sqrt(trip_covariance_integrated(&kernel, &j).det));
+    double area = sqrt(trip_covariance_integrated(&kernel, &j).det);
+    return 2 * TRIP_CUTOFF * sqrt(area * cosine_off_axis(camera, from_eye));
 }
 
 /* A splat in perspective of fixed size; false behind the eye, and where it is so near that its
@@ -203,7 +214,19 @@ static bool is_affine(const trip_splat_frame *f, trip_vec3 ray, const trip_ray_s
     return TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE * trip_dot(ray, ray) >= apart2;
 }
 
-/* Conic, amplitude and bounds by the affine map at the centre, which is known. */
+/* Of a flat kernel that Swan's scaling enlarges, which may be many times more than the round one:
+ * S' is within the round kernel's S times as much, and no ray r of the view's plane has
+ * |r_c| / |r| above |r_c| |forward|. */
+static double scaled_radius(const trip_splat_frame *f, const trip_covariance2 *exact,
+                            const trip_covariance2 *wide, double ray2)
+{
+    double scale = sqrt(wide->det / exact->det);
+    double slant2 = f->camera.ortho ? 1 : ray2 * trip_dot(f->camera.forward, f->camera.forward);
+    return f->sigma * sqrt(f->cutoff2 * scale * slant2);
+}
+
+/* Conic, amplitude and bounds by the affine map at the centre, which is known, and the radius where
+ * it is not that of the round kernel. */
 static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
                        const trip_flattening *flat, trip_splat *s)
 {
@@ -211,6 +234,8 @@ static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
     trip_covariance2 exact = trip_covariance_integrated(&kernel, j);
     trip_covariance2 wide = low_passed(f, &exact), conic = trip_covariance2_inverse(&wide);
     double half_x = sqrt(f->cutoff2 * wide.xx), half_y = sqrt(f->cutoff2 * wide.yy);
+    if (f->low_pass == TRIP_LOW_PASS_UNIFORM && flat->share > 0)
+        s->radius = scaled_radius(f, &exact, &wide, s->ray2);
     s->affine = true;
     s->ray2 = 1;
     s->conic_xx = conic.xx;

@@ -81,7 +81,8 @@
  * gradient_full) (shade.h), so that where there is no surface it stays round. It keeps its
  * integral: footprint' stretch = stretch(x, y) / (2 pi sigma^2) sqrt(|S of the round kernel| /
  * |S'|) ... Near splats in perspective stay round; bounds on what a splat reaches are those of
- * round ones.
+ * round ones, but with settings.low_pass uniform, which makes what is seen edge-on up to s times as
+ * large as it would make a round kernel: then all bricks before the eye are drawn.
  *
  * With uneven spacing (coordinates.h) a voxel's kernel is as wide along each axis as the voxel is,
  * trip_coordinates_width(): all of the above is in an index space of its own, in which that is 1
@@ -154,9 +155,11 @@ typedef struct trip_flattening {
 trip_flattening trip_splat_flattening(const trip_splat_frame *f, const double gradient[3],
                                       double gradient_full);
 
-/* What settings.sprite_px is by the paper: twice the radius of the footprint of a splat at
- * `middle`, a point of index space (of the circle as large where that is an ellipse). 0: it lies
- * behind the eye. */
+/* What settings.sprite_px is by the paper: W b |v'c - E| / |vc - E|, with vc `middle`, a point of
+ * index space, v'c its projection on a plane before the eye E on which the picture is W pixels and
+ * 2 units wide, and b the radius of a splat there, across its ray (that of the circle as large
+ * where it is an ellipse). At a given depth it does not depend on the angle. 0: it lies behind the
+ * eye. */
 double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *settings,
                             trip_vec3 middle);
 /* How far fixed footprints reach, low-pass included. */

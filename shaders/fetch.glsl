@@ -153,6 +153,13 @@ record fetch_record(uint position)
 #else
     r.place = run.place + vec3(dot(to_x.xyz, offset), dot(to_y.xyz, offset),
                                dot(forward.xyz, offset));
+#ifdef FIXED
+    // Sprites are as large at the eye as anywhere: about it no depth may be what rounding left of
+    // the run's, and that of the voxel that the eye is at is 0.
+    if (dot(r.from_eye, r.from_eye) < dot(offset, offset))
+        r.place = vec3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
+                       dot(forward.xyz, r.from_eye));
+#endif
 #endif
 #if defined(HAS_NORMALS) && defined(INDEXED)
     r.normal = normals[at];

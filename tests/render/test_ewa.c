@@ -4,6 +4,7 @@
 #include "ewa.h"
 #include "splat.h"
 #include "test.h"
+#include "weight.h"
 
 #define PI 3.14159265358979323846
 
@@ -268,6 +269,45 @@ static void affine_supports_are_ellipses_within_their_radius(void **state)
     assert_in_range(near, 20, 600);
 }
 
+/* The same of flat kernels that are scaled, which may be larger than round ones by far; in parallel
+ * views rays begin in the plane of the eye. */
+static void scaled_flat_supports_are_within_their_radius(void **state)
+{
+    (void)state;
+    int larger = 0;
+    for (int i = 0; i < 400; i++) {
+        trip_affine map = random_map(0.8);
+        double ortho = i % 4 ? 0 : 40;
+        trip_camera c = camera_of(trip_v3(8, 3, 2), trip_v3(0, 0, 0), 20 + i % 90, ortho, &map);
+        trip_settings settings = ewa_settings();
+        settings.low_pass = TRIP_LOW_PASS_UNIFORM;
+        settings.flatten = 3 + i % 60;
+        trip_splat_frame f = trip_splat_frame_make(&c, &settings);
+        double px = 200 * test_random(), py = 150 * test_random(), z = 5 + 400 * test_random();
+        trip_vec3 begin =
+            ortho > 0 ? trip_add(trip_scale(c.rx, px), trip_scale(c.ry, py)) : trip_v3(0, 0, 0);
+        trip_vec3 from_eye = trip_add(begin, trip_scale(trip_camera_ray(&c, px, py), z));
+        const double gradient[3] = { test_random() - 0.5, test_random() - 0.5,
+                                     test_random() - 0.5 };
+        trip_flattening flat = trip_splat_flattening(&f, gradient, 1e-3);
+        trip_splat s;
+        if (!trip_splat_project_flat(&f, trip_add(c.eye, from_eye), &flat, &s) || s.near)
+            continue;
+        for (int k = 0; k < 40; k++) {
+            double dx = cos(k * PI / 20), dy = sin(k * PI / 20);
+            double m = s.conic_xx * dx * dx + 2 * s.conic_xy * dx * dy + s.conic_yy * dy * dy;
+            double x = s.x + dx * sqrt(f.cutoff2 / m), y = s.y + dy * sqrt(f.cutoff2 / m);
+            trip_vec3 r = trip_camera_ray(&c, x, y), to = from_eye;
+            if (ortho > 0)
+                to = trip_sub(to, trip_add(trip_scale(c.rx, x), trip_scale(c.ry, y)));
+            double d = trip_length(trip_cross(to, r)) / trip_length(r);
+            assert_true(d <= s.radius * (1 + 1e-9));
+            larger += d > 4 * settings.kernel_radius;
+        }
+    }
+    assert_in_range(larger, 100, 16000);
+}
+
 /* ---- pictures ---- */
 
 /* Voxels here and there. */
@@ -408,6 +448,74 @@ static void renderers_flatten_as_the_reference_does(void **state)
     compare_views(5);
 }
 
+static trip_settings flat_and_scaled(void)
+{
+    trip_settings settings = ewa_settings();
+    settings.low_pass = TRIP_LOW_PASS_UNIFORM;
+    settings.flatten = 100;
+    settings.shading = false;
+    settings.background[3] = 0;
+    settings.method = TRIP_METHOD_AXIS;
+    return settings;
+}
+
+/* Clip draws a pixel by the list that axis draws all by, or by another: no splat that reaches it is
+ * left out because its middle is weighed elsewhere. */
+static void scaled_flat_splats_reach_over_where_lists_meet(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 16, NULL);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.7), 80, 50, 48);
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &view, &s.data->index_to_world), 0);
+    trip_settings settings = flat_and_scaled();
+    scene_picture whole = scene_draw(&s, scene_renderers(), &view, &settings);
+    settings.method = TRIP_METHOD_CLIP;
+    scene_picture parts = scene_draw(&s, scene_renderers(), &view, &settings);
+    int axis = trip_weight_axis_of_view(&c), own = 0;
+    for (int i = 0; i < 48 * 48; i++) {
+        trip_vec3 ray = trip_camera_ray(&c, i % 48 + 0.5, i / 48 + 0.5);
+        if (!(trip_weight(&settings, axis, ray, axis) > 0))
+            continue;
+        own++;
+        for (int k = 0; k < 4; k++)
+            assert_close(parts.rgba[4 * i + k], whole.rgba[4 * i + k], 1e-6);
+    }
+    assert_in_range(own, 400, 48 * 48 - 400);
+    scene_picture_free(&whole);
+    scene_picture_free(&parts);
+    scene_destroy(&s);
+}
+
+/* A picture is the middle of a larger one; what is seen edge-on lies along the rim. */
+static void scaled_flat_splats_reach_in_from_beside_the_picture(void **state)
+{
+    (void)state;
+    scene s;
+    cpu_scenes_blobs(&s, 16, NULL);
+    trip_settings settings = flat_and_scaled();
+    for (int i = 0; i < 6; i++) {
+        const trip_vec3 aside = trip_scale(trip_v3(0.6, -0.8, 0), 7 * (i / 2));
+        trip_camera_params view = scene_view(&s, trip_v3(0.8, 0.6, 0.7), 80, 10, 24);
+        view.eye = trip_add(view.eye, aside);
+        view.look = trip_add(view.look, aside);
+        view.ortho_height = i % 2 ? 14 : 0;
+        scene_picture small = scene_draw(&s, scene_renderers(), &view, &settings);
+        view.width = view.height = 72;
+        view.fov_degrees = 360 / PI * atan(3 * tan(5 * PI / 180));
+        view.ortho_height *= 3;
+        scene_picture large = scene_draw(&s, scene_renderers(), &view, &settings);
+        for (int n = 0; n < 24 * 24; n++)
+            for (int k = 0; k < 4; k++)
+                assert_close(small.rgba[4 * n + k],
+                             scene_pixel(&large, 24 + n % 24, 24 + n / 24)[k], 1e-5);
+        scene_picture_free(&small);
+        scene_picture_free(&large);
+    }
+    scene_destroy(&s);
+}
+
 static double conic_det(const trip_splat *s)
 {
     return s->conic_xx * s->conic_yy - s->conic_xy * s->conic_xy;
@@ -450,9 +558,12 @@ int main(void)
         cmocka_unit_test(flat_kernels_become_surface_kernels),
         cmocka_unit_test(at_the_centre_and_in_parallel_views_nothing_is_approximated),
         cmocka_unit_test(affine_supports_are_ellipses_within_their_radius),
+        cmocka_unit_test(scaled_flat_supports_are_within_their_radius),
         cmocka_unit_test(pictures_are_sums_of_gaussians),
         cmocka_unit_test(renderers_agree_with_the_reference),
         cmocka_unit_test(renderers_flatten_as_the_reference_does),
+        cmocka_unit_test(scaled_flat_splats_reach_over_where_lists_meet),
+        cmocka_unit_test(scaled_flat_splats_reach_in_from_beside_the_picture),
         cmocka_unit_test(kernels_are_flattened_along_their_gradients),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

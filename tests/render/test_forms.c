@@ -78,6 +78,36 @@ static void a_sprite_is_as_large_as_the_sphere_in_the_middle(void **state)
     scene_destroy(&s);
 }
 
+/* W b |v'c - E| / |vc - E| in world space, of a point that the view does not look at; of cubes, and
+ * of cells that are longer one way, across which all rays here run. */
+static void off_the_axis_a_sprite_has_the_papers_size(void **state)
+{
+    (void)state;
+    trip_settings settings = plain();
+    for (int i = 0; i < 12; i++) {
+        const double longer = i % 2 ? 3 : 1, degrees = 6 * i;
+        trip_affine map = trip_affine_identity();
+        map.m[2][2] = longer;
+        const trip_vec3 eye = { 2, 3, 4 * longer }, ahead = trip_v3(0.6, 0.8, 0);
+        trip_camera_params view = { .eye = eye,
+                                    .look = trip_add(eye, ahead),
+                                    .up = { 0, 0, 1 },
+                                    .fov_degrees = 40,
+                                    .width = 90,
+                                    .height = 60 };
+        trip_camera c;
+        assert_int_equal(trip_camera_make(&c, &view, &map), 0);
+        double angle = degrees * PI / 180, plane = 1 / tan(20 * PI / 180); /* 2 units high */
+        trip_vec3 aside = trip_v3(-0.8, 0.6, 0);
+        trip_vec3 from_eye =
+            trip_scale(trip_add(trip_scale(ahead, cos(angle)), trip_scale(aside, sin(angle))), 35);
+        double projected = plane / cos(angle), b = 2 * sqrt(longer);
+        trip_vec3 middle = trip_add(eye, from_eye);
+        middle.z /= longer;
+        assert_close(trip_splat_sprite_px(&c, &settings, middle), 60 * b * projected / 35, 1e-9);
+    }
+}
+
 /* Near and far voxels are as large, and as deep in their middle as the exact ones would be. */
 static void every_sprite_has_that_size(void **state)
 {
@@ -163,6 +193,68 @@ static void gl_draws_the_references_sprites(void **state)
     }
 }
 
+/* A voxel at the eye has no depth and no place in the picture. */
+static void a_sprite_at_the_eye_is_not_drawn(void **state)
+{
+    (void)state;
+    const pair p = { { 11, 13, 9 }, { 20, 17, 14 } };
+    scene s;
+    make_pair(&s, &p, 5);
+    trip_settings settings = plain();
+    settings.footprint = TRIP_FOOTPRINT_FIXED;
+    settings.sprite_px = 20;
+    const scene_renderer *r = scene_renderers();
+    for (; (r = next_with(r, "reference", "gl"))->name; r++) {
+        for (int i = 0; i < 12; i++) {
+            trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 9, 100, SIZE);
+            view.eye = trip_v3(11, 13, 9);
+            view.look = trip_v3(20.1 + 0.17 * i, 17.3, 14.7 - 0.31 * i);
+            scene_picture drawn = scene_draw(&s, r, &view, &settings);
+            double most[2] = { 0 };
+            for (int k = 0; k < SIZE * SIZE; k++)
+                for (int c = 0; c < 2; c++)
+                    most[c] = fmax(most[c], (double)drawn.rgba[4 * k + 2 * c]);
+            assert_true(most[0] == 0 && most[1] > 0.1);
+            scene_picture_free(&drawn);
+        }
+    }
+    scene_destroy(&s);
+}
+
+/* The eye a little behind the voxel, which lies on the ray through (30, 40): the sprite is there.
+ */
+static void a_sprite_just_before_the_eye_is_drawn_where_it_lies(void **state)
+{
+    (void)state;
+    const pair p = { { 11, 13, 9 }, { 20, 17, 14 } };
+    scene s;
+    make_pair(&s, &p, 5);
+    trip_settings settings = plain();
+    settings.footprint = TRIP_FOOTPRINT_FIXED;
+    settings.sprite_px = 9;
+    const scene_renderer *r = scene_renderers();
+    for (; (r = next_with(r, "reference", "gl"))->name; r++) {
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0.6, -0.3), 9, 100, SIZE);
+        trip_camera c = camera_of(&s, &view);
+        trip_vec3 way = trip_sub(view.look, view.eye);
+        view.eye = trip_sub(trip_v3(11, 13, 9), trip_scale(trip_camera_ray(&c, 30, 40), 1e-5));
+        view.look = trip_add(view.eye, way);
+        scene_picture drawn = scene_draw(&s, r, &view, &settings);
+        double sum = 0, x = 0, y = 0;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            double red = (double)drawn.rgba[4 * k];
+            sum += red;
+            x += red * (k % SIZE + 0.5);
+            y += red * (k / SIZE + 0.5);
+        }
+        assert_true(sum > 1);
+        assert_close(x / sum, 30, 0.01);
+        assert_close(y / sum, 40, 0.01);
+        scene_picture_free(&drawn);
+    }
+    scene_destroy(&s);
+}
+
 /* ---- weights of vertices ---- */
 
 /* Whether a voxel that dense is opaque there. */
@@ -232,6 +324,26 @@ static void weights_are_interpolated_between_the_corners_of_the_last_splat(void 
     assert_true(mixed > 100 && apart > 0.005);
     scene_picture_free(&drawn);
     scene_picture_free(&usual);
+    scene_destroy(&s);
+}
+
+/* In dense fog no pixel is left empty by a layer whose weight comes from corners far beside it. */
+static void weights_of_splats_about_the_eye_leave_no_holes(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 24, 24, 24 } });
+    s.table[65535] = (trip_tf_entry){ 1, 1, 1, 5 };
+    trip_settings settings = plain();
+    settings.vertex_weights = true;
+    for (int i = 0; i < 6; i++) {
+        trip_camera_params view = scene_view(&s, trip_v3(1, 0.3 * i - 0.8, 0.4), 0.3 + i, 100, 40);
+        settings.traversal = i % 2 ? TRIP_TRAVERSAL_ASCENDING : TRIP_TRAVERSAL_OUTWARD;
+        scene_picture drawn = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+        for (int k = 0; k < 40 * 40; k++)
+            assert_close(drawn.rgba[4 * k + 3], 1, 1e-3);
+        scene_picture_free(&drawn);
+    }
     scene_destroy(&s);
 }
 
@@ -393,10 +505,14 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sprite_is_as_large_as_the_sphere_in_the_middle),
+        cmocka_unit_test(off_the_axis_a_sprite_has_the_papers_size),
         cmocka_unit_test(every_sprite_has_that_size),
         cmocka_unit_test(in_parallel_views_of_cubes_nothing_changes),
         cmocka_unit_test(gl_draws_the_references_sprites),
+        cmocka_unit_test(a_sprite_at_the_eye_is_not_drawn),
+        cmocka_unit_test(a_sprite_just_before_the_eye_is_drawn_where_it_lies),
         cmocka_unit_test(weights_are_interpolated_between_the_corners_of_the_last_splat),
+        cmocka_unit_test(weights_of_splats_about_the_eye_leave_no_holes),
         cmocka_unit_test(the_sheets_of_one_splat_add_up_to_it),
         cmocka_unit_test(splats_are_cut_by_planes_of_equal_depth),
         cmocka_unit_test(no_list_shows),
