@@ -249,9 +249,9 @@ static void gradients_of_floats_are_right(void **state)
     trip_brick_summary s;
     trip_brick_params p = params_for("float", "a.trip");
     p.keep_all = true;
-    p.volume.spacing[0] = 0.5;
-    p.volume.spacing[1] = 1;
-    p.volume.spacing[2] = 2;
+    p.volume.spacing[0] = 5;
+    p.volume.spacing[1] = 10;
+    p.volume.spacing[2] = 20;
     make_floats();
     assert_int_equal(trip_brick(&p, &s), 0);
     test_read_lists("a.trip", &l);
@@ -260,8 +260,8 @@ static void gradients_of_floats_are_right(void **state)
             for (int i = 1; i < NX - 1; i++) {
                 const float *f = floats + ((size_t)k * NY + (size_t)j) * NX + (size_t)i;
                 double g[3],
-                    e[3] = { ((double)f[1] - f[-1]) / 2 / 0.5, ((double)f[NX] - f[-NX]) / 2,
-                             ((double)f[NX * NY] - f[-NX * NY]) / 2 / 2 };
+                    e[3] = { ((double)f[1] - f[-1]) / 2 / 5, ((double)f[NX] - f[-NX]) / 2 / 10,
+                             ((double)f[NX * NY] - f[-NX * NY]) / 2 / 20 };
                 double full = l.header.gradient_full;
                 trip_normal_unpack(l.normals[0][f - floats], full, g);
                 double length = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
