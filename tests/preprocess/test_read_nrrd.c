@@ -574,6 +574,10 @@ static void left_handed_spaces_are_turned_right_handed(void **state)
         assert_map(&info.index_to_world,
                    (const double[3][4]){ { -1, 4, 0, -10 }, { 2, 1, 0.5, 20 }, { 3, 0, 2, 30 } });
     }
+    const trip_affine map = map_of(write_with_lines(
+        "left.nrrd", "space: LAS\ncoordinates 0:=1 2 3 4 9\ncoordinates 1:=1 2 3 5\n"));
+    assert_map(&map,
+               (const double[3][4]){ { -2, 0, 0, -1 }, { 0, 4 / 3.0, 0, 1 }, { 0, 0, 1, 0 } });
 }
 
 static void vectors_with_time_give_their_place_in_space(void **state)
