@@ -635,6 +635,14 @@ static void coordinates_of_axes_are_a_key_and_value(void **state)
     assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 4 2\n"),
                    "neither ascend nor descend");
     assert_refused(write_with_lines("bad.nrrd", "coordinates z:=1\n"), "names no axis");
+    static const char *const of_tilted[] = { "coordinates 0:=1 2 3 4 9\n",
+                                             "coordinates 1:=1 2 3 9\n" };
+    for (int i = 0; i < 2; i++) {
+        char lines[200];
+        snprintf(lines, sizeof lines, "space: RAS\nspace directions: (1,1,0) (0,1,0) (0,0,1)\n%s",
+                 of_tilted[i]);
+        assert_refused(write_with_lines("bad.nrrd", lines), "does not lie along that of the world");
+    }
 }
 
 static void the_measurement_frame_changes_nothing(void **state)
