@@ -372,9 +372,9 @@ static void append_points(trip_writer *w, unsigned list, const uint32_t points[4
  * fourth, which both have. */
 static void a_voxel_of_two_kinds_is_found_in_any_square(void **state)
 {
-    const uint32_t kept[4][3] = { { 8, 1, 1 }, { 1, 8, 1 }, { 1, 1, 8 }, { 8, 8, 8 } };
-    const uint32_t shared[4][3] = { { 8, 0, 0 }, { 0, 8, 0 }, { 0, 0, 8 }, { 8, 8, 8 } };
-    const uint32_t apart[4][3] = { { 8, 0, 0 }, { 0, 8, 0 }, { 0, 0, 8 }, { 9, 9, 9 } };
+    const uint32_t kept[4][3] = { { 10, 1, 1 }, { 1, 10, 1 }, { 1, 1, 10 }, { 10, 10, 10 } };
+    const uint32_t shared[4][3] = { { 10, 0, 0 }, { 0, 10, 0 }, { 0, 0, 10 }, { 10, 10, 10 } };
+    const uint32_t apart[4][3] = { { 10, 0, 0 }, { 0, 10, 0 }, { 0, 0, 10 }, { 9, 9, 9 } };
     const trip_writer_params params = { .dims = { 16, 16, 16 },
                                         .tile_voxels = 16,
                                         .replace = true,
