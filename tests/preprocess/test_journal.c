@@ -255,6 +255,7 @@ ATTACK(start_twice, records[record_count - 1].kind = START)
 ATTACK(start_cut_short, records[0].bytes -= 8)
 ATTACK(checkpoint_cut_short, records[record_count - 1].bytes = 16)
 ATTACK(a_kept_voxel_less, checkpoint()->kept--)
+ATTACK(a_voxel_less_around, checkpoint()->halo--)
 
 static void numbers_that_no_run_writes_are_refused(void **state)
 {
@@ -360,6 +361,22 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     free_records();
     expect_refused(p, "a kept voxel less", "what the interrupted run left is damaged");
     assert_false(test_exists("a.trip.partial"));
+}
+
+static void a_false_count_of_voxels_around_them_is_found_at_the_end(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    make_volume();
+    p.keep_all = false;
+    p.slices = 20;
+    leave_killed_run(p);
+    read_journal();
+    assert_true(checkpoint()->halo > 0);
+    a_voxel_less_around();
+    write_journal();
+    free_records();
+    expect_refused(p, "a voxel less around", "voxels around them were counted");
 }
 
 /* Bytes of a file of the killed run. */
@@ -686,6 +703,7 @@ int main(void)
         TEST(another_identity_is_refused),
         TEST(false_lengths_of_files_in_order_are_found_when_they_are_read),
         TEST(a_false_count_of_kept_voxels_is_found_at_the_end),
+        TEST(a_false_count_of_voxels_around_them_is_found_at_the_end),
         TEST(false_records_of_the_list_in_order_are_refused),
         TEST(a_block_that_is_longer_than_any_is_refused),
         TEST(a_record_that_is_longer_than_any_is_none),
