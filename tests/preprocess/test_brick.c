@@ -613,6 +613,21 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
     p = params_for("uint8", "a.trip");
     p.memory_bytes = 1 << 20;
     check_refused(p, "--memory");
+    for (unsigned threads = 1; threads < 4; threads++) { /* what it says that it needs suffices */
+        unsigned least = 0;
+        char same[200];
+        p.memory_bytes = 1 << 20;
+        p.threads = threads;
+        check_refused(p, "threads need --memory ");
+        assert_int_equal(sscanf(strstr(test_report, "--memory "), "--memory %uM", &least), 1);
+        snprintf(same, sizeof same, "%s", strstr(test_report, "slices of"));
+        p.memory_bytes = (uint64_t)(least - 2) << 20;
+        check_refused(p, same);
+        p.memory_bytes = (uint64_t)least << 20;
+        assert_int_equal(trip_brick(&p, &(trip_brick_summary){ 0 }), 0);
+        assert_int_equal(rename(p.output, test_path(threads > 1 ? threads > 2 ? "3" : "2" : "1")),
+                         0);
+    }
     p = params_for("uint8", "a.trip");
     p.volume.raw_dims[2] = NZ + 1;
     check_refused(p, "v.raw");
