@@ -48,8 +48,8 @@ double trip_coordinates_place(const trip_coordinates *c, int axis, double index)
     if (!x || last < 1)
         return index;
     int64_t i = (int64_t)fmax(0, fmin(floor(index), (double)last - 1));
-    double part = index - (double)i;
-    return part == 1 ? x[i + 1] : x[i] + part * (x[i + 1] - x[i]);
+    /* Exactly its place at the last voxel, too: how the difference is rounded vanishes in it. */
+    return x[i] + (index - (double)i) * (x[i + 1] - x[i]);
 }
 
 double trip_coordinates_index(const trip_coordinates *c, int axis, double place)

@@ -113,12 +113,12 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
     return 0;
 }
 
-/* Whether no count is below that of the checkpoint before, which is clear at first. */
+/* Whether no count is below that of the checkpoint before, which is clear at first; that of
+ * sequences follows from the record. */
 static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
 {
     bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
-                c->runs >= before->runs && c->sequences >= before->sequences &&
-                c->ordered_splats >= before->ordered_splats;
+                c->runs >= before->runs && c->ordered_splats >= before->ordered_splats;
     for (int i = 0; i < TRIP_PLANES; i++)
         fits = fits && c->ordered_bytes[i] >= before->ordered_bytes[i];
     return fits;

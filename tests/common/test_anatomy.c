@@ -71,6 +71,29 @@ static void vectors_are_named_by_the_ends_they_point_to_most_first(void **state)
     assert_string_equal(trip_anatomy_words("LPS", trip_v3(NAN, 0, 0), words), "");
 }
 
+static void scans_from_above_lie_along_their_axes_in_slices_apart(void **state)
+{
+    (void)state;
+    static const double along[][4] = {
+        { 1, 1, 3, true },  { 2, 2, 1, true },  { 1, 1, 1.5, true }, { 1, 1, 1.49, false },
+        { 1, 1, 1, false }, { 0, 1, 3, false }, { -1, 1, 3, false }, { 1, 1, -3, false },
+    };
+    trip_affine m;
+    for (size_t i = 0; i < sizeof along / sizeof *along; i++) {
+        m = trip_affine_identity();
+        for (int a = 0; a < 3; a++)
+            m.m[a][a] = along[i][a];
+        assert_int_equal(trip_anatomy_is_scan_from_above(&m), along[i][3] > 0);
+    }
+    for (int n = 0; n < 12; n++) { /* turned, or moved */
+        m = (trip_affine){ { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 3, 0 } } };
+        if (n / 4 == n % 4)
+            continue;
+        m.m[n / 4][n % 4] = 0.1;
+        assert_false(trip_anatomy_is_scan_from_above(&m));
+    }
+}
+
 static void axes_are_one_end_of_each_pair(void **state)
 {
     (void)state;
@@ -90,6 +113,7 @@ int main(void)
         cmocka_unit_test(each_end_of_the_body_is_where_its_convention_has_it),
         cmocka_unit_test(both_conventions_are_right_handed),
         cmocka_unit_test(vectors_are_named_by_the_ends_they_point_to_most_first),
+        cmocka_unit_test(scans_from_above_lie_along_their_axes_in_slices_apart),
         cmocka_unit_test(axes_are_one_end_of_each_pair),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

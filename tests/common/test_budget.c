@@ -49,6 +49,30 @@ static void huge_requests_are_refused_without_overflow(void **state)
     trip_budget_destroy(b);
 }
 
+/* Half of all addresses, which no system gives. */
+static void what_the_system_refuses_is_not_counted(void **state)
+{
+    (void)state;
+    trip_budget *b;
+    assert_int_equal(trip_budget_create(&b, UINT64_MAX), 0);
+    assert_null(trip_budget_take(b, SIZE_MAX / 2));
+    assert_int_equal(trip_budget_left_bytes(b), UINT64_MAX);
+    trip_budget_destroy(b);
+}
+
+static void nothing_takes_a_page(void **state)
+{
+    (void)state;
+    trip_budget *b;
+    assert_int_equal(trip_budget_create(&b, 8192), 0);
+    void *p = trip_budget_take(b, 0);
+    assert_non_null(p);
+    assert_int_equal(trip_budget_left_bytes(b), 4096);
+    trip_budget_release(b, p, 0);
+    assert_int_equal(trip_budget_left_bytes(b), 8192);
+    trip_budget_destroy(b);
+}
+
 static void releasing_nothing_is_allowed(void **state)
 {
     (void)state;
@@ -151,6 +175,8 @@ static void other_texts_are_not_sizes(void **state)
                                          "1e3",
                                          "1..2",
                                          "99999999T",
+                                         "8388608T", /* 2^63 */
+                                         "9223372036854775808",
                                          "1iB",
                                          "1 ",
                                          "nan",
@@ -184,6 +210,8 @@ int main(void)
         cmocka_unit_test(memory_is_aligned_zeroed_and_counted),
         cmocka_unit_test(whole_limit_fits_and_one_byte_more_does_not),
         cmocka_unit_test(huge_requests_are_refused_without_overflow),
+        cmocka_unit_test(what_the_system_refuses_is_not_counted),
+        cmocka_unit_test(nothing_takes_a_page),
         cmocka_unit_test(releasing_nothing_is_allowed),
         cmocka_unit_test(default_limit_is_a_quarter_of_the_available_memory),
         cmocka_unit_test(threads_never_exceed_the_limit),

@@ -94,6 +94,36 @@ static void angiogram_shows_all_but_its_zeros(void **state)
     trip_tf_destroy(tf);
 }
 
+/* Background is the lowest peak, also where another is three times as high. */
+static void little_background_is_hidden_all_the_same(void **state)
+{
+    (void)state;
+    start(0, 1000);
+    put_peak(0, 1000, 100, 10, 1e6);
+    put_peak(0, 1000, 500, 10, 3e6);
+    put_peak(0, 1000, 900, 10, 1e5);
+    trip_tf *tf = automatic();
+    assert_false(trip_tf_visible_in(tf, 0, 120));
+    assert_true(opacity(tf, 500) > 0);
+    assert_true(opacity(tf, 900) > opacity(tf, 500));
+    trip_tf_destroy(tf);
+}
+
+/* The background ends with a group of sixteen bins of 1024, and what is stored with it is up to
+ * half a code of 65535 above. */
+static void background_that_codes_round_upwards_is_hidden_too(void **state)
+{
+    (void)state;
+    start(0, 1024);
+    put(7.5, 1e6);
+    for (int v = 600; v < 1000; v++)
+        put(v, 100);
+    trip_tf *tf = automatic();
+    assert_true(opacity(tf, 16 + 0.5 * 1024 / 65535) == 0);
+    assert_true(opacity(tf, 900) > 0);
+    trip_tf_destroy(tf);
+}
+
 static void tomogram_hides_air_veils_tissue_and_shows_bone(void **state)
 {
     (void)state;
@@ -197,6 +227,8 @@ int main(void)
         cmocka_unit_test(nothing_at_all_still_makes_a_function),
         cmocka_unit_test(two_values_show_the_upper_one_only),
         cmocka_unit_test(angiogram_shows_all_but_its_zeros),
+        cmocka_unit_test(little_background_is_hidden_all_the_same),
+        cmocka_unit_test(background_that_codes_round_upwards_is_hidden_too),
         cmocka_unit_test(tomogram_hides_air_veils_tissue_and_shows_bone),
         cmocka_unit_test(small_values_below_the_background_do_not_count_as_it),
         cmocka_unit_test(fog_with_a_long_tail_shows_its_dense_part),

@@ -252,9 +252,9 @@ static void gradients_of_floats_are_right(void **state)
     trip_brick_summary s;
     trip_brick_params p = params_for("float", "a.trip");
     p.keep_all = true;
-    p.volume.spacing[0] = 0.5;
-    p.volume.spacing[1] = 1;
-    p.volume.spacing[2] = 2;
+    p.volume.spacing[0] = 5;
+    p.volume.spacing[1] = 10;
+    p.volume.spacing[2] = 20;
     make_floats();
     assert_int_equal(trip_brick(&p, &s), 0);
     test_read_lists("a.trip", &l);
@@ -263,8 +263,8 @@ static void gradients_of_floats_are_right(void **state)
             for (int i = 1; i < NX - 1; i++) {
                 const float *f = floats + ((size_t)k * NY + (size_t)j) * NX + (size_t)i;
                 double g[3],
-                    e[3] = { ((double)f[1] - f[-1]) / 2 / 0.5, ((double)f[NX] - f[-NX]) / 2,
-                             ((double)f[NX * NY] - f[-NX * NY]) / 2 / 2 };
+                    e[3] = { ((double)f[1] - f[-1]) / 2 / 5, ((double)f[NX] - f[-NX]) / 2 / 10,
+                             ((double)f[NX * NY] - f[-NX * NY]) / 2 / 20 };
                 double full = l.header.gradient_full;
                 trip_normal_unpack(l.normals[0][f - floats], full, g);
                 double length = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
@@ -320,8 +320,113 @@ static void codes_have_the_bytes_of_the_source(void **state)
         assert_int_equal(l.header.code_bytes, s.code_bytes);
         for (int n = 0; n < N && i < 2; n++)
             assert_int_equal(l.codes[0][n], 85 * (258 + (i ? (int8_t)bytes[n] + 128 : bytes[n])));
+        for (int n = 0; n < NX * NY * (NZ / 2) && i == 2; n++)
+            assert_int_equal(l.codes[0][n],
+                             (int16_t)(bytes[2 * n] | bytes[2 * n + 1] << 8) + 32768);
         test_free_lists(&l);
     }
+}
+
+/* Bricks the bytes as NIfTI-1, which scales them. */
+static trip_brick_summary brick_scaled(float slope, float inter)
+{
+    static struct {
+        unsigned char header[352], values[N];
+    } file;
+    static char input[128];
+    const int32_t size = 348;
+    const int16_t dims[4] = { 3, NX, NY, NZ }, type = 2, bits = 8;
+    const float offset = 352;
+    memcpy(file.values, bytes, sizeof bytes);
+    memcpy(file.header, &size, 4);
+    memcpy(file.header + 40, dims, sizeof dims);
+    memcpy(file.header + 70, &type, 2);
+    memcpy(file.header + 72, &bits, 2);
+    memcpy(file.header + 108, &offset, 4);
+    memcpy(file.header + 112, &slope, 4);
+    memcpy(file.header + 116, &inter, 4);
+    memcpy(file.header + 344, "n+1", 4);
+    test_write("v.nii", &file, sizeof file);
+    trip_brick_summary s;
+    trip_brick_params p = params_for(NULL, "a.trip");
+    strcpy(input, test_path("v.nii"));
+    p.input = input;
+    p.volume = (trip_volume_params){ 0 };
+    p.keep_all = p.replace = true;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    return s;
+}
+
+/* 10 - 2 times the bytes: -500 to 10. */
+static void codes_of_bytes_are_exact_where_values_fall_as_they_rise(void **state)
+{
+    (void)state;
+    test_lists l;
+    make_bytes();
+    brick_scaled(-2, 10);
+    test_read_lists("a.trip", &l);
+    assert_int_equal(l.header.code_bytes, 1);
+    assert_true(l.header.code_lo < l.header.code_hi);
+    for (int n = 0; n < N; n++)
+        assert_int_equal(l.codes[0][n], 85 * (258 + 255 - bytes[n]));
+    for (int stored = 0; stored < 256; stored += 255) {
+        const double part = 85 * (258 + 255 - stored) / 65535.0;
+        const double value = l.header.code_lo + (l.header.code_hi - l.header.code_lo) * part;
+        assert_true(fabs(value - (10 - 2 * stored)) < 1e-9);
+    }
+    test_free_lists(&l);
+}
+
+/* About 10^6 floats are a sixteenth apart, so that tenths are not among them. */
+static void bytes_whose_values_are_no_floats_have_codes_of_16_bits(void **state)
+{
+    (void)state;
+    make_bytes();
+    assert_int_equal(brick_scaled(0.1f, 1).code_bytes, 1);
+    assert_int_equal(brick_scaled(0.1f, 1e6f).code_bytes, 2);
+}
+
+/* Of a field that is linear in the world they are the same everywhere. */
+static void gradients_of_uneven_grids_are_those_of_the_world(void **state)
+{
+    (void)state;
+    const int size[3] = { NX, NY, NZ };
+    const double slope[3] = { 2, -1, 0.5 };
+    double places[3][NX];
+    char files[400], paths[3][128];
+    test_lists l;
+    trip_brick_summary s;
+    trip_brick_params p = params_for("float", "a.trip");
+    for (int a = 0; a < 3; a++) {
+        snprintf(paths[a], sizeof paths[a], "%s.%c", p.input, 'x' + a);
+        FILE *f = fopen(paths[a], "w");
+        for (int i = 0; i < size[a]; i++) { /* steps of 1, 2, 3, 1, 2, 3 ... */
+            places[a][i] = i / 3 * 6 + (i % 3 == 0 ? 0 : i % 3 == 1 ? 1 : 3);
+            fprintf(f, "%g\n", places[a][i]);
+        }
+        fclose(f);
+    }
+    snprintf(files, sizeof files, "%s,%s,%s", paths[0], paths[1], paths[2]);
+    for (int i = 0; i < N; i++)
+        floats[i] = (float)(slope[0] * places[0][i % NX] + slope[1] * places[1][i / NX % NY] +
+                            slope[2] * places[2][i / NX / NY]);
+    test_write("v.raw", floats, sizeof floats);
+    p.volume.coordinates = files;
+    p.keep_all = true;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    test_read_lists("a.trip", &l);
+    for (int i = 0; i < N; i++) {
+        double g[3];
+        trip_normal_unpack(l.normals[0][i], l.header.gradient_full, g);
+        for (int a = 0; a < 3; a++)
+            assert_true(fabs(g[a] - slope[a]) <= l.header.gradient_full / 511);
+    }
+    test_free_lists(&l);
+    make_bytes(); /* whose differences are no multiples of a step, either */
+    p.volume.raw_type = "uint8";
+    p.replace = true;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_int_equal(s.normal_bytes, 4);
 }
 
 static void check_compact_normal(const trip_compact_normals *c, uint32_t normal, const uint8_t *b)
@@ -361,6 +466,23 @@ static void normals_of_bytes_are_compact_and_exact_below_full_shading(void **sta
                 check_compact_normal(&c, l.normals[0][at], bytes + at);
             }
     test_free_lists(&l);
+}
+
+/* Halves of a difference of bytes reach 63.5. The longest vector that is kept as one is that of
+ * 0.04 * 255 over a voxel, along z as many times a voxel's mean length as z is long. */
+static void normals_of_bytes_are_compact_where_halves_reach_far_enough(void **state)
+{
+    (void)state;
+    make_bytes();
+    for (int i = 0; i < 2; i++) {
+        trip_brick_summary s;
+        trip_brick_params p = params_for("uint8", "a.trip");
+        p.keep_all = p.replace = true;
+        p.volume.spacing[0] = p.volume.spacing[1] = 1;
+        p.volume.spacing[2] = i ? 27 : 8; /* 10.2 * 27 / 3 is beyond, 10.2 * 8 / 2 is not */
+        assert_int_equal(trip_brick(&p, &s), 0);
+        assert_int_equal(s.normal_bytes, i ? 4 : 3);
+    }
 }
 
 /* Compact normals need the range of values: where nothing else does, normals are full. */
@@ -494,11 +616,36 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
     p = params_for("uint8", "a.trip");
     p.memory_bytes = 1 << 20;
     check_refused(p, "--memory");
+    for (unsigned threads = 1; threads < 4; threads++) { /* what it says that it needs suffices */
+        unsigned least = 0;
+        char same[200];
+        p.memory_bytes = 1 << 20;
+        p.threads = threads;
+        check_refused(p, "threads need --memory ");
+        assert_int_equal(sscanf(strstr(test_report, "--memory "), "--memory %uM", &least), 1);
+        snprintf(same, sizeof same, "%s", strstr(test_report, "slices of"));
+        p.memory_bytes = (uint64_t)(least - 2) << 20;
+        check_refused(p, same);
+        p.memory_bytes = (uint64_t)least << 20;
+        assert_int_equal(trip_brick(&p, &(trip_brick_summary){ 0 }), 0);
+        assert_int_equal(rename(p.output, test_path(threads > 1 ? threads > 2 ? "3" : "2" : "1")),
+                         0);
+    }
     p = params_for("uint8", "a.trip");
     p.volume.raw_dims[2] = NZ + 1;
     check_refused(p, "v.raw");
     p = params_for("uint8", "no/such/folder.trip");
     check_refused(p, "No such file");
+    static const trip_region beyond[] = { { { 0, 0, 0 }, { 0, NY + 1, 0 } },
+                                          { { 0, NY, 0 }, { 0, 0, 0 } },
+                                          { { 0, 7, 0 }, { 0, 7, 0 } },
+                                          { { 0, -1, 0 }, { 0, 0, 0 } } };
+    for (size_t i = 0; i < sizeof beyond / sizeof *beyond; i++) {
+        p = params_for("uint8", "a.trip");
+        p.keep_all = true;
+        p.region = beyond[i];
+        check_refused(p, "leaves the grid along j");
+    }
     p = params_for("float", "a.trip");
     for (int i = 0; i < N; i++)
         floats[i] = NAN;
@@ -734,6 +881,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(codes_have_the_bytes_of_the_source, test_begin, test_end),
         cmocka_unit_test_setup_teardown(normals_of_bytes_are_compact_and_exact_below_full_shading,
                                         test_begin, test_end),
+        cmocka_unit_test_setup_teardown(normals_of_bytes_are_compact_where_halves_reach_far_enough,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(normals_have_the_bytes_that_were_chosen, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(kept_voxels_are_those_of_the_envelope, test_begin,
@@ -762,6 +911,12 @@ int main(void)
                                         test_end),
         cmocka_unit_test_setup_teardown(without_normals_there_is_no_such_plane, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(codes_of_bytes_are_exact_where_values_fall_as_they_rise,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(bytes_whose_values_are_no_floats_have_codes_of_16_bits,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(gradients_of_uneven_grids_are_those_of_the_world,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(what_cannot_be_done_is_said_in_one_line_and_leaves_nothing,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(an_existing_data_set_stays_unless_it_is_to_be_replaced,

@@ -118,6 +118,35 @@ static void members_one_after_the_other_are_one_stream(void **state)
     }
 }
 
+/* A mebibyte is read at once: of the second member it has no byte, one, or two. The first is made
+ * as long by a comment. */
+static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
+{
+    (void)state;
+    static unsigned char whole[(1 << 20) + (1 << 16)];
+    const bytes all = plain();
+    bytes half = { .count = 0 }, first = { .count = 0 }, second = { .count = 0 };
+    append(&half, all.data, COUNT / 2);
+    append_gzip(&first, &half);
+    half.count = 0;
+    append(&half, all.data + COUNT / 2, COUNT / 2);
+    append_gzip(&second, &half);
+    assert_int_equal(first.data[3], 0);
+    first.data[3] = 16; /* there is a comment behind the header's 10 bytes */
+    for (size_t left = 0; left < 3; left++) {
+        const size_t end = (1 << 20) - left, comment = end - first.count;
+        memcpy(whole, first.data, 10);
+        memset(whole + 10, 'x', comment - 1);
+        whole[10 + comment - 1] = 0;
+        memcpy(whole + 10 + comment, first.data + 10, first.count - 10);
+        memcpy(whole + end, second.data, second.count);
+        const char *path = write_bytes("border", whole, end + second.count);
+        assert_delivers(
+            &(trip_byte_source){ .path = path, .encoding = TRIP_BYTES_ZLIB, .size_bytes = COUNT },
+            0, 3000);
+    }
+}
+
 /* One byte less at a time, down to an empty file: also the checksums at the end are missed. */
 static void a_cut_file_is_refused_wherever_it_is_cut(void **state)
 {
@@ -255,6 +284,7 @@ int main(void)
         cmocka_unit_test(all_encodings_deliver_the_same_bytes_in_any_pieces),
         cmocka_unit_test(bytes_can_be_skipped_before_and_after_decompression),
         cmocka_unit_test(members_one_after_the_other_are_one_stream),
+        cmocka_unit_test(members_may_end_anywhere_in_what_is_read_at_once),
         cmocka_unit_test(a_cut_file_is_refused_wherever_it_is_cut),
         cmocka_unit_test(corrupt_data_is_found_by_the_checksum),
         cmocka_unit_test(other_content_than_promised_is_refused),

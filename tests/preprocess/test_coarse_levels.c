@@ -5,6 +5,7 @@
 
 #include "levels.h"
 #include "mean.h"
+#include "normal.h"
 #include "reader.h"
 
 enum { NX = 300, NY = 70, NZ = 41, N = NX * NY * NZ, LEAST = 200 };
@@ -65,7 +66,8 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
         p.range_count = 1;
     }
     p.replace = true;
-    p.volume = (trip_volume_params){ .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" };
+    if (!p.volume.raw_type)
+        p.volume = (trip_volume_params){ .raw_dims = { NX, NY, NZ }, .raw_type = "uint8" };
     if (trip_brick(&p, &s) != 0)
         fail_msg("%s", test_report);
     return s;
@@ -349,6 +351,121 @@ static void what_is_added_about_kept_voxels_does_not_show(void **state)
     assert_int_equal(check_added("a.trip", 0, 255 - LEAST), count);
 }
 
+static trip_dataset *open_data_set(const char *name, trip_budget **budget)
+{
+    trip_dataset *d;
+    assert_int_equal(trip_budget_create(budget, (uint64_t)1 << 28), 0);
+    assert_int_equal(trip_dataset_open(&d, test_path(name), *budget), 0);
+    return d;
+}
+
+/* Voxels of 16 bits, some squares long along y: at level 1 the means of up to eight of them, to
+ * the nearest. */
+enum { SX = 7, SY = 300, SZ = 9 };
+
+static uint16_t shorts[SX * SY * SZ];
+
+/* -1: beyond the grid. */
+static double mean_of_shorts(const int64_t at[3])
+{
+    double sum = 0, count = 0;
+    for (int n = 0; n < 8; n++) {
+        const int64_t x = 2 * at[0] + n % 2, y = 2 * at[1] + n / 2 % 2, z = 2 * at[2] + n / 4;
+        if (x < 0 || y < 0 || z < 0 || x >= SX || y >= SY || z >= SZ)
+            continue;
+        sum += shorts[(z * SY + y) * SX + x];
+        count++;
+    }
+    return count > 0 ? floor(sum / count + 0.5) : -1;
+}
+
+static void check_short(const trip_dataset *d, const trip_list *list, const int64_t at[3],
+                        unsigned code, void *user)
+{
+    const double own = mean_of_shorts(at);
+    double sharp = own;
+    (void)d;
+    (void)list;
+    for (int n = 0; n < 6; n++) {
+        int64_t to[3] = { at[0], at[1], at[2] };
+        to[n / 2] += n % 2 ? 1 : -1;
+        const double beside = mean_of_shorts(to);
+        sharp += beside < 0 ? 0 : (own - beside) / 8;
+    }
+    assert_true(fabs(code - fmin(65535, fmax(0, sharp))) <= 0.5);
+    ((uint64_t *)user)[sharp < 0 ? 0 : sharp > 65535 ? 2 : 1]++;
+}
+
+static void values_are_sharpened_to_the_nearest_code_and_stay_in_the_range_of_codes(void **state)
+{
+    (void)state;
+    uint64_t random = 4, counts[3] = { 0 };
+    for (int i = 0; i < SX * SY * SZ; i++) { /* cubes that are nearly black or nearly white */
+        const int which = (i % SX / 2 + i / SX % SY / 2 * 7 + i / SX / SY / 2 * 31) % 3;
+        const uint16_t near = (uint16_t)(test_random(&random) % 100);
+        shorts[i] = which == 0 ? near : which == 1 ? UINT16_MAX - near : 30000 + near;
+    }
+    test_write("v.raw", shorts, sizeof shorts);
+    brick_to("a.trip",
+             (trip_brick_params){ .volume = { .raw_dims = { SX, SY, SZ }, .raw_type = "uint16" },
+                                  .keep_all = true,
+                                  .levels = 1 });
+    trip_budget *budget;
+    trip_dataset *d = open_data_set("a.trip", &budget);
+    const uint64_t records =
+        visit(d, trip_dataset_find(d, 1, 1, TRIP_KIND_VALUES), check_short, counts);
+    assert_int_equal(records, (SX + 1) / 2 * (SY / 2) * ((SZ + 1) / 2));
+    for (int i = 0; i < 3; i++)
+        assert_true(counts[i] > 20);
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+}
+
+static void expect_records(const char *name, unsigned level, uint64_t records)
+{
+    trip_budget *budget;
+    trip_dataset *d = open_data_set(name, &budget);
+    for (int axis = 0; axis < 3; axis++)
+        assert_int_equal(trip_dataset_find(d, axis, level, TRIP_KIND_VALUES)->records, records);
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+}
+
+/* A voxel in the middle of one of level 2, which lies where a square begins and far from the first
+ * sheet. What is around it is in 2 x 2 x 2 voxels of level 1, and in that one of level 2, which
+ * gets all 26 beside it. */
+static void what_is_beside_a_voxel_is_added_wherever_it_lies(void **state)
+{
+    enum { X = 20, Y = 300, Z = 200 };
+    (void)state;
+    uint8_t *voxels = calloc(Z, (size_t)X * Y);
+    voxels[(154 * Y + 4 * 64 + 2) * X + 10] = 255;
+    test_write("v.raw", voxels, (size_t)X * Y * Z);
+    free(voxels);
+    brick_to("a.trip",
+             (trip_brick_params){ .volume = { .raw_dims = { X, Y, Z }, .raw_type = "uint8" },
+                                  .levels = 2 });
+    expect_records("a.trip", 1, 8);
+    expect_records("a.trip", 2, 27);
+}
+
+/* Where all that is there was kept, nothing is to be had that would not show. */
+static void nothing_is_added_beside_what_is_kept_whole(void **state)
+{
+    enum { EDGE = 16 };
+    (void)state;
+    float values[EDGE * EDGE * EDGE];
+    for (int i = 0; i < EDGE * EDGE * EDGE; i++)
+        values[i] = i % EDGE < EDGE / 2 ? (float)(1 + i % 5) : NAN;
+    test_write("v.raw", values, sizeof values);
+    brick_to("a.trip", (trip_brick_params){
+                           .volume = { .raw_dims = { EDGE, EDGE, EDGE }, .raw_type = "float" },
+                           .keep_all = true,
+                           .levels = 2 });
+    expect_records("a.trip", 1, 4 * 8 * 8);
+    expect_records("a.trip", 2, 2 * 4 * 4);
+}
+
 static void tiles_of_any_size_have_levels(void **state)
 {
     (void)state;
@@ -428,10 +545,8 @@ static void normals_are_those_of_the_faces(void **state)
         bytes[i] = i / NX / NY / 4 == 3 ? 255 : 0;
     test_write("v.raw", bytes, sizeof bytes);
     brick_to("a.trip", (trip_brick_params){ .normals = TRIP_NORMALS_FULL });
-    trip_dataset *d;
     trip_budget *budget;
-    assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 28), 0);
-    assert_int_equal(trip_dataset_open(&d, test_path("a.trip"), budget), 0);
+    trip_dataset *d = open_data_set("a.trip", &budget);
     const trip_list *list = trip_dataset_find(d, 2, 1, TRIP_KIND_MEANS);
     assert_non_null(list);
     assert_int_equal(list->records, 2 * 150 * 35);
@@ -449,12 +564,65 @@ static void normals_are_those_of_the_faces(void **state)
     trip_budget_destroy(budget);
 }
 
+/* The same slab in a world whose x is the grid's z. */
+static void compact_normals_are_those_of_the_faces_in_a_turned_world(void **state)
+{
+    (void)state;
+    const char header[] = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 300 70 41\n"
+                          "space dimension: 3\nspace directions: (0,1,0) (0,0,1) (1,0,0)\n"
+                          "encoding: raw\ndata file: v.raw\n";
+    for (int i = 0; i < N; i++)
+        bytes[i] = i / NX / NY / 4 == 3 ? 100 : 0;
+    test_write("v.raw", bytes, sizeof bytes);
+    test_write("v.nhdr", header, sizeof header - 1);
+    const trip_value_range shown = { 50, 255 };
+    static char input[128], output[128];
+    trip_brick_summary s;
+    strcpy(input, test_path("v.nhdr"));
+    strcpy(output, test_path("a.trip"));
+    const trip_brick_params p = { .input = input,
+                                  .output = output,
+                                  .ranges = &shown,
+                                  .range_count = 1,
+                                  .levels_for = TRIP_LEVELS_FOR_BOTH,
+                                  .levels = 1,
+                                  .normals = TRIP_NORMALS_COMPACT };
+    assert_int_equal(trip_brick(&p, &s), 0);
+    trip_budget *budget;
+    trip_dataset *d = open_data_set("a.trip", &budget);
+    const trip_list *list = trip_dataset_find(d, 2, 1, TRIP_KIND_MEANS);
+    const trip_compact_normals compact = trip_compact_normals_make(
+        &d->index_to_world, d->header.gradient_full, d->header.gradient_step);
+    assert_int_equal(d->header.normal_bytes, 3);
+    assert_int_equal(list->records, 2 * 150 * 35);
+    unsigned char *normals = malloc(list->plane_bytes[1]);
+    assert_int_equal(pread(list->plane_fd[1], normals, list->plane_bytes[1], 0),
+                     list->plane_bytes[1]);
+    for (uint64_t i = 0; i < list->records; i++) {
+        const unsigned char *n = normals + 3 * i;
+        double g[3];
+        trip_compact_normal_unpack(&compact, n[0] | (uint32_t)n[1] << 8 | (uint32_t)n[2] << 16, g);
+        assert_true(fabs(g[0]) > 0.9 * fmin(50, compact.full));
+        assert_true(fabs(g[1]) < 1 && fabs(g[2]) < 1);
+    }
+    free(normals);
+    trip_dataset_close(d);
+    trip_budget_destroy(budget);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(coarse_voxels_have_the_means_of_those_they_cover,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(what_is_added_about_kept_voxels_does_not_show, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(
+            values_are_sharpened_to_the_nearest_code_and_stay_in_the_range_of_codes, test_begin,
+            test_end),
+        cmocka_unit_test_setup_teardown(what_is_beside_a_voxel_is_added_wherever_it_lies,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(nothing_is_added_beside_what_is_kept_whole, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(tiles_of_any_size_have_levels, test_begin, test_end),
         cmocka_unit_test_setup_teardown(memory_threads_and_slices_make_no_difference, test_begin,
@@ -463,6 +631,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(levels_can_be_left_out_and_stop_at_one_voxel, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(normals_are_those_of_the_faces, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(compact_normals_are_those_of_the_faces_in_a_turned_world,
+                                        test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

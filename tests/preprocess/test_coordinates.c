@@ -240,6 +240,19 @@ static void places_and_indices_are_inverse(void **state)
     assert_true(fabs(c.widest - 1.375) < 1e-12);
 }
 
+/* Exactly, so that both ends of the grid are where they are without a table. */
+static void places_of_voxels_are_those_of_the_table(void **state)
+{
+    (void)state;
+    for (int i = 1; i < 6000; i++) {
+        const double x[] = { 0, i / 1000.0 / 3, 2 + i / 7000.0, 3 };
+        const trip_coordinates c = trip_coordinates_make((const double *const[3]){ x, x, x },
+                                                         (const int64_t[3]){ 4, 4, 4 });
+        for (int k = 0; k < 4; k++)
+            assert_true(trip_coordinates_place(&c, 0, k) == x[k]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -251,6 +264,7 @@ int main(void)
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(coordinates_may_come_through_a_pipe),
         cmocka_unit_test(places_and_indices_are_inverse),
+        cmocka_unit_test(places_of_voxels_are_those_of_the_table),
     };
     return cmocka_run_group_tests_name("coordinates", tests, make_folder, remove_folder);
 }

@@ -235,6 +235,8 @@ ATTACK(done_beyond_the_end, checkpoint()->done = NZ + 1)
 ATTACK(most_done, checkpoint()->done = UINT64_MAX)
 ATTACK(done_before, checkpoint()->done = 0)
 ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
+/* Of all values, those of the slices that were read are fewer. */
+ATTACK(more_kept_than_read, checkpoint()->kept = checkpoint()->done * NX * NY + 1)
 ATTACK(halo_without_room, checkpoint()->halo = 1)
 ATTACK(most_halo, checkpoint()->halo = UINT64_MAX)
 ATTACK(more_in_order_than_there_are, checkpoint()->ordered_splats = N + 1)
@@ -253,6 +255,7 @@ ATTACK(start_twice, records[record_count - 1].kind = START)
 ATTACK(start_cut_short, records[0].bytes -= 8)
 ATTACK(checkpoint_cut_short, records[record_count - 1].bytes = 16)
 ATTACK(a_kept_voxel_less, checkpoint()->kept--)
+ATTACK(a_voxel_less_around, checkpoint()->halo--)
 
 static void numbers_that_no_run_writes_are_refused(void **state)
 {
@@ -316,6 +319,8 @@ static void a_false_tally_of_all_values_is_refused(void **state)
         { "scanned voxel more", scanned_voxel_more },
         { "scanned exponent", scanned_exponent },
         { "not scanned", not_scanned },
+        { "done beyond the end", done_beyond_the_end },
+        { "more kept than was read", more_kept_than_read },
     };
     CHECK_ATTACKS(attacks, "is not what such a run writes", true);
 }
@@ -358,6 +363,22 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     assert_false(test_exists("a.trip.partial"));
 }
 
+static void a_false_count_of_voxels_around_them_is_found_at_the_end(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    make_volume();
+    p.keep_all = false;
+    p.slices = 20;
+    leave_killed_run(p);
+    read_journal();
+    assert_true(checkpoint()->halo > 0);
+    a_voxel_less_around();
+    write_journal();
+    free_records();
+    expect_refused(p, "a voxel less around", "voxels around them were counted");
+}
+
 /* Bytes of a file of the killed run. */
 static void overwrite(const char *name, long offset, const void *data, size_t bytes)
 {
@@ -395,6 +416,19 @@ static void false_records_of_the_list_in_order_are_refused(void **state)
         overwrite(attacks[i].file, attacks[i].offset, zeros, attacks[i].bytes);
         expect_refused(p, attacks[i].name, "what the interrupted run left is damaged");
     }
+}
+
+/* With codes of 16 bits there is a form behind the masks: of codes that have 65535 bits each. */
+static void a_block_that_is_longer_than_any_is_refused(void **state)
+{
+    (void)state;
+    static const unsigned char width[2] = { 255, 255 };
+    trip_brick_params p = params();
+    p.code_bits = TRIP_CODE_BITS_16;
+    make_volume();
+    leave_killed_run(p);
+    overwrite("partial/z0.voxels", 8 * 65 + 2, width, sizeof width);
+    expect_refused(p, "a block without end", "what the interrupted run left is damaged");
 }
 
 static void links_and_what_is_no_file_are_not_followed(void **state)
@@ -511,6 +545,25 @@ static void a_journal_as_it_was_written_is_gone_on_with(void **state)
         assert_int_equal(rename(output, test_path(automatic ? "2" : "1")), 0);
         p.resume = false;
     }
+}
+
+/* Its checksum is right; the journal ends before it, as before one that is cut off. */
+static void a_record_that_is_longer_than_any_is_none(void **state)
+{
+    (void)state;
+    trip_brick_params p = params();
+    trip_brick_summary s;
+    make_volume();
+    leave_killed_run(p);
+    read_journal();
+    assert_true(record_count < MOST_RECORDS);
+    records[record_count++] =
+        (record){ .kind = CHECKPOINT, .bytes = 64 << 20, .body = calloc(64, 1 << 20) };
+    write_journal();
+    free_records();
+    p.resume = true;
+    assert_int_equal(trip_brick(&p, &s), 0);
+    assert_true(s.resumed);
 }
 
 /* Killed until the last checkpoint, which is written behind the run, is one of this run: it has
@@ -650,7 +703,10 @@ int main(void)
         TEST(another_identity_is_refused),
         TEST(false_lengths_of_files_in_order_are_found_when_they_are_read),
         TEST(a_false_count_of_kept_voxels_is_found_at_the_end),
+        TEST(a_false_count_of_voxels_around_them_is_found_at_the_end),
         TEST(false_records_of_the_list_in_order_are_refused),
+        TEST(a_block_that_is_longer_than_any_is_refused),
+        TEST(a_record_that_is_longer_than_any_is_none),
         TEST(links_and_what_is_no_file_are_not_followed),
         TEST(folders_of_another_user_are_refused),
         TEST(partial_folders_of_another_user_are_refused),

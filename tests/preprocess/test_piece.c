@@ -148,6 +148,27 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
     trip_budget_destroy(budget);
 }
 
+/* Of a tile of 4 words: a word beyond it in place of one within; a position in place of the one
+ * before it. */
+static void positions_twice_or_beyond_the_tile_are_refused(void **state)
+{
+    (void)state;
+    static sample s;
+    const trip_piece_format f = { 4, true, false, false };
+    const uint64_t many[TRIP_TILE_MAX_WORDS] = { UINT64_MAX, 1 }, few[TRIP_TILE_MAX_WORDS] = { 7 };
+    make_piece(&s, &f, many);
+    assert_true(s.piece.words == 2 && trip_piece_check(&s.piece, &f, s.length));
+    uint64_t *mask = (void *)(&s.piece + 1);
+    assert_int_equal(*mask, 3);
+    *mask = 1 | 1 << 4;
+    assert_false(trip_piece_check(&s.piece, &f, s.length));
+    make_piece(&s, &f, few);
+    assert_true(s.piece.words == 0 && trip_piece_check(&s.piece, &f, s.length));
+    uint16_t *positions = (void *)(&s.piece + 1);
+    positions[1] = positions[0];
+    assert_false(trip_piece_check(&s.piece, &f, s.length));
+}
+
 static void codes_are_the_nearest_and_end_at_the_ends(void **state)
 {
     (void)state;
@@ -183,6 +204,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pieces_of_a_tile_come_out_as_one_run),
         cmocka_unit_test(damaged_pieces_are_refused_or_harmless),
+        cmocka_unit_test(positions_twice_or_beyond_the_tile_are_refused),
         cmocka_unit_test(codes_are_the_nearest_and_end_at_the_ends),
         cmocka_unit_test(codes_of_8_and_16_bits_are_exact),
     };

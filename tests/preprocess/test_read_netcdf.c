@@ -51,6 +51,7 @@ typedef struct contents {
     bool records;     /* z has as many as there are records */
     bool coordinates; /* of x and z (netcdf_files.h) */
     bool scaled;      /* t stands for twice as much, and 3 */
+    bool lost;        /* for nothing as much, and 3 */
     bool missing;     /* where t is 5, of no sign -7, it has no value */
     bool is_unsigned; /* t and x, then a byte, have no sign */
     int type;         /* of t: 1 int8, 3 int16, 5 float */
@@ -113,7 +114,7 @@ static void put_header(file *f, const contents *c)
     put_variable(f, "t", volume, 3);
     put_list(f, 12, (c->scaled ? 2 : 0) + (c->missing ? 1 : 0) + (c->is_unsigned ? 1 : 0));
     if (c->scaled) {
-        put_float_attribute(f, "scale_factor", 2);
+        put_float_attribute(f, "scale_factor", c->lost ? 0 : 2);
         put_float_attribute(f, "add_offset", 3);
     }
     if (c->missing)
@@ -275,6 +276,139 @@ static void numbers_are_scaled_and_missing_ones_are_none(void **state)
     }
 }
 
+static void a_scale_that_loses_the_values_is_refused(void **state)
+{
+    (void)state;
+    const contents c = { .form = 1, .scaled = true, .lost = true, .type = 3 };
+    assert_refused(write_contents("c.nc", &c), "which loses them");
+}
+
+/* Four records of 3 x 3 bytes, and of a byte of another variable, if there is one: each part is
+ * then padded to 4 bytes. */
+static void records_are_padded_where_there_are_several_variables(void **state)
+{
+    (void)state;
+    enum { RECORDS = 4, EACH = 9 };
+    static const char *const names[] = { "z", "y", "x" };
+    for (unsigned variables = 1; variables <= 2; variables++) {
+        static file f;
+        float values[RECORDS * EACH];
+        trip_volume_info info;
+        f = (file){ .form = 1 };
+        append(&f.b, "CDF\1\0\0\0\4", 8);
+        put_list(&f, 10, 3);
+        for (int i = 0; i < 3; i++) {
+            put_text(&f, names[i]);
+            put_count(&f, i > 0 ? 3 : 0);
+        }
+        put_list(&f, 12, 0);
+        put_list(&f, 11, variables);
+        put_variable(&f, "t", (const int[]){ 0, 1, 2 }, 3);
+        put_list(&f, 12, 0);
+        end_variable(&f, 0, 1, 12);
+        if (variables == 2) {
+            put_variable(&f, "u", (const int[]){ 0 }, 1);
+            put_list(&f, 12, 0);
+            end_variable(&f, 1, 1, 4);
+        }
+        begin_values(&f, 0);
+        for (int k = 0; k < RECORDS; k++) {
+            for (int i = 0; i < EACH; i++)
+                put(&f.b, (uint64_t)(EACH * k + i), 1);
+            if (variables == 1)
+                continue;
+            pad(&f);
+            if (k == 0)
+                begin_values(&f, 1);
+            put(&f.b, 99, 1);
+            pad(&f);
+        }
+        const char *path = write_file("padded.nc", &f.b);
+        assert_int_equal(read_volume(path, NULL, 2, values, RECORDS * EACH, &info), 0);
+        for (int i = 0; i < RECORDS * EACH; i++)
+            assert_true(values[i] == (float)i);
+    }
+}
+
+/* A volume at each of two times, of which there are as many as records; beside it a number each. */
+static void of_several_times_the_first_is_read(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "time", "z", "lat", "x" };
+    static file f;
+    f = (file){ .form = 2 };
+    append(&f.b, "CDF\2\0\0\0\2", 8);
+    put_list(&f, 10, 4);
+    for (int i = 0; i < 4; i++) {
+        put_text(&f, names[i]);
+        put_count(&f, (const uint64_t[]){ 0, NZ, NY, NX }[i]);
+    }
+    put_list(&f, 12, 0);
+    put_list(&f, 11, 2);
+    put_variable(&f, "t", (const int[]){ 0, 1, 2, 3 }, 4);
+    put_list(&f, 12, 0);
+    end_variable(&f, 0, 3, VOXELS * 2);
+    put_variable(&f, "n", (const int[]){ 0 }, 1);
+    put_list(&f, 12, 0);
+    end_variable(&f, 1, 4, 4);
+    for (int time = 0; time < 2; time++) {
+        if (time == 0)
+            begin_values(&f, 0);
+        if (time == 0)
+            append_volume(&f.b, TRIP_I16, true);
+        for (int i = 0; i < VOXELS && time > 0; i++)
+            put(&f.b, 7, 2);
+        if (time == 0)
+            begin_values(&f, 1);
+        put(&f.b, 1, 4);
+    }
+    assert_holds_sample(write_file("times.nc", &f.b), NULL, TRIP_I16);
+}
+
+/* netCDF's own, 0x7cf00000 as a float. */
+static void floats_that_were_never_written_are_none(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "z", "y", "x" };
+    static file f;
+    float values[2];
+    trip_volume_info info;
+    f = (file){ .form = 1 };
+    append(&f.b, "CDF\1\0\0\0\0", 8);
+    put_list(&f, 10, 3);
+    for (int i = 0; i < 3; i++) {
+        put_text(&f, names[i]);
+        put_count(&f, i < 2 ? 1 : 2);
+    }
+    put_list(&f, 12, 0);
+    put_list(&f, 11, 1);
+    put_variable(&f, "t", (const int[]){ 0, 1, 2 }, 3);
+    put_list(&f, 12, 0);
+    end_variable(&f, 0, 5, 8);
+    begin_values(&f, 0);
+    append_value(&f.b, TRIP_F32, 7, true);
+    put(&f.b, 0x7cf00000, 4);
+    assert_int_equal(read_volume(write_file("unwritten.nc", &f.b), NULL, 1, values, 2, &info), 0);
+    assert_true(values[0] == 7 && isnan(values[1]));
+}
+
+/* A name that is not padded to 4 bytes, and more dimensions than could be noted. */
+static void what_the_header_has_no_room_for_is_refused_where_it_is(void **state)
+{
+    (void)state;
+    file f = { .form = 1 };
+    append(&f.b, "CDF\1\0\0\0\0", 8);
+    put_list(&f, 10, 1);
+    put_count(&f, 5);
+    append(&f.b, "lat_1", 5);
+    assert_refused(write_file("short.nc", &f.b), "byte 24: its header makes no sense");
+    f = (file){ .form = 5 };
+    append(&f.b, "CDF\5", 4);
+    put_count(&f, 0);
+    put_list(&f, 10, UINT64_C(1) << 60);
+    assert_refused(write_file("many.nc", &f.b), "byte 24: its header makes no sense");
+}
+
 static void what_is_said_to_have_no_sign_has_none(void **state)
 {
     (void)state;
@@ -351,6 +485,11 @@ int main(void)
         cmocka_unit_test(too_many_coordinates_are_not_read),
         cmocka_unit_test(an_interruption_ends_the_reading_of_coordinates),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
+        cmocka_unit_test(a_scale_that_loses_the_values_is_refused),
+        cmocka_unit_test(records_are_padded_where_there_are_several_variables),
+        cmocka_unit_test(of_several_times_the_first_is_read),
+        cmocka_unit_test(floats_that_were_never_written_are_none),
+        cmocka_unit_test(what_the_header_has_no_room_for_is_refused_where_it_is),
         cmocka_unit_test(what_is_said_to_have_no_sign_has_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),
         cmocka_unit_test(a_header_takes_little_memory),

@@ -153,6 +153,37 @@ static void many_data_files_follow_one_another(void **state)
     assert_holds_sample(write_file("two.nhdr", &b), NULL, TRIP_U16);
 }
 
+static void many_data_files_are_read_again_from_the_first_and_all_there_at_opening(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    trip_budget *budget;
+    trip_volume *v;
+    write_parts("again", 1, 0, 1, NZ, false);
+    append_header(&b, TRIP_U16, false, "raw", "data file: again%d 0 6 1\n");
+    const char *path = write_file("again.nhdr", &b);
+    assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
+    assert_int_equal(trip_volume_open(&v, path, NULL, budget), 0);
+    for (int round = 0; round < 2; round++) {
+        float values[VOXELS];
+        trip_volume_portion portion;
+        assert_int_equal(trip_volume_next(v, NZ, &portion), 1);
+        assert_int_equal(
+            trip_portion_decode(v, &portion, portion.origin, portion.size, values, NULL), 0);
+        for (int i = 0; i < VOXELS; i++)
+            assert_true(values[i] == (float)sample(TRIP_U16, i % NX, i / NX % NY, i / NX / NY));
+        trip_portion_release(v, &portion);
+        assert_int_equal(trip_volume_rewind(v), 0);
+    }
+    trip_volume_close(v);
+    assert_int_equal(remove(path_of("again4")), 0);
+    catch_reports();
+    assert_int_equal(trip_volume_open(&v, path, NULL, budget), TRIP_ERROR);
+    trip_report_redirect(NULL, NULL);
+    assert_non_null(strstr(reported, "again4: cannot open"));
+    trip_budget_destroy(budget);
+}
+
 static void a_pattern_counts_its_files(void **state)
 {
     (void)state;
@@ -574,6 +605,10 @@ static void left_handed_spaces_are_turned_right_handed(void **state)
         assert_map(&info.index_to_world,
                    (const double[3][4]){ { -1, 4, 0, -10 }, { 2, 1, 0.5, 20 }, { 3, 0, 2, 30 } });
     }
+    const trip_affine map = map_of(write_with_lines(
+        "left.nrrd", "space: LAS\ncoordinates 0:=1 2 3 4 9\ncoordinates 1:=1 2 3 5\n"));
+    assert_map(&map,
+               (const double[3][4]){ { -2, 0, 0, -1 }, { 0, 4 / 3.0, 0, 1 }, { 0, 0, 1, 0 } });
 }
 
 static void vectors_with_time_give_their_place_in_space(void **state)
@@ -631,6 +666,14 @@ static void coordinates_of_axes_are_a_key_and_value(void **state)
     assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 4 2\n"),
                    "neither ascend nor descend");
     assert_refused(write_with_lines("bad.nrrd", "coordinates z:=1\n"), "names no axis");
+    static const char *const of_tilted[] = { "coordinates 0:=1 2 3 4 9\n",
+                                             "coordinates 1:=1 2 3 9\n" };
+    for (int i = 0; i < 2; i++) {
+        char lines[200];
+        snprintf(lines, sizeof lines, "space: RAS\nspace directions: (1,1,0) (0,1,0) (0,0,1)\n%s",
+                 of_tilted[i]);
+        assert_refused(write_with_lines("bad.nrrd", lines), "does not lie along that of the world");
+    }
 }
 
 static void the_measurement_frame_changes_nothing(void **state)
@@ -654,6 +697,7 @@ int main(void)
         cmocka_unit_test(a_detached_header_finds_its_data_beside_it),
         cmocka_unit_test(detached_data_may_be_compressed),
         cmocka_unit_test(many_data_files_follow_one_another),
+        cmocka_unit_test(many_data_files_are_read_again_from_the_first_and_all_there_at_opening),
         cmocka_unit_test(a_pattern_counts_its_files),
         cmocka_unit_test(lines_and_bytes_are_skipped),
         cmocka_unit_test(looking_for_lines_ends),

@@ -102,13 +102,14 @@ static void bits_without_a_sign_stand_for_more(void **state)
 static void scaling_is_rounded_once(void **state)
 {
     (void)state;
-    const double slope = 1.0 / 3, inter = -1e-3;
-    for (int i = -32768; i < 32768; i += 7) {
-        int16_t stored = (int16_t)i;
-        float v;
-        trip_scalar_decode(TRIP_I16, false, slope, inter, &stored, 1, &v);
-        assert_true(v == (float)(slope * i + inter));
-    }
+    static const double scales[][2] = { { 1.0 / 3, -1e-3 }, { 1, -1024 }, { 0.5, 0 } };
+    for (int n = 0; n < 3; n++)
+        for (int i = -32768; i < 32768; i += 7) {
+            int16_t stored = (int16_t)i;
+            float v;
+            trip_scalar_decode(TRIP_I16, false, scales[n][0], scales[n][1], &stored, 1, &v);
+            assert_true(v == (float)(scales[n][0] * i + scales[n][1]));
+        }
 }
 
 static void non_finite_values_pass_through(void **state)

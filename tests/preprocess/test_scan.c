@@ -87,6 +87,62 @@ static void what_is_not_finite_or_not_there_is_left_out(void **state)
     assert_int_equal(h.counts[1023], 1);
 }
 
+static void zero_has_no_sign(void **state)
+{
+    (void)state;
+    static trip_tally t;
+    const float values[2] = { -0.0f, 0 };
+    trip_tally_clear(&t);
+    tally_row(&t, values, NULL, 2);
+    assert_true(!signbit(t.value_min) && !signbit(t.value_max));
+}
+
+#define REFUSE(change)                                                                             \
+    do {                                                                                           \
+        t = sound;                                                                                 \
+        change;                                                                                    \
+        assert_false(trip_tally_check(&t));                                                        \
+    } while (0)
+
+/* Values 1 to 4 are 12289 bins of 2^-12 apart, from bin 4096 to bin 16384. */
+static void tallies_that_no_scan_makes_are_refused(void **state)
+{
+    (void)state;
+    static trip_tally sound, t;
+    const float values[5] = { 1, 2, 3, 4, NAN };
+    trip_tally_clear(&t);
+    assert_true(trip_tally_check(&t));
+    tally_row(&t, values, NULL, 5);
+    sound = t;
+    assert_true(trip_tally_check(&t));
+    assert_true(t.exponent == -12 && t.first == 4096 && t.counts[12288] == 1);
+    REFUSE(t.voxels = 3);
+    REFUSE(t.finite = 3);
+    REFUSE(t.kept = 6);
+    REFUSE(t.borders = 11);
+    REFUSE(t.counted = 3);
+    REFUSE(t.counts[1]++);
+    REFUSE((t.counts[0] = UINT64_MAX, t.counts[1] = 2));
+    REFUSE((t.counts[0] = 0, t.counts[12289] = 1)); /* above 4 */
+    REFUSE(t.first--);                              /* 1 would be in the bin below it */
+    REFUSE(
+        (memset(t.counts, 0, sizeof t.counts), t.counts[0] = 4, t.exponent = -11, t.first = 2048));
+    REFUSE(t.exponent = -150);
+    REFUSE(t.first = INT64_MIN);
+    REFUSE(t.value_min = NAN);
+    REFUSE(t.value_max = INFINITY);
+    REFUSE(t.value_max = 0.5);
+    REFUSE(t.value_max = 4.1); /* no float */
+    trip_tally_clear(&sound);
+    REFUSE(t.value_min = 0);
+    REFUSE(t.value_max = 0);
+    sound.voxels = sound.finite = 1; /* of a sample: in no bin */
+    REFUSE(t.voxels = 1);
+    sound.value_min = sound.value_max = 7;
+    assert_true(trip_tally_check(&sound));
+    REFUSE(t.value_max = 6);
+}
+
 static void one_value_alone_makes_one_bin(void **state)
 {
     (void)state;
@@ -113,6 +169,10 @@ static void the_extremes_of_float_are_counted(void **state)
     assert_int_equal(h.counts[0], 1);
     assert_int_equal(h.counts[512], 2);
     assert_int_equal(h.counts[1023], 1);
+    trip_tally_clear(&t); /* no bin is narrower than what is between floats */
+    tally_row(&t, values, NULL, 1);
+    assert_int_equal(t.exponent, -149);
+    assert_true(trip_tally_check(&t));
 }
 
 static int scan_raw(trip_tally *t, const char *type, int64_t nx, int64_t ny, int64_t nz,
@@ -178,6 +238,8 @@ int main(void)
         cmocka_unit_test(integers_are_binned_like_one_by_one),
         cmocka_unit_test(order_and_sharing_out_make_no_difference),
         cmocka_unit_test(what_is_not_finite_or_not_there_is_left_out),
+        cmocka_unit_test(zero_has_no_sign),
+        cmocka_unit_test(tallies_that_no_scan_makes_are_refused),
         cmocka_unit_test(one_value_alone_makes_one_bin),
         cmocka_unit_test(the_extremes_of_float_are_counted),
         cmocka_unit_test_setup_teardown(a_volume_is_seen_whole_by_any_number_of_threads, test_begin,

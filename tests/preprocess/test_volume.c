@@ -249,6 +249,9 @@ static void a_read_that_fails_in_mid_volume_stays_failed(void **state)
     assert_int_equal(trip_volume_next(v, 2, &portion), TRIP_ERROR);
     trip_report_redirect(NULL, NULL);
     assert_int_equal(reports, 1);
+    assert_int_equal(trip_volume_rewind(v), 0); /* what there is can be read again */
+    assert_int_equal(trip_volume_next(v, 2, &portion), 1);
+    trip_portion_release(v, &portion);
     trip_volume_close(v);
 }
 
@@ -266,6 +269,29 @@ static void spacing_replaces_lengths_and_keeps_directions(void **state)
     assert_int_equal(read_volume(write_file("turned.nrrd", &b), &p, 2, values, VOXELS, &info), 0);
     assert_map(&info.index_to_world,
                (const double[3][4]){ { 0, 0, -3, 1 }, { 0.6, -1.6, 0, 2 }, { 0.8, 1.2, 0, 3 } });
+}
+
+/* Files that do not say how they lie: x up, y to the left, z to the back, which are +z, +x and +y
+ * of LPS; each keeps its own spacing. */
+static void axes_turn_files_that_lie_along_their_own(void **state)
+{
+    (void)state;
+    const char head[] = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 7\nencoding: raw\n";
+    bytes up = { .count = 0 }, down = { .count = 0 };
+    float values[VOXELS];
+    trip_volume_info info;
+    append_text(&up, head);
+    append_text(&up, "spacings: 1 2 3\naxis mins: 10 20 30\ncenterings: node node node\n\n");
+    append_volume(&up, TRIP_U8, false);
+    const trip_volume_params p = { .axes = "SLP" };
+    assert_int_equal(read_volume(write_file("up.nrrd", &up), &p, 2, values, VOXELS, &info), 0);
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 0, 2, 0, 20 }, { 0, 0, 3, 30 }, { 1, 0, 0, 10 } });
+    assert_string_equal(info.space, "LPS");
+    append_text(&down, head);
+    append_text(&down, "spacings: 1 -2 3\n\n");
+    append_volume(&down, TRIP_U8, false);
+    assert_refused_as(TRIP_USAGE, write_file("down.nrrd", &down), &p, "directions of their own");
 }
 
 static void options_of_another_format_are_wrong_usage(void **state)
@@ -347,6 +373,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_read_that_fails_in_mid_volume_stays_failed, make_budget,
                                         end_budget),
         cmocka_unit_test(spacing_replaces_lengths_and_keeps_directions),
+        cmocka_unit_test(axes_turn_files_that_lie_along_their_own),
         cmocka_unit_test(voxels_too_long_or_short_to_be_drawn_are_refused),
         cmocka_unit_test(options_of_another_format_are_wrong_usage),
         cmocka_unit_test(what_cannot_be_opened_is_named),

@@ -365,7 +365,8 @@ static void forms_that_lead_astray_are_found(void **state)
     run *r = make_run(f, 1.1, 3);
     r->words--;
     expect_fault(r, "length");
-    r->words = 1 + 64; /* ends before the forms */
+    *first_form(r) = 17u << 16;
+    r->words = 1 + 64; /* ends before the forms, which are not looked at */
     expect_fault(r, "length");
     r = make_run(f, 1.1, 3);
     r->brick.code_max = UINT16_MAX;
@@ -409,6 +410,25 @@ static void bits_behind_a_squares_codes_are_padding_too(void **state)
     assert_false(trip_block_is_padded(&b));
 }
 
+/* Three codes of 2 bits, and behind them what would be one more that is out of range. */
+static void what_is_behind_the_last_code_is_none(void **state)
+{
+    (void)state;
+    run *r = &shared;
+    *r = (run){ .form = form_of(4, CODES),
+                .voxels = { trip_voxel_pack(0, 0, 100), trip_voxel_pack(1, 0, 101),
+                            trip_voxel_pack(0, 1, 102) },
+                .count = 3,
+                .brick = { .code_min = 100, .code_max = 102, .u_max = 1, .v_max = 1 } };
+    r->words = trip_block_pack(&r->form, r->voxels, r->count, r->block);
+    assert_int_equal(r->words, 4); /* presence, a mask, a form, codes */
+    r->block[3] |= 3 << 6;
+    const trip_block b = block_of(r);
+    assert_null(trip_block_check(&b, &r->brick));
+    r->brick.code_max--;
+    expect_fault(r, "outside its brick's range");
+}
+
 static void normals_are_packed_and_decoded(void **state)
 {
     const uint32_t normals[] = { 0x000000, 0x800000, 0xabcdef, 0x7fffff };
@@ -443,6 +463,7 @@ int main(void)
         cmocka_unit_test(forms_that_lead_astray_are_found),
         cmocka_unit_test(padding_that_is_not_zero_is_found),
         cmocka_unit_test(bits_behind_a_squares_codes_are_padding_too),
+        cmocka_unit_test(what_is_behind_the_last_code_is_none),
         cmocka_unit_test(normals_are_packed_and_decoded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -294,20 +294,27 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->coordinates_offset = c.header->checksums_offset,
            "the coordinates lie outside");
     REFUSE(c.header->dims[1] = 0, "grid size");
+    REFUSE(c.header->dims[2] = UINT64_C(1) << 31, "grid size");
     REFUSE(c.header->dims[2] = UINT64_C(1) << 32, "grid size");
     REFUSE(c.header->index_to_world[0] = NAN, "index-to-world");
     REFUSE(c.header->index_to_world[5] = 0, "index-to-world");
     REFUSE(c.header->code_lo = INFINITY, "range of codes");
     REFUSE(c.header->code_hi = -2, "range of codes");
     REFUSE(c.header->value_max = NAN, "range of values");
+    REFUSE(c.header->value_min = c.header->value_max + 1, "range of values");
     REFUSE(c.header->voxels = UINT64_MAX, "more voxels");
     REFUSE(c.header->voxels = 1, "more was kept");
     REFUSE(c.header->halo = UINT64_MAX, "more was kept");
+    REFUSE(c.header->halo = 34 * 20 * 18 - c.header->kept + 1, "than the grid has");
     REFUSE(c.header->halo = 1, "no list of it");
     REFUSE(c.header->gradient_step[1] = NAN, "gradient step");
     REFUSE(c.header->gradient_full = -1, "no length of gradients");
+    REFUSE(c.header->tile_log2 = 3, "tile size");
     REFUSE(c.header->tile_log2 = 8, "tile size");
     REFUSE(c.header->slab_sheets = 0, "sheets per slab");
+    REFUSE(c.header->slab_sheets = 65, "sheets per slab");
+    REFUSE(c.header->page_log2 = 11, "page size");
+    REFUSE(c.header->page_log2 = 25, "page size");
     REFUSE(c.header->page_log2 = 40, "page size");
     REFUSE(c.header->planes = 7, "planes");
     REFUSE(c.header->planes = 2, "planes");
@@ -321,6 +328,7 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->planes = 1, "3 or 4 bytes");
     REFUSE(c.header->checksums_offset = UINT64_MAX - 7, "checksums are not where");
     REFUSE(c.header->checksums_offset -= 8, "checksums are not where");
+    REFUSE(c.header->text_bytes = TRIP_TEXT_BYTES_MAX + 1, "text is too long");
     REFUSE(c.header->text_bytes = UINT64_MAX, "text is too long");
     REFUSE(c.header->text_offset = UINT64_MAX - 4, "text lies outside");
     REFUSE(c.header->lists_offset = UINT64_MAX - 7, "lists lie outside");
@@ -340,6 +348,16 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE(c.lists[1].kind = 1, "not the planes of its kind");
     REFUSE(c.lists[1].planes = 1, "not the planes of its kind");
     REFUSE(c.lists[0].level = 1, "not there for each axis");
+    REFUSE(c.lists[1].kind = TRIP_KIND_MEANS, "of a kind of coarse levels");
+    REFUSE((c.lists[1].level = 1, c.lists[1].records = 34 * 20 * 18 + 1,
+            c.lists[1].plane_bytes[1] = 4 * c.lists[1].records),
+           "more records than its grid has voxels");
+    REFUSE((c.lists[1].level = c.lists[2].level = 1, c.lists[2].records--,
+            c.lists[2].plane_bytes[1] -= 4),
+           "hold different numbers");
+    REFUSE((c.lists[1].level = c.lists[2].level = 1, c.lists[2].axis = 1,
+            c.lists[2].kind = TRIP_KIND_MEANS, c.lists[2].sheet_first = 2),
+           "lists of a level have different grids");
     REFUSE(c.lists[2].records++, "that were kept");
     REFUSE(c.lists[2].dims[0]--, "not of the header's grid");
     REFUSE(c.lists[2].dims[1] = 0, "grid size");
@@ -348,6 +366,7 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE(c.lists[2].sheet_first = 1, "not of the header's grid");
     REFUSE(c.lists[2].sheet_step = 0, "no ascending coordinates");
     REFUSE(c.lists[2].sheet_step = NAN, "no ascending coordinates");
+    REFUSE(c.lists[2].sheet_step = 1e308, "no ascending coordinates");
     REFUSE(c.lists[2].sheet_first = INFINITY, "no ascending coordinates");
     REFUSE(c.lists[2].plane_bytes[0] += 4, "not the bytes of its records");
     REFUSE(c.lists[2].plane_bytes[0] += 8, "do not add up");
@@ -373,7 +392,19 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE(BRICK[0].tile_u = UINT32_MAX, "not inside the grid");
     REFUSE(BRICK[0].u_max = 16, "not inside the grid");
     REFUSE(BRICK[0].u_min = 16, "not inside the grid");
+    REFUSE(BRICK[1].u_max = 2, "bounds are not inside the grid"); /* z = 16 + 2 of 18 */
+    REFUSE(BRICK[4].v_max = 2, "bounds are not inside the grid"); /* x = 32 + 2 of 34 */
+    REFUSE(BRICK[0].u_min = 15, "runs do not agree");             /* a column holds 16 */
+    REFUSE(BRICK[0].v_min = 15, "runs do not agree");
     REFUSE(BRICK[0].sheet_max = 8, "sheets are not inside");
+    REFUSE(BRICK[SLAB[2].first_brick].sheet_max = 4,
+           "sheets are not inside"); /* y = 16 + 4 of 20 */
+    REFUSE(BRICK[0].sheet_max--, "runs do not agree");
+    REFUSE(BRICK[0].sheet_min++, "runs do not agree");
+    REFUSE((BRICK[0].records -= RUN[0].records, RUN[0] = (trip_file_run){ 0 }),
+           "runs do not agree");
+    REFUSE((BRICK[0].records -= RUN[7].records, RUN[7] = (trip_file_run){ 0 }),
+           "runs do not agree");
     REFUSE(BRICK[0].code_min = 65535, "value range");
     REFUSE(SLAB[1].first_block += 8, "records do not follow");
     REFUSE(BRICK[0].records++, "runs do not agree");
@@ -404,6 +435,47 @@ static void verify_finds_records_that_do_not_agree_with_the_index(void **state)
     assert_int_equal(trip_dataset_verify(d, shared.budget), TRIP_ERROR);
     assert_non_null(strstr(fixture_reports(), "outside its brick"));
     b->u_min--;
+    trip_dataset_close(d);
+}
+
+/* Of a list's first block that has padding, the place of its last byte in the file. */
+static off_t find_padding(const trip_dataset *d, trip_list *list)
+{
+    static uint64_t block[TRIP_BLOCK_WORDS_MAX];
+    const trip_block_form form = trip_block_form_of(&d->header, list->kind);
+    trip_selection s;
+    trip_run run;
+    off_t at = -1;
+    assert_int_equal(trip_selection_create_whole(&s, d, list, false, shared.budget), TRIP_OK);
+    for (trip_run_iterator it = trip_run_begin(&s); at < 0 && trip_run_next(&it, &run);) {
+        const size_t bytes = 8 * (size_t)run.words;
+        assert_int_equal(pread(list->plane_fd[0], block, bytes, (off_t)run.at[0]), bytes);
+        ((unsigned char *)block)[bytes - 1] ^= 0x80;
+        const trip_block b = trip_block_make(&form, run.count, run.words, block, NULL);
+        if (!trip_block_check(&b, &list->bricks[run.brick]) && !trip_block_is_padded(&b))
+            at = (off_t)(run.at[0] + bytes - 1);
+    }
+    trip_selection_destroy(&s, shared.budget);
+    assert_true(at >= 0);
+    return at;
+}
+
+/* The checksum of its page is right, in the index as it is in memory. */
+static void verify_finds_padding_that_is_not_zero(void **state)
+{
+    static unsigned char page[4096];
+    trip_dataset *d;
+    (void)state;
+    assert_int_equal(trip_dataset_open(&d, shared.path, shared.budget), TRIP_OK);
+    trip_list *list = &d->lists[0];
+    const off_t at = find_padding(d, list), first = at / 4096 * 4096;
+    uint64_t *sum = (uint64_t *)(uintptr_t)&list->page_checksums[0][at / 4096];
+    flip(1, at, 0x80);
+    *sum = XXH64(page, (size_t)pread(list->plane_fd[0], page, sizeof page, first), 0);
+    fixture_catch_reports();
+    assert_int_equal(trip_dataset_verify(d, shared.budget), TRIP_ERROR);
+    assert_non_null(strstr(fixture_reports(), "the padding is not zero"));
+    flip(1, at, 0x80);
     trip_dataset_close(d);
 }
 
@@ -482,6 +554,7 @@ int main(void)
         cmocka_unit_test(coordinates_are_read_as_written_and_bad_ones_refused),
         cmocka_unit_test(tables_that_make_no_sense_are_refused_although_their_checksums_are_right),
         cmocka_unit_test(verify_finds_records_that_do_not_agree_with_the_index),
+        cmocka_unit_test(verify_finds_padding_that_is_not_zero),
         cmocka_unit_test(files_of_another_data_set_are_noticed),
         cmocka_unit_test(a_data_set_being_replaced_can_be_opened_at_every_moment),
     };

@@ -237,6 +237,20 @@ static void the_least_slot_holds_the_largest_run(void **state)
     finish(&t);
 }
 
+/* Of 64 x 64 records a block of codes of a byte has 577 words, of means, which have two, 1121. */
+static void the_least_slot_holds_a_run_of_any_kind(void **state)
+{
+    plan_test t = { 0 };
+    (void)state;
+    fixture_make(&t.f, &(fixture_params){ .code_bytes = 1, .page_bytes = 4096, .in_memory = true });
+    assert_int_equal(trip_dataset_open(&t.d, t.f.path, t.f.budget), TRIP_OK);
+    assert_int_equal(trip_planner_least_slot(t.d, 1), (2 + 1) * 4096);
+    t.d->lists[2].kind = TRIP_KIND_MEANS;
+    assert_int_equal(trip_planner_least_slot(t.d, 1), (3 + 1) * 4096);
+    trip_dataset_close(t.d);
+    fixture_free(&t.f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -248,6 +262,7 @@ int main(void)
         cmocka_unit_test(lists_that_come_in_turn_have_pieces_of_their_own),
         cmocka_unit_test(a_full_table_of_runs_ends_the_extent),
         cmocka_unit_test(the_least_slot_holds_the_largest_run),
+        cmocka_unit_test(the_least_slot_holds_a_run_of_any_kind),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

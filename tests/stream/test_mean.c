@@ -29,6 +29,20 @@ static void shares_of_two_by_two_by_two_are_exact(void **state)
         }
 }
 
+static void covers_and_depths_are_the_nearest_that_there_are(void **state)
+{
+    (void)state;
+    for (double x = 1.0 / 1000; x <= 1; x += 1.0 / 1000) {
+        const unsigned picked = trip_mean_pack_shares(x, x);
+        for (unsigned other = 0; other < TRIP_MEAN_SHARES; other++) {
+            assert_true(fabs(trip_mean_cover(picked) - x) <=
+                        fabs(trip_mean_cover(other) - x) + 1e-12);
+            assert_true(fabs(trip_mean_depth(picked) - x) <=
+                        fabs(trip_mean_depth(other) - x) + 1e-12);
+        }
+    }
+}
+
 static void values_are_the_nearest_of_1024(void **state)
 {
     (void)state;
@@ -82,6 +96,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_cube_that_is_full_keeps_its_extinction),
         cmocka_unit_test(shares_of_two_by_two_by_two_are_exact),
+        cmocka_unit_test(covers_and_depths_are_the_nearest_that_there_are),
         cmocka_unit_test(values_are_the_nearest_of_1024),
         cmocka_unit_test(steps_are_of_the_range_of_values),
         cmocka_unit_test(opacity_is_the_mean_over_the_columns),

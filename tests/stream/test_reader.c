@@ -502,7 +502,7 @@ static void more_passes_than_there_is_room_for_are_refused(void **state)
 /* A fault at the n-th read of a pass. */
 typedef struct sabotage {
     _Atomic int countdown;
-    enum { FAIL_EIO, FAIL_END, FAIL_BYTE, FAIL_EINVAL } kind;
+    enum { FAIL_EIO, FAIL_END, FAIL_BYTE, FAIL_EINVAL, FAIL_SHORT } kind;
 } sabotage;
 
 static long sabotage_read(void *user, void *data, uint64_t offset, size_t bytes, long result)
@@ -517,6 +517,7 @@ static long sabotage_read(void *user, void *data, uint64_t offset, size_t bytes,
     return s->kind == FAIL_EIO      ? -EIO
            : s->kind == FAIL_END    ? 0
            : s->kind == FAIL_EINVAL ? -EINVAL
+           : s->kind == FAIL_SHORT  ? result / 3
                                     : result;
 }
 
@@ -627,6 +628,40 @@ static void of_blocks_at_fault_the_first_is_reported_whoever_checks_them(void **
     close_fixture(&f, d);
 }
 
+/* Of two pieces of a file in one slot the second has the fault. */
+static void the_place_of_a_block_at_fault_is_where_it_lies_in_its_file(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    trip_reader *r;
+    trip_selection s;
+    trip_run run;
+    trip_batch batch;
+    char byte[64];
+    (void)state;
+    open_fixture(&f, &d);
+    const uint64_t last = d->lists[2].brick_count - 1;
+    trip_file_brick *brick = (trip_file_brick *)(uintptr_t)&d->lists[2].bricks[last];
+    assert_int_equal(trip_selection_create(&s, d, &d->lists[2], false, 0, INT32_MAX, f.budget), 0);
+    trip_selection_add(&s, last);
+    trip_run_iterator it = trip_run_begin(&s);
+    assert_true(trip_run_next(&it, &run) && run.sheet > 4);
+    snprintf(byte, sizeof byte,
+             "z0.voxels: byte %llu: ", (unsigned long long)run.at[TRIP_PLANE_VOXELS]);
+    trip_selection_add(&s, 0);
+    const trip_reader_params params = { .gap_bytes = 4096 };
+    assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
+    const trip_pass pass = trip_pass_of(&s);
+    brick->u_max = brick->u_min = brick->v_max = brick->v_min = 0;
+    fixture_catch_reports();
+    assert_int_equal(trip_reader_begin(r, &pass), TRIP_OK);
+    assert_int_equal(trip_reader_next(r, &batch), TRIP_ERROR);
+    assert_non_null(strstr(fixture_reports(), byte));
+    trip_selection_destroy(&s, f.budget);
+    trip_reader_destroy(r);
+    close_fixture(&f, d);
+}
+
 static void refused_direct_reads_go_on_through_the_page_cache(void **state)
 {
     fixture f;
@@ -650,6 +685,35 @@ static void refused_direct_reads_go_on_through_the_page_cache(void **state)
         assert_int_equal(n, f.count);
         assert_null(strstr(trip_reader_engine_name(r), "O_DIRECT"));
     }
+    trip_selection_destroy(&s, f.budget);
+    trip_reader_destroy(r);
+    free(out);
+    close_fixture(&f, d);
+}
+
+/* What is left of the read begins in mid sector, where direct reads would be refused. */
+static void a_direct_read_that_is_cut_short_is_no_reason_to_have_none(void **state)
+{
+    fixture f;
+    trip_dataset *d;
+    trip_reader *r;
+    trip_selection s;
+    size_t n;
+    sabotage fault = { .kind = FAIL_SHORT };
+    (void)state;
+    open_fixture(&f, &d);
+    fixture_voxel *out = calloc(f.count, sizeof *out);
+    const trip_reader_params params = { .planes = 3, .fault = sabotage_read, .fault_user = &fault };
+    assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
+    const bool direct = strstr(trip_reader_engine_name(r), "O_DIRECT");
+    if (!direct)
+        test_lacks("direct reads from this file system");
+    select_all(&s, d, 0, false);
+    assert_int_equal(read_pass(r, &s, 0, out, &n), 0);
+    assert_int_equal(n, f.count);
+    assert_memory_equal(out, f.lists[0], n * sizeof *out);
+    assert_true(fault.countdown < 0);
+    assert_int_equal(strstr(trip_reader_engine_name(r), "O_DIRECT") != NULL, direct);
     trip_selection_destroy(&s, f.budget);
     trip_reader_destroy(r);
     free(out);
@@ -1311,7 +1375,9 @@ int main(void)
         cmocka_unit_test(more_passes_than_there_is_room_for_are_refused),
         cmocka_unit_test(a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line),
         cmocka_unit_test(of_blocks_at_fault_the_first_is_reported_whoever_checks_them),
+        cmocka_unit_test(the_place_of_a_block_at_fault_is_where_it_lies_in_its_file),
         cmocka_unit_test(refused_direct_reads_go_on_through_the_page_cache),
+        cmocka_unit_test(a_direct_read_that_is_cut_short_is_no_reason_to_have_none),
         cmocka_unit_test(a_second_pass_reads_only_what_the_cache_has_no_room_for),
         cmocka_unit_test(a_data_set_in_memory_is_handed_out_where_it_lies),
         cmocka_unit_test(a_cache_follows_when_other_lists_are_read),

@@ -80,6 +80,14 @@ static void the_voxels_of_a_list_do_not_depend_on_tiles_slabs_or_pages(void **st
                                                 .page_bytes = 4096u << s });
 }
 
+/* 24 x 24 tiles of a sheet, each with a brick. */
+static void a_slab_has_as_many_bricks_as_there_are_tiles(void **state)
+{
+    (void)state;
+    check_round_trip(&(fixture_params){
+        .dims = { 384, 384, 2 }, .density = 0.02, .tile_voxels = 16, .slab_sheets = 2 });
+}
+
 static void an_empty_and_a_full_volume_are_written(void **state)
 {
     (void)state;
@@ -327,6 +335,95 @@ static void lists_of_other_levels_and_kinds_are_kept_and_verified(void **state)
     fixture_free(&f);
 }
 
+/* One voxel of the list along y has another value, or another normal. */
+static void lists_of_the_same_places_with_other_voxels_are_found(void **state)
+{
+    fixture f;
+    (void)state;
+    fixture_make(&f,
+                 &(fixture_params){
+                     .dims = { 20, 20, 20 }, .normals = true, .replace = true, .in_memory = true });
+    expect_verified(f.path, f.budget, NULL);
+    f.lists[1][3].code ^= 1;
+    assert_int_equal(fixture_write(&f, f.path), TRIP_OK);
+    expect_verified(f.path, f.budget, "the lists of voxels along x and y at level 0");
+    f.lists[1][3].code ^= 1;
+    f.lists[1][3].normal ^= 1;
+    assert_int_equal(fixture_write(&f, f.path), TRIP_OK);
+    expect_verified(f.path, f.budget, "the lists of voxels along x and y at level 0");
+    fixture_free(&f);
+}
+
+/* Points of a tile, at most four of a sheet, to a list of theirs. */
+static void append_points(trip_writer *w, unsigned list, const uint32_t points[4][3])
+{
+    const int axis = (int)list % 3, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (uint32_t sheet = 0; sheet < 16; sheet++) {
+        uint32_t voxels[4], count = 0;
+        for (uint64_t n = 0; n < 256; n++)
+            for (int i = 0; i < 4; i++)
+                if (points[i][axis] == sheet && trip_morton(points[i][u], points[i][v]) == n)
+                    voxels[count++] = trip_voxel_pack(points[i][u], points[i][v], 1);
+        assert_int_equal(trip_writer_append(w, list, sheet, 0, 0, voxels, NULL, count), TRIP_OK);
+    }
+}
+
+/* Whatever the axis, one of the first three points of either is in a square before that of the
+ * fourth, which both have. */
+static void a_voxel_of_two_kinds_is_found_in_any_square(void **state)
+{
+    const uint32_t kept[4][3] = { { 10, 1, 1 }, { 1, 10, 1 }, { 1, 1, 10 }, { 10, 10, 10 } };
+    const uint32_t shared[4][3] = { { 10, 0, 0 }, { 0, 10, 0 }, { 0, 0, 10 }, { 10, 10, 10 } };
+    const uint32_t apart[4][3] = { { 10, 0, 0 }, { 0, 10, 0 }, { 0, 0, 10 }, { 9, 9, 9 } };
+    const trip_writer_params params = { .dims = { 16, 16, 16 },
+                                        .tile_voxels = 16,
+                                        .replace = true,
+                                        .halo = true,
+                                        .index_to_world = trip_affine_identity() };
+    fixture f;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    for (int i = 0; i < 2; i++) {
+        trip_writer *w;
+        assert_int_equal(trip_writer_open(&w, path, &params, f.budget), TRIP_OK);
+        for (unsigned list = 0; list < 6; list++)
+            append_points(w, list, list < 3 ? kept : i ? apart : shared);
+        assert_int_equal(trip_writer_finish(w, &(trip_writer_summary){ .voxels = 4096 }), TRIP_OK);
+        expect_verified(path, f.budget, i ? NULL : "a voxel is in a list of another kind too");
+    }
+    fixture_free(&f);
+}
+
+/* FORMAT.md has none of them: what reads them need not take uneven steps of a level. */
+static void coarse_levels_of_uneven_grids_are_refused(void **state)
+{
+    fixture f;
+    double table[40];
+    trip_writer *w;
+    trip_dataset *d;
+    char path[128];
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    for (int i = 0; i < 40; i++)
+        table[i] = i * i / 39.0;
+    const trip_coordinates coordinates = trip_coordinates_make(
+        (const double *const[3]){ table, table, table }, (const int64_t[3]){ 40, 40, 40 });
+    const trip_writer_params params = { .dims = { 40, 40, 40 },
+                                        .index_to_world = trip_affine_identity(),
+                                        .coordinates = &coordinates,
+                                        .lists = many_lists(),
+                                        .list_count = MANY };
+    assert_int_equal(trip_writer_open(&w, path, &params, f.budget), TRIP_OK);
+    assert_int_equal(trip_writer_finish(w, &(trip_writer_summary){ .voxels = 64000 }), TRIP_OK);
+    fixture_catch_reports();
+    assert_int_equal(trip_dataset_open(&d, path, f.budget), TRIP_ERROR);
+    assert_non_null(strstr(fixture_reports(), "a coarse level of a grid with uneven spacing"));
+    fixture_free(&f);
+}
+
 static void lists_that_make_no_sense_are_refused(void **state)
 {
     trip_budget *budget;
@@ -401,12 +498,44 @@ static void runs_out_of_order_or_place_are_refused(void **state)
     assert_int_equal(trip_writer_append(w, 0, 5, 1, 1, &voxel, NULL, 1), TRIP_ERROR);
     assert_int_equal(trip_writer_append(w, 0, 4, 1, 1, &voxel, NULL, 1), TRIP_ERROR);
     assert_int_equal(trip_writer_append(w, 0, 6, 0, 0, &voxel, NULL, 1), TRIP_OK);
+    const uint32_t beyond_u = trip_voxel_pack(8, 0, 1), beyond_v = trip_voxel_pack(0, 8, 1);
+    assert_int_equal(trip_writer_append(w, 0, 7, 2, 0, &beyond_u, NULL, 1), TRIP_ERROR);
+    assert_int_equal(trip_writer_append(w, 0, 7, 0, 2, &beyond_v, NULL, 1), TRIP_ERROR);
     trip_writer_summary summary = { .voxels = 64000 };
     assert_int_equal(trip_writer_finish(w, &summary), TRIP_ERROR);
     trip_writer_abort(w);
     assert_non_null(strstr(fixture_reports(), "lists of the same voxels hold"));
     assert_false(is_there(path));
     fixture_run_command("test ! -e %s.partial", path);
+    fixture_free(&f);
+}
+
+/* A grid of one voxel that is kept, and, as it cannot be, around what is kept. */
+static void numbers_of_voxels_that_cannot_be_are_refused(void **state)
+{
+    fixture f;
+    char path[128];
+    const uint32_t voxel = trip_voxel_pack(0, 0, 1);
+    (void)state;
+    make_small(&f);
+    snprintf(path, sizeof path, "%s/b.trip", f.folder);
+    for (int i = 0; i < 4; i++) {
+        const unsigned lists = i == 3 ? 6 : 3;
+        const trip_writer_summary summary = { .voxels = i == 1 ? 0 : i == 2 ? 2 : 1 };
+        const trip_writer_params params = { .dims = { 1, 1, 1 },
+                                            .index_to_world = trip_affine_identity(),
+                                            .halo = lists == 6 };
+        trip_writer *w;
+        fixture_catch_reports();
+        assert_int_equal(trip_writer_open(&w, path, &params, f.budget), TRIP_OK);
+        for (unsigned list = 0; list < lists; list++)
+            assert_int_equal(trip_writer_append(w, list, 0, 0, 0, &voxel, NULL, 1), TRIP_OK);
+        assert_int_equal(trip_writer_finish(w, &summary), i == 0 ? TRIP_OK : TRIP_ERROR);
+        if (i > 0)
+            trip_writer_abort(w);
+        assert_int_equal(i > 0, strstr(fixture_reports(), "voxels kept and") != NULL);
+        fixture_run_command("rm -rf %s", path);
+    }
     fixture_free(&f);
 }
 
@@ -498,6 +627,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_written_is_read_in_both_directions),
         cmocka_unit_test(the_voxels_of_a_list_do_not_depend_on_tiles_slabs_or_pages),
+        cmocka_unit_test(a_slab_has_as_many_bricks_as_there_are_tiles),
         cmocka_unit_test(an_empty_and_a_full_volume_are_written),
         cmocka_unit_test(an_existing_data_set_is_kept_unless_it_may_be_replaced),
         cmocka_unit_test(only_a_data_set_is_replaced),
@@ -509,7 +639,11 @@ int main(void)
         cmocka_unit_test(runs_out_of_order_or_place_are_refused),
         cmocka_unit_test(codes_and_normals_of_every_length_are_read_as_written),
         cmocka_unit_test(lists_of_other_levels_and_kinds_are_kept_and_verified),
+        cmocka_unit_test(lists_of_the_same_places_with_other_voxels_are_found),
+        cmocka_unit_test(a_voxel_of_two_kinds_is_found_in_any_square),
+        cmocka_unit_test(coarse_levels_of_uneven_grids_are_refused),
         cmocka_unit_test(lists_that_make_no_sense_are_refused),
+        cmocka_unit_test(numbers_of_voxels_that_cannot_be_are_refused),
         cmocka_unit_test(parameters_out_of_range_are_refused),
         cmocka_unit_test(a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set),
         cmocka_unit_test(a_full_disk_is_one_line_and_leaves_nothing),

@@ -1,0 +1,94 @@
+/* Voxels made of the eight of the level below, against what they are by hand. */
+#include "test.h"
+
+#include "coarse.h"
+
+/* Beside it there is nothing, so that parts are divided by eight from level to level, until they
+ * would be less than a step. */
+static void a_voxel_alone_never_vanishes(void **state)
+{
+    (void)state;
+    trip_coarse_value value = { .known = TRIP_COARSE_ALL, .value = 777 };
+    trip_coarse_mean mean = { .kept = TRIP_COARSE_ALL,
+                              .mean = 777,
+                              .cover = { TRIP_COARSE_ALL, TRIP_COARSE_ALL, TRIP_COARSE_ALL } };
+    for (int level = 1; level <= 24; level++) {
+        trip_coarse_value_sum values = { 0 };
+        trip_coarse_mean_sum means;
+        trip_coarse_mean_clear(&means);
+        trip_coarse_value_add(&values, &value, false);
+        trip_coarse_mean_add(&means, &mean, (unsigned)level % 8, NULL);
+        trip_coarse_value_get(&values, &value);
+        trip_coarse_mean_get(&means, &mean);
+        assert_true(value.known >= 1 && fabs(value.known - ldexp(65535, -3 * level)) <= 1);
+        assert_true(mean.kept >= 1 && fabs(mean.kept - ldexp(65535, -3 * level)) <= 1);
+        assert_int_equal(value.value, 777);
+        assert_int_equal(mean.mean, 777);
+        for (int a = 0; a < 3; a++) /* what is kept is in its columns, and at most all of them */
+            assert_true(mean.cover[a] >= mean.kept);
+    }
+}
+
+static void values_count_by_what_is_known_of_them(void **state)
+{
+    (void)state;
+    const trip_coarse_value whole = { .known = TRIP_COARSE_ALL, .value = 10 },
+                            some = { .known = 1, .value = UINT16_MAX };
+    trip_coarse_value_sum sum = { 0 };
+    trip_coarse_value out;
+    trip_coarse_value_add_whole(&sum, 4, 1 + 2 + 2 + 2, true);
+    trip_coarse_value_get(&sum, &out);
+    assert_int_equal(out.value, 2); /* 1.75 */
+    assert_int_equal(out.known, (TRIP_COARSE_ALL + 1) / 2);
+    sum = (trip_coarse_value_sum){ 0 };
+    trip_coarse_value_add(&sum, &whole, false);
+    trip_coarse_value_add(&sum, &some, false);
+    trip_coarse_value_get(&sum, &out);
+    assert_int_equal(out.value, 11); /* (65535 * 10 + 1 * 65535) / 65536 */
+}
+
+/* Half a column behind half of it leaves a quarter open, by chance: of four columns 3/16 are
+ * covered. */
+static void columns_are_covered_as_if_by_chance(void **state)
+{
+    (void)state;
+    const trip_coarse_mean half = { .kept = 32768, .cover = { 32768, 32768, 32768 } };
+    trip_coarse_mean_sum sum;
+    trip_coarse_mean out;
+    trip_coarse_mean_clear(&sum);
+    trip_coarse_mean_add(&sum, &half, 0, NULL);
+    trip_coarse_mean_add(&sum, &half, 1, NULL); /* beside it along x */
+    trip_coarse_mean_get(&sum, &out);
+    assert_int_equal(out.kept, 8192);
+    assert_true(fabs(out.cover[0] - 65535 * 3 / 16.0) <= 65535 / 510.0);
+    for (int a = 1; a < 3; a++) /* two columns, half of each */
+        assert_true(fabs(out.cover[a] - 65535 / 4.0) <= 65535 / 510.0);
+}
+
+static void gradients_whose_sign_was_lost_add_up(void **state)
+{
+    (void)state;
+    const double long_one[3] = { 0, 0, 2 }, short_one[3] = { 0, 0, -1 };
+    trip_coarse_mean_sum sum;
+    double gradient[3];
+    trip_coarse_mean_clear(&sum);
+    trip_coarse_mean_add_whole(&sum, 1, 0, long_one);
+    trip_coarse_mean_add_whole(&sum, 1, 1, short_one);
+    trip_coarse_mean_gradient(&sum, gradient);
+    assert_true(gradient[0] == 0 && gradient[1] == 0);
+    assert_close(gradient[2], (2 * 2 + 1 * 1) / 3.0, 1e-6); /* each counts by its length */
+    trip_coarse_mean_clear(&sum);
+    trip_coarse_mean_gradient(&sum, gradient);
+    assert_true(gradient[2] == 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_voxel_alone_never_vanishes),
+        cmocka_unit_test(values_count_by_what_is_known_of_them),
+        cmocka_unit_test(columns_are_covered_as_if_by_chance),
+        cmocka_unit_test(gradients_whose_sign_was_lost_add_up),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
