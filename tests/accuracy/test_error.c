@@ -44,6 +44,24 @@ static void errors_made_by_hand_have_the_figures_expected(void **state)
     assert_close(f.psnr, 10 * log10(255.0 * 255 * 400 / (238 * 9 + 2 * 51.0 * 51)), 1e-5);
 }
 
+/* The least error that so many channels do not exceed: 198 of 200 are 99 of 100. */
+static void a_percentile_is_an_error_that_so_many_channels_reach_at_most(void **state)
+{
+    (void)state;
+    for (int off = 2; off <= 3; off++) {
+        accuracy_error *e = calloc(1, sizeof *e);
+        float picture[200], truth[200];
+        assert_non_null(e);
+        for (int i = 0; i < 200; i++)
+            truth[i] = picture[i] = 0.5F;
+        for (int i = 0; i < off; i++)
+            picture[70 * i] += 51.0F / 255;
+        accuracy_error_add(e, picture, truth, 50);
+        assert_close(accuracy_error_measure(e).percentile_99, off == 2 ? 0 : 51, 1e-6);
+        free(e);
+    }
+}
+
 static void colour_and_alpha_apart_are_three_channels_and_one(void **state)
 {
     (void)state;
@@ -77,6 +95,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_picture_is_not_far_from_itself),
         cmocka_unit_test(errors_made_by_hand_have_the_figures_expected),
+        cmocka_unit_test(a_percentile_is_an_error_that_so_many_channels_reach_at_most),
         cmocka_unit_test(colour_and_alpha_apart_are_three_channels_and_one),
         cmocka_unit_test(pixels_count_where_either_picture_covers_them),
     };

@@ -57,6 +57,22 @@ static void a_picture_is_like_itself(void **state)
     assert_close(ssim(a, a, SIDE, SIDE), 1, 1e-9);
 }
 
+/* One window, white in its middle alone: with w the weight of that pixel the means are w and 0, the
+ * variances w - w^2 and 0, and the covariance is 0. */
+static void windows_are_weighed_by_a_gaussian_of_a_pixel_and_a_half(void **state)
+{
+    (void)state;
+    double sum = 0;
+    for (int i = -5; i <= 5; i++)
+        sum += exp(-i * i / (2 * 1.5 * 1.5));
+    const double w = 1 / (sum * sum);
+    float one[4 * 11 * 11] = { 0 }, other[4 * 11 * 11] = { 0 };
+    for (int c = 0; c < 4; c++)
+        one[4 * (5 * 11 + 5) + c] = 1;
+    assert_close(ssim(one, other, 11, 11), 1e-4 * 9e-4 / ((w * w + 1e-4) * (w - w * w + 9e-4)),
+                 1e-7);
+}
+
 /* Without variance only the means count. */
 static void even_pictures_differ_by_their_means(void **state)
 {
@@ -102,6 +118,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_picture_is_like_itself),
+        cmocka_unit_test(windows_are_weighed_by_a_gaussian_of_a_pixel_and_a_half),
         cmocka_unit_test(even_pictures_differ_by_their_means),
         cmocka_unit_test(inverse_pictures_are_unlike),
         cmocka_unit_test(pictures_below_a_window_have_none),

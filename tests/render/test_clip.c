@@ -61,6 +61,38 @@ static void squares_hold_the_voxels_that_are_inside(void **state)
     }
 }
 
+/* Of a plane: when no corner of theirs is inside. */
+static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
+{
+    (void)state;
+    int missed = 0;
+    for (int n = 0; n < 1000; n++) {
+        const trip_vec3 normal =
+            trip_normalize(trip_v3(test_random() - 0.5, test_random() - 0.5, test_random() - 0.5));
+        const trip_vec3 at = trip_v3(50 * test_random(), -30 * test_random(), 7);
+        const double margin = n % 2 * 4 * test_random(), offset = 100 * test_random() - 50;
+        double lo[3], hi[3], most = -INFINITY;
+        for (int a = 0; a < 3; a++) {
+            lo[a] = 40 * test_random() - 20;
+            hi[a] = lo[a] + 10 * test_random();
+        }
+        for (int i = 0; i < 8; i++) {
+            const trip_vec3 corner = trip_v3(i & 1 ? hi[0] + margin : lo[0] - margin,
+                                             i & 2 ? hi[1] + margin : lo[1] - margin,
+                                             i & 4 ? hi[2] + margin : lo[2] - margin);
+            most = fmax(most, trip_dot(normal, trip_add(at, corner)) + offset);
+        }
+        trip_clip clip = { 0 };
+        trip_clip_add(&clip, normal, offset);
+        if (most > -TRIP_CLIP_SLACK)
+            assert_false(trip_clip_misses(&clip, at, lo, hi, margin));
+        if (most < -3 * TRIP_CLIP_SLACK)
+            assert_true(trip_clip_misses(&clip, at, lo, hi, margin));
+        missed += most < 0;
+    }
+    assert_in_range(missed, 200, 800);
+}
+
 /* Narrows an interval of the ray to one side of a plane, index space. */
 static void cut(const double plane[4], trip_vec3 o, trip_vec3 d, double *from, double *to)
 {
@@ -404,6 +436,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_is_the_inside_of_its_six_faces),
         cmocka_unit_test(squares_hold_the_voxels_that_are_inside),
+        cmocka_unit_test(boxes_are_missed_that_lie_outside_as_a_whole),
         cmocka_unit_test(what_is_left_of_the_path_has_its_opacity),
         cmocka_unit_test(splats_are_those_of_a_volume_without_the_others),
         cmocka_unit_test(sheets_cut_at_voxels_are_those_of_a_volume_without_the_others),

@@ -108,6 +108,55 @@ static void what_is_occluded_reaches_no_open_cell(void **state)
     scene_destroy(&s);
 }
 
+/* Of one voxel, whose bounds have no room but their own; cells are about where it is seen. */
+static void check_voxels(looks *l, int seed, unsigned *occluded, unsigned *reaching)
+{
+    for (int i = 0; i < 4000; i++) {
+        uint32_t h = scene_hash(i, seed, l->view.axis);
+        double p[3];
+        const trip_cpu_box box = { { h % 32, h / 32 % 32, h / 1024 % 32 }, { 0, 0, 0 } };
+        trip_splat s;
+        p[l->view.u_axis] = box.middle[0];
+        p[l->view.v_axis] = box.middle[1];
+        p[l->view.axis] = box.middle[2];
+        if (!trip_splat_project(&l->view.splat, trip_v3(p[0], p[1], p[2]), &s) || s.near)
+            continue;
+        double x = floor(s.x / 4) + (h >> 15) % 7 - 3, y = floor(s.y / 4) + (h >> 20) % 7 - 3;
+        if (!(x >= 0 && y >= 0 && x < SIZE / 4 && y < SIZE / 4))
+            continue;
+        open_only(l, (unsigned)x, (unsigned)y);
+        bool is_occluded = trip_cpu_box_occlusion(&l->view, &l->mask, &box) == TRIP_CPU_OCCLUDED;
+        bool reached = reaches(l, box.middle, (unsigned)x, (unsigned)y);
+        assert_false(is_occluded && reached);
+        *occluded += is_occluded;
+        *reaching += reached;
+    }
+}
+
+/* Near the eye and at wide angles, where supports reach farthest beyond what they do ahead. */
+static void a_voxel_that_is_occluded_reaches_no_open_cell(void **state)
+{
+    (void)state;
+    unsigned occluded = 0, reaching = 0;
+    for (int i = 0; i < 12; i++) {
+        scene s;
+        looks l;
+        scene_create(
+            &s, &(scene_params){ .dims = { 32, 32, 32 },
+                                 .index_to_world = i % 2 ? scene_sheared : trip_affine_identity(),
+                                 .tile_voxels = 32 });
+        trip_vec3 from = { cos(1.1 * i), sin(1.1 * i), 0.5 * sin(3.3 * i) };
+        trip_camera_params view = scene_view(&s, from, 30 + 4 * i, 120 - 6 * i, SIZE);
+        view.ortho_height = i % 6 == 5 ? 40 : 0;
+        look(&l, &s, &view, i % 3);
+        check_voxels(&l, i, &occluded, &reaching);
+        scene_destroy(&s);
+    }
+    print_message("%u occluded, %u reach\n", occluded, reaching);
+    assert_true(occluded > 1000);
+    assert_true(reaching > 1000);
+}
+
 static void without_saturated_texels_all_is_visible(void **state)
 {
     (void)state;
@@ -215,6 +264,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_occluded_reaches_no_open_cell),
+        cmocka_unit_test(a_voxel_that_is_occluded_reaches_no_open_cell),
         cmocka_unit_test(without_saturated_texels_all_is_visible),
         cmocka_unit_test(runs_show_all_that_reaches_an_open_cell),
     };

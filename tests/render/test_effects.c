@@ -481,6 +481,44 @@ static void what_is_farther_fades_into_the_background(void **state)
     }
 }
 
+/* The eye is in the middle of the box. */
+static void within_the_volume_fading_begins_at_the_eye(void **state)
+{
+    (void)state;
+    const uint64_t dims[3] = { 21, 21, 21 };
+    const trip_affine map = trip_affine_identity();
+    const trip_camera_params view = { .eye = { 10, 10, 10 },
+                                      .look = { 10, 10, 0 },
+                                      .up = { 0, 1, 0 },
+                                      .fov_degrees = 30,
+                                      .width = SIZE,
+                                      .height = SIZE };
+    trip_settings settings = trip_settings_default();
+    trip_camera camera;
+    settings.effects.cueing = 1;
+    assert_int_equal(trip_camera_make(&camera, &view, &map), 0);
+    const trip_effects_view e = trip_effects_view_make(&settings, &camera, dims);
+    for (int k = 0; k <= 10; k++)
+        assert_close(e.cue[0] * 3 + e.cue[1] * 4 + e.cue[2] * k + e.cue[3], 1 - k / 10.0, 1e-12);
+}
+
+/* By the lattice's cells, four voxels of 0.5 each. */
+static void light_is_looked_up_beside_surfaces_by_the_lattices_cells(void **state)
+{
+    (void)state;
+    const uint64_t dims[3] = { 201, 101, 51 };
+    const trip_affine map = { { { 0.5, 0, 0, 0 }, { 0, 0.5, 0, 0 }, { 0, 0, 0.5, 0 } } };
+    const trip_camera_params view = {
+        .eye = { 0, 0, 300 }, .up = { 0, 1, 0 }, .fov_degrees = 30, .width = SIZE, .height = SIZE
+    };
+    trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
+    trip_camera camera;
+    settings.effects.cells = 50;
+    assert_int_equal(trip_camera_make(&camera, &view, &map), 0);
+    assert_close(trip_effects_view_make(&settings, &camera, dims).bias, TRIP_LIGHT_BIAS * 4 * 0.5,
+                 1e-12);
+}
+
 static void scattering_keeps_light(void **state)
 {
     (void)state;
@@ -791,6 +829,8 @@ int main(void)
         cmocka_unit_test(threads_and_slots_change_no_bit),
         cmocka_unit_test(in_a_clear_volume_effects_change_nothing),
         cmocka_unit_test(what_is_farther_fades_into_the_background),
+        cmocka_unit_test(within_the_volume_fading_begins_at_the_eye),
+        cmocka_unit_test(light_is_looked_up_beside_surfaces_by_the_lattices_cells),
         cmocka_unit_test(scattering_keeps_light),
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),

@@ -169,7 +169,23 @@ static void a_given_height_of_a_parallel_view_stays_and_its_object_is_in_the_mid
         assert_close(lo[a], -hi[a], 1e-9);
 }
 
-/* The corners turned once round in small steps touch a margin and never cross one. */
+/* Of the corners of the box, turned once round in small steps. */
+static void turned_bounds(const trip_camera_framing *f, trip_affine m,
+                          const trip_camera_params *first, double lowest[2], double highest[2])
+{
+    lowest[0] = lowest[1] = highest[0] = highest[1] = 0;
+    for (int step = 0; step < 1440; step++) {
+        double lo[2], hi[2];
+        trip_camera_params p = trip_camera_turn(first, trip_v3(0, 0, 1), step * 0.25);
+        box_bounds(f, m, &p, lo, hi);
+        for (int a = 0; a < 2; a++) {
+            lowest[a] = fmin(lowest[a], lo[a]);
+            highest[a] = fmax(highest[a], hi[a]);
+        }
+    }
+}
+
+/* The corners touch a margin and never cross one. */
 static void an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margins(void **state)
 {
     (void)state;
@@ -186,22 +202,35 @@ static void an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margin
         trip_affine m = trip_affine_identity();
         m.m[2][2] = 0.7;
         trip_camera_params first = frame(&f, m);
-        double lowest[2] = { 0, 0 }, highest[2] = { 0, 0 };
-        for (int step = 0; step < 1440; step++) {
-            double lo[2], hi[2];
-            trip_camera_params p = trip_camera_turn(&first, trip_v3(0, 0, 1), step * 0.25);
-            box_bounds(&f, m, &p, lo, hi);
-            for (int a = 0; a < 2; a++) {
-                lowest[a] = fmin(lowest[a], lo[a]);
-                highest[a] = fmax(highest[a], hi[a]);
-            }
-        }
+        double lowest[2], highest[2];
+        turned_bounds(&f, m, &first, lowest, highest);
         double most = fmax(fmax(highest[0], -lowest[0]), fmax(highest[1], -lowest[1]));
         assert_true(most <= 0.9 + 1e-9);
         assert_close(most, 0.9, 1e-4);
         /* Its axis goes through the middle of the box. */
         assert_close(first.look.x, d[0] / 2, 1e-9);
         assert_close(first.look.y, d[1] / 2, 1e-9);
+    }
+}
+
+/* A tower, whose top is nearer than its foot. */
+static void a_turntable_leaves_as_much_above_as_below_however_it_is_rolled(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        trip_camera_framing f = { .hi = { 5, 5, 300 },
+                                  .width = 200,
+                                  .height = 200,
+                                  .elevation_degrees = 25,
+                                  .roll_degrees = 90 * i,
+                                  .turntable = true };
+        const trip_affine m = trip_affine_identity();
+        trip_camera_params first = frame(&f, m);
+        double lowest[2], highest[2];
+        turned_bounds(&f, m, &first, lowest, highest);
+        const int along = i % 2 ? 0 : 1;
+        assert_close(highest[along], 0.9, 1e-4);
+        assert_close(lowest[along], -0.9, 1e-4);
     }
 }
 
@@ -281,6 +310,10 @@ static void azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise(void
     seen_from(f, &p);
     place_of(&p, trip_v3(4.5, 4.5, 9), at); /* what was at the top is on the right */
     assert_true(at[0] > 0.5 && fabs(at[1]) < 1e-9);
+    f.roll_degrees = 180;
+    seen_from(f, &p);
+    place_of(&p, trip_v3(4.5, 4.5, 9), at);
+    assert_true(at[1] < -0.5 && fabs(at[0]) < 1e-9);
 }
 
 static void any_direction_can_be_made_up(void **state)
@@ -330,6 +363,7 @@ int main(void)
         cmocka_unit_test(an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margins),
         cmocka_unit_test(the_default_view_is_from_the_front_right_and_above),
         cmocka_unit_test(sides_have_names),
+        cmocka_unit_test(a_turntable_leaves_as_much_above_as_below_however_it_is_rolled),
         cmocka_unit_test(azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise),
         cmocka_unit_test(any_direction_can_be_made_up),
         cmocka_unit_test(a_box_of_no_size_far_out_is_framed),

@@ -88,6 +88,44 @@ static void width_is_that_of_similar_triangles(void **state)
     view.ortho_height = 80;
     assert_int_equal(trip_camera_make(&c, &view, &unit), 0);
     assert_float_equal(trip_lod_width_px(&c, depth), SIZE_PX / 80.0, 1e-9);
+    const trip_affine uneven = { { { 1, 0, 0, 0 }, { 0, 3, 0, 0 }, { 0, 0, 2, 0 } } };
+    assert_int_equal(trip_camera_make(&c, &view, &uneven), 0);
+    assert_float_equal(trip_lod_width_px(&c, depth), 3 * SIZE_PX / 80.0, 1e-9);
+}
+
+static trip_lod make_lod(const scene *s, const trip_camera_params *view,
+                         const trip_settings *settings, trip_camera *c)
+{
+    trip_lod lod;
+    assert_int_equal(trip_camera_make(c, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_lod_make(&lod, s->data, TRIP_KIND_MEANS, c, settings, s->budget), 0);
+    return lod;
+}
+
+/* Their faces that are turned to the eye lie half a voxel before them. */
+static void cubes_are_as_wide_as_their_nearest_voxels(void **state)
+{
+    (void)state;
+    scene s;
+    trip_camera c;
+    create(&s, 64, 0.01);
+    trip_camera_params view = { .up = { 0, 1, 0 },
+                                .fov_degrees = 2 * atan(0.5) * 180 / M_PI,
+                                .width = SIZE_PX,
+                                .height = SIZE_PX };
+    const trip_settings settings = settings_at(0.7);
+    for (int side = 0; side < 2; side++) {
+        view.eye = trip_v3(side ? 300 : -100, 0, 0);
+        trip_lod lod = make_lod(&s, &view, &settings, &c);
+        assert_int_equal(lod.cube_log2, 6);
+        for (int64_t i = 0; i < 3; i++) {
+            const int64_t cube[3] = { i, 1, 0 };
+            const double depth = side ? 300 - (64 * (double)i + 63.5) : 100 + 64 * (double)i - 0.5;
+            assert_float_equal(trip_lod_cube_width(&lod, s.data, &c, cube), SIZE_PX / depth, 1e-9);
+        }
+        trip_lod_release(&lod, s.budget);
+    }
+    scene_destroy(&s);
 }
 
 static trip_camera_params view_along(const scene *s)
@@ -135,6 +173,59 @@ static void each_place_is_drawn_at_one_level(void **state)
     assert_true((counts[0] > 0) + (counts[1] > 0) + (counts[2] > 0) + (counts[3] > 0) >= 2);
     trip_lod_release(&lod, s.budget);
     scene_destroy(&s);
+}
+
+/* Widths are in pixels of the picture, of which more are drawn. */
+static void levels_do_not_depend_on_samples(void **state)
+{
+    (void)state;
+    scene s;
+    trip_camera c;
+    trip_lod lods[2];
+    create(&s, 64, 0.01);
+    for (int i = 0; i < 2; i++) {
+        trip_settings settings = settings_at(0.7);
+        trip_camera_params view = view_along(&s);
+        settings.samples = i + 1;
+        view.width *= i + 1;
+        view.height *= i + 1;
+        lods[i] = make_lod(&s, &view, &settings, &c);
+    }
+    assert_true(lods[0].chosen & (lods[0].chosen - 1)); /* several */
+    assert_memory_equal(lods[0].level, lods[1].level, lods[0].bytes);
+    for (int i = 0; i < 2; i++)
+        trip_lod_release(&lods[i], s.budget);
+    scene_destroy(&s);
+}
+
+/* Of the coarse levels of large grids, whose cubes are but a few voxels wide. */
+static void squares_have_the_voxels_of_cubes_smaller_than_they_are(void **state)
+{
+    (void)state;
+    enum { ACROSS = 4, DOWN = 5, DEEP = 3, LEVEL = 5 };
+    uint8_t level[ACROSS * DOWN * DEEP];
+    const trip_lod lod = { .kind = TRIP_KIND_MEANS,
+                           .levels = 6,
+                           .cube_log2 = 6,
+                           .cubes = { ACROSS, DOWN, DEEP },
+                           .level = level };
+    for (int i = 0; i < ACROSS * DOWN * DEEP; i++)
+        level[i] = scene_hash(i, 0, 0) % 3 ? LEVEL : LEVEL + 1;
+    for (int axis = 0; axis < 3; axis++) {
+        const trip_list list = { .axis = axis,
+                                 .level = LEVEL,
+                                 .dims = { 2 * ACROSS - 1, 2 * DOWN, 2 * DEEP } };
+        const int64_t across = list.dims[(axis + 1) % 3], down = list.dims[(axis + 2) % 3];
+        for (int64_t v = 0; v < down; v += 8)
+            for (int64_t u = 0; u < across; u += 8) {
+                uint64_t expected = 0;
+                for (int64_t n = 0; n < 64; n++)
+                    if (u + n % 8 < across && v + n / 8 < down &&
+                        trip_lod_has(&lod, &list, 1, u + n % 8, v + n / 8))
+                        expected |= UINT64_C(1) << trip_morton((uint32_t)n % 8, (uint32_t)n / 8);
+                assert_int_equal(trip_lod_square(&lod, &list, 1, u, v), expected);
+            }
+    }
 }
 
 /* ---- pictures ---- */
@@ -520,6 +611,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(levels_are_the_coarsest_that_are_narrow_enough),
         cmocka_unit_test(width_is_that_of_similar_triangles),
+        cmocka_unit_test(cubes_are_as_wide_as_their_nearest_voxels),
+        cmocka_unit_test(levels_do_not_depend_on_samples),
+        cmocka_unit_test(squares_have_the_voxels_of_cubes_smaller_than_they_are),
         cmocka_unit_test(each_place_is_drawn_at_one_level),
         cmocka_unit_test(fog_is_as_thick_at_every_level),
         cmocka_unit_test(no_seam_shows_where_levels_meet),

@@ -126,6 +126,44 @@ static void it_is_the_same_for_any_tiles_and_slots(void **state)
     }
 }
 
+static bool one(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)gradient;
+    *code = CODE;
+    return i == 4 && j == 4 && k == 4;
+}
+
+/* From its middle half of it to each side, but for a pixel. */
+static void a_voxel_is_as_wide_as_it_is(void **state)
+{
+    (void)state;
+    scene s;
+    trip_outline *o;
+    scene_create(&s, &(scene_params){ .dims = { 9, 9, 9 }, .voxel = one });
+    scene_colour(&s, CODE, CODE, 1, 1, 1, 0.5);
+    trip_camera_params view = scene_view(&s, trip_v3(0, -1, 0), 40, 30, N);
+    view.ortho_height = 10;
+    trip_outline_params p = {
+        .data = s.data, .budget = s.budget, .table = s.table, .hi = { 8, 8, 8 }, .view = &view
+    };
+    assert_int_equal(trip_reader_create(&p.reader, s.data, &(trip_reader_params){ 0 }, s.budget),
+                     0);
+    assert_int_equal(trip_outline_make(&o, &p), 0);
+    assert_non_null(o);
+    const trip_reach_origin origin = { .index = { 4, 4, 4 } };
+    const trip_reach wanted[4] = { { .along = { 1, 0, 0 } },
+                                   { .along = { -1, 0, 0 } },
+                                   { .along = { 0, 0, 1 } },
+                                   { .along = { 0, 0, -1 } } };
+    double got[4];
+    trip_outline_reach(o, &origin, wanted, 4, got);
+    for (int i = 0; i < 4; i++)
+        assert_close(got[i], 0.5, 0.1);
+    trip_outline_destroy(o);
+    trip_reader_destroy(p.reader);
+    scene_destroy(&s);
+}
+
 /* Voxels 10 to 133 along x at the finest level, 2 * 20 to 2 * 59 + 1 at the next. */
 static bool rod(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -210,6 +248,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(faint_things_end_where_their_rays_are_too_faint_to_see),
         cmocka_unit_test(dense_things_reach_as_far_from_other_distances),
+        cmocka_unit_test(a_voxel_is_as_wide_as_it_is),
         cmocka_unit_test(it_is_the_same_for_any_tiles_and_slots),
         cmocka_unit_test(of_large_data_sets_a_coarse_level_is_read),
         cmocka_unit_test(without_that_level_or_where_nothing_shows_there_is_none),

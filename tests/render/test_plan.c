@@ -312,6 +312,22 @@ static void normals_are_planned_only_for_shading(void **state)
     scene_destroy(&s);
 }
 
+static void flattened_kernels_take_normals_without_shading_too(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 0.4, 0.3), 150, 40, 32);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+    settings.footprint = TRIP_FOOTPRINT_EWA;
+    settings.flatten = 3;
+    trip_plan plan = make_plan(&s, &c, &settings);
+    assert_int_equal(plan.planes, 1u << TRIP_PLANE_VOXELS | 1u << TRIP_PLANE_NORMALS);
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
 static char *explain(const scene *s, const trip_camera *c, const trip_settings *settings)
 {
     char *text;
@@ -449,6 +465,7 @@ int main(void)
         cmocka_unit_test(bricks_that_the_transfer_function_hides_are_not_read),
         cmocka_unit_test(a_brick_is_transparent_when_no_code_of_its_range_has_extinction),
         cmocka_unit_test(normals_are_planned_only_for_shading),
+        cmocka_unit_test(flattened_kernels_take_normals_without_shading_too),
         cmocka_unit_test(the_plan_explains_what_runs_and_why),
         cmocka_unit_test(the_plan_says_whether_the_function_is_looked_up),
         cmocka_unit_test(what_is_known_of_a_function_is_kept_from_plan_to_plan),

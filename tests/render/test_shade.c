@@ -134,6 +134,44 @@ static void a_parallel_view_is_lit_alike_everywhere(void **state)
     }
 }
 
+/* Of a light from +x, gradient_full 2. */
+static unsigned form_of(double gx, double gz, double grey)
+{
+    trip_settings s = trip_settings_default();
+    trip_camera c = camera(false);
+    s.headlight = false;
+    s.light_direction = trip_v3(1, 0, 0);
+    const trip_light light = trip_light_at(&s, &c, 2, trip_v3(0, 0, 0));
+    const double gradient[3] = { gx, 0, gz };
+    double rgb[3] = { grey, grey, grey };
+    return trip_light_colour(&light, gradient, rgb);
+}
+
+static void colours_by_another_formula_have_another_number(void **state)
+{
+    (void)state;
+    assert_int_equal(form_of(5, 1, 0.5), form_of(4, 1.5, 0.5));
+    assert_int_not_equal(form_of(5, 1, 0.5), form_of(1, 0.2, 0.5)); /* not at full strength */
+    assert_int_not_equal(form_of(5, 1, 0.5), form_of(-5, 1, 0.5));  /* lit from behind */
+    assert_int_not_equal(form_of(6, 5, 0.5), form_of(6, 5, 1));     /* as bright as can be */
+    assert_int_not_equal(form_of(0, 0, 0.5), form_of(1, 0.2, 0.5)); /* flat */
+}
+
+static void a_light_farther_than_can_be_computed_with_is_refused(void **state)
+{
+    (void)state;
+    const trip_affine m = trip_affine_identity();
+    trip_settings s = trip_settings_default();
+    s.headlight = false;
+    s.point_light = true;
+    s.light_place = trip_v3(0, 0.99 * TRIP_LIGHT_FARTHEST_VOXELS, 0);
+    assert_int_equal(trip_light_check(&s, &m), 0);
+    test_catch_reports();
+    s.light_place = trip_v3(0, -1.01 * TRIP_LIGHT_FARTHEST_VOXELS, 0);
+    assert_int_equal(trip_light_check(&s, &m), TRIP_USAGE);
+    assert_int_equal(test_caught_reports(), 1);
+}
+
 static double random_coordinate(uint64_t *state)
 {
     *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
@@ -293,6 +331,8 @@ int main(void)
         cmocka_unit_test(a_sphere_shines_on_the_side_that_light_and_eye_share),
         cmocka_unit_test(the_result_stays_within_the_colours_range),
         cmocka_unit_test(a_parallel_view_is_lit_alike_everywhere),
+        cmocka_unit_test(colours_by_another_formula_have_another_number),
+        cmocka_unit_test(a_light_farther_than_can_be_computed_with_is_refused),
         cmocka_unit_test(four_bytes_change_no_colour_by_half_a_step),
         cmocka_unit_test(three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step),
         cmocka_unit_test(three_bytes_of_bytes_change_no_colour),

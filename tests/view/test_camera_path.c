@@ -68,6 +68,36 @@ static void a_turn_about_an_axis_has_constant_speed(void **state)
     trip_camera_path_release(&p);
 }
 
+/* About one of the camera's own axes. */
+static trip_navigation turned(int axis, double degrees)
+{
+    trip_navigation n = around(20);
+    if (axis == 2)
+        trip_navigation_roll(&n, degrees);
+    else
+        trip_navigation_orbit(&n, axis ? degrees : 0, axis ? 0 : degrees);
+    return n;
+}
+
+/* Between two keys, of which each is more than a right angle from the other. */
+static void a_turn_goes_the_shorter_way_round(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 24; i++) {
+        const int axis = i % 3;
+        const double degrees = (i % 2 ? -1 : 1) * (100 + 6 * (i / 2));
+        trip_camera_path p = { 0 };
+        add(&p, 0, turned(axis, 0), NULL);
+        add(&p, 2, turned(axis, degrees), NULL);
+        const trip_navigation n = trip_camera_path_view(&p, 1), half = turned(axis, degrees / 2);
+        assert_eye(&n, half.eye[0], half.eye[1], half.eye[2]);
+        for (int a = 0; a < 3; a++)
+            assert_close(trip_navigation_get_axes(&n).up[a], trip_navigation_get_axes(&half).up[a],
+                         1e-12);
+        trip_camera_path_release(&p);
+    }
+}
+
 static void a_flight_straight_on_is_straight(void **state)
 {
     (void)state;
@@ -389,6 +419,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(keys_are_their_views_to_the_last_bit),
         cmocka_unit_test(a_turn_about_an_axis_has_constant_speed),
+        cmocka_unit_test(a_turn_goes_the_shorter_way_round),
         cmocka_unit_test(a_flight_straight_on_is_straight),
         cmocka_unit_test(distances_go_by_factors),
         cmocka_unit_test(the_eye_passes_keys_smoothly),

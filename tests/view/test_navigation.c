@@ -162,6 +162,16 @@ static void turning_keeps_the_eye(void **state)
     assert_point(n.look, 10 * cos(PI / 6), -10, 5);
 }
 
+static void upside_down_a_turn_goes_to_the_pictures_right_too(void **state)
+{
+    (void)state;
+    trip_navigation n = front();
+    trip_navigation_roll(&n, 180); /* -x is to the right */
+    trip_navigation_turn(&n, 90, 0);
+    assert_point(trip_navigation_get_axes(&n).forward, -1, 0, 0);
+    assert_point(trip_navigation_get_axes(&n).up, 0, 0, -1);
+}
+
 static void a_roll_turns_the_picture_clockwise(void **state)
 {
     (void)state;
@@ -286,6 +296,7 @@ int main(void)
         cmocka_unit_test(a_dolly_goes_to_the_point_under_the_cursor),
         cmocka_unit_test(flying_moves_eye_and_point_looked_at),
         cmocka_unit_test(turning_keeps_the_eye),
+        cmocka_unit_test(upside_down_a_turn_goes_to_the_pictures_right_too),
         cmocka_unit_test(a_roll_turns_the_picture_clockwise),
         cmocka_unit_test(another_lens_keeps_the_size_of_what_is_looked_at),
         cmocka_unit_test(sides_are_seen_upright),

@@ -60,6 +60,28 @@ static void frames_that_scatter_do_not_make_the_next_one_large(void **state)
     assert_true(trip_pace_scale(&free, 480e3, 33) == 1);
 }
 
+/* Of one frame all of the time is taken to be of its pixels: 33 ms would be 132e3 of them. */
+static void frames_grow_threefold_at_most(void **state)
+{
+    (void)state;
+    trip_pace p = { 0 };
+    trip_pace_note(&p, 20e3, 5);
+    const double part = trip_pace_scale(&p, 480e3, 33);
+    assert_true(fabs(part * part * 480e3 - 60e3) < 1);
+}
+
+/* The larger ones are faster, by chance: pixels may still cost as much as scatter hides. */
+static void pixels_that_seem_to_cost_nothing_may_cost_what_scatter_hides(void **state)
+{
+    (void)state;
+    trip_pace p = { 0 };
+    const double pixels[] = { 210e3, 200e3, 220e3, 200e3, 210e3 }, ms[] = { 36, 43, 35, 41, 38 };
+    for (int i = 0; i < 5; i++)
+        trip_pace_note(&p, pixels[i], ms[i]);
+    assert_true(trip_pace_expect_ms(&p, 480e3) > trip_pace_expect_ms(&p, 210e3) + 5);
+    assert_true(trip_pace_scale(&p, 480e3, 33) < 0.9);
+}
+
 /* Followed as a viewer does, from a start that says nothing, the time is met. */
 static void following_it_comes_to_the_time(void **state)
 {
@@ -81,6 +103,8 @@ int main(void)
         cmocka_unit_test(the_size_meets_the_time),
         cmocka_unit_test(where_the_time_cannot_be_met_pixels_are_not_thrown_away),
         cmocka_unit_test(frames_that_scatter_do_not_make_the_next_one_large),
+        cmocka_unit_test(frames_grow_threefold_at_most),
+        cmocka_unit_test(pixels_that_seem_to_cost_nothing_may_cost_what_scatter_hides),
         cmocka_unit_test(following_it_comes_to_the_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
