@@ -309,8 +309,8 @@ typedef struct triptych_settings {
     triptych_compositing compositing; /* pre */
     triptych_footprint footprint;     /* pre */
     triptych_low_pass low_pass;       /* pre */
-    int vertex_weights; /* not 0: merge takes weights from the corners of splats (pre, by splat; by
-                           the reference alone) */
+    int vertex_weights; /* not 0: merge takes weights from the corners of splats, about the eye of
+                           pixels (pre, by splat; by the reference alone) */
     int normalise;      /* not 0: colours are divided by the opacity that has accumulated, and what
                            is covered at all is opaque */
     double flatten; /* of EWA footprints: how many times flatter kernels are along full gradients, 1

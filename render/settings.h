@@ -13,8 +13,9 @@
  * fallen to exp(-TRIP_CUTOFF^2 / 2) = 0.39 % of its peak; it is lowered by as much, to end at 0. */
 #define TRIP_CUTOFF (10.0 / 3.0)
 #define TRIP_KERNEL_RADIUS_VOXELS 2.0
-/* Standard deviation of the low-pass Gaussian in pixels (the h of Zwicker et al. 2001, EWA volume
- * resampling filter), so that a splat never falls between pixel centres. */
+/* Standard deviation of the low-pass Gaussian in pixels (the filter of Zwicker et al. 2001, EWA
+ * volume resampling filter, which is 1 pixel there), so that a splat never falls between pixel
+ * centres. */
 #define TRIP_LOW_PASS_PX 0.4
 typedef enum trip_method {
     TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005, 5.2; 2008, 4.2) */
@@ -113,7 +114,8 @@ typedef struct trip_settings {
     double
         flatten; /* of EWA footprints: how much flatter kernels are along the gradient, 1: round */
     double sprite_px;    /* of fixed footprints: their width, trip_splat_sprite_px() */
-    bool vertex_weights; /* merge: weights of a splat's corners, interpolated over it (2008, 4.2) */
+    bool vertex_weights; /* merge: weights of a splat's corners, interpolated over it (2008, 4.2);
+                            of pixels where it is near */
     int slices;          /* of a sheet, post: 1 to TRIP_SLICES_MAX */
     trip_method method;
     trip_traversal traversal;

@@ -558,7 +558,7 @@ static void a_record_that_is_longer_than_any_is_none(void **state)
     read_journal();
     assert_true(record_count < MOST_RECORDS);
     records[record_count++] =
-        (record){ .kind = CHECKPOINT, .bytes = 64 << 20, .body = calloc(64, 1 << 20) };
+        (record){ .kind = CHECKPOINT, .bytes = (4 << 20) + 8, .body = calloc(1, (4 << 20) + 8) };
     write_journal();
     free_records();
     p.resume = true;
