@@ -128,61 +128,80 @@ static void release_sampled(void *opaque, trip_volume_portion *portion)
     portion->data = NULL;
 }
 
-/* The voxel that stands for one of the samples, in the portion or next to it. */
-static int64_t voxel_of(const sampled *s, const trip_volume_portion *of, int axis, int64_t sample)
-{
-    const int64_t at = sample * s->step, least = of->origin[axis] - 1;
-    const int64_t most = of->origin[axis] + of->size[axis];
-    return at < least ? least : at > most ? most : at;
-}
-
-typedef struct whole_box {
-    int64_t lo[3], size[3];
-    size_t voxels;
+/* Where decoded samples go: arrays of the box [lo, lo + size). */
+typedef struct sample_box {
+    const int64_t *lo, *size;
     float *values;
     uint8_t *active;
-} whole_box;
+} sample_box;
 
-static void pick_box(const sampled *s, const trip_volume_portion *of, const whole_box *box,
-                     const int64_t lo[3], const int64_t size[3], float *values, uint8_t *active)
+/* Of all voxels from the first to the last of samples [lo, lo + size). */
+static void pick_box(const sampled *s, const int64_t lo[3], const int64_t size[3],
+                     const int64_t voxels[3], const float *values, const uint8_t *active,
+                     const sample_box *to)
 {
     for (int64_t k = 0; k < size[2]; k++)
         for (int64_t j = 0; j < size[1]; j++)
             for (int64_t i = 0; i < size[0]; i++) {
-                const int64_t x = voxel_of(s, of, 0, lo[0] + i) - box->lo[0];
-                const int64_t y = voxel_of(s, of, 1, lo[1] + j) - box->lo[1];
-                const int64_t z = voxel_of(s, of, 2, lo[2] + k) - box->lo[2];
-                const size_t at = (size_t)((z * box->size[1] + y) * box->size[0] + x);
-                *values++ = box->values[at];
-                if (active)
-                    *active++ = box->active[at];
+                const int64_t from = ((k * voxels[1] + j) * voxels[0] + i) * s->step;
+                const int64_t at =
+                    ((lo[2] - to->lo[2] + k) * to->size[1] + lo[1] - to->lo[1] + j) * to->size[0] +
+                    lo[0] - to->lo[0] + i;
+                to->values[at] = values[from];
+                if (to->active)
+                    to->active[at] = active[from];
             }
 }
 
+static int decode_part(const sampled *s, const trip_volume_portion *of, const int64_t lo[3],
+                       const int64_t size[3], const sample_box *to)
+{
+    int64_t first[3], voxels[3];
+    size_t count = 1;
+    for (int a = 0; a < 3; a++) {
+        first[a] = lo[a] * s->step;
+        voxels[a] = (size[a] - 1) * s->step + 1;
+        count *= (size_t)voxels[a];
+    }
+    float *values = trip_budget_take(s->budget, count * sizeof *values);
+    uint8_t *active = trip_budget_take(s->budget, count);
+    int status = values && active
+                     ? s->of->decode(s->state, of, first, voxels, values, active)
+                     : trip_fail(TRIP_ERROR, "read", "portion", "does not fit the memory given");
+    if (!status)
+        pick_box(s, lo, size, voxels, values, active, to);
+    if (values)
+        trip_budget_release(s->budget, values, count * sizeof *values);
+    if (active)
+        trip_budget_release(s->budget, active, count);
+    return status;
+}
+
+/* Those beside the portion first, side by side, so that little of what is between them and it is
+ * decoded: they may lie far away. */
 static int decode_sampled(const void *opaque, const trip_volume_portion *portion,
                           const int64_t lo[3], const int64_t size[3], float *values,
                           uint8_t *active)
 {
     const sampled *s = opaque;
-    const trip_volume_portion *of = portion->data;
-    whole_box box = { .voxels = 1 };
-    for (int a = 0; a < 3; a++) {
-        box.lo[a] = voxel_of(s, of, a, lo[a]);
-        box.size[a] = voxel_of(s, of, a, lo[a] + size[a] - 1) - box.lo[a] + 1;
-        box.voxels *= (size_t)box.size[a];
+    const sample_box to = { lo, size, values, active };
+    int64_t from[3] = { lo[0], lo[1], lo[2] }, left[3] = { size[0], size[1], size[2] };
+    int status = 0;
+    for (int n = 0; n < 6 && !status && left[n / 2] > 0; n++) {
+        const int a = n / 2;
+        const bool before = n % 2 == 0 && from[a] < portion->origin[a];
+        const bool behind = n % 2 && from[a] + left[a] > portion->origin[a] + portion->size[a];
+        if (!before && !behind)
+            continue;
+        int64_t side[3] = { from[0], from[1], from[2] }, part[3] = { left[0], left[1], left[2] };
+        side[a] = before ? from[a] : from[a] + left[a] - 1;
+        part[a] = 1;
+        status = decode_part(s, portion->data, side, part, &to);
+        from[a] += before;
+        left[a]--;
     }
-    box.values = trip_budget_take(s->budget, box.voxels * sizeof *box.values);
-    box.active = trip_budget_take(s->budget, box.voxels);
-    int status = box.values && box.active
-                     ? s->of->decode(s->state, of, box.lo, box.size, box.values, box.active)
-                     : trip_fail(TRIP_ERROR, "read", "portion", "does not fit the memory given");
-    if (!status)
-        pick_box(s, of, &box, lo, size, values, active);
-    if (box.values)
-        trip_budget_release(s->budget, box.values, box.voxels * sizeof *box.values);
-    if (box.active)
-        trip_budget_release(s->budget, box.active, box.voxels);
-    return status;
+    const bool some = left[0] > 0 && left[1] > 0 && left[2] > 0;
+    return !status && some ? decode_part(s, portion->data, from, left, &to) : status;
 }
 
 /* ---- opening ---- */

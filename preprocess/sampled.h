@@ -1,6 +1,5 @@
 /* A reader of every n-th voxel of another reader's volume along each axis, from the first one on: a
- * small volume of the same thing, soon read. What lies beside a portion of a sparse volume is taken
- * from the voxels next to it. As volume_reader.h says of threads. */
+ * small volume of the same thing, soon read. As volume_reader.h says of threads. */
 #ifndef TRIP_SAMPLED_H
 #define TRIP_SAMPLED_H
 

@@ -523,12 +523,12 @@ static void decode_slices(const trip_volume *v, const stored_slices *s, const in
 int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion,
                         const int64_t lo[3], const int64_t size[3], float *values, uint8_t *active)
 {
-    if (!v->reader->read_slices)
-        return v->reader->decode(v->state, portion, lo, size, values, active);
     for (int a = 0; a < 3; a++)
         if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
             lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
             return trip_fail(TRIP_ERROR, "read", v->path, "voxels outside the portion");
+    if (!v->reader->read_slices)
+        return v->reader->decode(v->state, portion, lo, size, values, active);
     decode_slices(v, portion->data, lo, size, values, active);
     return 0;
 }

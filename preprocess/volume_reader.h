@@ -37,7 +37,7 @@ typedef struct trip_volume_reader {
     bool (*swap)(const void *state);
 
     /* Portion readers (read_slices NULL): as trip_volume_next, trip_portion_decode, _release.
-     * decode is called by many threads at once. */
+     * decode is called by many threads at once, and takes boxes anywhere in the grid. */
     int (*next)(void *state, trip_volume_portion *portion);
     int (*decode)(const void *state, const trip_volume_portion *portion, const int64_t lo[3],
                   const int64_t size[3], float *values, uint8_t *active);

@@ -248,19 +248,15 @@ int next_box(void *opaque, trip_volume_portion *portion)
     return 1;
 }
 
-int decode_box(const void *opaque, const trip_volume_portion *portion, const int64_t lo[3],
+int decode_box(const void *opaque, const trip_volume_portion *, const int64_t lo[3],
                const int64_t size[3], float *values, uint8_t *active)
 {
     const State &state = *(const State *)opaque;
     const trip_vdb_grid &grid = *state.grid;
     return guard(state.path, [&] {
         int64_t at[3];
-        for (int a = 0; a < 3; a++) {
-            if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
-                lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
-                throw trip_vdb_error("voxels outside the portion");
+        for (int a = 0; a < 3; a++)
             at[a] = lo[a] + grid.lo[a];
-        }
         grid.decode(at, size, values, active);
         return 0;
     });

@@ -248,6 +248,43 @@ static void a_sparse_volume_has_its_background_around_what_is_kept(void **state)
         }
 }
 
+/* Every second, third ... voxel of it: of some the last is kept, which has nothing behind it. */
+static void samples_of_a_sparse_volume_have_their_halo_within_the_grid(void **state)
+{
+    (void)state;
+    static const trip_value_range all = { 1e-6, 2 };
+    bool some_kept_at_the_end = false;
+    int64_t whole[3];
+    test_lists l;
+    trip_brick_params p = params_for("v.vdb");
+#ifndef TEST_OPENVDB
+    skip();
+#endif
+    generate("v.vdb");
+    p.ranges = &all;
+    for (int64_t step = 1; step < 8; step++) {
+        p.volume.most_voxels = 0;
+        for (int a = 0; a < 3 && step > 1; a++)
+            p.volume.most_voxels =
+                (a ? p.volume.most_voxels : 1) * (uint64_t)((whole[a] - 1) / step + 1);
+        brick_to(p, "a.trip");
+        test_read_lists("a.trip", &l);
+        test_check_lists(&l);
+        const int64_t dims[3] = { (int64_t)l.header.dims[0], (int64_t)l.header.dims[1],
+                                  (int64_t)l.header.dims[2] };
+        if (step == 1)
+            memcpy(whole, dims, sizeof dims);
+        for (int64_t at = 0; at < dims[0] * dims[1] * dims[2]; at++) {
+            const int64_t x = at % dims[0], y = at / dims[0] % dims[1], z = at / dims[0] / dims[1];
+            assert_int_equal(l.codes[3][at] >= 0, is_halo(l.codes[0], dims, x, y, z));
+            if (l.codes[0][at] >= 0 && (x + 1 == dims[0] || y + 1 == dims[1] || z + 1 == dims[2]))
+                some_kept_at_the_end = true;
+        }
+        test_free_lists(&l);
+    }
+    assert_true(some_kept_at_the_end);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -260,6 +297,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(values_that_are_not_finite_are_not_in_the_halo, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(a_sparse_volume_has_its_background_around_what_is_kept,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(samples_of_a_sparse_volume_have_their_halo_within_the_grid,
                                         test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
