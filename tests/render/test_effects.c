@@ -519,6 +519,38 @@ static void light_is_looked_up_beside_surfaces_by_the_lattices_cells(void **stat
                  1e-12);
 }
 
+static double note_place(const void *user, trip_vec3 voxel)
+{
+    *(trip_vec3 *)(size_t)user = voxel;
+    return 1;
+}
+
+/* Beside a surface light is looked up three voxels towards it, but not behind it. */
+static void light_at_a_place_is_not_passed(void **state)
+{
+    (void)state;
+    trip_vec3 asked = { 0, 0, 0 };
+    trip_effects_view e = { .effects = { .shadows = true },
+                            .to_index = trip_affine_identity(),
+                            .bias = 3,
+                            .point_light = true,
+                            .user = &asked,
+                            .reached = note_place };
+    const trip_light light = {
+        .eye = { 0, 0, 1 }, .light = { 0, 0.6, 0.8 }, .half = { 0, 0.6, 0.8 }, .gradient_full = 1
+    };
+    const double gradient[3] = { 0, 0, 2 };
+    for (int distance = 1; distance < 10; distance++) {
+        double rgb[3] = { 1, 1, 1 };
+        const double by = fmin(3, distance);
+        e.light = trip_v3(5, 0.6 * distance, 7 + 0.8 * distance);
+        trip_effects_colour(&e, &light, trip_v3(5, 0, 7), gradient, rgb);
+        assert_close(asked.x, 5, 1e-12);
+        assert_close(asked.y, 0.6 * by, 1e-12);
+        assert_close(asked.z, 7 + 0.8 * by, 1e-12);
+    }
+}
+
 static void scattering_keeps_light(void **state)
 {
     (void)state;
@@ -583,6 +615,30 @@ static void complete(trip_light_map *m, const trip_light_source *source)
     while (trip_light_map_step(m, NULL) > 0)
         trip_light_map_await(m, UINT64_MAX);
     assert_true(trip_light_map_is_complete(m));
+}
+
+/* Of even fog any mean is the same, at nodes beyond its last voxels too. */
+static void a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node(void **state)
+{
+    (void)state;
+    scene s;
+    trip_light_map *m;
+    const trip_clip none = { 0 };
+    create_fog(&s, FOG);
+    trip_settings settings = scene_with_shadows(trip_v3(0, 0, 1));
+    const trip_light_source source = {
+        .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
+    };
+    assert_int_equal(trip_light_map_create(&m, s.budget), 0);
+    for (int cells = 3; cells < EDGE; cells++) {
+        settings.effects.cells = cells;
+        complete(m, &source);
+        const trip_light_grid *g = trip_light_map_gathered(m);
+        for (size_t n = 0; n < trip_light_grid_count(g); n++)
+            assert_close((double)g->at[n], FOG, 1e-6);
+    }
+    trip_light_map_destroy(m);
+    scene_destroy(&s);
 }
 
 /* On the rim of fog columns beside the node have left it. */
@@ -821,6 +877,7 @@ int main(void)
         cmocka_unit_test(fog_is_lit_from_a_place),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
         cmocka_unit_test(a_light_far_away_is_one_in_a_direction),
+        cmocka_unit_test(a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node),
         cmocka_unit_test(every_node_is_lit_from_a_place_once),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
         cmocka_unit_test(openness_is_the_mean_over_directions),
@@ -831,6 +888,7 @@ int main(void)
         cmocka_unit_test(what_is_farther_fades_into_the_background),
         cmocka_unit_test(within_the_volume_fading_begins_at_the_eye),
         cmocka_unit_test(light_is_looked_up_beside_surfaces_by_the_lattices_cells),
+        cmocka_unit_test(light_at_a_place_is_not_passed),
         cmocka_unit_test(scattering_keeps_light),
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),

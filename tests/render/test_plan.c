@@ -235,6 +235,55 @@ static void no_splat_that_touches_a_pixel_is_left_out(void **state)
     scene_destroy(&s);
 }
 
+/* One voxel that shows, in a box of others or by itself. */
+static bool middle_and_corners(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = i == 16 ? 65535 : 0;
+    return (i == 16 && j == 16 && k == 16) || (i == 0 && j == 0 && k == 0) ||
+           (i == 31 && j == 31 && k == 31);
+}
+
+static void make_voxel(scene *s, unsigned tile, unsigned slab)
+{
+    scene_create(s, &(scene_params){ .dims = { 32, 32, 32 },
+                                     .tile_voxels = tile,
+                                     .slab_sheets = slab,
+                                     .voxel = middle_and_corners });
+    scene_colour(s, 65535, 65535, 1, 1, 1, 0.5);
+}
+
+/* Rays that miss a voxel before the eye may be near it behind the eye, where it is so near. */
+static void a_voxel_about_the_eye_is_never_left_out(void **state)
+{
+    (void)state;
+    scene whole, parts;
+    int shown = 0;
+    make_voxel(&whole, 32, 32);
+    make_voxel(&parts, 16, 1);
+    for (int i = 0; i < 4 * CAMERAS; i++) {
+        const trip_vec3 from = trip_scale(random_direction(), 3);
+        trip_camera_params view = { .eye = trip_add(trip_v3(16, 16, 16), from),
+                                    .up = { 0.1, 0.2, 1 },
+                                    .fov_degrees = 40 + i % 120,
+                                    .width = 9,
+                                    .height = 6 };
+        view.look = trip_add(view.eye, random_direction());
+        trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.85);
+        settings.footprint = (trip_footprint)(i % 2);
+        scene_picture p = scene_draw(&whole, scene_renderers(), &view, &settings);
+        scene_picture q = scene_draw(&parts, scene_renderers(), &view, &settings);
+        shown += p.lists[0].splats_drawn + p.lists[1].splats_drawn + p.lists[2].splats_drawn > 0;
+        assert_true(scene_difference(&p, &q) <= 1e-9);
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+    }
+    assert_true(shown > CAMERAS);
+    scene_destroy(&whole);
+    scene_destroy(&parts);
+}
+
 static bool is_visible(const scene *s, int code)
 {
     return s->table[code].extinction > 0;
@@ -462,6 +511,7 @@ int main(void)
         cmocka_unit_test(inside_the_volume_each_list_is_read_from_the_eye_outwards),
         cmocka_unit_test(ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze),
         cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
+        cmocka_unit_test(a_voxel_about_the_eye_is_never_left_out),
         cmocka_unit_test(bricks_that_the_transfer_function_hides_are_not_read),
         cmocka_unit_test(a_brick_is_transparent_when_no_code_of_its_range_has_extinction),
         cmocka_unit_test(normals_are_planned_only_for_shading),

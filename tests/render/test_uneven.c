@@ -532,6 +532,49 @@ static void from_within_all_draw_the_splats_of_the_reference(void **state)
     }
 }
 
+static void create_body(scene *s, const uneven *u, unsigned tile, unsigned slab)
+{
+    scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                     .coordinates = &u->coordinates,
+                                     .tile_voxels = tile,
+                                     .slab_sheets = slab });
+    scene_colour(s, 65535, 65535, 1, 0.5, 0.25, 0.05);
+}
+
+/* One brick is read whole; of many those that narrow views from anywhere call for. */
+static void bricks_that_are_left_out_show_nothing(void **state)
+{
+    (void)state;
+    uneven u;
+    scene whole, parts;
+    uint64_t left_out = 0;
+    make_uneven(&u, 20);
+    create_body(&whole, &u, 32, 32);
+    create_body(&parts, &u, 16, 1);
+    for (int i = 0; i < 40; i++) {
+        trip_camera_params view = {
+            .eye = { 24 * test_random() - 2, 24 * test_random() - 2, 24 * test_random() - 2 },
+            .look = { 19 * test_random(), 19 * test_random(), 19 * test_random() },
+            .up = { 0.1, 0.2, 1 },
+            .fov_degrees = 10 + i,
+            .ortho_height = i % 4 ? 0 : 3,
+            .width = 8,
+            .height = 12
+        };
+        trip_settings settings = i % 2 ? post(2) : splats();
+        settings.footprint = i % 4 == 2 ? TRIP_FOOTPRINT_EWA : TRIP_FOOTPRINT_EXACT;
+        scene_picture p = scene_draw(&whole, &cpu_scenes_reference, &view, &settings);
+        scene_picture q = scene_draw(&parts, &cpu_scenes_reference, &view, &settings);
+        assert_true(scene_difference(&p, &q) <= 1e-6);
+        left_out += q.stats.all.splats_read < p.stats.all.splats_read;
+        scene_picture_free(&p);
+        scene_picture_free(&q);
+    }
+    assert_true(left_out > 10);
+    scene_destroy(&whole);
+    scene_destroy(&parts);
+}
+
 /* Tables of even steps draw what no tables draw. */
 static void even_coordinates_change_nothing(void **state)
 {
@@ -605,6 +648,7 @@ int main(void)
         cmocka_unit_test(all_draw_the_sheets_of_the_reference),
         cmocka_unit_test(what_a_segment_leaps_over_is_seen),
         cmocka_unit_test(from_within_all_draw_the_splats_of_the_reference),
+        cmocka_unit_test(bricks_that_are_left_out_show_nothing),
         cmocka_unit_test(even_coordinates_change_nothing),
         cmocka_unit_test(voxels_are_clipped_where_they_lie),
     };
