@@ -12,6 +12,7 @@
 
 #include "input_file.h"
 #include "json.h"
+#include "options.h"
 #include "report.h"
 
 enum { MOST_BYTES = 16 << 20, VERSION = 1 };
@@ -114,10 +115,9 @@ static int check_data(const cJSON *root, const char *path, const accuracy_wanted
 
 static void read_levels(const cJSON *root, accuracy_found *out)
 {
-    static const char *const names[] = { "auto", "post", "pre", "both" };
     const char *name = text_of(root, "levels_for");
-    for (int i = 0; name && i < 4; i++)
-        if (!strcmp(name, names[i])) {
+    for (int i = 0; name && trip_levels_for_names[i]; i++)
+        if (!strcmp(name, trip_levels_for_names[i])) {
             out->says_levels = true;
             out->levels_for = (triptych_levels_for)i;
         }

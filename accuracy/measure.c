@@ -13,6 +13,7 @@
 #include "contexts.h"
 #include "flip.h"
 #include "json.h"
+#include "options.h"
 #include "picture_data.h"
 #include "report.h"
 #include "ssim.h"
@@ -196,7 +197,7 @@ static void note_levels(accuracy_measured *m, const char *notes)
     static const char option[] = "--levels-for=";
     const cJSON *one;
     trip_json json = { 0 };
-    snprintf(m->levels_for, sizeof m->levels_for, "auto");
+    snprintf(m->levels_for, sizeof m->levels_for, "%s", trip_levels_for_names[0]);
     if (trip_json_parse(&json, notes, m->options->data[0], NULL) != 0)
         return;
     cJSON_ArrayForEach(one, cJSON_GetObjectItemCaseSensitive(json.root, "source_options"))

@@ -270,9 +270,8 @@ static int parse_levels(const char *text, int *levels)
 
 static int parse_levels_for(const char *text, triptych_levels_for *levels_for)
 {
-    static const char *const names[] = { "auto", "post", "pre", "both", NULL };
     int choice = 0;
-    int status = trip_option_choice("--levels-for", text, names, &choice);
+    int status = trip_option_choice("--levels-for", text, trip_levels_for_names, &choice);
     *levels_for = (triptych_levels_for)choice;
     return status;
 }

@@ -151,6 +151,8 @@ int trip_option_size(const char *option, const char *text, int *width, int *heig
     return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a size like 1024x768", text);
 }
 
+const char *const trip_levels_for_names[] = { "auto", "post", "pre", "both", NULL };
+
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out)
 {
     char list[256] = "";

@@ -22,6 +22,8 @@ int trip_option_range(const char *option, const char *text, double *lo, double *
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
 /* A picture of 1 to 99999 pixels a side: "1024x768". */
 int trip_option_size(const char *option, const char *text, int *width, int *height);
+/* Names of triptych_levels_for, NULL behind them. */
+extern const char *const trip_levels_for_names[];
 /* The position of `text` in a NULL-terminated list of names. */
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out);
 

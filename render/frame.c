@@ -28,9 +28,9 @@ static double now_ms(void)
 
 static void report_progress(trip_drawing *d, const trip_batch *batch)
 {
-    const bool of_values = trip_plan_is_of_values(d->frame->plan, d->frame->settings);
     if (!d->frame->progress)
         return;
+    const bool of_values = trip_plan_is_of_values(d->frame->plan, d->frame->settings);
     for (size_t i = 0; i < batch->run_count; i++)
         d->splats += batch->runs[i].count;
     d->frame->progress(d->frame->progress_user, of_values ? "draw" : "splat", d->splats,

@@ -211,7 +211,7 @@ static bool is_to_merge(const trip_cpu *r, uint32_t pane)
     return r->states[pane] & TRIP_CPU_PANE_BEGUN && !trip_cpu_is_alone(r, pane);
 }
 
-/* What is alone has sheets that the layer's view is to end. */
+/* Of what is alone, whether it has sheets that the layer's view is to end: with the layer. */
 static bool is_to_end(const trip_cpu *r, uint32_t pane)
 {
     return r->open_sheets && r->states[pane] & TRIP_CPU_PANE_BEGUN &&
@@ -263,7 +263,7 @@ static void finish_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
     const float *pixels = NULL;
     if (r->states[pane] & TRIP_CPU_PANE_BEGUN && trip_cpu_is_alone(r, pane)) {
         content = TRIP_CPU_LAYER;
-        pixels = layer_of_pane(r, w, pane);
+        pixels = is_to_end(r, pane) ? layer_of_pane(r, w, pane) : trip_cpu_pane_pixels(r, pane);
     } else if (r->states[pane]) {
         content = TRIP_CPU_SUM;
         pixels = sum_so_far(r, w, pane);

@@ -190,6 +190,22 @@ class Drawn(program.ProgramTest):
         for axis in "xyz":
             self.assertEqual(lists[0][axis]["splats_drawn"], lists[1][axis]["splats_drawn"])
 
+    def test_the_last_sheet_of_a_list_is_drawn_where_the_next_list_waits_for_the_queue(self):
+        """Walls of fog: in so large a picture the queue of gl is full when a list ends."""
+        fog = numpy.full((24, 24, 24), 1, "u1")
+        for end in 0, -1:
+            fog[end] = fog[:, end] = fog[:, :, end] = 2
+        program.write_nrrd("walls.nrrd", fog)
+        program.write("walls.tf", b"values data\nunit voxel\n0 .2 .4 1 .005\n1.5 .2 .4 1 .005\n"
+                                  b"1.5 1 .3 .1 .9\n2 1 .3 .1 .9\n")
+        self.brick("walls.nrrd", "walls.trip", "--tf=walls.tf", "--keep-all", "--levels=0")
+        view = ["--eye=-6,-9,-7", "--look=12,12,12", "--up=0,0,1", "--fov=60", "--size=512x512"]
+        look = ["--classify=pre", "--compositing=sheet", "--no-shading"]
+        expected = self.picture("walls.trip", *view, *look, "--renderer=cpu")
+        for gl in program.GL:
+            drawn = self.picture("walls.trip", *view, *look, f"--renderer={gl}")
+            self.assertLess(255 * abs(drawn - expected).max(), 1)
+
     def test_only_what_the_view_sees_is_read(self):
         """Looking past it, and at a corner of it close up."""
         centre, radius, _ = self.middle("tooth")

@@ -193,16 +193,24 @@ static void gl_draws_the_references_sprites(void **state)
     }
 }
 
+/* Of which the eye will be at the first, or a little behind it. */
+static const pair about_the_eye = { { 11, 13, 9 }, { 20, 17, 14 } };
+
+static trip_settings sprites(double width_px)
+{
+    trip_settings settings = plain();
+    settings.footprint = TRIP_FOOTPRINT_FIXED;
+    settings.sprite_px = width_px;
+    return settings;
+}
+
 /* A voxel at the eye has no depth and no place in the picture. */
 static void a_sprite_at_the_eye_is_not_drawn(void **state)
 {
     (void)state;
-    const pair p = { { 11, 13, 9 }, { 20, 17, 14 } };
     scene s;
-    make_pair(&s, &p, 5);
-    trip_settings settings = plain();
-    settings.footprint = TRIP_FOOTPRINT_FIXED;
-    settings.sprite_px = 20;
+    make_pair(&s, &about_the_eye, 5);
+    const trip_settings settings = sprites(20);
     const scene_renderer *r = scene_renderers();
     for (; (r = next_with(r, "reference", "gl"))->name; r++) {
         for (int i = 0; i < 12; i++) {
@@ -226,12 +234,9 @@ static void a_sprite_at_the_eye_is_not_drawn(void **state)
 static void a_sprite_just_before_the_eye_is_drawn_where_it_lies(void **state)
 {
     (void)state;
-    const pair p = { { 11, 13, 9 }, { 20, 17, 14 } };
     scene s;
-    make_pair(&s, &p, 5);
-    trip_settings settings = plain();
-    settings.footprint = TRIP_FOOTPRINT_FIXED;
-    settings.sprite_px = 9;
+    make_pair(&s, &about_the_eye, 5);
+    const trip_settings settings = sprites(9);
     const scene_renderer *r = scene_renderers();
     for (; (r = next_with(r, "reference", "gl"))->name; r++) {
         trip_camera_params view = scene_view(&s, trip_v3(1, 0.6, -0.3), 9, 100, SIZE);

@@ -136,10 +136,6 @@ static void every_method_and_traversal_agrees_with_the_reference(void **state)
     compare("merge, h 0", &s, &view, &settings);
     settings.traversal = TRIP_TRAVERSAL_ASCENDING;
     compare("ascending, back to front", &s, &view, &settings);
-    settings.traversal = TRIP_TRAVERSAL_OUTWARD;
-    settings.compositing = TRIP_COMPOSITING_SHEET;
-    view.width = view.height = 400; /* which layers wait for one another */
-    compare("summed by sheets", &s, &view, &settings);
     scene_destroy(&s);
 }
 

@@ -76,7 +76,6 @@ INLINE unsigned vh_bits(vh m)
     return (unsigned)_mm_movemask_epi8(_mm_packs_epi16((__m128i)m, _mm_setzero_si128()));
 }
 
-/* Sums and differences that end at the greatest and least number. */
 /* (a (16384 - w) + b w) / 16384, rounded down; `weights` is w << 16 | 16384 - w. */
 INLINE vh vh_between(vh a, vh b, int32_t weights)
 {
