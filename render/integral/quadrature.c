@@ -11,9 +11,11 @@ enum { MOST_HALVINGS = 40, POLLED_HALVINGS = 12 };
 /* How many times closer halves bring Simpson's rule to the integral of what is smooth. */
 #define CLOSER 15.0
 
-/* What a piece does to light: what it adds in front, and how much it lets through. */
+/* What a piece does to light: what it adds in front, and how much it lets through. Of colour 1 it
+ * adds its opacity, exactly; `white` is what the rule makes of that. */
 typedef struct part {
-    double rgb[3], depth, through; /* exp(-depth) */
+    double rgb[3], white, depth;
+    double opacity; /* 1 - exp(-depth), to the last bits however small */
 } part;
 
 typedef struct piece {
@@ -22,18 +24,18 @@ typedef struct piece {
     part whole; /* by Simpson's rule */
 } piece;
 
-/* exp(-depth), 1 below 0: light that is let through, not made. Small depths, which most pieces
+/* 1 - exp(-depth), 0 below 0: light that is let through, not made. Small depths, which most pieces
  * have, by the series, whose terms left out are below the last bit. */
-static double let_through(double depth)
+static double opacity_of(double depth)
 {
     if (depth > 1.0 / 16)
-        return exp(-depth);
+        return 1 - exp(-depth);
     if (depth <= 0)
-        return 1;
+        return 0;
     double x = -depth, sum = 1;
-    for (int i = 9; i >= 1; i--)
+    for (int i = 9; i >= 2; i--)
         sum = 1 + x * (1.0 / i) * sum;
-    return sum;
+    return depth * sum;
 }
 
 /* Depths at the middle and the end are those of the parabola through the three extinctions. */
@@ -43,20 +45,23 @@ static void set_simpson(part *p, double length, const trip_ray_sample *a, const 
     const double sixth = length * (1.0 / 6);
     double half = 0.25 * sixth * (5 * a->extinction + 8 * m->extinction - b->extinction);
     p->depth = sixth * (a->extinction + 4 * m->extinction + b->extinction);
-    p->through = let_through(p->depth);
+    p->opacity = opacity_of(p->depth);
     double wa = sixth * a->extinction;
-    double wm = sixth * 4 * m->extinction * let_through(half);
-    double wb = sixth * b->extinction * p->through;
+    double wm = sixth * 4 * m->extinction * (1 - opacity_of(half));
+    double wb = sixth * b->extinction * (1 - p->opacity);
+    p->white = wa + wm + wb;
     for (int i = 0; i < 3; i++)
         p->rgb[i] = wa * a->rgb[i] + wm * m->rgb[i] + wb * b->rgb[i];
 }
 
 static void set_both(part *p, const part *front, const part *back)
 {
+    const double through = 1 - front->opacity;
     p->depth = front->depth + back->depth;
-    p->through = front->through * back->through;
+    p->opacity = front->opacity + through * back->opacity;
+    p->white = front->white + through * back->white;
     for (int i = 0; i < 3; i++)
-        p->rgb[i] = front->rgb[i] + front->through * back->rgb[i];
+        p->rgb[i] = front->rgb[i] + through * back->rgb[i];
 }
 
 static double distance(const part *a, const part *b)
@@ -66,7 +71,7 @@ static double distance(const part *a, const part *b)
         double apart = fabs(a->rgb[i] - b->rgb[i]);
         most = apart > most ? apart : most;
     }
-    return most + fabs(a->through - b->through);
+    return most + fabs(a->opacity - b->opacity);
 }
 
 /* What both come to where the integrand is smooth. */
@@ -80,7 +85,7 @@ static void append(trip_ray_sum *s, const part *whole, const part *finer)
     double depth = correct(whole->depth, finer->depth);
     for (int i = 0; i < 3; i++)
         s->rgb[i] += s->transmittance * correct(whole->rgb[i], finer->rgb[i]);
-    s->transmittance *= let_through(depth);
+    s->transmittance *= 1 - opacity_of(depth);
 }
 
 static void set_piece(piece *p, const trip_ray_end *from, const trip_ray_end *to,
@@ -108,9 +113,10 @@ static bool is_smooth(const piece *first, const piece *last)
 /* `smooth`: whether the finer is known to be closer than the difference. */
 static bool is_close(const trip_ray_sum *s, const piece *p, const part *finer, bool smooth)
 {
-    double error = distance(&p->whole, finer) * (smooth ? 1 / CLOSER : 1);
+    double apart = distance(&p->whole, finer), white = fabs(finer->white - finer->opacity);
+    double error = (white > apart ? white : apart) * (smooth ? 1 / CLOSER : 1);
     double length_share = (p->to->t - p->from->t) / s->length;
-    double opacity_share = s->transmittance * (1 - finer->through);
+    double opacity_share = s->transmittance * finer->opacity;
     return !(s->transmittance * error > s->tolerance / 4 * (length_share + opacity_share));
 }
 

@@ -3,11 +3,13 @@
  *     transmittance = T at the end
  * with extinction k and colour c. A piece is halved until Simpson's rule over its halves is within
  * the piece's share of the tolerance: half of that goes by length, half by the opacity that the
- * piece adds in the picture. How close it is, in colour and transmittance together, is estimated
- * by how much it differs from the rule over all of the piece: where the integrand is smooth it is
- * fifteen times closer than that, elsewhere it is taken for no closer; and it is corrected by that
- * fifteenth. What is behind a transmittance of half the tolerance is left out. So the errors of all
- * pieces add up to at most half the tolerance, and with what is left out to the tolerance. */
+ * piece adds in the picture. How close it is is estimated by the greater of two differences: in
+ * colour and transmittance together, from the rule over all of the piece; and of what it adds where
+ * colours are 1, from the opacity, which that is. Where the integrand is smooth it is fifteen times
+ * closer than these, elsewhere it is taken for no closer; and it is corrected by a fifteenth of the
+ * first. What is behind a transmittance of half the tolerance is left out. So the errors of all
+ * pieces add up to at most half the tolerance, and with what is left out to the tolerance
+ * (tests/render/test_quadrature.c: wherever extinction or colour breaks). */
 #ifndef TRIP_QUADRATURE_H
 #define TRIP_QUADRATURE_H
 
