@@ -157,11 +157,30 @@ static void set_weights(trip_kernel kernel, place *at, trip_vec3 point)
                          w[2][first + n / (edge * edge)];
 }
 
-/* False where the cell is empty. */
-static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point, place *at)
+/* The corners of a cell; of a place at a sheet those there alone, twice. */
+static bool take_corners(const passage *p, const int64_t cell[3], double coordinate,
+                         trip_field_cell *out)
+{
+    const bool at_sheet = coordinate == floor(coordinate);
+    memcpy(out->at, cell, sizeof out->at);
+    out->edge = 2;
+    for (int n = 0; n < 8; n++) {
+        int64_t at[3] = { cell[0] + (n & 1), cell[1] + (n >> 1 & 1), cell[2] + (n >> 2) };
+        at[p->axis] = at_sheet ? (int64_t)coordinate : at[p->axis];
+        out->voxels[n] = trip_field_at(p->s->field, at[0], at[1], at[2]);
+        if (!out->voxels[n])
+            return false;
+    }
+    return true;
+}
+
+/* False where something is missing that it is interpolated from. */
+static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point, double coordinate,
+                        place *at)
 {
     const trip_kernel kernel = p->s->frame->settings->kernel;
-    if (!trip_field_take_cell(p->s->field, kernel, cell, &at->cell))
+    if (kernel == TRIP_KERNEL_LINEAR ? !take_corners(p, cell, coordinate, &at->cell)
+                                     : !trip_field_take_cell(p->s->field, kernel, cell, &at->cell))
         return false;
     set_weights(kernel, at, point);
     at->code = 0;
@@ -170,9 +189,17 @@ static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point
     return true;
 }
 
-/* At t, where the ray is at the sheet of `cells` or between it and the next. False in empty cells
- * and beyond the grid. */
-static bool find_place(const passage *p, double t, int64_t cells, place *at)
+/* Where the ray is at a coordinate of the axis, in indices. */
+static double reached_at(const passage *p, double coordinate)
+{
+    return (trip_coordinates_place(p->s->coordinates, p->axis, coordinate) -
+            trip_component(p->origin, p->axis)) /
+           trip_component(p->direction, p->axis);
+}
+
+/* At a coordinate, at the sheet of `cells` or between it and the next, where the ray is at t. False
+ * in empty cells and beyond the grid. */
+static bool find_place(const passage *p, double coordinate, double t, int64_t cells, place *at)
 {
     const int64_t *dims = trip_field_dims(p->s->field);
     trip_vec3 point = index_at(p, point_at(p, t));
@@ -183,7 +210,7 @@ static bool find_place(const passage *p, double t, int64_t cells, place *at)
             return false;
         cell[a] = a == p->axis ? cells : (int64_t)fmin(floor(x), last - 1);
     }
-    return interpolate(p, cell, point, at);
+    return interpolate(p, cell, point, coordinate, at);
 }
 
 static trip_vec3 gradient_at(const place *at)
@@ -233,15 +260,16 @@ static double code_at(const place ends[2], double t0, double t1, double t)
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
 }
 
-/* Between two slices. False once the pixel is saturated. */
-static bool add_segment(passage *p, double t0, double t1, int64_t cells)
+/* Between the slices at two coordinates. False once the pixel is saturated. */
+static bool add_segment(passage *p, double first, double last, int64_t cells)
 {
     place ends[2];
+    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
     const double from = fmax(t0, p->from), to = fmin(t1, p->to);
     double own[3];
     if (!(from < to))
         return true;
-    if (!find_place(p, t0, cells, &ends[0]) || !find_place(p, t1, cells, &ends[1]))
+    if (!find_place(p, first, t0, cells, &ends[0]) || !find_place(p, last, t1, cells, &ends[1]))
         return true;
     trip_segment segment =
         trip_segment_of(&p->s->segments, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to));
@@ -261,14 +289,6 @@ static bool add_segment(passage *p, double t0, double t1, int64_t cells)
                      -expm1(-segment.extinction * (to - from) * p->world_per_t));
 }
 
-/* Where the ray is at a coordinate of the axis, in indices. */
-static double reached_at(const passage *p, double coordinate)
-{
-    return (trip_coordinates_place(p->s->coordinates, p->axis, coordinate) -
-            trip_component(p->origin, p->axis)) /
-           trip_component(p->direction, p->axis);
-}
-
 /* Between the slices at coordinates n / slices that lie before the eye, and from the eye itself to
  * the first of them. */
 static void add_segments(passage *p)
@@ -285,7 +305,7 @@ static void add_segments(passage *p)
     for (; (last - n) * step >= 0; n += step) {
         double to = n / slices;
         int64_t cells = (int64_t)fmin(floor(0.5 * (from + to)), top - 1);
-        if (from != to && !add_segment(p, reached_at(p, from), reached_at(p, to), cells))
+        if (from != to && !add_segment(p, from, to, cells))
             return;
         from = to;
     }

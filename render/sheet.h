@@ -13,9 +13,10 @@
  *
  * Slices. Along the axis of a list slices lie at the coordinates n / S, S = settings.slices; in
  * perspective the eye's own coordinate is one more. A layer's ray is cut by them into segments, and
- * only the field at the slices is used: at one lies, with the cells on both sides of it where n / S
- * is whole, the sample (c, g) of each end of a segment. A segment is in the cell layer between two
- * sheets; it is empty where either end lies in an empty cell of that layer, or beyond the grid.
+ * only the field at the slices is used: at one lies the sample (c, g) of each end of a segment. A
+ * segment is in the cell layer between two sheets; it is empty where either end lies in an empty
+ * cell of that layer, or beyond the grid. Linear samples at a sheet (n / S is whole) are
+ * interpolated from the four voxels around them there, and need no others.
  * Rays begin at the eye, in parallel views at its plane: what begins behind that is left out.
  *
  * A segment from code a to code b, L world units long, has with the extinction k and the colour q

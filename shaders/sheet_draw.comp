@@ -55,7 +55,7 @@ struct ray {
 struct place {
     ivec2 cell;
     vec2 part; // of it
-    bool there; // all corners of the cell are
+    bool there; // all that it is interpolated from is
     float code;
 };
 
@@ -156,15 +156,17 @@ tap tap_of(place at, trip_gl_sheet_end end, vec4 weights[3], int n)
     return t;
 }
 
-float wide_code(place at, trip_gl_sheet_end end)
+// By differences from a corner, so that one value all around is that value, however weights are
+// rounded.
+float wide_code(place at, trip_gl_sheet_end end, float corner)
 {
     vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
     float sum = 0.0;
     for (int n = 0; n < 64; n++) {
         tap t = tap_of(at, end, weights, n);
-        sum += t.weight * texelFetch(codes, t.at, 0).r;
+        sum += t.weight * (texelFetch(codes, t.at, 0).r - corner);
     }
-    return sum;
+    return corner + sum;
 }
 #endif
 
@@ -222,13 +224,19 @@ place place_at(ray r, trip_gl_sheet_end end)
     at.code = 0.0;
     if (any(lessThan(at.cell, ivec2(0))) || any(greaterThanEqual(at.cell + 1, extent.xy)))
         return at;
+#ifdef WIDE
     vec4 before = corners_at(at.cell, end.before), behind = corners_at(at.cell, end.behind);
     at.there = all(greaterThanEqual(min(before, behind), vec4(0.0)));
-    vec4 weights = corner_weights(at.part);
-    at.code = mix(dot(weights, before), dot(weights, behind), end.part);
-#ifdef WIDE
     if (at.there)
-        at.code = wide_code(at, end);
+        at.code = wide_code(at, end, before.x);
+#else
+    // At a sheet the corners there are both. By differences from one, as wide_code().
+    vec4 before = corners_at(at.cell, end.part < 1.0 ? end.before : end.behind), behind = before;
+    if (end.part > 0.0 && end.part < 1.0)
+        behind = corners_at(at.cell, end.behind);
+    at.there = all(greaterThanEqual(min(before, behind), vec4(0.0)));
+    vec4 weights = corner_weights(at.part);
+    at.code = before.x + mix(dot(weights, before - before.x), dot(weights, behind - before.x), end.part);
 #endif
     return at;
 }

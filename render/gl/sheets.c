@@ -365,8 +365,10 @@ static double place_at(const trip_gl_sheets *s, const trip_gl_sheet *from, doubl
                                   (double)from->number + part * (double)s->way);
 }
 
-/* The ends of the slices from held[i] to the next; returns how many there are then. */
-static int add_ends(const trip_gl_sheets *s, int i, trip_gl_sheet_end *ends, int count)
+/* The ends of the slices from held[i] to the next; returns how many there are then. `first`: those
+ * of the interval before are not there, whose last end is the first of these but for kernels of 64
+ * voxels, which weigh others there. */
+static int add_ends(const trip_gl_sheets *s, int i, bool first, trip_gl_sheet_end *ends, int count)
 {
     const trip_gl_sheet *from = &s->held[i];
     const int slices = s->frame->settings->slices;
@@ -374,7 +376,8 @@ static int add_ends(const trip_gl_sheets *s, int i, trip_gl_sheet_end *ends, int
                             layer_of(s, i + 2) };
     const double eye = fmax(0, eye_behind(s, i));
     double last = place_at(s, from, eye);
-    ends[count++] = trip_gl_sheet_end_at(&s->view, last, 0, layers, eye);
+    if (first || s->frame->settings->kernel != TRIP_KERNEL_LINEAR)
+        ends[count++] = trip_gl_sheet_end_at(&s->view, last, 0, layers, eye);
     for (int n = 1; n <= slices; n++) {
         double part = (double)n / slices;
         if (n <= eye * slices)
@@ -395,9 +398,13 @@ static void begin_group(trip_gl_sheets *s)
     d->in_group = true;
     d->band = d->row = d->ends = 0;
     d->done = s->front;
-    for (; d->done < d->to && d->ends + most <= TRIP_GL_ENDS_MAX; d->done++)
-        if (shows(s, d->done))
-            d->ends = add_ends(s, d->done, ends, d->ends);
+    bool first = true;
+    for (; d->done < d->to && d->ends + most <= TRIP_GL_ENDS_MAX; d->done++) {
+        const bool some = shows(s, d->done);
+        if (some)
+            d->ends = add_ends(s, d->done, first, ends, d->ends);
+        first = !some;
+    }
     if (d->ends)
         glNamedBufferSubData(s->ends_block, 0, (GLsizeiptr)((size_t)d->ends * sizeof *ends), ends);
 }

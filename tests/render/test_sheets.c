@@ -796,6 +796,100 @@ static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
     scene_destroy(&s);
 }
 
+/* Noise, in which a cell goes from what shows to what does not on every side. */
+enum { NOISE_LEAST = 30000, NOISE_MOST = 38000 };
+
+static unsigned noise_code(int i, int j, int k)
+{
+    return scene_hash(i, j, k) % 65536;
+}
+
+static bool noise_shows(int i, int j, int k)
+{
+    const unsigned code = noise_code(i, j, k);
+    return is_within(i, j, k, 0, EDGE - 1) && code >= NOISE_LEAST && code < NOISE_MOST;
+}
+
+static bool noise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = noise_code(i, j, k);
+    return noise_shows(i, j, k) && scene_hash(k, i, j) % 8 == 0;
+}
+
+static bool around_noise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    bool some = false;
+    for (int n = 0; n < 27; n++)
+        some |= noise(user, i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1, code, gradient);
+    const bool kept = noise(user, i, j, k, code, gradient);
+    return some && !kept;
+}
+
+/* Rays leave the halo at any place of a sheet: all draw the same pieces of them. */
+static void what_lies_beyond_the_halo_is_left_out_alike(void **state)
+{
+    (void)state;
+    const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_noise };
+    scene s;
+    scene_create(
+        &s, &(scene_params){
+                .dims = { EDGE, EDGE, EDGE }, .voxel = noise, .parts = &halo, .part_count = 1 });
+    scene_colour(&s, NOISE_LEAST, NOISE_MOST, 0.9, 0.6, 0.3, 0.6);
+    for (int i = 0; i < 8; i++) {
+        trip_settings settings = scene_post(1 + i / 4);
+        trip_camera_params view =
+            scene_view(&s, trip_v3(i & 1 ? -1 : 1, 0.9, i & 2 ? 0.8 : -0.8), 60, 20, 64);
+        scene_picture expected = scene_draw(&s, scene_renderers_post(), &view, &settings);
+        scene_turn turn = scene_turns(scene_renderers_post() + 1, &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            assert_true(scene_difference(&turn.picture, &expected) <= 1.0 / 255);
+        }
+        scene_picture_free(&expected);
+    }
+    scene_destroy(&s);
+}
+
+enum { ONE_VALUE = 40001 };
+
+static bool one_value(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)j;
+    (void)k;
+    (void)gradient;
+    *code = i < 6 ? 0 : ONE_VALUE;
+    return true;
+}
+
+/* However weights are rounded: where all is one value, at which the function begins, or ends. Other
+ * voxels, which are not in the picture, hold another. */
+static void one_value_is_that_value_by_every_kernel(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = one_value });
+    for (int i = 0; i < 6; i++) {
+        const bool ends = i / 3;
+        for (int code = 0; code < 65536; code++) {
+            const bool shows = ends ? code <= ONE_VALUE : code >= ONE_VALUE;
+            s.table[code] = (trip_tf_entry){ 1, 1, 1, shows ? 0.1F : 0 };
+        }
+        trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 60, 20, 16);
+        view.ortho_height = 7.34;
+        view.look.x += 4;
+        view.eye.x += 4;
+        trip_settings settings = scene_post(3);
+        settings.kernel = (trip_kernel)(i % 3);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn))
+            for (int n = 0; n < 16 * 16; n++)
+                assert_close(turn.picture.rgba[4 * n + 3], 1 - exp(-0.1F * (EDGE - 1)), 1e-5);
+    }
+    scene_destroy(&s);
+}
+
 /* The largest change of a pixel from one picture to the next while the camera is turned in steps of
  * 0.1 degrees across 45 degrees, where the layer of most weight changes. */
 static double most_change(const scene *s, const scene_renderer *r, const trip_settings *settings)
@@ -907,6 +1001,8 @@ int main(void)
         cmocka_unit_test(by_the_cubic_kernel_it_is_the_cubic_integral),
         cmocka_unit_test(along_the_sheets_slices_have_the_values_of_the_kernel),
         cmocka_unit_test(beyond_the_halo_voxels_count_as_those_next_to_them),
+        cmocka_unit_test(what_lies_beyond_the_halo_is_left_out_alike),
+        cmocka_unit_test(one_value_is_that_value_by_every_kernel),
         cmocka_unit_test(turning_across_45_degrees_nothing_pops),
         cmocka_unit_test(bricks_and_coarser_levels_change_no_bit),
     };

@@ -86,26 +86,16 @@ INLINE four_corners corners_from(const trip_cpu_group *g, vi at)
                            two_codes(pool + TRIP_CPU_RASTER_STRIDE, places) };
 }
 
-INLINE vm all_are_there(four_corners c)
-{
-    const halves missing = (halves){ 0 } + TRIP_CPU_CODE_MISSING;
-    wide least = WIDE(min_epi16)(c.top, c.bottom); /* missing ones are the least there are */
-    return vi_is_0((vi)((halves)least == missing));
-}
-
 /* The index, and which rays have all corners. */
 INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
+    const halves missing = (halves){ 0 } + TRIP_CPU_CODE_MISSING;
     const four_corners c = corners_from(g, at);
     vi sum =
         (vi)WIDE(madd_epi16)(c.top, (wide)s->top) + (vi)WIDE(madd_epi16)(c.bottom, (wide)s->bottom);
-    s->there = all_are_there(c);
+    wide least = WIDE(min_epi16)(c.top, c.bottom); /* missing ones are the least there are */
+    s->there = vi_is_0((vi)((halves)least == missing));
     s->index = index_of(in, sum);
-}
-
-INLINE vm has_corners(const trip_cpu_group *g, vi at)
-{
-    return all_are_there(corners_from(g, at));
 }
 
 /* Of six numbers, three of a corner and three of the one beside it: along u twice, along v, ... */
@@ -164,27 +154,17 @@ INLINE int32_t of_two(int16_t left, int16_t right, int32_t weights)
     return left * (weights & 0xffff) + right * (weights >> 16);
 }
 
-INLINE vm has_corners(const trip_cpu_group *g, vi at)
-{
-    vi lack;
-    for (int i = 0; i < V; i++) {
-        const int16_t *top = (const int16_t *)g->pool + at[i],
-                      *bottom = top + TRIP_CPU_RASTER_STRIDE;
-        lack[i] = top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
-                  bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
-    }
-    return vi_is_0(lack);
-}
-
 INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
-    vi sum;
+    vi sum, lack;
     for (int i = 0; i < V; i++) {
         const int16_t *top = (const int16_t *)g->pool + at[i],
                       *bottom = top + TRIP_CPU_RASTER_STRIDE;
         sum[i] = of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
+        lack[i] = top[0] == TRIP_CPU_CODE_MISSING || top[1] == TRIP_CPU_CODE_MISSING ||
+                  bottom[0] == TRIP_CPU_CODE_MISSING || bottom[1] == TRIP_CPU_CODE_MISSING;
     }
-    s->there = has_corners(g, at);
+    s->there = vi_is_0(lack);
     s->index = index_of(in, sum);
 }
 

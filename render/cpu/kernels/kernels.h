@@ -307,7 +307,7 @@ typedef struct trip_cpu_kernels {
     void (*sheet_ranges)(const trip_cpu_voxels *raster, uint64_t squares,
                          trip_cpu_square_ranges *out);
     /* Which cells of the squares lie between two sheets on some code from `least` to `most`
-     * (biased): none that lacks a corner, and none of other squares. */
+     * (biased): none that lacks corners at both sheets, and none of other squares. */
     void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                         int16_t least, int16_t most, trip_cpu_cells *out);
     /* Gradients of the squares' voxels that are there. Beside the raster lie those to the left of

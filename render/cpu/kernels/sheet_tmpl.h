@@ -435,9 +435,8 @@ static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *
         }
 }
 
-/* Whether some square of the box is in a set, or not in it where `flip` is UINT64_MAX and not 0. */
-INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uint64_t flip,
-                           cell_box box)
+/* Whether some square of the box is in a set. */
+INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, cell_box box)
 {
     int32_t u0 = box.lo[0] >> 3, u1 = box.hi[0] >> 3, v1 = box.hi[1] >> 3;
     for (int32_t v = box.lo[1] >> 3; v <= v1; v++) {
@@ -445,7 +444,7 @@ INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, uin
         for (int32_t u = u0; u <= u1;) {
             int32_t end = u | 7; /* of the raster */
             end = end > u1 ? u1 : end;
-            uint64_t bits = (row[u >> 3] ^ flip) >> (v & 7) * 8 & 255;
+            uint64_t bits = row[u >> 3] >> (v & 7) * 8 & 255;
             if (bits >> (u & 7) & ((2u << (end - u)) - 1))
                 return true;
             u = end + 1;
@@ -495,7 +494,6 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 /* What a patch passes. */
 typedef struct patch_path {
     uint64_t segments; /* in which something may show */
-    uint64_t gaps;     /* of these, where cells that rays meet may lack corners */
     /* At each slice of these the raster that all of its rays lie in: from its start in the pool,
      * where a ray is that is at 0 from pane_path.base; -1: several, or none. */
     int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
@@ -536,11 +534,11 @@ static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group 
     out->some = 0;
     out->made = g->slices[0].making ? 0 : UINT64_MAX;
     find_boxes(g, path, &r, 0, g->segments, &slices);
-    if (!some_square_of(g, g->some, 0, both_boxes(&slices, 0, g->segments)))
+    if (!some_square_of(g, g->some, both_boxes(&slices, 0, g->segments)))
         return;
     find_segment_boxes(0, g->segments - 1, &slices, &out->boxes);
     for (unsigned n = 0; n < g->segments; n++)
-        if (some_square_of(g, g->visible[n], 0, box_of_segment(&out->boxes, n)))
+        if (some_square_of(g, g->visible[n], box_of_segment(&out->boxes, n)))
             out->some |= UINT64_C(1) << n;
 }
 
@@ -555,15 +553,13 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     const unsigned last = 63 - (unsigned)__builtin_clzll(segments);
     find_boxes(g, path, &r, first, last + 1, &slices);
     find_segment_boxes(first, last, &slices, &boxes);
-    area->segments = area->gaps = 0;
+    area->segments = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
         const cell_box box = box_of_segment(&boxes, n);
         if (!cells_show(g, n, box))
             continue;
         area->segments |= UINT64_C(1) << n;
-        if (g->without_halo && some_square_of(g, g->whole[n], UINT64_MAX, box))
-            area->gaps |= UINT64_C(1) << n;
         if (placed != n)
             find_raster(g, path, n, r.whole, &slices, area);
         find_raster(g, path, n + 1, r.whole, &slices, area);
@@ -759,25 +755,6 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 }
 
 #include "cpu/kernels/wide_tmpl.h"
-
-/* Which rays at slice n are in cells of a segment that have all of their corners. Those at the
- * slice's own sheet were looked up for the sample, and slices between sheets lack what either
- * lacks; with kernels of 64 voxels a slice has no values of its own, and both sheets count. */
-INLINE vm in_whole_cells(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
-                         unsigned n, unsigned segment, vm open)
-{
-    const int32_t *const *sheets = g->sheets[segment];
-    for (int k = 0; k < 2; k++) {
-        if (!is_wide(g) && g->slices[n].rasters != sheets[1 - k])
-            continue;
-        corners c = cells_at(path, l, n);
-        vi whole[2];
-        find_cells(g, path, n, &c, whole);
-        open = vm_and(open,
-                      has_corners(g, raster_starts(g, sheets[k], whole) + place_in_raster(whole)));
-    }
-    return open;
-}
 
 /* ---- a segment ---- */
 
@@ -1005,8 +982,8 @@ INLINE void places_at(const trip_cpu_group *g, const pane_path *path, const stam
 
 /* Puts a segment behind what the pixels hold; false where it shows in none of them. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                              const stamp_rays *l, const pane_path *path, unsigned n, bool gaps,
-                              sample *a, sample *b, vf pixel[CHANNELS])
+                              const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
+                              sample *b, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, TRIP_CPU_CLOSED
@@ -1014,8 +991,6 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
                             : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* what begins behind the eye's plane is left out */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
-    if (gaps && vm_any(open))
-        open = in_whole_cells(g, path, l, n + 1, n, in_whole_cells(g, path, l, n, n, open));
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
@@ -1192,8 +1167,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
         }
         sampled = next;
-        if (!composite_segment(view, g, l, path, n, area->gaps >> n & 1, &ends[n % 2],
-                               &ends[next % 2], pixel))
+        if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
             continue;
         finish_saturated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))

@@ -63,7 +63,6 @@ typedef struct trip_cpu_voxels {
  * where there are none. */
 typedef struct trip_cpu_square_ranges {
     int16_t least[64], most[64];
-    uint64_t whole; /* squares whose cells have all of their corners at the sheet */
 } trip_cpu_square_ranges;
 
 /* The cells of a raster that may show between a sheet and the next: a bit each, a word a row. */
@@ -140,12 +139,7 @@ typedef struct trip_cpu_group {
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
     const trip_cpu_cells *cells[TRIP_CPU_SEGMENTS];
     const uint64_t *needed[TRIP_CPU_SEGMENTS]; /* squares with voxels that rays may take there */
-    bool leaps; /* rays may light themselves at a sheet from beyond these */
-    /* The squares whose cells all have their eight corners, and the rasters of the sheets that
-     * these are of; for data without a halo, where cells that show may lack some. */
-    bool without_halo;
-    const uint64_t *whole[TRIP_CPU_SEGMENTS];
-    const int32_t *sheets[TRIP_CPU_SEGMENTS][2];
+    bool leaps;                  /* rays may light themselves at a sheet from beyond these */
     const trip_cpu_about *about; /* for each segment; NULL: the kernel is linear */
     const uint64_t *some;        /* squares visible in any segment */
     /* Only rays whose cell at the first slice is in [lo, hi) are drawn; voxels, as positions are.

@@ -189,7 +189,6 @@ static int16_t least_there(const int16_t *at)
 static void sheet_ranges(const trip_cpu_voxels *raster, uint64_t squares,
                          trip_cpu_square_ranges *out)
 {
-    out->whole = 0;
     for (int i = 0; i < 64; i++) {
         out->least[i] = INT16_MAX;
         out->most[i] = INT16_MIN;
@@ -207,8 +206,6 @@ static void sheet_ranges(const trip_cpu_voxels *raster, uint64_t squares,
         out->most[square] = (int16_t)~vh_least(~most);
         if (out->least[square] == TRIP_CPU_CODE_MISSING)
             out->least[square] = least_there(first);
-        else
-            out->whole |= UINT64_C(1) << square;
     }
 }
 
@@ -221,6 +218,26 @@ INLINE extremes extremes_at(const int16_t *from, const int16_t *to)
 {
     vh a = vh_load(from), b = vh_load(from + 1), c = vh_load(to), d = vh_load(to + 1);
     return (extremes){ vh_min(vh_min(a, b), vh_min(c, d)), vh_max(vh_max(a, b), vh_max(c, d)) };
+}
+
+/* Of a row of cells some of which lack corners, those that have all four at either sheet: what
+ * their corners lie between that are there; and the others. */
+static __attribute__((noinline)) vh least_of_faces(const int16_t *from, const int16_t *to, vh *lack)
+{
+    vh least = vh_set(INT16_MAX), faces = vh_set(0);
+    for (int sheet = 0; sheet < 2; sheet++) {
+        const int16_t *at = sheet ? to : from;
+        vh face = vh_set(INT16_MIN);
+        for (int n = 0; n < 4; n++) {
+            /* A missing code is the least, and less 1 it is the greatest. */
+            vh code = vh_less_1(vh_load(at + n / 2 * TRIP_CPU_RASTER_STRIDE + n % 2));
+            least = vh_min(least, code);
+            face = vh_max(face, code);
+        }
+        faces |= (vh)(face != INT16_MAX);
+    }
+    *lack = ~faces;
+    return (vh)((vhu)least + 1);
 }
 
 static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
@@ -237,7 +254,11 @@ static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, 
             at += TRIP_CPU_RASTER_STRIDE;
             extremes below = extremes_at(from->codes + at, to->codes + at);
             vh low = vh_min(above.least, below.least), high = vh_max(above.most, below.most);
-            vh out_of = (vh)(low > highest) | (vh)(lowest > high) | vh_is_missing(low);
+            vh lack = vh_is_missing(low), below_all = (vh)(lowest > high);
+            if (vh_bits(lack & ~below_all))
+                low = least_of_faces(from->codes + at - TRIP_CPU_RASTER_STRIDE,
+                                     to->codes + at - TRIP_CPU_RASTER_STRIDE, &lack);
+            vh out_of = (vh)(low > highest) | below_all | lack;
             row[v] |= (uint64_t)(~vh_bits(out_of) & 0xff) << u;
             above = below;
         }

@@ -77,6 +77,20 @@ static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_place *
         weights[n] = (float)(w[0][n & 3] * w[1][n >> 2 & 3] * w[2][n >> 4]);
 }
 
+/* Of one ray: by differences from a corner of its cell, so that one value all around is the value
+ * there to the last bit, however weights are rounded. */
+static double interpolated_code(const trip_cpu_sheet_view *view, const wide_place *p, int lane,
+                                const tap taps[64])
+{
+    enum { CORNER = 1 + 4 + 16 };
+    const int corner = taps[CORNER].raster->codes[taps[CORNER].at];
+    float weights[64], sum = 0;
+    find_tap_weights(view, p, lane, weights);
+    for (int k = 0; k < 64; k++)
+        sum += weights[k] * (float)(taps[k].raster->codes[taps[k].at] - corner);
+    return (double)corner + (double)sum;
+}
+
 /* Where the rays of slice n are, in cells of a segment. The grid's last voxels are within it. */
 INLINE void find_wide_places(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                              const pane_path *path, const stamp_rays *l, unsigned n,
@@ -108,15 +122,11 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
     find_wide_places(view, g, path, l, n, segment, s->wide);
     for (int i = 0; i < V; i++) {
         tap taps[64];
-        float weights[64], sum = 0;
         lack[i] = !take_taps(view, g, s->wide, i, taps);
-        if (lack[i])
-            continue;
-        find_tap_weights(view, s->wide, i, weights);
-        for (int k = 0; k < 64; k++)
-            sum += weights[k] * taps[k].raster->codes[taps[k].at];
-        code[i] =
-            (int32_t)(within((double)sum, TRIP_CPU_CODE_LEAST, INT16_MAX) * (1 << WEIGHT_LOG2));
+        if (!lack[i])
+            code[i] = (int32_t)(within(interpolated_code(view, s->wide, i, taps),
+                                       TRIP_CPU_CODE_LEAST, INT16_MAX) *
+                                (1 << WEIGHT_LOG2));
     }
     s->there = vi_is_0(lack);
     s->index = index_of(view->integrals, code);

@@ -355,11 +355,9 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index
         g->visible[g->segments] = from->visible;
         g->cells[g->segments] = from->cells;
         g->needed[g->segments] = from->needed;
-        g->whole[g->segments] = from->whole;
         if (is_wide(s))
             s->about[g->segments] = about_of(s, i);
-        g->sheets[g->segments][0] = from->rasters;
-        g->sheets[g->segments++][1] = sheet_of(s, i + 1)->rasters;
+        g->segments++;
     }
     g->slices[g->segments] = (trip_cpu_slice){ at->rasters, coordinate,
                                                trip_cpu_sheets_at_once(s) ? NULL : &at->making };
@@ -496,7 +494,6 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
                                  .down = store->down,
                                  .about = is_wide(s) ? s->about : NULL,
                                  .leaps = trip_cpu_sheets_leap(s),
-                                 .without_halo = s->of->frame->data->header.halo == 0,
                                  .windowed = s->windows.used,
                                  .lo = { given.lo[0], given.lo[1] },
                                  .hi = { given.hi[0], given.hi[1] } };

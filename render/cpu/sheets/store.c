@@ -71,7 +71,6 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->ranges = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->ranges);
         sheet->filled = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->filled);
         sheet->visible = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->visible);
-        sheet->whole = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->whole);
         sheet->cells = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->cells);
         sheet->edges = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->edges);
         sheet->needed = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->needed);
@@ -194,7 +193,6 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
     }
     if (sheet->visible) {
         memset(sheet->visible, 0, grid * sizeof *sheet->visible);
-        memset(sheet->whole, 0, grid * sizeof *sheet->whole);
         memset(sheet->edges, 0, grid * sizeof *sheet->edges);
         memset(sheet->needed, 0, grid * sizeof *sheet->needed);
     }
@@ -364,13 +362,17 @@ static bool cell_shows(const trip_cpu_function *f, const int16_t *from, const in
                        int first)
 {
     int16_t least = INT16_MAX, most = INT16_MIN;
+    int corners[2] = { 0 };
     for (int k = 0; k < 8; k++) {
         int16_t code =
             (k >> 2 ? to : from)[first + (k >> 1 & 1) * TRIP_CPU_RASTER_STRIDE + (k & 1)];
+        if (code == TRIP_CPU_CODE_MISSING)
+            continue;
+        corners[k >> 2]++;
         least = code < least ? code : least;
         most = code > most ? code : most;
     }
-    return least != TRIP_CPU_CODE_MISSING && trip_cpu_function_shows(f, least, most);
+    return (corners[0] == 4 || corners[1] == 4) && trip_cpu_function_shows(f, least, most);
 }
 
 static void find_cells_one_by_one(const trip_cpu_function *f, const trip_cpu_voxels *from,
@@ -478,7 +480,6 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
                             : shows_about(job, w, at, i)))
                 visible |= UINT64_C(1) << i;
         }
-    w->sheet->whole[at] = w->other->rasters[at] ? a->whole & b->whole : 0;
     memset(edges, 0, sizeof w->sheet->edges[at]);
     if (visible) {
         find_cells(job, w, at, visible);

@@ -30,7 +30,6 @@ typedef struct trip_cpu_sheet {
     _Atomic uint64_t *filled;       /* squares with voxels; of rasters that are there */
     uint64_t *visible;              /* squares in which cells may show from here to the next */
     trip_cpu_cells *cells;          /* those cells, of rasters with visible squares */
-    uint64_t *whole;                /* squares whose cells all have eight corners */
     trip_cpu_edges *edges;          /* these squares by edges */
     uint64_t *needed;               /* squares of which segments that may show take voxels */
     trip_cpu_making making;         /* but for frames whose sheets and slices are made at once */
@@ -126,9 +125,9 @@ typedef struct trip_cpu_sheet_work {
 
 /* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
-/* Which squares and cells may show from prepared sheets to the next, `other`, which squares are
- * needed then, and which are whole. With kernels of 64 voxels all cells may that have their eight
- * corners, of squares about which the function shows something. */
+/* Which squares and cells may show from prepared sheets to the next, `other`, and which squares are
+ * needed then. With kernels of 64 voxels all cells may that have four corners at a sheet, of
+ * squares about which the function shows something. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_function *f);
 /* All gradients of prepared sheets' voxels. */
