@@ -93,6 +93,129 @@ static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
     assert_in_range(missed, 200, 800);
 }
 
+/* Nor is a box of one voxel that counts as inside because it all but is. */
+static void boxes_of_voxels_that_count_as_inside_are_not_missed(void **state)
+{
+    (void)state;
+    for (double beyond = 0.25; beyond <= 1; beyond += 0.25) {
+        const double at[3] = { 5, 6, 7 };
+        trip_clip clip = { 0 };
+        trip_clip_add(&clip, trip_v3(0, 1, 0), -6 - beyond * TRIP_CLIP_SLACK);
+        assert_true(trip_clip_has(&clip, trip_v3(5, 6, 7)));
+        assert_false(trip_clip_misses(&clip, trip_v3(0, 0, 0), at, at, 0));
+    }
+}
+
+static trip_half_space random_half_space(void)
+{
+    return (trip_half_space){ trip_normalize(trip_v3(test_random() - 0.5, test_random() - 0.5,
+                                                     test_random() - 0.5)),
+                              20 * test_random() - 8 };
+}
+
+/* How far inside of all half-spaces a point is; below 0: outside of one. */
+static double room_at(const trip_clip *clip, trip_vec3 p)
+{
+    double least = INFINITY;
+    for (int i = 0; i < clip->count; i++)
+        least = fmin(least, trip_dot(clip->planes[i].normal, p) + clip->planes[i].offset);
+    return least;
+}
+
+/* What is left of a ray from 1 to 20 is inside, what is beside that is not; where nothing is left
+ * no place of it is. */
+static void a_ray_is_cut_to_what_is_inside(void **state)
+{
+    (void)state;
+    int left = 0;
+    for (int n = 0; n < 2000; n++) {
+        const trip_vec3 o = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const trip_vec3 d = random_half_space().normal;
+        double from = 1, to = 20;
+        trip_clip clip = { .count = 1 + n % 3 };
+        for (int i = 0; i < clip.count; i++)
+            clip.planes[i] = random_half_space();
+        const bool some = trip_clip_ray(&clip, o, d, &from, &to);
+        for (int i = 0; i <= 190; i++) {
+            const double t = 1 + 0.1 * i, room = room_at(&clip, trip_add(o, trip_scale(d, t)));
+            if (fabs(room) > 1e-9)
+                assert_int_equal(some && t >= from && t <= to, room > 0);
+        }
+        left += some;
+    }
+    assert_in_range(left, 200, 1800);
+}
+
+/* A ray that lies in the plane is inside; of one that only touches it, nothing is left. */
+static void what_lies_on_a_plane_is_inside(void **state)
+{
+    (void)state;
+    trip_clip clip = { 0 };
+    trip_clip_add(&clip, trip_v3(1, 0, 0), -3);
+    double from = 0, to = 5;
+    assert_true(trip_clip_ray(&clip, trip_v3(3, 0, 0), trip_v3(0, 1, 0), &from, &to));
+    assert_true(from == 0 && to == 5);
+    assert_false(
+        trip_clip_ray(&clip, trip_v3(8, 0, 0), trip_v3(1, 0, 0), &(double){ -9 }, &(double){ -5 }));
+}
+
+/* Half-spaces of the world are the same ones in the source space of a map, in its units of length;
+ * one without a normal holds all of it or nothing, as its offset says. */
+static void half_spaces_keep_their_side_before_a_map(void **state)
+{
+    (void)state;
+    trip_clip clip = { 0 };
+    for (int i = 0; i < 6; i++) {
+        const trip_half_space p = random_half_space();
+        trip_clip_add(&clip, trip_scale(p.normal, 3), p.offset);
+    }
+    trip_clip_add(&clip, trip_v3(0, 0, 0), 2);
+    trip_clip_add(&clip, trip_v3(0, 0, 0), -2);
+    const trip_clip before = trip_clip_before(&clip, &scene_sheared);
+    assert_int_equal(before.count, clip.count);
+    for (int n = 0; n < 50 * clip.count; n++) {
+        const trip_half_space *p = &clip.planes[n % clip.count],
+                              *q = &before.planes[n % clip.count];
+        const trip_vec3 at = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const trip_vec3 to = trip_affine_point(&scene_sheared, at);
+        const double own = trip_dot(q->normal, at) + q->offset;
+        const double world = trip_dot(p->normal, to) + p->offset;
+        assert_true(own * world > 0);
+        if (n % clip.count < 6)
+            assert_close(trip_length(q->normal), 1, 1e-12);
+    }
+}
+
+/* Those that cut off no voxel of 10 x 20 x 30; what is left of them is in order. */
+static void half_spaces_that_hold_all_voxels_are_left_out(void **state)
+{
+    (void)state;
+    const uint64_t dims[3] = { 10, 20, 30 };
+    const struct {
+        trip_vec3 normal;
+        double offset;
+        bool cuts;
+    } of[] = {
+        { { 1, 0, 0 }, 0, false },     { { 1, 0, 0 }, -0.1, true },    { { -1, 0, 0 }, 9, false },
+        { { -1, 0, 0 }, 8.9, true },   { { 0, 1, 0 }, 0, false },      { { 0, 1, 0 }, -0.2, true },
+        { { 0, -1, 0 }, 19, false },   { { 0, -1, 0 }, 18.9, true },   { { 0, 0, 1 }, 0, false },
+        { { 0, 0, 1 }, -0.3, true },   { { 0, 0, -1 }, 29, false },    { { 0, 0, -1 }, 28.9, true },
+        { { -1, -1, -1 }, 57, false }, { { -1, -1, -1 }, 56.9, true },
+    };
+    enum { COUNT = sizeof of / sizeof *of };
+    trip_clip clip = { 0 };
+    for (int i = 0; i < COUNT; i++)
+        trip_clip_add(&clip, of[i].normal, of[i].offset);
+    trip_clip_simplify(&clip, dims);
+    int kept = 0;
+    for (int i = 0; i < COUNT; i++)
+        if (of[i].cuts) {
+            assert_memory_equal(&clip.planes[kept].normal, &of[i].normal, sizeof of[i].normal);
+            assert_true(clip.planes[kept++].offset == of[i].offset);
+        }
+    assert_int_equal(clip.count, kept);
+}
+
 /* Narrows an interval of the ray to one side of a plane, index space. */
 static void cut(const double plane[4], trip_vec3 o, trip_vec3 d, double *from, double *to)
 {
@@ -437,6 +560,11 @@ int main(void)
         cmocka_unit_test(a_box_is_the_inside_of_its_six_faces),
         cmocka_unit_test(squares_hold_the_voxels_that_are_inside),
         cmocka_unit_test(boxes_are_missed_that_lie_outside_as_a_whole),
+        cmocka_unit_test(boxes_of_voxels_that_count_as_inside_are_not_missed),
+        cmocka_unit_test(a_ray_is_cut_to_what_is_inside),
+        cmocka_unit_test(what_lies_on_a_plane_is_inside),
+        cmocka_unit_test(half_spaces_keep_their_side_before_a_map),
+        cmocka_unit_test(half_spaces_that_hold_all_voxels_are_left_out),
         cmocka_unit_test(what_is_left_of_the_path_has_its_opacity),
         cmocka_unit_test(splats_are_those_of_a_volume_without_the_others),
         cmocka_unit_test(sheets_cut_at_voxels_are_those_of_a_volume_without_the_others),
