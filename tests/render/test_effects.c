@@ -69,6 +69,60 @@ static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
     scene_destroy(&s);
 }
 
+/* Light passes what is cut away; the lattice has half a voxel of what lies between those on both
+ * sides of a cut in the middle. */
+static void what_is_cut_away_casts_no_shadow(void **state)
+{
+    (void)state;
+    const double at = 8.5;
+    scene s;
+    create_fog(&s, (float)FOG);
+    const trip_camera_params view = along_z(&s);
+    trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
+    trip_clip_add(&settings.clip, trip_v3(-1, 0, 0), at);
+    scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+    scene_picture exact = integrate(&s, &view, &settings);
+    int left = 0;
+    for (int x = 0; x < SIZE; x++) {
+        const double place = place_x(&s, &view, x, 4);
+        const double expected =
+            place > at ? 0 : (1 - exp(-FOG * (EDGE - 1))) * (0.3 + 0.7 * exp(-FOG * (at - place)));
+        assert_close(scene_pixel(&exact, x, 4)[0], expected, 2e-5);
+        left += place < at;
+    }
+    assert_in_range(left, 2, SIZE - 2);
+    while (scene_take_turn(&turn))
+        assert_true(scene_difference(&turn.picture, &exact) < 1e-3);
+    scene_picture_free(&exact);
+    scene_destroy(&s);
+}
+
+/* Of a segment between two slices a fifth is left: it fades, and is as far, as in the middle of
+ * that. */
+static void what_is_left_of_a_segment_fades_where_it_is(void **state)
+{
+    (void)state;
+    const double from = 7.1, to = 7.3, middle = 7.2, depth = 50 * (to - from);
+    scene s;
+    create_fog(&s, 50);
+    const trip_camera_params view = along_z(&s);
+    trip_settings settings = scene_post(1);
+    settings.saturation = 0;
+    settings.effects.cueing = 1;
+    settings.depth = true;
+    trip_clip_add(&settings.clip, trip_v3(0, 0, 1), -from);
+    trip_clip_add(&settings.clip, trip_v3(0, 0, -1), to);
+    scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+    while (scene_take_turn(&turn)) {
+        const double tolerance = 1e-4 + 0.1 * turn.renderer->tolerance;
+        const float *c = scene_pixel(&turn.picture, 4, 4);
+        assert_close(c[3], 1 - exp(-depth), tolerance);
+        assert_close(c[0], (1 - exp(-depth)) * middle / (EDGE - 1), tolerance);
+        assert_close(turn.picture.depth[4 * SIZE + 4], view.eye.z - middle, tolerance);
+    }
+    scene_destroy(&s);
+}
+
 /* From the eye's side: light and view pass the same, turned back by 180 degrees. */
 static void fog_lit_from_the_front_scatters_backwards(void **state)
 {
@@ -873,6 +927,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fog_lit_from_the_side_is_darker_away_from_the_light),
+        cmocka_unit_test(what_is_cut_away_casts_no_shadow),
+        cmocka_unit_test(what_is_left_of_a_segment_fades_where_it_is),
         cmocka_unit_test(fog_lit_from_the_front_scatters_backwards),
         cmocka_unit_test(fog_is_lit_from_a_place),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
