@@ -33,6 +33,15 @@ static void a_box_is_the_inside_of_its_six_faces(void **state)
     }
 }
 
+/* The bit of a voxel in a square. */
+static int morton_of(int u, int v)
+{
+    int bit = 0;
+    for (int b = 0; b < 3; b++)
+        bit |= (u >> b & 1) << 2 * b | (v >> b & 1) << (2 * b + 1);
+    return bit;
+}
+
 static void squares_hold_the_voxels_that_are_inside(void **state)
 {
     (void)state;
@@ -53,12 +62,45 @@ static void squares_hold_the_voxels_that_are_inside(void **state)
                 p[axis] = 5;
                 p[(axis + 1) % 3] = 8 + u;
                 p[(axis + 2) % 3] = 16 + v;
-                int bit = 0;
-                for (int b = 0; b < 3; b++)
-                    bit |= (u >> b & 1) << 2 * b | (v >> b & 1) << (2 * b + 1);
-                assert_int_equal(mask >> bit & 1, trip_clip_has(&clip, trip_v3(p[0], p[1], p[2])));
+                assert_int_equal(mask >> morton_of(u, v) & 1,
+                                 trip_clip_has(&clip, trip_v3(p[0], p[1], p[2])));
             }
     }
+}
+
+/* By their places; those beyond the grid's last are not there, wherever they would lie. */
+static void squares_of_uneven_grids_hold_the_voxels_that_are_inside(void **state)
+{
+    (void)state;
+    enum { MOST = 32 };
+    double tables[3][MOST];
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < MOST; i++)
+            tables[a][i] = i + 0.3 * sin(1.1 * i + a);
+    const int64_t voxels[3] = { 13, 21, 19 }, corner[3] = { 8, 16, 5 };
+    const trip_coordinates c =
+        trip_coordinates_make((const double *const[]){ tables[0], tables[1], tables[2] }, voxels);
+    int inside = 0, outside = 0;
+    for (int n = 0; n < 60; n++) {
+        const int axis = n % 3, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+        trip_clip clip = { 0 };
+        trip_clip_add(&clip, trip_normalize(trip_v3(sin(n), cos(1.7 * n), sin(2.3 * n))),
+                      n % 20 - 8);
+        const uint64_t mask = trip_clip_uneven_square(&clip, &c, axis, corner);
+        for (int i = 0; i < 64; i++) {
+            const int u = i % 8, v = i / 8;
+            double p[3];
+            p[axis] = tables[axis][corner[2]];
+            p[u_axis] = tables[u_axis][corner[0] + u];
+            p[v_axis] = tables[v_axis][corner[1] + v];
+            const bool there = corner[0] + u < voxels[u_axis] && corner[1] + v < voxels[v_axis];
+            const bool has = there && trip_clip_has(&clip, trip_v3(p[0], p[1], p[2]));
+            assert_int_equal(mask >> morton_of(u, v) & 1, has);
+            inside += has;
+            outside += there && !has;
+        }
+    }
+    assert_true(inside > 100 && outside > 100);
 }
 
 /* Of a plane: when no corner of theirs is inside. */
@@ -559,6 +601,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_is_the_inside_of_its_six_faces),
         cmocka_unit_test(squares_hold_the_voxels_that_are_inside),
+        cmocka_unit_test(squares_of_uneven_grids_hold_the_voxels_that_are_inside),
         cmocka_unit_test(boxes_are_missed_that_lie_outside_as_a_whole),
         cmocka_unit_test(boxes_of_voxels_that_count_as_inside_are_not_missed),
         cmocka_unit_test(a_ray_is_cut_to_what_is_inside),
