@@ -605,6 +605,123 @@ static void light_at_a_place_is_not_passed(void **state)
     }
 }
 
+/* What reaches a place and what is open there, as functions of it. */
+static double test_reached(const void *user, trip_vec3 v)
+{
+    (void)user;
+    return 0.5 + 0.4 * sin(v.x + 2 * v.y - v.z);
+}
+
+static double test_open(const void *user, trip_vec3 v)
+{
+    (void)user;
+    return 0.5 + 0.45 * sin(2 * v.x - v.y + 1.5 * v.z);
+}
+
+/* The formula of effects.h for a component of a colour, of a light in a direction. */
+static double lit_component(const trip_effects_view *e, const trip_light *at, trip_vec3 x,
+                            const double *gradient, double c)
+{
+    const trip_lit lit = gradient ? trip_light_on(at, gradient) : (trip_lit){ 0 };
+    const double g = e->effects.anisotropy, strength = lit.strength;
+    double reached = 1, open = 1, phase = 1;
+    if (e->effects.shadows) {
+        const trip_vec3 aside = trip_scale(at->light, strength * e->bias);
+        const double cosine = trip_dot(trip_scale(at->light, -1), at->eye);
+        reached = test_reached(NULL, trip_add(x, trip_affine_vector(&e->to_index, aside)));
+        phase = (1 - g * g) / pow(1 + g * g - 2 * g * cosine, 1.5);
+    }
+    if (e->effects.occlusion) {
+        const trip_vec3 n =
+            gradient ? trip_v3(gradient[0], gradient[1], gradient[2]) : trip_v3(1, 0, 0);
+        const trip_vec3 aside =
+            trip_affine_vector(&e->to_index, trip_scale(n, strength * e->bias / trip_length(n)));
+        open = fmin(1, (1 + strength) * fmax(test_open(NULL, trip_add(x, aside)),
+                                             test_open(NULL, trip_sub(x, aside))));
+    }
+    const double all =
+        c * (TRIP_AMBIENT * open +
+             TRIP_DIFFUSE * reached * ((1 - strength) * phase + strength * lit.diffuse)) +
+        strength * reached * TRIP_SPECULAR * lit.specular;
+    return fmin(1, fmax(0, all));
+}
+
+/* Flat, in part and full; with shadows, with occlusion, and with both. */
+static void colours_are_those_of_the_formula(void **state)
+{
+    (void)state;
+    int full = 0, bright = 0, changed = 0;
+    trip_effects_view e = { .bias = 0.7, .reached = test_reached, .open = test_open };
+    assert_true(trip_affine_invert(&scene_sheared, &e.to_index));
+    for (int n = 0; n < 3000; n++) {
+        const trip_vec3 x = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const trip_vec3 eye = trip_effects_direction(n % TRIP_OPEN_DIRECTIONS);
+        const trip_vec3 light = trip_effects_direction(n * 7 % 29);
+        const trip_light at = { .eye = eye,
+                                .light = light,
+                                .half = trip_normalize(trip_add(eye, light)),
+                                .gradient_full = 1 };
+        const trip_vec3 g = trip_scale(at.half, 1.5 * test_random());
+        const double turned[3] = { g.x + 0.3 * test_random(), g.y, g.z - 0.3 * test_random() };
+        const double *gradient = n % 5 ? turned : NULL;
+        e.effects = (trip_effects){ .shadows = n % 3 != 1,
+                                    .occlusion = n % 3 > 0,
+                                    .anisotropy = 0.8 * sin(n) };
+        double rgb[3] = { 1, 0.6 * test_random(), 0 };
+        const double c[3] = { rgb[0], rgb[1], rgb[2] };
+        trip_effects_colour(&e, &at, x, gradient, rgb);
+        for (int i = 0; i < 3; i++)
+            assert_close(rgb[i], lit_component(&e, &at, x, gradient, c[i]), 1e-12);
+        full += gradient && trip_light_on(&at, gradient).strength == 1;
+        bright += rgb[0] == 1;
+        changed += fabs(rgb[0] - c[0]) > 0.1;
+    }
+    assert_true(full > 100 && bright > 100 && changed > 1000);
+}
+
+/* Corner `n` of a box of voxels of three lengths, in index space. */
+static const uint64_t box_dims[3] = { 21, 31, 41 };
+
+static trip_vec3 box_corner(int n)
+{
+    return trip_v3(n & 1 ? 20 : 0, n & 2 ? 30 : 0, n & 4 ? 40 : 0);
+}
+
+/* By distances along the gaze in the world: from 0 at the nearest corner before the eye, or at the
+ * eye, to 1 at the farthest. */
+static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 60; n++) {
+        const trip_vec3 middle = trip_affine_point(&scene_sheared, trip_v3(10, 15, 20));
+        const trip_vec3 gaze = trip_effects_direction(n % TRIP_OPEN_DIRECTIONS);
+        const trip_camera_params view = { .eye = trip_sub(middle, trip_scale(gaze, n % 3 ? 90 : 5)),
+                                          .look = trip_add(middle, gaze),
+                                          .up = { 0.1, 0.2, 0.3 },
+                                          .fov_degrees = 30,
+                                          .ortho_height = n % 2 ? 50 : 0,
+                                          .width = SIZE,
+                                          .height = SIZE };
+        trip_settings settings = trip_settings_default();
+        trip_camera camera;
+        double z[8], near = INFINITY, far = 0;
+        settings.effects.cueing = 1;
+        for (int i = 0; i < 8; i++) {
+            const trip_vec3 corner = trip_affine_point(&scene_sheared, box_corner(i));
+            z[i] = trip_dot(gaze, trip_sub(corner, view.eye));
+            near = fmin(near, fmax(0, z[i]));
+            far = fmax(far, z[i]);
+        }
+        assert_int_equal(trip_camera_make(&camera, &view, &scene_sheared), 0);
+        const trip_effects_view e = trip_effects_view_make(&settings, &camera, box_dims);
+        for (int i = 0; i < 8; i++) {
+            const trip_vec3 c = box_corner(i);
+            assert_close(e.cue[0] * c.x + e.cue[1] * c.y + e.cue[2] * c.z + e.cue[3],
+                         (z[i] - near) / (far - near), 1e-9);
+        }
+    }
+}
+
 static void scattering_keeps_light(void **state)
 {
     (void)state;
@@ -945,6 +1062,8 @@ int main(void)
         cmocka_unit_test(within_the_volume_fading_begins_at_the_eye),
         cmocka_unit_test(light_is_looked_up_beside_surfaces_by_the_lattices_cells),
         cmocka_unit_test(light_at_a_place_is_not_passed),
+        cmocka_unit_test(colours_are_those_of_the_formula),
+        cmocka_unit_test(fading_goes_from_the_nearest_corner_to_the_farthest),
         cmocka_unit_test(scattering_keeps_light),
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),
