@@ -569,6 +569,58 @@ static void bricks_that_are_cut_away_are_not_read(void **state)
     scene_destroy(&s);
 }
 
+/* Lumps without a gap. */
+static bool lumps(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)(32768 + 32000 * sin(0.9 * i) * cos(0.7 * j + 0.5 * k));
+    return true;
+}
+
+/* Whether bricks are small or one is all there is, the picture is the same: rays inside take values
+ * and gradients from beyond the cut, the farther the steeper they are over a sheet. */
+static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
+{
+    (void)state;
+    enum { WIDE = 48, SIZE = 16 };
+    scene parts, whole;
+    uint64_t left_out = 0;
+    for (int i = 0; i < 2; i++) {
+        scene_create(i ? &whole : &parts, &(scene_params){ .dims = { WIDE, WIDE, WIDE },
+                                                           .tile_voxels = i ? 64 : 16,
+                                                           .slab_sheets = i ? 64 : 1,
+                                                           .voxel = lumps });
+        scene_colour(i ? &whole : &parts, 20000, 65535, 0.9, 0.4, 0.1, 0.1);
+    }
+    for (int i = 0; i < 36; i++) {
+        const bool steep = i % 3 == 2; /* along a list that the view is far from */
+        const trip_half_space cut = random_half_space();
+        const trip_vec3 middle = { WIDE / 2, WIDE / 2, WIDE / 2 };
+        trip_vec3 gaze = random_half_space().normal;
+        trip_camera_params view = scene_view(&whole, gaze, i % 4 ? 70 : 10, steep ? 120 : 40, SIZE);
+        view.ortho_height = i % 4 == 1 ? 50 : 0;
+        trip_settings settings = clear(TRIP_CLASSIFY_POST);
+        settings.slices = 1 + i % 2;
+        settings.shading = i % 5 > 0;
+        settings.kernel = (trip_kernel)(i / 2 % 3);
+        settings.h = 0.3;
+        settings.method = steep ? TRIP_METHOD_AXIS : TRIP_METHOD_MERGE;
+        trip_clip_add(&settings.clip, cut.normal, 0.3 - trip_dot(cut.normal, middle));
+        scene_picture a = scene_draw(&parts, scene_renderers(), &view, &settings);
+        scene_picture b = scene_draw(&whole, scene_renderers(), &view, &settings);
+        double apart = scene_difference(&a, &b);
+        if (!(apart <= 1e-6))
+            fail_msg("view %d: %g apart", i, apart);
+        left_out += b.stats.all.splats_read - a.stats.all.splats_read;
+        scene_picture_free(&a);
+        scene_picture_free(&b);
+    }
+    assert_true(left_out > 10 * WIDE * WIDE * WIDE);
+    scene_destroy(&parts);
+    scene_destroy(&whole);
+}
+
 /* Where one list alone has weight its colour is that of its axis. */
 static void lists_are_shown_in_their_colours(void **state)
 {
@@ -614,6 +666,7 @@ int main(void)
         cmocka_unit_test(the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others),
         cmocka_unit_test(renderers_cut_as_the_reference_does),
         cmocka_unit_test(bricks_that_are_cut_away_are_not_read),
+        cmocka_unit_test(what_is_left_out_behind_a_cut_changes_nothing),
         cmocka_unit_test(lists_are_shown_in_their_colours),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
