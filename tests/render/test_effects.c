@@ -1,5 +1,6 @@
 /* Shadows, scattering, ambient occlusion and depth cueing: the integral against closed forms, the
  * others against it and one another. */
+#include "dataset_join.h"
 #include "effects.h"
 #include "light_map.h"
 #include "scenes.h"
@@ -812,6 +813,62 @@ static void a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node(void *
     scene_destroy(&s);
 }
 
+/* The half of the grid along i that *user says, and the sheet of the other half next to it. */
+static bool half_fog(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)j, (void)k, (void)gradient;
+    *code = 65535;
+    return (i < EDGE / 2) == (*(const int *)user == 0);
+}
+
+static bool beside_half_fog(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)j, (void)k, (void)gradient;
+    *code = 65535;
+    return i == (*(const int *)user == 0 ? EDGE / 2 : EDGE / 2 - 1);
+}
+
+/* What is halo of one data set is kept in the other, and counts once. */
+static void joined_data_sets_make_one_fog(void **state)
+{
+    (void)state;
+    scene halves[2];
+    trip_dataset *joined;
+    trip_light_map *m;
+    const trip_clip none = { 0 };
+    for (int n = 0; n < 2; n++) {
+        const scene_part halo = {
+            .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = beside_half_fog, .user = &n
+        };
+        scene_create(&halves[n], &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                                  .voxel = half_fog,
+                                                  .user = &n,
+                                                  .parts = &halo,
+                                                  .part_count = 1 });
+        halves[n].table[65535] = (trip_tf_entry){ 1, 1, 1, (float)FOG };
+    }
+    trip_dataset *const parts[2] = { halves[0].data, halves[1].data };
+    assert_int_equal(trip_dataset_join(&joined, parts, 2, halves[0].budget), 0);
+    for (int n = 0; n < 6; n++) {
+        trip_settings settings = scene_with_shadows(trip_v3(n / 2 == 0, n / 2 == 1, n / 2 == 2));
+        settings.classify = n % 2 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+        const trip_light_source source = { .data = joined,
+                                           .settings = &settings,
+                                           .clip = &none,
+                                           .table = halves[0].table,
+                                           .threads = 1 };
+        assert_int_equal(trip_light_map_create(&m, halves[0].budget), 0);
+        complete(m, &source);
+        const trip_light_grid *g = trip_light_map_gathered(m);
+        for (size_t i = 0; i < trip_light_grid_count(g); i++)
+            assert_close((double)g->at[i], FOG, 1e-6);
+        trip_light_map_destroy(m);
+    }
+    trip_dataset_join_close(joined);
+    scene_destroy(&halves[0]);
+    scene_destroy(&halves[1]);
+}
+
 /* On the rim of fog columns beside the node have left it. */
 static bool is_on_rim(trip_vec3 node)
 {
@@ -1051,6 +1108,7 @@ int main(void)
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
         cmocka_unit_test(a_light_far_away_is_one_in_a_direction),
         cmocka_unit_test(a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node),
+        cmocka_unit_test(joined_data_sets_make_one_fog),
         cmocka_unit_test(every_node_is_lit_from_a_place_once),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
         cmocka_unit_test(openness_is_the_mean_over_directions),
