@@ -293,6 +293,18 @@ static void parallel_views_are_neither_too_low_nor_too_high(void **state)
     }
 }
 
+/* Where the eye is so near that it comes no nearer, what is seen becomes no smaller either. */
+static void a_parallel_view_grows_as_long_as_its_eye_moves(void **state)
+{
+    (void)state;
+    trip_navigation n = oblique(true);
+    const double seen = n.ortho_height / trip_navigation_distance(&n);
+    for (int i = 0; i < 200; i++)
+        trip_navigation_dolly(&n, 0.5, n.look);
+    const double ratio = n.ortho_height / trip_navigation_distance(&n) / seen;
+    assert_true(ratio > 0.25 && ratio < 4);
+}
+
 static void the_point_looked_at_can_always_be_left_again(void **state)
 {
     (void)state;
@@ -325,6 +337,7 @@ int main(void)
         cmocka_unit_test(a_box_is_fitted_exactly),
         cmocka_unit_test(what_is_no_view_is_left_out),
         cmocka_unit_test(parallel_views_are_neither_too_low_nor_too_high),
+        cmocka_unit_test(a_parallel_view_grows_as_long_as_its_eye_moves),
         cmocka_unit_test(the_point_looked_at_can_always_be_left_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
