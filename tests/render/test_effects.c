@@ -723,6 +723,50 @@ static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
     }
 }
 
+/* Where all of the box lies behind the eye, none of it fades. */
+static void what_lies_behind_the_eye_does_not_fade(void **state)
+{
+    (void)state;
+    const trip_affine map = trip_affine_identity();
+    const trip_camera_params view = { .eye = { 10, 15, 50 },
+                                      .look = { 10, 15, 60 },
+                                      .up = { 0, 1, 0 },
+                                      .fov_degrees = 30,
+                                      .width = SIZE,
+                                      .height = SIZE };
+    trip_settings settings = trip_settings_default();
+    trip_camera camera;
+    settings.effects.cueing = 1;
+    assert_int_equal(trip_camera_make(&camera, &view, &map), 0);
+    const trip_effects_view e = trip_effects_view_make(&settings, &camera, box_dims);
+    for (int i = 0; i < 4; i++)
+        assert_true(e.cue[i] == 0);
+}
+
+/* By a form that is below 0 and above 1 in places. */
+static void fading_blends_with_the_background_by_its_share(void **state)
+{
+    (void)state;
+    const trip_effects_view e = { .effects = { .cueing = 0.8 },
+                                  .cue = { 0.1, 0.25, -0.15, 0.2 },
+                                  .cue_rgb = { 0.9, 0.1, 0.4 } };
+    const trip_light light = { .gradient_full = 1 };
+    int below = 0, above = 0;
+    for (int n = 0; n < 500; n++) {
+        const trip_vec3 x = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const double form = 0.1 * x.x + 0.25 * x.y - 0.15 * x.z + 0.2;
+        const double share = 0.8 * fmin(1, fmax(0, form));
+        const double c[3] = { test_random(), test_random(), test_random() };
+        double rgb[3] = { c[0], c[1], c[2] };
+        trip_effects_colour(&e, &light, x, NULL, rgb);
+        for (int i = 0; i < 3; i++)
+            assert_close(rgb[i], c[i] * (1 - share) + e.cue_rgb[i] * share, 1e-12);
+        below += form < 0;
+        above += form > 1;
+    }
+    assert_true(below > 10 && above > 10);
+}
+
 static void scattering_keeps_light(void **state)
 {
     (void)state;
@@ -747,6 +791,7 @@ static void directions_are_spread_evenly(void **state)
             assert_true(trip_dot(d, trip_effects_direction(m)) < 0.95);
     }
     assert_true(trip_length(sum) / TRIP_OPEN_DIRECTIONS < 0.02);
+    assert_close(sum.z, 0, 1e-12); /* each above has one as far below */
 }
 
 /* The second frame reads nothing where the view alone has changed; the light takes a sweep; the
@@ -1122,6 +1167,8 @@ int main(void)
         cmocka_unit_test(light_at_a_place_is_not_passed),
         cmocka_unit_test(colours_are_those_of_the_formula),
         cmocka_unit_test(fading_goes_from_the_nearest_corner_to_the_farthest),
+        cmocka_unit_test(what_lies_behind_the_eye_does_not_fade),
+        cmocka_unit_test(fading_blends_with_the_background_by_its_share),
         cmocka_unit_test(scattering_keeps_light),
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),
