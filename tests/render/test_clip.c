@@ -595,16 +595,20 @@ static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
     }
     for (int i = 0; i < 36; i++) {
         const bool steep = i % 3 == 2; /* along a list that the view is far from */
-        const trip_half_space cut = random_half_space();
+        const bool straight = i % 3 == 1;
+        const trip_vec3 along = { i / 3 % 3 == 0, i / 3 % 3 == 1, i / 3 % 3 == 2 };
         const trip_vec3 middle = { WIDE / 2, WIDE / 2, WIDE / 2 };
+        trip_half_space cut = random_half_space();
         trip_vec3 gaze = random_half_space().normal;
+        if (straight) /* of a list the cut is between two sheets, which the view is along */
+            cut.normal = gaze = trip_scale(along, i / 9 % 2 ? 1 : -1);
         trip_camera_params view = scene_view(&whole, gaze, i % 4 ? 70 : 10, steep ? 120 : 40, SIZE);
         view.ortho_height = i % 4 == 1 ? 50 : 0;
         trip_settings settings = clear(TRIP_CLASSIFY_POST);
         settings.slices = 1 + i % 2;
         settings.shading = i % 5 > 0;
         settings.kernel = (trip_kernel)(i / 2 % 3);
-        settings.h = 0.3;
+        settings.h = straight ? TRIP_H_AUTO : 0.3;
         settings.method = steep ? TRIP_METHOD_AXIS : TRIP_METHOD_MERGE;
         trip_clip_add(&settings.clip, cut.normal, 0.3 - trip_dot(cut.normal, middle));
         scene_picture a = scene_draw(&parts, scene_renderers(), &view, &settings);
