@@ -580,14 +580,16 @@ static bool lumps(void *user, int i, int j, int k, unsigned *code, double gradie
 
 /* Whether bricks are small or one is all there is, the picture is the same: rays inside take values
  * and gradients from beyond the cut, the farther the steeper they are over a sheet. */
-static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
+enum { WIDE = 48 };
+
+static void compare_what_is_left_out(const trip_coordinates *coordinates, double middle_place)
 {
-    (void)state;
-    enum { WIDE = 48, SIZE = 16 };
+    enum { SIZE = 16 };
     scene parts, whole;
     uint64_t left_out = 0;
     for (int i = 0; i < 2; i++) {
         scene_create(i ? &whole : &parts, &(scene_params){ .dims = { WIDE, WIDE, WIDE },
+                                                           .coordinates = coordinates,
                                                            .tile_voxels = i ? 64 : 16,
                                                            .slab_sheets = i ? 64 : 1,
                                                            .voxel = lumps });
@@ -597,7 +599,7 @@ static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
         const bool steep = i % 3 == 2; /* along a list that the view is far from */
         const bool straight = i % 3 == 1;
         const trip_vec3 along = { i / 3 % 3 == 0, i / 3 % 3 == 1, i / 3 % 3 == 2 };
-        const trip_vec3 middle = { WIDE / 2, WIDE / 2, WIDE / 2 };
+        const trip_vec3 middle = { middle_place, middle_place, middle_place };
         trip_half_space cut = random_half_space();
         trip_vec3 gaze = random_half_space().normal;
         if (straight) /* of a list the cut is between two sheets, which the view is along */
@@ -607,7 +609,7 @@ static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
         trip_settings settings = clear(TRIP_CLASSIFY_POST);
         settings.slices = 1 + i % 2;
         settings.shading = i % 5 > 0;
-        settings.kernel = (trip_kernel)(i / 2 % 3);
+        settings.kernel = coordinates ? TRIP_KERNEL_LINEAR : (trip_kernel)(i / 2 % 3);
         settings.h = straight ? TRIP_H_AUTO : 0.3;
         settings.method = steep ? TRIP_METHOD_AXIS : TRIP_METHOD_MERGE;
         trip_clip_add(&settings.clip, cut.normal, 0.3 - trip_dot(cut.normal, middle));
@@ -623,6 +625,20 @@ static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
     assert_true(left_out > 10 * WIDE * WIDE * WIDE);
     scene_destroy(&parts);
     scene_destroy(&whole);
+}
+
+/* With uneven spacing voxels in the middle, where the cut is, are nearly two wide. */
+static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
+{
+    (void)state;
+    double table[WIDE] = { 0 };
+    for (int i = 1; i < WIDE; i++)
+        table[i] = table[i - 1] + (i > 16 && i <= 32 ? 1.96875 : 0.5);
+    const double *const along[3] = { table, table, table };
+    const trip_coordinates coordinates =
+        trip_coordinates_make(along, (const int64_t[]){ WIDE, WIDE, WIDE });
+    compare_what_is_left_out(NULL, WIDE / 2);
+    compare_what_is_left_out(&coordinates, table[WIDE / 2]);
 }
 
 /* Where one list alone has weight its colour is that of its axis. */
