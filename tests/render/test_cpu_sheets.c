@@ -792,6 +792,39 @@ static bool ramp_to_the_faces(void *user, int i, int j, int k, unsigned *code, d
     return (k == 0) == halo;
 }
 
+/* Single voxels that show, none beside another, at all places in squares of eight and rasters of
+ * those. */
+static bool sparks(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    static const int places[3] = { 62 % 21, 63 % 21, 65 % 21 }; /* beside a raster's border */
+    const bool shows = k % 3 == 1 && i % 21 == places[k / 9 % 3] && j % 21 == places[k / 3 % 3];
+    *code = shows ? 65535 : 0;
+    return true;
+}
+
+/* A segment about one of them may have an end in a square beside, in which nothing shows. */
+static void what_shows_beside_a_square_is_as_in_the_reference(void **state)
+{
+    (void)state;
+    const double ways[4][2] = { { 0.96, 0.95 }, { -0.96, 0.3 }, { 0.2, -0.96 }, { -0.95, -0.96 } };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 150, 150, 27 }, .voxel = sparks });
+    scene_colour(&s, 5000, 65535, 1, 0.6, 0.3, 0.25);
+    for (int i = 0; i < 8; i++) {
+        trip_camera_params view =
+            scene_view(&s, trip_v3(ways[i % 4][0], ways[i % 4][1], 1), 90, 30, 64);
+        trip_settings settings = post(2 + i % 3);
+        settings.shading = false;
+        view.ortho_height = i < 4 ? 60 : 30;
+        view.eye.x += i / 4 ? -10 : 0;
+        view.look.x += i / 4 ? -10 : 0;
+        expect_as_in_the_reference(&s, &view, &settings);
+    }
+    scene_destroy(&s);
+}
+
 /* What shows reaches the grid's faces. Beyond them is nothing, by whatever kernel. */
 static void nothing_shows_beyond_the_grids_faces(void **state)
 {
@@ -837,6 +870,7 @@ int main(void)
         cmocka_unit_test(labels_keep_their_colours),
         cmocka_unit_test(masks_are_lit_as_in_the_reference),
         cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),
+        cmocka_unit_test(what_shows_beside_a_square_is_as_in_the_reference),
         cmocka_unit_test(nothing_shows_beyond_the_grids_faces),
         cmocka_unit_test(cells_that_lack_a_corner_are_empty_as_in_the_reference),
     };
