@@ -118,6 +118,44 @@ static void members_one_after_the_other_are_one_stream(void **state)
     }
 }
 
+/* As gzip and bzip2 do: what follows a complete stream and does not begin as another is passed
+ * over, be it padding, or of the two bytes that one begins with the first alone. */
+static void bytes_behind_a_complete_stream_are_passed_over(void **state)
+{
+    (void)state;
+    static const unsigned char zeros[600];
+    const struct {
+        const void *bytes;
+        size_t count;
+    } tails[] = { { zeros, 1 },
+                  { zeros, 2 },
+                  { zeros, sizeof zeros },
+                  { "\x1f", 1 },
+                  { "\x1f ", 2 },
+                  { " \x8b", 2 },
+                  { "B", 1 },
+                  { "B ", 2 },
+                  { " Z", 2 },
+                  { "what is more", 12 } };
+    const bytes all = plain();
+    for (int e = TRIP_BYTES_ZLIB; e <= TRIP_BYTES_BZIP2; e++)
+        for (size_t i = 0; i < sizeof tails / sizeof *tails; i++) {
+            bytes out = { .count = 0 };
+            if (e == TRIP_BYTES_ZLIB)
+                append_gzip(&out, &all);
+            else
+                append_bzip2(&out, &all);
+            append(&out, tails[i].bytes, tails[i].count);
+            catch_reports();
+            assert_delivers(&(trip_byte_source){ .path = write_file("tail", &out),
+                                                 .encoding = (trip_byte_encoding)e,
+                                                 .size_bytes = COUNT },
+                            0, 3000);
+            trip_report_redirect(NULL, NULL);
+            assert_int_equal(reports, 0);
+        }
+}
+
 /* A mebibyte is read at once: of the second member it has no byte, one, or two. The first is made
  * as long by a comment. */
 static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
@@ -284,6 +322,7 @@ int main(void)
         cmocka_unit_test(all_encodings_deliver_the_same_bytes_in_any_pieces),
         cmocka_unit_test(bytes_can_be_skipped_before_and_after_decompression),
         cmocka_unit_test(members_one_after_the_other_are_one_stream),
+        cmocka_unit_test(bytes_behind_a_complete_stream_are_passed_over),
         cmocka_unit_test(members_may_end_anywhere_in_what_is_read_at_once),
         cmocka_unit_test(a_cut_file_is_refused_wherever_it_is_cut),
         cmocka_unit_test(corrupt_data_is_found_by_the_checksum),

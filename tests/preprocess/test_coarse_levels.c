@@ -304,7 +304,7 @@ static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
 
 /* Voxels that cover nothing known: none may show. */
 typedef struct added {
-    unsigned shown_from, shown_to;
+    int shown_from, shown_to; /* values */
     uint64_t count;
 } added;
 
@@ -315,12 +315,12 @@ static void check_added_record(const trip_dataset *d, const trip_list *list, con
     (void)d;
     if (sum_cube(at, list->level, 0).known > 0)
         return;
-    assert_true(code < 85 * (258 + a->shown_from) || code > 85 * (258 + a->shown_to));
+    assert_true((int)code < 85 * (258 + a->shown_from) || (int)code > 85 * (258 + a->shown_to));
     a->count++;
 }
 
 /* Those of level 2 along X. */
-static uint64_t check_added(const char *name, unsigned shown_from, unsigned shown_to)
+static uint64_t check_added(const char *name, int shown_from, int shown_to)
 {
     added a = { shown_from, shown_to, 0 };
     trip_dataset *d;
@@ -349,6 +349,55 @@ static void what_is_added_about_kept_voxels_does_not_show(void **state)
     p.range_count = 1;
     brick_to("a.trip", p);
     assert_int_equal(check_added("a.trip", 0, 255 - LEAST), count);
+}
+
+/* Below all values that codes have, and above. */
+enum { LOWEST = -258, HIGHEST = 513 };
+
+/* What is kept in the place of what make_bytes() kept; of the others every second one, along any
+ * axis, lies below that, and the rest above. */
+static void spread_bytes(const trip_value_range *kept, unsigned count)
+{
+    const int lo = (int)kept[0].lo, hi = (int)kept[count - 1].hi;
+    for (int i = 0; i < N; i++) {
+        const trip_value_range *in = &kept[bytes[i] % count];
+        const int width = (int)(in->hi - in->lo) + 1, byte = bytes[i];
+        const bool below = (i % NX + i / NX % NY + i / NX / NY) % 2;
+        if (byte >= LEAST)
+            bytes[i] = (uint8_t)(in->lo + byte / (int)count % width);
+        else
+            bytes[i] = (uint8_t)(below ? byte % lo : 255 - byte % (255 - hi));
+    }
+    test_write("v.raw", bytes, sizeof bytes);
+}
+
+/* What is not kept lies on both sides of what is: it is of the one with more of the range, though
+ * sharpened. */
+static void what_is_added_is_of_the_wider_side(void **state)
+{
+    static const struct {
+        trip_value_range kept[2];
+        unsigned count;
+        bool above;
+    } forms[] = {
+        { { { 60, 100 } }, 1, true },
+        { { { 155, 195 } }, 1, false },
+        { { { 35, 50 }, { 205, 215 } }, 2, true },
+        { { { 40, 50 }, { 205, 220 } }, 2, false },
+        { { { 40, 50 }, { 205, 215 } }, 2, false }, /* as much of it on both */
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof forms / sizeof *forms; i++) {
+        const trip_value_range *kept = forms[i].kept;
+        const unsigned count = forms[i].count;
+        make_bytes(12, 2000);
+        spread_bytes(kept, count);
+        brick_to("a.trip",
+                 (trip_brick_params){ .ranges = kept, .range_count = count, .levels = 2 });
+        const int middle = (int)(kept[0].lo + kept[count - 1].hi) / 2;
+        assert_true(check_added("a.trip", forms[i].above ? LOWEST : middle,
+                                forms[i].above ? middle : HIGHEST) > 100);
+    }
 }
 
 static trip_dataset *open_data_set(const char *name, trip_budget **budget)
@@ -617,6 +666,7 @@ int main(void)
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(what_is_added_about_kept_voxels_does_not_show, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(what_is_added_is_of_the_wider_side, test_begin, test_end),
         cmocka_unit_test_setup_teardown(
             values_are_sharpened_to_the_nearest_code_and_stay_in_the_range_of_codes, test_begin,
             test_end),

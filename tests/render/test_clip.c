@@ -33,6 +33,15 @@ static void a_box_is_the_inside_of_its_six_faces(void **state)
     }
 }
 
+/* The bit of a voxel in a square. */
+static int morton_of(int u, int v)
+{
+    int bit = 0;
+    for (int b = 0; b < 3; b++)
+        bit |= (u >> b & 1) << 2 * b | (v >> b & 1) << (2 * b + 1);
+    return bit;
+}
+
 static void squares_hold_the_voxels_that_are_inside(void **state)
 {
     (void)state;
@@ -53,12 +62,45 @@ static void squares_hold_the_voxels_that_are_inside(void **state)
                 p[axis] = 5;
                 p[(axis + 1) % 3] = 8 + u;
                 p[(axis + 2) % 3] = 16 + v;
-                int bit = 0;
-                for (int b = 0; b < 3; b++)
-                    bit |= (u >> b & 1) << 2 * b | (v >> b & 1) << (2 * b + 1);
-                assert_int_equal(mask >> bit & 1, trip_clip_has(&clip, trip_v3(p[0], p[1], p[2])));
+                assert_int_equal(mask >> morton_of(u, v) & 1,
+                                 trip_clip_has(&clip, trip_v3(p[0], p[1], p[2])));
             }
     }
+}
+
+/* By their places; those beyond the grid's last are not there, wherever they would lie. */
+static void squares_of_uneven_grids_hold_the_voxels_that_are_inside(void **state)
+{
+    (void)state;
+    enum { MOST = 32 };
+    double tables[3][MOST];
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < MOST; i++)
+            tables[a][i] = i + 0.3 * sin(1.1 * i + a);
+    const int64_t voxels[3] = { 13, 21, 19 }, corner[3] = { 8, 16, 5 };
+    const trip_coordinates c =
+        trip_coordinates_make((const double *const[]){ tables[0], tables[1], tables[2] }, voxels);
+    int inside = 0, outside = 0;
+    for (int n = 0; n < 60; n++) {
+        const int axis = n % 3, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+        trip_clip clip = { 0 };
+        trip_clip_add(&clip, trip_normalize(trip_v3(sin(n), cos(1.7 * n), sin(2.3 * n))),
+                      n % 20 - 8);
+        const uint64_t mask = trip_clip_uneven_square(&clip, &c, axis, corner);
+        for (int i = 0; i < 64; i++) {
+            const int u = i % 8, v = i / 8;
+            double p[3];
+            p[axis] = tables[axis][corner[2]];
+            p[u_axis] = tables[u_axis][corner[0] + u];
+            p[v_axis] = tables[v_axis][corner[1] + v];
+            const bool there = corner[0] + u < voxels[u_axis] && corner[1] + v < voxels[v_axis];
+            const bool has = there && trip_clip_has(&clip, trip_v3(p[0], p[1], p[2]));
+            assert_int_equal(mask >> morton_of(u, v) & 1, has);
+            inside += has;
+            outside += there && !has;
+        }
+    }
+    assert_true(inside > 100 && outside > 100);
 }
 
 /* Of a plane: when no corner of theirs is inside. */
@@ -91,6 +133,129 @@ static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
         missed += most < 0;
     }
     assert_in_range(missed, 200, 800);
+}
+
+/* Nor is a box of one voxel that counts as inside because it all but is. */
+static void boxes_of_voxels_that_count_as_inside_are_not_missed(void **state)
+{
+    (void)state;
+    for (double beyond = 0.25; beyond <= 1; beyond += 0.25) {
+        const double at[3] = { 5, 6, 7 };
+        trip_clip clip = { 0 };
+        trip_clip_add(&clip, trip_v3(0, 1, 0), -6 - beyond * TRIP_CLIP_SLACK);
+        assert_true(trip_clip_has(&clip, trip_v3(5, 6, 7)));
+        assert_false(trip_clip_misses(&clip, trip_v3(0, 0, 0), at, at, 0));
+    }
+}
+
+static trip_half_space random_half_space(void)
+{
+    return (trip_half_space){ trip_normalize(trip_v3(test_random() - 0.5, test_random() - 0.5,
+                                                     test_random() - 0.5)),
+                              20 * test_random() - 8 };
+}
+
+/* How far inside of all half-spaces a point is; below 0: outside of one. */
+static double room_at(const trip_clip *clip, trip_vec3 p)
+{
+    double least = INFINITY;
+    for (int i = 0; i < clip->count; i++)
+        least = fmin(least, trip_dot(clip->planes[i].normal, p) + clip->planes[i].offset);
+    return least;
+}
+
+/* What is left of a ray from 1 to 20 is inside, what is beside that is not; where nothing is left
+ * no place of it is. */
+static void a_ray_is_cut_to_what_is_inside(void **state)
+{
+    (void)state;
+    int left = 0;
+    for (int n = 0; n < 2000; n++) {
+        const trip_vec3 o = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const trip_vec3 d = random_half_space().normal;
+        double from = 1, to = 20;
+        trip_clip clip = { .count = 1 + n % 3 };
+        for (int i = 0; i < clip.count; i++)
+            clip.planes[i] = random_half_space();
+        const bool some = trip_clip_ray(&clip, o, d, &from, &to);
+        for (int i = 0; i <= 190; i++) {
+            const double t = 1 + 0.1 * i, room = room_at(&clip, trip_add(o, trip_scale(d, t)));
+            if (fabs(room) > 1e-9)
+                assert_int_equal(some && t >= from && t <= to, room > 0);
+        }
+        left += some;
+    }
+    assert_in_range(left, 200, 1800);
+}
+
+/* A ray that lies in the plane is inside; of one that only touches it, nothing is left. */
+static void what_lies_on_a_plane_is_inside(void **state)
+{
+    (void)state;
+    trip_clip clip = { 0 };
+    trip_clip_add(&clip, trip_v3(1, 0, 0), -3);
+    double from = 0, to = 5;
+    assert_true(trip_clip_ray(&clip, trip_v3(3, 0, 0), trip_v3(0, 1, 0), &from, &to));
+    assert_true(from == 0 && to == 5);
+    assert_false(
+        trip_clip_ray(&clip, trip_v3(8, 0, 0), trip_v3(1, 0, 0), &(double){ -9 }, &(double){ -5 }));
+}
+
+/* Half-spaces of the world are the same ones in the source space of a map, in its units of length;
+ * one without a normal holds all of it or nothing, as its offset says. */
+static void half_spaces_keep_their_side_before_a_map(void **state)
+{
+    (void)state;
+    trip_clip clip = { 0 };
+    for (int i = 0; i < 6; i++) {
+        const trip_half_space p = random_half_space();
+        trip_clip_add(&clip, trip_scale(p.normal, 3), p.offset);
+    }
+    trip_clip_add(&clip, trip_v3(0, 0, 0), 2);
+    trip_clip_add(&clip, trip_v3(0, 0, 0), -2);
+    const trip_clip before = trip_clip_before(&clip, &scene_sheared);
+    assert_int_equal(before.count, clip.count);
+    for (int n = 0; n < 50 * clip.count; n++) {
+        const trip_half_space *p = &clip.planes[n % clip.count],
+                              *q = &before.planes[n % clip.count];
+        const trip_vec3 at = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const trip_vec3 to = trip_affine_point(&scene_sheared, at);
+        const double own = trip_dot(q->normal, at) + q->offset;
+        const double world = trip_dot(p->normal, to) + p->offset;
+        assert_true(own * world > 0);
+        if (n % clip.count < 6)
+            assert_close(trip_length(q->normal), 1, 1e-12);
+    }
+}
+
+/* Those that cut off no voxel of 10 x 20 x 30; what is left of them is in order. */
+static void half_spaces_that_hold_all_voxels_are_left_out(void **state)
+{
+    (void)state;
+    const uint64_t dims[3] = { 10, 20, 30 };
+    const struct {
+        trip_vec3 normal;
+        double offset;
+        bool cuts;
+    } of[] = {
+        { { 1, 0, 0 }, 0, false },     { { 1, 0, 0 }, -0.1, true },    { { -1, 0, 0 }, 9, false },
+        { { -1, 0, 0 }, 8.9, true },   { { 0, 1, 0 }, 0, false },      { { 0, 1, 0 }, -0.2, true },
+        { { 0, -1, 0 }, 19, false },   { { 0, -1, 0 }, 18.9, true },   { { 0, 0, 1 }, 0, false },
+        { { 0, 0, 1 }, -0.3, true },   { { 0, 0, -1 }, 29, false },    { { 0, 0, -1 }, 28.9, true },
+        { { -1, -1, -1 }, 57, false }, { { -1, -1, -1 }, 56.9, true },
+    };
+    enum { COUNT = sizeof of / sizeof *of };
+    trip_clip clip = { 0 };
+    for (int i = 0; i < COUNT; i++)
+        trip_clip_add(&clip, of[i].normal, of[i].offset);
+    trip_clip_simplify(&clip, dims);
+    int kept = 0;
+    for (int i = 0; i < COUNT; i++)
+        if (of[i].cuts) {
+            assert_memory_equal(&clip.planes[kept].normal, &of[i].normal, sizeof of[i].normal);
+            assert_true(clip.planes[kept++].offset == of[i].offset);
+        }
+    assert_int_equal(clip.count, kept);
 }
 
 /* Narrows an interval of the ray to one side of a plane, index space. */
@@ -404,6 +569,78 @@ static void bricks_that_are_cut_away_are_not_read(void **state)
     scene_destroy(&s);
 }
 
+/* Lumps without a gap. */
+static bool lumps(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)(32768 + 32000 * sin(0.9 * i) * cos(0.7 * j + 0.5 * k));
+    return true;
+}
+
+/* Whether bricks are small or one is all there is, the picture is the same: rays inside take values
+ * and gradients from beyond the cut, the farther the steeper they are over a sheet. */
+enum { WIDE = 48 };
+
+static void compare_what_is_left_out(const trip_coordinates *coordinates, double middle_place)
+{
+    enum { SIZE = 16 };
+    scene parts, whole;
+    uint64_t left_out = 0;
+    for (int i = 0; i < 2; i++) {
+        scene_create(i ? &whole : &parts, &(scene_params){ .dims = { WIDE, WIDE, WIDE },
+                                                           .coordinates = coordinates,
+                                                           .tile_voxels = i ? 64 : 16,
+                                                           .slab_sheets = i ? 64 : 1,
+                                                           .voxel = lumps });
+        scene_colour(i ? &whole : &parts, 20000, 65535, 0.9, 0.4, 0.1, 0.1);
+    }
+    for (int i = 0; i < 36; i++) {
+        const bool steep = i % 3 == 2; /* along a list that the view is far from */
+        const bool straight = i % 3 == 1;
+        const trip_vec3 along = { i / 3 % 3 == 0, i / 3 % 3 == 1, i / 3 % 3 == 2 };
+        const trip_vec3 middle = { middle_place, middle_place, middle_place };
+        trip_half_space cut = random_half_space();
+        trip_vec3 gaze = random_half_space().normal;
+        if (straight) /* of a list the cut is between two sheets, which the view is along */
+            cut.normal = gaze = trip_scale(along, i / 9 % 2 ? 1 : -1);
+        trip_camera_params view = scene_view(&whole, gaze, i % 4 ? 70 : 10, steep ? 120 : 40, SIZE);
+        view.ortho_height = i % 4 == 1 ? 50 : 0;
+        trip_settings settings = clear(TRIP_CLASSIFY_POST);
+        settings.slices = 1 + i % 2;
+        settings.shading = i % 5 > 0;
+        settings.kernel = coordinates ? TRIP_KERNEL_LINEAR : (trip_kernel)(i / 2 % 3);
+        settings.h = straight ? TRIP_H_AUTO : 0.3;
+        settings.method = steep ? TRIP_METHOD_AXIS : TRIP_METHOD_MERGE;
+        trip_clip_add(&settings.clip, cut.normal, 0.3 - trip_dot(cut.normal, middle));
+        scene_picture a = scene_draw(&parts, scene_renderers(), &view, &settings);
+        scene_picture b = scene_draw(&whole, scene_renderers(), &view, &settings);
+        double apart = scene_difference(&a, &b);
+        if (!(apart <= 1e-6))
+            fail_msg("view %d: %g apart", i, apart);
+        left_out += b.stats.all.splats_read - a.stats.all.splats_read;
+        scene_picture_free(&a);
+        scene_picture_free(&b);
+    }
+    assert_true(left_out > 10 * WIDE * WIDE * WIDE);
+    scene_destroy(&parts);
+    scene_destroy(&whole);
+}
+
+/* With uneven spacing voxels in the middle, where the cut is, are nearly two wide. */
+static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
+{
+    (void)state;
+    double table[WIDE] = { 0 };
+    for (int i = 1; i < WIDE; i++)
+        table[i] = table[i - 1] + (i > 16 && i <= 32 ? 1.96875 : 0.5);
+    const double *const along[3] = { table, table, table };
+    const trip_coordinates coordinates =
+        trip_coordinates_make(along, (const int64_t[]){ WIDE, WIDE, WIDE });
+    compare_what_is_left_out(NULL, WIDE / 2);
+    compare_what_is_left_out(&coordinates, table[WIDE / 2]);
+}
+
 /* Where one list alone has weight its colour is that of its axis. */
 static void lists_are_shown_in_their_colours(void **state)
 {
@@ -436,13 +673,20 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_is_the_inside_of_its_six_faces),
         cmocka_unit_test(squares_hold_the_voxels_that_are_inside),
+        cmocka_unit_test(squares_of_uneven_grids_hold_the_voxels_that_are_inside),
         cmocka_unit_test(boxes_are_missed_that_lie_outside_as_a_whole),
+        cmocka_unit_test(boxes_of_voxels_that_count_as_inside_are_not_missed),
+        cmocka_unit_test(a_ray_is_cut_to_what_is_inside),
+        cmocka_unit_test(what_lies_on_a_plane_is_inside),
+        cmocka_unit_test(half_spaces_keep_their_side_before_a_map),
+        cmocka_unit_test(half_spaces_that_hold_all_voxels_are_left_out),
         cmocka_unit_test(what_is_left_of_the_path_has_its_opacity),
         cmocka_unit_test(splats_are_those_of_a_volume_without_the_others),
         cmocka_unit_test(sheets_cut_at_voxels_are_those_of_a_volume_without_the_others),
         cmocka_unit_test(the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others),
         cmocka_unit_test(renderers_cut_as_the_reference_does),
         cmocka_unit_test(bricks_that_are_cut_away_are_not_read),
+        cmocka_unit_test(what_is_left_out_behind_a_cut_changes_nothing),
         cmocka_unit_test(lists_are_shown_in_their_colours),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -120,6 +120,67 @@ static void an_opaque_slab_is_as_far_as_its_front_face(void **state)
     check_flat(one_slab, 0.9999, 0, 2e-3);
 }
 
+/* However opaque it is: splats and sums of them stay numbers. */
+static void a_slab_is_as_far_and_as_bright_however_opaque_it_is(void **state)
+{
+    (void)state;
+    const float rgb[3] = { 1, 0.5F, 0.2F };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { N, N, N }, .tile_voxels = 16, .voxel = one_slab });
+    for (int i = 0; i < 6; i++) {
+        const double extinctions[3] = { 1e12, 1e27, 3e38 };
+        for (int code = 0; code < 65536; code++)
+            s.table[code] = (trip_tf_entry){ rgb[0], rgb[1], rgb[2], (float)extinctions[i / 2] };
+        trip_settings settings = with_depth();
+        settings.compositing = (trip_compositing)(i % 2);
+        trip_camera_params view = head_on(&s, 30, false);
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn))
+            for (int n = 0; n < view.width * view.height; n++) {
+                const float *c = turn.picture.rgba + 4 * n;
+                const double far = 30 * slant(&view, n % view.width, n / view.width);
+                for (int k = 0; k < 4; k++)
+                    assert_close(c[k], k < 3 ? rgb[k] : 1, 1e-5);
+                assert_close(turn.picture.depth[n], far, 1e-5);
+            }
+    }
+    scene_destroy(&s);
+}
+
+/* The centre of the only splat lies half a voxel behind the eye, or its plane in parallel views; of
+ * the rest of it that shows, the distance is none. */
+static void what_has_its_centre_behind_the_eye_is_not_before_it(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { N, N, N }, .voxel = one_voxel });
+    scene_colour(&s, 1, 1, 1, 1, 1, 0.5);
+    for (int i = 0; i < 4; i++) {
+        trip_settings settings = with_depth();
+        settings.compositing = (trip_compositing)(i % 2);
+        trip_camera_params view = { .eye = { N / 2 + 0.1, N / 2, N / 2 - 0.5 },
+                                    .look = { N / 2 + 0.1, N / 2, 0 },
+                                    .up = { 0, 1, 0 },
+                                    .fov_degrees = 60,
+                                    .ortho_height = i / 2 ? 3 : 0,
+                                    .width = 12,
+                                    .height = 12 };
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            int seen = 0;
+            for (int n = 0; n < view.width * view.height; n++) {
+                const bool shows = turn.picture.rgba[4 * n] > 1e-3F;
+                seen += shows;
+                if (shows && !(turn.picture.depth[n] == 0))
+                    fail_msg("%s: pixel %d lies %g away", turn.renderer->name, n,
+                             (double)turn.picture.depth[n]);
+            }
+            assert_true(seen > 20);
+        }
+    }
+    scene_destroy(&s);
+}
+
 /* 0.5 of the front one is seen and 0.25 of the back one; kernels ripple by about a hundredth. */
 static void two_half_transparent_sheets_are_at_their_weighted_mean(void **state)
 {
@@ -275,6 +336,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_opaque_slab_is_as_far_as_its_front_face),
+        cmocka_unit_test(a_slab_is_as_far_and_as_bright_however_opaque_it_is),
+        cmocka_unit_test(what_has_its_centre_behind_the_eye_is_not_before_it),
         cmocka_unit_test(two_half_transparent_sheets_are_at_their_weighted_mean),
         cmocka_unit_test(where_nothing_is_seen_is_infinitely_far),
         cmocka_unit_test(renderers_have_the_reference_s_depths_and_their_own_colours),

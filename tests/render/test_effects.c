@@ -1,5 +1,6 @@
 /* Shadows, scattering, ambient occlusion and depth cueing: the integral against closed forms, the
  * others against it and one another. */
+#include "dataset_join.h"
 #include "effects.h"
 #include "light_map.h"
 #include "scenes.h"
@@ -65,6 +66,60 @@ static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
         while (scene_take_turn(&turn))
             assert_true(scene_difference(&turn.picture, &exact) < 5e-4);
         scene_picture_free(&exact);
+    }
+    scene_destroy(&s);
+}
+
+/* Light passes what is cut away; the lattice has half a voxel of what lies between those on both
+ * sides of a cut in the middle. */
+static void what_is_cut_away_casts_no_shadow(void **state)
+{
+    (void)state;
+    const double at = 8.5;
+    scene s;
+    create_fog(&s, (float)FOG);
+    const trip_camera_params view = along_z(&s);
+    trip_settings settings = scene_with_shadows(trip_v3(1, 0, 0));
+    trip_clip_add(&settings.clip, trip_v3(-1, 0, 0), at);
+    scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+    scene_picture exact = integrate(&s, &view, &settings);
+    int left = 0;
+    for (int x = 0; x < SIZE; x++) {
+        const double place = place_x(&s, &view, x, 4);
+        const double expected =
+            place > at ? 0 : (1 - exp(-FOG * (EDGE - 1))) * (0.3 + 0.7 * exp(-FOG * (at - place)));
+        assert_close(scene_pixel(&exact, x, 4)[0], expected, 2e-5);
+        left += place < at;
+    }
+    assert_in_range(left, 2, SIZE - 2);
+    while (scene_take_turn(&turn))
+        assert_true(scene_difference(&turn.picture, &exact) < 1e-3);
+    scene_picture_free(&exact);
+    scene_destroy(&s);
+}
+
+/* Of a segment between two slices a fifth is left: it fades, and is as far, as in the middle of
+ * that. */
+static void what_is_left_of_a_segment_fades_where_it_is(void **state)
+{
+    (void)state;
+    const double from = 7.1, to = 7.3, middle = 7.2, depth = 50 * (to - from);
+    scene s;
+    create_fog(&s, 50);
+    const trip_camera_params view = along_z(&s);
+    trip_settings settings = scene_post(1);
+    settings.saturation = 0;
+    settings.effects.cueing = 1;
+    settings.depth = true;
+    trip_clip_add(&settings.clip, trip_v3(0, 0, 1), -from);
+    trip_clip_add(&settings.clip, trip_v3(0, 0, -1), to);
+    scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+    while (scene_take_turn(&turn)) {
+        const double tolerance = 1e-4 + 0.1 * turn.renderer->tolerance;
+        const float *c = scene_pixel(&turn.picture, 4, 4);
+        assert_close(c[3], 1 - exp(-depth), tolerance);
+        assert_close(c[0], (1 - exp(-depth)) * middle / (EDGE - 1), tolerance);
+        assert_close(turn.picture.depth[4 * SIZE + 4], view.eye.z - middle, tolerance);
     }
     scene_destroy(&s);
 }
@@ -551,6 +606,167 @@ static void light_at_a_place_is_not_passed(void **state)
     }
 }
 
+/* What reaches a place and what is open there, as functions of it. */
+static double test_reached(const void *user, trip_vec3 v)
+{
+    (void)user;
+    return 0.5 + 0.4 * sin(v.x + 2 * v.y - v.z);
+}
+
+static double test_open(const void *user, trip_vec3 v)
+{
+    (void)user;
+    return 0.5 + 0.45 * sin(2 * v.x - v.y + 1.5 * v.z);
+}
+
+/* The formula of effects.h for a component of a colour, of a light in a direction. */
+static double lit_component(const trip_effects_view *e, const trip_light *at, trip_vec3 x,
+                            const double *gradient, double c)
+{
+    const trip_lit lit = gradient ? trip_light_on(at, gradient) : (trip_lit){ 0 };
+    const double g = e->effects.anisotropy, strength = lit.strength;
+    double reached = 1, open = 1, phase = 1;
+    if (e->effects.shadows) {
+        const trip_vec3 aside = trip_scale(at->light, strength * e->bias);
+        const double cosine = trip_dot(trip_scale(at->light, -1), at->eye);
+        reached = test_reached(NULL, trip_add(x, trip_affine_vector(&e->to_index, aside)));
+        phase = (1 - g * g) / pow(1 + g * g - 2 * g * cosine, 1.5);
+    }
+    if (e->effects.occlusion) {
+        const trip_vec3 n =
+            gradient ? trip_v3(gradient[0], gradient[1], gradient[2]) : trip_v3(1, 0, 0);
+        const trip_vec3 aside =
+            trip_affine_vector(&e->to_index, trip_scale(n, strength * e->bias / trip_length(n)));
+        open = fmin(1, (1 + strength) * fmax(test_open(NULL, trip_add(x, aside)),
+                                             test_open(NULL, trip_sub(x, aside))));
+    }
+    const double all =
+        c * (TRIP_AMBIENT * open +
+             TRIP_DIFFUSE * reached * ((1 - strength) * phase + strength * lit.diffuse)) +
+        strength * reached * TRIP_SPECULAR * lit.specular;
+    return fmin(1, fmax(0, all));
+}
+
+/* Flat, in part and full; with shadows, with occlusion, and with both. */
+static void colours_are_those_of_the_formula(void **state)
+{
+    (void)state;
+    int full = 0, bright = 0, changed = 0;
+    trip_effects_view e = { .bias = 0.7, .reached = test_reached, .open = test_open };
+    assert_true(trip_affine_invert(&scene_sheared, &e.to_index));
+    for (int n = 0; n < 3000; n++) {
+        const trip_vec3 x = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const trip_vec3 eye = trip_effects_direction(n % TRIP_OPEN_DIRECTIONS);
+        const trip_vec3 light = trip_effects_direction(n * 7 % 29);
+        const trip_light at = { .eye = eye,
+                                .light = light,
+                                .half = trip_normalize(trip_add(eye, light)),
+                                .gradient_full = 1 };
+        const trip_vec3 g = trip_scale(at.half, 1.5 * test_random());
+        const double turned[3] = { g.x + 0.3 * test_random(), g.y, g.z - 0.3 * test_random() };
+        const double *gradient = n % 5 ? turned : NULL;
+        e.effects = (trip_effects){ .shadows = n % 3 != 1,
+                                    .occlusion = n % 3 > 0,
+                                    .anisotropy = 0.8 * sin(n) };
+        double rgb[3] = { 1, 0.6 * test_random(), 0 };
+        const double c[3] = { rgb[0], rgb[1], rgb[2] };
+        trip_effects_colour(&e, &at, x, gradient, rgb);
+        for (int i = 0; i < 3; i++)
+            assert_close(rgb[i], lit_component(&e, &at, x, gradient, c[i]), 1e-12);
+        full += gradient && trip_light_on(&at, gradient).strength == 1;
+        bright += rgb[0] == 1;
+        changed += fabs(rgb[0] - c[0]) > 0.1;
+    }
+    assert_true(full > 100 && bright > 100 && changed > 1000);
+}
+
+/* Corner `n` of a box of voxels of three lengths, in index space. */
+static const uint64_t box_dims[3] = { 21, 31, 41 };
+
+static trip_vec3 box_corner(int n)
+{
+    return trip_v3(n & 1 ? 20 : 0, n & 2 ? 30 : 0, n & 4 ? 40 : 0);
+}
+
+/* By distances along the gaze in the world: from 0 at the nearest corner before the eye, or at the
+ * eye, to 1 at the farthest. */
+static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
+{
+    (void)state;
+    for (int n = 0; n < 60; n++) {
+        const trip_vec3 middle = trip_affine_point(&scene_sheared, trip_v3(10, 15, 20));
+        const trip_vec3 gaze = trip_effects_direction(n % TRIP_OPEN_DIRECTIONS);
+        const trip_camera_params view = { .eye = trip_sub(middle, trip_scale(gaze, n % 3 ? 90 : 5)),
+                                          .look = trip_add(middle, gaze),
+                                          .up = { 0.1, 0.2, 0.3 },
+                                          .fov_degrees = 30,
+                                          .ortho_height = n % 2 ? 50 : 0,
+                                          .width = SIZE,
+                                          .height = SIZE };
+        trip_settings settings = trip_settings_default();
+        trip_camera camera;
+        double z[8], near = INFINITY, far = 0;
+        settings.effects.cueing = 1;
+        for (int i = 0; i < 8; i++) {
+            const trip_vec3 corner = trip_affine_point(&scene_sheared, box_corner(i));
+            z[i] = trip_dot(gaze, trip_sub(corner, view.eye));
+            near = fmin(near, fmax(0, z[i]));
+            far = fmax(far, z[i]);
+        }
+        assert_int_equal(trip_camera_make(&camera, &view, &scene_sheared), 0);
+        const trip_effects_view e = trip_effects_view_make(&settings, &camera, box_dims);
+        for (int i = 0; i < 8; i++) {
+            const trip_vec3 c = box_corner(i);
+            assert_close(e.cue[0] * c.x + e.cue[1] * c.y + e.cue[2] * c.z + e.cue[3],
+                         (z[i] - near) / (far - near), 1e-9);
+        }
+    }
+}
+
+/* Where all of the box lies behind the eye, none of it fades. */
+static void what_lies_behind_the_eye_does_not_fade(void **state)
+{
+    (void)state;
+    const trip_affine map = trip_affine_identity();
+    const trip_camera_params view = { .eye = { 10, 15, 50 },
+                                      .look = { 10, 15, 60 },
+                                      .up = { 0, 1, 0 },
+                                      .fov_degrees = 30,
+                                      .width = SIZE,
+                                      .height = SIZE };
+    trip_settings settings = trip_settings_default();
+    trip_camera camera;
+    settings.effects.cueing = 1;
+    assert_int_equal(trip_camera_make(&camera, &view, &map), 0);
+    const trip_effects_view e = trip_effects_view_make(&settings, &camera, box_dims);
+    for (int i = 0; i < 4; i++)
+        assert_true(e.cue[i] == 0);
+}
+
+/* By a form that is below 0 and above 1 in places. */
+static void fading_blends_with_the_background_by_its_share(void **state)
+{
+    (void)state;
+    const trip_effects_view e = { .effects = { .cueing = 0.8 },
+                                  .cue = { 0.1, 0.25, -0.15, 0.2 },
+                                  .cue_rgb = { 0.9, 0.1, 0.4 } };
+    const trip_light light = { .gradient_full = 1 };
+    int below = 0, above = 0;
+    for (int n = 0; n < 500; n++) {
+        const trip_vec3 x = trip_v3(9 * test_random(), 9 * test_random(), 9 * test_random());
+        const double form = 0.1 * x.x + 0.25 * x.y - 0.15 * x.z + 0.2;
+        const double share = 0.8 * fmin(1, fmax(0, form));
+        const double c[3] = { test_random(), test_random(), test_random() };
+        double rgb[3] = { c[0], c[1], c[2] };
+        trip_effects_colour(&e, &light, x, NULL, rgb);
+        for (int i = 0; i < 3; i++)
+            assert_close(rgb[i], c[i] * (1 - share) + e.cue_rgb[i] * share, 1e-12);
+        below += form < 0;
+        above += form > 1;
+    }
+    assert_true(below > 10 && above > 10);
+}
+
 static void scattering_keeps_light(void **state)
 {
     (void)state;
@@ -575,6 +791,7 @@ static void directions_are_spread_evenly(void **state)
             assert_true(trip_dot(d, trip_effects_direction(m)) < 0.95);
     }
     assert_true(trip_length(sum) / TRIP_OPEN_DIRECTIONS < 0.02);
+    assert_close(sum.z, 0, 1e-12); /* each above has one as far below */
 }
 
 /* The second frame reads nothing where the view alone has changed; the light takes a sweep; the
@@ -639,6 +856,62 @@ static void a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node(void *
     }
     trip_light_map_destroy(m);
     scene_destroy(&s);
+}
+
+/* The half of the grid along i that *user says, and the sheet of the other half next to it. */
+static bool half_fog(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)j, (void)k, (void)gradient;
+    *code = 65535;
+    return (i < EDGE / 2) == (*(const int *)user == 0);
+}
+
+static bool beside_half_fog(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)j, (void)k, (void)gradient;
+    *code = 65535;
+    return i == (*(const int *)user == 0 ? EDGE / 2 : EDGE / 2 - 1);
+}
+
+/* What is halo of one data set is kept in the other, and counts once. */
+static void joined_data_sets_make_one_fog(void **state)
+{
+    (void)state;
+    scene halves[2];
+    trip_dataset *joined;
+    trip_light_map *m;
+    const trip_clip none = { 0 };
+    for (int n = 0; n < 2; n++) {
+        const scene_part halo = {
+            .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = beside_half_fog, .user = &n
+        };
+        scene_create(&halves[n], &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                                  .voxel = half_fog,
+                                                  .user = &n,
+                                                  .parts = &halo,
+                                                  .part_count = 1 });
+        halves[n].table[65535] = (trip_tf_entry){ 1, 1, 1, (float)FOG };
+    }
+    trip_dataset *const parts[2] = { halves[0].data, halves[1].data };
+    assert_int_equal(trip_dataset_join(&joined, parts, 2, halves[0].budget), 0);
+    for (int n = 0; n < 6; n++) {
+        trip_settings settings = scene_with_shadows(trip_v3(n / 2 == 0, n / 2 == 1, n / 2 == 2));
+        settings.classify = n % 2 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+        const trip_light_source source = { .data = joined,
+                                           .settings = &settings,
+                                           .clip = &none,
+                                           .table = halves[0].table,
+                                           .threads = 1 };
+        assert_int_equal(trip_light_map_create(&m, halves[0].budget), 0);
+        complete(m, &source);
+        const trip_light_grid *g = trip_light_map_gathered(m);
+        for (size_t i = 0; i < trip_light_grid_count(g); i++)
+            assert_close((double)g->at[i], FOG, 1e-6);
+        trip_light_map_destroy(m);
+    }
+    trip_dataset_join_close(joined);
+    scene_destroy(&halves[0]);
+    scene_destroy(&halves[1]);
 }
 
 /* On the rim of fog columns beside the node have left it. */
@@ -873,11 +1146,14 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fog_lit_from_the_side_is_darker_away_from_the_light),
+        cmocka_unit_test(what_is_cut_away_casts_no_shadow),
+        cmocka_unit_test(what_is_left_of_a_segment_fades_where_it_is),
         cmocka_unit_test(fog_lit_from_the_front_scatters_backwards),
         cmocka_unit_test(fog_is_lit_from_a_place),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
         cmocka_unit_test(a_light_far_away_is_one_in_a_direction),
         cmocka_unit_test(a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node),
+        cmocka_unit_test(joined_data_sets_make_one_fog),
         cmocka_unit_test(every_node_is_lit_from_a_place_once),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
         cmocka_unit_test(openness_is_the_mean_over_directions),
@@ -889,6 +1165,10 @@ int main(void)
         cmocka_unit_test(within_the_volume_fading_begins_at_the_eye),
         cmocka_unit_test(light_is_looked_up_beside_surfaces_by_the_lattices_cells),
         cmocka_unit_test(light_at_a_place_is_not_passed),
+        cmocka_unit_test(colours_are_those_of_the_formula),
+        cmocka_unit_test(fading_goes_from_the_nearest_corner_to_the_farthest),
+        cmocka_unit_test(what_lies_behind_the_eye_does_not_fade),
+        cmocka_unit_test(fading_blends_with_the_background_by_its_share),
         cmocka_unit_test(scattering_keeps_light),
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),

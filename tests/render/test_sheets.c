@@ -237,6 +237,65 @@ static void from_within_what_lies_before_the_eye_is_seen(void **state)
     scene_destroy(&s);
 }
 
+/* A pixel of a parallel view along an axis, its ray at `u` and `v` along the two next ones. */
+static trip_camera_params pixel_along(int axis, double sign, double at, double u, double v)
+{
+    double eye[3], look[3];
+    eye[axis] = at;
+    look[axis] = at + sign;
+    eye[(axis + 1) % 3] = look[(axis + 1) % 3] = u;
+    eye[(axis + 2) % 3] = look[(axis + 2) % 3] = v;
+    return (trip_camera_params){ .eye = { eye[0], eye[1], eye[2] },
+                                 .look = { look[0], look[1], look[2] },
+                                 .up = { 0.3, 0.5, 0.7 },
+                                 .ortho_height = 1e-3,
+                                 .width = 1,
+                                 .height = 1 };
+}
+
+/* The segment that the plane of the eye is in begins behind it. */
+static void a_parallel_view_from_within_begins_at_the_next_slice(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
+    fill_table(&s, 1, 1, 1, 0.1);
+    for (int i = 0; i < 36; i++) {
+        const double at = (double[]){ 7.3, 7, 12.6 }[i / 12], sign = i / 3 % 2 ? 1 : -1;
+        const int slices = 1 + i / 6 % 2 * 2;
+        const double next = sign > 0 ? ceil(at * slices) / slices : floor(at * slices) / slices;
+        trip_camera_params view = pixel_along(i % 3, sign, at, 9.4, 8.7);
+        trip_settings settings = scene_post(slices);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn))
+            assert_close(turn.picture.rgba[3], 1 - exp(-0.1F * (sign > 0 ? EDGE - 1 - next : next)),
+                         1e-6 + turn.renderer->tolerance);
+    }
+    scene_destroy(&s);
+}
+
+/* Rays along an axis, a hundredth of a voxel on either side of the box of voxel centres. */
+static void rays_beside_the_grid_meet_nothing(void **state)
+{
+    (void)state;
+    const double last = EDGE - 1, beside[] = { -0.01, 0.01, last - 0.01, last + 0.01, last + 0.9 };
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
+    fill_table(&s, 1, 1, 1, 0.1);
+    for (int i = 0; i < 30; i++) {
+        const double place = beside[i / 3 % 5], other = 8.3;
+        const bool within = place > 0 && place < last;
+        trip_camera_params view =
+            pixel_along(i % 3, 1, -20, i / 15 ? place : other, i / 15 ? other : place);
+        trip_settings settings = scene_post(1 + i % 2);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn))
+            assert_close(turn.picture.rgba[3], within ? 1 - exp(-0.1F * last) : 0,
+                         1e-6 + turn.renderer->tolerance);
+    }
+    scene_destroy(&s);
+}
+
 /* Opaque walls in a ramp. */
 static void colour_walls(scene *s)
 {
@@ -739,6 +798,46 @@ static void along_the_sheets_slices_have_the_values_of_the_kernel(void **state)
     }
 }
 
+/* Between two sheets with unlike gradients, of 300 and 1250 codes a voxel, a segment is lit by
+ * their mean; all the others are cut away. */
+static void a_segment_is_lit_by_the_mean_of_both_gradients(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 6; i++) {
+        layers l = { .axis = i % 3 };
+        for (int n = 0; n < EDGE; n++)
+            l.codes[n] = n < 3 ? 19900 : n == 3 ? 20000 : n == 4 ? 20500 : 22500;
+        scene s;
+        scene_create(
+            &s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = layer_code, .user = &l });
+        fill_table(&s, 0.6, 0.3, 0.1, 1);
+        const trip_vec3 along = { l.axis == 0, l.axis == 1, l.axis == 2 };
+        trip_camera_params view = scene_view(&s, trip_scale(along, i < 3 ? 1 : -1), 60, 20, 1);
+        view.ortho_height = 0.1;
+        trip_settings settings = scene_post(1);
+        settings.shading = true;
+        settings.headlight = false;
+        settings.light_direction = trip_normalize(trip_v3(0.5, 0.6, 0.7));
+        trip_clip_add(&settings.clip, along, -3);
+        trip_clip_add(&settings.clip, trip_scale(along, -1), 4);
+
+        trip_camera camera;
+        const trip_vec3 mean = trip_scale(along, (300 + 1250) / 2.0 / 65535);
+        double rgb[3] = { 0.6F, 0.3F, 0.1F };
+        assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
+        trip_shade(&settings, &camera, trip_shade_gradient_full(&s.data->header, 1, 0),
+                   trip_v3(0, 0, 0), (const double[3]){ mean.x, mean.y, mean.z }, rgb);
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            const float *c = turn.picture.rgba;
+            assert_close(c[3], 1 - exp(-1), 1e-6 + turn.renderer->tolerance);
+            for (int k = 0; k < 3; k++)
+                assert_close(c[k] / c[3], rgb[k], 1e-5 + 0.5 * turn.renderer->tolerance);
+        }
+        scene_destroy(&s);
+    }
+}
+
 static bool is_inside(double x, double y, double z)
 {
     return x * x + y * y + z * z < 50;
@@ -990,10 +1089,13 @@ int main(void)
         cmocka_unit_test(values_fall_to_those_of_the_halo_and_end_without_it),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
         cmocka_unit_test(from_within_what_lies_before_the_eye_is_seen),
+        cmocka_unit_test(a_parallel_view_from_within_begins_at_the_next_slice),
+        cmocka_unit_test(rays_beside_the_grid_meet_nothing),
         cmocka_unit_test(the_nearest_wall_hides_those_behind_it),
         cmocka_unit_test(walls_are_seen_on_both_sides_of_an_eye_between_them),
         cmocka_unit_test(a_saturated_pixel_is_opaque),
         cmocka_unit_test(light_comes_by_differences_of_values),
+        cmocka_unit_test(a_segment_is_lit_by_the_mean_of_both_gradients),
         cmocka_unit_test(what_a_segment_leaps_over_is_seen_and_lit),
         cmocka_unit_test(depth_is_the_mean_distance_of_what_is_seen),
         cmocka_unit_test(mirrored_turned_and_moved_it_is_the_same_picture),

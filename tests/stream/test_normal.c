@@ -145,6 +145,35 @@ static void central_differences_of_bytes_are_exact_below_full(void **state)
     assert_true(weak > 30000);
 }
 
+/* Factors of 1 and 8: the eighth as fine steps as along the other axes do not reach far enough. */
+static void gradients_are_exact_only_where_they_are_along_each_axis(void **state)
+{
+    (void)state;
+    double step[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const trip_affine m = stretched(axis == 0 ? 8 : 1, axis == 1 ? 8 : 1, axis == 2 ? 8 : 1);
+        assert_true(trip_compact_normals_choose(&m, 127, 8, step));
+        assert_false(trip_compact_normals_choose(&m, 127, 1, step));
+    }
+}
+
+/* To 127 of them, of gradients that are below full. */
+static void parts_are_cut_where_steps_do_not_reach(void **state)
+{
+    (void)state;
+    const trip_affine m = trip_affine_identity();
+    const trip_compact_normals c = trip_compact_normals_make(&m, 1024, (const double[]){ 1, 1, 1 });
+    for (int i = 0; i < 27; i++) {
+        double g[3], expected[3], back[3];
+        for (int a = 0; a < 3; a++) {
+            g[a] = ((int[]){ i, i / 3, i / 9 }[a] % 3 - 1) * 300 + 5;
+            expected[a] = fmin(127, fmax(-127, g[a]));
+        }
+        trip_compact_normal_unpack(&c, trip_compact_normal_pack(&c, g), back);
+        assert_true(is_same_or_opposite(back, expected));
+    }
+}
+
 static void other_weak_gradients_come_back_within_half_a_step(void **state)
 {
     uint64_t random = 7;
@@ -234,6 +263,8 @@ int main(void)
         cmocka_unit_test(what_has_no_direction_is_zero),
         cmocka_unit_test(the_longest_gradients_are_cut),
         cmocka_unit_test(central_differences_of_bytes_are_exact_below_full),
+        cmocka_unit_test(gradients_are_exact_only_where_they_are_along_each_axis),
+        cmocka_unit_test(parts_are_cut_where_steps_do_not_reach),
         cmocka_unit_test(other_weak_gradients_come_back_within_half_a_step),
         cmocka_unit_test(strong_gradients_keep_their_direction_within_a_tenth_of_a_degree),
         cmocka_unit_test(compact_normals_of_what_is_not_finite_are_zero),

@@ -271,6 +271,40 @@ static void what_is_no_view_is_left_out(void **state)
     assert_memory_equal(&n, &before, sizeof n);
 }
 
+/* Though the eye moves, heights of parallel views stay from 1e-100 to 1e100. */
+static void parallel_views_are_neither_too_low_nor_too_high(void **state)
+{
+    (void)state;
+    const struct {
+        double height, factor;
+        bool taken;
+    } steps[] = { { 2e-100, 0.4, false }, { 3e-100, 0.5, true }, { 4e99, 3, false },
+                  { 4e99, 2, true },      { 1e-101, 5, false },  { 1e-101, 20, true },
+                  { 1e101, 0.2, false },  { 1e101, 0.05, true } };
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        trip_navigation n = oblique(true);
+        n.ortho_height = steps[i].height;
+        const trip_navigation before = n;
+        trip_navigation_dolly(&n, steps[i].factor, (const double[3]){ 1.5, 1, 0.25 });
+        if (steps[i].taken)
+            assert_true(n.ortho_height == steps[i].height * steps[i].factor);
+        else
+            assert_memory_equal(&n, &before, sizeof n);
+    }
+}
+
+/* Where the eye is so near that it comes no nearer, what is seen becomes no smaller either. */
+static void a_parallel_view_grows_as_long_as_its_eye_moves(void **state)
+{
+    (void)state;
+    trip_navigation n = oblique(true);
+    const double seen = n.ortho_height / trip_navigation_distance(&n);
+    for (int i = 0; i < 200; i++)
+        trip_navigation_dolly(&n, 0.5, n.look);
+    const double ratio = n.ortho_height / trip_navigation_distance(&n) / seen;
+    assert_true(ratio > 0.25 && ratio < 4);
+}
+
 static void the_point_looked_at_can_always_be_left_again(void **state)
 {
     (void)state;
@@ -302,6 +336,8 @@ int main(void)
         cmocka_unit_test(sides_are_seen_upright),
         cmocka_unit_test(a_box_is_fitted_exactly),
         cmocka_unit_test(what_is_no_view_is_left_out),
+        cmocka_unit_test(parallel_views_are_neither_too_low_nor_too_high),
+        cmocka_unit_test(a_parallel_view_grows_as_long_as_its_eye_moves),
         cmocka_unit_test(the_point_looked_at_can_always_be_left_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
