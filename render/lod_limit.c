@@ -21,7 +21,7 @@ static int lists_read(const trip_camera *camera, const trip_settings *settings)
     const int axis_of_view = trip_weight_axis_of_view(camera);
     int lists = 0;
     for (int axis = 0; axis < 3; axis++)
-        lists += trip_weight_is_somewhere(settings, camera, axis_of_view, axis);
+        lists += trip_weight_is_somewhere(settings, camera, axis_of_view, axis, TRIP_WAY_ANY);
     return lists;
 }
 

@@ -10,7 +10,6 @@
 #include "report.h"
 #include "shade.h"
 #include "sheet.h"
-#include "weight.h"
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
 
@@ -48,25 +47,52 @@ static bool is_in_layer(const planning *p, const trip_list *list, int axis)
     return !trip_kind_of(list->kind)->coarse || trip_lod_concerns(&p->plan->lod, list);
 }
 
-/* First sheet that is not below the eye, cut to [0, sheets]. */
-static int64_t first_sheet_beyond(double eye, int64_t sheets)
+/* Whether each ray takes part in the pass of its own way alone. Rays through values begin at the
+ * eye whatever the passes are; weights of vertices are those of splats, not of rays; and sheets
+ * parallel to the image have an order of their own. */
+static bool is_by_ways(const planning *p)
 {
-    return (int64_t)fmin((double)sheets, fmax(0, ceil(eye)));
+    const trip_settings *s = p->settings;
+    return s->classify == TRIP_CLASSIFY_PRE && s->traversal == TRIP_TRAVERSAL_OUTWARD &&
+           !p->camera->ortho && !s->vertex_weights && s->method != TRIP_METHOD_IMAGE;
+}
+
+/* Places of a list along its axis: of the eye, and how far on either side of it splats of the other
+ * side show. */
+typedef struct eye_place {
+    double at, over;
+} eye_place;
+
+static eye_place place_of_eye(const planning *p, const trip_list *list)
+{
+    const trip_plan_list *planned = &p->plan->lists[list->index];
+    eye_place eye = { .at = trip_component(planned->camera.eye, list->axis) };
+    if (is_by_ways(p)) {
+        const trip_cull cull = trip_cull_make(p->data, &planned->camera, &planned->grid,
+                                              p->settings, p->plan->axis_of_view, NULL, NULL);
+        eye.over = trip_cull_reach_over_eye(&cull, list->axis, list->dims);
+    }
+    return eye;
+}
+
+/* First sheet that does not lie below a place, cut to [0, sheets]. */
+static int64_t first_sheet_beyond(const planning *p, const trip_list *list, double place)
+{
+    double index = trip_coordinates_index(&p->data->coordinates, list->axis, place);
+    return (int64_t)fmin((double)list->dims[list->axis], fmax(0, ceil(index)));
 }
 
 static int add_selection(const planning *p, trip_plan_pass *pass, const trip_list *list, sides side)
 {
     trip_plan *plan = p->plan;
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
-    double eye =
-        trip_coordinates_index(&p->data->coordinates, list->axis,
-                               trip_component(plan->lists[list->index].camera.eye, list->axis));
+    const eye_place eye = place_of_eye(p, list);
     /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round. */
     int64_t over = p->about ? trip_sheet_reach(p->settings->kernel) : 0;
     if (side == BEYOND)
-        first = first_sheet_beyond(eye, sheets) - over;
+        first = first_sheet_beyond(p, list, eye.at - eye.over) - over;
     else if (side == BELOW)
-        last = first_sheet_beyond(eye, sheets) - 1 + over;
+        last = first_sheet_beyond(p, list, eye.at + eye.over) - 1 + over;
     first = first > 0 ? first : 0;
     last = last < sheets ? last : sheets - 1;
     if (first > last)
@@ -98,8 +124,15 @@ static int add_pass(const planning *p, int axis, sides side, bool descending, bo
     return status;
 }
 
-/* The sides of the eye, each from the eye outwards. Sides do not cover one another: a ray meets
- * only the side it points to. In a parallel view the eye is infinitely far off. */
+static bool has_rays(const planning *p, int axis, trip_way way)
+{
+    return !is_by_ways(p) ||
+           trip_weight_is_somewhere(p->settings, p->camera, p->plan->axis_of_view, axis, way);
+}
+
+/* The sides of the eye, each from the eye outwards. A ray meets only the side it points to, and of
+ * the other the splats that reach over the eye's coordinate. In a parallel view the eye is
+ * infinitely far off. */
 static int add_passes(const planning *p, int axis)
 {
     const trip_camera *c = p->camera;
@@ -109,8 +142,12 @@ static int add_passes(const planning *p, int axis)
         return add_pass(p, axis, ALL, false, upwards);
     if (c->ortho)
         return add_pass(p, axis, ALL, !upwards, true);
-    int status = add_pass(p, axis, BEYOND, false, true);
-    return status ? status : add_pass(p, axis, BELOW, true, true);
+    int status = 0;
+    if (has_rays(p, axis, TRIP_WAY_UP))
+        status = add_pass(p, axis, BEYOND, false, true);
+    if (!status && has_rays(p, axis, TRIP_WAY_DOWN))
+        status = add_pass(p, axis, BELOW, true, true);
+    return status;
 }
 
 /* Those of a pass: they lie in the plan's array. */
@@ -306,9 +343,12 @@ static int plan_layer(planning *p, int axis)
     for (unsigned i = 0; i < p->data->list_count && !status; i++)
         if (is_in_layer(p, &p->data->lists[i], axis))
             status = select_bricks(p, &p->data->lists[i]);
-    if (!status)
-        drop_empty(p->plan, &p->plan->layers[axis], p->budget);
-    return status;
+    if (status)
+        return status;
+    trip_plan_layer *layer = &p->plan->layers[axis];
+    drop_empty(p->plan, layer, p->budget);
+    layer->parted = layer->pass_count == 2 && is_by_ways(p);
+    return 0;
 }
 
 /* The layer of lists whose values are interpolated. */
@@ -428,8 +468,9 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
         status = take_lists(plan, data->list_count, budget);
     for (int axis = 0; axis < 3 && !status; axis++) {
         trip_plan_layer *layer = &plan->layers[axis];
-        layer->used = settings->show != TRIP_SHOW_MERGE &&
-                      trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis);
+        layer->used =
+            settings->show != TRIP_SHOW_MERGE &&
+            trip_weight_is_somewhere(settings, camera, plan->axis_of_view, axis, TRIP_WAY_ANY);
         if (layer->used)
             status = settings->classify == TRIP_CLASSIFY_POST ? plan_sheets(&p, axis)
                                                               : plan_layer(&p, axis);
@@ -669,9 +710,10 @@ static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *o
         const trip_selection *s = selection_in(plan, list->axis, i, list);
         if (!s)
             continue;
-        fprintf(out, "%ssheets %" PRId64 " to %" PRId64 " %s, %s", before, s->sheet_first,
+        fprintf(out, "%ssheets %" PRId64 " to %" PRId64 " %s, %s%s", before, s->sheet_first,
                 s->sheet_last, s->descending ? "descending" : "ascending",
-                layer->passes[i].front_to_back ? "front to back" : "back to front");
+                layer->passes[i].front_to_back ? "front to back" : "back to front",
+                layer->parted ? ", for rays that way" : "");
         before = "; then ";
     }
     fprintf(out, "\n");
@@ -783,6 +825,11 @@ uint64_t trip_plan_bytes_left_out(const trip_plan *plan, const trip_dataset *dat
         for (int plane = 0; plane < TRIP_PLANES; plane++)
             bytes += left_out >> plane & 1 ? plan->lists[i].bytes_selected[plane] : 0;
     return bytes;
+}
+
+trip_way trip_plan_way(const trip_plan *plan, int axis, bool descending)
+{
+    return !plan->layers[axis].parted ? TRIP_WAY_ANY : descending ? TRIP_WAY_DOWN : TRIP_WAY_UP;
 }
 
 bool trip_plan_is_of_values(const trip_plan *plan, const trip_settings *s)

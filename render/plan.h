@@ -13,6 +13,7 @@
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
+#include "weight.h"
 
 /* A list of the data set as the frame sees it. */
 typedef struct trip_plan_list {
@@ -30,7 +31,8 @@ typedef struct trip_plan_list {
     uint64_t bytes_selected[TRIP_PLANES]; /* of those, in the data set's planes */
 } trip_plan_list;
 
-/* One pass over the lists of an axis: a side of the eye, or all in `ascending` traversal. */
+/* One pass over the lists of an axis: from the eye outwards up the axis or down it, or all in
+ * `ascending` traversal. */
 typedef struct trip_plan_pass {
     trip_pass pass;
     bool front_to_back; /* false only in `ascending` traversal against the gaze */
@@ -41,6 +43,9 @@ typedef struct trip_plan_layer {
     bool used;      /* some ray of the view has weight in it */
     int pass_count; /* at most 2: beyond the eye (ascending), then below (descending) */
     trip_plan_pass passes[2];
+    /* Splats: a ray takes part in the pass that goes its way alone. The passes overlap, by as far
+     * as splats reach over the eye's coordinate. */
+    bool parted;
 } trip_plan_layer;
 
 typedef struct trip_plan {
@@ -98,6 +103,9 @@ uint64_t trip_plan_square(const trip_plan *plan, const trip_list *list, int64_t 
                           int64_t v);
 /* Whether that is all of them, of any square of the list. */
 bool trip_plan_draws_all(const trip_plan *plan, const trip_list *list);
+
+/* The rays that take part in the pass of an axis that goes ascending or descending. */
+trip_way trip_plan_way(const trip_plan *plan, int axis, bool descending);
 
 /* Whether a frame is of interpolated values: not of splats. */
 bool trip_plan_is_of_values(const trip_plan *plan, const trip_settings *settings);

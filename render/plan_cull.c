@@ -169,6 +169,39 @@ static double radius_in(const trip_cull *cull, double depth)
     return sqrt(cull->radius2 + low_pass2) * (1 + 1e-9);
 }
 
+/* The least that a ray with weight goes along the axis for each step along that which it goes
+ * farthest along. */
+static double least_slope(const trip_cull *cull, int axis)
+{
+    const double *scale = cull->grid->scale;
+    double h = trip_settings_has_one_list(cull->settings) ? 0 : trip_weight_h(cull->settings);
+    return h * fmin(scale[0], fmin(scale[1], scale[2])) / scale[axis];
+}
+
+/* With c from the eye and p the point of the ray that is nearest to c, at most R(z) away at the
+ * depth z of c, a ray of the other way has p_a <= 0, and so c_a <= R; and p_a <= -slope |p|, |p|
+ * the largest of its components, so that also c_a <= R - slope (|c| - R), with |c| at least z over
+ * the sum of |forward|. The two are equal where R is as long as |c|. Below that the first holds,
+ * beyond it the second, which is convex: largest there or at the farthest depth. Of splats about
+ * the eye p may lie behind it by a radius too, which the 2 is for. */
+double trip_cull_reach_over_eye(const trip_cull *cull, int axis, const int64_t dims[3])
+{
+    const trip_vec3 f = cull->camera->forward;
+    const double depth = fabs(f.x) + fabs(f.y) + fabs(f.z), slope = least_slope(cull, axis);
+    const double turn2 = cull->low_pass2 * depth * depth; /* R grows by its root for each |c| */
+    const double radius2 = 2 * cull->radius2;
+    trip_brick_box all = { .lo = { 0, 0, 0 } };
+    for (int i = 0; i < 3; i++)
+        all.hi[i] = (double)(dims[(axis + 1 + i) % 3] - 1);
+    const box b = place_box(cull, axis, &all);
+    const double away = larger(farthest_along(&b, f), 0);
+    const double farthest = sqrt(radius2 + cull->low_pass2 * away * away);
+    if (!(turn2 < 1))
+        return farthest * (1 + 1e-9);
+    const double about = sqrt(radius2 / (1 - turn2));
+    return larger(about, (1 + slope) * farthest - slope * away / depth) * (1 + 1e-9);
+}
+
 bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double hi[3])
 {
     box b;

@@ -45,6 +45,11 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
                          const trip_list_grid *grid, const trip_settings *settings,
                          int axis_of_view, const trip_code_set *shown, trip_brick_ranges *about);
 
+/* How far on the other side of the eye's sheet a splat of the list, `dims` voxels, may lie that
+ * shows at a ray with weight, along the list's axis: its centre above the eye where the ray goes
+ * down, or the other way round. An upper bound. */
+double trip_cull_reach_over_eye(const trip_cull *cull, int axis, const int64_t dims[3]);
+
 /* Whether splats of voxels in a box of the list's grid may be seen, by the view alone. */
 bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double hi[3]);
 

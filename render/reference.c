@@ -24,6 +24,7 @@ typedef struct pixel {
     double sheet[TRIP_CHANNELS_MAX]; /* of the open sheet: sums of optical depth times the channels,
                                         where splats are summed */
     double weight;                   /* of the layer at this pixel */
+    trip_way way;                    /* of its ray along the layer's axis */
     double stretch;    /* world units per index length of the list at hand, along the ray */
     double ray_length; /* |J r(p)| of it */
     double merged[TRIP_CHANNELS_MAX]; /* sum of w^2 layer over the layers that are done */
@@ -49,6 +50,7 @@ typedef struct reference {
     trip_reference_sheets *sheets; /* of frames that classify after interpolation; else NULL */
     trip_image_sheets *slabs;      /* of frames that are composited by them; else NULL */
     int axis;                      /* of the layer being drawn; -1 before the first */
+    trip_way way;                  /* of the rays that take part in the pass at hand */
     bool sums;                     /* splats, sheet by sheet */
     int64_t sheet;                 /* that is open, of the level of `list` */
     trip_pixels rows;              /* that it may have touched */
@@ -242,6 +244,7 @@ static int begin_layer(trip_renderer *base, int axis)
             pixel *p = &row_of(r, y)[x];
             trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
             memset(p->layer, 0, sizeof p->layer);
+            p->way = trip_ray_goes(ray, axis);
             p->weight = 0; /* of vertices: until a splat is drawn there */
             if (!r->frame->settings->vertex_weights)
                 p->weight =
@@ -338,7 +341,14 @@ static void draw_pixel(reference *r, const trip_splat *s, trip_vec3 voxel, int x
         put_fragment(r, p, fragment, depth * trip_splat_front(r->splat, s, x + 0.5, y + 0.5));
 }
 
-/* True when some pixel centre is in the support where the layer has weight. */
+/* Whether a pixel's ray takes part in the pass, and the layer has weight there. */
+static bool takes_part(const reference *r, const pixel *p)
+{
+    return (r->way == TRIP_WAY_ANY || r->way == p->way) &&
+           (p->weight > 0 || r->frame->settings->vertex_weights);
+}
+
+/* True when some pixel centre is in the support of one that takes part. */
 static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
                            double fragment[TRIP_CHANNELS_MAX], double extinction)
 {
@@ -356,7 +366,7 @@ static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
         for (int x = columns.first; x <= columns.last; x++) {
             pixel *p = &row_of(r, y)[x];
             double m = trip_splat_radius2(r->splat, s, x + 0.5, y + 0.5);
-            if (!((p->weight > 0 || by_vertices) && m <= r->constants.cutoff2))
+            if (!(takes_part(r, p) && m <= r->constants.cutoff2))
                 continue;
             touched = true;
             if (by_vertices)
@@ -495,6 +505,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     if (front_to_back != r->front_to_back)
         end_sheet(r);
     r->front_to_back = front_to_back;
+    r->way = trip_plan_way(r->frame->plan, r->axis, batch->pass->descending);
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_run *run = &batch->runs[i];
         int status = use_list(r, trip_batch_list(batch, run));

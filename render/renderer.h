@@ -17,7 +17,9 @@ struct trip_field;
 struct trip_light_map;
 struct trip_emission;
 
-/* Of a list in one frame. Where frames classify after interpolation nothing is projected: 0. */
+/* Of a list in one frame. Splats about the eye's coordinate, which are in the passes of both ways
+ * (plan.h), count once for each. Where frames classify after interpolation nothing is projected: 0.
+ */
 typedef struct trip_list_stats {
     uint64_t splats_read;      /* handed to the renderer */
     uint64_t splats_projected; /* of those, not culled by w +- dw or behind the eye */

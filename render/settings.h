@@ -26,7 +26,7 @@ typedef enum trip_method {
 } trip_method;
 
 typedef enum trip_traversal {
-    TRIP_TRAVERSAL_OUTWARD,   /* from the eye's coordinate outward, front to back */
+    TRIP_TRAVERSAL_OUTWARD,   /* from the eye outward, front to back, as each ray goes */
     TRIP_TRAVERSAL_ASCENDING, /* file order, blend equation by the central ray (2008, 5.3) */
 } trip_traversal;
 

@@ -31,8 +31,13 @@
  *     depth(p) = sum of depth_i(p),  alpha(p) = 1 - exp(-depth(p)),
  *     v(p) = sum of depth_i(p) v_i / depth(p)
  * for each channel v of layer.h, so that their order within the sheet does not matter: a mirrored
- * volume gives the mirrored picture. Sheets are composited in list order. Front to back, a pixel
- * whose transmittance is below trip_settings_saturation() takes no more of what is composited.
+ * volume gives the mirrored picture. Sheets are composited in list order: front to back, ascending
+ * along the list's axis at pixels whose ray goes up it, descending at the others (trip_ray_goes()),
+ * so that splats behind the eye which reach before it come before those beyond, as a ray meets
+ * them. With settings.vertex_weights all pixels take the sheets beyond the eye's coordinate in
+ * ascending order and then those below it in descending order, and with settings.traversal
+ * ascending one order. Front to back, a pixel whose transmittance is below
+ * trip_settings_saturation() takes no more of what is composited.
  *
  * The support {m(p) <= TRIP_CUTOFF^2} is the inside of a conic. Writing k = TRIP_CUTOFF,
  *     E = S'^-1 - (k^2 / |r_c|^2) [rx.rx rx.ry; rx.ry ry.ry],  l = (k^2 / |r_c|^2) (r_c.rx, r_c.ry)

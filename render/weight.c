@@ -66,6 +66,8 @@ trip_ray_bounds trip_ray_bounds_of(const double lo[3], const double hi[3])
 {
     trip_ray_bounds b;
     for (int a = 0; a < 3; a++) {
+        b.lo[a] = lo[a];
+        b.hi[a] = hi[a];
         b.least[a] = larger(0, larger(lo[a], -hi[a]));
         b.most[a] = larger(fabs(lo[a]), fabs(hi[a]));
     }
@@ -95,6 +97,15 @@ bool trip_weight_may_lie(const trip_settings *s, int axis_of_view, const trip_ra
     return !(bounds->most[axis] * (1 + 1e-9) < trip_weight_h(s) * least); /* room for rounding */
 }
 
+bool trip_way_may_lie(const trip_ray_bounds *bounds, int axis, trip_way way)
+{
+    const double *most = bounds->most;
+    double room = 1e-9 * larger(most[0], larger(most[1], most[2])); /* for rounding */
+    if (way == TRIP_WAY_UP)
+        return bounds->hi[axis] >= -room;
+    return way == TRIP_WAY_ANY || bounds->lo[axis] <= room;
+}
+
 /* Pixels, inclusive. */
 typedef struct rectangle {
     int lo[2], hi[2];
@@ -102,34 +113,37 @@ typedef struct rectangle {
 
 /* By halving. */
 static bool some_pixel_weighs(const trip_settings *s, const trip_camera *c, int axis_of_view,
-                              int axis, const rectangle *r)
+                              int axis, trip_way way, const rectangle *r)
 {
     int middle[2] = { r->lo[0] + (r->hi[0] - r->lo[0]) / 2, r->lo[1] + (r->hi[1] - r->lo[1]) / 2 };
     trip_vec3 ray = trip_camera_ray(c, middle[0] + 0.5, middle[1] + 0.5);
-    if (trip_weight(s, axis_of_view, ray, axis) > 0)
+    if (trip_weight(s, axis_of_view, ray, axis) > 0 &&
+        (way == TRIP_WAY_ANY || trip_ray_goes(ray, axis) == way))
         return true;
     if (r->lo[0] == r->hi[0] && r->lo[1] == r->hi[1])
         return false;
     const double from[2] = { r->lo[0] + 0.5, r->lo[1] + 0.5 };
     const double to[2] = { r->hi[0] + 0.5, r->hi[1] + 0.5 };
     trip_ray_bounds bounds = trip_ray_bounds_over(c, from, to);
-    if (!trip_weight_may_lie(s, axis_of_view, &bounds, axis))
+    if (!trip_weight_may_lie(s, axis_of_view, &bounds, axis) ||
+        !trip_way_may_lie(&bounds, axis, way))
         return false;
     int d = r->hi[0] - r->lo[0] >= r->hi[1] - r->lo[1] ? 0 : 1;
     rectangle first = *r, second = *r;
     first.hi[d] = middle[d];
     second.lo[d] = middle[d] + 1;
-    return some_pixel_weighs(s, c, axis_of_view, axis, &first) ||
-           some_pixel_weighs(s, c, axis_of_view, axis, &second);
+    return some_pixel_weighs(s, c, axis_of_view, axis, way, &first) ||
+           some_pixel_weighs(s, c, axis_of_view, axis, way, &second);
 }
 
 bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
-                              int axis)
+                              int axis, trip_way way)
 {
-    if (c->ortho || trip_settings_has_one_list(s))
-        return trip_weight(s, axis_of_view, c->r0, axis) > 0;
-    const rectangle image = { { 0, 0 }, { c->width - 1, c->height - 1 } };
-    return some_pixel_weighs(s, c, axis_of_view, axis, &image);
+    if (trip_settings_has_one_list(s) && axis != axis_of_view)
+        return false;
+    const rectangle all = { { 0, 0 }, { c->width - 1, c->height - 1 } },
+                    one = { { 0, 0 }, { 0, 0 } };
+    return some_pixel_weighs(s, c, axis_of_view, axis, way, c->ortho ? &one : &all);
 }
 
 /* The rays with weight and a given sign of r_a form a convex cone, so that the corner pixels speak

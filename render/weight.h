@@ -31,9 +31,19 @@ static inline double trip_weight_h(const trip_settings *s)
 bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axis_of_view, int axis,
                            trip_vec3 centre_from_eye, double radius);
 
-/* Bounds of |r_a| over a set of rays, by axis. */
+/* The ways that rays go along a list's axis. A ray up it meets the list's sheets in ascending
+ * order, one down it in descending order. */
+typedef enum trip_way { TRIP_WAY_ANY, TRIP_WAY_UP, TRIP_WAY_DOWN } trip_way;
+
+/* The way of a ray along an axis; those along its sheets count as going up. */
+static inline trip_way trip_ray_goes(trip_vec3 ray, int axis)
+{
+    return trip_component(ray, axis) >= 0 ? TRIP_WAY_UP : TRIP_WAY_DOWN;
+}
+
+/* Bounds of the components r_a over a set of rays, by axis, and of |r_a|. */
 typedef struct trip_ray_bounds {
-    double least[3], most[3];
+    double lo[3], hi[3], least[3], most[3];
 } trip_ray_bounds;
 
 /* Of the rays whose components lie in [lo, hi]. */
@@ -48,9 +58,13 @@ trip_ray_bounds trip_ray_bounds_over(const trip_camera *c, const double from[2],
 bool trip_weight_may_lie(const trip_settings *s, int axis_of_view, const trip_ray_bounds *bounds,
                          int axis);
 
-/* Whether list `axis` has weight at the centre of some pixel of the image, exactly. */
+/* False only when no ray within the bounds goes that way along an axis. */
+bool trip_way_may_lie(const trip_ray_bounds *bounds, int axis, trip_way way);
+
+/* Whether list `axis` has weight at the centre of some pixel of the image whose ray goes that way,
+ * exactly. */
 bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
-                              int axis);
+                              int axis, trip_way way);
 
 /* Whether every pixel centre has weight in list `axis`, and its rays go the same way along it: then
  * nothing need be masked, and one direction draws all. In views whose weights are constant it is

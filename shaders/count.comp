@@ -7,6 +7,7 @@
 
 layout(local_size_x = TRIP_GL_COUNT_GROUP) in;
 layout(location = TRIP_GL_PIECE) uniform uvec3 piece; // draw positions: first, count; number of the list
+layout(location = TRIP_GL_WAY) uniform int way; // of the rays that the pass is of
 
 // Low and high half of "projected", then of "drawn", by list.
 layout(std430, binding = TRIP_GL_COUNTS) buffer trip_gl_counts { uint counts[]; };
@@ -36,7 +37,8 @@ bool touches(splat s, ivec2 pixel)
 #else
     bool front = !s.near || dot(s.along, real3(1.0, p)) > -sqrt(kernel.y);
 #endif
-    return front && m <= kernel.y && weight_of(p + screen.xy, int(weight.z)) > 0.0;
+    int axis = int(weight.z);
+    return front && m <= kernel.y && weight_of(p + screen.xy, axis) > 0.0 && goes(p + screen.xy, axis, way);
 }
 
 bool drawn(splat s)

@@ -19,13 +19,20 @@ int largest_axis(real3 r)
     return a.y >= a.z ? 1 : 2;
 }
 
-// trip_weight() of a pixel position (from the image's corner) in the data's axes.
+// Of a pixel position (from the image's corner) in the data's axes.
+real3 pixel_ray(real2 pixel)
+{
+    precise real3 ray = camera_r0.xyz + (camera_rx.xyz * pixel.x + camera_ry.xyz * pixel.y);
+    return ray;
+}
+
+// trip_weight() of such a position.
 real weight_of(real2 pixel, int axis)
 {
 #if METHOD == 2
     return axis == int(weight.w) ? 1.0 : 0.0;
 #else
-    precise real3 ray = camera_r0.xyz + (camera_rx.xyz * pixel.x + camera_ry.xyz * pixel.y);
+    real3 ray = pixel_ray(pixel);
 #if METHOD == 1
     return axis == largest_axis(ray) ? 1.0 : 0.0;
 #else
@@ -33,6 +40,12 @@ real weight_of(real2 pixel, int axis)
     return max(real(0.0), (abs(ray[axis]) / largest_of(ray) - h) / (1.0 - h));
 #endif
 #endif
+}
+
+// Whether its ray goes a way, as trip_ray_goes().
+bool goes(real2 pixel, int axis, int way)
+{
+    return way == TRIP_GL_WAY_ANY || (pixel_ray(pixel)[axis] >= 0.0) == (way == TRIP_GL_WAY_UP);
 }
 
 // trip_weight_may_reach() of a splat, list axes; where weights are constant the plan has decided.

@@ -12,7 +12,7 @@ typedef struct trip_selection {
     const trip_dataset *data;
     const trip_list *list;
     bool descending;                 /* draw order is the exact reverse of the file's */
-    int64_t sheet_first, sheet_last; /* inclusive; the side of the eye this pass covers */
+    int64_t sheet_first, sheet_last; /* inclusive; what of the list this pass covers */
     uint64_t *bricks;                /* bit per brick of the list */
 } trip_selection;
 

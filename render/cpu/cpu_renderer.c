@@ -32,8 +32,10 @@ static bool classifies_post(const trip_cpu *r)
 static void make_views(trip_cpu *r, bool front_to_back, bool normals)
 {
     const trip_dataset *data = r->frame->data;
-    int axis = r->view.axis;
+    const int axis = r->view.axis;
+    const trip_way way = r->view.way;
     trip_cpu_layer_view_make(&r->view, r->frame, axis, front_to_back);
+    r->view.way = way;
     r->view.shading = normals && r->frame->settings->shading;
     r->view.flattens = normals && r->view.splat.flatten > 0;
     for (unsigned i = 0; i < data->list_count; i++) {
@@ -42,13 +44,36 @@ static void make_views(trip_cpu *r, bool front_to_back, bool normals)
             continue;
         trip_cpu_view_make(&r->views[i], classifies_post(r) ? &r->sheet_frame : r->frame, list,
                            front_to_back);
+        r->views[i].way = way;
         r->views[i].shading = r->view.shading;
         r->views[i].flattens = r->view.flattens;
         if (!classifies_post(r))
             trip_cpu_view_set_table(&r->views[i], r->frame->plan->lists[i].table);
-        if (r->frame->count)
-            trip_cpu_view_make(&r->counted_views[i], &r->counted_frame, list, front_to_back);
+        if (!r->frame->count)
+            continue;
+        trip_cpu_view_make(&r->counted_views[i], &r->counted_frame, list, front_to_back);
+        r->counted_views[i].way = way;
     }
+}
+
+/* The layer of an axis, or what of it is of rays of one way, starts empty. */
+static void start_layer(trip_cpu *r, int axis, trip_way way)
+{
+    r->view.axis = axis;
+    r->view.way = way;
+    make_views(r, true, false);
+    trip_cpu_begin_pane_layer(r);
+    r->visible_per_voxel = 1;
+}
+
+/* Takes up the way of the rays that a batch's pass is of. */
+static void use_way(trip_cpu *r, const trip_batch *batch)
+{
+    const trip_way way = trip_plan_way(r->frame->plan, r->view.axis, batch->pass->descending);
+    if (way == r->view.way)
+        return;
+    trip_cpu_merge_layer(r);
+    start_layer(r, r->view.axis, way);
 }
 
 static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back)
@@ -56,6 +81,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     trip_cpu *r = (trip_cpu *)base;
     if (classifies_post(r))
         return trip_cpu_sheets_draw(r->sheets, batch);
+    use_way(r, batch);
     bool normals = batch->planes[TRIP_PLANE_NORMALS];
     bool shading = r->frame->settings->shading && normals;
     bool flattens = r->view.splat.flatten > 0 && normals;
@@ -85,11 +111,8 @@ static int begin_layer(trip_renderer *base, int axis)
     int status = end_layer(r);
     if (status)
         return status;
-    r->view.axis = axis;
-    make_views(r, true, false);
-    trip_cpu_begin_pane_layer(r);
+    start_layer(r, axis, trip_plan_way(r->frame->plan, axis, false));
     r->in_layer = true;
-    r->visible_per_voxel = 1;
     return classifies_post(r) ? trip_cpu_sheets_begin_layer(r->sheets, axis) : 0;
 }
 
@@ -330,6 +353,7 @@ bool trip_cpu_occluded(void *renderer, const trip_selection *selection, const tr
 {
     trip_cpu *r = renderer;
     if (r->base.ops != &cpu_ops || !r->in_layer || selection->list->axis != r->view.axis ||
+        trip_plan_way(r->frame->plan, r->view.axis, selection->descending) != r->view.way ||
         !r->view.front_to_back || r->view.coordinates)
         return false;
     const trip_cpu_view *view = &r->views[selection->list->index];

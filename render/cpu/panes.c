@@ -21,7 +21,7 @@ static size_t lay_out(trip_cpu *r, char *memory)
         r->open_sheets = trip_cpu_take_array(
             memory, &at, panes * TRIP_CPU_SHEET_FLOATS(r->channels) * sizeof *r->open_sheets);
     r->states = trip_cpu_take_array(memory, &at, panes);
-    r->axes = trip_cpu_take_array(memory, &at, panes);
+    r->layers = trip_cpu_take_array(memory, &at, panes);
     r->mask.panes = trip_cpu_take_array(memory, &at, (panes + 1) * sizeof *r->mask.panes);
     r->portions = trip_cpu_take_array(memory, &at, 4 * panes * sizeof *r->portions);
     /* Splats are also counted for the pane beyond the last, diagonally. */
@@ -72,30 +72,47 @@ int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
 
 /* ---- frames and layers ---- */
 
-/* The axes, a bit each, whose layers may have weight in the pane at (x, y). Where there is but one,
- * its weight is 1 all over the pane. */
-static uint8_t axes_of_pane(const trip_frame *frame, int x, int y)
+/* The layers of an axis that rays within the bounds may take part in. */
+static unsigned layers_of_axis(const trip_frame *frame, const trip_ray_bounds *bounds, int axis)
+{
+    unsigned layers = 0;
+    if (!frame->plan->layers[axis].parted)
+        return trip_cpu_layer_bit(axis, TRIP_WAY_ANY);
+    for (trip_way way = TRIP_WAY_UP; way <= TRIP_WAY_DOWN; way++)
+        if (trip_way_may_lie(bounds, axis, way))
+            layers |= trip_cpu_layer_bit(axis, way);
+    return layers;
+}
+
+/* The layers, a bit each, that may have weight in the pane at (x, y). Where there is but one, its
+ * weight is 1 all over the pane. */
+static uint8_t layers_of_pane(const trip_frame *frame, int x, int y)
 {
     const double from[2] = { x, y }, to[2] = { x + TRIP_CPU_PANE, y + TRIP_CPU_PANE };
     trip_ray_bounds bounds = trip_ray_bounds_over(frame->camera, from, to);
-    unsigned axes = 0;
+    unsigned layers = 0;
     for (int axis = 0; axis < 3; axis++)
         if (trip_weight_may_lie(frame->settings, frame->plan->axis_of_view, &bounds, axis))
-            axes |= 1u << axis;
-    return (uint8_t)axes;
+            layers |= layers_of_axis(frame, &bounds, axis);
+    return (uint8_t)layers;
+}
+
+static bool is_of_layer(const trip_cpu *r, uint32_t pane)
+{
+    return r->layers[pane] & trip_cpu_layer_bit(r->view.axis, r->view.way);
 }
 
 void trip_cpu_begin_panes(trip_cpu *r)
 {
     memset(r->states, 0, trip_cpu_pane_count(r));
     for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++)
-        r->axes[t] = axes_of_pane(r->frame, trip_cpu_pane_x(r, t), trip_cpu_pane_y(r, t));
+        r->layers[t] = layers_of_pane(r->frame, trip_cpu_pane_x(r, t), trip_cpu_pane_y(r, t));
 }
 
 void trip_cpu_begin_pane_layer(trip_cpu *r)
 {
     for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++)
-        atomic_store_explicit(&r->mask.panes[t], r->axes[t] >> r->view.axis & 1 ? UINT64_MAX : 0,
+        atomic_store_explicit(&r->mask.panes[t], is_of_layer(r, t) ? UINT64_MAX : 0,
                               memory_order_relaxed);
 }
 
@@ -214,8 +231,8 @@ static bool is_to_merge(const trip_cpu *r, uint32_t pane)
 /* Of what is alone, whether it has sheets that the layer's view is to end: with the layer. */
 static bool is_to_end(const trip_cpu *r, uint32_t pane)
 {
-    return r->open_sheets && r->states[pane] & TRIP_CPU_PANE_BEGUN &&
-           r->axes[pane] == 1u << r->view.axis;
+    return r->open_sheets && r->states[pane] & TRIP_CPU_PANE_BEGUN && trip_cpu_is_alone(r, pane) &&
+           is_of_layer(r, pane);
 }
 
 /* The layer's pixels, with the open sheet. */

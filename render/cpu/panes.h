@@ -11,7 +11,7 @@ void trip_cpu_release_panes(trip_cpu *r);
 
 /* Every pane of a frame is empty. */
 void trip_cpu_begin_panes(trip_cpu *r);
-/* Every pane of a layer is open where the layer may have weight. */
+/* Every pane of the layer that is the view's is open where that may have weight. */
 void trip_cpu_begin_pane_layer(trip_cpu *r);
 
 /* Depths of a buffer's splats from one on; NULL where it has none. */
@@ -25,7 +25,7 @@ void trip_cpu_blend_filled(trip_cpu *r);
 /* The same, and ends with everything drawn so far in the pixels. */
 void trip_cpu_finish_blending(trip_cpu *r);
 
-/* Adds the layer, all of which is drawn, to the sum of layers. */
+/* Adds the layer, all of which was handed in, to the sum of layers. */
 void trip_cpu_merge_layer(trip_cpu *r);
 /* The picture of what is drawn so far; `depth` NULL without depth. */
 void trip_cpu_finish_picture(trip_cpu *r, float *rgba, float *depth);

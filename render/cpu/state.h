@@ -60,14 +60,14 @@ typedef struct trip_cpu {
     float *open_sheets; /* of panes, where splats are summed; else NULL */
     bool has_open_sheets;
     uint8_t *states;
-    uint8_t *axes; /* whose layers may have weight in a pane, a bit each */
+    uint8_t *layers; /* that may have weight in a pane, by trip_cpu_layer_bit() */
     trip_cpu_portion *portions;
 
     const trip_frame *frame;
-    trip_cpu_view view;   /* of the layer being drawn */
-    trip_cpu_view *views; /* of its lists, by number in the data set */
-    unsigned list_room;   /* of `views`, and of `counted_views` where that is there */
-    bool in_layer;
+    trip_cpu_view view;     /* of the layer being drawn */
+    trip_cpu_view *views;   /* of its lists, by number in the data set */
+    unsigned list_room;     /* of `views`, and of `counted_views` where that is there */
+    bool in_layer;          /* of the view's axis, and of its way where the axis has two */
     trip_list_stats *stats; /* by number of the list, as many as `views` */
     /* Where the frame counts: the same with every voxel visible, whatever its code. */
     trip_frame counted_frame;
@@ -128,10 +128,17 @@ static inline float *trip_cpu_pane_sheet(const trip_cpu *r, uint32_t pane)
     return r->open_sheets ? r->open_sheets + pane * TRIP_CPU_SHEET_FLOATS(r->channels) : NULL;
 }
 
+/* Where a ray takes part in the pass of its own way alone (trip_plan_layer.parted), panes hold each
+ * way's as a layer of its own. */
+static inline unsigned trip_cpu_layer_bit(int axis, trip_way way)
+{
+    return 1u << (way == TRIP_WAY_DOWN ? 3 + axis : axis);
+}
+
 /* Whether one layer alone has weight in a pane, and so it is 1 all over. */
 static inline bool trip_cpu_is_alone(const trip_cpu *r, uint32_t pane)
 {
-    return (r->axes[pane] & (r->axes[pane] - 1)) == 0;
+    return (r->layers[pane] & (r->layers[pane] - 1)) == 0;
 }
 
 #endif

@@ -1,10 +1,11 @@
 /* trip_gl_create(): the picture by OpenGL. Splats are drawn in list order and blended into one
- * layer per list, pixels where the list has no weight masked by the stencil, or sheets are drawn
- * into it slice by slice (gl/sheets.h); a full-screen pass merges the layers. The shaders
- * (shaders/) mirror the reference; nothing is computed here but a frame's constants and the places
- * of runs. */
+ * layer per list, pixels where the list has no weight, or whose rays go the other way, masked by
+ * the stencil, or sheets are drawn into it slice by slice (gl/sheets.h); a full-screen pass merges
+ * the layers. The shaders (shaders/) mirror the reference; nothing is computed here but a frame's
+ * constants and the places of runs. */
 #include "renderer.h"
 
+#include <assert.h>
 #include <epoxy/gl.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -62,6 +63,7 @@ typedef struct gl_renderer {
     int axis;               /* of the layer being drawn */
     unsigned layers;        /* bit a: the layer of axis a was begun */
     bool masked;            /* the layer being drawn, by the stencil */
+    trip_way way;           /* of the rays that the pass at hand is of */
     uint64_t quads;         /* splats of the frame drawn as quads, not sprites as set */
     trip_list_stats *stats; /* by number of the list; `counts` has room for as many */
     unsigned stats_room;
@@ -264,22 +266,46 @@ static int draw_screen(gl_renderer *r, int axis)
     return status;
 }
 
-/* Sets the stencil to 1 where the layer has weight, and has only those pixels drawn from now on. */
-static int mask_region(gl_renderer *r, int axis)
+/* What the stencil is where the layer has weight and rays go that way; elsewhere it is 0. */
+static GLint mark_of(trip_way way)
 {
+    return way == TRIP_WAY_DOWN ? 2 : 1;
+}
+
+static const GLuint all_marks = 3;
+
+/* Only pixels of the pass at hand are drawn from now on. */
+static void draw_masked(const gl_renderer *r)
+{
+    glEnable(GL_STENCIL_TEST);
+    glStencilFunc(GL_EQUAL, mark_of(r->way), all_marks);
+    glStencilOp(GL_KEEP, GL_KEEP, GL_KEEP);
+}
+
+static int mark_region(gl_renderer *r, int axis, trip_way way)
+{
+    static_assert(TRIP_WAY_ANY == TRIP_GL_WAY_ANY && TRIP_WAY_UP == TRIP_GL_WAY_UP, "as in GLSL");
     int status = use_program(r, TRIP_GL_PASS_REGION, 0);
     if (status)
         return status;
     trip_gl_constants_bind_layer(&r->constants, axis, true);
     glEnable(GL_STENCIL_TEST);
-    glStencilFunc(GL_ALWAYS, 1, 1);
+    glStencilFunc(GL_ALWAYS, mark_of(way), all_marks);
     glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    glUniform1i(TRIP_GL_WAY, (GLint)way);
     status = draw_screen(r, axis);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    glStencilFunc(GL_EQUAL, 1, 1);
-    glStencilOp(GL_KEEP, GL_KEEP, GL_KEEP);
     return status;
+}
+
+/* Marks the pixels of the layer, by their rays' ways where passes are parted by them. */
+static int mask_region(gl_renderer *r, int axis)
+{
+    if (!r->frame->plan->layers[axis].parted)
+        return mark_region(r, axis, TRIP_WAY_ANY);
+    int status = mark_region(r, axis, TRIP_WAY_UP);
+    return status ? status : mark_region(r, axis, TRIP_WAY_DOWN);
 }
 
 /* The last sheets of the layer begun, if any are open: a part of them. */
@@ -317,7 +343,8 @@ static int begin_layer(trip_renderer *base, int axis)
     const trip_frame *frame = r->frame;
     if (classifies_post(r))
         return begin_sheet_layer(r, axis);
-    bool whole =
+    const bool whole =
+        !frame->plan->layers[axis].parted &&
         trip_weight_is_everywhere(frame->settings, frame->camera, frame->plan->axis_of_view, axis);
     int status = end_passes(base);
     if (!status)
@@ -335,6 +362,7 @@ static int begin_layer(trip_renderer *base, int axis)
     r->layers |= 1u << axis;
     r->axis = axis;
     r->masked = !whole;
+    r->way = trip_plan_way(frame->plan, axis, false);
     r->in_layer = true;
     if (frame->settings->indexed)
         trip_gl_resident_bind(&r->resident, axis);
@@ -393,6 +421,7 @@ static int count_piece(gl_renderer *r, const trip_gl_piece *piece)
     trip_gl_constants_bind_list(&r->constants, piece->list, true);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_COUNTS, r->counts);
     glUniform3ui(TRIP_GL_PIECE, piece->first, piece->count, piece->list);
+    glUniform1i(TRIP_GL_WAY, (GLint)r->way);
     glDispatchCompute((piece->count + TRIP_GL_COUNT_GROUP - 1) / TRIP_GL_COUNT_GROUP, 1, 1);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
     return TRIP_OK;
@@ -426,7 +455,7 @@ static void prepare_drawing(gl_renderer *r, bool front_to_back)
     else
         glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
     if (r->masked)
-        glEnable(GL_STENCIL_TEST);
+        draw_masked(r);
     r->sums.front_to_back = front_to_back;
     bind_batch(&r->batch);
     trip_gl_voxel_places_bind(&r->places, r->frame->settings->indexed);
@@ -466,10 +495,21 @@ static void count_read(gl_renderer *r, const trip_batch *batch)
             batch->runs[i].count;
 }
 
+/* Takes up the way of the rays that a batch's pass is of. */
+static int use_way(gl_renderer *r, const trip_batch *batch)
+{
+    const trip_way way = trip_plan_way(r->frame->plan, r->axis, batch->pass->descending);
+    const bool other = way != r->way;
+    r->way = way;
+    return other && sums_sheets(r) ? trip_gl_sums_end_layer(&r->sums) : TRIP_OK;
+}
+
 static int begin_batch(gl_renderer *r, const trip_batch *batch)
 {
     trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
-    int status = trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, r->frame->plan, batch,
+    int status = use_way(r, batch);
+    if (!status)
+        status = trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, r->frame->plan, batch,
                                     slot, r->frame->settings->indexed ? r->resident.lists : NULL);
     if (status)
         return status;

@@ -46,9 +46,13 @@
 #define TRIP_GL_ROW 0
 #define TRIP_GL_ROW_IN_BAND 1
 #define TRIP_GL_PIECE 0
+#define TRIP_GL_WAY 2
 #define TRIP_GL_SHEET 0
 #define TRIP_GL_SHEET_SIZE 1
 #define TRIP_GL_SHEET_APART 2
+/* Ways of rays, as trip_way has them. */
+#define TRIP_GL_WAY_ANY 0
+#define TRIP_GL_WAY_UP 1
 /* Invocations of a counting work group. */
 #define TRIP_GL_COUNT_GROUP 64
 /* Of those over a sheet or an image, each way. */

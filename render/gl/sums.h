@@ -23,7 +23,7 @@ void trip_gl_sums_begin_layer(trip_gl_sums *s, int axis);
 /* Readies a band for splats of a sheet, which lists of a level have in common: they are to be added
  * up from now on. */
 int trip_gl_sums_use(trip_gl_sums *s, const trip_gl_band *band, unsigned level, int32_t sheet);
-/* Composites what is open. */
+/* Composites what is open, whatever the stencil: of the layer, or of its passes so far. */
 int trip_gl_sums_end_layer(trip_gl_sums *s);
 
 #endif

@@ -135,11 +135,15 @@ class Drawn(program.ProgramTest):
         self.assertEqual(len(stats["frames"]), 5)
 
     def test_with_h_0_a_view_of_everything_draws_thrice_what_was_kept(self):
+        """From beyond a corner: a splat counts twice where rays go both ways along an axis."""
         directions = random.Random(3)
         for name, kept in self.kept.items():
             for renderer in "cpu", "reference":
-                direction = [directions.uniform(-1, 1) for _ in range(3)]
-                view = self.view_from(name, direction, "--h", "0", "--renderer", renderer)
+                matrix, dims = (numpy.array(self.info(f"{name}.trip")[key])
+                                for key in ("index_to_world", "dims"))
+                corner = [directions.choice((-1, 1)) * directions.uniform(0.6, 1) * d for d in dims]
+                view = self.view_from(name, matrix[:, :3] @ corner, "--h", "0", "--renderer",
+                                      renderer)
                 self.assertEqual(self.drawn(*view), 3 * kept, view)
 
     def test_a_parallel_view_along_an_axis_draws_it_once(self):

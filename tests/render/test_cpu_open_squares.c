@@ -26,7 +26,7 @@ typedef struct fixture {
     trip_cpu cpu;
     trip_cpu_sheets sheets;
     _Atomic uint64_t panes[PANES];
-    uint8_t axes[PANES];
+    uint8_t layers[PANES];
     uint64_t open[RASTERS * RASTERS];
     uint64_t taken, closed; /* voxels that rays take; squares left out */
 } fixture;
@@ -63,9 +63,10 @@ static void look(fixture *f, const trip_camera_params *params, int axis, int64_t
                              .settings = &f->settings,
                              .plan = &f->plan,
                              .table = f->scene.table };
-    memset(f->axes, 7, sizeof f->axes);
-    f->cpu =
-        (trip_cpu){ .frame = &f->frame, .mask = { { ACROSS, ACROSS }, f->panes }, .axes = f->axes };
+    memset(f->layers, 7, sizeof f->layers);
+    f->cpu = (trip_cpu){ .frame = &f->frame,
+                         .mask = { { ACROSS, ACROSS }, f->panes },
+                         .layers = f->layers };
     f->sheets = (trip_cpu_sheets){ .of = &f->cpu, .axis = axis, .way = way };
     f->sheets.store.first_u = f->sheets.store.first_v = -1;
     f->sheets.store.across = f->sheets.store.down = RASTERS;

@@ -13,6 +13,12 @@ static trip_camera_params side_view(const scene *s)
     return scene_view(s, trip_v3(1, 0.7, 0.5), 48, 50, 150);
 }
 
+/* From within, so wide that lists have rays of both ways, in panes of their own and in common. */
+static trip_camera_params inside_view(const scene *s)
+{
+    return scene_view(s, trip_v3(0.3, -0.6, 0.5), 5, 150, 70);
+}
+
 static void assert_same(const scene_picture *a, const scene_picture *b)
 {
     assert_int_equal(a->width, b->width);
@@ -62,6 +68,7 @@ static void check_same(const scene *a, const scene *b, unsigned threads,
                        const trip_reader_params *reader)
 {
     check_view(a, b, side_view(a), threads, reader);
+    check_view(a, b, inside_view(a), threads, reader);
 }
 
 static void any_number_of_threads_draws_the_same(void **state)
@@ -209,16 +216,17 @@ static void draw_by_hand(frame_by_hand *f, const scene *s, size_t piece, bool sk
     trip_reader_destroy(reader);
 }
 
-static void check_pieces(trip_settings settings)
+static void check_pieces(trip_settings settings, bool inside)
 {
     scene s;
     cpu_scenes_blobs(&s, 32, NULL);
-    trip_camera_params view = side_view(&s);
+    trip_camera_params view = inside ? inside_view(&s) : side_view(&s);
     scene_picture whole = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
     const size_t pieces[3] = { 1, 3, 17 };
     for (int i = 0; i < 3; i++) {
         frame_by_hand f;
         begin_by_hand(&f, &s, &view, 3, &settings);
+        assert_int_equal(f.plan.layers[0].parted, inside);
         draw_by_hand(&f, &s, pieces[i], false);
         assert_memory_equal(f.rgba, whole.rgba, 16 * (size_t)view.width * (size_t)view.height);
         end_by_hand(&f, &s);
@@ -230,9 +238,11 @@ static void check_pieces(trip_settings settings)
 static void batches_cut_anywhere_draw_the_same(void **state)
 {
     (void)state;
-    check_pieces(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EXACT));
-    check_pieces(settings_with(TRIP_COMPOSITING_SHEET, TRIP_FOOTPRINT_EXACT));
-    check_pieces(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EWA));
+    for (int inside = 0; inside < 2; inside++) {
+        check_pieces(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EXACT), inside);
+        check_pieces(settings_with(TRIP_COMPOSITING_SHEET, TRIP_FOOTPRINT_EXACT), inside);
+        check_pieces(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EWA), inside);
+    }
 }
 
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -246,23 +256,26 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* A body of opaque voxels, filling the view: what lies behind its face is occluded. */
-static void check_occluded(trip_settings settings)
+/* A body of opaque voxels, filling the view: what lies behind its face, or some radii from an eye
+ * within it, is occluded. */
+static void check_occluded(trip_settings settings, bool inside)
 {
     scene s;
     frame_by_hand all, some;
+    settings.kernel_radius = inside ? 1 : settings.kernel_radius;
     scene_create(&s,
                  &(scene_params){
                      .dims = { 48, 48, 48 }, .tile_voxels = 16, .slab_sheets = 4, .voxel = solid });
     scene_colour(&s, 0, 65535, 0.4, 0.7, 0.2, 0.95);
     scene_colour(&s, 0, 20000, 0.9, 0.3, 0.2, 0.9);
-    trip_camera_params view = scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
+    trip_camera_params view =
+        inside ? inside_view(&s) : scene_view(&s, trip_v3(1, 0.5, 0.3), 70, 30, 100);
     begin_by_hand(&all, &s, &view, 1, &settings);
     draw_by_hand(&all, &s, UINT32_MAX / 2, false);
     /* Small buffers let panes close early. */
     for (unsigned threads = 1; threads <= 4; threads++) {
         trip_budget *budget = s.budget;
-        assert_int_equal(trip_budget_create(&s.budget, UINT64_C(64) << 20), 0);
+        assert_int_equal(trip_budget_create(&s.budget, (uint64_t)(inside ? 16 : 64) << 20), 0);
         begin_by_hand(&some, &s, &view, threads, &settings);
         draw_by_hand(&some, &s, 1, true);
         assert_memory_equal(all.rgba, some.rgba, 16 * (size_t)view.width * (size_t)view.height);
@@ -281,9 +294,11 @@ static void check_occluded(trip_settings settings)
 static void leaving_out_what_is_occluded_draws_the_same(void **state)
 {
     (void)state;
-    check_occluded(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EXACT));
-    check_occluded(settings_with(TRIP_COMPOSITING_SHEET, TRIP_FOOTPRINT_EXACT));
-    check_occluded(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EWA));
+    for (int inside = 0; inside < 2; inside++) {
+        check_occluded(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EXACT), inside);
+        check_occluded(settings_with(TRIP_COMPOSITING_SHEET, TRIP_FOOTPRINT_EXACT), inside);
+        check_occluded(settings_with(TRIP_COMPOSITING_SPLAT, TRIP_FOOTPRINT_EWA), inside);
+    }
 }
 
 static void frames_follow_one_another_on_one_renderer(void **state)

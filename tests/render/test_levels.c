@@ -100,7 +100,6 @@ typedef struct item {
     trip_vec3 place; /* in the world */
     int level;
     uint64_t morton;
-    bool beyond;
     const trip_tf_entry *entry;
     trip_splat splat;
 } item;
@@ -135,7 +134,6 @@ static bool is_there(const levels *l, int level, const int at[3])
 static void add(brute *b, int level, int axis, const int at[3])
 {
     const levels *l = b->levels;
-    double eye = trip_component(b->frames[0].camera.eye, axis);
     item *i = &b->items[b->count];
     int scale = level ? l->coarse.by[axis] : 1;
     if (!is_there(l, level, at) ||
@@ -147,8 +145,6 @@ static void add(brute *b, int level, int axis, const int at[3])
     i->level = level;
     i->morton = trip_morton((unsigned)at[(axis + 1) % 3], (unsigned)at[(axis + 2) % 3]);
     i->entry = &l->drawn.table[level ? COARSE : FINE];
-    i->beyond = b->frames[0].camera.ortho ? trip_component(b->frames[0].camera.r0, axis) > 0
-                                          : i->coordinate >= eye;
     b->count++;
 }
 
@@ -194,15 +190,12 @@ static void put_behind(const brute *b, const item *i, double x, double y, double
     layer[4] += distance_of(b, i, x, y) * add;
 }
 
-/* What lies beyond the eye upwards, then what lies below it downwards. */
-static void composite(const brute *b, double x, double y, double layer[CHANNELS])
+/* As the ray meets their sheets: up the axis or down it. */
+static void composite(const brute *b, int axis, double x, double y, double layer[CHANNELS])
 {
+    const bool up = trip_component(trip_camera_ray(&b->frames[0].camera, x, y), axis) > 0;
     for (size_t i = 0; i < b->count; i++)
-        if (b->items[i].beyond)
-            put_behind(b, &b->items[i], x, y, layer);
-    for (size_t i = b->count; i-- > 0;)
-        if (!b->items[i].beyond)
-            put_behind(b, &b->items[i], x, y, layer);
+        put_behind(b, &b->items[up ? i : b->count - 1 - i], x, y, layer);
 }
 
 /* CHANNELS floats a pixel. */
@@ -219,7 +212,7 @@ static float *draw_by_hand(brute *b)
             double w = trip_weight(&b->settings, axis_of_view, trip_camera_ray(c, x, y), axis);
             if (!(w > 0))
                 continue;
-            composite(b, x, y, layer);
+            composite(b, axis, x, y, layer);
             for (int i = 0; i < CHANNELS; i++)
                 merged[CHANNELS * p + i] += (float)(w * w * layer[i]);
             weights[p] += w * w;

@@ -129,25 +129,59 @@ static void inside_the_volume_each_list_is_read_from_the_eye_outwards(void **sta
     (void)state;
     scene s;
     make_scene(&s);
-    trip_camera_params p = scene_view(&s, trip_v3(1, 1, 1), 1, 150, 16);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 1, 1), 1, 150, 160);
     p.eye = trip_v3(20.5, 30, -3);
     p.look = trip_v3(40, 10, 30);
     trip_camera c = make_camera(&s, &p);
-    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.3);
+    settings.kernel_radius = 2.5; /* and as deep behind the eye: sqrt(2) times as far */
     trip_plan plan = make_plan(&s, &c, &settings);
     const trip_plan_pass *x = plan.layers[0].passes, *y = plan.layers[1].passes;
     assert_int_equal(plan.layers[0].pass_count, 2);
-    assert_int_equal(x[0].pass.selections->sheet_first, 21);
+    assert_true(plan.layers[0].parted);
+    assert_int_equal(x[0].pass.selections->sheet_first, 17);
     assert_int_equal(x[0].pass.selections->sheet_last, 49);
     assert_false(x[0].pass.selections->descending);
     assert_int_equal(x[1].pass.selections->sheet_first, 0);
-    assert_int_equal(x[1].pass.selections->sheet_last, 20);
+    assert_int_equal(x[1].pass.selections->sheet_last, 24);
     assert_true(x[1].pass.selections->descending);
     assert_int_equal(plan.layers[1].pass_count, 2);
-    assert_int_equal(y[0].pass.selections->sheet_first, 30);
-    assert_int_equal(y[1].pass.selections->sheet_last, 29);
-    assert_int_equal(plan.layers[2].pass_count, 1); /* the eye is below all sheets */
+    assert_int_equal(y[0].pass.selections->sheet_first, 27);
+    assert_int_equal(y[1].pass.selections->sheet_last, 33);
+    assert_int_equal(plan.layers[2].pass_count, 2); /* the eye is below all sheets */
     assert_int_equal(plan.layers[2].passes[0].pass.selections[0].sheet_first, 0);
+    assert_int_equal(plan.layers[2].passes[1].pass.selections[0].sheet_last, 0);
+    trip_plan_release(&plan, s.budget);
+    scene_destroy(&s);
+}
+
+/* Of rays that go the other way too, but have no weight, nothing is drawn; and where nothing of the
+ * volume is that a way's rays may meet, no pixel is masked. */
+static void a_way_that_no_ray_with_weight_goes_has_no_pass(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 1, 1), 1, 60, 64);
+    p.eye = trip_v3(20.5, 30, 24.2);
+    p.look = trip_v3(60, 30, 40);
+    trip_camera c = make_camera(&s, &p);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.5);
+    trip_plan plan = make_plan(&s, &c, &settings);
+    for (int axis = 0; axis < 3; axis += 2) {
+        assert_true(axis == 0 || trip_component(trip_camera_ray(&c, 32, 63.5), axis) < 0);
+        assert_int_equal(plan.layers[axis].pass_count, 1);
+        assert_false(plan.layers[axis].passes[0].pass.selections->descending);
+        assert_false(plan.layers[axis].parted);
+    }
+    assert_int_equal(plan.layers[1].pass_count, 2);
+    assert_true(plan.layers[1].parted);
+    trip_plan_release(&plan, s.budget);
+    p.eye.y = -10;
+    c = make_camera(&s, &p);
+    plan = make_plan(&s, &c, &settings);
+    assert_int_equal(plan.layers[1].pass_count, 1);
+    assert_false(plan.layers[1].parted);
     trip_plan_release(&plan, s.budget);
     scene_destroy(&s);
 }
@@ -171,7 +205,8 @@ static void ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze
     scene_destroy(&s);
 }
 
-/* The splats of a list that touch a pixel with weight, counted from the whole list. */
+/* The splats of a list that touch a pixel with weight, counted from the whole list: in perspective
+ * once for each way of rays along the axis, since a pass of its own draws these. */
 static uint64_t count_touching(const scene *s, const trip_camera *c, const trip_settings *settings,
                                int axis_of_view, int axis, bool (*counts)(const scene *s, int code))
 {
@@ -187,17 +222,17 @@ static uint64_t count_touching(const scene *s, const trip_camera *c, const trip_
         if (!clumps(NULL, at[0], at[1], at[2], &code, gradient) || !counts(s, (int)code) ||
             !trip_splat_project(&f, trip_v3(at[0], at[1], at[2]), &p))
             continue;
-        bool touches = false;
-        for (int y = 0; y < c->height && !touches; y++) {
-            for (int x = 0; x < c->width && !touches; x++) {
+        bool touches[2] = { false, false };
+        for (int y = 0; y < c->height && !(touches[0] && touches[1]); y++) {
+            for (int x = 0; x < c->width; x++) {
                 trip_vec3 ray = trip_camera_ray(c, x + 0.5, y + 0.5);
-                touches = x + 0.5 >= p.x0 && x + 0.5 <= p.x1 && y + 0.5 >= p.y0 &&
-                          y + 0.5 <= p.y1 &&
-                          trip_splat_radius2(&f, &p, x + 0.5, y + 0.5) <= f.cutoff2 &&
-                          trip_weight(settings, axis_of_view, ray, axis) > 0;
+                touches[!c->ortho && trip_component(ray, axis) < 0] |=
+                    x + 0.5 >= p.x0 && x + 0.5 <= p.x1 && y + 0.5 >= p.y0 && y + 0.5 <= p.y1 &&
+                    trip_splat_radius2(&f, &p, x + 0.5, y + 0.5) <= f.cutoff2 &&
+                    trip_weight(settings, axis_of_view, ray, axis) > 0;
             }
         }
-        n += touches;
+        n += touches[0] + touches[1];
     }
     return n;
 }
@@ -509,6 +544,7 @@ int main(void)
         cmocka_unit_test(a_list_is_used_exactly_when_some_pixel_has_weight_in_it),
         cmocka_unit_test(a_parallel_view_along_an_axis_uses_that_list_alone),
         cmocka_unit_test(inside_the_volume_each_list_is_read_from_the_eye_outwards),
+        cmocka_unit_test(a_way_that_no_ray_with_weight_goes_has_no_pass),
         cmocka_unit_test(ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze),
         cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
         cmocka_unit_test(a_voxel_about_the_eye_is_never_left_out),

@@ -139,14 +139,17 @@ static void in_a_parallel_view_the_one_direction_decides(void **state)
 
 typedef struct weighing {
     bool some, all;
+    bool way[TRIP_WAY_DOWN + 1]; /* some, by ways */
 } weighing;
 
 static weighing weigh_every_pixel(const trip_settings *s, const trip_camera *c, int view, int axis)
 {
-    weighing w = { false, true };
+    weighing w = { .all = true };
     for (int y = 0; y < c->height; y++)
         for (int x = 0; x < c->width; x++) {
-            bool some = trip_weight(s, view, trip_camera_ray(c, x + 0.5, y + 0.5), axis) > 0;
+            trip_vec3 ray = trip_camera_ray(c, x + 0.5, y + 0.5);
+            bool some = trip_weight(s, view, ray, axis) > 0;
+            w.way[trip_component(ray, axis) < 0 ? TRIP_WAY_DOWN : TRIP_WAY_UP] |= some;
             w.some |= some;
             w.all &= some;
         }
@@ -162,7 +165,9 @@ static void a_list_is_used_if_some_pixel_has_weight_in_it_and_whole_only_if_all_
         trip_camera c = random_camera(i % 5 == 0);
         int view = trip_weight_axis_of_view(&c), axis = i / 3 % 3;
         weighing w = weigh_every_pixel(&s, &c, view, axis);
-        assert_int_equal(trip_weight_is_somewhere(&s, &c, view, axis), w.some);
+        assert_int_equal(trip_weight_is_somewhere(&s, &c, view, axis, TRIP_WAY_ANY), w.some);
+        for (trip_way way = TRIP_WAY_UP; way <= TRIP_WAY_DOWN; way++)
+            assert_int_equal(trip_weight_is_somewhere(&s, &c, view, axis, way), w.way[way]);
         unused += !w.some;
         if (!w.some || !trip_weight_is_everywhere(&s, &c, view, axis))
             continue;

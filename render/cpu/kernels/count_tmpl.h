@@ -10,7 +10,7 @@
 #include "cpu/kernels/project_tmpl.h"
 
 /* Whether some pixel of a stamp of the pane at hand lies in the image, in the support of `splat`,
- * which is local to the pane, and where the list has weight. */
+ * which is local to the pane, and where the view's layer has weight. */
 static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsigned number)
 {
     const trip_cpu_view *view = s->view;
@@ -29,8 +29,8 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
     } else {
         in = vm_and(in, v_gt(nearness(&p, splat, TRIP_CPU_PERSPECTIVE), v_set(0)));
     }
-    pixel_rays r = pixel_rays_at(view, s->x, s->y, column, row);
-    return vm_any(in) && vm_any(vm_and(in, v_gt(weight(view, view->axis, &r), v_set(0))));
+    return vm_any(in) &&
+           vm_any(vm_and(in, v_gt(layer_weight(view, s->x, s->y, column, row), v_set(0))));
 }
 
 /* Whether some pixel of the pane at (x, y) does. */

@@ -12,9 +12,11 @@
 #include "layer.h"
 #include "renderer.h"
 #include "splat.h"
+#include "weight.h"
 
 /* A pixel is saturated when its transmittance is below trip_cpu_view.saturation, or where its layer
- * has no weight: it takes no more splats, front to back. Until then it is open.
+ * has no weight, or is of rays that go the other way: it takes no more splats, front to back. Until
+ * then it is open.
  *
  * Edge in pixels of a pane, an aligned square of the picture (tiles are squares of a sheet). Its
  * pixels are kept as V-lane vectors of four columns times V / 4 rows (a stamp), so that a small
@@ -100,6 +102,7 @@ typedef struct trip_cpu_view {
                   */
     unsigned code_bytes, normal_bytes; /* of the list's codes, of the data set's normals */
     int axis, u_axis, v_axis;
+    trip_way way;        /* of the rays that the layer is of; set once the view is made */
     float compact[3][3]; /* of 3-byte normals: from steps to world space, over gradient_full */
     float normal_full;   /* length of those of which the direction is kept, likewise; of 4-byte
                             normals the least */

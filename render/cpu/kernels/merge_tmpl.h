@@ -27,17 +27,19 @@ typedef struct rays {
     vd r[3]; /* magnitudes */
 } rays;
 
+INLINE vd component_at(const trip_camera *c, int axis, vd x, vd y)
+{
+    vd r = vd_set(trip_component(c->r0, axis));
+    if (c->ortho)
+        return r;
+    return r + (vd_set(trip_component(c->rx, axis)) * x + vd_set(trip_component(c->ry, axis)) * y);
+}
+
 INLINE rays rays_at(const trip_camera *c, vd x, vd y)
 {
-    const double r0[3] = { c->r0.x, c->r0.y, c->r0.z };
-    const double rx[3] = { c->rx.x, c->rx.y, c->rx.z }, ry[3] = { c->ry.x, c->ry.y, c->ry.z };
     rays out;
-    for (int i = 0; i < 3; i++) {
-        vd r = vd_set(r0[i]);
-        if (!c->ortho)
-            r = r + (vd_set(rx[i]) * x + vd_set(ry[i]) * y);
-        out.r[i] = vd_abs(r);
-    }
+    for (int i = 0; i < 3; i++)
+        out.r[i] = vd_abs(component_at(c, i, x, y));
     return out;
 }
 
@@ -86,17 +88,26 @@ typedef struct pixel_rays {
     vm usual;
 } pixel_rays;
 
+typedef struct pixel_centres {
+    vd_pair x, y;
+} pixel_centres;
+
 /* Of stamp (column, row) of the pane at (x, y). */
-INLINE pixel_rays pixel_rays_at(const trip_cpu_view *view, int x, int y, int column, int row)
+INLINE pixel_centres centres_at(int x, int y, int column, int row)
 {
     float across[V], down[V];
     for (int i = 0; i < V; i++) {
         across[i] = (float)(4 * column + i % 4) + 0.5f;
         down[i] = (float)(STAMP_ROWS * row + i / 4) + 0.5f;
     }
-    vd_pair px = centres(x, across), py = centres(y, down);
+    return (pixel_centres){ centres(x, across), centres(y, down) };
+}
+
+INLINE pixel_rays pixel_rays_at(const trip_cpu_view *view, int x, int y, int column, int row)
+{
+    const pixel_centres p = centres_at(x, y, column, row);
     const trip_camera *camera = view->of->camera;
-    rays lo = rays_at(camera, px.lo, py.lo), hi = rays_at(camera, px.hi, py.hi);
+    rays lo = rays_at(camera, p.x.lo, p.y.lo), hi = rays_at(camera, p.x.hi, p.y.hi);
     vd_pair most = { most_of(&lo), most_of(&hi) };
     vf z = v_narrow(most.lo, most.hi), inverse = v_set(1) / z;
     return (pixel_rays){
@@ -126,6 +137,26 @@ INLINE vf weight(const trip_cpu_view *view, int axis, const pixel_rays *r)
     return v_narrow(weight_half(view, s, axis, &r->lo), weight_half(view, s, axis, &r->hi));
 }
 
+/* As trip_ray_goes(): 1 where rays go up an axis, else 0. */
+INLINE vd is_upwards(const trip_camera *c, int axis, vd x, vd y)
+{
+    return vd_select((vl)(component_at(c, axis, x, y) >= vd_set(0)), vd_set(1), vd_set(0));
+}
+
+/* The weight of the view's layer at a stamp's pixels: 0 where rays go the other way. */
+INLINE vf layer_weight(const trip_cpu_view *view, int x, int y, int column, int row)
+{
+    pixel_rays r = pixel_rays_at(view, x, y, column, row);
+    vf w = weight(view, view->axis, &r);
+    if (view->way == TRIP_WAY_ANY)
+        return w;
+    const pixel_centres p = centres_at(x, y, column, row);
+    const trip_camera *camera = view->of->camera;
+    vf up = v_narrow(is_upwards(camera, view->axis, p.x.lo, p.y.lo),
+                     is_upwards(camera, view->axis, p.x.hi, p.y.hi));
+    return w * (view->way == TRIP_WAY_UP ? up : v_set(1) - up);
+}
+
 /* Lanes of a stamp that lie in the image. */
 INLINE vm in_image(const trip_camera *camera, int x, int y, int column, int row)
 {
@@ -145,10 +176,8 @@ static void pane_clear(const trip_cpu_view *view, int x, int y, bool alone, floa
         vf t = v_set(1);
         if (view->front_to_back) {
             vm open = in_image(&view->splat.camera, x, y, column, row);
-            if (!alone) {
-                pixel_rays r = pixel_rays_at(view, x, y, column, row);
-                open = vm_and(open, v_gt(weight(view, view->axis, &r), v_set(0)));
-            }
+            if (!alone)
+                open = vm_and(open, v_gt(layer_weight(view, x, y, column, row), v_set(0)));
             t = v_select(open, t, v_set(0));
         }
         for (int c = 0; c < 3; c++)
@@ -165,8 +194,7 @@ static void pane_merge(const trip_cpu_view *view, int x, int y, const float *pix
     for (int b = 0; b < STAMPS; b++) {
         const float *stamp = pixels + STAMP_FLOATS * b;
         float *to = sum + STAMP_FLOATS * b;
-        pixel_rays r = pixel_rays_at(view, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
-        vf w = weight(view, view->axis, &r);
+        vf w = layer_weight(view, x, y, b % STAMPS_ACROSS, b / STAMPS_ACROSS);
         w = w * w;
         for (int c = 0; c < CHANNELS; c++) {
             vf layer = v_load(stamp + c * V);

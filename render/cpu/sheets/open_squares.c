@@ -145,7 +145,8 @@ static uint64_t open_texels(const trip_cpu *r, uint32_t pane)
 static bool some_is_saturated(const trip_cpu *r, int axis)
 {
     for (uint32_t i = 0; i < trip_cpu_pane_count(r); i++)
-        if (r->axes[i] >> axis & 1 && open_texels(r, i) != UINT64_MAX)
+        if (r->layers[i] & trip_cpu_layer_bit(axis, TRIP_WAY_ANY) &&
+            open_texels(r, i) != UINT64_MAX)
             return true;
     return false;
 }

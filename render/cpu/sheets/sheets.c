@@ -434,7 +434,7 @@ static void draw_pane(void *context, unsigned task, unsigned thread)
     trip_cpu_sheets *s = context;
     trip_cpu *r = s->of;
     (void)thread;
-    if (trip_interrupted() || !(r->axes[task] >> s->axis & 1) ||
+    if (trip_interrupted() || !(r->layers[task] & trip_cpu_layer_bit(s->axis, TRIP_WAY_ANY)) ||
         trip_cpu_pane_is_saturated(&r->mask, task))
         return;
     float *pixels = trip_cpu_pane_pixels(r, task);
