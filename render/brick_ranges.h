@@ -4,12 +4,9 @@
 #ifndef TRIP_BRICK_RANGES_H
 #define TRIP_BRICK_RANGES_H
 
+#include "code_set.h"
 #include "dataset.h"
 #include "sheet.h"
-
-typedef struct trip_code_range {
-    uint16_t least, most; /* least > most: no codes */
-} trip_code_range;
 
 /* Slabs on each side that a voxel may reach into: those of one sheet, into two. */
 enum { TRIP_BRICK_RANGES_SLABS = 2 * TRIP_SHEET_REACH_MOST + 1 };

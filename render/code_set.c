@@ -35,6 +35,22 @@ void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double l
     }
 }
 
+trip_code_range trip_code_set_range(const trip_code_set *set)
+{
+    unsigned least = 1, most = 0, count = 0;
+    for (unsigned word = 0; word < 1024; word++) {
+        const uint64_t bits = set->codes[word];
+        if (bits && count == 0)
+            least = word * 64 + (unsigned)__builtin_ctzll(bits);
+        if (bits)
+            most = word * 64 + 63 - (unsigned)__builtin_clzll(bits);
+        count += (unsigned)__builtin_popcountll(bits);
+    }
+    return count > 0 && most - least + 1 == count
+               ? (trip_code_range){ (uint16_t)least, (uint16_t)most }
+               : (trip_code_range){ 1, 0 };
+}
+
 /* Whether some bit from first to last is set. */
 static bool has_some(const uint64_t *bits, unsigned first, unsigned last)
 {

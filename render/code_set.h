@@ -8,6 +8,10 @@
 
 #include "transfer_function.h"
 
+typedef struct trip_code_range {
+    uint16_t least, most; /* least > most: no codes */
+} trip_code_range;
+
 typedef struct trip_code_set {
     uint64_t codes[1024], some[16];
 } trip_code_set;
@@ -17,6 +21,9 @@ void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double l
 
 /* Whether some code from first to last is in it. */
 bool trip_code_set_has_some(const trip_code_set *set, unsigned first, unsigned last);
+
+/* All of its codes, where they follow one another without a gap; else none. */
+trip_code_range trip_code_set_range(const trip_code_set *set);
 
 static inline bool trip_code_set_has(const trip_code_set *set, unsigned code)
 {

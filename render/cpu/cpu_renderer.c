@@ -48,7 +48,8 @@ static void make_views(trip_cpu *r, bool front_to_back, bool normals)
         r->views[i].shading = r->view.shading;
         r->views[i].flattens = r->view.flattens;
         if (!classifies_post(r))
-            trip_cpu_view_set_table(&r->views[i], r->frame->plan->lists[i].table);
+            trip_cpu_view_set_table(&r->views[i], r->frame->plan->lists[i].table,
+                                    r->frame->plan->lists[i].shown);
         if (!r->frame->count)
             continue;
         trip_cpu_view_make(&r->counted_views[i], &r->counted_frame, list, front_to_back);

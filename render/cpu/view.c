@@ -125,13 +125,14 @@ static void set_byte_rows(trip_cpu_view *view)
         shown++;
     }
     const bool has_gaps = shown != most - least + 1;
-    view->shown_least = has_gaps ? 1 : (uint8_t)least;
-    view->shown_most = has_gaps ? 0 : (uint8_t)most;
+    view->shown =
+        has_gaps ? (trip_code_range){ 1, 0 } : (trip_code_range){ (uint16_t)least, (uint16_t)most };
 }
 
-void trip_cpu_view_set_table(trip_cpu_view *view, const trip_tf_entry *table)
+void trip_cpu_view_set_table(trip_cpu_view *view, const trip_tf_entry *table, trip_code_range shown)
 {
     view->table = table;
+    view->shown = shown;
     if (view->code_bytes == 1)
         set_byte_rows(view);
 }
@@ -165,7 +166,7 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
         for (int k = 0; k < 3; k++)
             view->world[k][i] = camera->index_to_world.m[k][axes[i]] / camera->voxel_world;
     }
-    trip_cpu_view_set_table(view, frame->table);
+    trip_cpu_view_set_table(view, frame->table, (trip_code_range){ 1, 0 });
     set_compact_normals(view, frame->data, full);
     set_along(view->along_x, view, camera->to_x);
     set_along(view->along_y, view, camera->to_y);

@@ -36,6 +36,18 @@ static inline __m512i emulated_i64gather_epi64(__m512i index, const int64_t *bas
 #undef _mm512_i64gather_epi64
 #define _mm512_i64gather_epi64(index, base, scale) emulated_i64gather_epi64(index, base)
 
+static inline __m512i emulated_cvtepu8_epi32(__m128i a)
+{
+    uint8_t from[16];
+    emulated_i32 r;
+    memcpy(from, &a, sizeof from);
+    for (int i = 0; i < 16; i++)
+        r[i] = from[i];
+    return (__m512i)r;
+}
+#undef _mm512_cvtepu8_epi32
+#define _mm512_cvtepu8_epi32 emulated_cvtepu8_epi32
+
 static inline __m512i emulated_maskz_compress_epi8(uint64_t mask, __m512i a)
 {
     int8_t from[64], to[64] = { 0 };

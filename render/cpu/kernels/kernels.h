@@ -123,9 +123,9 @@ typedef struct trip_cpu_view {
     float behind;        /* splats at this depth or less do not show */
     float near;          /* in parallel views: splats of less depth are near */
     trip_cpu_effects effects;
-    trip_tf_entry byte_rows[256];    /* of the table, where codes take a byte */
-    uint8_t shown_least, shown_most; /* those of them with extinction, where these follow one
-                                        another without a gap; else least > most */
+    trip_tf_entry byte_rows[256]; /* of the table, where codes take a byte */
+    trip_code_range shown; /* rows of trip_cpu_rows() with extinction, where these are known to
+                              follow one another without a gap; else none */
 } trip_cpu_view;
 
 /* What a list's codes show as, by code as it is stored: those of one byte have a table of their

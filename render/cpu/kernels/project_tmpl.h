@@ -46,21 +46,12 @@ INLINE void places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
 #endif
 }
 
-typedef uint8_t bytes_of_lanes __attribute__((vector_size(V)));
-
-INLINE vi load_bytes(const uint8_t *from)
-{
-    bytes_of_lanes b;
-    memcpy(&b, from, sizeof b);
-    return __builtin_convertvector(b, vi);
-}
-
 /* The codes of V voxels from number `at` on, a multiple of V. Lanes behind the square's voxels are
  * codes too. */
 INLINE vi load_codes(const trip_cpu_square *square, unsigned code_bytes, int32_t at)
 {
     if (code_bytes == 1)
-        return load_bytes(square->codes + at);
+        return vi_load_bytes(square->codes + at);
     const uint32_t width = square->width;
     return (vi_load_bits(square->codes + (size_t)at * width / 8, width) + (int32_t)square->least) &
            UINT16_MAX;
@@ -79,19 +70,31 @@ INLINE uint64_t reversed_bits(uint64_t a)
     return __builtin_bswap64(a);
 }
 
-/* `in_range`: codes are bytes, and those with extinction are those from view->shown_least to
- * view->shown_most, so that what is seen of the square is known at once. Lanes beyond the square's
- * voxels hold what lies there, and are left out. */
+/* Which lanes have codes with extinction; `in_range`: these are those from view->shown.least to
+ * view->shown.most, and rows of the table, which lie far apart, are read for what is seen alone. */
+INLINE unsigned lanes_seen(const trip_cpu_view *view, vi code, bool in_range)
+{
+    if (in_range) {
+        const vf at = v_from_int(code);
+        return vm_bits(vm_and(v_ge(at, v_set((float)view->shown.least)),
+                              v_ge(v_set((float)view->shown.most), at)));
+    }
+    return vm_bits(v_gt(v_gather(&trip_cpu_rows(view)->extinction, code * 4), v_set(0)));
+}
+
+/* `in_range`: as of lanes_seen(); of codes that are bytes what is seen of the square is then known
+ * at once. Lanes beyond the square's voxels hold what lies there, and are left out. */
 INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *square,
                              unsigned code_bytes, bool in_range, bool reversed,
                              trip_cpu_staged *staged, uint32_t filled)
 {
-    const float *extinction = &trip_cpu_rows(view)->extinction;
+    const bool bytes_in_range = in_range && code_bytes == 1;
     const vi u = vi_set(square->u), v = vi_set(square->v), sheet = vi_set(square->sheet);
     int32_t count = __builtin_popcountll(square->mask), all = (count + V - 1) / V * V;
     uint64_t seen = UINT64_MAX >> (64 - count);
-    if (in_range)
-        seen &= v_bytes_within(square->codes, view->shown_least, view->shown_most);
+    if (bytes_in_range)
+        seen &=
+            v_bytes_within(square->codes, (uint8_t)view->shown.least, (uint8_t)view->shown.most);
     if (seen == 0)
         return filled;
     uint8_t places[PLACES_ROOM];
@@ -100,7 +103,7 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
     for (int32_t i = 0; i < all; i += V) {
         int32_t at = reversed ? all - V - i : i;
         unsigned lanes = (unsigned)(in_order >> i) & ((1u << V) - 1);
-        vi place = load_bytes(places + at), code = load_codes(square, code_bytes, at);
+        vi place = vi_load_bytes(places + at), code = load_codes(square, code_bytes, at);
         vi normal = vi_set(0);
         if (view->shading || view->flattens)
             normal = load_normals(square->normals, view->normal_bytes, at);
@@ -109,8 +112,8 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
             code = vi_reverse(code);
             normal = vi_reverse(normal);
         }
-        if (!in_range)
-            lanes &= vm_bits(v_gt(v_gather(extinction, code * 4), v_set(0)));
+        if (!bytes_in_range)
+            lanes &= lanes_seen(view, code, in_range);
         vi_store_packed(staged->u + filled, lanes, u + (place & 7));
         vi_store_packed(staged->v + filled, lanes, v + v_shift_right(place, 3));
         vi_store(staged->sheet + filled, sheet);
@@ -125,12 +128,16 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
 static uint32_t stage(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled)
 {
-    if (view->code_bytes == 1 && view->shown_least <= view->shown_most)
+    const bool in_range = view->shown.least <= view->shown.most;
+    if (view->code_bytes == 1 && in_range)
         return reversed ? stage_square(view, square, 1, true, true, staged, filled)
                         : stage_square(view, square, 1, true, false, staged, filled);
     if (view->code_bytes == 1)
         return reversed ? stage_square(view, square, 1, false, true, staged, filled)
                         : stage_square(view, square, 1, false, false, staged, filled);
+    if (in_range)
+        return reversed ? stage_square(view, square, 2, true, true, staged, filled)
+                        : stage_square(view, square, 2, true, false, staged, filled);
     return reversed ? stage_square(view, square, 2, false, true, staged, filled)
                     : stage_square(view, square, 2, false, false, staged, filled);
 }

@@ -845,6 +845,21 @@ INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t least, uint8_t most)
 #endif
 }
 
+/* A byte a lane. Compilers convert such vectors lane by lane. */
+INLINE vi vi_load_bytes(const unsigned char *from)
+{
+#if TRIP_SIMD == TRIP_SIMD_AVX512
+    return (vi)_mm512_cvtepu8_epi32(_mm_loadu_si128((const void *)from));
+#elif TRIP_SIMD == TRIP_SIMD_AVX2
+    return (vi)_mm256_cvtepu8_epi32(_mm_loadl_epi64((const void *)from));
+#else
+    vi a;
+    for (int i = 0; i < V; i++)
+        a[i] = from[i];
+    return a;
+#endif
+}
+
 /* Three bytes a lane; as many as a vector has are read. */
 INLINE vi vi_load_3_bytes(const unsigned char *from)
 {
