@@ -260,12 +260,13 @@ static unsigned put_row(const work *k, const uint8_t *flags, int64_t y, int64_t 
     const int64_t voxel[3] = { c->origin[0] + c->first[0], c->origin[1] + c->first[1] + y,
                                c->origin[2] + z };
     size_t at = entry_of(k, voxel);
-    splat_row r = { .values = k->w->decoded + at,
-                    .first = (unsigned)c->first[0],
-                    .index = trip_splat_box_row(c, c->first[1] + y, z) };
+    splat_row r;
     r.count = find_flags(flags + at, c->size[0], c->first[0], r.x);
     if (r.count == 0)
         return 0;
+    r.values = k->w->decoded + at;
+    r.first = (unsigned)c->first[0];
+    r.index = trip_splat_box_row(c, c->first[1] + y, z);
     trip_splat_box_mark(c, c->first[1] + y, z, r.x, r.count);
     put_values(k, &r);
     if (normals)
