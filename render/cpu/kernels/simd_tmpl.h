@@ -845,7 +845,9 @@ INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t least, uint8_t most)
 #endif
 }
 
-/* A byte a lane. Compilers convert such vectors lane by lane. */
+typedef uint8_t bytes_of_lanes __attribute__((vector_size(V)));
+
+/* A byte a lane. On x86 compilers convert such vectors lane by lane. */
 INLINE vi vi_load_bytes(const unsigned char *from)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX512
@@ -853,10 +855,9 @@ INLINE vi vi_load_bytes(const unsigned char *from)
 #elif TRIP_SIMD == TRIP_SIMD_AVX2
     return (vi)_mm256_cvtepu8_epi32(_mm_loadl_epi64((const void *)from));
 #else
-    vi a;
-    for (int i = 0; i < V; i++)
-        a[i] = from[i];
-    return a;
+    bytes_of_lanes b;
+    memcpy(&b, from, sizeof b);
+    return __builtin_convertvector(b, vi);
 #endif
 }
 
