@@ -13,7 +13,7 @@
 
 /* To be raised with every change after which the same input and parameters give other bytes,
  * whether in a reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 18 };
+enum { BRICKER_VERSION = 19 };
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
 {

@@ -458,7 +458,8 @@ static int open_sharpen(making *m)
     /* A kept voxel has 26 beside it. */
     int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
     trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file,
-                      m->work.params->kinds.means && !own, m->work.edge_log2, m->budget);
+                      m->work.params->kinds.means && !own, m->work.params->hidden_above,
+                      m->work.edge_log2, m->budget);
     return status;
 }
 

@@ -36,10 +36,11 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
     return at;
 }
 
-void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
-                       trip_budget *budget)
+void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, bool round,
+                       unsigned edge_log2, trip_budget *budget)
 {
-    *s = (trip_sharpen){ .file = file, .edge_log2 = edge_log2, .sheet = UINT64_MAX };
+    *s =
+        (trip_sharpen){ .file = file, .edge_log2 = edge_log2, .round = round, .sheet = UINT64_MAX };
     trip_level_places_open(&s->places, file, means, edge_log2, budget);
 }
 
@@ -139,6 +140,14 @@ static uint16_t sharpened(uint16_t value, int32_t sum)
     return (uint16_t)(to < 0 ? 0 : to > UINT16_MAX ? UINT16_MAX : to);
 }
 
+/* What covers nothing known has a value that does not show, and is moved away from what does alone.
+ */
+static uint16_t sharpened_value(const trip_sharpen *s, const trip_coarse_value *voxel, int32_t sum)
+{
+    const bool towards = s->round ? sum < 0 : sum > 0;
+    return voxel->known == 0 && towards ? voxel->value : sharpened(voxel->value, sum);
+}
+
 TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
                                  const trip_sharpen_neighbourhood *of)
 {
@@ -149,8 +158,8 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
         status = add_around(s, l, of->beside);
     for (uint32_t i = 0; i < place->count && status == 0; i++) {
         trip_coarse_value *voxel = &l->values[i];
-        voxel->value =
-            sharpened(voxel->value, l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u]);
+        const int32_t sum = l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u];
+        voxel->value = sharpened_value(s, voxel, sum);
     }
     return status;
 }

@@ -5,7 +5,8 @@
  *     value + the sum over the six voxels beside it of (value - theirs) / TRIP_SHARPEN_PART,
  *
  * those that are not there counting as equal, and within the range of codes, which is wider than
- * that of values (brick_codes.h). The voxels come from the file that trip_level_file_append()
+ * that of values (brick_codes.h). Voxels that cover nothing known (level_halo.h) are not moved
+ * towards what shows. The voxels come from the file that trip_level_file_append()
  * writes, square by square. They are taken by columns, the squares of a few sheets one behind the
  * other, so that what is made of them lies together in every list; of those sheets and the ones
  * before and behind only where their squares lie is held, and a few squares by each lane. One
@@ -46,15 +47,17 @@ typedef struct trip_sharpen_lane {
 typedef struct trip_sharpen {
     const trip_output *file;
     unsigned edge_log2;
+    bool round; /* what is not kept lies above what is */
     trip_level_places places;
     uint64_t sheet;                   /* the first of the columns at hand */
     size_t next[TRIP_SHARPEN_SHEETS]; /* square of each of their sheets */
 } trip_sharpen;
 
-/* Of a file with squares of 2^edge_log2 voxels, with means or without. The file is complete and
- * flushed before the first square is taken. */
-void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, unsigned edge_log2,
-                       trip_budget *budget);
+/* Of a file with squares of 2^edge_log2 voxels, with means or without; `round`: codes are turned
+ * round in `around` (coarse.h). The file is complete and flushed before the first square is taken.
+ */
+void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, bool round,
+                       unsigned edge_log2, trip_budget *budget);
 void trip_sharpen_close(trip_sharpen *s);
 
 /* Lays out a lane in memory of so many bytes, zeroed and aligned to 64; with NULL it computes these
