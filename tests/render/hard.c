@@ -67,9 +67,7 @@ static void check_gl(const scene *s, const hard_view *view, unsigned form,
 
 static void expect_shown(const hard_view *view, unsigned form, const scene_picture *p)
 {
-    double most = 0;
-    for (int i = 0; i < p->width * p->height; i++)
-        most = fmax(most, (double)p->rgba[4 * i + 3]);
+    const double most = scene_most_opaque(p);
     if (view->shows && !(most > 0.5))
         fail_msg("%s, %s: the reference shows %g at most", view->what, name_of(form), most);
 }

@@ -431,6 +431,17 @@ bool scene_take_turn(scene_turn *t)
     return true;
 }
 
+double scene_most_opaque(const scene_picture *p)
+{
+    double most = 0;
+    for (int y = 0; y < p->height; y++)
+        for (int x = 0; x < p->width; x++) {
+            const double opacity = scene_pixel(p, x, y)[3];
+            most = opacity > most ? opacity : most;
+        }
+    return most;
+}
+
 double scene_difference(const scene_picture *a, const scene_picture *b)
 {
     assert_int_equal(a->width, b->width);

@@ -132,6 +132,9 @@ static inline const float *scene_pixel(const scene_picture *p, int x, int y)
     return p->rgba + 4 * ((size_t)y * (size_t)p->width + (size_t)x);
 }
 
+/* The greatest opacity of a pixel. */
+double scene_most_opaque(const scene_picture *p);
+
 /* Largest difference of any component. */
 double scene_difference(const scene_picture *a, const scene_picture *b);
 

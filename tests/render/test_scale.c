@@ -59,10 +59,7 @@ static void expect_alike(const scene *s, const trip_camera_params *view, const c
     trip_settings settings = trip_settings_default();
     const scene_renderer *all = scene_renderers();
     scene_picture expected = scene_draw(s, &all[0], view, &settings);
-    double seen = 0;
-    for (int i = 0; i < SIZE_PX * SIZE_PX; i++)
-        seen = fmax(seen, (double)expected.rgba[4 * i + 3]);
-    if (!(seen > 0.5))
+    if (!(scene_most_opaque(&expected) > 0.5))
         fail_msg("%s: the reference shows nothing", what);
     for (const scene_renderer *r = all + 1; r->name; r++) {
         bool cpu = strcmp(r->name, "cpu") == 0;
