@@ -24,7 +24,7 @@ typedef struct trip_plan_list {
     trip_clip clip;      /* of its voxels, in its own index space */
     bool by_level;       /* of its voxels those are drawn that trip_plan.lod says */
     const trip_tf_entry *table; /* of 65536: what its codes look like */
-    trip_code_range shown;      /* those with extinction */
+    trip_code_range shown;      /* those with extinction, as trip_code_set_range() has them */
     uint64_t bricks, bricks_selected;
     uint64_t bricks_outside, bricks_without_weight, bricks_transparent, bricks_of_other_levels,
         bricks_clipped; /* why left out */

@@ -536,14 +536,12 @@ static void what_is_farther_fades_into_the_background(void **state)
     }
 }
 
-/* The eye is in the middle of the box. */
-static void within_the_volume_fading_begins_at_the_eye(void **state)
+/* How a box of voxels fades with the distance from an eye. */
+static trip_effects_view fading(trip_vec3 eye, trip_vec3 look, const uint64_t dims[3])
 {
-    (void)state;
-    const uint64_t dims[3] = { 21, 21, 21 };
     const trip_affine map = trip_affine_identity();
-    const trip_camera_params view = { .eye = { 10, 10, 10 },
-                                      .look = { 10, 10, 0 },
+    const trip_camera_params view = { .eye = eye,
+                                      .look = look,
                                       .up = { 0, 1, 0 },
                                       .fov_degrees = 30,
                                       .width = SIZE,
@@ -552,7 +550,15 @@ static void within_the_volume_fading_begins_at_the_eye(void **state)
     trip_camera camera;
     settings.effects.cueing = 1;
     assert_int_equal(trip_camera_make(&camera, &view, &map), 0);
-    const trip_effects_view e = trip_effects_view_make(&settings, &camera, dims);
+    return trip_effects_view_make(&settings, &camera, dims);
+}
+
+/* The eye is in the middle of the box. */
+static void within_the_volume_fading_begins_at_the_eye(void **state)
+{
+    (void)state;
+    const uint64_t dims[3] = { 21, 21, 21 };
+    const trip_effects_view e = fading(trip_v3(10, 10, 10), trip_v3(10, 10, 0), dims);
     for (int k = 0; k <= 10; k++)
         assert_close(e.cue[0] * 3 + e.cue[1] * 4 + e.cue[2] * k + e.cue[3], 1 - k / 10.0, 1e-12);
 }
@@ -727,18 +733,7 @@ static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
 static void what_lies_behind_the_eye_does_not_fade(void **state)
 {
     (void)state;
-    const trip_affine map = trip_affine_identity();
-    const trip_camera_params view = { .eye = { 10, 15, 50 },
-                                      .look = { 10, 15, 60 },
-                                      .up = { 0, 1, 0 },
-                                      .fov_degrees = 30,
-                                      .width = SIZE,
-                                      .height = SIZE };
-    trip_settings settings = trip_settings_default();
-    trip_camera camera;
-    settings.effects.cueing = 1;
-    assert_int_equal(trip_camera_make(&camera, &view, &map), 0);
-    const trip_effects_view e = trip_effects_view_make(&settings, &camera, box_dims);
+    const trip_effects_view e = fading(trip_v3(10, 15, 50), trip_v3(10, 15, 60), box_dims);
     for (int i = 0; i < 4; i++)
         assert_true(e.cue[i] == 0);
 }

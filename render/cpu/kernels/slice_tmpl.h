@@ -220,8 +220,8 @@ INLINE extremes extremes_at(const int16_t *from, const int16_t *to)
     return (extremes){ vh_min(vh_min(a, b), vh_min(c, d)), vh_max(vh_max(a, b), vh_max(c, d)) };
 }
 
-/* Of a row of cells some of which lack corners, those that have all four at either sheet: what
- * their corners lie between that are there; and the others. */
+/* The least code that is there of each of a row of cells, and which of these have all four corners
+ * at neither sheet. */
 static __attribute__((noinline)) vh least_of_faces(const int16_t *from, const int16_t *to, vh *lack)
 {
     vh least = vh_set(INT16_MAX), faces = vh_set(0);
