@@ -202,10 +202,10 @@ static int set_frame(drawing *d, int index)
 static int draw_frame(drawing *d)
 {
     enum { LOOK_NS = 20000000 };
-    int status;
+    int status = 0;
     d->progress = trip_progress_start(false);
-    while ((status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_WAITS)
-        triptych_await(d->t, LOOK_NS);
+    while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_WAITS)
+        status = triptych_await(d->t, LOOK_NS);
     if (!status)
         status = d->depth ? triptych_picture_and_depth(d->t, d->rgba, d->depth)
                           : triptych_picture(d->t, d->rgba);

@@ -648,8 +648,8 @@ int triptych_draw(triptych *t, float *rgba)
     int status = triptych_begin(t);
     if (status)
         return status;
-    while ((status = triptych_step(t, UINT64_MAX)) == TRIPTYCH_WAITS)
-        triptych_await(t, LOOK_NS);
+    while (!status && (status = triptych_step(t, UINT64_MAX)) == TRIPTYCH_WAITS)
+        status = triptych_await(t, LOOK_NS);
     if (!status)
         status = triptych_picture(t, rgba);
     triptych_end(t);

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -802,17 +803,6 @@ static void a_turned_view_can_be_turned_back(void **state)
     triptych_destroy(t);
 }
 
-/* A thread with a context of its own. */
-typedef struct worker {
-    pthread_t thread;
-    triptych *t;
-    float *rgba;
-    int status, frames;
-    int same;
-    char error[256];
-} worker;
-
-/* The frame is begun already, so that cancelling is noticed whenever it comes. */
 /* The tooth has 16 bits, which codes hold exactly, and with a halo every cell with a visible value
  * has its corners: unlit, nothing is lost. Lit, normals are stored in fewer bits. */
 static void the_integral_of_what_is_kept_is_that_of_the_volume(void **state)
@@ -948,6 +938,17 @@ static void a_level_is_mixed_into_the_one_before_it(void **state)
     assert_int_equal(system("rm -r levels.trip"), 0);
 }
 
+/* A thread with a context of its own. */
+typedef struct worker {
+    pthread_t thread;
+    triptych *t;
+    float *rgba;
+    int status, frames;
+    int same;
+    char error[256];
+} worker;
+
+/* The frame is begun already, so that cancelling is noticed whenever it comes. */
 static void *draw_until_cancelled(void *user)
 {
     worker *w = user;
@@ -1000,6 +1001,38 @@ static void two_contexts_draw_in_two_threads_and_one_is_cancelled(void **state)
         triptych_destroy(w[i].t);
         free(w[i].rgba);
     }
+}
+
+static void *draw_once(void *user)
+{
+    worker *w = user;
+    w->status = triptych_draw(w->t, w->rgba);
+    return NULL;
+}
+
+/* At moments all over a frame: while it is begun, reads, draws or waits for the disk. */
+static void a_frame_that_is_cancelled_passes_one_message(void **state)
+{
+    (void)state;
+    enum { TRIES = 200, APART_NS = 50000 };
+    static float rgba[FLOATS];
+    int cancelled = 0, messages;
+    worker w = { .t = new_context(), .rgba = rgba };
+    open_data(w.t, TRIPTYCH_RENDERER_CPU);
+    triptych_set_messages(w.t, count_message, &messages);
+    for (int i = 0; i < TRIES; i++) {
+        const struct timespec moment = { .tv_nsec = (long)i * APART_NS };
+        messages = 0;
+        assert_int_equal(pthread_create(&w.thread, NULL, draw_once, &w), 0);
+        nanosleep(&moment, NULL);
+        triptych_cancel(w.t);
+        pthread_join(w.thread, NULL);
+        assert_true(w.status == TRIPTYCH_OK || w.status == TRIPTYCH_CANCELLED);
+        assert_int_equal(messages, w.status == TRIPTYCH_CANCELLED);
+        cancelled += messages;
+    }
+    assert_true(cancelled > 0);
+    triptych_destroy(w.t);
 }
 
 static triptych_frame_stats draw(triptych *t, float *rgba)
@@ -1263,6 +1296,7 @@ int main(void)
         cmocka_unit_test(the_device_names_the_kernels_that_draw),
         cmocka_unit_test(measurements_keep_their_colours_unless_effects_are_asked_for),
         cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
+        cmocka_unit_test(a_frame_that_is_cancelled_passes_one_message),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);
 }
