@@ -539,7 +539,7 @@ static int sweep_count(const trip_light_map *m)
     return m->stage == SWEEP_OPEN ? TRIP_OPEN_DIRECTIONS : m->point_light ? TRIP_LIGHT_REGIONS : 1;
 }
 
-/* A layer. */
+/* A piece. */
 static int sweep(trip_light_map *m, const trip_task_runner *runner)
 {
     if (clear(m))

@@ -39,7 +39,7 @@ void trip_light_map_destroy(trip_light_map *m);
 /* Takes the lattices and starts the reads; what is there from before and the same is kept, as far
  * as it was made. Fails (reported) where the lattices do not fit the memory given. */
 int trip_light_map_begin(trip_light_map *m, const trip_light_source *source);
-/* A piece of what is ready: a batch, some rows of nodes, or a layer, by `runner` (NULL: by the
+/* A piece of what is ready: a batch, or some rows of nodes or columns, by `runner` (NULL: by the
  * caller's thread). trip_frame's TRIP_FRAME_* of what it has come to. */
 int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
 /* Waits until there is something to do, at most for the timeout. */

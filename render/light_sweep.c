@@ -5,7 +5,10 @@
 /* Less is taken for nothing. */
 #define DARK 1e-7
 
-enum { BAND_ROWS = 4 }; /* of a task */
+enum {
+    BAND_ROWS = 4,  /* of a task */
+    PIECE = 1 << 14 /* columns or nodes of a step */
+};
 
 static size_t column_bytes(const trip_light_sweep *s)
 {
@@ -63,8 +66,6 @@ static bool take_columns(trip_light_sweep *s, trip_budget *budget)
     s->budget = budget;
     s->layer = s->start;
     s->through = trip_budget_take(budget, column_bytes(s));
-    for (size_t i = 0; s->through && i < column_bytes(s) / sizeof *s->through; i++)
-        s->through[i] = 1;
     return s->through != NULL;
 }
 
@@ -172,11 +173,11 @@ static double depth_of(const trip_light_sweep *s, const double from[3], const do
     return 0.5 * sum * (t1 - t0) * (s->point ? length_of(s, step) : s->length);
 }
 
-/* Of rows from one before another. */
-static int end_of_band(unsigned band, int first, int end)
+/* The rows of a task: from, and to below. */
+static void band_of(const trip_light_sweep *s, unsigned band, int rows[2])
 {
-    const int last = first + (int)(band + 1) * BAND_ROWS;
-    return last < end ? last : end;
+    rows[0] = s->rows[0] + (int)band * BAND_ROWS;
+    rows[1] = rows[0] + BAND_ROWS < s->rows[1] ? rows[0] + BAND_ROWS : s->rows[1];
 }
 
 /* Where a column that is at w at the last layer is at the layer before, and its step: voxels. */
@@ -189,24 +190,26 @@ static void place_column(const trip_light_sweep *s, int i, double w, double pass
     step[axis] = passed * moved * s->out->spacing;
 }
 
-/* Some rows of columns from the layer before to this one. */
+/* Some rows of columns from the layer before to this one; all light is left before the first. */
 static void attenuate(void *sweep, unsigned band)
 {
     const trip_light_sweep *s = sweep;
-    const int first = (int)band * BAND_ROWS, end = end_of_band(band, 0, s->columns[1]);
-    const double passed = s->layer > s->start ? 1 : s->before;
+    const bool begins = s->layer == s->start;
+    const double passed = begins ? s->before : 1;
     double from[3], step[3];
+    int rows[2];
+    band_of(s, band, rows);
     from[s->axis] = node_of(s, s->layer - passed) * s->out->spacing;
     step[s->axis] = node_of(s, s->layer) * s->out->spacing - from[s->axis];
-    double *through = s->through + (ptrdiff_t)first * s->columns[0];
-    for (int row = first; row < end; row++) {
+    double *through = s->through + (ptrdiff_t)rows[0] * s->columns[0];
+    for (int row = rows[0]; row < rows[1]; row++) {
         place_column(s, 1, s->first[1] + row, passed, from, step);
         for (int column = 0; column < s->columns[0]; column++, through++) {
             place_column(s, 0, s->first[0] + column, passed, from, step);
-            double depth = *through > 0 ? depth_of(s, from, step) : 0;
-            if (depth > 0)
-                *through *= exp(-depth);
-            *through = *through > DARK ? *through : 0;
+            const double before = begins ? 1 : *through;
+            const double depth = before > 0 && passed > 0 ? depth_of(s, from, step) : 0;
+            const double left = depth > 0 ? before * exp(-depth) : before;
+            *through = left > DARK ? left : 0;
         }
     }
 }
@@ -228,11 +231,11 @@ static void give(void *sweep, unsigned band)
     const trip_light_sweep *s = sweep;
     const size_t strides[3] = { 1, (size_t)s->out->nodes[0],
                                 (size_t)s->out->nodes[0] * (size_t)s->out->nodes[1] };
-    const int first = s->nodes[1][0] + (int)band * BAND_ROWS;
-    const int end = end_of_band(band, s->nodes[1][0], s->nodes[1][1]);
     float *layer = s->out->at + (size_t)node_of(s, s->layer) * strides[s->axis];
     double part[2];
-    for (int v = first; v < end; v++) {
+    int rows[2];
+    band_of(s, band, rows);
+    for (int v = rows[0]; v < rows[1]; v++) {
         const int row = column_before(s, 1, column_of(s, 1, v, s->layer), &part[1]);
         const double *upper = s->through + (ptrdiff_t)row * s->columns[0];
         const double *lower = upper + s->columns[0];
@@ -270,18 +273,35 @@ static void find_nodes(trip_light_sweep *s)
     }
 }
 
-static unsigned bands_of(int rows)
+/* Does the next rows of a layer, of so many columns or nodes each: as many as one thread does in
+ * a few milliseconds. Whether none are left then. */
+static bool do_rows(trip_light_sweep *s, const trip_task_runner *runner,
+                    void (*task)(void *sweep, unsigned band), int end, int length)
 {
-    return (unsigned)((rows + BAND_ROWS - 1) / BAND_ROWS);
+    const int bands = PIECE / (BAND_ROWS * length + 1);
+    const int most = BAND_ROWS * (bands > 1 ? bands : 1);
+    s->rows[0] = s->rows[1];
+    s->rows[1] = end - s->rows[0] < most ? end : s->rows[0] + most;
+    const int rows = s->rows[1] - s->rows[0];
+    trip_run_tasks(runner, task, s, (unsigned)((rows + BAND_ROWS - 1) / BAND_ROWS));
+    return s->rows[1] == end;
 }
 
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner)
 {
     if (!s->through)
         return false;
-    if (s->layer > s->start || s->before > 0)
-        trip_run_tasks(runner, attenuate, s, bands_of(s->columns[1]));
-    find_nodes(s);
-    trip_run_tasks(runner, give, s, bands_of(s->nodes[1][1] - s->nodes[1][0]));
+    if (!s->attenuated) {
+        s->attenuated = do_rows(s, runner, attenuate, s->columns[1], s->columns[0]);
+        if (s->attenuated) {
+            find_nodes(s);
+            s->rows[1] = s->nodes[1][0];
+        }
+        return true;
+    }
+    if (!do_rows(s, runner, give, s->nodes[1][1], s->nodes[0][1] - s->nodes[0][0]))
+        return true;
+    s->attenuated = false;
+    s->rows[1] = 0;
     return ++s->layer <= last_layer(s);
 }

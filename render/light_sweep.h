@@ -35,6 +35,8 @@ typedef struct trip_light_sweep {
     int start;                /* the layer that the light comes to first */
     double before;            /* and layers that it passes before that */
     int layer;                /* the next */
+    bool attenuated;          /* its columns are done, its nodes are being done */
+    int rows[2];              /* of columns or nodes, those of a step: from, and to below */
     int nodes[2][2];          /* of the layer, the region's: from, and to below */
     double *through;          /* NULL: the region has no nodes */
     trip_budget *budget;
@@ -47,7 +49,7 @@ bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget
 #define TRIP_LIGHT_REGIONS 6
 bool trip_light_sweep_begin_at(trip_light_sweep *s, trip_vec3 light, int region,
                                trip_budget *budget);
-/* One layer; false once all are done. `runner` NULL: the caller's thread does all of it. */
+/* Some rows of a layer; false once all are done. `runner` NULL: the caller's thread does them. */
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner);
 void trip_light_sweep_end(trip_light_sweep *s);
 /* The most that the columns of any light take. */

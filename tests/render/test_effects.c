@@ -1030,6 +1030,38 @@ static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
     scene_destroy(&s);
 }
 
+/* A step does 16384 columns or nodes of a layer or fewer, so that a frame can be given up soon. */
+static void a_wide_layer_takes_several_steps(void **state)
+{
+    (void)state;
+    enum { WIDE = 200, LAYERS = 9, LAYER_NODES = WIDE * WIDE, PIECES = 6, STEPS = 3 };
+    scene s;
+    trip_light_map *m;
+    const trip_clip none = { 0 };
+    scene_create(&s, &(scene_params){ .dims = { WIDE, WIDE, LAYERS }, .tile_voxels = 64 });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 1, 1, (float)FOG };
+    trip_settings settings = scene_with_shadows(trip_v3(0, 0, 1));
+    settings.effects.cells = WIDE;
+    const trip_light_source source = {
+        .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
+    };
+    int sweeps = 0;
+    assert_int_equal(trip_light_map_create(&m, s.budget), 0);
+    assert_int_equal(trip_light_map_begin(m, &source), 0);
+    while (trip_light_map_step(m, NULL) > 0) {
+        sweeps += trip_light_map_stats(m).sweep_ms > 0;
+        trip_light_map_await(m, UINT64_MAX);
+    }
+    assert_true(sweeps >= PIECES + 2 * STEPS * LAYERS);
+    const trip_light_grid *reached = trip_light_map_reached(m);
+    assert_int_equal(trip_light_grid_count(reached), LAYER_NODES * LAYERS);
+    for (int n = 0; n < LAYER_NODES * LAYERS; n++)
+        assert_close(reached->at[n], exp(-FOG * (LAYERS - 1 - n / LAYER_NODES)), 1e-6);
+    trip_light_map_destroy(m);
+    scene_destroy(&s);
+}
+
 /* Means are made and lattices cleared up to so many nodes in a step; what a frame that is given up
  * has left of that, the next one does. */
 static void a_lattice_of_many_nodes_takes_many_steps(void **state)
@@ -1064,7 +1096,8 @@ static void a_lattice_of_many_nodes_takes_many_steps(void **state)
     }
     /* The first comes once all has been read. */
     assert_int_equal(averages, 1 + PIECES);
-    assert_int_equal(sweeps, PIECES + NODES + OPEN_PIECES + OPEN_NODES * TRIP_OPEN_DIRECTIONS);
+    assert_int_equal(sweeps,
+                     PIECES + 2 * NODES + OPEN_PIECES + 2 * OPEN_NODES * TRIP_OPEN_DIRECTIONS);
     const trip_light_grid *means = trip_light_map_gathered(maps[0]);
     assert_int_equal(trip_light_grid_count(means), COUNT);
     for (size_t n = 0; n < COUNT; n++)
@@ -1169,6 +1202,7 @@ int main(void)
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),
         cmocka_unit_test(a_renderer_without_effects_refuses_them),
         cmocka_unit_test(whoever_does_the_tasks_the_lattice_has_the_same_bits),
+        cmocka_unit_test(a_wide_layer_takes_several_steps),
         cmocka_unit_test(a_lattice_of_many_nodes_takes_many_steps),
         cmocka_unit_test(a_lattice_that_does_not_fit_is_refused),
     };
