@@ -59,6 +59,14 @@ static inline trip_vec3 trip_coordinates_point(const trip_coordinates *c, trip_v
                    c->along[2][(int64_t)voxel.z]);
 }
 
+/* Of a voxel, along each axis. */
+static inline trip_vec3 trip_coordinates_widths(const trip_coordinates *c, trip_vec3 voxel)
+{
+    return trip_v3(trip_coordinates_width(c, 0, (int64_t)voxel.x),
+                   trip_coordinates_width(c, 1, (int64_t)voxel.y),
+                   trip_coordinates_width(c, 2, (int64_t)voxel.z));
+}
+
 static inline double trip_coordinates_at(const trip_coordinates *c, int axis, int64_t voxel)
 {
     return c->along[axis] ? c->along[axis][voxel] : (double)voxel;

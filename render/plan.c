@@ -399,9 +399,7 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
     const char *why = NULL;
     if (!trip_coordinates_uneven(&data->coordinates))
         return 0;
-    if (s->field == TRIP_FIELD_SPLATS)
-        why = "the sum of its splats has no integral here; --field values has";
-    else if (s->kernel != TRIP_KERNEL_LINEAR)
+    if (s->kernel != TRIP_KERNEL_LINEAR)
         why = "it is interpolated linearly alone";
     else if (s->footprint == TRIP_FOOTPRINT_FIXED || s->vertex_weights ||
              s->method == TRIP_METHOD_IMAGE)

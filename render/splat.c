@@ -58,9 +58,7 @@ trip_vec3 trip_splat_place(const trip_splat_frame *f, const trip_coordinates *co
         *frame = *f;
         return voxel;
     }
-    const trip_vec3 width = trip_v3(trip_coordinates_width(coordinates, 0, (int64_t)voxel.x),
-                                    trip_coordinates_width(coordinates, 1, (int64_t)voxel.y),
-                                    trip_coordinates_width(coordinates, 2, (int64_t)voxel.z));
+    const trip_vec3 width = trip_coordinates_widths(coordinates, voxel);
     *frame = trip_splat_frame_scaled(f, width);
     *growth = fmax(width.x, fmax(width.y, width.z));
     return trip_vec3_over(trip_coordinates_point(coordinates, voxel), width);

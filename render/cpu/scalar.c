@@ -128,9 +128,7 @@ static splat_space space_of(const trip_cpu_view *view, trip_vec3 voxel)
     s.centre = trip_splat_place(&view->splat, c, voxel, &s.frame, &growth);
     if (!view->coordinates)
         return s;
-    s.width = trip_v3(trip_coordinates_width(c, 0, (int64_t)voxel.x),
-                      trip_coordinates_width(c, 1, (int64_t)voxel.y),
-                      trip_coordinates_width(c, 2, (int64_t)voxel.z));
+    s.width = trip_coordinates_widths(c, voxel);
     trip_vec3 ray =
         camera->ortho ? camera->r0 : trip_sub(trip_coordinates_point(c, voxel), camera->eye);
     double length = trip_length(ray);

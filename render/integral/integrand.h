@@ -12,7 +12,7 @@
 
 typedef struct trip_integrand {
     const trip_field *field;             /* finished */
-    const trip_coordinates *coordinates; /* of its grid; NULL: spacing is even */
+    const trip_coordinates *coordinates; /* of its grid */
     const trip_classes *classes;
     const trip_settings *settings;
     const trip_camera *camera; /* of the grid of the field */
@@ -34,7 +34,8 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
 /* Splats that a ray meets: a thread's memory, from the budget, kept from ray to ray. */
 typedef struct trip_splat_hit {
     double enter, middle, leave; /* t */
-    double distance2;            /* of the ray from the voxel, index space */
+    double distance2;            /* of the ray from the voxel, index space of its own (splat.h) */
+    double length;               /* of the ray's direction there */
     double extinction;           /* per world unit */
     double rgb[3];
     uint64_t voxel; /* its number in the grid */

@@ -15,7 +15,6 @@ typedef struct passage {
     const trip_ray *ray;
     trip_splat_hits *hits;
     double sigma, radius, amplitude; /* index space; the amplitude is that of a density */
-    double length;                   /* of the ray's direction, index space */
     size_t first;                    /* hits before this one end before where the ray is */
 } passage;
 
@@ -43,13 +42,17 @@ static int make_room(trip_splat_hits *h)
     return 0;
 }
 
-/* Squared distance of a point from the ray's line, and where on it that is least. */
-static double distance2(const passage *p, trip_vec3 point, double *t)
+/* Squared distance of a point from the ray's line, where a voxel of this width has edges of 1;
+ * where on the line that is least, and the length of the ray's direction there. */
+static double distance2(const trip_ray *ray, trip_vec3 point, trip_vec3 width, double *t,
+                        double *length)
 {
-    trip_vec3 from = trip_sub(point, p->ray->origin), d = p->ray->direction;
-    trip_vec3 across = trip_cross(from, d);
-    *t = trip_dot(from, d) / (p->length * p->length);
-    return trip_dot(across, across) / (p->length * p->length);
+    const trip_vec3 from = trip_vec3_over(trip_sub(point, ray->origin), width);
+    const trip_vec3 d = trip_vec3_over(ray->direction, width);
+    const trip_vec3 across = trip_cross(from, d);
+    *length = trip_length(d);
+    *t = trip_dot(from, d) / (*length * *length);
+    return trip_dot(across, across) / (*length * *length);
 }
 
 static void colour(const trip_integrand *in, trip_vec3 at, const trip_field_voxel *v,
@@ -66,15 +69,20 @@ static void colour(const trip_integrand *in, trip_vec3 at, const trip_field_voxe
 static int add_hit(passage *p, const int64_t at[3], const trip_field_voxel *v)
 {
     const trip_tf_entry *entry = &p->in->classes->table[(unsigned)v->code];
-    const trip_vec3 centre = trip_v3((double)at[0], (double)at[1], (double)at[2]);
+    const trip_coordinates *c = p->in->coordinates;
+    const trip_vec3 voxel = trip_v3((double)at[0], (double)at[1], (double)at[2]);
+    const trip_vec3 centre = trip_coordinates_point(c, voxel);
     const int64_t *dims = trip_field_dims(p->in->field);
     trip_splat_hit hit = { .extinction = entry->extinction };
-    hit.distance2 = distance2(p, centre, &hit.middle);
-    double half2 = p->radius * p->radius - hit.distance2;
-    if (!(entry->extinction > 0 && half2 > 0 && trip_clip_has(p->in->clip, centre)))
+    if (!(entry->extinction > 0))
         return 0;
-    hit.enter = fmax(0, hit.middle - sqrt(half2) / p->length);
-    hit.leave = hit.middle + sqrt(half2) / p->length;
+    hit.distance2 =
+        distance2(p->ray, centre, trip_coordinates_widths(c, voxel), &hit.middle, &hit.length);
+    double half2 = p->radius * p->radius - hit.distance2;
+    if (!(half2 > 0 && trip_clip_has(p->in->clip, centre)))
+        return 0;
+    hit.enter = fmax(0, hit.middle - sqrt(half2) / hit.length);
+    hit.leave = hit.middle + sqrt(half2) / hit.length;
     hit.voxel = ((uint64_t)at[2] * (uint64_t)dims[1] + (uint64_t)at[1]) * (uint64_t)dims[0] +
                 (uint64_t)at[0];
     if (hit.leave <= hit.enter)
@@ -86,14 +94,30 @@ static int add_hit(passage *p, const int64_t at[3], const trip_field_voxel *v)
     return 0;
 }
 
+/* Whether no splat of a cube's voxels reaches the ray. */
+static bool is_missed(const passage *p, const trip_field_cube *cube)
+{
+    const trip_coordinates *c = p->in->coordinates;
+    const int64_t *dims = trip_field_dims(p->in->field);
+    double half[3], middle[3], t, length;
+    for (int a = 0; a < 3; a++) {
+        const int64_t end = cube->at[a] + TRIP_FIELD_EDGE,
+                      last = end < dims[a] ? end - 1 : dims[a] - 1;
+        const double from = trip_coordinates_at(c, a, cube->at[a]),
+                     to = trip_coordinates_at(c, a, last);
+        half[a] = 0.5 * (to - from);
+        middle[a] = 0.5 * (to + from);
+    }
+    const double reach =
+        p->radius * c->widest + sqrt(half[0] * half[0] + half[1] * half[1] + half[2] * half[2]);
+    return distance2(p->ray, trip_v3(middle[0], middle[1], middle[2]), trip_v3(1, 1, 1), &t,
+                     &length) > reach * reach;
+}
+
 static int add_hits_of_cube(passage *p, const trip_field_cube *cube)
 {
     enum { EDGE = TRIP_FIELD_EDGE };
-    const double half = 0.5 * (EDGE - 1), reach = p->radius + half * sqrt(3);
-    double t;
-    trip_vec3 centre =
-        trip_v3((double)cube->at[0] + half, (double)cube->at[1] + half, (double)cube->at[2] + half);
-    if (distance2(p, centre, &t) > reach * reach)
+    if (is_missed(p, cube))
         return 0;
     for (int n = 0; n < EDGE * EDGE * EDGE; n++) {
         const int64_t at[3] = { cube->at[0] + n % EDGE, cube->at[1] + n / EDGE % EDGE,
@@ -125,7 +149,7 @@ static int gather_hits(passage *p)
 
 static double density(const passage *p, const trip_splat_hit *hit, double t)
 {
-    double along = (t - hit->middle) * p->length;
+    double along = (t - hit->middle) * hit->length;
     double r2 = hit->distance2 + along * along, left = p->radius * p->radius - r2;
     if (!(left > 0))
         return 0;
@@ -148,14 +172,17 @@ static void sample(void *user, double t, trip_ray_sample *out)
         out->rgb[i] /= out->extinction;
 }
 
-/* Piece by piece, each a voxel long; stretches without splats are passed over. */
+/* Piece by piece, each as long as the least voxel; stretches without splats are passed over. */
 static void add_pieces(passage *p, trip_ray_sum *sum)
 {
     const trip_splat_hit *hits = p->hits->hits;
     const size_t count = p->hits->count;
-    double end = 0, step = 1 / p->length, longest = 2 * p->radius / p->length;
-    for (size_t i = 0; i < count; i++)
+    double end = 0, step = INFINITY, longest = 0;
+    for (size_t i = 0; i < count; i++) {
         end = fmax(end, hits[i].leave);
+        step = fmin(step, 1 / hits[i].length);
+        longest = fmax(longest, 2 * p->radius / hits[i].length);
+    }
     sum->length = end - hits[0].enter;
     trip_ray_end from = trip_ray_end_at(hits[0].enter, sample, p);
     while (from.t < end && !trip_ray_sum_is_over(sum)) {
@@ -179,8 +206,7 @@ int trip_integrate_splats(const trip_integrand *in, const trip_ray *ray, trip_sp
                   .hits = hits,
                   .sigma = f.sigma,
                   .radius = f.sigma * TRIP_CUTOFF,
-                  .amplitude = f.amplitude / (sqrt(two_pi) * f.sigma),
-                  .length = trip_length(ray->direction) };
+                  .amplitude = f.amplitude / (sqrt(two_pi) * f.sigma) };
     *out = trip_ray_sum_begin(in->settings->tolerance, 1);
     int status = gather_hits(&p);
     if (!status && hits->count > 0)

@@ -254,6 +254,21 @@ class Accuracy(program.ProgramTest):
         self.assertEqual([one["name"] for one in report["left_out"]], ["popping-pre"])
         self.assertEqual(report["popping"], {})
 
+    def test_spacing_may_be_uneven(self):
+        """Splats have an integral of their sum, and no other kernel interpolates."""
+        for axis, count in zip("xyz", (40, 28, 24)):
+            places = " ".join(str(i + 0.3 * math.sin(i)) for i in range(count))
+            program.write(f"{axis}.txt", places.encode())
+        self.brick("a.nrrd", "uneven.trip", "--coordinates", "x.txt,y.txt,z.txt")
+        run = self.works("accuracy", "uneven.trip", "-o", "uneven", *SMALL, "--tf", "a.tf",
+                         "--settings", "post,pre,post-cubic", program=program.QUICK_PROGRAM)
+        with open("uneven/accuracy.json", encoding="utf-8") as f:
+            report = json.load(f)
+        models = {row["name"]: row["model"]["mean"] for row in report["rows"]}
+        self.assertEqual(list(models), ["post", "pre"])
+        self.assertTrue(models["post"] == 0 < models["pre"], models)
+        self.assertIn("left out: post-cubic: uneven.trip: has uneven spacing", run.stdout.decode())
+
     def test_what_is_left_out_is_listed(self):
         (left_out,) = self.report["left_out"]
         self.assertEqual(left_out["name"], "post-samples-2")

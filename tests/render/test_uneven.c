@@ -289,7 +289,8 @@ static void splats_have_the_mass_of_their_voxels(void **state)
         s.table[code].extinction = 1e-3F * (float)code / 65535;
     trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 30, SIZE);
     view.ortho_height = 60;
-    const trip_settings settings = splats();
+    trip_settings settings = splats();
+    settings.field = TRIP_FIELD_SPLATS; /* of the integral */
     double mass = 0;
     for (int n = 0; n < EDGE * EDGE * EDGE; n++) {
         const int at[3] = { n % EDGE, n / EDGE % EDGE, n / EDGE / EDGE };
@@ -303,14 +304,126 @@ static void splats_have_the_mass_of_their_voxels(void **state)
         mass += volume * (double)s.table[code].extinction;
     }
     const scene_renderer *const renderers[] = { &cpu_scenes_reference, &cpu_scenes_cpu };
-    for (int i = 0; i < 2; i++) {
-        scene_picture p = scene_draw(&s, renderers[i], &view, &settings);
+    for (int i = 0; i < 3; i++) {
+        scene_picture p = i < 2 ? scene_draw(&s, renderers[i], &view, &settings)
+                                : integrate(&s, &view, &settings);
         double sum = 0, pixel = 60.0 / SIZE;
         for (int n = 0; n < SIZE * SIZE; n++)
             sum -= log1p(-(double)p.rgba[4 * n + 3]) * pixel * pixel;
         assert_close(sum / mass, 1, 2e-3);
         scene_picture_free(&p);
     }
+    scene_destroy(&s);
+}
+
+static const int lone[3] = { 9, 12, 6 };
+
+static bool one_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = 7;
+    return i == lone[0] && j == lone[1] && k == lone[2];
+}
+
+/* The kernel of even spacing, stretched along each axis as the voxel is. */
+static void a_splat_is_as_wide_as_its_voxel(void **state)
+{
+    (void)state;
+    enum { SIZE = 15 };
+    const double cutoff = TRIP_CUTOFF, edge = exp(-cutoff * cutoff / 2), extinction = 3;
+    uneven u;
+    double place[3], width[3];
+    make_uneven(&u, 6);
+    for (int a = 0; a < 3; a++) {
+        const double *x = u.tables[a] + lone[a];
+        place[a] = x[0];
+        width[a] = (x[1] - x[-1]) / 2;
+    }
+    for (int i = 0; i < 8; i++) {
+        scene s;
+        int covered = 0;
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                          .coordinates = &u.coordinates,
+                                          .voxel = one_voxel });
+        s.table[7] = (trip_tf_entry){ 0.2F, 0.4F, 1, (float)extinction };
+        trip_settings settings = plain(1e-7);
+        settings.field = TRIP_FIELD_SPLATS;
+        settings.kernel_radius = i % 2 ? 3 : 2;
+        const double sigma = settings.kernel_radius / cutoff;
+        trip_camera_params view = view_of(&s, i / 2, SIZE);
+        view.look = trip_v3(place[0], place[1], place[2]);
+        view.eye = trip_add(view.look, trip_scale(trip_sub(view.look, view.eye), 0.3));
+        view.fov_degrees = 30;
+        view.ortho_height = i / 4 ? 8 : 0;
+        scene_picture p = integrate(&s, &view, &settings);
+        for (int n = 0; n < SIZE * SIZE; n++) {
+            trip_vec3 o, d;
+            scene_ray(&s, &view, n % SIZE, n / SIZE, &o, &d);
+            const trip_vec3 w = trip_v3(width[0], width[1], width[2]);
+            const trip_vec3 own = trip_vec3_over(d, w),
+                            to = trip_vec3_over(trip_sub(view.look, o), w);
+            const trip_vec3 across = trip_cross(to, trip_scale(own, 1 / trip_length(own)));
+            const double d2 = trip_dot(across, across) / (sigma * sigma);
+            double footprint = d2 < cutoff * cutoff ? exp(-d2 / 2) - edge : 0;
+            footprint /=
+                2 * 3.14159265358979323846 * sigma * sigma * (1 - edge * (1 + cutoff * cutoff / 2));
+            const double world = trip_length(d) / trip_length(own); /* of a voxel's step */
+            const double alpha = -expm1(-extinction * world * footprint);
+            covered += alpha > 0.01;
+            assert_close(scene_pixel(&p, n % SIZE, n / SIZE)[3], alpha, 1e-6);
+            assert_close(scene_pixel(&p, n % SIZE, n / SIZE)[1], 0.4F * alpha, 1e-6);
+        }
+        assert_in_range(covered, 5, SIZE * SIZE - 1);
+        scene_picture_free(&p);
+        scene_destroy(&s);
+    }
+}
+
+static bool noise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = scene_hash(i, j, k) % 65536;
+    return true;
+}
+
+/* Of one colour, so that their order does not matter; but for the low-pass of the screen, which
+ * adds a variance that falls with the square of the pixel. */
+static void splats_of_one_colour_come_to_their_integral(void **state)
+{
+    (void)state;
+    enum { SIZE = 12, FINENESSES = 3 };
+    uneven u;
+    scene s;
+    double errors[FINENESSES] = { 0 };
+    make_uneven(&u, 6);
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .coordinates = &u.coordinates,
+                                      .voxel = noise });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, code > 40000 ? 0.1F : 0 };
+    trip_settings settings = splats();
+    settings.h = 0;
+    settings.tolerance = 1e-6;
+    settings.field = TRIP_FIELD_SPLATS;
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, -0.4), 60, 0, SIZE);
+    view.ortho_height = 6;
+    scene_picture truth = integrate(&s, &view, &settings);
+    for (int i = 0, finer = 1; i < FINENESSES; i++, finer *= 3) { /* the same rays */
+        view.width = view.height = SIZE * finer;
+        scene_picture p = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
+        for (int n = 0; n < SIZE * SIZE; n++) {
+            const float *drawn =
+                scene_pixel(&p, n % SIZE * finer + finer / 2, n / SIZE * finer + finer / 2);
+            errors[i] = fmax(errors[i], test_most_apart(drawn, truth.rgba + 4 * n, 4));
+        }
+        scene_picture_free(&p);
+    }
+    assert_true(errors[0] > 1e-3);
+    assert_close(errors[1] / errors[0], 1.0 / 9, 0.05);
+    assert_close(errors[2] / errors[1], 1.0 / 9, 0.05);
+    scene_picture_free(&truth);
     scene_destroy(&s);
 }
 
@@ -642,6 +755,8 @@ int main(void)
         cmocka_unit_test(a_gaussian_has_its_line_integral),
         cmocka_unit_test(slices_come_to_the_integral),
         cmocka_unit_test(splats_have_the_mass_of_their_voxels),
+        cmocka_unit_test(a_splat_is_as_wide_as_its_voxel),
+        cmocka_unit_test(splats_of_one_colour_come_to_their_integral),
         cmocka_unit_test(all_draw_the_splats_of_the_reference),
         cmocka_unit_test(nothing_is_left_outside_a_support),
         cmocka_unit_test(gl_draws_exact_and_near_kernels),
