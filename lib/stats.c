@@ -24,6 +24,9 @@ static void explain_parts(const triptych *t, FILE *out)
         fprintf(out, ": the coarsest whose voxels are at most %g pixels wide\n", s->lod_px);
     else
         fputs(": the finest\n", out);
+    if (p->count > 1)
+        fprintf(out, "            of %d pictures, what follows is of number %d, at level %u\n",
+                p->count, t->part + 1, p->level[t->part]);
 }
 
 /* What was not set, and what it came to. */

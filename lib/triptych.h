@@ -473,8 +473,8 @@ TRIPTYCH_API void triptych_cancel(triptych *t);
 
 /* ---- what a frame takes ---- */
 
-/* Of a frame that is begun: what it reads and why, an effect or list a line. *text is for free().
- */
+/* Of a frame that is begun: what it reads and why, an effect or list a line; of post at several
+ * levels, the picture that is being drawn. *text is for free(). */
 TRIPTYCH_API int triptych_explain(triptych *t, char **text);
 
 /* Of the last frame whose picture was complete. Texts last until the data set is closed. */

@@ -87,12 +87,16 @@ static int add_selection(const planning *p, trip_plan_pass *pass, const trip_lis
     trip_plan *plan = p->plan;
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
     const eye_place eye = place_of_eye(p, list);
-    /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round. */
+    /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round, where
+     * it lies among them. */
     int64_t over = p->about ? trip_sheet_reach(p->settings->kernel) : 0;
-    if (side == BEYOND)
-        first = first_sheet_beyond(p, list, eye.at - eye.over) - over;
-    else if (side == BELOW)
-        last = first_sheet_beyond(p, list, eye.at + eye.over) - 1 + over;
+    if (side == BEYOND) {
+        first = first_sheet_beyond(p, list, eye.at - eye.over);
+        first -= first < sheets ? over : 0;
+    } else if (side == BELOW) {
+        last = first_sheet_beyond(p, list, eye.at + eye.over) - 1;
+        last += last >= 0 ? over : 0;
+    }
     first = first > 0 ? first : 0;
     last = last < sheets ? last : sheets - 1;
     if (first > last)
@@ -156,13 +160,14 @@ static trip_selection *selections_of(const trip_plan *plan, const trip_plan_pass
     return plan->selections + (pass->pass.selections - plan->selections);
 }
 
-/* Of a list in pass `i` of its layer; NULL where it has none. */
+/* Of a list, or of one with its number at another level (dataset_level.h), in pass `i` of its
+ * layer; NULL where it has none. */
 static trip_selection *selection_in(const trip_plan *plan, int axis, int i, const trip_list *list)
 {
     const trip_plan_pass *pass = &plan->layers[axis].passes[i];
     trip_selection *selections = selections_of(plan, pass);
     for (unsigned k = 0; k < pass->pass.selection_count; k++)
-        if (selections[k].list == list)
+        if (selections[k].list->index == list->index)
             return &selections[k];
     return NULL;
 }
@@ -698,7 +703,8 @@ static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *ou
     if (plan->clip.count == 0)
         fprintf(out, "clipping    does not run: nothing of the grid lies outside\n");
     else
-        fprintf(out, "clipping    runs: %d planes cut the grid\n", plan->clip.count);
+        fprintf(out, "clipping    runs: %d plane%s the grid\n", plan->clip.count,
+                plan->clip.count > 1 ? "s cut" : " cuts");
 }
 
 static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *out)
@@ -730,12 +736,18 @@ static bool is_read(const trip_plan *plan, const trip_list *list)
 static const char *why_not_drawn(const trip_plan *plan, const trip_settings *s,
                                  const trip_list *list)
 {
+    const bool post = s->classify == TRIP_CLASSIFY_POST;
     if (plan->gathers)
         return "";
-    if (trip_kind_of(list->kind)->coarse && !(plan->lod.level && list->level <= plan->lod.levels))
-        return ": the finest level alone is drawn";
-    return is_of(s, list) ? ": no ray of the view has weight in it"
-                          : ": its records are not splatted";
+    if (!is_of(s, list))
+        return post ? ": it has no values to interpolate" : ": its records are not splatted";
+    const bool other = post ? list->level != plan->level
+                            : trip_kind_of(list->kind)->coarse &&
+                                  !(plan->lod.level && list->level <= plan->lod.levels);
+    if (other)
+        return post && trip_settings_has_levels(s) ? ": of another level than what is drawn"
+                                                   : ": the finest level alone is drawn";
+    return ": no ray of the view has weight in it";
 }
 
 /* Reasons that not every frame has. */

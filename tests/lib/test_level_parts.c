@@ -221,6 +221,53 @@ static void steps_come_to_the_same_bits(void **state)
 }
 
 /* Light that reaches places, and distances, are of one level: the finest that is called for. */
+/* Which of the pictures it is, from 1 on; lists of its level are read, or have no weight. */
+static int check_plan(triptych *t)
+{
+    static const char said[] = "of 3 pictures, what follows is of number ";
+    char *text = NULL;
+    int number, read = 0;
+    unsigned level;
+    assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
+    const char *at = strstr(text, said);
+    assert_non_null(at);
+    assert_int_equal(sscanf(at + strlen(said), "%d, at level %u", &number, &level), 2);
+    for (at = text; (at = strstr(at, "\nlist ")); at++) {
+        const unsigned of = at[7] > '0' && at[7] <= '9' ? (unsigned)(at[7] - '0') : 0;
+        const char *end = strchr(at + 1, '\n');
+        const char *other = strstr(at, ": of another level than what is drawn\n");
+        const char *reads = strstr(at, " read: ");
+        assert_int_equal(other && other < end, of != level);
+        read += reads && reads < end;
+    }
+    assert_true(read > 0);
+    free(text);
+    return number;
+}
+
+static void the_plan_is_of_the_picture_that_is_drawn(void **state)
+{
+    (void)state;
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
+    const triptych_settings s = plain(4);
+    int status = TRIPTYCH_MORE, number = 0;
+    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    assert_int_equal(check_plan(t), 1);
+    while (status > 0) {
+        status = triptych_step(t, 0);
+        assert_true(status >= 0);
+        const int now = check_plan(t);
+        assert_in_range(now, number, 3);
+        number = now;
+        if (status == TRIPTYCH_WAITS)
+            assert_int_equal(triptych_await(t, UINT64_MAX), TRIPTYCH_OK);
+    }
+    assert_int_equal(number, 3);
+    triptych_end(t);
+    triptych_destroy(t);
+}
+
 static void what_takes_one_level_has_one(void **state)
 {
     (void)state;
@@ -299,6 +346,7 @@ int main(void)
         cmocka_unit_test(parts_join_without_a_seam),
         cmocka_unit_test(what_comes_after_the_last_part),
         cmocka_unit_test(steps_come_to_the_same_bits),
+        cmocka_unit_test(the_plan_is_of_the_picture_that_is_drawn),
         cmocka_unit_test(what_takes_one_level_has_one),
         cmocka_unit_test(a_bound_makes_parts_coarser),
         cmocka_unit_test(a_bound_holds_for_one_level),

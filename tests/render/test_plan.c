@@ -155,6 +155,34 @@ static void inside_the_volume_each_list_is_read_from_the_eye_outwards(void **sta
     scene_destroy(&s);
 }
 
+/* Values about the eye are interpolated from sheets on both sides of it, and gradients from one
+ * sheet more, if there are some. */
+static void between_values_what_lies_behind_the_eye_has_no_pass(void **state)
+{
+    (void)state;
+    scene s;
+    make_scene(&s);
+    trip_camera_params p = scene_view(&s, trip_v3(1, 1, 1), 1, 150, 160);
+    trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.3);
+    settings.classify = TRIP_CLASSIFY_POST;
+    for (int z = -1; z <= 61; z += 31) { /* before, among and beyond 60 sheets */
+        p.eye = trip_v3(20.5, 30.5, z);
+        p.look = trip_v3(40, 10, 30);
+        const trip_camera c = make_camera(&s, &p);
+        trip_plan plan = make_plan(&s, &c, &settings);
+        const trip_plan_layer *x = &plan.layers[0], *along = &plan.layers[2];
+        assert_int_equal(x->pass_count, 2);
+        assert_int_equal(x->passes[0].pass.selections->sheet_first, 19);
+        assert_int_equal(x->passes[1].pass.selections->sheet_last, 22);
+        assert_int_equal(along->pass_count, z == 30 ? 2 : 1);
+        assert_int_equal(along->passes[0].pass.selections->sheet_first, z == 30 ? 28 : 0);
+        assert_int_equal(along->passes[0].pass.selections->sheet_last, 59);
+        assert_int_equal(along->passes[0].pass.selections->descending, z == 61);
+        trip_plan_release(&plan, s.budget);
+    }
+    scene_destroy(&s);
+}
+
 /* Of rays that go the other way too, but have no weight, nothing is drawn; and where nothing of the
  * volume is that a way's rays may meet, no pixel is masked. */
 static void a_way_that_no_ray_with_weight_goes_has_no_pass(void **state)
@@ -544,6 +572,7 @@ int main(void)
         cmocka_unit_test(a_list_is_used_exactly_when_some_pixel_has_weight_in_it),
         cmocka_unit_test(a_parallel_view_along_an_axis_uses_that_list_alone),
         cmocka_unit_test(inside_the_volume_each_list_is_read_from_the_eye_outwards),
+        cmocka_unit_test(between_values_what_lies_behind_the_eye_has_no_pass),
         cmocka_unit_test(a_way_that_no_ray_with_weight_goes_has_no_pass),
         cmocka_unit_test(ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze),
         cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
