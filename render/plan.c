@@ -711,6 +711,10 @@ static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *o
 {
     const trip_plan_layer *layer = &plan->layers[list->axis];
     const char *before = "            ";
+    if (plan->gathers) {
+        fprintf(out, "%sall sheets\n", before);
+        return;
+    }
     for (int i = 0; i < layer->pass_count; i++) {
         const trip_selection *s = selection_in(plan, list->axis, i, list);
         if (!s)
@@ -738,7 +742,9 @@ static const char *why_not_drawn(const trip_plan *plan, const trip_settings *s,
 {
     const bool post = s->classify == TRIP_CLASSIFY_POST;
     if (plan->gathers)
-        return "";
+        return list->level > 0   ? ": the finest level alone is drawn"
+               : list->axis != 2 ? ": list z has the same"
+                                 : ": its records are not splatted";
     if (!is_of(s, list))
         return post ? ": it has no values to interpolate" : ": its records are not splatted";
     const bool other = post ? list->level != plan->level
