@@ -188,10 +188,12 @@ static void write_figure(FILE *f, const char *name, const char *picture, const c
 
 static void write_pictures(FILE *f, const accuracy_report *r)
 {
-    fprintf(f,
-            "<h2>Pictures of the first view</h2>\n<p>Beside each how far it is from the integral, "
-            "the most of a pixel's channels: black is none, white %g of 255 and more.</p>\n",
-            ACCURACY_DIFFERENCE_MOST);
+    fprintf(
+        f,
+        "<h2>Pictures of the first view</h2>\n<p>Beside each how far it is from the integral, "
+        "the most of a pixel's channels: black is none, white %g of 255 and more; figures are of "
+        "all views.</p>\n",
+        ACCURACY_DIFFERENCE_MOST);
     if (r->m->truth)
         fprintf(f, "<figure><img alt='' src=\"%s\"><figcaption>integral</figcaption></figure>\n",
                 r->m->truth);

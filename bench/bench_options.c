@@ -195,8 +195,8 @@ static const struct table {
     },
     {
         .name = "ewa",
-        .refused = OF_LEVELS | OF_MODEL | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_NO_COUNTS) |
-                   BIT(KEY_VIEWS),
+        .refused = OF_FLIGHT | BIT(KEY_PLOT) | OF_LEVELS | OF_MODEL | BIT(KEY_ENGINE) |
+                   BIT(KEY_OCCLUDED) | BIT(KEY_NO_COUNTS) | BIT(KEY_VIEWS),
         .repeat = 5,
         .sizes = { { 512, 512 } },
         .size_count = 1,

@@ -89,6 +89,12 @@ static int add_contenders(race *c, bench_report *r)
     return status;
 }
 
+/* Of post there are no splats to be counted. */
+static bool counts(const race *c)
+{
+    return !c->options->no_counts && c->options->settings.classify == TRIP_CLASSIFY_PRE;
+}
+
 /* Splats by the first contender's exact count, pixels by a sample of the footprints. */
 static int measure_load(bench_frame frame, load *out)
 {
@@ -110,7 +116,7 @@ static int draw_view(race *c, bench_frame frame, int view)
 {
     int repeat = c->options->repeat, status = 0;
     frame.renderer = c->contenders[0].renderer;
-    if (!c->options->no_counts)
+    if (counts(c))
         status = measure_load(frame, &c->loads[view]);
     for (int i = 0; i < c->count && !status; i++) {
         bench_cost untimed, *costs = &c->contenders[i].costs[view * repeat];
@@ -193,7 +199,7 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
     cJSON_AddNumberToObject(row, "ms_min", values[0]);
     cJSON_AddNumberToObject(row, "ms_max", values[frames - 1]);
     cJSON_AddNumberToObject(row, "fps", 1e3 / median);
-    if (!c->options->no_counts) {
+    if (counts(c)) {
         cJSON_AddNumberToObject(row, "splats_drawn", splats / frames);
         cJSON_AddNumberToObject(row, "msplats_per_s", splats / ms * 1e-3);
         cJSON_AddNumberToObject(row, "mpixels_per_s", pixels / ms * 1e-3);
@@ -237,11 +243,14 @@ static void add_limits(const race *c, bench_report *r)
                           "was loaded: no figure contains the disk. A frame is planning, drawing "
                           "from memory and merging, and ends with the picture in the program's "
                           "memory.");
-    bench_report_limit(r, "Msplats/s: splats with a pixel centre in their footprint where their "
-                          "list has weight, all views together, over the time of all views. Those "
-                          "behind saturated pixels count too, though a renderer may skip them.");
-    bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
-                       SAMPLE_EVERY);
+    if (counts(c))
+        bench_report_limit(r,
+                           "Msplats/s: splats with a pixel centre in their footprint where their "
+                           "list has weight, all views together, over the time of all views. Those "
+                           "behind saturated pixels count too, though a renderer may skip them.");
+    if (counts(c))
+        bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
+                           SAMPLE_EVERY);
     if (leaves_out_occluded(c))
         bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
                               "same.");

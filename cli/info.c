@@ -81,7 +81,7 @@ static void grid_bounds(const triptych_info *info, double bounds[2][3])
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++)
-            p[a] = corner >> a & 1 ? (double)info->dims[a] - 0.5 : -0.5;
+            p[a] = info->grid_edges[corner >> a & 1][a];
         trip_vec3 world = trip_affine_point(&map, trip_v3(p[0], p[1], p[2]));
         for (int a = 0; a < 3; a++) {
             double v = trip_component(world, a);

@@ -225,7 +225,7 @@ static int draw_planned(drawing *d, int index)
         status = draw_frame(d);
     triptych_end(d->t);
     if (!status && d->o.explain)
-        status = render_stats_explain_cost(d->t, stdout);
+        status = render_stats_explain_cost(&d->o, d->t, stdout);
     return status;
 }
 

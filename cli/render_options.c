@@ -834,6 +834,8 @@ static int choose_classify(parse *p)
 static int check_classify(const parse *p)
 {
     const render_options *o = p->o;
+    if (o->count && o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_option_fail("--count", "does not apply to --renderer integral");
     if (o->settings.classify == TRIPTYCH_CLASSIFY_AUTO)
         return 0;
     if (o->settings.classify == TRIPTYCH_PRE && p->kernel &&

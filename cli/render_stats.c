@@ -56,10 +56,12 @@ static void add_ms(cJSON *object, const char *name, double ms)
     cJSON_AddRawToObject(object, name, text);
 }
 
-/* "x" at level 0, "x1" at level 1; only what is drawn has statistics. */
+/* "x" at level 0, "x1" at level 1, "x halo"; only what is drawn has statistics. */
 static const char *list_name(const triptych_list *list, char name[24])
 {
-    if (list->level == 0)
+    if (!strcmp(list->kind, "halo"))
+        snprintf(name, 24, "%c halo", 'x' + list->axis);
+    else if (list->level == 0)
         snprintf(name, 24, "%c", 'x' + list->axis);
     else
         snprintf(name, 24, "%c%u", 'x' + list->axis, list->level);
@@ -86,12 +88,16 @@ static void add_list(cJSON *list, const triptych_list_stats *s)
     cJSON_AddNumberToObject(list, "bricks_outside", (double)s->bricks_outside);
     cJSON_AddNumberToObject(list, "bricks_without_weight", (double)s->bricks_without_weight);
     cJSON_AddNumberToObject(list, "bricks_clipped", (double)s->bricks_clipped);
+    cJSON_AddNumberToObject(list, "bricks_of_other_levels", (double)s->bricks_of_other_levels);
 }
 
-/* Whether frames are drawn from the list: by splats of voxels and means, else of voxels and values
- * (and their halo, which is not counted apart). */
-static bool is_drawn_from(const triptych_list *list, const triptych_frame_stats *frame)
+/* Whether frames are drawn from the list: by splats of voxels and means, else of voxels, values and
+ * the halo. */
+static bool is_drawn_from(const triptych_list *list, const triptych_frame_stats *frame,
+                          const triptych_list_stats *s)
 {
+    if (s->splats_read > 0)
+        return true;
     if (list->level == 0 || frame->classify == TRIPTYCH_PRE)
         return list->drawn;
     return !strcmp(list->kind, "values");
@@ -114,7 +120,7 @@ static int each_list(triptych *t,
         status = triptych_get_list(t, i, &list);
         if (!status)
             status = triptych_get_list_stats(t, i, &s);
-        if (!status && is_drawn_from(&list, &frame))
+        if (!status && is_drawn_from(&list, &frame, &s))
             one(user, list_name(&list, name), &s);
     }
     return status;
@@ -223,6 +229,30 @@ static int write_file(const char *path, const char *text)
     return status;
 }
 
+/* How the frame was drawn. */
+static void add_method(cJSON *root, const render_options *o, const triptych_frame_stats *frame)
+{
+    if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL) {
+        static const char *const fields[] = { [RENDER_FIELD_UNSET] = "stored",
+                                              [RENDER_FIELD_STORED] = "stored",
+                                              [RENDER_FIELD_SOURCE] = "source",
+                                              [RENDER_FIELD_SPLATS] = "splats" };
+        cJSON_AddStringToObject(root, "field", fields[o->field]);
+        cJSON_AddNumberToObject(root, "tolerance", o->settings.tolerance);
+        return;
+    }
+    cJSON_AddStringToObject(root, "classify", frame->classify == TRIPTYCH_POST ? "post" : "pre");
+    if (frame->classify == TRIPTYCH_POST) {
+        cJSON_AddNumberToObject(root, "slices", frame->slices);
+        cJSON_AddBoolToObject(root, "closed_form", frame->closed_form);
+    } else {
+        cJSON_AddStringToObject(root, "compositing",
+                                o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
+        cJSON_AddStringToObject(root, "kernel", footprint_names[frame->footprint]);
+    }
+    cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
+}
+
 int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
 {
     cJSON *root = s->root;
@@ -233,16 +263,7 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
         return status;
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
-    cJSON_AddStringToObject(root, "classify", frame.classify == TRIPTYCH_POST ? "post" : "pre");
-    if (frame.classify == TRIPTYCH_POST) {
-        cJSON_AddNumberToObject(root, "slices", frame.slices);
-        cJSON_AddBoolToObject(root, "closed_form", frame.closed_form);
-    } else {
-        cJSON_AddStringToObject(root, "compositing",
-                                o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
-    }
-    if (frame.classify == TRIPTYCH_PRE)
-        cJSON_AddStringToObject(root, "kernel", footprint_names[o->settings.footprint]);
+    add_method(root, o, &frame);
     if (o->settings.lod_px > 0)
         cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
     if (frame.effects) {
@@ -254,7 +275,6 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     }
     if (frame.saturation >= 0)
         cJSON_AddNumberToObject(root, "saturation", frame.saturation);
-    cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);
     cJSON_AddItemToObject(root, "size", cJSON_CreateIntArray(size, 2));
@@ -302,21 +322,36 @@ int render_stats_explain_plan(triptych *t, FILE *out)
     return status;
 }
 
-static void explain_list(void *user, const char *name, const triptych_list_stats *s)
+/* What was read, a record each. */
+static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
 {
-    char bytes[32];
-    if (s->splats_read)
-        fprintf(user, "cost %-6s %s read, %" PRIu64 " splats\n", name,
-                trip_format_bytes(s->bytes_read, bytes), s->splats_read);
+    const bool splats = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? o->field == RENDER_FIELD_SPLATS
+                                                                  : frame->classify == TRIPTYCH_PRE;
+    return splats ? "splats" : "voxels";
 }
 
-int render_stats_explain_cost(triptych *t, FILE *out)
+typedef struct costs {
+    FILE *out;
+    const char *things;
+} costs;
+
+static void explain_list(void *user, const char *name, const triptych_list_stats *s)
+{
+    const costs *c = user;
+    char bytes[32];
+    if (s->splats_read)
+        fprintf(c->out, "cost %-6s %s read, %" PRIu64 " %s\n", name,
+                trip_format_bytes(s->bytes_read, bytes), s->splats_read, c->things);
+}
+
+int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
 {
     char bytes[32], memory[32];
     triptych_frame_stats frame;
     int status = triptych_get_frame_stats(t, &frame);
+    costs c = { out, status ? "" : things_read(o, &frame) };
     if (!status)
-        status = each_list(t, explain_list, out);
+        status = each_list(t, explain_list, &c);
     if (status)
         return status;
     if (frame.bytes_cached)
@@ -334,8 +369,9 @@ int render_stats_explain_cost(triptych *t, FILE *out)
                 trip_format_bytes(frame.heat_memory_bytes, memory));
     fprintf(out, "drawn by    %s: %s\n", frame.renderer, frame.device);
     fprintf(out, "ring        %s\n", frame.ring);
-    fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, merging %.1f\n",
-            frame.ms, frame.wait_ms, frame.draw_ms, frame.merge_ms);
+    fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, %s %.1f\n",
+            frame.ms, frame.wait_ms, frame.draw_ms,
+            o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? "integrating" : "merging", frame.merge_ms);
     return 0;
 }
 
@@ -349,14 +385,6 @@ static void explain_counted(void *user, const char *name, const triptych_list_st
 int render_stats_explain_count(triptych *t, FILE *out)
 {
     return each_list(t, explain_counted, out);
-}
-
-/* What was read, a record each. */
-static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
-{
-    const bool splats = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? o->field == RENDER_FIELD_SPLATS
-                                                                  : frame->classify == TRIPTYCH_PRE;
-    return splats ? "splats" : "voxels";
 }
 
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out)

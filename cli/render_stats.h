@@ -29,7 +29,7 @@ int render_stats_write(render_stats *s, const render_options *o);
  * begun. */
 int render_stats_explain_plan(triptych *t, FILE *out);
 /* What the parts of the last frame cost, a line each. */
-int render_stats_explain_cost(triptych *t, FILE *out);
+int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out);
 /* The exact counts of its lists, a line each. */
 int render_stats_explain_count(triptych *t, FILE *out);
 /* "image.png: 1024 x 1024, 1.2 million splats, 34 MB read, 0.32 s"; voxels, where values are

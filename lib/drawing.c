@@ -348,7 +348,7 @@ static void check_bound(const triptych *t)
 {
     const double most = t->settings.max_bytes;
     char is[32], allowed[32];
-    if (!(most > 0))
+    if (!(most > 0) || t->settings.show == TRIP_SHOW_MERGE)
         return;
     const double bytes = t->plan.lod.level    ? t->plan.lod.limit.bytes
                          : t->parts.bytes > 0 ? t->parts.bytes
@@ -360,7 +360,8 @@ static void check_bound(const triptych *t)
     trip_format_bytes((uint64_t)most, allowed);
     trip_warn(
         t->session.input,
-        "up to %s are read by the coarsest level that the data set has, more than the %s allowed",
+        "codes and normals of up to %s are read by the coarsest level that the data set has, more "
+        "than the %s allowed",
         is, allowed);
 }
 
@@ -400,11 +401,10 @@ static void warn_of_halo(triptych *t)
     if (t->kernel_warned || !trip_plan_halo_is_short(t->frame.data, &t->drawn_settings))
         return;
     t->kernel_warned = true;
-    trip_warn(
-        s->input,
-        "has one voxel about what it keeps, and the %s kernel reaches two: those beyond count "
-        "as the ones next to them; brick --keep-all leaves nothing out",
-        trip_kernel_name(t->settings.kernel));
+    trip_warn(s->input,
+              "has %s voxel about what it keeps, and the %s kernel reaches two: those beyond count "
+              "as the ones next to them; brick --keep-all leaves nothing out",
+              t->frame.data->header.halo ? "one" : "no", trip_kernel_name(t->settings.kernel));
 }
 
 /* Once for a data set, of frames that are drawn by levels: it has those of the other classification

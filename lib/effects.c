@@ -147,8 +147,10 @@ static void explain(const triptych *t, const char *name, int effect, bool runs, 
 {
     const bool automatic = t->effects & TRIPTYCH_EFFECTS_AUTO;
     const char *why = t->effects & effect ? "asked for" : "not asked for";
+    if (t->settings.show == TRIP_SHOW_MERGE && (automatic || t->effects & effect))
+        why = "the merge map has nothing of the volume";
     /* Of fog it is shadows that there is something to say about, whether they run or not. */
-    if (automatic && !(t->effects & effect) && effect == TRIPTYCH_EMISSION)
+    else if (automatic && !(t->effects & effect) && effect == TRIPTYCH_EMISSION)
         why = runs ? "a data set of heat is given" : "no data set of heat is given";
     else if (automatic && !(t->effects & effect))
         why = runs || effect == TRIPTYCH_SHADOWS ? t->why_effects

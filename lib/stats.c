@@ -10,18 +10,27 @@ static void explain_parts(const triptych *t, FILE *out)
 {
     const trip_lod_parts *p = &t->parts;
     const trip_settings *s = &t->drawn_settings;
-    if (s->classify != TRIP_CLASSIFY_POST || !trip_settings_has_levels(s))
+    const bool coarse = p->count > 1 || p->level[0] > 0;
+    if (s->classify != TRIP_CLASSIFY_POST || !trip_settings_has_levels(s) ||
+        s->show == TRIP_SHOW_MERGE)
         return;
-    fprintf(out, "levels      %s: level %u", p->count > 1 || p->level[0] > 0 ? "run" : "do not run",
-            p->level[0]);
+    if (trip_dataset_levels(t->session.data, TRIP_KIND_VALUES) == 0) {
+        fprintf(out, "levels      do not run: the data set has none\n");
+        return;
+    }
+    fprintf(out, "levels      %s: level %u", coarse ? "run" : "do not run", p->level[0]);
     if (p->share > 0)
         fprintf(out, ", and %.0f %% of the picture of level %u", 100 * p->share, p->level[1]);
     for (int i = 1; i < p->count && !(p->share > 0); i++)
         fprintf(out, ", from %.6g along the view on level %u", p->distance[i], p->level[i]);
-    if (p->bounded)
+    if (p->bounded && p->bytes > s->max_bytes)
+        fputs(": the coarsest there is, of more bytes than the bound allows\n", out);
+    else if (p->bounded)
         fputs(": the finest that the bound on bytes allows\n", out);
-    else if (s->lod_px > 0)
+    else if (s->lod_px > 0 && coarse)
         fprintf(out, ": the coarsest whose voxels are at most %g pixels wide\n", s->lod_px);
+    else if (s->lod_px > 0)
+        fprintf(out, ": voxels of coarser ones are more than %g pixels wide\n", s->lod_px);
     else
         fputs(": the finest\n", out);
     if (p->count > 1)
@@ -40,8 +49,9 @@ static void explain_choices(const triptych *t, FILE *out)
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.slices)
         fprintf(out,
                 "slices      %d by the view: rays move up to %.2f voxels along a sheet to the "
-                "next, voxels are up to %.3g px wide\n",
-                t->slices.slices, t->slices.slope, t->slices.voxel_px);
+                "next, voxels count as up to %.3g %s wide\n",
+                t->slices.slices, t->slices.slope, t->slices.voxel_px,
+                t->settings.samples > 1 ? "samples" : "px");
 }
 
 int triptych_explain(triptych *t, char **text)
@@ -125,6 +135,7 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .engine = trip_reader_engine_name(t->reader),
         .classify = (triptych_classify)t->drawn_settings.classify,
         .slices = t->drawn_settings.classify == TRIP_CLASSIFY_POST ? t->drawn_settings.slices : 0,
+        .footprint = (triptych_footprint)t->drawn_settings.footprint,
         .saturation = t->plan.gathers ? -1 : trip_settings_saturation(&t->drawn_settings),
         .ring = ring_text(t->renderer, t->reader),
         .effects = effects_of(&t->drawn_settings.effects),
@@ -152,6 +163,7 @@ static triptych_list_stats list_stats(const triptych *t, unsigned i)
         .bricks_outside = planned->bricks_outside,
         .bricks_without_weight = planned->bricks_without_weight,
         .bricks_clipped = planned->bricks_clipped,
+        .bricks_of_other_levels = planned->bricks_of_other_levels,
         .splats_read = counts.splats_read,
         .bytes_read = counts.bytes_read,
         .counted = counted,
@@ -184,6 +196,7 @@ static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *befo
     to->bytes_cached += before->bytes_cached;
     to->runs_occluded += before->runs_occluded;
     to->bytes_occluded += before->bytes_occluded;
+    to->bytes_unused += before->bytes_unused;
 }
 
 /* The lists of parts before keep their numbers. */

@@ -291,7 +291,6 @@ int triptych_add(triptych *t, const char *path)
     return trip_context_leave(before, status);
 }
 
-/* The box of world space about voxels `first` to `last`, from edge to edge. */
 /* Where a voxel ends along an axis. */
 static double edge_of(const trip_coordinates *c, int axis, int64_t voxel, bool upper)
 {
@@ -299,14 +298,21 @@ static double edge_of(const trip_coordinates *c, int axis, int64_t voxel, bool u
     return trip_coordinates_at(c, axis, voxel) + (upper ? half : -half);
 }
 
+/* The box of world space about voxels `first` to `last`, from edge to edge. */
 static void find_box(const trip_dataset *d, triptych_info *out)
 {
     const trip_affine *m = &d->index_to_world;
+    for (int a = 0; a < 3; a++)
+        for (int end = 0; end < 2; end++) {
+            out->edges[end][a] =
+                edge_of(&d->coordinates, a, end ? out->last[a] : out->first[a], end);
+            out->grid_edges[end][a] =
+                edge_of(&d->coordinates, a, end ? (int64_t)d->header.dims[a] - 1 : 0, end);
+        }
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++)
-            p[a] = edge_of(&d->coordinates, a, corner >> a & 1 ? out->last[a] : out->first[a],
-                           corner >> a & 1);
+            p[a] = out->edges[corner >> a & 1][a];
         trip_vec3 world = trip_affine_point(m, trip_v3(p[0], p[1], p[2]));
         for (int a = 0; a < 3; a++) {
             double x = trip_component(world, a);

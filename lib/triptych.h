@@ -113,8 +113,10 @@ typedef struct triptych_info {
     /* Least and most distance of neighbours along i, j, k in the world. They differ where spacing
      * is uneven; the matrix then takes places to the world, which are indices on the average. */
     double spacing_least[3], spacing_most[3];
-    int64_t first[3], last[3];   /* voxels kept along i, j, k */
-    double lo[3], hi[3];         /* box of those in world space, from edge to edge */
+    int64_t first[3], last[3]; /* voxels kept along i, j, k */
+    double lo[3], hi[3];       /* box of those in world space, from edge to edge */
+    /* Where those begin and end along i, j, k, and where the grid does: for the matrix. */
+    double edges[2][3], grid_edges[2][3];
     double value_min, value_max; /* of the volume */
     double code_lo, code_hi;     /* values of codes 0 and 65535 (FORMAT.md) */
     uint64_t voxels;             /* of the volume */
@@ -428,8 +430,8 @@ typedef struct triptych_hit {
     double opacity; /* of the whole ray, unshaded; 0: nothing is seen, what follows is not set */
     double position[3]; /* world space */
     double index[3];    /* the same in voxels */
-    double value;       /* of the data there, interpolated */
-    double depth;       /* from the eye along the ray, in parallel views from the eye's plane */
+    double value; /* of the data where the ray meets the sheet nearest to that, interpolated */
+    double depth; /* from the eye along the ray, in parallel views from the eye's plane */
     double depth_first; /* where what shows begins */
 } triptych_hit;
 
@@ -491,6 +493,7 @@ typedef struct triptych_frame_stats {
     const char *ring;                         /* where reads land, in words */
     triptych_classify classify;               /* pre or post, what was drawn */
     int slices;                               /* of a sheet, post; else 0 */
+    triptych_footprint footprint;             /* pre: what was drawn */
     double saturation; /* transmittance below which pixels took no more; -1 of the integral */
     int effects;       /* that ran; of shadows and occlusion: */
     uint64_t light_bytes_read; /* not in bytes_read; 0 where it was kept */
@@ -511,7 +514,7 @@ typedef struct triptych_list_stats {
     uint64_t splats_read, bytes_read;
     int counted; /* by triptych_settings.count; else what follows is 0 */
     uint64_t splats_projected, splats_drawn; /* not culled; of those, with a pixel centre in them */
-    uint64_t bricks_clipped;                 /* left out, too */
+    uint64_t bricks_clipped, bricks_of_other_levels; /* left out, too */
 } triptych_list_stats;
 
 /* The same frame's, by list. */

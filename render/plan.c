@@ -597,7 +597,7 @@ static void explain_kernel(const trip_dataset *data, const trip_settings *s, FIL
         return;
     fprintf(out, "kernel      %s: from 64 voxels%s\n", trip_kernel_name(s->kernel),
             trip_plan_halo_is_short(data, s)
-                ? "; those beyond the halo of one voxel count as the ones next to them"
+                ? "; those that were left out count as the ones next to them"
                 : "");
 }
 
@@ -664,7 +664,8 @@ static void explain_classification(const trip_plan *plan, const trip_settings *s
 
 static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
-    if (!trip_settings_has_levels(s) || plan->gathers || s->classify == TRIP_CLASSIFY_POST)
+    if (!trip_settings_has_levels(s) || plan->gathers || s->classify == TRIP_CLASSIFY_POST ||
+        s->show == TRIP_SHOW_MERGE)
         return;
     char chosen[64] = "the finest";
     const char *bound = s->max_bytes > 0 ? ", or what the bound on bytes calls for" : "";
@@ -698,7 +699,7 @@ static void explain_limit(const trip_plan *plan, const trip_settings *s, FILE *o
 
 static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
-    if (s->clip.count == 0)
+    if (s->clip.count == 0 || s->show == TRIP_SHOW_MERGE)
         return;
     if (plan->clip.count == 0)
         fprintf(out, "clipping    does not run: nothing of the grid lies outside\n");
@@ -741,6 +742,8 @@ static const char *why_not_drawn(const trip_plan *plan, const trip_settings *s,
                                  const trip_list *list)
 {
     const bool post = s->classify == TRIP_CLASSIFY_POST;
+    if (s->show == TRIP_SHOW_MERGE)
+        return ": the merge map has nothing of the volume";
     if (plan->gathers)
         return list->level > 0   ? ": the finest level alone is drawn"
                : list->axis != 2 ? ": list z has the same"
@@ -862,7 +865,9 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
                                          : "from the direction given";
     char bytes[32];
     const bool of_values = trip_plan_is_of_values(plan, s);
-    if (of_values && s->shading)
+    if (s->show == TRIP_SHOW_MERGE)
+        fprintf(out, "shading     does not run: the merge map has nothing of the volume\n");
+    else if (of_values && s->shading)
         fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
     else if (of_values)
         fprintf(out, "shading     does not run: switched off\n");

@@ -58,10 +58,9 @@ static int slices_of(double voxel_px)
 trip_view_slices trip_slices_of_view(const trip_camera *camera, const trip_settings *settings,
                                      const uint64_t dims[3])
 {
-    const double distance = distance_to(camera, dims);
+    const double distance = fmax(distance_to(camera, dims), TRIP_SLICES_NEAR_VOXELS);
     trip_view_slices v = { .slope = steepest(camera, settings),
                            .voxel_px = voxel_px(camera, distance) };
-    const double counted = voxel_px(camera, fmax(distance, TRIP_SLICES_NEAR_VOXELS));
-    v.slices = v.slope <= TRIP_SLICES_STRAIGHT ? 1 : slices_of(counted);
+    v.slices = v.slope <= TRIP_SLICES_STRAIGHT ? 1 : slices_of(v.voxel_px);
     return v;
 }

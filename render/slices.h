@@ -11,7 +11,7 @@
 typedef struct trip_view_slices {
     int slices;
     double slope;    /* the steepest ray with weight moves so far along u or v over a sheet */
-    double voxel_px; /* of a voxel where the grid is nearest to the eye, infinite within it */
+    double voxel_px; /* of a voxel where the grid is nearest to the eye, as it is counted */
 } trip_view_slices;
 
 /* Between two slices values are taken to run straight. A ray along an axis meets them so; one of

@@ -18,11 +18,8 @@ trip_annotation_box trip_annotation_box_of(const triptych_info *info)
         for (int row = 0; row < 3; row++) {
             const double *m = info->index_to_world[row];
             box.corners[n][row] = m[3];
-            for (int a = 0; a < 3; a++) {
-                bool upper = n >> a & 1;
-                double index = upper ? (double)info->last[a] + 0.5 : (double)info->first[a] - 0.5;
-                box.corners[n][row] += m[a] * index;
-            }
+            for (int a = 0; a < 3; a++)
+                box.corners[n][row] += m[a] * info->edges[n >> a & 1][a];
         }
     return box;
 }

@@ -659,10 +659,10 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
                 bytes_text(static_cast<double>(f.bytes_read)).c_str(),
                 bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
                 static_cast<double>(f.splats) * 1e-6);
-    ImGui::Text("moving %.0f ms at 1/%.1f, detail of %.1f px; whole %.0f ms", s.moving_ms,
-                s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
+    ImGui::TextWrapped("moving %.0f ms at 1/%.1f, detail of %.1f px; whole %.0f ms", s.moving_ms,
+                       s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
     ImGui::PlotLines("##times", times, count, 0, "ms", 0, FLT_MAX,
-                     ImVec2(-1, 40 * static_cast<float>(p->scale)));
+                     ImVec2(ImGui::GetContentRegionAvail().x, 40 * static_cast<float>(p->scale)));
     ImGui::TextWrapped("%s, %s; %s", s.renderer, s.device, s.engine);
 }
 
@@ -741,6 +741,8 @@ void draw_probe(ImDrawList *list, trip_viewer *v, const trip_document *d)
     const triptych_hit &h = probed.hit;
     const ImVec2 place(static_cast<float>(probed.x), static_cast<float>(probed.y));
     list->AddCircle(place, 5, IM_COL32_WHITE);
+    if (ImGui::GetIO().WantCaptureMouse) // the pointer is over the panel or a list
+        return;
     if (!(h.opacity > 0)) {
         ImGui::SetTooltip("nothing is seen here");
         return;
@@ -810,7 +812,7 @@ void draw_keys(trip_viewer *v)
         { "f", "fit the data into the picture" },
         { "x y z", "along an axis; shift: from the other end" },
         { "1 2 3 4 5 6", "front, back, left, right, top, bottom" },
-        { "0, home", "the view at the start" },
+        { "0, home", "the default view" },
         { "o", "perspective or parallel" },
         { "[ ]", "field of view" },
         { "b", "box" },
@@ -820,7 +822,8 @@ void draw_keys(trip_viewer *v)
         { "t", "panel" },
         { "tab", "next data set" },
         { "F1, ?", "these keys" },
-        { "q, escape", "quit" },
+        { "q", "quit" },
+        { "escape", "close this list, or quit" },
     };
     ImGui::SetNextWindowPos(
         ImVec2(static_cast<float>(v->width) / 2, static_cast<float>(v->height) / 2), 0,

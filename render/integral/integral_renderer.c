@@ -272,9 +272,9 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
 static trip_list_stats stats(const trip_renderer *base, unsigned list)
 {
     const integral *r = (const integral *)base;
-    bool gathered = r->frame->plan->lists[list].drawn;
-    return (trip_list_stats){ .splats_read =
-                                  gathered ? r->splats[r->frame->data->lists[list].kind] : 0 };
+    const trip_plan_list *planned = &r->frame->plan->lists[list];
+    const bool read = planned->drawn && r->splats[r->frame->data->lists[list].kind] > 0;
+    return (trip_list_stats){ .splats_read = read ? planned->splats_selected : 0 };
 }
 
 static const trip_renderer_ops integral_ops = {

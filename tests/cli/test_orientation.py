@@ -410,6 +410,16 @@ class Orientation(program.ProgramTest):
         self.assertIn("j points to  posterior, 20 degrees to superior\n", words)
         self.assertIn("k points to  superior\n", words)
 
+    def test_bounds_are_those_of_the_voxels_where_spacing_is_uneven(self):
+        program.write_nrrd("u.nrrd", program.noise((4, 4, 4)))
+        program.write("x.txt", b"0 1 2 6")
+        program.write("y.txt", b"0 1 2 3")
+        self.brick("u.nrrd", "--keep-all", "--coordinates", "x.txt,y.txt,y.txt")
+        info = self.info("a.trip")
+        for end, bounds in enumerate(([-0.5, -0.5, -0.5], [8, 3.5, 3.5])):
+            numpy.testing.assert_allclose(info["bounds"][end], bounds, atol=1e-6)
+            numpy.testing.assert_allclose(info["kept_bounds"][end], bounds, atol=1e-6)
+
     def test_info_gives_the_bounds_of_the_grid_and_of_what_is_kept(self):
         values = numpy.zeros((6, 7, 8), "u1")
         values[2:5, 1:3, 4:8] = 9

@@ -268,6 +268,32 @@ static void the_plan_is_of_the_picture_that_is_drawn(void **state)
     triptych_destroy(t);
 }
 
+static void assert_levels(triptych *t, const triptych_settings *s, const char *words)
+{
+    char *text = NULL;
+    assert_int_equal(triptych_set_settings(t, s), TRIPTYCH_OK);
+    assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
+    assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
+    assert_non_null(strstr(text, words));
+    free(text);
+    triptych_end(t);
+}
+
+static void the_plan_says_why_levels_are_what_they_are(void **state)
+{
+    (void)state;
+    triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
+    triptych_settings s = plain(4);
+    assert_levels(t, &s, ": the coarsest whose voxels are at most 4 pixels wide\n");
+    s.lod_px = 0.25;
+    assert_levels(t, &s,
+                  "do not run: level 0: voxels of coarser ones are more than 0.25 pixels wide\n");
+    s.lod_px = 0;
+    s.max_bytes = 100;
+    assert_levels(t, &s, ": the coarsest there is, of more bytes than the bound allows\n");
+    triptych_destroy(t);
+}
+
 static void what_takes_one_level_has_one(void **state)
 {
     (void)state;
@@ -347,6 +373,7 @@ int main(void)
         cmocka_unit_test(what_comes_after_the_last_part),
         cmocka_unit_test(steps_come_to_the_same_bits),
         cmocka_unit_test(the_plan_is_of_the_picture_that_is_drawn),
+        cmocka_unit_test(the_plan_says_why_levels_are_what_they_are),
         cmocka_unit_test(what_takes_one_level_has_one),
         cmocka_unit_test(a_bound_makes_parts_coarser),
         cmocka_unit_test(a_bound_holds_for_one_level),

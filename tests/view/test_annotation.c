@@ -13,8 +13,7 @@ static trip_navigation parallel(double x, double y, double z)
 
 static trip_annotation_box box(void)
 {
-    const triptych_info info = { .first = { 0, 0, 0 },
-                                 .last = { 9, 9, 9 },
+    const triptych_info info = { .edges = { { -0.5, -0.5, -0.5 }, { 9.5, 9.5, 9.5 } },
                                  .index_to_world = {
                                      { 1, 0, 0, -4.5 }, { 0, 2, 0, -9 }, { 0, 0, 3, -13.5 } } };
     return trip_annotation_box_of(&info);
@@ -158,9 +157,9 @@ static void ticks_are_round_numbers_on_the_lowest_edge(void **state)
 static void oblique_axes_count_from_the_corner(void **state)
 {
     (void)state;
-    const triptych_info info = {
-        .last = { 9, 9, 9 }, .index_to_world = { { 3, -4, 0, 0 }, { 4, 3, 0, 7 }, { 0, 0, 5, 0 } }
-    };
+    const triptych_info info = { .edges = { { -0.5, -0.5, -0.5 }, { 9.5, 9.5, 9.5 } },
+                                 .index_to_world = {
+                                     { 3, -4, 0, 0 }, { 4, 3, 0, 7 }, { 0, 0, 5, 0 } } };
     trip_annotation_box b = trip_annotation_box_of(&info);
     const triptych_camera camera = { .eye = { 200, -300, 150 },
                                      .up = { 0, 0, 1 },
