@@ -44,7 +44,8 @@ static void describe(const session *s, const bench_options *o, bool included, be
     snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
     if (o->size_count == 1)
         cJSON_AddStringToObject(settings, "size", text);
-    cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
+    if (o->settings.classify == TRIP_CLASSIFY_PRE)
+        cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
     cJSON_AddBoolToObject(settings, "shading", is_lit(s, &o->settings));
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }

@@ -197,7 +197,7 @@ static void describe(const flying *m)
     snprintf(text, sizeof text, "%lld x %lld x %lld", (long long)info->dims[0],
              (long long)info->dims[1], (long long)info->dims[2]);
     cJSON_AddStringToObject(settings, "grid", text);
-    cJSON_AddNumberToObject(settings, "data_set_bytes", (double)info->bytes);
+    cJSON_AddNumberToObject(settings, "stored_bytes", (double)info->bytes);
     cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
     snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
     cJSON_AddStringToObject(settings, "size", text);

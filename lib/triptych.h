@@ -481,13 +481,14 @@ TRIPTYCH_API int triptych_explain(triptych *t, char **text);
 
 /* Of the last frame whose picture was complete. Texts last until the data set is closed. */
 typedef struct triptych_frame_stats {
-    double ms;                                /* from its begin to its picture */
-    double plan_ms;                           /* before that */
-    double wait_ms, draw_ms, merge_ms;        /* waiting for the disk, drawing, merging layers */
-    uint64_t splats, bytes_read, reads;       /* of all lists, from the disk */
-    uint64_t bytes_cached;                    /* instead from memory */
-    uint64_t runs_occluded, bytes_occluded;   /* not read: behind what is opaque */
-    uint64_t bytes_unused;                    /* not read: of attributes that have no effect */
+    double ms;                              /* from its begin to its picture */
+    double plan_ms;                         /* before that */
+    double wait_ms, draw_ms, merge_ms;      /* waiting for the disk, drawing, merging layers (of the
+                                               integral: its rays) */
+    uint64_t splats, bytes_read, reads;     /* of all lists, from the disk */
+    uint64_t bytes_cached;                  /* instead from memory */
+    uint64_t runs_occluded, bytes_occluded; /* not read: behind what is opaque */
+    uint64_t bytes_unused;                  /* not read: of attributes that have no effect */
     uint64_t memory_bytes, peak_memory_bytes; /* that may be taken, and were since it was opened */
     const char *renderer, *device, *engine;   /* "cpu", "8 threads, AVX2", "io_uring+O_DIRECT" */
     const char *ring;                         /* where reads land, in words */
