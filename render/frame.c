@@ -327,11 +327,14 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
     return status;
 }
 
+/* What a renderer's device or threads do meanwhile is drawing. */
 static void await_renderer(trip_drawing *d, uint64_t timeout_ns)
 {
     const trip_renderer_ops *ops = d->renderer->ops;
+    const double start = now_ms();
     if (ops->await && !d->done)
         ops->await(d->renderer, timeout_ns);
+    d->stats.draw_ms += now_ms() - start;
 }
 
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
