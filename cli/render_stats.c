@@ -330,6 +330,7 @@ static const char *things_read(const render_options *o, const triptych_frame_sta
     return splats ? "splats" : "voxels";
 }
 
+/* Where lines of costs go, and what they call records. */
 typedef struct costs {
     FILE *out;
     const char *things;
