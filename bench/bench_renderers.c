@@ -243,14 +243,14 @@ static void add_limits(const race *c, bench_report *r)
                           "was loaded: no figure contains the disk. A frame is planning, drawing "
                           "from memory and merging, and ends with the picture in the program's "
                           "memory.");
-    if (counts(c))
+    if (counts(c)) {
         bench_report_limit(r,
                            "Msplats/s: splats with a pixel centre in their footprint where their "
                            "list has weight, all views together, over the time of all views. Those "
                            "behind saturated pixels count too, though a renderer may skip them.");
-    if (counts(c))
         bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
                            SAMPLE_EVERY);
+    }
     if (leaves_out_occluded(c))
         bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
                               "same.");
