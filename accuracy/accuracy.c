@@ -15,8 +15,8 @@
 static int print_settings(void)
 {
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
-    const triptych_settings usual = triptych_default_settings();
-    int count = accuracy_settings(all, &usual);
+    const triptych_settings defaults = triptych_default_settings();
+    int count = accuracy_settings(all, &defaults);
     for (int i = 0; i < count; i++) {
         printf("%-20s ", all[i].name);
         accuracy_write_options(stdout, &all[i]);

@@ -9,7 +9,7 @@
 enum {
     KEY_SOURCE = 256,
     KEY_ALSO,
-    KEY_BESIDE,
+    KEY_COMPARE,
     KEY_TF,
     KEY_NO_SHADING,
     KEY_SETTINGS,
@@ -44,7 +44,7 @@ static const struct argp_option options[] = {
       "A data set of the same volume kept otherwise (halo, bits, levels), drawn by the defaults; "
       "up to 7",
       1 },
-    { "beside", KEY_BESIDE, "COMMAND", 0,
+    { "compare", KEY_COMPARE, "COMMAND", 0,
       "Another program that draws the same views of the source, up to 4; none: nor VTK's ray "
       "caster, "
       "which is one where it is installed: see triptych-accuracy(1)",
@@ -126,12 +126,12 @@ static int parse_word(int key, char *arg, accuracy_options *o)
     case KEY_SOURCE:
         o->source = arg;
         return 0;
-    case KEY_BESIDE:
+    case KEY_COMPARE:
         if (strcmp(arg, "none") == 0)
-            return o->beside_none = true, 0;
-        if (o->beside_count == ACCURACY_BESIDE_MAX)
-            return trip_option_fail("--beside", "4 other programs at most");
-        o->beside[o->beside_count++] = arg;
+            return o->no_programs = true, 0;
+        if (o->program_count == ACCURACY_COMPARED_PROGRAMS_MAX)
+            return trip_option_fail("--compare", "4 other programs at most");
+        o->program[o->program_count++] = arg;
         return 0;
     case KEY_TF:
         o->tf = arg;
@@ -174,8 +174,8 @@ static int check(parse *p)
         return trip_option_fail("NAME.trip",
                                 "none given: `triptych accuracy NAME.trip -o REPORT/`");
     int status = 0;
-    if (o->beside_none && o->beside_count)
-        return trip_option_fail("--beside", "a program or none");
+    if (o->no_programs && o->program_count)
+        return trip_option_fail("--compare", "a program or none");
     for (int i = 0; i < p->also_count && !status; i++)
         status = add_data(p->also[i], o);
     return status;

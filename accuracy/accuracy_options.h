@@ -5,14 +5,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { ACCURACY_DATA_MAX = 8, ACCURACY_BESIDE_MAX = 4 };
+enum { ACCURACY_DATA_MAX = 8, ACCURACY_COMPARED_PROGRAMS_MAX = 4 };
 
 typedef struct accuracy_options {
     const char *data[ACCURACY_DATA_MAX]; /* the first is swept, the others kept otherwise */
     int data_count;
-    const char *beside[ACCURACY_BESIDE_MAX]; /* commands of programs that draw the same views */
-    int beside_count;
-    bool beside_none; /* nor VTK, which stands there of itself where it is installed */
+    const char *
+        program[ACCURACY_COMPARED_PROGRAMS_MAX]; /* commands of programs that draw the same views */
+    int program_count;
+    bool no_programs; /* nor VTK, which stands there of itself where it is installed */
     const char *output;
     const char *source;   /* the volume that the data were made of; NULL: not known */
     const char *tf;       /* NULL: the function kept in the data set */

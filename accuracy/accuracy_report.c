@@ -18,7 +18,7 @@ static bool is_measured(const accuracy_report *r, int i)
 /* And no program beside. */
 static bool is_setting(const accuracy_report *r, int i)
 {
-    return is_measured(r, i) && !r->m->rows[i].beside;
+    return is_measured(r, i) && !r->m->rows[i].program;
 }
 
 static double error_of(const accuracy_report *r, int i, bool mean)
@@ -143,7 +143,7 @@ void accuracy_report_print(FILE *f, const accuracy_report *r)
         if (is_measured(r, i))
             fprintf(f, "| %s%s | %.1f | %.2f | %.2f | %.2f | %.1f | %.4f | %.4f |\n",
                     row->setting.name, r->front[i] ? " *" : "", r->ms[i], e->mean, e->percentile_99,
-                    e->most, e->psnr, row->ssim / row->views, row->flip / row->views);
+                    e->max, e->psnr, row->ssim / row->views, row->flip / row->views);
     }
     fprintf(f, "\n* on the front: no other is as fast and as close at the 99th percentile.\n");
     for (int i = 0; i < r->m->row_count; i++)

@@ -51,7 +51,7 @@ static int open_context(const accuracy_contexts *c, int data, int renderer, trip
     };
     int status = triptych_open(t, o->data[data], &resources);
     if (!status)
-        status = triptych_set_function(t, &(triptych_function){ .name = o->tf });
+        status = triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = o->tf });
     if (!status && source)
         status = triptych_set_source(t, o->source, NULL);
     if (!status && c->view)

@@ -4,12 +4,12 @@
 
 static void add_channel(accuracy_error *e, double error)
 {
-    double place = fmin(ACCURACY_ERROR_BINS - 1, round(error * ACCURACY_ERROR_BINS_PER_LEVEL));
-    e->bins[(size_t)place]++;
+    double position = fmin(ACCURACY_ERROR_BINS - 1, round(error * ACCURACY_ERROR_BINS_PER_LEVEL));
+    e->bins[(size_t)position]++;
     e->count++;
     e->sum += error;
     e->sum_of_squares += error * error;
-    e->most = fmax(e->most, error);
+    e->max = fmax(e->max, error);
 }
 
 void accuracy_error_add_apart(accuracy_error *colour, accuracy_error *alpha, const float *picture,
@@ -36,7 +36,7 @@ static double percentile(const accuracy_error *e, double share)
         if ((double)below >= share * (double)e->count)
             return (double)i / ACCURACY_ERROR_BINS_PER_LEVEL;
     }
-    return e->most;
+    return e->max;
 }
 
 accuracy_error_figures accuracy_error_measure(const accuracy_error *e)
@@ -48,7 +48,7 @@ accuracy_error_figures accuracy_error_measure(const accuracy_error *e)
         .median = percentile(e, 0.5),
         .mean = e->sum / count,
         .percentile_99 = percentile(e, 0.99),
-        .most = e->most,
+        .max = e->max,
         .psnr = -10 * log10(e->sum_of_squares / count / (255.0 * 255.0)),
     };
 }

@@ -15,13 +15,13 @@ enum {
 /* Gathered picture by picture; starts zeroed. */
 typedef struct accuracy_error {
     uint64_t count; /* of channels of covered pixels */
-    double sum, sum_of_squares, most;
+    double sum, sum_of_squares, max;
     uint64_t bins[ACCURACY_ERROR_BINS];
 } accuracy_error;
 
 /* Of 255, but for psnr: decibels against 255, infinite where the pictures are the same. */
 typedef struct accuracy_error_figures {
-    double median, mean, percentile_99, most, psnr;
+    double median, mean, percentile_99, max, psnr;
 } accuracy_error_figures;
 
 /* Pictures of `pixels` times 4 floats, premultiplied, without background; all four channels. */

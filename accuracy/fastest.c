@@ -15,7 +15,7 @@
 #include "options.h"
 #include "report.h"
 
-enum { MOST_BYTES = 16 << 20, VERSION = 1 };
+enum { MAX_BYTES = 16 << 20, VERSION = 1 };
 
 char *accuracy_report_path(const char *data)
 {
@@ -127,12 +127,12 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
                   accuracy_found *out)
 {
     const cJSON *row;
-    const triptych_settings usual = out->setting.settings;
+    const triptych_settings defaults = out->setting.settings;
     const char *data_set = text_of(root, "data_set");
     accuracy_found best = { .ms = INFINITY }, closest = { .error = INFINITY };
     cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "rows"))
     {
-        accuracy_found one = { .setting.settings = usual };
+        accuracy_found one = { .setting.settings = defaults };
         if (!read_row(row, data_set, &one) ||
             (w->renderers && !(w->renderers & 1u << one.setting.renderer)))
             continue;
@@ -148,7 +148,7 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
         return trip_fail(TRIP_ERROR, "--error", path,
                          "nothing stays below %g; %s comes closest, with %.2f", w->error,
                          closest.setting.name, closest.error);
-    warn_of_differences(root, path, w, &usual);
+    warn_of_differences(root, path, w, &defaults);
     *out = best;
     const char *checksum = text_of(root, "checksum");
     snprintf(out->checksum, sizeof out->checksum, "%s", checksum ? checksum : "");
@@ -175,12 +175,12 @@ int accuracy_fastest_in(const char *text, const char *path, const accuracy_wante
 static int read_text(const char *path, char *text)
 {
     int fd = trip_input_open(path);
-    ssize_t bytes = fd >= 0 ? trip_input_read(fd, text, MOST_BYTES + 1) : -1;
+    ssize_t bytes = fd >= 0 ? trip_input_read(fd, text, MAX_BYTES + 1) : -1;
     int status =
         bytes < 0
             ? trip_fail_errno("--error", path, "`triptych accuracy` makes this report; cannot open")
-        : bytes > MOST_BYTES ? trip_fail(TRIP_ERROR, "--error", path, "is longer than a report is")
-                             : 0;
+        : bytes > MAX_BYTES ? trip_fail(TRIP_ERROR, "--error", path, "is longer than a report is")
+                            : 0;
     if (fd >= 0)
         close(fd);
     if (!status)
@@ -196,7 +196,7 @@ int accuracy_fastest(const char *path, const accuracy_wanted *wanted, accuracy_f
     if (snprintf(file, sizeof file, "%s%s", path, is_file ? "" : "/accuracy.json") >=
         (int)sizeof file)
         return trip_fail(TRIP_USAGE, "--error", path, "the name is too long");
-    char *text = malloc(MOST_BYTES + 1);
+    char *text = malloc(MAX_BYTES + 1);
     if (!text)
         return trip_fail(TRIP_ERROR, "--error", path, "out of memory");
     int status = read_text(file, text);

@@ -234,7 +234,7 @@ static void colour_seen(const picture *p, size_t i, double lab[3])
 }
 
 /* The distance of green and blue, the largest that colours have. */
-static double most_apart(void)
+static double max_apart(void)
 {
     double green[3], blue[3];
     rgb_to_hunt_lab((double[3]){ 0, 1, 0 }, green);
@@ -243,21 +243,21 @@ static double most_apart(void)
 }
 
 /* Colours: small errors get most of the range (equation 5). */
-static double colour_error(double apart, double most)
+static double colour_error(double apart, double max)
 {
     const double pc = 0.4, pt = 0.95;
-    double e = pow(apart, 0.7), knee = pc * most;
-    return e < knee ? pt * e / knee : pt + (e - knee) / (most - knee) * (1 - pt);
+    double e = pow(apart, 0.7), knee = pc * max;
+    return e < knee ? pt * e / knee : pt + (e - knee) / (max - knee) * (1 - pt);
 }
 
 /* Equations 6 and 7. */
-static double error_at(const work *w, size_t i, double most)
+static double error_at(const work *w, size_t i, double max)
 {
     const picture *a = &w->pictures[0], *b = &w->pictures[1];
     double x[3], y[3];
     colour_seen(a, i, x);
     colour_seen(b, i, y);
-    double colour = colour_error(hyab(x, y), most);
+    double colour = colour_error(hyab(x, y), max);
     double feature = fmax(fabs((double)a->edges[i] - (double)b->edges[i]),
                           fabs((double)a->points[i] - (double)b->points[i]));
     return pow(colour, 1 - sqrt(feature / sqrt(2)));
@@ -289,9 +289,9 @@ int accuracy_flip(const float *a, const float *b, int width, int height, trip_bu
     lay_out(&w, memory);
     look_at(&w, a, &w.pictures[0]);
     look_at(&w, b, &w.pictures[1]);
-    double sum = 0, most = most_apart();
+    double sum = 0, max = max_apart();
     for (size_t i = 0; i < w.pixels; i++)
-        sum += error_at(&w, i, most);
+        sum += error_at(&w, i, max);
     *out = sum / (double)w.pixels;
     trip_budget_release(budget, memory, bytes);
     return 0;

@@ -36,7 +36,7 @@ typedef struct sweep {
     accuracy_measured *m;
     const accuracy_options *o;
     accuracy_contexts contexts;
-    triptych_settings usual;
+    triptych_settings defaults;
     bench_progress *progress;
     float *pictures[PICTURES];
     size_t picture_bytes;
@@ -104,12 +104,12 @@ static int add_row(accuracy_measured *m, int data, const accuracy_setting *setti
 }
 
 /* The other data sets, by post and by pre. */
-static int add_others(accuracy_measured *m, const triptych_settings *usual)
+static int add_others(accuracy_measured *m, const triptych_settings *defaults)
 {
     int status = 0;
     for (int d = 1; d < m->options->data_count && !status; d++)
         for (int pre = 0; pre < 2 && !status; pre++) {
-            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU, .settings = *usual };
+            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU, .settings = *defaults };
             const char *slash = strrchr(m->options->data[d], '/');
             one.settings.classify = pre ? TRIPTYCH_PRE : TRIPTYCH_POST;
             snprintf(one.name, sizeof one.name, "%s-%.30s", pre ? "pre" : "post",
@@ -126,10 +126,10 @@ static int add_program(accuracy_measured *m, const char *name, const char *comma
     snprintf(one.name, sizeof one.name, "%s", name);
     int status = add_row(m, 0, &one);
     accuracy_row *row = &m->rows[m->row_count - 1];
-    if (!status && !(row->beside = calloc(1, sizeof *row->beside)))
+    if (!status && !(row->program = calloc(1, sizeof *row->program)))
         status = trip_fail(TRIP_ERROR, "accuracy", one.name, "out of memory");
     if (!status)
-        *row->beside = (accuracy_beside){ .socket = -1, .command = command };
+        *row->program = (accuracy_program){ .socket = -1, .command = command };
     return status;
 }
 
@@ -138,12 +138,12 @@ static int add_programs(accuracy_measured *m)
 {
     const accuracy_options *o = m->options;
     int status = 0;
-    for (int i = 0; i < o->beside_count && !status; i++) {
+    for (int i = 0; i < o->program_count && !status; i++) {
         char name[ACCURACY_NAME_BYTES];
-        snprintf(name, sizeof name, "beside-%d", i + 1);
-        status = add_program(m, name, o->beside[i]);
+        snprintf(name, sizeof name, "program-%d", i + 1);
+        status = add_program(m, name, o->program[i]);
     }
-    if (!status && !o->beside_count && !o->beside_none && o->source &&
+    if (!status && !o->program_count && !o->no_programs && o->source &&
         is_wanted(o->settings, "vtk") && accuracy_vtk_command(o->source, m->vtk, sizeof m->vtk)) {
         status = add_program(m, "vtk", m->vtk);
         m->rows[m->row_count - 1].is_vtk = true;
@@ -151,10 +151,10 @@ static int add_programs(accuracy_measured *m)
     return status;
 }
 
-static int add_rows(accuracy_measured *m, const triptych_settings *usual)
+static int add_rows(accuracy_measured *m, const triptych_settings *defaults)
 {
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
-    int count = accuracy_settings(all, usual), status = 0;
+    int count = accuracy_settings(all, defaults), status = 0;
     if (!(m->rows = calloc(ACCURACY_ROWS_MAX, sizeof *m->rows)) ||
         !(m->views = calloc((size_t)m->options->views, sizeof *m->views)))
         return trip_fail(TRIP_ERROR, "accuracy", "rows", "out of memory");
@@ -162,7 +162,7 @@ static int add_rows(accuracy_measured *m, const triptych_settings *usual)
         if (is_wanted(m->options->settings, all[i].name))
             status = add_row(m, 0, &all[i]);
     if (!status)
-        status = add_others(m, usual);
+        status = add_others(m, defaults);
     if (!status)
         status = add_programs(m);
     for (int i = 0; i < ACCURACY_POPPINGS; i++)
@@ -228,8 +228,8 @@ static int leave_out_idle(sweep *s)
         if (row->is_vtk && (double)n[0] * (double)n[1] * (double)n[2] * ACCURACY_VTK_VOXEL_BYTES >
                                0.25 * (double)trip_memory_available_bytes())
             leave_out(row,
-                      "VTK would hold the whole volume in memory; --beside draws it all the same");
-        if (row->beside)
+                      "VTK would hold the whole volume in memory; --compare draws it all the same");
+        if (row->program)
             continue;
         if (row->setting.settings.lod_px > 0 && !has_levels(t, &row->setting.settings))
             leave_out(row, "the data set has no coarse levels for it");
@@ -257,9 +257,9 @@ static int draw_integral(sweep *s, int data, int renderer, triptych_settings set
 }
 
 /* That of values, as they are interpolated by default. */
-static triptych_settings usual_field(const sweep *s)
+static triptych_settings default_field(const sweep *s)
 {
-    triptych_settings settings = s->usual;
+    triptych_settings settings = s->defaults;
     settings.field = TRIPTYCH_VALUES;
     return settings;
 }
@@ -269,14 +269,15 @@ static int need_stored(sweep *s, int data)
     if (s->stored_data == data)
         return 0;
     s->stored_data = data;
-    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, usual_field(s), s->pictures[STORED]);
+    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, default_field(s),
+                         s->pictures[STORED]);
 }
 
 /* Of what a row draws: the sum of its splats, or values by its kernel. */
 static int need_field(sweep *s, const accuracy_row *row, bool splats)
 {
     const triptych_settings *drawn = &row->setting.settings;
-    triptych_settings field = usual_field(s);
+    triptych_settings field = default_field(s);
     if (splats) {
         field.field = TRIPTYCH_SPLATS;
         field.classify = TRIPTYCH_PRE;
@@ -426,31 +427,31 @@ static int time_row(sweep *s, accuracy_row *row)
     return status;
 }
 
-static int draw_beside(sweep *s, accuracy_row *row, int view)
+static int draw_program(sweep *s, accuracy_row *row, int view)
 {
-    accuracy_beside *b = row->beside;
+    accuracy_program *b = row->program;
     const accuracy_view *seen = &s->m->views[view];
     double ms;
-    int status = accuracy_beside_picture(b, seen, s->m->folder, s->pictures[RAN], &ms, row->why);
+    int status = accuracy_program_picture(b, seen, s->m->folder, s->pictures[RAN], &ms, row->why);
     for (int i = 0; i < s->o->repeat && !status; i++)
-        status = accuracy_beside_draw(b, seen, &row->ms[row->frames++], row->why);
+        status = accuracy_program_draw(b, seen, &row->ms[row->frames++], row->why);
     return status;
 }
 
 /* Another program, as measure_row() does settings. */
-static int measure_beside(sweep *s, accuracy_row *row, int view)
+static int measure_program(sweep *s, accuracy_row *row, int view)
 {
     triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
     int status = 0;
     bench_progress_step(s->progress, row->setting.name);
     if (view == 0) {
-        status = accuracy_beside_start(row->beside, s->o, t, row->why);
+        status = accuracy_program_start(row->program, s->o, t, row->why);
         if (!status)
             snprintf(row->setting.name, sizeof row->setting.name, "%.*s",
-                     (int)sizeof row->setting.name - 1, row->beside->name);
+                     (int)sizeof row->setting.name - 1, row->program->name);
     }
     if (!status)
-        status = draw_beside(s, row, view);
+        status = draw_program(s, row, view);
     if (status == TRIP_ERROR) {
         row->state = ACCURACY_LEFT_OUT;
         return 0;
@@ -504,7 +505,7 @@ static int find_truth(sweep *s, int view)
     int status;
     s->stored_data = s->field_data = s->reference_data = -1;
     if (s->o->source)
-        status = draw_integral(s, 0, ACCURACY_SOURCE, usual_field(s), s->pictures[TRUTH]);
+        status = draw_integral(s, 0, ACCURACY_SOURCE, default_field(s), s->pictures[TRUTH]);
     else {
         status = need_stored(s, 0);
         memcpy(s->pictures[TRUTH], s->pictures[STORED], s->picture_bytes);
@@ -533,8 +534,8 @@ static int measure_view(sweep *s, int view)
     for (int i = 0; i < m->row_count && !status; i++)
         if (m->rows[i].state == (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED) &&
             (view || i == 0 || !is_over(s)))
-            status = m->rows[i].beside ? measure_beside(s, &m->rows[i], view)
-                                       : measure_row(s, &m->rows[i], view);
+            status = m->rows[i].program ? measure_program(s, &m->rows[i], view)
+                                        : measure_row(s, &m->rows[i], view);
     if (!status)
         m->view_count++;
     return status;
@@ -559,7 +560,7 @@ static int take_pictures(sweep *s)
     return 0;
 }
 
-static triptych_settings usual_settings(const accuracy_options *o)
+static triptych_settings default_settings(const accuracy_options *o)
 {
     triptych_settings s = triptych_default_settings();
     s.shading = o->shading;
@@ -571,8 +572,8 @@ static int measure_popping(sweep *s)
 {
     int status = 0;
     for (int i = 0; i < s->m->popping_count && !status && !is_over(s); i++)
-        status = accuracy_popping_measure(&s->m->popping[i], &s->contexts, &s->usual, s->progress,
-                                          s->pictures[RAN]);
+        status = accuracy_popping_measure(&s->m->popping[i], &s->contexts, &s->defaults,
+                                          s->progress, s->pictures[RAN]);
     return status;
 }
 
@@ -596,9 +597,9 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
         return trip_fail(TRIP_ERROR, "accuracy", "sweep", "out of memory");
     s->m = m;
     s->o = o;
-    s->usual = usual_settings(o);
+    s->defaults = default_settings(o);
     s->begin = now_seconds();
-    int status = add_rows(m, &s->usual);
+    int status = add_rows(m, &s->defaults);
     if (!status)
         status = accuracy_contexts_create(&s->contexts, o);
     if (!status)
@@ -622,9 +623,9 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
 void accuracy_measured_free(accuracy_measured *m)
 {
     for (int i = 0; i < m->row_count; i++) {
-        if (m->rows[i].beside)
-            accuracy_beside_end(m->rows[i].beside);
-        free(m->rows[i].beside);
+        if (m->rows[i].program)
+            accuracy_program_end(m->rows[i].program);
+        free(m->rows[i].program);
         free(m->rows[i].ms);
         free(m->rows[i].picture);
         free(m->rows[i].difference);

@@ -5,14 +5,15 @@
 #define TRIP_ACCURACY_MEASURE_H
 
 #include "accuracy_options.h"
-#include "beside.h"
+#include "compared_programs.h"
 #include "error.h"
 #include "popping.h"
 #include "setting.h"
 #include "views.h"
 
 enum {
-    ACCURACY_ROWS_MAX = ACCURACY_SETTINGS_MAX + 2 * ACCURACY_DATA_MAX + ACCURACY_BESIDE_MAX,
+    ACCURACY_ROWS_MAX =
+        ACCURACY_SETTINGS_MAX + 2 * ACCURACY_DATA_MAX + ACCURACY_COMPARED_PROGRAMS_MAX,
     ACCURACY_COMMAND_BYTES = 4200
 };
 
@@ -28,9 +29,9 @@ typedef enum accuracy_step {
 
 typedef struct accuracy_row {
     accuracy_setting setting;
-    int data;                /* of accuracy_options.data */
-    accuracy_beside *beside; /* another program, whose name is the setting's; NULL: a setting */
-    bool is_vtk;             /* without being given */
+    int data;                  /* of accuracy_options.data */
+    accuracy_program *program; /* another program, whose name is the setting's; NULL: a setting */
+    bool is_vtk;               /* without being given */
     accuracy_state state;
     char why[256]; /* it was left out */
     accuracy_error error[ACCURACY_STEPS];

@@ -94,22 +94,22 @@ static void mean_colour(const source *s, int x, int y, uint8_t rgb[3])
 
 static void difference_colour(const source *s, int x, int y, uint8_t rgb[3])
 {
-    double most = 0;
+    double max = 0;
     for (int j = y * s->step; j < (y + 1) * s->step; j++)
         for (int i = x * s->step; i < (x + 1) * s->step; i++)
             for (size_t c = 0; c < 4; c++) {
                 size_t at = 4 * ((size_t)j * (size_t)s->width + (size_t)i) + c;
-                most = fmax(most, fabs((double)s->a[at] - (double)s->b[at]));
+                max = fmax(max, fabs((double)s->a[at] - (double)s->b[at]));
             }
-    double heat = 3 * 255 * most / ACCURACY_DIFFERENCE_MOST;
+    double heat = 3 * 255 * max / ACCURACY_DIFFERENCE_MAX;
     for (int c = 0; c < 3; c++)
         rgb[c] = byte_of(heat - c);
 }
 
-static char *encode(source s, int most)
+static char *encode(source s, int max)
 {
     int longer = s.width > s.height ? s.width : s.height;
-    s.step = (longer + most - 1) / most;
+    s.step = (longer + max - 1) / max;
     int width = s.width / s.step, height = s.height / s.step;
     width = width > 0 ? width : 1;
     height = height > 0 ? height : 1;
@@ -129,12 +129,12 @@ static char *encode(source s, int most)
     return text;
 }
 
-char *accuracy_picture_data(const float *rgba, int width, int height, int most)
+char *accuracy_picture_data(const float *rgba, int width, int height, int max)
 {
-    return encode((source){ .a = rgba, .width = width, .height = height }, most);
+    return encode((source){ .a = rgba, .width = width, .height = height }, max);
 }
 
-char *accuracy_difference_data(const float *a, const float *b, int width, int height, int most)
+char *accuracy_difference_data(const float *a, const float *b, int width, int height, int max)
 {
-    return encode((source){ .a = a, .b = b, .width = width, .height = height }, most);
+    return encode((source){ .a = a, .b = b, .width = width, .height = height }, max);
 }

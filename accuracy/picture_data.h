@@ -5,12 +5,12 @@
 /* A picture of width * height times 4 floats, shown over black, made smaller by a whole factor to
  * be at most `most` pixels wide and high; for free(). NULL, with nothing reported, without memory.
  */
-char *accuracy_picture_data(const float *rgba, int width, int height, int most);
+char *accuracy_picture_data(const float *rgba, int width, int height, int max);
 
 /* Likewise how far two pictures are apart: the largest difference of a channel at each pixel, from
- * black over red and yellow to white at ACCURACY_DIFFERENCE_MOST of 255; of the pixels that become
+ * black over red and yellow to white at ACCURACY_DIFFERENCE_MAX of 255; of the pixels that become
  * one, the largest. */
-#define ACCURACY_DIFFERENCE_MOST 16.0
-char *accuracy_difference_data(const float *a, const float *b, int width, int height, int most);
+#define ACCURACY_DIFFERENCE_MAX 16.0
+char *accuracy_difference_data(const float *a, const float *b, int width, int height, int max);
 
 #endif

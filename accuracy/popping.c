@@ -79,13 +79,13 @@ static int draw_steps(accuracy_contexts *contexts, triptych *t, const triptych_s
 
 /* Where a frame fails its message is why there are no figures. */
 static int measure_settings(accuracy_popping *p, accuracy_contexts *contexts, triptych *t,
-                            const triptych_settings *usual, bench_progress *progress, orbit *turn,
-                            float *rgba, bench_popping_changes *changes)
+                            const triptych_settings *defaults, bench_progress *progress,
+                            orbit *turn, float *rgba, bench_popping_changes *changes)
 {
     int status = 0;
     for (int i = 0; i < ACCURACY_POPPING_ROWS && !status; i++) {
         const bench_popping_setting *one = &bench_popping_settings[i];
-        triptych_settings settings = *usual;
+        triptych_settings settings = *defaults;
         settings.classify = p->classify;
         settings.method = one->method;
         settings.h = one->h;
@@ -101,7 +101,8 @@ static int measure_settings(accuracy_popping *p, accuracy_contexts *contexts, tr
 }
 
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const triptych_settings *usual, bench_progress *progress, float *rgba)
+                             const triptych_settings *defaults, bench_progress *progress,
+                             float *rgba)
 {
     const accuracy_options *o = contexts->options;
     triptych *t = contexts->contexts[0][TRIPTYCH_RENDERER_CPU];
@@ -117,7 +118,7 @@ int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
         p->state = ACCURACY_LEFT_OUT;
         return 0;
     }
-    int status = measure_settings(p, contexts, t, usual, progress, &turn, rgba, &changes);
+    int status = measure_settings(p, contexts, t, defaults, progress, &turn, rgba, &changes);
     bench_popping_end(&changes);
     return status;
 }

@@ -25,6 +25,7 @@ extern const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS];
 /* Of the first data set by the cpu renderer, whose context is open and whose view is lost; `usual`
  * has what the settings have in common. `rgba`: room for a picture. */
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const triptych_settings *usual, bench_progress *progress, float *rgba);
+                             const triptych_settings *defaults, bench_progress *progress,
+                             float *rgba);
 
 #endif

@@ -65,7 +65,7 @@ static void write_row(FILE *f, const accuracy_report *r, int i)
     write_number(f, row->bytes_read / row->views);
     for (int s = 0; s < ACCURACY_STEPS; s++) {
         const accuracy_error_figures *e = &r->figures[i][s];
-        const double figures[] = { e->most, e->mean, e->median, e->percentile_99, e->psnr };
+        const double figures[] = { e->max, e->mean, e->median, e->percentile_99, e->psnr };
         for (int k = 0; k < 5; k++)
             write_number(f, row->has[s] ? figures[k] : NAN);
     }
@@ -84,7 +84,7 @@ char *accuracy_report_csv(const accuracy_report *r)
         return NULL;
     write_head(f);
     for (int i = 0; i < r->m->row_count; i++)
-        if (r->m->rows[i].state == ACCURACY_MEASURED && !r->m->rows[i].beside)
+        if (r->m->rows[i].state == ACCURACY_MEASURED && !r->m->rows[i].program)
             write_row(f, r, i);
     if (fclose(f) == 0)
         return text;

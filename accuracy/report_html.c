@@ -21,7 +21,7 @@ static const char style[] =
     "svg{max-width:100%;height:auto;font:11px system-ui,sans-serif;background:#fff}"
     ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}.leader{stroke:#bbb;fill:none}"
     "circle,rect{stroke:#fff}"
-    ".beside{fill:#7b3fa0}.post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}."
+    ".program{fill:#7b3fa0}.post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}."
     "quality{fill:#c21f3a}"
     ".key{display:inline-block;width:11px;height:11px;border-radius:6px;"
     "margin:0 4px 0 14px}\n";
@@ -90,7 +90,7 @@ static void write_plots(FILE *f, const accuracy_report *r)
             "<span class=key style='background:#c21f3a'></span>quality"
             "%s. "
             "The line is the front: no setting is both faster and closer.</p>\n",
-            r->m->options->beside_count || r->m->vtk[0]
+            r->m->options->program_count || r->m->vtk[0]
                 ? "<span class=key style='background:#7b3fa0;border-radius:0'></span>"
                   "another program, with its own light"
                 : "");
@@ -103,8 +103,8 @@ static void write_row(FILE *f, const accuracy_report *r, int i)
     const accuracy_row *row = &r->m->rows[i];
     const accuracy_error_figures *e = &r->figures[i][ACCURACY_TOTAL];
     fprintf(f, "<tr%s><td title=\"", r->front[i] ? " class=front" : "");
-    if (row->beside)
-        write_escaped(f, row->beside->about);
+    if (row->program)
+        write_escaped(f, row->program->about);
     else
         accuracy_write_options(f, &row->setting);
     fputs("\">", f);
@@ -112,7 +112,7 @@ static void write_row(FILE *f, const accuracy_report *r, int i)
     write_number(f, r->ms[i], 1);
     write_number(f, row->splats / row->views / 1e6, 3);
     write_number(f, row->bytes_read / row->views / 1e6, 2);
-    write_number(f, e->most, 1);
+    write_number(f, e->max, 1);
     write_number(f, e->mean, 2);
     write_number(f, e->median, 2);
     write_number(f, e->percentile_99, 2);
@@ -193,7 +193,7 @@ static void write_pictures(FILE *f, const accuracy_report *r)
         "<h2>Pictures of the first view</h2>\n<p>Beside each how far it is from the integral, "
         "the most of a pixel's channels: black is none, white %g of 255 and more; figures are of "
         "all views.</p>\n",
-        ACCURACY_DIFFERENCE_MOST);
+        ACCURACY_DIFFERENCE_MAX);
     if (r->m->truth)
         fprintf(f, "<figure><img alt='' src=\"%s\"><figcaption>integral</figcaption></figure>\n",
                 r->m->truth);
@@ -250,7 +250,7 @@ static void write_commands(FILE *f, const accuracy_report *r)
     }
     for (int i = 0; i < r->m->row_count; i++) {
         const accuracy_row *row = &r->m->rows[i];
-        if (row->state != ACCURACY_MEASURED || row->beside)
+        if (row->state != ACCURACY_MEASURED || row->program)
             continue;
         fputs("triptych render ", memory);
         trip_text_write_word(memory, o->data[row->data]);

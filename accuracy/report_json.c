@@ -18,7 +18,7 @@ static void add_number(cJSON *to, const char *name, double value)
 static cJSON *add_figures(cJSON *to, const char *name, const accuracy_error_figures *f)
 {
     cJSON *o = cJSON_AddObjectToObject(to, name);
-    add_number(o, "max", f->most);
+    add_number(o, "max", f->max);
     add_number(o, "mean", f->mean);
     add_number(o, "median", f->median);
     add_number(o, "percentile_99", f->percentile_99);
@@ -50,13 +50,13 @@ static void add_row(cJSON *rows, const accuracy_report *r, int i)
     cJSON_AddItemToArray(rows, o);
     cJSON_AddStringToObject(o, "name", row->setting.name);
     cJSON_AddStringToObject(o, "data_set", r->m->options->data[row->data]);
-    if (row->beside)
-        cJSON_AddStringToObject(o, "version", row->beside->about);
+    if (row->program)
+        cJSON_AddStringToObject(o, "version", row->program->about);
     else
         add_options(o, &row->setting);
     add_number(o, "views", row->views);
     add_times(o, r->ms[i], row->ms, row->frames);
-    if (!row->beside) {
+    if (!row->program) {
         add_number(o, "splats", row->splats / row->views);
         add_number(o, "splats_drawn", row->splats_drawn >= 0 ? row->splats_drawn : NAN);
         add_number(o, "bytes_read", row->bytes_read / row->views);
@@ -68,7 +68,7 @@ static void add_row(cJSON *rows, const accuracy_report *r, int i)
     for (int s = ACCURACY_TOTAL + 1; s < ACCURACY_STEPS; s++)
         if (row->has[s])
             add_figures(o, accuracy_step_names[s], &r->figures[i][s]);
-    if (!row->beside)
+    if (!row->program)
         cJSON_AddBoolToObject(o, "front", r->front[i]);
 }
 
@@ -105,7 +105,7 @@ static void add_popping(cJSON *to, const accuracy_popping *p)
         cJSON_AddStringToObject(o, "settings", bench_popping_settings[i].name);
         add_number(o, "mean", row->mean);
         add_number(o, "percentile_99", row->percentile_99);
-        add_number(o, "max", row->most);
+        add_number(o, "max", row->max);
         add_number(o, "motion", row->motion);
     }
 }
@@ -143,14 +143,14 @@ char *accuracy_report_json(const accuracy_report *r)
     add_facts(root, r);
     cJSON *views = cJSON_AddArrayToObject(root, "views");
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
-    cJSON *beside = cJSON_AddArrayToObject(root, "beside");
+    cJSON *programs = cJSON_AddArrayToObject(root, "compared");
     cJSON *popping = cJSON_AddObjectToObject(root, "popping");
     cJSON *left_out = cJSON_AddArrayToObject(root, "left_out");
     for (int i = 0; i < r->m->view_count; i++)
         add_view(views, &r->m->views[i]);
     for (int i = 0; i < r->m->row_count; i++)
         if (r->m->rows[i].state == ACCURACY_MEASURED)
-            add_row(r->m->rows[i].beside ? beside : rows, r, i);
+            add_row(r->m->rows[i].program ? programs : rows, r, i);
         else
             add_left_out(left_out, r->m->rows[i].setting.name, r->m->rows[i].state,
                          r->m->rows[i].why);

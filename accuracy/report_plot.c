@@ -8,7 +8,7 @@
 
 enum { WIDTH = 860, HEIGHT = 480, LEFT = 64, RIGHT = 20, TOP = 16, BOTTOM = 48, LABELS_MAX = 256 };
 
-static const double least_error = 0.01; /* what is less is drawn there */
+static const double min_error = 0.01; /* what is less is drawn there */
 
 typedef struct box {
     double x0, y0, x1, y1;
@@ -30,7 +30,7 @@ static bool is_shown(const plot *p, int i)
 
 static double error_of(const plot *p, const accuracy_error_figures *f)
 {
-    return fmax(least_error, p->mean ? f->mean : f->percentile_99);
+    return fmax(min_error, p->mean ? f->mean : f->percentile_99);
 }
 
 static double row_error(const plot *p, int i)
@@ -55,12 +55,12 @@ static void find_edges(plot *p)
             include(p, p->r->ms[i], row_error(p, i));
 }
 
-static double place_x(const plot *p, double ms)
+static double position_x(const plot *p, double ms)
 {
     return LEFT + (log10(ms) - p->x0) / (p->x1 - p->x0) * (WIDTH - LEFT - RIGHT);
 }
 
-static double place_y(const plot *p, double error)
+static double position_y(const plot *p, double error)
 {
     return HEIGHT - BOTTOM - (log10(error) - p->y0) / (p->y1 - p->y0) * (HEIGHT - TOP - BOTTOM);
 }
@@ -71,7 +71,8 @@ static void draw_ticks(const plot *p)
     static const double steps[] = { 1, 2, 5 };
     for (int decade = -4; decade < 8; decade++)
         for (int k = 0; k < 3; k++) {
-            double value = steps[k] * pow(10, decade), x = place_x(p, value), y = place_y(p, value);
+            double value = steps[k] * pow(10, decade), x = position_x(p, value),
+                   y = position_y(p, value);
             if (log10(value) >= p->x0 && log10(value) <= p->x1)
                 fprintf(p->f,
                         "<path class=grid d='M%.1f %d V%d'/><text x='%.1f' y='%d' "
@@ -138,7 +139,7 @@ static void draw_front(plot *p)
                 next = i;
         if (next < 0)
             break;
-        double x = place_x(p, p->r->ms[next]), y = place_y(p, row_error(p, next));
+        double x = position_x(p, p->r->ms[next]), y = position_y(p, row_error(p, next));
         fprintf(p->f, begun ? " H%.1f V%.1f" : "M%.1f %.1f", x, y);
         if (begun) {
             take_line(p, before_x, before_y, x, before_y);
@@ -167,15 +168,15 @@ static void write_label(plot *p, double x, double y, const char *name)
     const double width = 6.4 * (double)strlen(name), height = 12;
     for (int ring = 0; ring < 5; ring++) {
         const double up = -4 - 14 * ring, down = 14 + 14 * ring;
-        const double places[][2] = { { 8, up },
-                                     { 8, down },
-                                     { -8 - width, up },
-                                     { -8 - width, down },
-                                     { -width / 2, up - 6 },
-                                     { -width / 2, down + 6 } };
-        for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-            box b = { x + places[i][0], y + places[i][1] - height + 2, x + places[i][0] + width,
-                      y + places[i][1] + 2 };
+        const double positions[][2] = { { 8, up },
+                                        { 8, down },
+                                        { -8 - width, up },
+                                        { -8 - width, down },
+                                        { -width / 2, up - 6 },
+                                        { -width / 2, down + 6 } };
+        for (size_t i = 0; i < sizeof positions / sizeof *positions; i++) {
+            box b = { x + positions[i][0], y + positions[i][1] - height + 2,
+                      x + positions[i][0] + width, y + positions[i][1] + 2 };
             if (overlaps(p, b))
                 continue;
             take(p, b);
@@ -193,12 +194,13 @@ static void draw_rows(plot *p)
         if (!is_shown(p, i))
             continue;
         const char *name = p->r->m->rows[i].setting.name;
-        double x = place_x(p, p->r->ms[i]), y = place_y(p, row_error(p, i));
-        if (p->r->m->rows[i].beside)
-            fprintf(p->f,
-                    "<rect class=beside x='%.1f' y='%.1f' width='9' height='9'><title>%s: %.1f ms, "
-                    "%.2f</title></rect>\n",
-                    x - 4.5, y - 4.5, name, p->r->ms[i], row_error(p, i));
+        double x = position_x(p, p->r->ms[i]), y = position_y(p, row_error(p, i));
+        if (p->r->m->rows[i].program)
+            fprintf(
+                p->f,
+                "<rect class=program x='%.1f' y='%.1f' width='9' height='9'><title>%s: %.1f ms, "
+                "%.2f</title></rect>\n",
+                x - 4.5, y - 4.5, name, p->r->ms[i], row_error(p, i));
         else
             fprintf(p->f,
                     "<circle class=%s cx='%.1f' cy='%.1f' r='%d'><title>%s: %.1f ms, %.2f"
@@ -215,11 +217,11 @@ static void write_labels(plot *p)
     for (int pass = 0; pass < 3; pass++)
         for (int i = 0; i < p->r->m->row_count; i++) {
             const char *name = p->r->m->rows[i].setting.name;
-            int rank = front[i] || p->r->m->rows[i].beside ? 0
-                       : !strcmp(family(name), "quality")  ? 1
-                                                           : 2;
+            int rank = front[i] || p->r->m->rows[i].program ? 0
+                       : !strcmp(family(name), "quality")   ? 1
+                                                            : 2;
             if (is_shown(p, i) && rank == pass)
-                write_label(p, place_x(p, p->r->ms[i]), place_y(p, row_error(p, i)), name);
+                write_label(p, position_x(p, p->r->ms[i]), position_y(p, row_error(p, i)), name);
         }
 }
 

@@ -21,11 +21,11 @@ __attribute__((format(printf, 4, 5))) static void add(sweep *w, triptych_rendere
     one->settings = s;
 }
 
-static void add_qualities(sweep *w, const triptych_settings *usual)
+static void add_qualities(sweep *w, const triptych_settings *defaults)
 {
     static const char *const names[] = { "draft", "normal", "high", "exact" };
     for (int i = 0; i < 4; i++) {
-        triptych_settings s = *usual;
+        triptych_settings s = *defaults;
         triptych_set_quality(&s, (triptych_quality)(TRIPTYCH_DRAFT + i));
         add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", names[i]);
     }
@@ -34,19 +34,19 @@ static void add_qualities(sweep *w, const triptych_settings *usual)
 /* Post with each number of slices, the papers' parameter h, the other methods. */
 static void add_post(sweep *w)
 {
-    static const int slices[] = { 1, 2, 3, 4, 6, 8, 16 };
+    static const int samples_per_sheet[] = { 1, 2, 3, 4, 6, 8, 16 };
     static const double h[] = { 0, 0.5, 0.7, 0.85, 0.95 };
     triptych_settings s = w->post;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post");
-    for (size_t i = 0; i < sizeof slices / sizeof *slices; i++) {
-        s.slices = slices[i];
-        add(w, TRIPTYCH_RENDERER_CPU, s, "post-slices-%d", slices[i]);
+    for (size_t i = 0; i < sizeof samples_per_sheet / sizeof *samples_per_sheet; i++) {
+        s.samples_per_sheet = samples_per_sheet[i];
+        add(w, TRIPTYCH_RENDERER_CPU, s, "post-samples-per-sheet-%d", samples_per_sheet[i]);
     }
     s = w->post;
     s.method = TRIPTYCH_CLIP;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip");
-    s.slices = 1;
-    add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip-slices-1");
+    s.samples_per_sheet = 1;
+    add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip-samples-per-sheet-1");
     s = w->post;
     s.method = TRIPTYCH_AXIS;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-axis");
@@ -94,9 +94,9 @@ static void add_saturations(sweep *w)
     static const double saturations[] = { 0, 1.0 / 128, 1.0 / 32 };
     for (size_t i = 0; i < sizeof saturations / sizeof *saturations; i++) {
         triptych_settings pre = w->pre, post = w->post;
-        pre.saturation = post.saturation = saturations[i];
-        add(w, TRIPTYCH_RENDERER_CPU, post, "post-saturation-%g", saturations[i]);
-        add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-saturation-%g", saturations[i]);
+        pre.early_termination = post.early_termination = saturations[i];
+        add(w, TRIPTYCH_RENDERER_CPU, post, "post-early-termination-%g", saturations[i]);
+        add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-early-termination-%g", saturations[i]);
     }
 }
 
@@ -156,12 +156,13 @@ static void add_samples(sweep *w)
     }
 }
 
-int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptych_settings *usual)
+int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
+                      const triptych_settings *defaults)
 {
-    sweep w = { .out = out, .pre = *usual, .post = *usual };
+    sweep w = { .out = out, .pre = *defaults, .post = *defaults };
     w.pre.classify = TRIPTYCH_PRE;
     w.post.classify = TRIPTYCH_POST;
-    add_qualities(&w, usual);
+    add_qualities(&w, defaults);
     add_post(&w);
     add_pre(&w, TRIPTYCH_BY_SPLAT);
     add_targets(&w);
@@ -177,12 +178,12 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptyc
 bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b)
 {
     if (a->classify != b->classify || a->method != b->method || a->lod_px != b->lod_px ||
-        a->saturation != b->saturation || a->samples != b->samples ||
+        a->early_termination != b->early_termination || a->samples != b->samples ||
         (a->method == TRIPTYCH_MERGE && a->h != b->h))
         return false;
     if (a->classify == TRIPTYCH_PRE)
         return a->compositing == b->compositing && a->kernel_radius == b->kernel_radius &&
                a->footprint == b->footprint && a->low_pass == b->low_pass &&
                a->flatten == b->flatten;
-    return a->slices == b->slices && a->kernel == b->kernel;
+    return a->samples_per_sheet == b->samples_per_sheet && a->kernel == b->kernel;
 }

@@ -24,7 +24,8 @@ typedef enum accuracy_state {
 
 /* All of them, those first that matter most; `usual` has what they have in common (shading,
  * background). Returns how many. */
-int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const triptych_settings *usual);
+int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
+                      const triptych_settings *defaults);
 
 /* Whether a picture of the reference is the same for both. */
 bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b);

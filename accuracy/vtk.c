@@ -10,8 +10,8 @@
 
 static bool ends_with(const char *path, const char *end)
 {
-    const size_t length = strlen(path), least = strlen(end);
-    return length >= least && strcasecmp(path + length - least, end) == 0;
+    const size_t length = strlen(path), min = strlen(end);
+    return length >= min && strcasecmp(path + length - min, end) == 0;
 }
 
 bool accuracy_vtk_command(const char *source, char *command, size_t bytes)

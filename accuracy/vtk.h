@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* The command of `--beside` that draws a volume by vtk_worker.py, a sample every half voxel; false
+/* The command of `--compare` that draws a volume by vtk_worker.py, a sample every half voxel; false
  * where VTK, a display without a screen or the worker is not there, or VTK does not read the
  * volume. Starts Python, which takes part of a second. */
 bool accuracy_vtk_command(const char *source, char *command, size_t bytes);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws one volume by one of VTK's mappers, for tests/compare and `triptych accuracy --beside`.
+"""Draws one volume by one of VTK's mappers, for tests/compare and `triptych accuracy --compare`.
 Options: --step VOXELS, --mapper cpu|gpu, in place of what the first line says. JSON lines on
 standard input say what is drawn:
   {"volume": FILE, "dims": [i, j, k], "index_to_world": 3 x 4, "tf": TEXT, "shading": bool,

@@ -16,11 +16,11 @@ static const struct {
     bool makes_volumes; /* where no data set is named */
     bool opens;         /* the data set by itself */
 } tables[] = {
-    { "orders", bench_orders, false, false },   { "submit", bench_submit, false, false },
-    { "stream", bench_stream, false, false },   { "renderers", bench_renderers, false, false },
-    { "popping", bench_popping, false, false }, { "levels", bench_levels, true, false },
-    { "flight", bench_flight, false, true },    { "ewa", bench_ewa, false, false },
-    { "forms", bench_forms, false, false },
+    { "orders", bench_orders, false, false },     { "submit", bench_submit, false, false },
+    { "stream", bench_stream, false, false },     { "renderers", bench_renderers, false, false },
+    { "popping", bench_popping, false, false },   { "levels", bench_levels, true, false },
+    { "flight", bench_flight, false, true },      { "ewa", bench_ewa, false, false },
+    { "variants", bench_variants, false, false },
 };
 
 /* Splats by their normals, values by their differences. */

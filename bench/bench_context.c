@@ -34,8 +34,8 @@ static triptych_settings settings_of(const trip_settings *s)
     to.classify = s->classify == TRIP_CLASSIFY_POST ? TRIPTYCH_POST : TRIPTYCH_PRE;
     to.compositing =
         s->compositing == TRIP_COMPOSITING_SHEET ? TRIPTYCH_BY_SHEET : TRIPTYCH_BY_SPLAT;
-    to.slices = s->slices;
-    to.saturation = s->saturation;
+    to.samples_per_sheet = s->samples_per_sheet;
+    to.early_termination = s->early_termination;
     to.shading = s->shading;
     to.kernel_radius = s->kernel_radius;
     memset(to.background, 0, sizeof to.background);
@@ -53,7 +53,8 @@ int bench_context_open(bench_context *c, const char *path, const bench_options *
         return trip_fail(TRIP_ERROR, "bench", path, "out of memory");
     int status = triptych_open(c->t, path, &resources);
     if (!status)
-        status = triptych_set_function(c->t, &(triptych_function){ .name = o->tf });
+        status =
+            triptych_set_transfer_function(c->t, &(triptych_transfer_function){ .name = o->tf });
     return check(c, status);
 }
 

@@ -3,7 +3,7 @@
 #ifndef TRIP_BENCH_DISK_H
 #define TRIP_BENCH_DISK_H
 
-#include "session.h"
+#include "library_session.h"
 
 /* Plane files of a data set's lists. */
 typedef struct bench_files {

@@ -26,7 +26,7 @@ enum {
 /* Of optical depth over the image plane: the largest difference as a share of the peak, the mean
  * one as a share of the mean, and by how much the sum is off. */
 typedef struct deviation {
-    double most, mean, sum;
+    double max, mean, sum;
     bool affine;
 } deviation;
 
@@ -41,19 +41,19 @@ static deviation compare_splats(const trip_splat_frame *exact, const trip_splat 
                                 const trip_splat_frame *ewa, const trip_splat *b)
 {
     double x0 = fmin(a->x0, b->x0), x1 = fmax(a->x1, b->x1), y0 = fmin(a->y0, b->y0);
-    double y1 = fmax(a->y1, b->y1), peak = 0, most = 0, apart = 0, sum = 0, truth = 0;
+    double y1 = fmax(a->y1, b->y1), peak = 0, max = 0, apart = 0, sum = 0, truth = 0;
     for (int i = 0; i < SAMPLES; i++)
         for (int j = 0; j < SAMPLES; j++) {
             double x = x0 + (x1 - x0) * (i + 0.5) / SAMPLES;
             double y = y0 + (y1 - y0) * (j + 0.5) / SAMPLES;
             double is = depth_at(ewa, b, x, y), should = depth_at(exact, a, x, y);
             peak = fmax(peak, should);
-            most = fmax(most, fabs(is - should));
+            max = fmax(max, fabs(is - should));
             apart += fabs(is - should);
             sum += is;
             truth += should;
         }
-    return (deviation){ most / peak, apart / truth, sum / truth - 1, true };
+    return (deviation){ max / peak, apart / truth, sum / truth - 1, true };
 }
 
 /* A splat of cubes so many kernel radii from the eye, at an angle from the axis of view, without
@@ -105,7 +105,7 @@ static int measure_splats(bench_report *r)
             cJSON_AddNumberToObject(row, "angle", angles[i]);
             cJSON_AddNumberToObject(row, "distance", distances[k]);
             if (d.affine) {
-                cJSON_AddNumberToObject(row, "most", 100 * d.most);
+                cJSON_AddNumberToObject(row, "most", 100 * d.max);
                 cJSON_AddNumberToObject(row, "mean", 100 * d.mean);
                 cJSON_AddNumberToObject(row, "sum", 100 * d.sum);
             }
@@ -180,7 +180,7 @@ static int measure_view(pair *p, double fov, cJSON *rows)
         cJSON_AddNumberToObject(row, "fov", fov);
         cJSON_AddNumberToObject(row, "mean", figures.mean);
         cJSON_AddNumberToObject(row, "percentile_99", figures.percentile_99);
-        cJSON_AddNumberToObject(row, "most", figures.most);
+        cJSON_AddNumberToObject(row, "most", figures.max);
         cJSON_AddNumberToObject(row, "exact_ms", exact);
         cJSON_AddNumberToObject(row, "ewa_ms", ewa);
         cJSON_AddNumberToObject(row, "ratio", ewa / exact);

@@ -9,7 +9,7 @@
 #include "error.h"
 #include "report.h"
 
-enum { MOST = BENCH_FINER_MOST, TRUTH_SAMPLES = 4, ENTRIES = 2 };
+enum { MAX = BENCH_FINER_MAX, TRUTH_SAMPLES = 4, ENTRIES = 2 };
 
 /* One volume; it is drawn by two contexts, so that each keeps what it reads. */
 typedef struct volume {
@@ -203,7 +203,7 @@ static void describe(const bench_options *o, bench_report *r)
 
 static int report(const measuring *m, bench_report *r)
 {
-    bench_finer_row rows[MOST];
+    bench_finer_row rows[MAX];
     for (int i = 0; i < m->count; i++)
         rows[i] = row_of(m, i);
     add_rows(r, rows, m->count);
@@ -263,7 +263,7 @@ int bench_finer(const bench_options *o, bench_report *r)
     measuring m = { .options = o,
                     .count = 1,
                     .pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1] };
-    while (m.count < MOST && BENCH_FINER_COARSEST << m.count <= o->finest)
+    while (m.count < MAX && BENCH_FINER_COARSEST << m.count <= o->finest)
         m.count++;
     int status = begin(&m);
     if (!status)

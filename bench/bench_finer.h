@@ -6,7 +6,7 @@
 #include "bench_options.h"
 #include "bench_report.h"
 
-enum { BENCH_FINER_COARSEST = 128, BENCH_FINER_MOST = 4 };
+enum { BENCH_FINER_COARSEST = 128, BENCH_FINER_MAX = 4 };
 
 /* Of a volume: ms of a frame, and mean errors of 255. */
 typedef struct bench_finer_row {

@@ -83,17 +83,17 @@ static void draw(const plot *p)
 
 int bench_finer_plot(const char *path, const bench_finer_row *rows, int count)
 {
-    double least = INFINITY, most = 0;
+    double min = INFINITY, max = 0;
     char *svg = NULL;
     size_t bytes = 0;
     for (int i = 0; i < count; i++) {
-        least = fmin(least, fmin(rows[i].ms, rows[i].fine_ms));
-        most = fmax(most, fmax(rows[i].ms, rows[i].fine_ms));
+        min = fmin(min, fmin(rows[i].ms, rows[i].fine_ms));
+        max = fmax(max, fmax(rows[i].ms, rows[i].fine_ms));
     }
     plot p = { .rows = rows,
                .count = count,
-               .lo = (int)floor(log2(least)),
-               .hi = (int)floor(log2(most)) + 1,
+               .lo = (int)floor(log2(min)),
+               .hi = (int)floor(log2(max)) + 1,
                .file = open_memstream(&svg, &bytes) };
     if (!p.file)
         return trip_fail(TRIP_ERROR, "bench", path, "out of memory");

@@ -132,7 +132,7 @@ static int draw_alone(const flying *m, triptych *t, int *differ)
                                                       .renderer = bench_context_renderer(o),
                                                       .engine = (triptych_engine)o->engine });
     if (!status)
-        status = triptych_set_function(t, &(triptych_function){ .name = o->tf });
+        status = triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = o->tf });
     if (!status)
         status = triptych_set_settings(t, &settings);
     if (!status)

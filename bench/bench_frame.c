@@ -7,7 +7,7 @@
 
 #include "cpu/cpu_renderer.h"
 #include "report.h"
-#include "slices.h"
+#include "sheet_samples.h"
 #include "splat.h"
 
 double bench_now_ms(void)
@@ -68,9 +68,10 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
 {
     trip_plan plan;
     trip_settings settings = f->settings;
-    if (!settings.slices)
-        settings.slices =
-            trip_slices_of_view(camera, &settings, f->session->data->header.dims).slices;
+    if (!settings.samples_per_sheet)
+        settings.samples_per_sheet =
+            trip_sheet_samples_of_view(camera, &settings, f->session->data->header.dims)
+                .samples_per_sheet;
     if (settings.footprint == TRIP_FOOTPRINT_FIXED)
         settings.sprite_px = sprite_px(f->session->data, camera, &settings);
     if (f->occluder)
@@ -155,11 +156,11 @@ static void bound(const bench_cost *c, char text[48])
                   { "waiting for data", c->wait_ms },
                   { "drawing", c->draw_ms },
                   { "merging", c->merge_ms } };
-    int most = 0;
+    int max = 0;
     for (int i = 1; i < 4; i++)
-        if (parts[i].ms > parts[most].ms)
-            most = i;
-    snprintf(text, 48, "%s %.0f %%", parts[most].name, 100 * parts[most].ms / c->ms);
+        if (parts[i].ms > parts[max].ms)
+            max = i;
+    snprintf(text, 48, "%s %.0f %%", parts[max].name, 100 * parts[max].ms / c->ms);
 }
 
 void bench_runs_describe(bench_runs *r, int frame, cJSON *row)

@@ -5,7 +5,7 @@
 #include "bench_options.h"
 #include "bench_report.h"
 #include "frame.h"
-#include "session.h"
+#include "library_session.h"
 
 typedef struct bench_frame {
     const session *session;

@@ -13,9 +13,9 @@
 
 enum {
     /* Pixels of the truth along a side of a picture's, at least. */
-    LEAST_SAMPLES = 4,
+    MIN_SAMPLES = 4,
     /* Of that, pixels along a side, at most: levels whose truth would be larger are left out. */
-    MOST_TRUTH_PX = 4096,
+    MAX_TRUTH_PX = 4096,
     DOLLY_STEPS = 128,
     DOLLY_PX = 192,
     TOO_LARGE = 1,
@@ -69,7 +69,7 @@ static int look_at(measuring *m, int view, unsigned level, triptych_camera *came
 
 static int samples_of(unsigned level)
 {
-    return (1 << level) > LEAST_SAMPLES ? 1 << level : LEAST_SAMPLES;
+    return (1 << level) > MIN_SAMPLES ? 1 << level : MIN_SAMPLES;
 }
 
 static int draw_and_compare(measuring *m, unsigned level, entry *e, float *truth, float *rgba)
@@ -108,7 +108,7 @@ static int measure_view(measuring *m, int view, unsigned level, entry *e)
     if (status)
         return status;
     e->width = camera.width;
-    if (camera.width > MOST_TRUTH_PX / samples_of(level))
+    if (camera.width > MAX_TRUTH_PX / samples_of(level))
         return TOO_LARGE;
     status = triptych_new_picture(m->context.t, e->width, e->width, 4, &truth);
     if (!status)
@@ -248,19 +248,19 @@ static const bench_column dolly_columns[] = {
 
 static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const flicker *finest)
 {
-    double sum = 0, most = 0, sum_of_finest = 0, most_of_finest = 0;
+    double sum = 0, max = 0, sum_of_finest = 0, max_of_finest = 0;
     cJSON *row = cJSON_CreateObject();
     for (int i = 0; i < DOLLY_STEPS; i++) {
         sum += f->changes[i];
-        most = fmax(most, f->changes[i]);
+        max = fmax(max, f->changes[i]);
         sum_of_finest += finest->changes[i];
-        most_of_finest = fmax(most_of_finest, f->changes[i] / finest->changes[i]);
+        max_of_finest = fmax(max_of_finest, f->changes[i] / finest->changes[i]);
     }
     cJSON_AddStringToObject(row, "drawn", drawn);
     cJSON_AddNumberToObject(row, "mean", sum / DOLLY_STEPS);
-    cJSON_AddNumberToObject(row, "most", most);
+    cJSON_AddNumberToObject(row, "most", max);
     cJSON_AddNumberToObject(row, "mean_of_finest", sum / sum_of_finest);
-    cJSON_AddNumberToObject(row, "most_of_finest", most_of_finest);
+    cJSON_AddNumberToObject(row, "most_of_finest", max_of_finest);
     cJSON_AddItemToArray(table, row);
 }
 
@@ -297,7 +297,7 @@ static void add_limits(const measuring *m)
         "the level on whose truth would be wider than %d pixels there is none. Views: %d round "
         "the object, parallel. Colour is premultiplied; means and 99 %% are over "
         "the pixels that the object covers.",
-        LEAST_SAMPLES, LEAST_SAMPLES, MOST_TRUTH_PX, m->options->views);
+        MIN_SAMPLES, MIN_SAMPLES, MAX_TRUTH_PX, m->options->views);
     bench_report_limit(m->report,
                        "The eye moves away from the object's middle in %d steps, from where voxels "
                        "of the finest level are %g pixels wide to where they are %g; "

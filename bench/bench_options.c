@@ -21,8 +21,8 @@ enum {
     KEY_NO_COUNTS,
     KEY_CLASSIFY,
     KEY_COMPOSITING,
-    KEY_SLICES,
-    KEY_SATURATION,
+    KEY_SAMPLES_PER_SHEET,
+    KEY_EARLY_TERMINATION,
     KEY_FIELD,
     KEY_FINEST,
     KEY_PLOT,
@@ -32,7 +32,9 @@ enum {
 };
 
 #define BIT(key) (1u << ((key)-KEY_TF))
-#define OF_MODEL (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SLICES) | BIT(KEY_SATURATION))
+#define OF_MODEL                                                                                   \
+    (BIT(KEY_CLASSIFY) | BIT(KEY_COMPOSITING) | BIT(KEY_SAMPLES_PER_SHEET) |                       \
+     BIT(KEY_EARLY_TERMINATION))
 #define OF_FLIGHT (BIT(KEY_SECONDS) | BIT(KEY_FPS))
 #define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST))
 
@@ -40,10 +42,11 @@ static const struct argp_option options[] = {
     TRIP_OPTION_TF(KEY_TF, 0),
     { "size", KEY_SIZE, "WxH[,...]", 0,
       "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping, levels "
-      "256x256; forms 128x128; flight 800x600)",
+      "256x256; variants 128x128; flight 800x600)",
       0 },
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl, forms reference; renderers all there "
+      "gl, cpu, reference or auto (default: auto; submit gl, variants reference; renderers all "
+      "there "
       "are; popping, "
       "levels cpu)",
       0 },
@@ -69,13 +72,15 @@ static const struct argp_option options[] = {
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
       "As of `triptych render`, pre (default: splat); renderers, stream, popping and levels only",
       0 },
-    { "slices", KEY_SLICES, "N", 0,
+    { "samples-per-sheet", KEY_SAMPLES_PER_SHEET, "N", 0,
       "Slices of a sheet, post (default: by the view); renderers, stream, popping and levels only",
       0 },
-    { "saturation", KEY_SATURATION, "T", 0,
+    { "slices", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0 },
+    { "early-termination", KEY_EARLY_TERMINATION, "T", 0,
       "As of `triptych render` (default: pre 1/8192, post 1/512); renderers, stream, popping and "
       "levels only",
       0 },
+    { "saturation", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0 },
     { "field", KEY_FIELD, "NAME", 0,
       "What is sampled finer and finer: marschner-lobb, cloud, shells or filaments (default: "
       "shells); levels without a data set only",
@@ -182,7 +187,7 @@ static const struct table {
         .renderer_count = 1,
     },
     {
-        .name = "forms",
+        .name = "variants",
         .refused = OF_FLIGHT | OF_LEVELS | BIT(KEY_PLOT) | OF_MODEL | BIT(KEY_VIEWS) |
                    BIT(KEY_NO_COUNTS) | BIT(KEY_ENGINE) | BIT(KEY_OCCLUDED) | BIT(KEY_RENDERER) |
                    BIT(KEY_THREADS) | BIT(KEY_REPEAT),
@@ -328,11 +333,12 @@ static int parse_option(int key, char *arg, bench_options *o)
         return parse_classify(arg, o);
     case KEY_COMPOSITING:
         return parse_compositing(arg, o);
-    case KEY_SLICES:
-        return trip_option_integer("--slices", arg, 1, TRIP_SLICES_MAX, &o->settings.slices);
-    case KEY_SATURATION:
-        return trip_option_number("--saturation", arg, 0, TRIP_SATURATION_MAX,
-                                  &o->settings.saturation);
+    case KEY_SAMPLES_PER_SHEET:
+        return trip_option_integer("--samples-per-sheet", arg, 1, TRIP_SHEET_SAMPLES_MAX,
+                                   &o->settings.samples_per_sheet);
+    case KEY_EARLY_TERMINATION:
+        return trip_option_number("--early-termination", arg, 0, TRIP_EARLY_TERMINATION_MAX,
+                                  &o->settings.early_termination);
     case KEY_FIELD:
         return parse_field(arg, o);
     case KEY_FINEST:
@@ -400,8 +406,8 @@ static void be_short(parse *p)
 
 static int check(parse *p)
 {
-    static const char *const names[] = { "orders", "submit", "stream", "renderers", "popping",
-                                         "levels", "flight", "forms",  "ewa",       NULL };
+    static const char *const names[] = { "orders", "submit", "stream",   "renderers", "popping",
+                                         "levels", "flight", "variants", "ewa",       NULL };
     bench_options *o = p->o;
     int which;
     if (!o->table)
@@ -464,7 +470,7 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
                           .seconds = 12,
                           .frames_per_second = 30,
                           .settings = trip_settings_default() };
-    o->settings.slices = 0;
+    o->settings.samples_per_sheet = 0;
     parse p = { .o = o };
     return trip_options_parse(&argp, argc, argv, &p);
 }

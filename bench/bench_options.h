@@ -43,7 +43,7 @@ typedef struct bench_options {
     "  levels     how far coarse levels are from the finest; what an object sampled finer takes\n" \
     "  flight     the viewer's drawing while the eye turns, approaches and flies through\n"        \
     "  ewa        how far EWA's affine approximation is from the exact form, and its time\n"       \
-    "  forms      what the papers' fixed sprites, weights of vertices and others change\n"
+    "  variants   what the papers' fixed sprites, weights of vertices and others change\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

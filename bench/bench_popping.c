@@ -33,7 +33,7 @@ static void add_row(cJSON *table, const char *name, const bench_popping_row *f)
     cJSON_AddStringToObject(row, "settings", name);
     cJSON_AddNumberToObject(row, "mean", f->mean);
     cJSON_AddNumberToObject(row, "percentile_99", f->percentile_99);
-    cJSON_AddNumberToObject(row, "most", f->most);
+    cJSON_AddNumberToObject(row, "most", f->max);
     cJSON_AddNumberToObject(row, "motion", f->motion);
     cJSON_AddItemToArray(table, row);
 }

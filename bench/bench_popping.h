@@ -48,10 +48,10 @@ void bench_popping_add(bench_popping_changes *p, int step, const float *rgba);
 
 /* Of 255, over the pixels that change at all. */
 typedef struct bench_popping_row {
-    const char *label;                /* below the plot */
-    bool has_h;                       /* it is merged */
-    double mean, percentile_99, most; /* changes beyond the motion, in the step where most */
-    double motion;                    /* its mean */
+    const char *label;               /* below the plot */
+    bool has_h;                      /* it is merged */
+    double mean, percentile_99, max; /* changes beyond the motion, in the step where most */
+    double motion;                   /* its mean */
 } bench_popping_row;
 
 /* The figures of a setting of which all steps were added; they take the changes' place. */

@@ -52,10 +52,10 @@ static int ascending(const void *a, const void *b)
 /* Of the component that changes most. */
 static float change_of(const float a[4], const float b[4])
 {
-    float most = 0;
+    float max = 0;
     for (int c = 0; c < 4; c++)
-        most = fmaxf(most, fabsf(a[c] - b[c]));
-    return most;
+        max = fmaxf(max, fabsf(a[c] - b[c]));
+    return max;
 }
 
 void bench_popping_add(bench_popping_changes *p, int step, const float *rgba)
@@ -99,7 +99,7 @@ void bench_popping_find(bench_popping_changes *p, const bench_popping_setting *o
             sum += (double)(p->sorted[n] = p->changes[n][i]);
         qsort(p->sorted, count, sizeof *p->sorted, ascending);
         f->mean = fmax(f->mean, 255 * sum / (double)count);
-        f->most = fmax(f->most, 255 * (double)p->sorted[count - 1]);
+        f->max = fmax(f->max, 255 * (double)p->sorted[count - 1]);
         f->percentile_99 = fmax(f->percentile_99, 255 * (double)p->sorted[(count - 1) * 99 / 100]);
     }
 }

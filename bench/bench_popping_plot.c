@@ -9,16 +9,16 @@
 
 enum { WIDTH = 620, HEIGHT = 380, LEFT = 70, RIGHT = 130, TOP = 44, BOTTOM = 56 };
 
-static const double least = 0.01; /* of 255; what is less is drawn there */
+static const double min = 0.01; /* of 255; what is less is drawn there */
 
 typedef struct curve {
     const char *name, *colour;
     double (*of)(const bench_popping_row *row);
 } curve;
 
-static double most_of(const bench_popping_row *r)
+static double max_of(const bench_popping_row *r)
 {
-    return r->most;
+    return r->max;
 }
 
 static double percentile_99_of(const bench_popping_row *r)
@@ -37,7 +37,7 @@ static double motion_of(const bench_popping_row *r)
 }
 
 static const curve curves[] = {
-    { "most", "#b03020", most_of },
+    { "most", "#b03020", max_of },
     { "99 %", "#c08010", percentile_99_of },
     { "mean", "#2050b0", mean_of },
     { "motion", "#777", motion_of },
@@ -59,15 +59,15 @@ static double x_of(const plot *p, int i)
 
 static double y_of(const plot *p, double change)
 {
-    double share = (log10(fmax(least, change)) - p->lo) / (p->hi - p->lo);
+    double share = (log10(fmax(min, change)) - p->lo) / (p->hi - p->lo);
     return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share;
 }
 
 static void text(const plot *p, double x, double y, const char *anchor, const char *colour,
-                 const char *what)
+                 const char *stage)
 {
     fprintf(p->file, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\">%s</text>\n", x, y,
-            anchor, colour, what);
+            anchor, colour, stage);
 }
 
 static void draw_axes(const plot *p)
@@ -121,13 +121,13 @@ static void draw_names(const plot *p)
 
 void bench_popping_draw(FILE *f, const bench_popping_row *rows, int count)
 {
-    double most = 10 * least;
+    double max = 10 * min;
     for (int i = 0; i < count; i++)
-        most = fmax(most, fmax(rows[i].most, rows[i].motion));
+        max = fmax(max, fmax(rows[i].max, rows[i].motion));
     const plot p = { .rows = rows,
                      .count = count,
-                     .lo = (int)floor(log10(least)),
-                     .hi = (int)ceil(log10(most)),
+                     .lo = (int)floor(log10(min)),
+                     .hi = (int)ceil(log10(max)),
                      .file = f };
     fprintf(f,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "

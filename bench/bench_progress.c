@@ -20,7 +20,7 @@ struct bench_progress {
     /* Under the lock. */
     bool stopped;
     int begun, expected; /* steps */
-    char what[48];
+    char stage[48];
 };
 
 static unsigned seconds_since(const struct timespec *begin)
@@ -36,7 +36,7 @@ static void print_line(const bench_progress *p)
     unsigned s = seconds_since(&p->begin);
     fprintf(stderr, "%s%s  %u:%02u", p->lines ? "" : "\r\033[K", p->name, s / 60, s % 60);
     if (p->begun)
-        fprintf(stderr, "  step %d of %d: %s", p->begun, p->expected, p->what);
+        fprintf(stderr, "  step %d of %d: %s", p->begun, p->expected, p->stage);
     fputc(p->lines ? '\n' : '\r', stderr);
     fflush(stderr);
 }
@@ -122,13 +122,13 @@ void bench_progress_expect(bench_progress *p, int steps)
     pthread_mutex_unlock(&p->lock);
 }
 
-void bench_progress_step(bench_progress *p, const char *what)
+void bench_progress_step(bench_progress *p, const char *stage)
 {
     if (!p)
         return;
     pthread_mutex_lock(&p->lock);
     p->begun++;
-    snprintf(p->what, sizeof p->what, "%s", what);
+    snprintf(p->stage, sizeof p->stage, "%s", stage);
     pthread_mutex_unlock(&p->lock);
 }
 

@@ -13,7 +13,7 @@ bench_progress *bench_progress_start_lines(const char *name);
 /* There are so many steps more than those said before. */
 void bench_progress_expect(bench_progress *p, int steps);
 /* The next step begins: "frames of cpu". */
-void bench_progress_step(bench_progress *p, const char *what);
+void bench_progress_step(bench_progress *p, const char *stage);
 /* Clears the line and frees. */
 void bench_progress_end(bench_progress *p);
 

@@ -13,7 +13,7 @@ int bench_levels(const session *s, const bench_options *o, bench_report *r);
 /* Without a session: it opens the data set as the viewer does. */
 int bench_flight(const session *s, const bench_options *o, bench_report *r);
 int bench_ewa(const session *s, const bench_options *o, bench_report *r);
-int bench_forms(const session *s, const bench_options *o, bench_report *r);
+int bench_variants(const session *s, const bench_options *o, bench_report *r);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 
 #endif

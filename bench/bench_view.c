@@ -5,13 +5,13 @@ static const double fov_degrees = 30, fill = 0.95, degree = 3.141592653589793238
 /* The box of all splats, kernels included, in world space, and a view's basis. */
 typedef struct framing {
     trip_vec3 corners[8], middle;
-    trip_vec3 right, up, gaze; /* unit length */
+    trip_vec3 right, up, view_direction; /* unit length */
 } framing;
 
 static void frame_box(framing *f, const session *s)
 {
     trip_camera_framing box = { 0 };
-    trip_dataset_text_frame(s->text, s->data, &box);
+    trip_dataset_metadata_frame(s->text, s->data, &box);
     const double *lo = box.lo, *hi = box.hi;
     for (int i = 0; i < 8; i++)
         f->corners[i] = trip_affine_point(
@@ -21,20 +21,21 @@ static void frame_box(framing *f, const session *s)
 }
 
 /* Directions of the index space, taken to the world. */
-static framing make_framing(const session *s, trip_vec3 gaze, trip_vec3 up)
+static framing make_framing(const session *s, trip_vec3 view_direction, trip_vec3 up)
 {
     framing f;
     frame_box(&f, s);
-    f.gaze = trip_normalize(trip_affine_vector(&s->data->index_to_world, gaze));
-    f.right = trip_normalize(trip_cross(f.gaze, trip_affine_vector(&s->data->index_to_world, up)));
-    f.up = trip_cross(f.right, f.gaze);
+    f.view_direction = trip_normalize(trip_affine_vector(&s->data->index_to_world, view_direction));
+    f.right = trip_normalize(
+        trip_cross(f.view_direction, trip_affine_vector(&s->data->index_to_world, up)));
+    f.up = trip_cross(f.right, f.view_direction);
     return f;
 }
 
 static trip_camera_params params(const framing *f, const int size[2], double distance)
 {
     return (trip_camera_params){
-        .eye = trip_sub(f->middle, trip_scale(f->gaze, distance)),
+        .eye = trip_sub(f->middle, trip_scale(f->view_direction, distance)),
         .look = f->middle,
         .up = f->up,
         .width = size[0],
@@ -51,7 +52,7 @@ static double distance_needed(const framing *f, const int size[2])
         trip_vec3 corner = trip_sub(f->corners[i], f->middle);
         double needed = fmax(fabs(trip_dot(corner, f->right)) / slope_x,
                              fabs(trip_dot(corner, f->up)) / slope_y);
-        distance = fmax(distance, needed - trip_dot(corner, f->gaze));
+        distance = fmax(distance, needed - trip_dot(corner, f->view_direction));
     }
     return distance;
 }
@@ -100,12 +101,12 @@ static framing make_turned(const session *s, double azimuth_degrees)
     framing f;
     trip_camera_params view;
     trip_camera_framing box = { .width = 1, .height = 1, .azimuth_degrees = azimuth_degrees };
-    trip_dataset_text_frame(s->text, s->data, &box);
+    trip_dataset_metadata_frame(s->text, s->data, &box);
     trip_camera_frame(&box, &s->data->index_to_world, &view);
     frame_box(&f, s);
-    f.gaze = trip_normalize(trip_sub(view.look, view.eye));
-    f.right = trip_normalize(trip_cross(f.gaze, view.up));
-    f.up = trip_cross(f.right, f.gaze);
+    f.view_direction = trip_normalize(trip_sub(view.look, view.eye));
+    f.right = trip_normalize(trip_cross(f.view_direction, view.up));
+    f.up = trip_cross(f.right, f.view_direction);
     return f;
 }
 

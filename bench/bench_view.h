@@ -2,7 +2,7 @@
 #ifndef TRIP_BENCH_VIEW_H
 #define TRIP_BENCH_VIEW_H
 
-#include "session.h"
+#include "library_session.h"
 
 /* Perspective, along the diagonal of the index space, where the regions of all three lists meet in
  * the image's centre; all splats in the picture. */

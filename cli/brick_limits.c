@@ -9,7 +9,7 @@
 #include "report.h"
 
 /* Of a larger data set only so much is written for the limit. */
-static const uint64_t most_written_bytes = (uint64_t)4 << 30;
+static const uint64_t max_written_bytes = (uint64_t)4 << 30;
 
 static const char *const stage_names[TRIPTYCH_STAGES] = { "scan", "read", "merge", "levels",
                                                           "finish" };
@@ -33,7 +33,7 @@ static bool holds_values(const char *path, const triptych_brick_summary *s)
 
 static int measure_write(plain_disk *d, const char *output, uint64_t bytes, void *memory)
 {
-    uint64_t part = bytes < most_written_bytes ? bytes : most_written_bytes;
+    uint64_t part = bytes < max_written_bytes ? bytes : max_written_bytes;
     char *copy = strdup(output);
     int status = copy ? plain_disk_write(d, dirname(copy), part, memory)
                       : trip_fail(TRIP_ERROR, "brick", output, "out of memory");

@@ -16,7 +16,7 @@
 #include "report.h"
 
 enum { KEY_LENGTH = sizeof(cache_key) - 1, NAME_BYTES = 64 };
-static const uint64_t least_limit = UINT64_C(4) << 30;
+static const uint64_t min_limit = UINT64_C(4) << 30;
 
 /* What a process that is no longer there may have left, besides its lock. */
 static const char *const leftovers[] = { ".trip.partial", ".trip.spill", ".trip.replaced",
@@ -61,12 +61,12 @@ static int find_path(char **path)
     return trip_fail(TRIP_ERROR, "cache", "", "out of memory");
 }
 
-static int fail_to_write(const char *path, const char *what)
+static int fail_to_write(const char *path, const char *stage)
 {
     return trip_fail(TRIP_ERROR, "cache", path,
                      "cannot be %s: %s; set XDG_CACHE_HOME to a folder that can be written, or use "
                      "`triptych brick`",
-                     what, strerror(errno));
+                     stage, strerror(errno));
 }
 
 /* With the folder it is in, which need not be there on a new account. */
@@ -107,7 +107,7 @@ static int find_limit(cache_folder *c)
                          "\"%s\" is not a size like 512M or 20G", text);
     }
     uint64_t disk = fstatvfs(c->fd, &v) == 0 ? (uint64_t)v.f_blocks * v.f_frsize : 0;
-    c->limit_bytes = disk / 10 > least_limit ? disk / 10 : least_limit;
+    c->limit_bytes = disk / 10 > min_limit ? disk / 10 : min_limit;
     return 0;
 }
 

@@ -14,7 +14,7 @@
 #define INDEX_NAME "index.trip"
 
 /* Files are read for their content up to this, which takes about a second. */
-static const uint64_t most_content_bytes = UINT64_C(1) << 30;
+static const uint64_t max_content_bytes = UINT64_C(1) << 30;
 
 /* While a volume is looked for and bricked. */
 typedef struct search {
@@ -59,9 +59,9 @@ static void on_wait(void *user)
     trip_progress_show(p, "wait", 0, 1, "");
 }
 
-static int identify(search *s, uint64_t most_bytes)
+static int identify(search *s, uint64_t max_bytes)
 {
-    return triptych_identify(s->t, s->volume, &s->options, most_bytes, &s->identity);
+    return triptych_identify(s->t, s->volume, &s->options, max_bytes, &s->identity);
 }
 
 /* Large files are distinguished by their times alone, which must then differ after every later
@@ -88,8 +88,8 @@ static cache_key key_of(const char text[33])
 /* By what the files hold, or, of large ones, by their state. */
 static int find_content_key(search *s, cache_key *key)
 {
-    bool read = s->identity.bytes <= most_content_bytes;
-    int status = read ? identify(s, most_content_bytes) : wait_until_stable(s);
+    bool read = s->identity.bytes <= max_content_bytes;
+    int status = read ? identify(s, max_content_bytes) : wait_until_stable(s);
     if (status == 0)
         *key = key_of(*s->identity.content ? s->identity.content : s->identity.state);
     return status;
@@ -194,7 +194,7 @@ static int find(search *s)
     int status = find_key(s);
     if (status == 0 && !(v->path = cache_folder_path(&v->folder, &v->key)))
         status = TRIP_ERROR;
-    s->options.most_bytes = v->folder.limit_bytes;
+    s->options.max_bytes = v->folder.limit_bytes;
     return status == 0 ? take(s) : status;
 }
 

@@ -24,9 +24,9 @@ int trip_option_clip_box(const char *text, triptych_clip *clip)
 
 int trip_option_clip_plane(const char *text, triptych_clip *clip)
 {
-    const int most = (int)(sizeof clip->plane / sizeof *clip->plane);
+    const int max = (int)(sizeof clip->plane / sizeof *clip->plane);
     int count;
-    if (clip->planes == most)
+    if (clip->planes == max)
         return trip_option_fail("--clip-plane", "there are at most 6");
     double *plane = clip->plane[clip->planes++];
     int status = trip_option_numbers("--clip-plane", text, 4, 4, plane, &count);

@@ -79,13 +79,13 @@ int trip_option_temperature(const char *text, triptych_settings *s)
 
 int trip_option_check_effects(const triptych_settings *s, const char *heat)
 {
-    const triptych_settings usual = triptych_default_settings();
+    const triptych_settings defaults = triptych_default_settings();
     const int some = s->effects | (s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : 0);
-    if (s->anisotropy != usual.anisotropy && !(some & TRIPTYCH_SHADOWS))
+    if (s->anisotropy != defaults.anisotropy && !(some & TRIPTYCH_SHADOWS))
         return trip_option_fail("--anisotropy", "applies to --effects shadows");
-    if (s->cueing != usual.cueing && !(some & TRIPTYCH_CUEING))
+    if (s->cueing != defaults.cueing && !(some & TRIPTYCH_CUEING))
         return trip_option_fail("--cueing", "applies to --effects cueing");
-    if (s->light_cells != usual.light_cells &&
+    if (s->light_cells != defaults.light_cells &&
         !(some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION)))
         return trip_option_fail("--light-cells",
                                 "applies to --effects shadows, occlusion and emission");
@@ -94,7 +94,7 @@ int trip_option_check_effects(const triptych_settings *s, const char *heat)
                                              "own: --emission HEAT.trip");
     if (heat && !(some & TRIPTYCH_EMISSION))
         return trip_option_fail("--emission", "applies to --effects emission and auto");
-    if (!heat && (s->kelvin[0] != usual.kelvin[0] || s->kelvin[1] != usual.kelvin[1]))
+    if (!heat && (s->kelvin[0] != defaults.kelvin[0] || s->kelvin[1] != defaults.kelvin[1]))
         return trip_option_fail("--temperature", "applies to --emission only");
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
         return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "

@@ -9,7 +9,7 @@
 #include "library.h"
 #include "report.h"
 
-enum { MOST_CONTEXTS = 16, REPORT_BYTES = 4096 };
+enum { MAX_CONTEXTS = 16, REPORT_BYTES = 4096 };
 
 typedef struct flying {
     const flight *f;
@@ -65,7 +65,7 @@ static int open_data(pilot *p)
     if (!status)
         status = library_add(p->t, o->more, o->more_count, o->heat);
     if (!status)
-        status = triptych_set_function(p->t, &o->function);
+        status = triptych_set_transfer_function(p->t, &o->function);
     if (!status)
         status = triptych_new_picture(p->t, o->width, o->height, 4, &p->rgba);
     if (!status && o->depth)
@@ -156,11 +156,11 @@ static void *fly(void *argument)
 int flight_draw(const flight *f, int *done)
 {
     flying all = { .f = f, .signalled = trip_scope_signal() };
-    pilot pilots[MOST_CONTEXTS] = { { 0 } };
+    pilot pilots[MAX_CONTEXTS] = { { 0 } };
     int count = 0;
     pthread_mutex_init(&all.lock, NULL);
     pthread_cond_init(&all.turn, NULL);
-    for (int i = 0; i < f->contexts && i < MOST_CONTEXTS; i++) {
+    for (int i = 0; i < f->contexts && i < MAX_CONTEXTS; i++) {
         pilots[count].all = &all;
         count += pthread_create(&pilots[count].thread, NULL, fly, &pilots[count]) == 0;
     }

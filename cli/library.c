@@ -51,10 +51,10 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
     return status || !heat ? status : triptych_set_heat(t, heat);
 }
 
-int library_set_function_quietly(triptych *t, const triptych_function *function)
+int library_set_function_quietly(triptych *t, const triptych_transfer_function *function)
 {
     triptych_set_messages(t, NULL, NULL);
-    int status = triptych_set_function(t, function);
+    int status = triptych_set_transfer_function(t, function);
     triptych_set_messages(t, pass_message, NULL);
     if (status)
         trip_report_line(triptych_error(t));

@@ -16,7 +16,7 @@ int library_add(triptych *t, const char *const *paths, int count, const char *he
 int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
 /* The function without its warnings; failures are reported. */
-int library_set_function_quietly(triptych *t, const triptych_function *function);
+int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);
 
 /* A text among the notes of the data set that is open, for free(); NULL where there is none. */
 char *library_note(triptych *t, const char *key);

@@ -111,7 +111,7 @@ int trip_option_range(const char *option, const char *text, double *lo, double *
     return 0;
 }
 
-int trip_option_numbers(const char *option, const char *text, int least, int most, double *out,
+int trip_option_numbers(const char *option, const char *text, int min, int max, double *out,
                         int *count)
 {
     const char *rest = text;
@@ -121,18 +121,18 @@ int trip_option_numbers(const char *option, const char *text, int least, int mos
         const char *comma = strchr(rest, ',');
         size_t length = comma ? (size_t)(comma - rest) : strlen(rest);
         snprintf(number, sizeof number, "%.*s", (int)(length < 64 ? length : 63), rest);
-        if (*count == most || length >= sizeof number || !trip_text_to_double(number, &out[*count]))
+        if (*count == max || length >= sizeof number || !trip_text_to_double(number, &out[*count]))
             break;
         (*count)++;
         rest = comma ? comma + 1 : NULL;
     }
-    if (!rest && *count >= least)
+    if (!rest && *count >= min)
         return 0;
-    if (least == most)
+    if (min == max)
         return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not %d numbers joined by commas",
-                         text, most);
+                         text, max);
     return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not %d to %d numbers joined by commas",
-                     text, least, most);
+                     text, min, max);
 }
 
 int trip_option_bytes(const char *option, const char *text, uint64_t *out)

@@ -14,7 +14,7 @@ int trip_options_parse(const struct argp *argp, int argc, char **argv, void *inp
 int trip_option_number(const char *option, const char *text, double lo, double hi, double *out);
 int trip_option_integer(const char *option, const char *text, int lo, int hi, int *out);
 /* Comma-separated numbers: at least `least`, at most `most`; *count is how many there were. */
-int trip_option_numbers(const char *option, const char *text, int least, int most, double *out,
+int trip_option_numbers(const char *option, const char *text, int min, int max, double *out,
                         int *count);
 /* "LO:HI", the smaller first. */
 int trip_option_range(const char *option, const char *text, double *lo, double *hi);

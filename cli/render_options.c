@@ -55,7 +55,7 @@ enum {
     KEY_TEMPERATURE,
     KEY_NO_SHADING,
     KEY_H,
-    KEY_SATURATION,
+    KEY_EARLY_TERMINATION,
     KEY_KERNEL_RADIUS,
     KEY_LOW_PASS,
     KEY_FLATTEN,
@@ -68,7 +68,7 @@ enum {
     KEY_REPORT,
     KEY_CLASSIFY,
     KEY_COMPOSITING,
-    KEY_SLICES,
+    KEY_SAMPLES_PER_SHEET,
     KEY_LOD,
     KEY_MAX_BYTES,
     KEY_MAX_MS,
@@ -165,8 +165,9 @@ static const struct argp_option options[] = {
       "are summed and go over those behind together, so that a mirrored volume gives the mirrored "
       "picture (default: splat); pre only",
       3 },
-    { "slices", KEY_SLICES, "N|auto", 0,
+    { "samples-per-sheet", KEY_SAMPLES_PER_SHEET, "N|auto", 0,
       "Slices of a sheet, 1 to 16 (default: auto, by the view); post only", 3 },
+    { "slices", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 3 },
     { "lod", KEY_LOD, "PX", 0,
       "Draw coarse levels where their voxels are at most so many pixels wide (default: 0, the "
       "finest alone)",
@@ -186,10 +187,11 @@ static const struct argp_option options[] = {
       3 },
     { "h", KEY_H, "H", 0,
       "Where lists begin to blend, 0 to below 1 (default: pre 0.85, post 0.99); merge only", 3 },
-    { "saturation", KEY_SATURATION, "T", 0,
+    { "early-termination", KEY_EARLY_TERMINATION, "T", 0,
       "Transmittance below which a pixel takes nothing of what lies behind, 0 (never) to 0.1, and "
       "the most that it is off by (default: pre 1/8192, post 1/512)",
       3 },
+    { "saturation", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 3 },
     { "weights", KEY_WEIGHTS, "pixel|vertex", 0,
       "What merge blends by: the weights of each pixel, or of the corners of splats, interpolated "
       "over them (by reference only) (default: pixel); pre only",
@@ -262,9 +264,9 @@ static const struct argp_option options[] = {
 typedef struct parse {
     render_options *o;
     quality_options quality;
-    bool h, saturation, target, background, lists, forms, side, light, level, kernel_radius;
+    bool h, early_termination, target, background, lists, forms, side, light, level, kernel_radius;
     bool order; /* --method or --traversal */
-    bool slices, compositing, classify;
+    bool samples_per_sheet, compositing, classify;
     bool levels;           /* --lod, --max-bytes or --max-ms */
     bool kernel, integral; /* options of the integral renderer */
     bool again;            /* over settings that --quality or --error has chosen */
@@ -324,7 +326,7 @@ static int parse_background(const char *text, triptych_settings *s)
     return status;
 }
 
-static int parse_window(const char *text, triptych_function *look)
+static int parse_window(const char *text, triptych_transfer_function *look)
 {
     int status = trip_option_number("--window", text, 0, DBL_MAX, &look->window);
     return !status && look->window == 0 ? trip_option_fail("--window", "must be above 0") : status;
@@ -491,10 +493,12 @@ static int parse_method(int key, char *arg, parse *p)
     case KEY_MAX_MS:
         p->levels = true;
         return trip_option_number("--max-ms", arg, 1e-3, 1e9, &s->max_ms);
-    case KEY_SLICES:
-        p->slices = true;
-        s->slices = 0;
-        return strcmp(arg, "auto") ? trip_option_integer("--slices", arg, 1, 16, &s->slices) : 0;
+    case KEY_SAMPLES_PER_SHEET:
+        p->samples_per_sheet = true;
+        s->samples_per_sheet = 0;
+        return strcmp(arg, "auto")
+                   ? trip_option_integer("--samples-per-sheet", arg, 1, 16, &s->samples_per_sheet)
+                   : 0;
     case KEY_METHOD:
         status = trip_option_choice("--method", arg, methods, &which);
         s->method = (triptych_method)which;
@@ -509,9 +513,9 @@ static int parse_method(int key, char *arg, parse *p)
         p->h = true;
         status = trip_option_number("--h", arg, 0, 1, &s->h);
         return !status && s->h == 1 ? trip_option_fail("--h", "must be below 1") : status;
-    case KEY_SATURATION:
-        p->saturation = true;
-        return trip_option_number("--saturation", arg, 0, 0.1, &s->saturation);
+    case KEY_EARLY_TERMINATION:
+        p->early_termination = true;
+        return trip_option_number("--early-termination", arg, 0, 0.1, &s->early_termination);
     case KEY_KERNEL_RADIUS:
         p->kernel_radius = true;
         return trip_option_number("--kernel-radius", arg, 0.1, 100, &s->kernel_radius);
@@ -740,12 +744,14 @@ static int check_integral(parse *p)
                                            "source; give the volume in its place");
     if (integral && p->classify && o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
         return trip_option_fail("--classify", "does not apply to --renderer integral");
-    if (integral && p->slices)
-        return trip_option_fail("--slices", "does not apply to --renderer integral, which has no "
-                                            "sheets");
-    if (integral && p->saturation)
-        return trip_option_fail("--saturation", "does not apply to --renderer integral, whose "
-                                                "--tolerance bounds what is left out");
+    if (integral && p->samples_per_sheet)
+        return trip_option_fail("--samples-per-sheet",
+                                "does not apply to --renderer integral, which has no "
+                                "sheets");
+    if (integral && p->early_termination)
+        return trip_option_fail("--early-termination",
+                                "does not apply to --renderer integral, whose "
+                                "--tolerance bounds what is left out");
     if (integral && (p->h || p->order || p->compositing || p->weights))
         return trip_option_fail("--method, --h, --weights, --traversal, --compositing",
                                 "do not apply to --renderer integral, which has no layers");
@@ -817,16 +823,16 @@ static int choose_classify(parse *p)
     if (o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
         return 0;
     const bool of_values = p->kernel && o->renderer != TRIPTYCH_RENDERER_INTEGRAL;
-    if (splats && (p->slices || of_values))
+    if (splats && (p->samples_per_sheet || of_values))
         return trip_option_fail(
-            p->slices ? "--slices" : "--kernel linear, cubic or gaussian",
+            p->samples_per_sheet ? "--samples-per-sheet" : "--kernel linear, cubic or gaussian",
             "does not go with --kernel exact, ewa or fixed, --low-pass, --flatten, "
             "--kernel-radius, --method image, --weights, --compositing, --target, --submit, "
             "--count or "
             "--traversal ascending, which are of splats");
     if (splats)
         o->settings.classify = TRIPTYCH_PRE;
-    else if (p->slices || of_values)
+    else if (p->samples_per_sheet || of_values)
         o->settings.classify = TRIPTYCH_POST;
     return 0;
 }
@@ -842,7 +848,9 @@ static int check_classify(const parse *p)
         o->renderer != TRIPTYCH_RENDERER_INTEGRAL)
         return trip_option_fail("--kernel", "applies to --classify post and --renderer integral");
     if (o->settings.classify == TRIPTYCH_PRE)
-        return p->slices ? trip_option_fail("--slices", "applies to --classify post only") : 0;
+        return p->samples_per_sheet
+                   ? trip_option_fail("--samples-per-sheet", "applies to --classify post only")
+                   : 0;
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
         return trip_option_fail("--traversal", "is outward with --classify post");
     if (o->settings.method == TRIPTYCH_IMAGE)
@@ -924,9 +932,10 @@ static int check(parse *p)
     if (p->level != (o->function.window > 0))
         return trip_option_fail(p->level ? "--level" : "--window",
                                 "--window and --level are given together");
-    if (p->saturation && o->settings.traversal != TRIPTYCH_OUTWARD)
-        return trip_option_fail("--saturation", "goes with --traversal outward: from back to front "
-                                                "all is drawn");
+    if (p->early_termination && o->settings.traversal != TRIPTYCH_OUTWARD)
+        return trip_option_fail("--early-termination",
+                                "goes with --traversal outward: from back to front "
+                                "all is drawn");
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
         return trip_option_fail("--h", "applies to --method merge only");
     status = check_integral(p);
@@ -969,12 +978,13 @@ static int check(parse *p)
 /* Options of the settings that reports measure, but for the renderer, by which one is chosen. */
 static void note_measurable(int key, quality_options *q)
 {
-    static const int keys[] = { KEY_CLASSIFY,      KEY_COMPOSITING, KEY_SLICES,    KEY_LOD,
-                                KEY_MAX_BYTES,     KEY_MAX_MS,      KEY_METHOD,    KEY_H,
-                                KEY_SATURATION,    KEY_WEIGHTS,     KEY_NORMALISE, KEY_TRAVERSAL,
-                                KEY_KERNEL_RADIUS, KEY_LOW_PASS,    KEY_FLATTEN,   KEY_TARGET,
-                                KEY_SUBMIT,        KEY_KERNEL,      KEY_FIELD,     KEY_TOLERANCE,
-                                KEY_SAMPLES };
+    static const int keys[] = { KEY_CLASSIFY,      KEY_COMPOSITING, KEY_SAMPLES_PER_SHEET,
+                                KEY_LOD,           KEY_MAX_BYTES,   KEY_MAX_MS,
+                                KEY_METHOD,        KEY_H,           KEY_EARLY_TERMINATION,
+                                KEY_WEIGHTS,       KEY_NORMALISE,   KEY_TRAVERSAL,
+                                KEY_KERNEL_RADIUS, KEY_LOW_PASS,    KEY_FLATTEN,
+                                KEY_TARGET,        KEY_SUBMIT,      KEY_KERNEL,
+                                KEY_FIELD,         KEY_TOLERANCE,   KEY_SAMPLES };
     bool measured = false;
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
         measured = measured || keys[i] == key;
@@ -1033,17 +1043,17 @@ int render_options_parse(render_options *o, int argc, char **argv)
                "volume, are drawn in one picture.\vPoints and lengths are in the data's world "
                "units.",
     };
-    const render_options usual = { .width = 1024,
-                                   .height = 1024,
-                                   .settings = triptych_default_settings() };
+    const render_options defaults = { .width = 1024,
+                                      .height = 1024,
+                                      .settings = triptych_default_settings() };
     char *name = argv[0];
-    *o = usual;
+    *o = defaults;
     parse p = { .o = o };
     int status = trip_options_parse(&argp, argc, argv, &p);
     if (status || !quality_options_given(&p.quality))
         return status;
     /* Again, over what was chosen: other options go before, wherever they stand. */
-    render_options chosen = usual;
+    render_options chosen = defaults;
     chosen.renderer = o->renderer;
     chosen.settings.shading = o->settings.shading;
     status = quality_options_use(&p.quality, &(quality_drawn){ o->input, o->function.name },

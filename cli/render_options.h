@@ -27,13 +27,13 @@ enum { RENDER_MORE_MAX = 63 };
 typedef struct render_options {
     const char *input,
         *output; /* data set or volume; an image file, the model of the names of several; a video */
-    const char *more[RENDER_MORE_MAX]; /* data sets drawn with it, */
-    int more_count;                    /* so many */
-    const char *heat;                  /* data set of --emission; NULL: none */
-    triptych_brick_options volume;     /* how a volume is read; nothing else of it is set */
-    triptych_function function;        /* colour and opacity */
-    const char *depth;                 /* a file for distances, or NULL */
-    const char *stats;                 /* file, "-" for stdout, or NULL */
+    const char *more[RENDER_MORE_MAX];   /* data sets drawn with it, */
+    int more_count;                      /* so many */
+    const char *heat;                    /* data set of --emission; NULL: none */
+    triptych_brick_options volume;       /* how a volume is read; nothing else of it is set */
+    triptych_transfer_function function; /* colour and opacity */
+    const char *depth;                   /* a file for distances, or NULL */
+    const char *stats;                   /* file, "-" for stdout, or NULL */
     int width, height;
     bool eye_given, look_given, up_given;
     double eye[3], look[3], up[3];

@@ -243,7 +243,7 @@ static void add_method(cJSON *root, const render_options *o, const triptych_fram
     }
     cJSON_AddStringToObject(root, "classify", frame->classify == TRIPTYCH_POST ? "post" : "pre");
     if (frame->classify == TRIPTYCH_POST) {
-        cJSON_AddNumberToObject(root, "slices", frame->slices);
+        cJSON_AddNumberToObject(root, "samples_per_sheet", frame->samples_per_sheet);
         cJSON_AddBoolToObject(root, "closed_form", frame->closed_form);
     } else {
         cJSON_AddStringToObject(root, "compositing",
@@ -273,8 +273,8 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
             if (frame.effects >> i & 1)
                 cJSON_AddItemToArray(effects, cJSON_CreateString(names[i]));
     }
-    if (frame.saturation >= 0)
-        cJSON_AddNumberToObject(root, "saturation", frame.saturation);
+    if (frame.early_termination >= 0)
+        cJSON_AddNumberToObject(root, "early_termination", frame.early_termination);
     cJSON_AddStringToObject(root, "engine", frame.engine);
     cJSON_AddStringToObject(root, "ring", frame.ring);
     cJSON_AddItemToObject(root, "size", cJSON_CreateIntArray(size, 2));

@@ -148,9 +148,9 @@ static int find_function(triptych *t, const char *name, trip_tf **out)
     return status;
 }
 
-static triptych_function look_of(const sequence *s, const char *text)
+static triptych_transfer_function look_of(const sequence *s, const char *text)
 {
-    triptych_function f = s->o->function;
+    triptych_transfer_function f = s->o->function;
     f.name = NULL;
     f.text = text;
     return f;
@@ -159,9 +159,9 @@ static triptych_function look_of(const sequence *s, const char *text)
 /* Taken once, so that it is warned of. */
 static int try_function(const sequence *s, triptych *t, const trip_path_key *key)
 {
-    triptych_function f = look_of(s, key->text);
+    triptych_transfer_function f = look_of(s, key->text);
     f.name = key->function;
-    return triptych_set_function(t, &f);
+    return triptych_set_transfer_function(t, &f);
 }
 
 static int find_functions(sequence *s, triptych *t)
@@ -203,9 +203,10 @@ static int set_function(const sequence *s, triptych *t, int frame, bool quiet)
 {
     char *text;
     int status = mix_text(s, frame, &text);
-    const triptych_function f = look_of(s, text);
+    const triptych_transfer_function f = look_of(s, text);
     if (!status)
-        status = quiet ? triptych_set_function(t, &f) : library_set_function_quietly(t, &f);
+        status =
+            quiet ? triptych_set_transfer_function(t, &f) : library_set_function_quietly(t, &f);
     free(text);
     return status;
 }

@@ -39,15 +39,15 @@ trip_vec3 trip_anatomy_direction(const char *space, char end)
 bool trip_anatomy_is_scan_from_above(const trip_affine *index_to_world)
 {
     const double(*m)[4] = index_to_world->m;
-    double least = INFINITY, most = 0;
+    double min = INFINITY, max = 0;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 4; j++)
             if (i != j && m[i][j] != 0)
                 return false;
-        least = fmin(least, m[i][i]);
-        most = fmax(most, m[i][i]);
+        min = fmin(min, m[i][i]);
+        max = fmax(max, m[i][i]);
     }
-    return least > 0 && most >= 1.5 * least;
+    return min > 0 && max >= 1.5 * min;
 }
 
 const char *trip_anatomy_end_name(char end)
@@ -72,21 +72,21 @@ const char *trip_anatomy_end_name(char end)
 
 const char *trip_anatomy_ends(const char *space, trip_vec3 v, char ends[4])
 {
-    double length = trip_length(v), most[3] = { 0, 0, 0 };
+    double length = trip_length(v), max[3] = { 0, 0, 0 };
     int count = 0;
     ends[0] = '\0';
     if (!trip_anatomy_known(space) || !(length > 0 && isfinite(length)))
         return ends;
     for (int a = 0; a < 3; a++) {
         double part = trip_component(v, a) / length;
-        if (fabs(part) < TRIP_ANATOMY_LEAST)
+        if (fabs(part) < TRIP_ANATOMY_MIN)
             continue;
         int at = count++;
-        for (; at > 0 && most[at - 1] < fabs(part); at--) {
-            most[at] = most[at - 1];
+        for (; at > 0 && max[at - 1] < fabs(part); at--) {
+            max[at] = max[at - 1];
             ends[at] = ends[at - 1];
         }
-        most[at] = fabs(part);
+        max[at] = fabs(part);
         ends[at] = part > 0 ? space[a] : opposite(space[a]);
     }
     ends[count] = '\0';

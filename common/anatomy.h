@@ -34,9 +34,9 @@ bool trip_anatomy_is_scan_from_above(const trip_affine *index_to_world);
 const char *trip_anatomy_end_name(char end);
 
 /* The ends of the body that a world vector points to, the main one first: "L", "SP". An end counts
- * if the component towards it is at least TRIP_ANATOMY_LEAST of the vector's length. "" for an
+ * if the component towards it is at least TRIP_ANATOMY_MIN of the vector's length. "" for an
  * unknown space and for a vector that is zero or not finite. */
-#define TRIP_ANATOMY_LEAST 1e-4
+#define TRIP_ANATOMY_MIN 1e-4
 const char *trip_anatomy_ends(const char *space, trip_vec3 v, char ends[4]);
 
 /* The same in words: "left", "superior, 20 degrees to posterior", for messages. */

@@ -28,12 +28,12 @@ trip_coordinates trip_coordinates_make(const double *const along[3], const int64
 }
 
 /* The last voxel at or before a place that another one follows. */
-static int64_t interval_of(const double *x, int64_t voxels, double place)
+static int64_t interval_of(const double *x, int64_t voxels, double position)
 {
     int64_t lo = 0, hi = voxels - 1; /* x[lo] <= place < x[hi], but for places beyond the ends */
     while (hi - lo > 1) {
         int64_t middle = lo + (hi - lo) / 2;
-        if (x[middle] <= place)
+        if (x[middle] <= position)
             lo = middle;
         else
             hi = middle;
@@ -41,7 +41,7 @@ static int64_t interval_of(const double *x, int64_t voxels, double place)
     return lo;
 }
 
-double trip_coordinates_place(const trip_coordinates *c, int axis, double index)
+double trip_coordinates_position(const trip_coordinates *c, int axis, double index)
 {
     const double *x = c->along[axis];
     const int64_t last = c->voxels[axis] - 1;
@@ -52,13 +52,13 @@ double trip_coordinates_place(const trip_coordinates *c, int axis, double index)
     return x[i] + (index - (double)i) * (x[i + 1] - x[i]);
 }
 
-double trip_coordinates_index(const trip_coordinates *c, int axis, double place)
+double trip_coordinates_index(const trip_coordinates *c, int axis, double position)
 {
     const double *x = c->along[axis];
     if (!x || c->voxels[axis] < 2)
-        return place;
-    int64_t i = interval_of(x, c->voxels[axis], place);
-    return (double)i + (place - x[i]) / (x[i + 1] - x[i]);
+        return position;
+    int64_t i = interval_of(x, c->voxels[axis], position);
+    return (double)i + (position - x[i]) / (x[i + 1] - x[i]);
 }
 
 double trip_coordinates_width(const trip_coordinates *c, int axis, int64_t voxel)

@@ -42,9 +42,9 @@ trip_coordinates trip_coordinates_make(const double *const along[3], const int64
 
 /* The place of a position between voxels; beyond the first and last the spacing next to them goes
  * on. */
-double trip_coordinates_place(const trip_coordinates *c, int axis, double index);
+double trip_coordinates_position(const trip_coordinates *c, int axis, double index);
 /* The other way round. */
-double trip_coordinates_index(const trip_coordinates *c, int axis, double place);
+double trip_coordinates_index(const trip_coordinates *c, int axis, double position);
 
 /* How long a voxel is along an axis: half of what its neighbours are apart, at the ends of the grid
  * what the one neighbour is away. 1 where the spacing is even. */

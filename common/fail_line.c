@@ -5,7 +5,7 @@
 
 #include "report.h"
 
-int trip_fail_line(const char *what, const char *name, long line, const char *why, ...)
+int trip_fail_line(const char *stage, const char *name, long line, const char *why, ...)
 {
     char where[512], text[512];
     va_list args;
@@ -13,5 +13,5 @@ int trip_fail_line(const char *what, const char *name, long line, const char *wh
     vsnprintf(text, sizeof text, why, args);
     va_end(args);
     snprintf(where, sizeof where, "%.400s: line %ld", name, line);
-    return trip_fail(TRIP_ERROR, what, where, "%s", text);
+    return trip_fail(TRIP_ERROR, stage, where, "%s", text);
 }

@@ -3,7 +3,7 @@
 #define TRIP_FAIL_LINE_H
 
 /* trip_fail(TRIP_ERROR, what, "NAME: line N", why, ...). */
-__attribute__((format(printf, 4, 5))) int trip_fail_line(const char *what, const char *name,
+__attribute__((format(printf, 4, 5))) int trip_fail_line(const char *stage, const char *name,
                                                          long line, const char *why, ...);
 
 #endif

@@ -20,8 +20,8 @@ typedef struct trip_affine {
 } trip_affine;
 
 /* Voxels of these lengths in the world can be drawn: extinctions are floats per world unit. */
-#define TRIP_VOXEL_WORLD_LEAST 1e-32
-#define TRIP_VOXEL_WORLD_MOST 1e32
+#define TRIP_VOXEL_WORLD_MIN 1e-32
+#define TRIP_VOXEL_WORLD_MAX 1e32
 
 static inline trip_vec3 trip_v3(double x, double y, double z)
 {

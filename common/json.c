@@ -9,7 +9,7 @@
 #include "text.h"
 
 enum {
-    MOST_DEPTH = 64,
+    MAX_DEPTH = 64,
     /* The node, and beside the bytes of its texts what the allocator adds to all three. */
     NODE_BYTES = sizeof(cJSON) + 16 + 2 * 32,
 };
@@ -48,9 +48,9 @@ int trip_json_parse(trip_json *out, const char *text, const char *path, trip_bud
 {
     outline o = outline_of(text);
     *out = (trip_json){ .budget = budget };
-    if (o.depth > MOST_DEPTH)
+    if (o.depth > MAX_DEPTH)
         return trip_fail(TRIP_ERROR, "read", path, "its text is nested more than %d deep",
-                         MOST_DEPTH);
+                         MAX_DEPTH);
     uint64_t bytes = o.bytes + o.nodes * NODE_BYTES; /* far from overflow: nodes are bytes */
     if (budget && !trip_budget_charge(budget, bytes))
         return trip_fail(TRIP_ERROR, "read", path,

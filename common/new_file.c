@@ -45,35 +45,35 @@ static bool leads_to_open_file(const char *path)
     return length == sizeof proc - 1 && memcmp(target, proc, sizeof proc - 1) == 0;
 }
 
-static int refuse_special(const char *what, const char *path)
+static int refuse_special(const char *stage, const char *path)
 {
     struct stat st;
     if (leads_to_open_file(path) ||
         (stat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode)))
-        return trip_fail(TRIP_ERROR, what, path,
+        return trip_fail(TRIP_ERROR, stage, path,
                          "is a device, a pipe or a socket, which a file cannot take the place of");
     return 0;
 }
 
-int trip_new_file_begin(trip_new_file *f, const char *what, const char *path)
+int trip_new_file_begin(trip_new_file *f, const char *stage, const char *path)
 {
-    *f = (trip_new_file){ .what = what, .path = path, .fd = -1 };
-    int status = refuse_special(what, path);
+    *f = (trip_new_file){ .stage = stage, .path = path, .fd = -1 };
+    int status = refuse_special(stage, path);
     if (status)
         return status;
     errno = EEXIST;
     for (int i = 0; i < TRIES && f->fd < 0 && errno == EEXIST; i++) {
         if (!choose_name(f))
-            return trip_fail(TRIP_ERROR, what, path, "the name is too long");
+            return trip_fail(TRIP_ERROR, stage, path, "the name is too long");
         f->fd = open(f->temporary, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     }
     if (f->fd < 0)
-        return trip_fail_errno(what, path, "cannot create a file beside it");
+        return trip_fail_errno(stage, path, "cannot create a file beside it");
     keep_mode(f);
     return 0;
 }
 
-int trip_new_file_check(const char *what, const char *path)
+int trip_new_file_check(const char *stage, const char *path)
 {
     char folder[PATH_MAX];
     struct stat st;
@@ -81,12 +81,12 @@ int trip_new_file_check(const char *what, const char *path)
     int length = slash ? snprintf(folder, sizeof folder, "%.*s", (int)(slash + 1 - path), path)
                        : snprintf(folder, sizeof folder, ".");
     if (length >= (int)sizeof folder)
-        return trip_fail(TRIP_ERROR, what, path, "the name is too long");
+        return trip_fail(TRIP_ERROR, stage, path, "the name is too long");
     if (stat(folder, &st) != 0 || access(folder, W_OK | X_OK) != 0)
-        return trip_fail_errno(what, path, "cannot create a file in its folder");
+        return trip_fail_errno(stage, path, "cannot create a file in its folder");
     if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
-        return trip_fail(TRIP_ERROR, what, path, "is a folder");
-    return refuse_special(what, path);
+        return trip_fail(TRIP_ERROR, stage, path, "is a folder");
+    return refuse_special(stage, path);
 }
 
 int trip_new_file_finish(trip_new_file *f)
@@ -95,7 +95,7 @@ int trip_new_file_finish(trip_new_file *f)
     f->fd = -1;
     if (closed == 0 && rename(f->temporary, f->path) == 0)
         return 0;
-    int status = trip_fail_errno(f->what, f->path, "cannot write");
+    int status = trip_fail_errno(f->stage, f->path, "cannot write");
     unlink(f->temporary);
     return status;
 }
@@ -114,17 +114,17 @@ static int write_text(const trip_new_file *f, const char *text)
     for (size_t left = strlen(text); left > 0;) {
         ssize_t written = write(f->fd, text, left);
         if (written < 0 && errno != EINTR)
-            return trip_fail_errno(f->what, f->path, NULL);
+            return trip_fail_errno(f->stage, f->path, NULL);
         text += written > 0 ? written : 0;
         left -= written > 0 ? (size_t)written : 0;
     }
-    return fsync(f->fd) == 0 ? 0 : trip_fail_errno(f->what, f->path, NULL);
+    return fsync(f->fd) == 0 ? 0 : trip_fail_errno(f->stage, f->path, NULL);
 }
 
-int trip_new_file_of_text(const char *what, const char *path, const char *text)
+int trip_new_file_of_text(const char *stage, const char *path, const char *text)
 {
     trip_new_file file;
-    int status = trip_new_file_begin(&file, what, path);
+    int status = trip_new_file_begin(&file, stage, path);
     if (status)
         return status;
     status = write_text(&file, text);

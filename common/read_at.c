@@ -3,10 +3,10 @@
 #include <errno.h>
 #include <unistd.h>
 
-ssize_t trip_read_at(int fd, void *to, size_t bytes, size_t least, uint64_t offset)
+ssize_t trip_read_at(int fd, void *to, size_t bytes, size_t min, uint64_t offset)
 {
     size_t done = 0;
-    while (done < least) {
+    while (done < min) {
         ssize_t n = pread(fd, (char *)to + done, bytes - done, (off_t)(offset + done));
         if (n < 0 && errno == EINTR)
             continue;

@@ -142,14 +142,14 @@ static void finish_line(line *l)
 }
 
 __attribute__((format(printf, 4, 0))) static void
-report(int status, const char *what, const char *where, const char *why, va_list args)
+report(int status, const char *stage, const char *where, const char *why, va_list args)
 {
     int saved_errno = errno;
     char text[LINE_BYTES];
     line l = { .length = 0 };
     vsnprintf(text, sizeof text, why, args);
     put_visible(&l, "triptych: ");
-    put_visible(&l, what);
+    put_visible(&l, stage);
     put_visible(&l, ": ");
     if (where && *where)
         put_where(&l, where);
@@ -162,22 +162,22 @@ report(int status, const char *what, const char *where, const char *why, va_list
 #undef trip_fail
 #undef trip_fail_errno
 
-int trip_fail(int status, const char *what, const char *where, const char *why, ...)
+int trip_fail(int status, const char *stage, const char *where, const char *why, ...)
 {
     va_list args;
     va_start(args, why);
-    report(status, what, where, why, args);
+    report(status, stage, where, why, args);
     va_end(args);
     return status;
 }
 
-int trip_fail_errno(const char *what, const char *where, const char *action)
+int trip_fail_errno(const char *stage, const char *where, const char *action)
 {
     char buffer[256];
     const char *reason = trip_errno_text(errno, buffer, sizeof buffer);
     if (action && *action)
-        return trip_fail(TRIP_ERROR, what, where, "%s: %s", action, reason);
-    return trip_fail(TRIP_ERROR, what, where, "%s", reason);
+        return trip_fail(TRIP_ERROR, stage, where, "%s: %s", action, reason);
+    return trip_fail(TRIP_ERROR, stage, where, "%s", reason);
 }
 
 void trip_warn(const char *where, const char *why, ...)
@@ -188,11 +188,11 @@ void trip_warn(const char *where, const char *why, ...)
     va_end(args);
 }
 
-void trip_note(const char *where, const char *what, ...)
+void trip_note(const char *where, const char *stage, ...)
 {
     va_list args;
-    va_start(args, what);
-    report(TRIP_OK, "note", where, what, args);
+    va_start(args, stage);
+    report(TRIP_OK, "note", where, stage, args);
     va_end(args);
 }
 

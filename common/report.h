@@ -21,11 +21,11 @@ enum trip_status {
 /* Prints "triptych: WHAT: WHERE: why" and returns `status`. WHAT is the stage ("read", "brick",
  * "render", ...), WHERE the file and place ("a.nrrd: line 3"), why says cause and remedy. Control
  * characters and bad UTF-8 from files are made visible, so a message is always one line. */
-__attribute__((format(printf, 4, 5))) int trip_fail(int status, const char *what, const char *where,
-                                                    const char *why, ...);
+__attribute__((format(printf, 4, 5))) int trip_fail(int status, const char *stage,
+                                                    const char *where, const char *why, ...);
 
 /* Like trip_fail() with strerror(errno) as the why, after an optional action ("cannot open"). */
-int trip_fail_errno(const char *what, const char *where, const char *action);
+int trip_fail_errno(const char *stage, const char *where, const char *action);
 
 /* For static analysers, which see callers without report.c: these results are never 0. */
 #ifdef __clang_analyzer__
@@ -37,7 +37,7 @@ int trip_fail_errno(const char *what, const char *where, const char *action);
 __attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const char *why, ...);
 
 /* Prints "triptych: note: WHERE: what": a choice made for the user, and how to make another. */
-__attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *what, ...);
+__attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *stage, ...);
 
 /* Reports a line that another scope took. */
 void trip_report_line(const char *line);

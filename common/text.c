@@ -75,7 +75,7 @@ static bool is_acted_on(uint32_t code)
 trip_text_character trip_text_next(const char *text)
 {
     const unsigned char *p = (const unsigned char *)text;
-    static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
+    static const uint32_t min[5] = { 0, 0, 0x80, 0x800, 0x10000 };
     unsigned count = *p < 0x80             ? 1
                      : (*p & 0xe0) == 0xc0 ? 2
                      : (*p & 0xf0) == 0xe0 ? 3
@@ -83,7 +83,7 @@ trip_text_character trip_text_next(const char *text)
                                            : 0;
     uint32_t code = count == 1 ? *p : count > 0 ? decode(p, *p & (0x7fu >> count), count) : 0;
     bool surrogate = code >= 0xd800 && code < 0xe000;
-    if (count == 0 || code < least[count] || surrogate || code > 0x10ffff)
+    if (count == 0 || code < min[count] || surrogate || code > 0x10ffff)
         return (trip_text_character){ 0xfffd, 1, false };
     return (trip_text_character){ code, (uint8_t)count, !is_acted_on(code) };
 }
@@ -131,9 +131,9 @@ void trip_text_write_word(FILE *f, const char *word)
 
 size_t trip_text_distance(const char *a, const char *b)
 {
-    enum { MOST = 64 };
-    size_t row[MOST], m = strlen(a), n = strlen(b);
-    if (m >= MOST || n >= MOST)
+    enum { MAX = 64 };
+    size_t row[MAX], m = strlen(a), n = strlen(b);
+    if (m >= MAX || n >= MAX)
         return SIZE_MAX;
     for (size_t j = 0; j <= n; j++)
         row[j] = j;

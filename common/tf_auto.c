@@ -45,13 +45,13 @@ static trip_rgba colour_at(double t, double opacity)
  * falls steeply. */
 static void find_background(analysis *a)
 {
-    double group[GROUPS] = { 0 }, most = 0;
+    double group[GROUPS] = { 0 }, max = 0;
     for (int i = 0; i < BINS; i++)
         group[i / GROUP_BINS] += a->counts[i];
     for (int g = 0; g < GROUPS; g++)
-        most = fmax(most, group[g]);
+        max = fmax(max, group[g]);
     int end = 0;
-    while (group[end] < most / 4)
+    while (group[end] < max / 4)
         a->under += group[end++];
     while (end + 1 < GROUPS && group[end + 1] > group[end])
         end++;

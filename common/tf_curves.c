@@ -154,13 +154,13 @@ static void add_opacity(samples *s, double value, double opacity)
 }
 
 /* How many equal parts a segment is cut into, when `total` are to cover all nodes. */
-static int parts_of(const trip_tf_nodes *n, size_t i, int total, int least)
+static int parts_of(const trip_tf_nodes *n, size_t i, int total, int min)
 {
     double span = n->data[n->count - 1].value - n->data[0].value;
     double fraction = (n->data[i + 1].value - n->data[i].value) / span;
     int parts =
         fraction >= 0 && fraction <= 1 ? (int)ceil(fraction * total) : 1; /* span may overflow */
-    return parts > least ? parts : least;
+    return parts > min ? parts : min;
 }
 
 static double along(const trip_tf_nodes *n, size_t i, double s)

@@ -25,13 +25,13 @@ static trip_rgba colour_of(double label)
 /* Zero, or the most frequent where there is none. */
 static double background_of(const trip_histogram *h)
 {
-    int most = 0;
+    int max = 0;
     for (int i = 1; i < BINS; i++)
-        if (h->counts[i] > h->counts[most])
-            most = i;
+        if (h->counts[i] > h->counts[max])
+            max = i;
     if (h->value_min <= 0)
         return 0;
-    return ceil(h->value_min + (h->value_max - h->value_min) * most / BINS);
+    return ceil(h->value_min + (h->value_max - h->value_min) * max / BINS);
 }
 
 /* A label's colour holds half way to the whole numbers beside it. */

@@ -73,15 +73,15 @@ static void group_bins(const trip_histogram *h, int first, int past, double grou
 static int find_valley(const double groups[GROUPS])
 {
     int peak = 0, valley = -1;
-    double most = 0;
+    double max = 0;
     for (int g = 1; g < GROUPS / 4; g++)
         peak = groups[g] > groups[peak] ? g : peak;
     int lowest = peak;
     for (int g = peak + 1; g < GROUPS; g++) {
         if (groups[g] < groups[lowest])
             lowest = g;
-        if (groups[g] > 2 * groups[lowest] && groups[g] > most) {
-            most = groups[g];
+        if (groups[g] > 2 * groups[lowest] && groups[g] > max) {
+            max = groups[g];
             valley = lowest;
         }
     }

@@ -114,7 +114,7 @@ static int parse_lines(parser *p, const char *text, size_t bytes)
 }
 
 /* No line makes more than one point. */
-static size_t most_points(const char *text, size_t bytes)
+static size_t max_points(const char *text, size_t bytes)
 {
     size_t lines = 1;
     for (size_t i = 0; i < bytes && lines < TRIP_TF_MAX_POINTS; i++)
@@ -124,7 +124,7 @@ static size_t most_points(const char *text, size_t bytes)
 
 int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t bytes)
 {
-    parser p = { .name = name, .room = most_points(text, bytes) };
+    parser p = { .name = name, .room = max_points(text, bytes) };
     *out = NULL;
     if (bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
         text += 3;

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MOST_POINTS = 10, PRESETS = 16 };
+enum { MAX_POINTS = 10, PRESETS = 16 };
 
 /* What a preset's values are. */
 typedef enum basis {
@@ -22,7 +22,7 @@ typedef enum basis {
 typedef struct preset {
     const char *name, *summary;
     basis basis;
-    trip_tf_point points[MOST_POINTS]; /* ends before the first point of all zeros */
+    trip_tf_point points[MAX_POINTS]; /* ends before the first point of all zeros */
     trip_tf_kind kind;
 } preset;
 
@@ -171,7 +171,7 @@ int trip_tf_from_preset(trip_tf **out, const char *name)
         if (p->basis == HISTOGRAM)
             return trip_tf_from_kind(out, p->kind);
         size_t count = 0;
-        while (count < MOST_POINTS && !(count && is_end(&p->points[count])))
+        while (count < MAX_POINTS && !(count && is_end(&p->points[count])))
             count++;
         int status = trip_tf_from_points(out, p->points, count, p->basis == OVER_RANGE, 0);
         if (!status)

@@ -10,7 +10,7 @@ typedef double trip_field_function(trip_vec3 p, double detail, trip_vec3 *gradie
 
 typedef struct trip_field {
     const char *name;
-    const char *what;
+    const char *stage;
     trip_field_function *sample; /* gradient per unit of p; may be NULL */
 } trip_field;
 

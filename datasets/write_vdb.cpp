@@ -59,7 +59,7 @@ class CubeArchive : public openvdb::io::Archive
         openvdb::MetaMap().writeMeta(os);
         os.write((const char *)&grid_count, sizeof grid_count);
         descriptor.writeHeader(os);
-        const std::streampos places = os.tellp();
+        const std::streampos positions = os.tellp();
         descriptor.writeStreamPos(os);
         descriptor.setGridPos(os.tellp());
         setGridCompression(os, grid);
@@ -70,7 +70,7 @@ class CubeArchive : public openvdb::io::Archive
         for (const Coord &origin : m_used)
             make_lower(origin)->writeBuffers(os, false);
         descriptor.setEndPos(os.tellp());
-        os.seekp(places);
+        os.seekp(positions);
         descriptor.writeStreamPos(os);
     }
 

@@ -45,7 +45,7 @@ struct Header {
     bool is_signed = false;
     std::vector<Rescale> rescales; /* of every frame, or one of all */
     trip_vec3 origin = { 0, 0, 0 };
-    std::vector<trip_vec3> places;     /* of the first pixel, for every frame, or none */
+    std::vector<trip_vec3> positions;  /* of the first pixel, for every frame, or none */
     std::vector<double> rows;          /* directions of i, then j */
     std::vector<double> pixel_spacing; /* between rows, then between columns */
     double location = NAN, number = NAN, spacing = NAN;
@@ -53,7 +53,7 @@ struct Header {
 
     bool placed() const
     {
-        return !places.empty() && rows.size() == 6;
+        return !positions.empty() && rows.size() == 6;
     }
     trip_vec3 normal() const
     {
@@ -164,19 +164,19 @@ std::vector<DcmItem *> get_frame_items(DcmItem &item, int64_t count)
 }
 
 /* There is nothing to go by unless all frames say where they are. */
-std::vector<trip_vec3> get_frame_places(const std::vector<DcmItem *> &frames, const Header &h)
+std::vector<trip_vec3> get_frame_positions(const std::vector<DcmItem *> &frames, const Header &h)
 {
-    std::vector<trip_vec3> places;
+    std::vector<trip_vec3> positions;
     for (DcmItem *frame : frames) {
         std::vector<double> rows = get_numbers(*frame, DCM_ImageOrientationPatient, 6, true);
         if (!rows.empty() && !are_alike(rows, h.rows))
             throw trip_slice_error(h.file, "has frames that are oriented differently");
-        std::vector<double> place = get_numbers(*frame, DCM_ImagePositionPatient, 3, true);
-        if (place.empty())
+        std::vector<double> position = get_numbers(*frame, DCM_ImagePositionPatient, 3, true);
+        if (position.empty())
             return {};
-        places.push_back(vector_of(place, 0));
+        positions.push_back(vector_of(position, 0));
     }
-    return places;
+    return positions;
 }
 
 /* What an item says, itself or in those within it; the rest as in `missing`. */
@@ -222,12 +222,12 @@ void read_geometry(DcmItem &item, Header &h)
         nested ? get_frame_items(item, h.frames) : std::vector<DcmItem *>();
     h.rows = get_numbers(item, DCM_ImageOrientationPatient, 6, nested);
     check_rows(h);
-    std::vector<double> place = get_numbers(item, DCM_ImagePositionPatient, 3, nested);
+    std::vector<double> position = get_numbers(item, DCM_ImagePositionPatient, 3, nested);
     if (h.frames > 1)
-        h.places = get_frame_places(frames, h);
-    else if (!place.empty())
-        h.places.push_back(vector_of(place, 0));
-    h.origin = place.empty() ? trip_v3(0, 0, 0) : vector_of(place, 0);
+        h.positions = get_frame_positions(frames, h);
+    else if (!position.empty())
+        h.positions.push_back(vector_of(position, 0));
+    h.origin = position.empty() ? trip_v3(0, 0, 0) : vector_of(position, 0);
     h.biped = item.findAndGetOFString(DCM_AnatomicalOrientationType, body).bad() || body.empty() ||
               body == "BIPED";
     h.pixel_spacing = get_numbers(item, DCM_PixelSpacing, 2, nested);
@@ -295,9 +295,9 @@ template <typename Has> bool all_have(const std::vector<Header> &headers, const 
 }
 
 /* Puts the slices in order of `key`, which must differ from slice to slice and leave no gap unless
- * that is allowed. Returns what trip_check_places() does. */
+ * that is allowed. Returns what trip_check_positions() does. */
 template <typename Key>
-double sort_by(std::vector<Header> &headers, const Key &key, const char *what, bool allow_gaps)
+double sort_by(std::vector<Header> &headers, const Key &key, const char *stage, bool allow_gaps)
 {
     std::vector<double> keys;
     std::vector<std::string> names;
@@ -305,12 +305,12 @@ double sort_by(std::vector<Header> &headers, const Key &key, const char *what, b
                      [&](const Header &a, const Header &b) { return key(a) < key(b); });
     for (const Header &h : headers) {
         if (!keys.empty() && !(key(h) - keys.back() > 1e-6))
-            throw trip_slice_error(h.file, std::string("has the same ") + what + " as " +
+            throw trip_slice_error(h.file, std::string("has the same ") + stage + " as " +
                                                names.back() + ": several series in one folder?");
         keys.push_back(key(h));
         names.push_back(h.file);
     }
-    return trip_check_places(keys, names, allow_gaps);
+    return trip_check_positions(keys, names, allow_gaps);
 }
 
 bool all_placed(const std::vector<Header> &headers)
@@ -330,7 +330,7 @@ double sort_slices(std::vector<Header> &headers, bool allow_gaps)
             if (!are_alike(h.rows, rows))
                 throw trip_slice_error(h.file, "is oriented unlike " + first);
         return sort_by(
-            headers, [&](const Header &h) { return trip_dot(h.places[0], normal); }, "place",
+            headers, [&](const Header &h) { return trip_dot(h.positions[0], normal); }, "place",
             allow_gaps);
     }
     if (all_have(headers, [](const Header &h) { return std::isfinite(h.location); })) {
@@ -345,29 +345,29 @@ double sort_slices(std::vector<Header> &headers, bool allow_gaps)
 }
 
 /* The frames of one file in order of their place; none where places are not known. Sets `squeeze`
- * to what trip_check_places() returns of them. */
+ * to what trip_check_positions() returns of them. */
 std::vector<Uint32> sort_frames(Header &h, bool allow_gaps, double &squeeze)
 {
-    std::vector<Uint32> order(h.placed() ? h.places.size() : 0);
+    std::vector<Uint32> order(h.placed() ? h.positions.size() : 0);
     std::vector<trip_vec3> sorted;
     std::vector<std::string> names;
     std::vector<double> depths, sorted_depths;
     for (size_t i = 0; i < order.size(); i++) {
         order[i] = (Uint32)i;
-        depths.push_back(trip_dot(h.places[i], h.normal()));
+        depths.push_back(trip_dot(h.positions[i], h.normal()));
     }
     std::stable_sort(order.begin(), order.end(),
                      [&](Uint32 a, Uint32 b) { return depths[a] < depths[b]; });
     for (size_t i = 0; i < order.size(); i++) {
         if (i > 0 && !(depths[order[i]] - depths[order[i - 1]] > 1e-6))
             throw trip_slice_error(h.file, "has several frames at one place: of several times?");
-        sorted.push_back(h.places[order[i]]);
+        sorted.push_back(h.positions[order[i]]);
         sorted_depths.push_back(depths[order[i]]);
         names.push_back(h.file + ": frame " + std::to_string(order[i] + 1));
     }
-    squeeze = trip_check_places(sorted_depths, names, allow_gaps);
+    squeeze = trip_check_positions(sorted_depths, names, allow_gaps);
     if (!sorted.empty()) {
-        h.places = sorted;
+        h.positions = sorted;
         h.origin = sorted[0];
     }
     return order;
@@ -376,12 +376,12 @@ std::vector<Uint32> sort_frames(Header &h, bool allow_gaps, double &squeeze)
 /* Slices are the sheets of one grid, sheared where the gantry was tilted, if they all lie on one
  * straight line; half a pixel beside it is refused. Steps of several lengths are a grid still, with
  * slices missing perhaps, and draw a warning. */
-void check_line(const std::string &file, const std::vector<trip_vec3> &places, trip_vec3 normal,
+void check_line(const std::string &file, const std::vector<trip_vec3> &positions, trip_vec3 normal,
                 trip_vec3 step, double pixel)
 {
-    double along = trip_dot(step, normal), least = INFINITY, most = 0, before = 0;
-    for (size_t i = 1; i < places.size(); i++) {
-        trip_vec3 way = trip_sub(places[i], places[0]);
+    double along = trip_dot(step, normal), min = INFINITY, max = 0, before = 0;
+    for (size_t i = 1; i < positions.size(); i++) {
+        trip_vec3 way = trip_sub(positions[i], positions[0]);
         double steps = trip_dot(way, normal) / along;
         double aside = trip_length(trip_sub(way, trip_scale(step, steps)));
         if (!(aside <= 0.5 * pixel)) {
@@ -392,27 +392,27 @@ void check_line(const std::string &file, const std::vector<trip_vec3> &places, t
                           i + 1, aside);
             throw trip_slice_error(file, text);
         }
-        least = std::min(least, steps - before);
-        most = std::max(most, steps - before);
+        min = std::min(min, steps - before);
+        max = std::max(max, steps - before);
         before = steps;
     }
-    if (most - least > 0.02)
+    if (max - min > 0.02)
         trip_warn(file.c_str(), "slices are %g to %g apart, perhaps some are missing; drawn evenly",
-                  least * trip_length(step), most * trip_length(step));
+                  min * trip_length(step), max * trip_length(step));
 }
 
 /* The step from slice to slice in space, from where they are, else from what they state. */
 trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal, double pixel)
 {
     const Header &first = headers.front(), &last = headers.back();
-    std::vector<trip_vec3> places;
+    std::vector<trip_vec3> positions;
     if (all_placed(headers))
         for (const Header &h : headers)
-            places.insert(places.end(), h.places.begin(), h.places.end());
-    if (places.size() > 1) {
-        trip_vec3 step =
-            trip_scale(trip_sub(places.back(), places.front()), 1 / ((double)places.size() - 1));
-        check_line(first.file, places, normal, step, pixel);
+            positions.insert(positions.end(), h.positions.begin(), h.positions.end());
+    if (positions.size() > 1) {
+        trip_vec3 step = trip_scale(trip_sub(positions.back(), positions.front()),
+                                    1 / ((double)positions.size() - 1));
+        check_line(first.file, positions, normal, step, pixel);
         return step;
     }
     double length = (last.location - first.location) / ((double)headers.size() - 1);

@@ -21,8 +21,8 @@
 
 enum {
     TEXT_BYTES = 4096,
-    MOST_WARNINGS = 64,   /* of one request */
-    MOST_SIGNS = 1 << 20, /* of life in one request; they come a second apart */
+    MAX_WARNINGS = 64,    /* of one request */
+    MAX_SIGNS = 1 << 20,  /* of life in one request; they come a second apart */
     PATIENCE_MS = 120000, /* without a byte from the helper */
     WAIT_MS = 100,        /* between looks at the interrupt flag */
     REAP_MS = 1000,
@@ -41,7 +41,7 @@ static const helper_program netcdf_program = { "triptych-netcdf", TRIP_NETCDF_HE
                                                "reads netCDF-4" };
 
 struct trip_image_helper {
-    const char *what;
+    const char *stage;
     const char *program;
     char path[PATH_MAX]; /* of the last request */
     pid_t pid;           /* 0: gone */
@@ -123,23 +123,23 @@ static int spawn(char *program, int fd, pid_t *pid)
     return error;
 }
 
-static int start(trip_image_helper **out, const char *what, const helper_program *of)
+static int start(trip_image_helper **out, const char *stage, const helper_program *of)
 {
     char program[PATH_MAX] = "";
     int fds[2], error = ENOMEM;
     if (!stand_in && !of->built)
-        return trip_fail(TRIP_ERROR, what, of->name, "was not built; it %s", of->does);
+        return trip_fail(TRIP_ERROR, stage, of->name, "was not built; it %s", of->does);
     if (!stand_in && !trip_companion_find(program, of->name, of->built, X_OK))
-        return trip_fail(TRIP_ERROR, what, of->name,
+        return trip_fail(TRIP_ERROR, stage, of->name,
                          "is not beside this program nor in ../libexec/triptych; it %s", of->does);
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fds) != 0)
-        return trip_fail_errno(what, program, "cannot connect");
+        return trip_fail_errno(stage, program, "cannot connect");
     trip_image_helper *h = calloc(1, sizeof *h);
     if (h)
         error = stand_in ? stand_in(fds[1]) : spawn(program, fds[1], &h->pid);
     close(fds[1]);
     if (h && error == 0) {
-        h->what = what;
+        h->stage = stage;
         h->program = of->name;
         h->fd = fds[0];
         h->patience_ms = stand_in ? stand_in_patience_ms : PATIENCE_MS;
@@ -149,17 +149,17 @@ static int start(trip_image_helper **out, const char *what, const helper_program
     close(fds[0]);
     free(h);
     errno = error;
-    return trip_fail_errno(what, program, "cannot start");
+    return trip_fail_errno(stage, program, "cannot start");
 }
 
-int trip_image_helper_start(trip_image_helper **out, const char *what)
+int trip_image_helper_start(trip_image_helper **out, const char *stage)
 {
-    return start(out, what, &image_program);
+    return start(out, stage, &image_program);
 }
 
-int trip_image_helper_start_netcdf(trip_image_helper **out, const char *what)
+int trip_image_helper_start_netcdf(trip_image_helper **out, const char *stage)
 {
-    return start(out, what, &netcdf_program);
+    return start(out, stage, &netcdf_program);
 }
 
 /* Ends the process and returns its status. One that the kernel cannot end at once, in the middle of
@@ -193,17 +193,17 @@ static int helper_lost(trip_image_helper *h)
     int status = end_process(h);
     h->broken = true;
     if (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL)
-        return trip_fail(TRIP_ERROR, h->what, h->path,
+        return trip_fail(TRIP_ERROR, h->stage, h->path,
                          "brought the decoder down (%s): corrupt, or of an unusual kind",
                          strsignal(WTERMSIG(status)));
-    return trip_fail(TRIP_ERROR, h->what, h->path, "%s ended before it was done", h->program);
+    return trip_fail(TRIP_ERROR, h->stage, h->path, "%s ended before it was done", h->program);
 }
 
 int trip_image_helper_distrust(trip_image_helper *h, const char *why)
 {
     end_process(h);
     h->broken = true;
-    return trip_fail(TRIP_ERROR, h->what, h->path, "%s gives an answer that cannot be: %s",
+    return trip_fail(TRIP_ERROR, h->stage, h->path, "%s gives an answer that cannot be: %s",
                      h->program, why);
 }
 
@@ -216,7 +216,7 @@ static int wait_for(trip_image_helper *h, short events)
         if (trip_interrupted()) {
             end_process(h);
             h->broken = true;
-            return trip_fail(TRIP_INTERRUPTED, h->what, h->path, "interrupted");
+            return trip_fail(TRIP_INTERRUPTED, h->stage, h->path, "interrupted");
         }
         int ms = h->patience_ms < WAIT_MS ? h->patience_ms : WAIT_MS;
         int ready = poll(&p, 1, ms);
@@ -227,7 +227,7 @@ static int wait_for(trip_image_helper *h, short events)
     }
     end_process(h);
     h->broken = true;
-    return trip_fail(TRIP_ERROR, h->what, h->path,
+    return trip_fail(TRIP_ERROR, h->stage, h->path,
                      "%s has not answered for %g s: corrupt, or of an unusual kind", h->program,
                      h->patience_ms / 1e3);
 }
@@ -303,7 +303,7 @@ int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, c
     if (numbers)
         memcpy(request.numbers, numbers, sizeof request.numbers);
     if (request.path_bytes >= PATH_MAX)
-        return trip_fail(TRIP_ERROR, h->what, path, "has a name that is too long");
+        return trip_fail(TRIP_ERROR, h->stage, path, "has a name that is too long");
     memcpy(h->path, path, request.path_bytes + 1);
     if (h->broken)
         return helper_lost(h);
@@ -350,14 +350,14 @@ int trip_image_helper_outcome(trip_image_helper *h, uint64_t *data_bytes_out)
             *data_bytes_out = reply.data_bytes;
             return 0;
         case TRIP_IMAGE_FAILED:
-            return trip_fail(reply.status, h->what, where, "%s", why);
+            return trip_fail(reply.status, h->stage, where, "%s", why);
         case TRIP_IMAGE_WARNING:
-            if (++warnings > MOST_WARNINGS)
+            if (++warnings > MAX_WARNINGS)
                 return trip_image_helper_distrust(h, "warnings without end");
             trip_warn(where, "%s", why);
             break;
         case TRIP_IMAGE_WORKING:
-            if (++signs > MOST_SIGNS)
+            if (++signs > MAX_SIGNS)
                 return trip_image_helper_distrust(h, "work without end");
             break;
         default:

@@ -110,9 +110,9 @@ typedef struct trip_image_helper trip_image_helper;
 
 /* Starts the program; it gets ready while the caller goes on. `what` ("read", "write") begins the
  * lines about it and must outlive it. */
-int trip_image_helper_start(trip_image_helper **out, const char *what);
+int trip_image_helper_start(trip_image_helper **out, const char *stage);
 /* The same of triptych-netcdf; fails where that was not built. */
-int trip_image_helper_start_netcdf(trip_image_helper **out, const char *what);
+int trip_image_helper_start_netcdf(trip_image_helper **out, const char *stage);
 /* Ends it, also in the middle of something. NULL is fine. */
 void trip_image_helper_stop(trip_image_helper *h);
 

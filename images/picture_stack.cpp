@@ -67,7 +67,7 @@ class PictureStack : public trip_slice_stack
 
   private:
     Input open(const std::string &file) const;
-    void check_same(const std::string &what, const OIIO::ImageSpec &spec) const;
+    void check_same(const std::string &stage, const OIIO::ImageSpec &spec) const;
     void count_pages(OIIO::ImageInput &in);
     void choose_channels(trip_budget *budget);
     void colour_to_luma(float *values) const;
@@ -92,12 +92,12 @@ Input PictureStack::open(const std::string &file) const
     return in;
 }
 
-void PictureStack::check_same(const std::string &what, const OIIO::ImageSpec &spec) const
+void PictureStack::check_same(const std::string &stage, const OIIO::ImageSpec &spec) const
 {
     Form form(spec);
     if (!(form == *form_))
-        throw trip_slice_error(what, "is " + form.text() + ", unlike the first slice, which is " +
-                                         form_->text());
+        throw trip_slice_error(stage, "is " + form.text() + ", unlike the first slice, which is " +
+                                          form_->text());
 }
 
 /* ImageJ writes stacks beyond 4 GB as one page and the rest behind it, which no library reads. */

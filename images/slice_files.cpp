@@ -151,8 +151,8 @@ bool match_number(const NumberPattern &p, const std::string &name, long long &nu
         name.substr(p.before.size(), name.size() - p.before.size() - p.after.size());
     if (digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos)
         return false;
-    size_t least = std::max<size_t>(p.width, 1);
-    if (digits.size() < least || (digits.size() > least && digits[0] == '0'))
+    size_t min = std::max<size_t>(p.width, 1);
+    if (digits.size() < min || (digits.size() > min && digits[0] == '0'))
         return false;
     number = std::atoll(digits.c_str());
     return true;

@@ -11,7 +11,7 @@
 namespace
 {
 
-constexpr size_t most_digits = 18;
+constexpr size_t max_digits = 18;
 
 bool is_digit(char c)
 {
@@ -60,7 +60,7 @@ std::vector<Numbered> numbers_of(const std::vector<Parts> &names, size_t counter
 {
     std::vector<Numbered> numbered;
     for (const Parts &parts : names) {
-        if (parts[counter].size() > most_digits)
+        if (parts[counter].size() > max_digits)
             return {};
         numbered.push_back({ std::atoll(parts[counter].c_str()), &parts });
     }
@@ -83,11 +83,11 @@ std::string name_with(const Numbered &neighbour, size_t counter, long long numbe
     return name;
 }
 
-void report_gap(const std::string &path, const std::string &what, bool allow_gaps)
+void report_gap(const std::string &path, const std::string &stage, bool allow_gaps)
 {
     if (!allow_gaps)
-        throw trip_slice_error(path, what + "; --allow-gaps goes on as if its neighbours touched");
-    trip_warn(path.c_str(), "%s; drawn as if its neighbours touched", what.c_str());
+        throw trip_slice_error(path, stage + "; --allow-gaps goes on as if its neighbours touched");
+    trip_warn(path.c_str(), "%s; drawn as if its neighbours touched", stage.c_str());
 }
 
 void check_one_shape(const std::string &path, const std::vector<Parts> &names, bool allow_gaps)
@@ -111,11 +111,11 @@ void check_one_shape(const std::string &path, const std::vector<Parts> &names, b
     if (!before)
         return;
     long long number = before->number + step;
-    std::string what = "slice " + std::to_string(number) + " is missing (" +
-                       name_with(*before, counter, number) + ")";
+    std::string stage = "slice " + std::to_string(number) + " is missing (" +
+                        name_with(*before, counter, number) + ")";
     if (missing > 1)
-        what += ", and " + std::to_string(missing - 1) + " more";
-    report_gap(path, what, allow_gaps);
+        stage += ", and " + std::to_string(missing - 1) + " more";
+    report_gap(path, stage, allow_gaps);
 }
 
 } // namespace
@@ -139,26 +139,26 @@ void trip_check_numbers(const std::string &path, const std::vector<std::string> 
         check_one_shape(path, shape.second, allow_gaps);
 }
 
-double trip_check_places(const std::vector<double> &places, const std::vector<std::string> &names,
-                         bool allow_gaps)
+double trip_check_positions(const std::vector<double> &positions,
+                            const std::vector<std::string> &names, bool allow_gaps)
 {
     std::vector<double> steps;
-    for (size_t i = 1; i < places.size(); i++)
-        steps.push_back(places[i] - places[i - 1]);
+    for (size_t i = 1; i < positions.size(); i++)
+        steps.push_back(positions[i] - positions[i - 1]);
     if (steps.size() < 2)
         return 1;
     std::vector<double> sorted = steps;
     std::sort(sorted.begin(), sorted.end());
-    const double usual = sorted[(sorted.size() - 1) / 2];
+    const double defaults = sorted[(sorted.size() - 1) / 2];
     for (size_t i = 0; i < steps.size(); i++) {
-        double times = steps[i] / usual, whole = std::round(times);
+        double times = steps[i] / defaults, whole = std::round(times);
         if (!(whole >= 2 && whole < 1e6 && std::fabs(times - whole) <= 0.1))
             continue;
         report_gap(names[i],
                    "a slice is missing after it: the next one, " + names[i + 1] + ", lies " +
                        std::to_string((long)whole) + " steps on",
                    allow_gaps);
-        return usual * (double)steps.size() / (places.back() - places.front());
+        return defaults * (double)steps.size() / (positions.back() - positions.front());
     }
     return 1;
 }

@@ -19,7 +19,7 @@ void trip_check_numbers(const std::string &path, const std::vector<std::string> 
 /* The same by where slices are, `places` in ascending order, one for each of `names`: most steps
  * have one length, the usual one, and a step of about two or more of it has slices missing in it.
  * Returns the usual step over the mean one where gaps were found and allowed, else 1. */
-double trip_check_places(const std::vector<double> &places, const std::vector<std::string> &names,
-                         bool allow_gaps);
+double trip_check_positions(const std::vector<double> &positions,
+                            const std::vector<std::string> &names, bool allow_gaps);
 
 #endif

@@ -36,17 +36,17 @@ static void write_source(FILE *f, const char *path, const char *source)
     free(beside);
 }
 
-char *brick_command(const trip_dataset_text *text, const char *path, const char *volume,
+char *brick_command(const trip_dataset_metadata *text, const char *path, const char *volume,
                     const char *tf, const double *range)
 {
     char *command = NULL, *option = NULL, lo[32], hi[32];
     size_t bytes;
-    const char *source = trip_dataset_text_source(text), *how;
+    const char *source = trip_dataset_metadata_source(text), *how;
     FILE *f = source ? open_memstream(&command, &bytes) : NULL;
     if (!f)
         return NULL;
     fputs("triptych brick", f);
-    for (int i = 0; (how = trip_dataset_text_source_option(text, i)); i++)
+    for (int i = 0; (how = trip_dataset_metadata_source_option(text, i)); i++)
         write_word(f, how);
     write_word(f, "--tf");
     write_word(f, tf ? tf : "auto");

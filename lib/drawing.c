@@ -2,7 +2,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "context.h"
+#include "library_context.h"
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
 #include "kernel.h"
@@ -11,7 +11,7 @@
 #include "report.h"
 #include "rounding.h"
 #include "splat.h"
-#include "tint.h"
+#include "debug_view.h"
 
 static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
 {
@@ -102,13 +102,13 @@ static int make_camera(triptych *t)
 }
 
 /* Bytes that a processor draws in a millisecond, where nothing was measured yet. */
-#define USUAL_BYTES_PER_MS 20e3
+#define DEFAULT_BYTES_PER_MS 20e3
 
 /* A bound of time as one of bytes. */
 static trip_settings bounded_settings(const triptych *t)
 {
     trip_settings s = t->settings;
-    const double rate = t->bytes_per_ms > 0 ? t->bytes_per_ms : USUAL_BYTES_PER_MS;
+    const double rate = t->bytes_per_ms > 0 ? t->bytes_per_ms : DEFAULT_BYTES_PER_MS;
     const double bytes = fmax(t->max_ms * rate, 1);
     if (t->max_ms > 0)
         s.max_bytes = s.max_bytes > 0 ? fmin(s.max_bytes, bytes) : bytes;
@@ -202,8 +202,11 @@ static int enter_part(triptych *t)
         status = make_camera(t);
     if (status)
         return status;
-    t->slices = trip_slices_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
-    t->drawn_settings.slices = t->settings.slices ? t->settings.slices : t->slices.slices;
+    t->samples_per_sheet =
+        trip_sheet_samples_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
+    t->drawn_settings.samples_per_sheet = t->settings.samples_per_sheet
+                                              ? t->settings.samples_per_sheet
+                                              : t->samples_per_sheet.samples_per_sheet;
     t->drawn_settings.clip = trip_context_clip(t);
     trip_lod_parts_clip(&t->parts, t->part, &t->drawn_settings.clip);
     return 0;
@@ -248,7 +251,7 @@ static int prepare(triptych *t)
     if (status)
         return status;
     if (!t->has_function)
-        status = trip_context_use_function(t, &(triptych_function){ 0 });
+        status = trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer)
@@ -346,18 +349,18 @@ static void check_rounding(triptych *t)
 /* The coarsest levels may have more than the bound allows, and a data set may have none. */
 static void check_bound(const triptych *t)
 {
-    const double most = t->settings.max_bytes;
+    const double max = t->settings.max_bytes;
     char is[32], allowed[32];
-    if (!(most > 0) || t->settings.show == TRIP_SHOW_MERGE)
+    if (!(max > 0) || t->settings.show == TRIP_SHOW_MERGE)
         return;
     const double bytes = t->plan.lod.level    ? t->plan.lod.limit.bytes
                          : t->parts.bytes > 0 ? t->parts.bytes
                                               : trip_lod_values_bytes(t->session.data, &t->camera,
                                                                       &t->drawn_settings, 0);
-    if (bytes <= most)
+    if (bytes <= max)
         return;
     trip_format_bytes((uint64_t)bytes, is);
-    trip_format_bytes((uint64_t)most, allowed);
+    trip_format_bytes((uint64_t)max, allowed);
     trip_warn(
         t->session.input,
         "codes and normals of up to %s are read by the coarsest level that the data set has, more "
@@ -596,8 +599,8 @@ static void draw_merge_map(const triptych *t, float *rgba)
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++, rgba += 4) {
             double rgb[3];
-            trip_tint_merge(&t->drawn_settings, &t->camera, t->plan.axis_of_view, (x + 0.5) * side,
-                            (y + 0.5) * side, rgb);
+            trip_debug_view_merge(&t->drawn_settings, &t->camera, t->plan.axis_of_view,
+                                  (x + 0.5) * side, (y + 0.5) * side, rgb);
             for (int c = 0; c < 3; c++)
                 rgba[c] = (float)rgb[c];
             rgba[3] = 1;

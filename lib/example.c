@@ -23,8 +23,8 @@ static int set_up(triptych *t, const char *data, const char *function)
     triptych_settings settings = triptych_default_settings();
     int status = triptych_open(t, data, &(triptych_resources){ .memory_bytes = 256u << 20 });
     if (!status)
-        status =
-            triptych_set_function(t, &(triptych_function){ .name = *function ? function : NULL });
+        status = triptych_set_transfer_function(
+            t, &(triptych_transfer_function){ .name = *function ? function : NULL });
     settings.background[2] = 0.25; /* dark blue */
     if (!status)
         status = triptych_set_settings(t, &settings);

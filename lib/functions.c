@@ -1,9 +1,9 @@
 /* Transfer functions as things of their own: the built-in ones, and as text for other programs. */
 #include <string.h>
 
-#include "context.h"
+#include "library_context.h"
 #include "report.h"
-#include "volume_function.h"
+#include "volume_tf.h"
 
 int triptych_get_preset(unsigned number, triptych_preset *out)
 {
@@ -20,7 +20,7 @@ int triptych_get_histogram(triptych *t, triptych_histogram *out)
     int status = trip_context_check_open(t);
     if (!status)
         status = session_read_text(&t->session);
-    if (!status && trip_dataset_text_histogram(t->session.text, &histogram)) {
+    if (!status && trip_dataset_metadata_histogram(t->session.text, &histogram)) {
         *out = (triptych_histogram){ .lo = histogram.value_min,
                                      .hi = histogram.value_max,
                                      .total = histogram.total };
@@ -34,8 +34,9 @@ static int load_for_data_set(triptych *t, const char *function, trip_tf **tf)
     session *s = &t->session;
     int status = session_read_text(s);
     if (!status)
-        status = function ? trip_tf_load(tf, function) : trip_dataset_text_tf(s->text, s->data, tf);
-    return status ? status : trip_dataset_text_adapt(s->text, s->data, *tf);
+        status =
+            function ? trip_tf_load(tf, function) : trip_dataset_metadata_tf(s->text, s->data, tf);
+    return status ? status : trip_dataset_metadata_adapt(s->text, s->data, *tf);
 }
 
 static int load_for_volume(triptych *t, const triptych_conversion *c, trip_tf **tf)
@@ -47,7 +48,7 @@ static int load_for_volume(triptych *t, const triptych_conversion *c, trip_tf **
         .progress = t->show ? trip_context_show_stage : NULL,
         .progress_user = t,
     };
-    return trip_volume_function(&params, tf);
+    return trip_volume_tf(&params, tf);
 }
 
 static int load_alone(const triptych_conversion *c, const char *name, trip_tf **tf)

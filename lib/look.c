@@ -1,12 +1,12 @@
 /* What is drawn: the transfer function, the settings and the view of triptych.h. */
-#include "context.h"
+#include "library_context.h"
 #include "report.h"
 #include "splat.h"
-#include "view.h"
+#include "library_view.h"
 
-enum { USUAL_SIZE = 1024 };
+enum { DEFAULT_SIZE = 1024 };
 
-int trip_context_use_function(triptych *t, const triptych_function *f)
+int trip_context_use_transfer_function(triptych *t, const triptych_transfer_function *f)
 {
     bool missing = false;
     const session_look look = { .tf = f->name,
@@ -24,32 +24,32 @@ int trip_context_use_function(triptych *t, const triptych_function *f)
 }
 
 /* More would make extinctions that are not finite. */
-#define OPACITY_SCALE_MOST 1e6
+#define OPACITY_SCALE_MAX 1e6
 
-static int check_function(const triptych_function *f)
+static int check_function(const triptych_transfer_function *f)
 {
     bool finite = isfinite(f->window) && isfinite(f->level);
     if (f->name && f->text)
         return trip_fail(TRIP_USAGE, "render", "function",
                          "is given by a name or as text, not both");
-    if (!(f->opacity_scale >= 0 && f->opacity_scale <= OPACITY_SCALE_MOST))
+    if (!(f->opacity_scale >= 0 && f->opacity_scale <= OPACITY_SCALE_MAX))
         return trip_fail(TRIP_USAGE, "render", "function", "an opacity scale lies between 0 and %g",
-                         OPACITY_SCALE_MOST);
+                         OPACITY_SCALE_MAX);
     return finite && f->window >= 0
                ? 0
                : trip_fail(TRIP_USAGE, "render", "function",
                            "a window is finite and not below 0, and so is its level");
 }
 
-int triptych_set_function(triptych *t, const triptych_function *function)
+int triptych_set_transfer_function(triptych *t, const triptych_transfer_function *function)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    const triptych_function usual = { 0 };
-    const triptych_function *f = function ? function : &usual;
+    const triptych_transfer_function defaults = { 0 };
+    const triptych_transfer_function *f = function ? function : &defaults;
     int status = trip_context_check_idle(t, true);
     if (!status)
         status = check_function(f);
-    return trip_context_leave(before, status ? status : trip_context_use_function(t, f));
+    return trip_context_leave(before, status ? status : trip_context_use_transfer_function(t, f));
 }
 
 triptych_settings triptych_default_settings(void)
@@ -68,7 +68,7 @@ triptych_settings triptych_default_settings(void)
         .headlight = s.headlight,
         .light = { s.light_direction.x, s.light_direction.y, s.light_direction.z },
         .h = s.h,
-        .saturation = s.saturation,
+        .early_termination = s.early_termination,
         .kernel_radius = s.kernel_radius,
         .background = { s.background[0], s.background[1], s.background[2], s.background[3] },
         .lod_px = s.lod_px,
@@ -85,25 +85,26 @@ triptych_settings triptych_default_settings(void)
 
 int triptych_set_quality(triptych_settings *s, triptych_quality quality)
 {
-    const triptych_settings usual = triptych_default_settings();
+    const triptych_settings defaults = triptych_default_settings();
     if (quality < TRIPTYCH_DRAFT || quality > TRIPTYCH_EXACT)
         return TRIPTYCH_USAGE;
-    s->classify = quality == TRIPTYCH_NORMAL ? usual.classify : TRIPTYCH_POST;
-    s->compositing = usual.compositing;
-    s->footprint = usual.footprint;
-    s->low_pass = usual.low_pass;
-    s->flatten = usual.flatten;
-    s->vertex_weights = usual.vertex_weights;
-    s->slices = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 8 : 0;
-    s->slices = quality == TRIPTYCH_EXACT ? 16 : s->slices;
-    s->method = usual.method;
-    s->h = usual.h;
-    s->saturation = quality == TRIPTYCH_EXACT ? TRIP_SATURATION_PRE : usual.saturation;
-    s->target = usual.target;
-    s->kernel_radius = usual.kernel_radius;
-    s->lod_px = usual.lod_px;
+    s->classify = quality == TRIPTYCH_NORMAL ? defaults.classify : TRIPTYCH_POST;
+    s->compositing = defaults.compositing;
+    s->footprint = defaults.footprint;
+    s->low_pass = defaults.low_pass;
+    s->flatten = defaults.flatten;
+    s->vertex_weights = defaults.vertex_weights;
+    s->samples_per_sheet = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 8 : 0;
+    s->samples_per_sheet = quality == TRIPTYCH_EXACT ? 16 : s->samples_per_sheet;
+    s->method = defaults.method;
+    s->h = defaults.h;
+    s->early_termination =
+        quality == TRIPTYCH_EXACT ? TRIP_EARLY_TERMINATION_PRE : defaults.early_termination;
+    s->target = defaults.target;
+    s->kernel_radius = defaults.kernel_radius;
+    s->lod_px = defaults.lod_px;
     s->max_bytes = s->max_ms = 0;
-    s->samples = usual.samples;
+    s->samples = defaults.samples;
     return TRIPTYCH_OK;
 }
 
@@ -185,14 +186,14 @@ static const char *fault_of_settings(const triptych_settings *s)
         return "there is no such method, traversal or target";
     if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_CLASSIFY_AUTO)
         return "there is no such classification";
-    if (!(s->slices >= 0 && s->slices <= TRIP_SLICES_MAX))
+    if (!(s->samples_per_sheet >= 0 && s->samples_per_sheet <= TRIP_SHEET_SAMPLES_MAX))
         return "a sheet has 1 to 16 slices, or as many as the view calls for (0)";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
         return "rounded layers have no depth; leave the target at rgba32f";
     if (!(s->h >= 0 && s->h < 1) && s->h != TRIPTYCH_H_AUTO)
         return "h lies between 0 and below 1, or is by the classification (-1)";
-    if (!(s->saturation >= 0 && s->saturation <= TRIP_SATURATION_MAX) &&
-        s->saturation != TRIPTYCH_SATURATION_AUTO)
+    if (!(s->early_termination >= 0 && s->early_termination <= TRIP_EARLY_TERMINATION_MAX) &&
+        s->early_termination != TRIPTYCH_EARLY_TERMINATION_AUTO)
         return "saturation lies between 0 and 0.1, or is by the classification (-1)";
     if ((s->shading || s->effects) && !s->headlight && !isfinite(length))
         return "the light is too far away, or not finite";
@@ -213,17 +214,17 @@ static const char *fault_of_settings(const triptych_settings *s)
     return fault ? fault : fault_of_integral(s);
 }
 
-typedef struct places {
+typedef struct positions {
     double at[3];
-} places;
+} positions;
 
 /* Of voxels; no bounds stay none. */
-static places places_of(const triptych *t, const double voxels[3])
+static positions positions_of(const triptych *t, const double voxels[3])
 {
-    places out;
+    positions out;
     for (int a = 0; a < 3; a++)
         out.at[a] = isfinite(voxels[a])
-                        ? trip_coordinates_place(&t->session.data->coordinates, a, voxels[a])
+                        ? trip_coordinates_position(&t->session.data->coordinates, a, voxels[a])
                         : voxels[a];
     return out;
 }
@@ -236,7 +237,8 @@ trip_clip trip_context_clip(const triptych *t)
     if (c->box && c->box_of_voxels) /* the map was checked on opening */
         trip_affine_invert(&t->session.data->index_to_world, &to_box);
     if (c->box && c->box_of_voxels)
-        trip_clip_add_box(&clip, places_of(t, c->box_lo).at, places_of(t, c->box_hi).at, &to_box);
+        trip_clip_add_box(&clip, positions_of(t, c->box_lo).at, positions_of(t, c->box_hi).at,
+                          &to_box);
     else if (c->box)
         trip_clip_add_box(&clip, c->box_lo, c->box_hi, &to_box);
     for (int i = 0; i < c->planes; i++)
@@ -251,13 +253,14 @@ trip_clip trip_context_clip(const triptych *t)
 static void warn_of_ripple(double kernel_radius)
 {
     trip_splat_ripple own = trip_splat_ripple_of(kernel_radius);
-    trip_splat_ripple usual = trip_splat_ripple_of(TRIP_KERNEL_RADIUS_VOXELS);
+    trip_splat_ripple defaults = trip_splat_ripple_of(TRIP_KERNEL_RADIUS_VOXELS);
     trip_warn("render",
               "a kernel radius of %g leaves a pattern of voxels: the extinction of constant fog is "
               "off by %+.0f %% through voxels and by %+.0f %% between them; at %g by %+.1f and "
               "%+.1f",
               kernel_radius, 100 * (own.through - 1), 100 * (own.between - 1),
-              TRIP_KERNEL_RADIUS_VOXELS, 100 * (usual.through - 1), 100 * (usual.between - 1));
+              TRIP_KERNEL_RADIUS_VOXELS, 100 * (defaults.through - 1),
+              100 * (defaults.between - 1));
 }
 
 static void set_light(trip_settings *out, const triptych_settings *s)
@@ -266,7 +269,7 @@ static void set_light(trip_settings *out, const triptych_settings *s)
     out->headlight = s->headlight;
     out->point_light = s->point_light && !s->headlight;
     if (out->point_light)
-        out->light_place = light;
+        out->light_position = light;
     else if (!s->headlight)
         out->light_direction = trip_normalize(light);
 }
@@ -299,7 +302,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .low_pass = (trip_low_pass)s->low_pass,
         .flatten = s->flatten,
         .vertex_weights = s->vertex_weights,
-        .slices = s->slices,
+        .samples_per_sheet = s->samples_per_sheet,
         .method = (trip_method)s->method,
         .traversal = (trip_traversal)s->traversal,
         .target = (trip_target)s->target,
@@ -308,7 +311,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
         .depth = s->depth,
         .shading = s->shading,
         .h = s->h,
-        .saturation = s->saturation,
+        .early_termination = s->early_termination,
         .kernel_radius = s->kernel_radius,
         .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
         .lod_px = s->lod_px,
@@ -338,9 +341,11 @@ int trip_context_find_view(triptych *t, const triptych_view *given)
     };
     triptych_view view = *given;
     trip_found_view found;
-    view.width = view.width ? view.width : USUAL_SIZE;
-    view.height = view.height ? view.height : USUAL_SIZE;
-    int status = t->has_function ? 0 : trip_context_use_function(t, &(triptych_function){ 0 });
+    view.width = view.width ? view.width : DEFAULT_SIZE;
+    view.height = view.height ? view.height : DEFAULT_SIZE;
+    int status = t->has_function
+                     ? 0
+                     : trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
     if (!status)
         status = trip_view_find(&found, &view, &t->session, t->settings.kernel_radius, &wanted);
     if (status)

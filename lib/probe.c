@@ -1,5 +1,5 @@
 /* What is seen at a place of the picture, by a ray of its own. */
-#include "context.h"
+#include "library_context.h"
 #include "ray_probe.h"
 #include "report.h"
 
@@ -21,15 +21,15 @@ static void put(double out[3], trip_vec3 v)
 static triptych_hit hit_of(const trip_ray_probe *probe, const trip_ray_hit *found)
 {
     const trip_file_header *h = &probe->data->header;
-    trip_vec3 place = trip_add(probe->origin, trip_scale(probe->direction, found->z));
+    trip_vec3 position = trip_add(probe->origin, trip_scale(probe->direction, found->z));
     triptych_hit hit = { .opacity = found->opacity,
                          .value = h->code_lo + (h->code_hi - h->code_lo) * found->code / 65535,
                          .depth = found->z * probe->world_per_z,
                          .depth_first = found->first_z * probe->world_per_z };
     for (int a = 0; a < 3; a++)
         hit.index[a] =
-            trip_coordinates_index(&probe->data->coordinates, a, trip_component(place, a));
-    put(hit.position, trip_affine_point(&probe->data->index_to_world, place));
+            trip_coordinates_index(&probe->data->coordinates, a, trip_component(position, a));
+    put(hit.position, trip_affine_point(&probe->data->index_to_world, position));
     return hit;
 }
 

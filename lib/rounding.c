@@ -18,16 +18,16 @@ double trip_rounding_opacity(const session *s, const trip_settings *settings)
     const double sigma = settings->kernel_radius / TRIP_CUTOFF;
     const double share =
         trip_settings_sum_sheets(settings) ? 1 : 1 / (2 * 3.14159265358979323846 * sigma * sigma);
-    double most = 0;
+    double max = 0;
     for (int code = code_of(h, h->value_min); code <= code_of(h, h->value_max); code++)
-        most = fmax(most, (double)s->table[code].extinction);
-    return -expm1(-most * voxel * share);
+        max = fmax(max, (double)s->table[code].extinction);
+    return -expm1(-max * voxel * share);
 }
 
 /* A splat of opacity a changes one of 3/4 by a / 4. Rounded to steps of that size u, a constant
  * splat's change is off by up to u / 2. By floats transmittance is what is kept, near 1 at first,
  * where steps are 2^-24. */
-double trip_rounding_least(trip_target target)
+double trip_rounding_min(trip_target target)
 {
     static const double steps[] = { [TRIP_TARGET_RGBA32F] = 0x1p-24,
                                     [TRIP_TARGET_RGBA16F] = 0x1p-11 * 4,
@@ -40,13 +40,13 @@ void trip_rounding_check(const session *s, const trip_settings *settings)
     static const char *const names[] = { "rgba32f", "rgba16f", "rgba8" };
     const double opacity = trip_rounding_opacity(s, settings);
     const bool by_sheets = trip_settings_sum_sheets(settings);
-    if (!(opacity > 0) || opacity >= trip_rounding_least(settings->target))
+    if (!(opacity > 0) || opacity >= trip_rounding_min(settings->target))
         return;
     trip_warn(s->input,
               "%s have an opacity of %.2g at most, and layers of %s, rounded at each, lose much of "
               "what is less than %.2g: %s",
               by_sheets ? "sheets" : "splats", opacity, names[settings->target],
-              trip_rounding_least(settings->target),
+              trip_rounding_min(settings->target),
               !by_sheets                                ? "--compositing sheet rounds once a sheet"
               : settings->target != TRIP_TARGET_RGBA32F ? "--target rgba32f loses less"
                                                         : "--renderer reference rounds nothing");

@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "context.h"
+#include "library_context.h"
 #include "report.h"
 
 /* The levels of a frame that classifies after interpolation, from the eye on. */
@@ -46,12 +46,12 @@ static void explain_choices(const triptych *t, FILE *out)
     if (t->why_pre)
         fprintf(out, "default     pre in place of post: %s\n", t->why_pre);
     explain_parts(t, out);
-    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.slices)
+    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
         fprintf(out,
                 "slices      %d by the view: rays move up to %.2f voxels along a sheet to the "
                 "next, voxels count as up to %.3g %s wide\n",
-                t->slices.slices, t->slices.slope, t->slices.voxel_px,
-                t->settings.samples > 1 ? "samples" : "px");
+                t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.slope,
+                t->samples_per_sheet.voxel_px, t->settings.samples > 1 ? "samples" : "px");
 }
 
 int triptych_explain(triptych *t, char **text)
@@ -134,9 +134,12 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .device = t->renderer->ops->device(t->renderer),
         .engine = trip_reader_engine_name(t->reader),
         .classify = (triptych_classify)t->drawn_settings.classify,
-        .slices = t->drawn_settings.classify == TRIP_CLASSIFY_POST ? t->drawn_settings.slices : 0,
+        .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
+                                 ? t->drawn_settings.samples_per_sheet
+                                 : 0,
         .footprint = (triptych_footprint)t->drawn_settings.footprint,
-        .saturation = t->plan.gathers ? -1 : trip_settings_saturation(&t->drawn_settings),
+        .early_termination =
+            t->plan.gathers ? -1 : trip_settings_early_termination(&t->drawn_settings),
         .ring = ring_text(t->renderer, t->reader),
         .effects = effects_of(&t->drawn_settings.effects),
         .light_bytes_read = light.bytes_read,

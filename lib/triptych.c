@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "camera.h"
-#include "context.h"
+#include "library_context.h"
 #include "dataset_level.h"
 #include "report.h"
 
@@ -44,7 +44,7 @@ int triptych_create(triptych **out)
     pthread_mutex_init(&t->lock, NULL);
     t->settings = trip_settings_default();
     t->settings.classify = TRIP_CLASSIFY_POST;
-    t->settings.slices = 0;
+    t->settings.samples_per_sheet = 0;
     t->classify_auto = true;
     return TRIPTYCH_OK;
 }
@@ -128,11 +128,11 @@ int trip_context_check_list(const triptych *t, unsigned number)
 
 /* ---- pictures ---- */
 
-static void release_picture(triptych *t, trip_context_picture **place)
+static void release_picture(triptych *t, trip_context_picture **position)
 {
-    trip_context_picture *p = *place;
+    trip_context_picture *p = *position;
     trip_budget_release(t->session.budget, p->pixels, p->bytes);
-    *place = p->next;
+    *position = p->next;
     free(p);
 }
 
@@ -162,9 +162,9 @@ int triptych_new_picture(triptych *t, int width, int height, int channels, float
     int status = trip_context_check_open(t);
     *pixels = NULL;
     if (!status &&
-        (width < 1 || height < 1 || width > TRIP_PICTURE_MOST_PX || height > TRIP_PICTURE_MOST_PX))
+        (width < 1 || height < 1 || width > TRIP_PICTURE_MAX_PX || height > TRIP_PICTURE_MAX_PX))
         status = trip_fail(TRIP_USAGE, "render", "picture", "has 1 to %d pixels either way",
-                           TRIP_PICTURE_MOST_PX);
+                           TRIP_PICTURE_MAX_PX);
     if (!status && channels != 1 && channels != 4)
         status = trip_fail(TRIP_USAGE, "render", "picture", "has 4 channels, or 1 for distances");
     if (!status)
@@ -339,13 +339,13 @@ static void describe_spacing(const trip_dataset *d, triptych_info *out)
     for (int a = 0; a < 3; a++) {
         const double length = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
         const double *x = d->coordinates.along[a];
-        double least = 1, most = 1;
+        double min = 1, max = 1;
         for (int64_t i = 1; x && i < d->coordinates.voxels[a]; i++) {
-            least = fmin(least, x[i] - x[i - 1]);
-            most = fmax(most, x[i] - x[i - 1]);
+            min = fmin(min, x[i] - x[i - 1]);
+            max = fmax(max, x[i] - x[i - 1]);
         }
-        out->spacing_least[a] = least * length;
-        out->spacing_most[a] = most * length;
+        out->spacing_min[a] = min * length;
+        out->spacing_max[a] = max * length;
     }
 }
 

@@ -112,7 +112,7 @@ typedef struct triptych_info {
     double index_to_world[3][4]; /* world = matrix . (i, j, k, 1), where spacing is even */
     /* Least and most distance of neighbours along i, j, k in the world. They differ where spacing
      * is uneven; the matrix then takes places to the world, which are indices on the average. */
-    double spacing_least[3], spacing_most[3];
+    double spacing_min[3], spacing_max[3];
     int64_t first[3], last[3]; /* voxels kept along i, j, k */
     double lo[3], hi[3];       /* box of those in world space, from edge to edge */
     /* Where those begin and end along i, j, k, and where the grid does: for the matrix. */
@@ -164,17 +164,18 @@ TRIPTYCH_API int triptych_get_histogram(triptych *t, triptych_histogram *out);
 
 /* ---- what is drawn ---- */
 
-typedef struct triptych_function {
+typedef struct triptych_transfer_function {
     const char *name;     /* preset or file, as of --tf; default: the one kept in the data set */
     double opacity_scale; /* multiplies extinction, up to 1e6; default 1 */
     double window, level; /* window > 0: stretched over level - window / 2 to level + window / 2 */
     int *left_out;        /* not NULL: set to 1 (else 0), in place of a warning, where values that
                              would show were not kept; the function is then not taken */
     const char *text;     /* the function itself, as the text of a `.tf`; not with a name */
-} triptych_function;
+} triptych_transfer_function;
 
 /* From the next frame on; NULL: the default. */
-TRIPTYCH_API int triptych_set_function(triptych *t, const triptych_function *function);
+TRIPTYCH_API int triptych_set_transfer_function(triptych *t,
+                                                const triptych_transfer_function *function);
 
 typedef struct triptych_preset {
     const char *name, *values, *summary; /* values: what the function's values are relative to */
@@ -304,7 +305,7 @@ enum {
 #define TRIPTYCH_H_AUTO (-1.0)
 
 /* The saturation that suits the classification: 1/8192 of splats, 1/512 of values. */
-#define TRIPTYCH_SATURATION_AUTO (-1.0)
+#define TRIPTYCH_EARLY_TERMINATION_AUTO (-1.0)
 
 typedef struct triptych_settings {
     triptych_classify classify;
@@ -317,19 +318,20 @@ typedef struct triptych_settings {
                            is covered at all is opaque */
     double flatten; /* of EWA footprints: how many times flatter kernels are along full gradients, 1
                        (round) to 100; without count */
-    int slices; /* of a sheet, post: 1 to 16, more come closer to the integral; 0: by the view */
+    int samples_per_sheet; /* of a sheet, post: 1 to 16, more come closer to the integral; 0: by the
+                              view */
     triptych_method method;
     triptych_traversal traversal;
-    triptych_target target; /* of the layers; not of the reference */
-    int indexed, triangles; /* how GL is given splats: one array for all lists, quads */
-    int shading;            /* from gradients */
-    int headlight;          /* light from the eye; else from light[] */
-    int point_light;        /* not 0: light[] is the light's place, as bright at any distance */
-    double light[3];        /* world direction to the light, not zero; or its place */
-    double h;               /* where layers begin to blend, 0 to below 1, or TRIPTYCH_H_AUTO */
-    double saturation;    /* transmittance below which a pixel takes nothing of what lies behind, 0
-                             (none is) to 0.1, or TRIPTYCH_SATURATION_AUTO: no component is off by more
-                             than that. By gl with pre at most the default */
+    triptych_target target;   /* of the layers; not of the reference */
+    int indexed, triangles;   /* how GL is given splats: one array for all lists, quads */
+    int shading;              /* from gradients */
+    int headlight;            /* light from the eye; else from light[] */
+    int point_light;          /* not 0: light[] is the light's place, as bright at any distance */
+    double light[3];          /* world direction to the light, not zero; or its place */
+    double h;                 /* where layers begin to blend, 0 to below 1, or TRIPTYCH_H_AUTO */
+    double early_termination; /* transmittance below which a pixel takes nothing of what lies
+                          behind, 0 (none is) to 0.1, or TRIPTYCH_EARLY_TERMINATION_AUTO: no
+                          component is off by more than that. By gl with pre at most the default */
     double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
     double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
     double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
@@ -493,10 +495,11 @@ typedef struct triptych_frame_stats {
     const char *renderer, *device, *engine;   /* "cpu", "8 threads, AVX2", "io_uring+O_DIRECT" */
     const char *ring;                         /* where reads land, in words */
     triptych_classify classify;               /* pre or post, what was drawn */
-    int slices;                               /* of a sheet, post; else 0 */
+    int samples_per_sheet;                    /* of a sheet, post; else 0 */
     triptych_footprint footprint;             /* pre: what was drawn */
-    double saturation; /* transmittance below which pixels took no more; -1 of the integral */
-    int effects;       /* that ran; of shadows and occlusion: */
+    double
+        early_termination; /* transmittance below which pixels took no more; -1 of the integral */
+    int effects;           /* that ran; of shadows and occlusion: */
     uint64_t light_bytes_read; /* not in bytes_read; 0 where it was kept */
     uint64_t light_memory_bytes;
     double light_gather_ms, light_sweep_ms; /* in ms: reading and gathering; working out */

@@ -65,8 +65,8 @@ typedef struct triptych_brick_options {
     /* Where in the patient x, y and z of a volume point to whose file does not say: three letters,
      * one of R and L, of A and P and of S and I each, as "PIR". */
     const char *axes;
-    int allow_gaps;       /* not 0: slices may be missing in a stack */
-    uint64_t most_voxels; /* not 0: of a volume of more voxels every second, third, ... along each
+    int allow_gaps;      /* not 0: slices may be missing in a stack */
+    uint64_t max_voxels; /* not 0: of a volume of more voxels every second, third, ... along each
                              axis is read, so that there are at most so many */
 
     /* What is kept: the union of these; with none of them, as with `automatic`. */
@@ -91,7 +91,7 @@ typedef struct triptych_brick_options {
     unsigned slab_sheets;  /* 1 to 64; default 8 */
     int replace;           /* not 0: a data set of that name */
     int resume;            /* not 0: goes on from where the same was killed, if it was */
-    uint64_t most_bytes;   /* more is refused before it is written */
+    uint64_t max_bytes;    /* more is refused before it is written */
     uint64_t memory_bytes; /* default: a quarter of what may be used */
     unsigned threads;      /* up to 256; default: one a processor */
 } triptych_brick_options;
@@ -160,11 +160,11 @@ typedef struct triptych_identity {
     int stable; /* 0: a file changed so lately that changing again may leave `state` as it is */
 } triptych_identity;
 
-/* Files of up to `most_content_bytes` together are read for `content`; 0: none are. What does not
+/* Files of up to `max_content_bytes` together are read for `content`; 0: none are. What does not
  * change the data set, such as memory and threads, does not count. */
 TRIPTYCH_API int triptych_identify(triptych *t, const char *volume,
                                    const triptych_brick_options *options,
-                                   uint64_t most_content_bytes, triptych_identity *out);
+                                   uint64_t max_content_bytes, triptych_identity *out);
 
 /* Calls `found` with the path of every file that a volume is read from; of a folder or a pattern
  * perhaps with some more. Of `options`, which may be NULL, only how it is read counts. What `found`

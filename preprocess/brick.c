@@ -10,7 +10,7 @@
 #include "brick_input.h"
 #include "brick_memory.h"
 #include "brick_temporary.h"
-#include "brick_text.h"
+#include "brick_metadata.h"
 #include "dataset.h"
 #include "estimate.h"
 #include "folder.h"
@@ -18,7 +18,7 @@
 #include "list_builder.h"
 #include "report.h"
 #include "splats.h"
-#include "upright.h"
+#include "orientation.h"
 
 /* One run; zeroed at first, so that close_all() undoes any part of it. */
 typedef struct brick {
@@ -35,7 +35,7 @@ typedef struct brick {
     trip_splatter *splatter;
     unsigned levels;        /* coarse ones */
     trip_level_kinds kinds; /* of those */
-    trip_upright upright;
+    trip_orientation upright;
     uint64_t written_before; /* up to the end of the last stage */
 } brick;
 
@@ -106,7 +106,7 @@ static int update_memory_plan(brick *b)
 
 static int open_writer(brick *b)
 {
-    trip_writer_list lists[6 * (TRIP_LEVELS_MOST + 1)];
+    trip_writer_list lists[6 * (TRIP_LEVELS_MAX + 1)];
     b->coordinates = trip_brick_coordinates(&b->in);
     trip_writer_params p = { .replace = b->params->replace,
                              .halo = b->format.halo,
@@ -361,13 +361,13 @@ static int make_levels(brick *b)
     return status;
 }
 
-static int fail_count(const brick *b, const char *what, uint64_t counted, uint64_t written)
+static int fail_count(const brick *b, const char *subject, uint64_t counted, uint64_t written)
 {
     return trip_fail(TRIP_ERROR, "brick", b->params->output,
                      "%" PRIu64 " %s were counted and %" PRIu64
                      " written: what the interrupted run left is damaged, without --resume it "
                      "starts again",
-                     counted, what, written);
+                     counted, subject, written);
 }
 
 /* The numbers of records written must be those counted, part of which may be from a journal. The
@@ -407,7 +407,7 @@ static bool is_up_unknown(const trip_volume_info *info)
            strcmp(info->format, "nifti");
 }
 
-static int find_upright(brick *b)
+static int find_orientation(brick *b)
 {
     const trip_quantiser *q = &b->codes.quantiser;
     trip_occupancy_params p = { .levels = b->levels,
@@ -420,19 +420,19 @@ static int find_upright(brick *b)
     /* A region of an object need not look as the whole does. */
     const bool whole = trip_region_is_whole(&b->params->region);
     return whole && is_up_unknown(b->in.info)
-               ? trip_upright_find(&b->upright, b->writer, &p, b->in.budget)
+               ? trip_orientation_find(&b->upright, b->writer, &p, b->in.budget)
                : 0;
 }
 
 static int finish_output(brick *b)
 {
     double begin = now_seconds();
-    char *text = trip_brick_text_make(&(trip_brick_text){ .params = b->params,
-                                                          .info = b->in.info,
-                                                          .envelope = &b->in.envelope,
-                                                          .functions = b->in.functions,
-                                                          .histogram = &b->in.histogram,
-                                                          .upright = b->upright });
+    char *text = trip_brick_metadata_make(&(trip_brick_metadata){ .params = b->params,
+                                                                  .info = b->in.info,
+                                                                  .envelope = &b->in.envelope,
+                                                                  .functions = b->in.functions,
+                                                                  .histogram = &b->in.histogram,
+                                                                  .upright = b->upright });
     if (!text)
         return TRIP_ERROR;
     trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
@@ -455,7 +455,7 @@ static void fill_summary(brick *b)
     trip_brick_summary *s = b->summary;
     const double(*m)[4] = b->in.info->index_to_world.m;
     memcpy(s->dims, b->in.info->dims, sizeof s->dims);
-    trip_brick_text_note(b->in.info, b->upright, s->note);
+    trip_brick_metadata_note(b->in.info, b->upright, s->note);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
     s->voxels = b->in.tally->voxels;
@@ -509,7 +509,7 @@ static int make(brick *b)
     if (status == 0)
         status = make_levels(b);
     if (status == 0)
-        status = find_upright(b);
+        status = find_orientation(b);
     return status == 0 ? finish_output(b) : status;
 }
 

@@ -61,7 +61,7 @@ typedef struct trip_brick_params {
     unsigned tile_voxels, slab_sheets;
     uint64_t memory_bytes; /* default: a quarter of what the process may use */
     unsigned threads;      /* default: one a processor */
-    uint64_t most_bytes;   /* refuse a larger data set: size of the cache it is for; 0: no limit */
+    uint64_t max_bytes;    /* refuse a larger data set: size of the cache it is for; 0: no limit */
     int64_t slices;        /* read at a time; default: by memory */
 
     /* Called on the calling thread with the progress of a stage ("sample", "scan", "read" in

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "brick_memory.h"
-#include "brick_text.h"
+#include "brick_metadata.h"
 #include "format.h"
 #include "normal.h"
 #include "report.h"
@@ -167,9 +167,9 @@ static bool has_byte_type(const trip_brick_input *in)
 void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
 {
     double size = trip_scalar_bytes(info->type) == 1 ? 256 : 65536;
-    double least = info->type == TRIP_I8 || info->type == TRIP_I16 ? -size / 2 : 0;
-    double a = info->slope * least + info->inter;
-    double b = info->slope * (least + size - 1) + info->inter;
+    double min = info->type == TRIP_I8 || info->type == TRIP_I16 ? -size / 2 : 0;
+    double a = info->slope * min + info->inter;
+    double b = info->slope * (min + size - 1) + info->inter;
     *lo = fmin(a, b);
     *hi = fmax(a, b);
 }

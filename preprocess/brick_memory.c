@@ -6,7 +6,7 @@
 #include "report.h"
 #include "splats.h"
 
-enum { MOST_SLICES = 32 };
+enum { MAX_SLICES = 32 };
 
 /* Allocated by the input before there is a plan. */
 #define TAKEN_BYTES ((uint64_t)1 << 20)
@@ -30,13 +30,13 @@ typedef struct needs {
 
 static uint64_t tiles_of_largest_sheet(const trip_volume_info *info, const trip_piece_format *f)
 {
-    uint64_t most = 0;
+    uint64_t max = 0;
     for (int a = 0; a < 3; a++) {
         uint64_t tiles = (uint64_t)((info->dims[a] >> f->tile_log2) + 1) *
                          (uint64_t)((info->dims[(a + 1) % 3] >> f->tile_log2) + 1);
-        most = tiles > most ? tiles : most;
+        max = tiles > max ? tiles : max;
     }
-    return most;
+    return max;
 }
 
 static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, unsigned threads)
@@ -97,12 +97,12 @@ static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_
 static int refuse(const char *path, const trip_volume_info *info, const needs *n, unsigned threads,
                   int64_t slices)
 {
-    uint64_t least = TAKEN_BYTES + n->opened_bytes + n->late_bytes +
-                     reader_bytes(n, slices, false) + n->list_min_bytes;
+    uint64_t min = TAKEN_BYTES + n->opened_bytes + n->late_bytes + reader_bytes(n, slices, false) +
+                   n->list_min_bytes;
     return trip_fail(TRIP_ERROR, "brick", path,
                      "slices of %" PRId64 " x %" PRId64 " and %u threads need --memory %" PRIu64
                      "M at least%s",
-                     info->dims[0], info->dims[1], threads, (least >> 20) + 1,
+                     info->dims[0], info->dims[1], threads, (min >> 20) + 1,
                      threads > 1 ? "; fewer --threads need less" : "");
 }
 
@@ -111,8 +111,8 @@ unsigned trip_memory_plan_threads(const trip_piece_format *format, uint64_t memo
     uint64_t each = trip_splat_thread_bytes(format, true) + trip_list_builder_min_bytes(format, 2) -
                     trip_list_builder_min_bytes(format, 1);
     uint64_t fixed = OPENED_BYTES + LATE_BYTES, processors = trip_workers_processors();
-    uint64_t most = memory_bytes > fixed ? (memory_bytes - fixed) / 2 / each : 0;
-    return (unsigned)(most < 1 ? 1 : most < processors ? most : processors);
+    uint64_t max = memory_bytes > fixed ? (memory_bytes - fixed) / 2 / each : 0;
+    return (unsigned)(max < 1 ? 1 : max < processors ? max : processors);
 }
 
 int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_volume_info *info,
@@ -122,7 +122,7 @@ int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_v
     needs n = needs_of(info, format, threads);
     if (info->sparse) /* readers of sparse formats took what they need when they were opened */
         return try_slices(plan, &n, memory_bytes, 1, true) ? 0 : refuse(path, info, &n, threads, 1);
-    for (int64_t s = slices ? slices : MOST_SLICES; s >= (slices ? slices : 1); s /= 2)
+    for (int64_t s = slices ? slices : MAX_SLICES; s >= (slices ? slices : 1); s /= 2)
         if (try_slices(plan, &n, memory_bytes, s, true) && is_comfortable(plan, &n, memory_bytes))
             return 0;
     slices = slices ? slices : 1;

@@ -245,8 +245,8 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
     char needed[32], there[32];
     trip_brick_estimate e = { .voxels = in->grid_voxels, .kept = in->grid_voxels };
     estimate_sizes(in, format, plan, &e);
-    uint64_t most = in->params->most_bytes ? in->params->most_bytes : UINT64_MAX;
-    if (e.bytes + e.temporary_bytes <= e.free_bytes && e.bytes <= most)
+    uint64_t max = in->params->max_bytes ? in->params->max_bytes : UINT64_MAX;
+    if (e.bytes + e.temporary_bytes <= e.free_bytes && e.bytes <= max)
         return 0;
     double seconds = check_seconds + check_seconds_per_voxel * (double)in->grid_voxels;
     bool all = in->params->keep_all && !in->info->sparse;
@@ -254,11 +254,11 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
     if (status <= 0)
         return status;
     estimate_sizes(in, format, plan, &e);
-    if (surely * (double)e.bytes > (double)most)
+    if (surely * (double)e.bytes > (double)max)
         return trip_fail(TRIP_ERROR, "cache", in->params->input,
                          "its data set would take about %s of a cache of %s: TRIPTYCH_CACHE_SIZE "
                          "gives it more, `triptych brick` writes the data set elsewhere",
-                         trip_format_bytes(e.bytes, needed), trip_format_bytes(most, there));
+                         trip_format_bytes(e.bytes, needed), trip_format_bytes(max, there));
     if (surely * (double)(e.bytes + e.temporary_bytes) <= (double)e.free_bytes)
         return 0;
     return trip_fail(TRIP_ERROR, "brick", in->params->output,

@@ -21,8 +21,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
             v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes, v->allow_gaps);
     if (v->axes)
         fprintf(f, "axes %s\n", v->axes);
-    if (v->most_voxels)
-        fprintf(f, "at most %" PRIu64 "\n", v->most_voxels);
+    if (v->max_voxels)
+        fprintf(f, "at most %" PRIu64 "\n", v->max_voxels);
     if (v->coordinates)
         fprintf(f, "%s\n", v->coordinates);
     for (int a = 0; a < 3; a++)

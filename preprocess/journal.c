@@ -16,7 +16,7 @@
 #include "report.h"
 
 /* A record is never longer: no checkpoint adds that many sequences. */
-enum { RUN_BUFFER = 4096, RECORD_MOST_BYTES = 4 << 20 };
+enum { RUN_BUFFER = 4096, RECORD_MAX_BYTES = 4 << 20 };
 
 enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2, RECORD_OUTPUT = 3 };
 
@@ -74,7 +74,7 @@ static int append_record(trip_journal *j, enum record_kind kind, const void *rec
 /* Room for the longest record, from the budget; the caller releases it. */
 static void *take_room(const trip_journal *j)
 {
-    void *room = trip_budget_take(j->budget, RECORD_MOST_BYTES);
+    void *room = trip_budget_take(j->budget, RECORD_MAX_BYTES);
     if (!room)
         trip_fail(TRIP_ERROR, "brick", j->path,
                   "needs more memory than is allowed: give more with --memory");
@@ -84,16 +84,16 @@ static void *take_room(const trip_journal *j)
 /* Reads the record at `offset`; false where there is no sound one. */
 static bool read_record(const trip_journal *j, uint64_t offset, record_head *head, void *record)
 {
-    return read_at(j->file, offset, head, sizeof *head) && head->bytes <= RECORD_MOST_BYTES &&
+    return read_at(j->file, offset, head, sizeof *head) && head->bytes <= RECORD_MAX_BYTES &&
            read_at(j->file, offset + sizeof *head, record, head->bytes) &&
            XXH64(record, head->bytes, head->kind) == head->checksum;
 }
 
 /* For records with a sound checksum that no run writes: they may have been made on purpose. */
-static int fail_false(const trip_journal *j, const char *what)
+static int fail_false(const trip_journal *j, const char *stage)
 {
     return trip_fail(TRIP_ERROR, "brick", j->path,
-                     "%s is not what such a run writes: without --resume it starts again", what);
+                     "%s is not what such a run writes: without --resume it starts again", stage);
 }
 
 static int check_start(const trip_journal *j, const trip_journal_start *s)
@@ -261,7 +261,7 @@ static int read_journal(trip_journal *j, trip_spill *spill)
     void *record = take_room(j);
     int status = record ? read_records(j, spill, record) : TRIP_ERROR;
     if (record)
-        trip_budget_release(j->budget, record, RECORD_MOST_BYTES);
+        trip_budget_release(j->budget, record, RECORD_MAX_BYTES);
     return status;
 }
 

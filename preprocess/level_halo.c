@@ -18,7 +18,7 @@ typedef struct held_square {
 } held_square;
 
 typedef struct adding {
-    trip_level_places places;
+    trip_level_positions positions;
     trip_output *to;
     const int64_t *dims;
     bool round; /* `around` is turned round */
@@ -57,9 +57,9 @@ static size_t lay_out(adding *a, unsigned char *memory)
 uint64_t trip_level_halo_bytes(const int64_t dims[3], unsigned edge_log2, uint64_t voxels)
 {
     adding a = { .edge_log2 = edge_log2 };
-    const uint64_t places = trip_level_places_later_bytes(dims, edge_log2, voxels);
-    const uint64_t squares = trip_level_places_squares(dims, edge_log2, voxels);
-    return places + lay_out(&a, NULL) + 9 * 3 * squares * sizeof *a.mortons;
+    const uint64_t positions = trip_level_positions_later_bytes(dims, edge_log2, voxels);
+    const uint64_t squares = trip_level_positions_squares(dims, edge_log2, voxels);
+    return positions + lay_out(&a, NULL) + 9 * 3 * squares * sizeof *a.mortons;
 }
 
 /* ---- squares that may have something ---- */
@@ -97,18 +97,18 @@ static void add_about(adding *a, uint64_t key)
 /* The squares of a sheet and those beside, of all three. */
 static int find_squares(adding *a, uint64_t sheet)
 {
-    size_t places = 0, kept = 0;
+    size_t positions = 0, kept = 0;
     a->count = 0;
     for (int pass = 0; pass < 2; pass++)
         for (int n = -1; n <= 1; n++) {
             const trip_level_sheet *of =
                 sheet + (uint64_t)n < (uint64_t)a->dims[2]
-                    ? trip_level_places_sheet(&a->places, sheet + (uint64_t)n)
+                    ? trip_level_positions_sheet(&a->positions, sheet + (uint64_t)n)
                     : NULL;
             for (size_t i = 0; of && pass == 1 && i < of->count; i++)
-                add_about(a, of->places[i].key);
-            places += of ? of->count : 0;
-            if (pass == 0 && n == 1 && make_room(a, 9 * places))
+                add_about(a, of->positions[i].key);
+            positions += of ? of->count : 0;
+            if (pass == 0 && n == 1 && make_room(a, 9 * positions))
                 return TRIP_ERROR;
         }
     qsort(a->mortons, a->count, sizeof *a->mortons, compare);
@@ -121,22 +121,22 @@ static int find_squares(adding *a, uint64_t sheet)
 
 /* ---- a square ---- */
 
-static int read_voxels(const adding *a, const trip_level_place *place, trip_coarse_value *to)
+static int read_voxels(const adding *a, const trip_level_position *position, trip_coarse_value *to)
 {
-    return trip_output_read(a->places.file, place->at, to, place->count * sizeof *to);
+    return trip_output_read(a->positions.file, position->at, to, position->count * sizeof *to);
 }
 
-static int hold(adding *a, const trip_level_place *place, const held_square **out)
+static int hold(adding *a, const trip_level_position *position, const held_square **out)
 {
-    held_square *s = &a->squares[(place->key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
+    held_square *s = &a->squares[(position->key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
     *out = s;
-    if (s->held && s->key == place->key)
+    if (s->held && s->key == position->key)
         return 0;
-    int status = read_voxels(a, place, a->read);
-    s->key = place->key;
+    int status = read_voxels(a, position, a->read);
+    s->key = position->key;
     s->held = status == 0;
     memset(s->around, 255, sizeof *s->around << 2 * a->edge_log2);
-    for (uint32_t i = 0; i < place->count && status == 0; i++)
+    for (uint32_t i = 0; i < position->count && status == 0; i++)
         s->around[((size_t)a->read[i].v << a->edge_log2) + a->read[i].u] = a->read[i].around;
     return status;
 }
@@ -183,11 +183,12 @@ TRIP_ALSO_V3 static int find_near(adding *a, uint64_t key)
     memset(a->near, 255, sizeof *a->near * (edge_of(a) + 2) * (edge_of(a) + 2));
     for (int n = 0; n < 27 && status == 0; n++) {
         const int u = n % 3 - 1, v = n / 3 % 3 - 1;
-        const trip_level_place place = trip_level_place_beside(&a->places, key, u, v, n / 9 - 1);
+        const trip_level_position position =
+            trip_level_position_beside(&a->positions, key, u, v, n / 9 - 1);
         const held_square *square;
-        if (place.count == 0)
+        if (position.count == 0)
             continue;
-        status = hold(a, &place, &square);
+        status = hold(a, &position, &square);
         if (status == 0)
             take_near(a, square, u, v);
     }
@@ -211,14 +212,14 @@ static uint32_t merge(adding *a, uint64_t key, uint32_t own)
     uint32_t next = 0, count = 0;
     for (size_t y = 0; y < size[1]; y++)
         for (size_t x = 0; x < size[0]; x++) {
-            const uint16_t least = a->near[y * edge + x];
+            const uint16_t min = a->near[y * edge + x];
             if (next < own && a->read[next].u == x && a->read[next].v == y)
                 a->values[count++] = a->read[next++];
-            else if (least < TRIP_COARSE_ALL_KEPT)
+            else if (min < TRIP_COARSE_ALL_KEPT)
                 a->values[count++] =
                     (trip_coarse_value){ .u = (uint8_t)x,
                                          .v = (uint8_t)y,
-                                         .value = trip_coarse_turned(least, a->round),
+                                         .value = trip_coarse_turned(min, a->round),
                                          .around = TRIP_COARSE_NONE_KEPT };
         }
     return count;
@@ -226,7 +227,7 @@ static uint32_t merge(adding *a, uint64_t key, uint32_t own)
 
 static int add_square(adding *a, uint64_t key)
 {
-    const trip_level_place own = trip_level_place_beside(&a->places, key, 0, 0, 0);
+    const trip_level_position own = trip_level_position_beside(&a->positions, key, 0, 0, 0);
     const bool full = own.count == within(a, key, 0) * within(a, key, 1);
     int status = full ? 0 : find_near(a, key);
     if (status == 0 && own.count > 0)
@@ -253,14 +254,14 @@ static int add_sheets(adding *a)
     uint64_t sheet = 0, next;
     int status = 0;
     while (status == 0) {
-        status = trip_level_places_look_ahead(&a->places, sheet + 1);
-        const bool about = trip_level_places_sheet(&a->places, sheet + 1) ||
-                           trip_level_places_sheet(&a->places, sheet) ||
-                           (sheet > 0 && trip_level_places_sheet(&a->places, sheet - 1));
+        status = trip_level_positions_look_ahead(&a->positions, sheet + 1);
+        const bool about = trip_level_positions_sheet(&a->positions, sheet + 1) ||
+                           trip_level_positions_sheet(&a->positions, sheet) ||
+                           (sheet > 0 && trip_level_positions_sheet(&a->positions, sheet - 1));
         if (status == 0 && about && sheet < (uint64_t)a->dims[2])
             status = add_sheet(a, sheet);
         if (status == 0 && !about) {
-            status = trip_level_places_next(&a->places, &next);
+            status = trip_level_positions_next(&a->positions, &next);
             if (next == UINT64_MAX)
                 break;
             sheet = next - 1; /* at least one further, all up to the one behind being known */
@@ -275,7 +276,7 @@ int trip_level_halo_add(const trip_output *from, bool means, bool round, trip_ou
                         const int64_t dims[3], unsigned edge_log2, trip_budget *budget)
 {
     adding a = { .to = to, .dims = dims, .round = round, .edge_log2 = edge_log2, .budget = budget };
-    trip_level_places_open(&a.places, from, means, edge_log2, budget);
+    trip_level_positions_open(&a.positions, from, means, edge_log2, budget);
     a.bytes = lay_out(&a, NULL);
     a.memory = trip_budget_take(budget, a.bytes);
     int status = a.memory ? 0 : trip_level_fail_memory();
@@ -287,6 +288,6 @@ int trip_level_halo_add(const trip_output *from, bool means, bool round, trip_ou
         trip_budget_release(budget, a.memory, a.bytes);
     if (a.mortons)
         trip_budget_release(budget, a.mortons, a.room * sizeof *a.mortons);
-    trip_level_places_close(&a.places);
+    trip_level_positions_close(&a.positions);
     return status;
 }

@@ -6,7 +6,7 @@
 #ifndef TRIP_LEVEL_HALO_H
 #define TRIP_LEVEL_HALO_H
 
-#include "level_places.h"
+#include "level_positions.h"
 
 /* Copies a file of trip_level_file_append(), with means or without, into one without, and adds the
  * halo there; `round`: codes are turned round in `around`. `from` is flushed, `to` is to be. One

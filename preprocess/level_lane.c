@@ -73,17 +73,17 @@ static void touch(trip_level_lane *l, size_t at)
 }
 
 /* Where a voxel of the level below is added up, and how odd its coordinates are. */
-typedef struct place {
+typedef struct position {
     size_t at;
     unsigned odd;
-} place;
+} position;
 
-static place place_of(const trip_level_work *w, const trip_level_source *square, unsigned u,
-                      unsigned v)
+static position position_of(const trip_level_work *w, const trip_level_source *square, unsigned u,
+                            unsigned v)
 {
     const size_t x = (size_t)square->u + u, y = (size_t)square->v + v;
-    return (place){ (y >> 1 << w->edge_log2) + (x >> 1),
-                    (unsigned)((x & 1) | (y & 1) << 1) | square->odd << 2 };
+    return (position){ (y >> 1 << w->edge_log2) + (x >> 1),
+                       (unsigned)((x & 1) | (y & 1) << 1) | square->odd << 2 };
 }
 
 /* In a square four voxels that follow one another are of one coarse voxel; where that lies. */
@@ -117,7 +117,7 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
                        const trip_level_source *square, const trip_square *of)
 {
     const uint32_t corner = trip_square_corner(of);
-    const size_t first = place_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
+    const size_t first = position_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
     uint32_t sums[65]; /* of the codes before each */
     uint16_t codes[64], around[16];
     trip_square_codes(of, codes);
@@ -150,7 +150,7 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
     if (run->normals)
         trip_block_normals(run, of->first, of->count, normals);
     for (uint32_t i = 0; i < of->count; i++) {
-        const place p = place_of(w, square, trip_voxel_u(voxels[i]), trip_voxel_v(voxels[i]));
+        const position p = position_of(w, square, trip_voxel_u(voxels[i]), trip_voxel_v(voxels[i]));
         if (run->normals)
             gradient_of(w, normals[i], gradient);
         trip_coarse_mean_add_whole(&l->mean_sums[p.at], (uint16_t)trip_voxel_code(voxels[i]), p.odd,
@@ -203,7 +203,7 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
     int status = read_square(l, square);
     for (uint32_t i = 0; i < square->voxels.count && status == 0; i++) {
         const trip_coarse_value *value = &l->values_below[i];
-        const place p = place_of(w, square, value->u, value->v);
+        const position p = position_of(w, square, value->u, value->v);
         touch(l, p.at);
         trip_coarse_value_add(&l->value_sums[p.at], value, w->params->hidden_above);
         if (!l->means_below || !l->means_below[i].kept)
@@ -363,7 +363,7 @@ TRIP_ALSO_V3 int trip_level_lane_emit_values(trip_level_lane *l, const trip_leve
         if (status == 0)
             put_values(l, w, of->square.count, sheet);
     }
-    for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS && status == 0; list++)
+    for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MAX_LISTS && status == 0; list++)
         status = emit(l, w, list);
     return status;
 }

@@ -14,7 +14,7 @@ typedef struct square_header {
 static_assert(sizeof(square_header) == TRIP_LEVEL_SQUARE_BYTES, "what precedes voxels");
 
 /* Says of the square that it is at, of a sheet and a Morton code, where in the next level it is. */
-static void place(trip_level_source *s, uint64_t sheet, uint64_t morton)
+static void position(trip_level_source *s, uint64_t sheet, uint64_t morton)
 {
     unsigned up = s->edge_log2 + 1 - s->tile_log2;
     uint64_t within = morton & ((UINT64_C(1) << 2 * up) - 1);
@@ -73,7 +73,7 @@ static int next_of_file(trip_level_source *s)
         s->voxels.at = s->next + TRIP_LEVEL_SQUARE_BYTES;
         s->next = s->voxels.at + trip_level_voxels_bytes(s->voxels.count, s->means);
         if ((key >> TRIP_TILE_MORTON_BITS) % 2 == s->odd) {
-            place(s, key >> TRIP_TILE_MORTON_BITS, key & TILE_MASK);
+            position(s, key >> TRIP_TILE_MORTON_BITS, key & TILE_MASK);
             return 0;
         }
     }
@@ -87,7 +87,7 @@ int trip_level_source_next(trip_level_source *s)
         return next_of_file(s);
     int status = trip_list_cursor_next(s->cursor, &s->run);
     if (status == 1)
-        place(s, s->run.sheet, trip_morton(s->run.brick.tile_u, s->run.brick.tile_v));
+        position(s, s->run.sheet, trip_morton(s->run.brick.tile_u, s->run.brick.tile_v));
     return status < 0 ? status : 0;
 }
 

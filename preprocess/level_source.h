@@ -19,7 +19,7 @@ typedef struct trip_level_source {
     /* Of a list. */
     trip_list_cursor *cursor;
     bool kept;
-    trip_list_place run;
+    trip_list_position run;
     /* Of a file. */
     const trip_output *file;
     bool means; /* it has them */

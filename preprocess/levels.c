@@ -65,11 +65,11 @@ typedef struct making {
 unsigned trip_levels_count(const int64_t dims[3], int wanted, unsigned tile_voxels)
 {
     const int64_t last = wanted > 0 ? 1 : (int64_t)tile_voxels;
-    const unsigned most =
-        wanted > 0 && wanted < TRIP_LEVELS_MOST ? (unsigned)wanted : TRIP_LEVELS_MOST;
+    const unsigned max =
+        wanted > 0 && wanted < TRIP_LEVELS_MAX ? (unsigned)wanted : TRIP_LEVELS_MAX;
     unsigned levels = 0;
     for (int a = 0; a < 3 && wanted >= 0; a++)
-        while (levels < most && (dims[a] - 1) >> levels >= last)
+        while (levels < max && (dims[a] - 1) >> levels >= last)
             levels++;
     return levels;
 }
@@ -156,7 +156,7 @@ static uint64_t late_bytes(const making *m)
     if (has_halo_of_its_own(m)) /* a kept voxel has 26 beside it */
         bytes += trip_level_halo_bytes(m->dims, m->work.edge_log2, 27 * records_below(m));
     else if (m->work.format.halo)
-        bytes += trip_level_places_later_bytes(m->dims, m->work.edge_log2, records_below(m));
+        bytes += trip_level_positions_later_bytes(m->dims, m->work.edge_log2, records_below(m));
     return bytes;
 }
 
@@ -205,10 +205,10 @@ static int open_lanes(making *m)
 static int open_builder(making *m)
 {
     const trip_levels_params *p = m->work.params;
-    const uint64_t least = trip_list_builder_min_bytes(&m->work.format, m->lane_count);
-    const uint64_t wanted = least + records_below(m) * PIECE_BYTES, late = late_bytes(m);
+    const uint64_t min = trip_list_builder_min_bytes(&m->work.format, m->lane_count);
+    const uint64_t wanted = min + records_below(m) * PIECE_BYTES, late = late_bytes(m);
     uint64_t left = trip_budget_left_bytes(m->budget);
-    left = left > late + least ? left - late : least;
+    left = left > late + min ? left - late : min;
     for (size_t i = 0; i < trip_spill_count(p->spill); i++)
         trip_spill_retire(p->spill, i);
     trip_list_builder_params b = { .format = m->work.format,
@@ -433,11 +433,11 @@ static size_t file_buffer_bytes(const making *m, uint64_t voxels, bool means)
 {
     const uint64_t grid = (uint64_t)m->dims[0] * (uint64_t)m->dims[1] * (uint64_t)m->dims[2];
     const uint64_t each = TRIP_LEVEL_SQUARE_BYTES + trip_level_voxels_bytes(1, means);
-    const uint64_t most = trip_budget_left_bytes(m->budget) / FILE_PART;
-    const uint64_t least = FILE_BUFFER_BYTES, all = (voxels < grid ? voxels : grid) * each;
-    uint64_t bytes = all < most ? all : most;
-    bytes -= bytes % least;
-    return bytes < least ? least : bytes;
+    const uint64_t max = trip_budget_left_bytes(m->budget) / FILE_PART;
+    const uint64_t min = FILE_BUFFER_BYTES, all = (voxels < grid ? voxels : grid) * each;
+    uint64_t bytes = all < max ? all : max;
+    bytes -= bytes % min;
+    return bytes < min ? min : bytes;
 }
 
 /* A file without a name, in memory where there is enough. */

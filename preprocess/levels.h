@@ -12,7 +12,7 @@
 #include "normal.h"
 
 /* Levels above 0. */
-enum { TRIP_LEVELS_MOST = 24 };
+enum { TRIP_LEVELS_MAX = 24 };
 
 /* What lists a level above 0 has, three each: of means, which are drawn as splats, before those of
  * values, which are interpolated. */

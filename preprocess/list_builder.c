@@ -17,16 +17,15 @@ enum { ORDERED_LIST = TRIP_ORDERED_LIST };
 typedef struct job {
     struct job *next;
     bool ordered;
-    trip_chain chains[TRIP_MOST_LISTS];
+    trip_chain chains[TRIP_MAX_LISTS];
     trip_checkpoint *checkpoint; /* to be written once it is done; or NULL */
 } job;
 
 struct trip_list_builder {
     trip_list_builder_params params;
     unsigned lists;
-    uint32_t (
-        *open)[TRIP_MOST_LISTS]; /* [producer][list], the chunk being filled; the producer's */
-    trip_list_output outputs[TRIP_MOST_LISTS]; /* until the merge only the background thread uses
+    uint32_t (*open)[TRIP_MAX_LISTS]; /* [producer][list], the chunk being filled; the producer's */
+    trip_list_output outputs[TRIP_MAX_LISTS]; /* until the merge only the background thread uses
                                                   that of the ordered list */
     pthread_t thread;
     bool thread_runs;
@@ -37,7 +36,7 @@ struct trip_list_builder {
     trip_piece_pool pool;
     bool stopping, has_spilled;
     int status;
-    trip_chain filled[TRIP_MOST_LISTS];
+    trip_chain filled[TRIP_MAX_LISTS];
     job *first_job, *last_job;
     unsigned jobs; /* waiting or being done */
 };
@@ -222,9 +221,9 @@ int trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned 
  * other half meanwhile; if all splats seem to fit, only when memory is nearly full. */
 static bool is_time_to_spill(const trip_list_builder *b, double done)
 {
-    const double most = 0.9 * (double)b->pool.chunk_count, now = spillable(b);
-    bool fits = !b->has_spilled && now <= most * done;
-    return now >= (fits ? most : (double)b->pool.chunk_count / 2);
+    const double max = 0.9 * (double)b->pool.chunk_count, now = spillable(b);
+    bool fits = !b->has_spilled && now <= max * done;
+    return now >= (fits ? max : (double)b->pool.chunk_count / 2);
 }
 
 int trip_list_builder_end_batch(trip_list_builder *b, double done)
@@ -305,7 +304,7 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
     pthread_mutex_init(&b->lock, NULL);
     pthread_cond_init(&b->work, NULL);
     pthread_cond_init(&b->freed, NULL);
-    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+    for (unsigned list = 0; list < TRIP_MAX_LISTS; list++)
         b->filled[list] = trip_chain_empty();
     int status = create_parts(b, budget);
     if (status == 0)
@@ -337,7 +336,7 @@ void trip_list_builder_destroy(trip_list_builder *b)
     if (!b)
         return;
     stop_thread(b, true);
-    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+    for (unsigned list = 0; list < TRIP_MAX_LISTS; list++)
         trip_list_output_destroy(&b->outputs[list]);
     trip_piece_pool_destroy(&b->pool);
     free(b->open);

@@ -44,7 +44,7 @@ int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *po
 /* Used by all workers. */
 typedef struct merge_job {
     const trip_list_merge *merge;
-    unsigned lists[TRIP_MOST_LISTS];
+    unsigned lists[TRIP_MAX_LISTS];
     pthread_mutex_t lock; /* guards the pool's free chain */
 } merge_job;
 
@@ -156,17 +156,17 @@ static int make_room(merge_job *job)
     size_t sequences = 0;
     int status = 0;
     unsigned lists = 0;
-    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++) {
+    for (unsigned list = 0; list < TRIP_MAX_LISTS; list++) {
         sequences += m->lists[list] ? sequences_of(m, list) : 0;
         lists += m->lists[list];
     }
     if (sequences <= m->pool->free.chunks)
         return 0;
-    for (unsigned list = 0; list < TRIP_MOST_LISTS && status == 0; list++) {
+    for (unsigned list = 0; list < TRIP_MAX_LISTS && status == 0; list++) {
         status = trip_spill_chain(m->spill, list, m->pool, &m->in_memory[list]);
         trip_chain_free(m->pool, &m->in_memory[list]);
     }
-    for (unsigned list = 0; list < TRIP_MOST_LISTS && status == 0; list++)
+    for (unsigned list = 0; list < TRIP_MAX_LISTS && status == 0; list++)
         while (status == 0 && sequences_of(m, list) > m->pool->free.chunks / (size_t)lists)
             status = consolidate(job, list);
     return status;
@@ -175,7 +175,7 @@ static int make_room(merge_job *job)
 static uint64_t splats_so_far(const trip_list_merge *m)
 {
     uint64_t splats = 0;
-    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+    for (unsigned list = 0; list < TRIP_MAX_LISTS; list++)
         splats += atomic_load_explicit(&m->outputs[list].splats, memory_order_relaxed);
     return splats;
 }
@@ -185,7 +185,7 @@ int trip_list_merge_run(const trip_list_merge *m, trip_workers *workers,
 {
     merge_job job = { .merge = m };
     unsigned lists = 0;
-    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+    for (unsigned list = 0; list < TRIP_MAX_LISTS; list++)
         if (m->lists[list])
             job.lists[lists++] = list;
     pthread_mutex_init(&job.lock, NULL);

@@ -12,8 +12,8 @@ typedef struct trip_list_merge {
     trip_piece_pool *pool; /* its free chunks become the sequences' read buffers */
     trip_chain *in_memory; /* of each list */
     trip_spill *spill;
-    trip_list_output *outputs;   /* of each list */
-    bool lists[TRIP_MOST_LISTS]; /* to merge */
+    trip_list_output *outputs;  /* of each list */
+    bool lists[TRIP_MAX_LISTS]; /* to merge */
     const trip_quantiser *quantiser;
 } trip_list_merge;
 

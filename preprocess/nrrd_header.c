@@ -68,11 +68,12 @@ int trip_nrrd_fail(const trip_nrrd_parser *p, int line, const char *why, ...)
     return trip_fail(TRIP_ERROR, "read", where, "%s", text);
 }
 
-void trip_nrrd_warn_unknown(const trip_nrrd_parser *p, int line, const char *what, const char *text)
+void trip_nrrd_warn_unknown(const trip_nrrd_parser *p, int line, const char *stage,
+                            const char *text)
 {
     char where[4200];
     snprintf(where, sizeof where, "%s: line %d", p->path, line);
-    trip_warn(where, "unknown %s \"%.40s\" is ignored", what, text);
+    trip_warn(where, "unknown %s \"%.40s\" is ignored", stage, text);
 }
 
 char *trip_nrrd_next_line(trip_nrrd_parser *p)

@@ -46,7 +46,7 @@ typedef struct trip_nrrd_parser {
 __attribute__((format(printf, 3, 4))) int trip_nrrd_fail(const trip_nrrd_parser *p, int line,
                                                          const char *why, ...);
 /* Warns that `text`, a field or a value (`what`), is unknown and ignored. */
-void trip_nrrd_warn_unknown(const trip_nrrd_parser *p, int line, const char *what,
+void trip_nrrd_warn_unknown(const trip_nrrd_parser *p, int line, const char *stage,
                             const char *text);
 
 /* The next line without its end, NULL after the last. */

@@ -7,7 +7,7 @@
 #include "report.h"
 
 enum {
-    MOST_VOXELS = 128, /* along each axis of the level that is read */
+    MAX_VOXELS = 128, /* along each axis of the level that is read */
     ALONG_Z = 2,
     WHOLE_VOXEL = 1023, /* weight of a voxel of the greatest value */
 };
@@ -24,7 +24,7 @@ static void choose_level(summing *s)
 {
     const trip_occupancy_params *p = s->params;
     for (int a = 0; a < 3; a++)
-        while (s->level < p->levels && (p->dims[a] - 1) >> s->level >= MOST_VOXELS)
+        while (s->level < p->levels && (p->dims[a] - 1) >> s->level >= MAX_VOXELS)
             s->level++;
     for (int a = 0; a < 3; a++) {
         int64_t last = (p->dims[a] - 1) >> s->level;
@@ -63,46 +63,46 @@ static uint64_t weight_of(const summing *s, unsigned code)
     return (uint64_t)(mean * kept + 0.5);
 }
 
-static void add_square(summing *s, const trip_list_place *place, const trip_square *square)
+static void add_square(summing *s, const trip_list_position *position, const trip_square *square)
 {
     const int *dims = s->dims;
     const unsigned tile_log2 = s->params->tile_log2;
-    const uint64_t plane = (uint64_t)(place->sheet >> s->shift[2]) * (uint64_t)dims[1];
+    const uint64_t plane = (uint64_t)(position->sheet >> s->shift[2]) * (uint64_t)dims[1];
     uint32_t voxels[64];
     trip_square_voxels(square, voxels);
     for (uint32_t n = 0; n < square->count; n++) {
-        uint64_t i =
-            (((uint64_t)place->brick.tile_u << tile_log2) + trip_voxel_u(voxels[n])) >> s->shift[0];
-        uint64_t j =
-            (((uint64_t)place->brick.tile_v << tile_log2) + trip_voxel_v(voxels[n])) >> s->shift[1];
+        uint64_t i = (((uint64_t)position->brick.tile_u << tile_log2) + trip_voxel_u(voxels[n])) >>
+                     s->shift[0];
+        uint64_t j = (((uint64_t)position->brick.tile_v << tile_log2) + trip_voxel_v(voxels[n])) >>
+                     s->shift[1];
         s->weights[(plane + j) * (uint64_t)dims[0] + i] += weight_of(s, trip_voxel_code(voxels[n]));
     }
 }
 
-static void add_run(summing *s, const trip_list_place *place, const trip_block *run)
+static void add_run(summing *s, const trip_list_position *position, const trip_block *run)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     const uint32_t count = trip_block_squares(run, squares);
     for (uint32_t i = 0; i < count; i++)
-        add_square(s, place, &squares[i]);
+        add_square(s, position, &squares[i]);
 }
 
 static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *buffer,
                       trip_budget *budget)
 {
     trip_list_cursor *cursor;
-    trip_list_place place;
+    trip_list_position position;
     trip_block run;
     int status = trip_list_cursor_open(&cursor, w, list_of(s), odd, false, budget);
     if (status < 0)
         return status;
-    while ((status = trip_list_cursor_next(cursor, &place)) > 0) {
-        status = trip_list_cursor_read(cursor, &place, 0, buffer, &run);
+    while ((status = trip_list_cursor_next(cursor, &position)) > 0) {
+        status = trip_list_cursor_read(cursor, &position, 0, buffer, &run);
         if (status == 0 && trip_interrupted())
             status = trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted");
         if (status < 0)
             break;
-        add_run(s, &place, &run);
+        add_run(s, &position, &run);
     }
     trip_list_cursor_close(cursor);
     return status;
@@ -112,12 +112,12 @@ static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *bu
 static void scale_weights(const summing *s, trip_occupancy *o)
 {
     const size_t count = (size_t)s->dims[0] * (size_t)s->dims[1] * (size_t)s->dims[2];
-    uint64_t most = 1;
+    uint64_t max = 1;
     memcpy(o->dims, s->dims, sizeof o->dims);
     for (size_t i = 0; i < count; i++)
-        most = s->weights[i] > most ? s->weights[i] : most;
+        max = s->weights[i] > max ? s->weights[i] : max;
     for (size_t i = 0; i < count; i++)
-        o->weights[i] = (uint16_t)((double)s->weights[i] / (double)most * UINT16_MAX + 0.5);
+        o->weights[i] = (uint16_t)((double)s->weights[i] / (double)max * UINT16_MAX + 0.5);
 }
 
 int trip_occupancy_read(trip_occupancy *o, trip_writer *w, const trip_occupancy_params *params,

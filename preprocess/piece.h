@@ -20,7 +20,7 @@
 #include "format.h"
 
 /* Lists by number: of kept voxels along X, Y and Z, then of their halo. */
-enum { TRIP_HALO_LISTS = 3, TRIP_MOST_LISTS = 6 };
+enum { TRIP_HALO_LISTS = 3, TRIP_MAX_LISTS = 6 };
 
 static inline int trip_list_axis(unsigned list)
 {
@@ -54,10 +54,10 @@ static inline void trip_quantiser_set_bytes(trip_quantiser *q, double first, dou
 /* The nearest code; of NaN the least. */
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
 {
-    const uint32_t step = q->bytes ? TRIP_CODE_STEP : 1, least = q->bytes ? TRIP_CODE_FIRST : 0,
-                   most = q->bytes ? TRIP_CODE_FIRST + 255 : 65535;
+    const uint32_t step = q->bytes ? TRIP_CODE_STEP : 1, min = q->bytes ? TRIP_CODE_FIRST : 0,
+                   max = q->bytes ? TRIP_CODE_FIRST + 255 : 65535;
     double code = (value - q->lo) * (65535 / step / (q->hi - q->lo)) + 0.5;
-    return step * (!(code > least) ? least : code >= most ? most : (uint32_t)code);
+    return step * (!(code > min) ? min : code >= max ? max : (uint32_t)code);
 }
 
 /* The format of all pieces that one bricking makes; those of the halo have no normals. */
@@ -70,7 +70,7 @@ typedef struct trip_piece_format {
 
 static inline unsigned trip_piece_list_count(const trip_piece_format *f)
 {
-    return f->halo ? TRIP_MOST_LISTS : TRIP_HALO_LISTS;
+    return f->halo ? TRIP_MAX_LISTS : TRIP_HALO_LISTS;
 }
 
 /* 64-bit words of a tile's bitmap. */

@@ -43,7 +43,7 @@ int trip_piece_pool_create(trip_piece_pool *pool, const trip_piece_format *f, co
     *pool = (trip_piece_pool){ .budget = budget,
                                .chunk_bytes = trip_chunk_bytes(f),
                                .free = trip_chain_empty() };
-    for (unsigned list = 0; list < TRIP_MOST_LISTS; list++)
+    for (unsigned list = 0; list < TRIP_MAX_LISTS; list++)
         pool->formats[list] = trip_piece_format_of(f, list);
     count_key_bits(pool, dims);
     pool->chunk_count = (bytes < MAX_POOL_BYTES ? bytes : MAX_POOL_BYTES) / pool->chunk_bytes;

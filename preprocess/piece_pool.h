@@ -24,7 +24,7 @@ static inline trip_chain trip_chain_empty(void)
 }
 
 typedef struct trip_piece_pool {
-    trip_piece_format formats[TRIP_MOST_LISTS]; /* of the pieces of each list */
+    trip_piece_format formats[TRIP_MAX_LISTS]; /* of the pieces of each list */
     trip_budget *budget;
     unsigned tile_bits, sheet_bits; /* significant ones in keys */
     size_t chunk_bytes, chunk_count;

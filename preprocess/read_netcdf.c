@@ -3,8 +3,9 @@
  * its own name has that for coordinates. What an attribute names as fill or missing is no value.
  * Whole numbers have no sign where the attribute _Unsigned is "true": two of the forms have no type
  * for such numbers.
- * Those of netCDF-4 are read_netcdf4.c's. Not by libnetcdf as these: nc_open() of 4.9.0 writes beyond
- * its memory and takes gigabytes for damaged files, and reads shortened ones as if they were whole. */
+ * Those of netCDF-4 are read_netcdf4.c's. Not by libnetcdf as these: nc_open() of 4.9.0 writes
+ * beyond its memory and takes gigabytes for damaged files, and reads shortened ones as if they were
+ * whole. */
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -21,8 +22,8 @@
 #include "volume_reader.h"
 
 enum {
-    HEADER_MOST = 1 << 20, /* with what is made of it, some 14 MB */
-    DIMS_MOST = 32,        /* of a variable */
+    HEADER_MAX = 1 << 20, /* with what is made of it, some 14 MB */
+    DIMS_MAX = 32,        /* of a variable */
     TAG_DIMENSION = 10,
     TAG_VARIABLE = 11,
     TAG_ATTRIBUTE = 12,
@@ -48,7 +49,7 @@ typedef struct dimension {
 typedef struct variable {
     text name;
     unsigned dims;
-    uint64_t dim[DIMS_MOST];
+    uint64_t dim[DIMS_MAX];
     int scalar;       /* trip_scalar; -1: characters */
     bool is_unsigned; /* whatever the type is that the file says */
     uint64_t begin;
@@ -110,10 +111,10 @@ static text take_text(header *h)
 }
 
 /* How many items a list announced by a tag has, of at least `least` bytes each. */
-static uint64_t take_list(header *h, unsigned tag, unsigned least)
+static uint64_t take_list(header *h, unsigned tag, unsigned min)
 {
     uint64_t is = take_number(h, 4), count = take_count(h);
-    if ((is != tag && !(is == 0 && count == 0)) || count > (h->count - h->at) / least)
+    if ((is != tag && !(is == 0 && count == 0)) || count > (h->count - h->at) / min)
         h->broken = true;
     return h->broken ? 0 : count;
 }
@@ -224,7 +225,7 @@ static void take_variable(header *h, variable *v)
 {
     v->name = take_text(h);
     uint64_t dims = take_count(h);
-    if (dims > DIMS_MOST) {
+    if (dims > DIMS_MAX) {
         h->broken = true;
         return;
     }
@@ -330,7 +331,7 @@ static int read_header(header *h, int fd, const char *path)
         return trip_fail_errno("read", path, "cannot open");
     h->path = path;
     h->file_bytes = (uint64_t)st.st_size;
-    h->count = h->file_bytes < HEADER_MOST ? (size_t)h->file_bytes : HEADER_MOST;
+    h->count = h->file_bytes < HEADER_MAX ? (size_t)h->file_bytes : HEADER_MAX;
     h->bytes = malloc(h->count + 1);
     if (!h->bytes)
         return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
@@ -343,10 +344,10 @@ static int read_header(header *h, int fd, const char *path)
         return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
     if (!h->broken)
         return 0;
-    const char *what = h->file_bytes > HEADER_MOST
-                           ? "its header makes no sense, or is longer than 1 MiB"
-                           : "its header makes no sense";
-    return trip_fail(TRIP_ERROR, "read", path, "byte %zu: %s", h->at, what);
+    const char *stage = h->file_bytes > HEADER_MAX
+                            ? "its header makes no sense, or is longer than 1 MiB"
+                            : "its header makes no sense";
+    return trip_fail(TRIP_ERROR, "read", path, "byte %zu: %s", h->at, stage);
 }
 
 /* ---- the volume ---- */
@@ -421,11 +422,11 @@ static int read_coordinates(const header *h, int fd, const variable *v, double *
     unsigned char piece[PIECE_BYTES];
     const unsigned bytes = bytes_of(v);
     const uint64_t stride = has_records(h, v) ? h->record_bytes : bytes;
-    const uint64_t most = stride < sizeof piece ? sizeof piece / stride : 1;
+    const uint64_t max = stride < sizeof piece ? sizeof piece / stride : 1;
     int status = 0;
     for (uint64_t i = 0, n; i < count && !status; i += n) {
         uint64_t at;
-        n = count - i < most ? count - i : most;
+        n = count - i < max ? count - i : max;
         if (__builtin_mul_overflow(i, stride, &at) || __builtin_add_overflow(at, v->begin, &at) ||
             at > h->file_bytes)
             at = h->file_bytes;

@@ -286,8 +286,8 @@ static void set_scaling(const nifti_2_header *n, trip_volume_info *info)
 static int open_values(const char *path, const header *h, const trip_volume_info *info,
                        void **state)
 {
-    int64_t least = h->own_file ? 0 : h->n.magic[2] == '2' ? 544 : 352;
-    if (h->n.vox_offset < least)
+    int64_t min = h->own_file ? 0 : h->n.magic[2] == '2' ? 544 : 352;
+    if (h->n.vox_offset < min)
         return trip_fail(TRIP_ERROR, "read", path,
                          "its values should start inside its header or nowhere (vox_offset)");
     int64_t beyond = 1;

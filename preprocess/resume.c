@@ -93,7 +93,7 @@ static int read_block(replay *r, uint32_t *words)
     int status = 0;
     for (*words = 0; status == 0 && (end = trip_block_end(r->form, r->block, *words)) > *words;
          *words = end)
-        status = end <= trip_block_most_words(r->form)
+        status = end <= trip_block_max_words(r->form)
                      ? read_next(r, TRIP_PLANE_VOXELS, r->block + *words,
                                  (end - *words) * sizeof *r->block)
                      : fail_damaged();

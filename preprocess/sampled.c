@@ -227,20 +227,20 @@ static int64_t samples_along(int64_t voxels, int64_t step)
     return (voxels - 1) / step + 1;
 }
 
-static int64_t step_for(const int64_t dims[3], uint64_t most_voxels)
+static int64_t step_for(const int64_t dims[3], uint64_t max_voxels)
 {
     int64_t step = 1;
     while ((double)samples_along(dims[0], step) * (double)samples_along(dims[1], step) *
                (double)samples_along(dims[2], step) >
-           (double)most_voxels)
+           (double)max_voxels)
         step++;
     return step;
 }
 
 int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volume_info *info,
-                      uint64_t most_voxels, trip_budget *budget)
+                      uint64_t max_voxels, trip_budget *budget)
 {
-    const int64_t step = step_for(info->dims, most_voxels);
+    const int64_t step = step_for(info->dims, max_voxels);
     if (step == 1)
         return 0;
     sampled *s = trip_budget_take(budget, sizeof *s);

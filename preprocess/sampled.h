@@ -9,6 +9,6 @@
  * *state and *info are its own from then on; where it has no more anyway all stays as it is. A
  * reported failure leaves them as they are. */
 int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volume_info *info,
-                      uint64_t most_voxels, trip_budget *budget);
+                      uint64_t max_voxels, trip_budget *budget);
 
 #endif

@@ -229,10 +229,10 @@ static bool check_range(double lo, double hi)
  * range then stays within its bins. */
 static bool check_bins(const trip_tally *t)
 {
-    const int64_t most = INT64_C(1) << 26; /* see last_bit() */
+    const int64_t max = INT64_C(1) << 26; /* see last_bit() */
     uint64_t sum = 0;
-    if (!check_range(t->value_min, t->value_max) || t->exponent < -149 || t->first < -most ||
-        t->first > most || t->exponent > exponent_for(t->value_min, t->value_max))
+    if (!check_range(t->value_min, t->value_max) || t->exponent < -149 || t->first < -max ||
+        t->first > max || t->exponent > exponent_for(t->value_min, t->value_max))
         return false;
     double first = floor(ldexp(t->value_min, -t->exponent));
     double last = floor(ldexp(t->value_max, -t->exponent));

@@ -41,26 +41,26 @@ void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, boo
 {
     *s =
         (trip_sharpen){ .file = file, .edge_log2 = edge_log2, .round = round, .sheet = UINT64_MAX };
-    trip_level_places_open(&s->places, file, means, edge_log2, budget);
+    trip_level_positions_open(&s->positions, file, means, edge_log2, budget);
 }
 
 void trip_sharpen_close(trip_sharpen *s)
 {
-    trip_level_places_close(&s->places);
+    trip_level_positions_close(&s->positions);
     *s = (trip_sharpen){ 0 };
 }
 
 /* ---- squares ---- */
 
 /* `values`: of the lane, for what is read. */
-static int read_square(const trip_sharpen *s, const trip_level_place *place,
+static int read_square(const trip_sharpen *s, const trip_level_position *position,
                        trip_coarse_value *values, trip_sharpen_square *to)
 {
-    int status = trip_output_read(s->file, place->at, values, place->count * sizeof *values);
-    to->key = place->key;
+    int status = trip_output_read(s->file, position->at, values, position->count * sizeof *values);
+    to->key = position->key;
     to->held = status == 0;
     memset(to->known, 0, sizeof *to->known << 2 * s->edge_log2);
-    for (uint32_t i = 0; i < place->count && status == 0; i++) {
+    for (uint32_t i = 0; i < position->count && status == 0; i++) {
         const size_t at = ((size_t)values[i].v << s->edge_log2) + values[i].u;
         to->known[at] = UINT16_MAX;
         to->values[at] = values[i].value;
@@ -68,13 +68,15 @@ static int read_square(const trip_sharpen *s, const trip_level_place *place,
     return status;
 }
 
-static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place *place,
-                       const trip_sharpen_square **out)
+static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l,
+                       const trip_level_position *position, const trip_sharpen_square **out)
 {
     trip_sharpen_square *square =
-        &l->squares[1 + (place->key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
+        &l->squares[1 + (position->key * UINT64_C(0x9e3779b97f4a7c15) >> 32) % HELD];
     *out = square;
-    return square->held && square->key == place->key ? 0 : read_square(s, place, l->beside, square);
+    return square->held && square->key == position->key
+               ? 0
+               : read_square(s, position, l->beside, square);
 }
 
 /* Where the others are there. */
@@ -99,19 +101,21 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
     }
 }
 
-static int add_square(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place *place,
-                      size_t row, size_t count, size_t column, size_t width, ptrdiff_t shift)
+static int add_square(const trip_sharpen *s, trip_sharpen_lane *l,
+                      const trip_level_position *position, size_t row, size_t count, size_t column,
+                      size_t width, ptrdiff_t shift)
 {
     const trip_sharpen_square *other = NULL;
-    int status = place->count > 0 ? hold_square(s, l, place, &other) : 0;
-    if (status == 0 && place->count > 0)
+    int status = position->count > 0 ? hold_square(s, l, position, &other) : 0;
+    if (status == 0 && position->count > 0)
         add_beside(s, l, other, row, count, column, width, shift);
     return status;
 }
 
 /* Along u and v, within the square at hand and from those around it; and from the sheets before and
  * behind. */
-static int add_around(const trip_sharpen *s, trip_sharpen_lane *l, const trip_level_place beside[6])
+static int add_around(const trip_sharpen *s, trip_sharpen_lane *l,
+                      const trip_level_position beside[6])
 {
     const size_t edge = (size_t)1 << s->edge_log2, last = edge - 1;
     const ptrdiff_t down = (ptrdiff_t)edge, across = (ptrdiff_t)last;
@@ -151,12 +155,12 @@ static uint16_t sharpened_value(const trip_sharpen *s, const trip_coarse_value *
 TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
                                  const trip_sharpen_neighbourhood *of)
 {
-    const trip_level_place *place = &of->square;
-    int status = read_square(s, place, l->values, &l->squares[0]);
+    const trip_level_position *position = &of->square;
+    int status = read_square(s, position, l->values, &l->squares[0]);
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     if (status == 0)
         status = add_around(s, l, of->beside);
-    for (uint32_t i = 0; i < place->count && status == 0; i++) {
+    for (uint32_t i = 0; i < position->count && status == 0; i++) {
         trip_coarse_value *voxel = &l->values[i];
         const int32_t sum = l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u];
         voxel->value = sharpened_value(s, voxel, sum);
@@ -170,11 +174,11 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
 static int next_sheet(trip_sharpen *s, uint64_t *first)
 {
     const uint64_t behind = s->sheet + TRIP_SHARPEN_SHEETS;
-    if (s->sheet != UINT64_MAX && trip_level_places_sheet(&s->places, behind)) {
+    if (s->sheet != UINT64_MAX && trip_level_positions_sheet(&s->positions, behind)) {
         *first = behind;
         return 0;
     }
-    int status = trip_level_places_next(&s->places, first);
+    int status = trip_level_positions_next(&s->positions, first);
     if (*first != UINT64_MAX)
         *first = *first / TRIP_SHARPEN_SHEETS * TRIP_SHARPEN_SHEETS;
     return status;
@@ -185,38 +189,38 @@ static void find_beside(const trip_sharpen *s, trip_sharpen_neighbourhood *of)
     const uint64_t key = of->square.key;
     for (int i = 0; i < 6; i++) {
         const int step = i % 2 ? 1 : -1;
-        of->beside[i] = trip_level_place_beside(&s->places, key, i / 2 == 0 ? step : 0,
-                                                i / 2 == 1 ? step : 0, i / 2 == 2 ? step : 0);
+        of->beside[i] = trip_level_position_beside(&s->positions, key, i / 2 == 0 ? step : 0,
+                                                   i / 2 == 1 ? step : 0, i / 2 == 2 ? step : 0);
     }
 }
 
 /* Of a sheet of the columns at hand the square that is next; NULL: there is none. */
-static const trip_level_place *next_place(const trip_sharpen *s, unsigned i)
+static const trip_level_position *next_position(const trip_sharpen *s, unsigned i)
 {
-    const trip_level_sheet *sheet = trip_level_places_sheet(&s->places, s->sheet + i);
-    return sheet && s->next[i] < sheet->count ? &sheet->places[s->next[i]] : NULL;
+    const trip_level_sheet *sheet = trip_level_positions_sheet(&s->positions, s->sheet + i);
+    return sheet && s->next[i] < sheet->count ? &sheet->positions[s->next[i]] : NULL;
 }
 
 /* Where the next column lies in its sheets; UINT64_MAX: there is none in those at hand. */
 static uint64_t next_morton(const trip_sharpen *s)
 {
-    uint64_t least = UINT64_MAX;
+    uint64_t min = UINT64_MAX;
     for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS && s->sheet != UINT64_MAX; i++) {
-        const trip_level_place *place = next_place(s, i);
-        if (place && (place->key & TILE_MASK) < least)
-            least = place->key & TILE_MASK;
+        const trip_level_position *position = next_position(s, i);
+        if (position && (position->key & TILE_MASK) < min)
+            min = position->key & TILE_MASK;
     }
-    return least;
+    return min;
 }
 
 static void take_column(trip_sharpen *s, uint64_t morton, trip_sharpen_column *column)
 {
     *column = (trip_sharpen_column){ .sheet = s->sheet, .morton = morton };
     for (unsigned i = 0; i < TRIP_SHARPEN_SHEETS; i++) {
-        const trip_level_place *place = next_place(s, i);
-        if (!place || (place->key & TILE_MASK) != morton)
+        const trip_level_position *position = next_position(s, i);
+        if (!position || (position->key & TILE_MASK) != morton)
             continue;
-        column->squares[i].square = *place;
+        column->squares[i].square = *position;
         find_beside(s, &column->squares[i]);
         s->next[i]++;
     }
@@ -232,7 +236,7 @@ int trip_sharpen_take(trip_sharpen *s, trip_sharpen_column *column)
             return status;
         s->sheet = first;
         memset(s->next, 0, sizeof s->next);
-        status = trip_level_places_look_ahead(&s->places, first + TRIP_SHARPEN_SHEETS);
+        status = trip_level_positions_look_ahead(&s->positions, first + TRIP_SHARPEN_SHEETS);
         if (status < 0)
             return status;
     }

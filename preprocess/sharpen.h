@@ -16,7 +16,7 @@
 #define TRIP_SHARPEN_H
 
 #include "coarse.h"
-#include "level_places.h"
+#include "level_positions.h"
 
 /* An eighth undoes it for what is smooth. */
 enum { TRIP_SHARPEN_PART = 8 };
@@ -29,7 +29,7 @@ enum { TRIP_SHARPEN_SHEETS = TRIP_LEVEL_SHEETS_HELD - 2 };
 /* A square, and those beside it, which have no voxels where the count is 0: along u, along v, in
  * the sheets before and behind. */
 typedef struct trip_sharpen_neighbourhood {
-    trip_level_place square, beside[6];
+    trip_level_position square, beside[6];
 } trip_sharpen_neighbourhood;
 
 typedef struct trip_sharpen_column {
@@ -48,7 +48,7 @@ typedef struct trip_sharpen {
     const trip_output *file;
     unsigned edge_log2;
     bool round; /* what is not kept lies above what is */
-    trip_level_places places;
+    trip_level_positions positions;
     uint64_t sheet;                   /* the first of the columns at hand */
     size_t next[TRIP_SHARPEN_SHEETS]; /* square of each of their sheets */
 } trip_sharpen;

@@ -112,14 +112,14 @@ static void end(XXH3_state_t *hash, trip_digest *out)
 
 static void add_state(XXH3_state_t *hash, const trip_source_file *f)
 {
-    char *place = realpath(f->path, NULL);
-    const char *name = place ? place : f->path;
+    char *position = realpath(f->path, NULL);
+    const char *name = position ? position : f->path;
     const uint64_t numbers[] = { f->inode, f->bytes, (uint64_t)f->modified_ns,
                                  (uint64_t)f->changed_ns };
     XXH3_128bits_update(hash, name, strlen(name) + 1);
     XXH3_128bits_update(hash, base_name(f->path), strlen(base_name(f->path)) + 1);
     XXH3_128bits_update(hash, numbers, sizeof numbers);
-    free(place);
+    free(position);
 }
 
 int trip_source_digest_state(const trip_source *s, const char *text, trip_digest *out)

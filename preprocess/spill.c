@@ -139,7 +139,7 @@ static int make_room(trip_spill *s, size_t count)
 static uint64_t end_of_sequence(const trip_sequence *t, uint64_t offset)
 {
     uint64_t end;
-    bool sound = t->offset == offset && t->list < TRIP_MOST_LISTS && t->retired == 0 &&
+    bool sound = t->offset == offset && t->list < TRIP_MAX_LISTS && t->retired == 0 &&
                  t->bytes >= sizeof(trip_piece) && t->bytes % 8 == 0 &&
                  !__builtin_add_overflow(t->offset, t->bytes, &end) &&
                  !__builtin_add_overflow(end, ALIGNMENT_BYTES - 1, &end) && end <= INT64_MAX;

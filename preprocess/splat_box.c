@@ -59,8 +59,9 @@ void trip_splat_box_mark(trip_splat_box *c, int64_t y, int64_t z, const uint8_t 
 /* The splats of one tile of one sheet: a piece to be. */
 typedef struct tile_splats {
     int axis;
-    int64_t sheet;          /* local */
-    unsigned first_place;   /* Morton code of the tile's first voxel, from a multiple of the edge */
+    int64_t sheet; /* local */
+    unsigned
+        first_position;     /* Morton code of the tile's first voxel, from a multiple of the edge */
     const uint64_t *bitmap; /* of the tile */
 } tile_splats;
 
@@ -69,8 +70,8 @@ static uint64_t key_of(const trip_splat_box *c, unsigned tile_log2, const tile_s
     const int u = (t->axis + 1) % 3, v = (t->axis + 2) % 3;
     const int64_t edge = c->tables->edge;
     const int64_t corner[3] = { c->origin[0], c->origin[1], c->origin[2] & ~(edge - 1) };
-    uint32_t tile_u = (uint32_t)((corner[u] + c->tables->u_of[t->first_place]) >> tile_log2);
-    uint32_t tile_v = (uint32_t)((corner[v] + c->tables->v_of[t->first_place]) >> tile_log2);
+    uint32_t tile_u = (uint32_t)((corner[u] + c->tables->u_of[t->first_position]) >> tile_log2);
+    uint32_t tile_v = (uint32_t)((corner[v] + c->tables->v_of[t->first_position]) >> tile_log2);
     return (uint64_t)(c->origin[t->axis] + t->sheet) << TRIP_TILE_MORTON_BITS |
            trip_morton(tile_u, tile_v);
 }
@@ -88,9 +89,9 @@ static uint32_t gather_indices(const trip_splat_box *c, unsigned words, const ti
     uint32_t n = 0;
     for (unsigned w = 0; w < words; w++)
         for (uint64_t bits = t->bitmap[w]; bits; bits &= bits - 1) {
-            unsigned place = t->first_place + w * 64 + (unsigned)__builtin_ctzll(bits);
+            unsigned position = t->first_position + w * 64 + (unsigned)__builtin_ctzll(bits);
             indices[n++] =
-                (uint32_t)(base + c->tables->u_of[place] * su + c->tables->v_of[place] * sv);
+                (uint32_t)(base + c->tables->u_of[position] * su + c->tables->v_of[position] * sv);
         }
     return n;
 }

@@ -224,9 +224,9 @@ int trip_volume_check_dims(const char *path, const trip_volume_info *info)
 int trip_volume_check_axes(const char *path, const trip_volume_info *info)
 {
     for (int a = 0; a < 3; a++)
-        if (info->dims[a] > TRIP_VOLUME_AXIS_MOST)
+        if (info->dims[a] > TRIP_VOLUME_AXIS_MAX)
             return trip_fail(TRIP_ERROR, "read", path, "more than %" PRId64 " voxels along an axis",
-                             TRIP_VOLUME_AXIS_MOST);
+                             TRIP_VOLUME_AXIS_MAX);
     return 0;
 }
 
@@ -235,11 +235,11 @@ static int check_lengths(const trip_volume *v)
     const double(*m)[4] = v->info.index_to_world.m;
     for (int a = 0; a < 3; a++) {
         double length = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
-        if (!(length >= TRIP_VOXEL_WORLD_LEAST && length <= TRIP_VOXEL_WORLD_MOST))
+        if (!(length >= TRIP_VOXEL_WORLD_MIN && length <= TRIP_VOXEL_WORLD_MAX))
             return trip_fail(TRIP_ERROR, "read", v->path,
                              "its voxels are %.3g world units long along %c, and %g to %g can be "
                              "drawn; --spacing X,Y,Z may give the axes other lengths",
-                             length, "ijk"[a], TRIP_VOXEL_WORLD_LEAST, TRIP_VOXEL_WORLD_MOST);
+                             length, "ijk"[a], TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
     }
     return 0;
 }
@@ -283,8 +283,8 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
         status = set_axes(v, params->axes);
     if (!status)
         status = check_info(v);
-    if (!status && params->most_voxels)
-        status = trip_sampled_wrap(&v->reader, &v->state, &v->info, params->most_voxels, v->budget);
+    if (!status && params->max_voxels)
+        status = trip_sampled_wrap(&v->reader, &v->state, &v->info, params->max_voxels, v->budget);
     if (!status)
         status = trip_volume_complete_coordinates(&v->info, v->path);
     if (status < 0 || !v->reader->read_slices)

@@ -46,7 +46,7 @@ int trip_scalar_from_name(const char *name);
 const char *trip_scalar_name(trip_scalar type);
 
 /* Voxels along an axis of a volume that is bricked, and of one with tables. */
-#define TRIP_VOLUME_AXIS_MOST (INT64_C(1) << 24)
+#define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
 
 typedef struct trip_volume_info {
     int64_t dims[3]; /* voxels along i, j, k; each >= 1 */
@@ -89,7 +89,7 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks in which slices are missing */
-    uint64_t most_voxels; /* of larger volumes every second, third, ... voxel along each axis */
+    uint64_t max_voxels; /* of larger volumes every second, third, ... voxel along each axis */
 } trip_volume_params;
 
 typedef struct trip_volume trip_volume;
@@ -107,7 +107,7 @@ typedef struct trip_volume_portion {
 int trip_volume_open(trip_volume **out, const char *path, const trip_volume_params *params,
                      trip_budget *budget);
 const trip_volume_info *trip_volume_get_info(const trip_volume *v);
-/* Reports and returns negative where an axis has more than TRIP_VOLUME_AXIS_MOST voxels. */
+/* Reports and returns negative where an axis has more than TRIP_VOLUME_AXIS_MAX voxels. */
 int trip_volume_check_axes(const char *path, const trip_volume_info *info);
 void trip_volume_close(trip_volume *v);
 

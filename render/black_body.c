@@ -50,15 +50,15 @@ void trip_black_body(double kelvin, double rgb[3])
     static const double from_xyz[3][3] = { { 3.2406, -1.5372, -0.4986 },
                                            { -0.9689, 1.8758, 0.0415 },
                                            { 0.0557, -0.2040, 1.0570 } };
-    double xyz[3], most = 0;
+    double xyz[3], max = 0;
     trip_black_body_xyz(kelvin, xyz);
     for (int i = 0; i < 3; i++) {
         const double *row = from_xyz[i];
         rgb[i] = fmax(0, row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]);
-        most = fmax(most, rgb[i]);
+        max = fmax(max, rgb[i]);
     }
     for (int i = 0; i < 3; i++)
-        rgb[i] /= most;
+        rgb[i] /= max;
 }
 
 double trip_display_of_linear(double light)

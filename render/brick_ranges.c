@@ -17,8 +17,7 @@ static bool is_of(const trip_brick_ranges *r, const trip_list *list)
 
 static trip_code_range both(trip_code_range a, trip_code_range b)
 {
-    return (trip_code_range){ a.least < b.least ? a.least : b.least,
-                              a.most > b.most ? a.most : b.most };
+    return (trip_code_range){ a.min < b.min ? a.min : b.min, a.max > b.max ? a.max : b.max };
 }
 
 /* The tiles that have bricks, grown by one. */
@@ -128,9 +127,9 @@ static void move_to(trip_brick_ranges *r, int64_t slab)
 static trip_code_range widened(trip_kernel kernel, trip_code_range range)
 {
     double bounds[2];
-    if (range.least > range.most)
+    if (range.min > range.max)
         return range;
-    trip_field_code_bounds(kernel, range.least, range.most, bounds);
+    trip_field_code_bounds(kernel, range.min, range.max, bounds);
     return (trip_code_range){ (uint16_t)fmax(0, floor(bounds[0])),
                               (uint16_t)fmin(65535, ceil(bounds[1])) };
 }

@@ -9,7 +9,7 @@
 #include "sheet.h"
 
 /* Slabs on each side that a voxel may reach into: those of one sheet, into two. */
-enum { TRIP_BRICK_RANGES_SLABS = 2 * TRIP_SHEET_REACH_MOST + 1 };
+enum { TRIP_BRICK_RANGES_SLABS = 2 * TRIP_SHEET_REACH_MAX + 1 };
 
 /* Tiles of a few slabs in a row. */
 typedef struct trip_brick_ranges {

@@ -16,10 +16,10 @@ static bool finite3(trip_vec3 v)
 
 static int check_params(const trip_camera_params *p)
 {
-    if (p->width < 1 || p->height < 1 || p->width > TRIP_PICTURE_MOST_PX ||
-        p->height > TRIP_PICTURE_MOST_PX)
+    if (p->width < 1 || p->height < 1 || p->width > TRIP_PICTURE_MAX_PX ||
+        p->height > TRIP_PICTURE_MAX_PX)
         return trip_fail(TRIP_USAGE, "camera", "size", "%d x %d px is not between 1 and %d",
-                         p->width, p->height, TRIP_PICTURE_MOST_PX);
+                         p->width, p->height, TRIP_PICTURE_MAX_PX);
     if (!finite3(p->eye) || !finite3(p->look) || !finite3(p->up))
         return trip_fail(TRIP_USAGE, "camera", "eye, look, up", "not finite");
     if (p->ortho_height != 0 && !(isfinite(p->ortho_height) && p->ortho_height > 0))
@@ -33,11 +33,11 @@ static int check_params(const trip_camera_params *p)
 
 static int make_basis(const trip_camera_params *p, basis *b)
 {
-    trip_vec3 gaze = trip_sub(p->look, p->eye);
-    if (!(trip_length(gaze) > 0 && isfinite(trip_length(gaze))))
+    trip_vec3 view_direction = trip_sub(p->look, p->eye);
+    if (!(trip_length(view_direction) > 0 && isfinite(trip_length(view_direction))))
         return trip_fail(TRIP_USAGE, "camera", "look",
                          "the point looked at must differ from the eye");
-    b->forward = trip_normalize(gaze);
+    b->forward = trip_normalize(view_direction);
     trip_vec3 right = trip_cross(b->forward, trip_normalize(p->up));
     if (!(trip_length(right) > 1e-9))
         return trip_fail(TRIP_USAGE, "camera", "up",
@@ -59,8 +59,8 @@ static double pixel_size(const trip_camera_params *p)
  * would be read. */
 static double without_rounding(double component, trip_vec3 v)
 {
-    double most = fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
-    return fabs(component) > 1e-9 * most ? component : 0;
+    double max = fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+    return fabs(component) > 1e-9 * max ? component : 0;
 }
 
 /* The power of two that takes a length to [sqrt(1/2), sqrt(2)): 1 for what is 1 but for rounding.
@@ -118,10 +118,10 @@ static int check_voxel(const trip_affine *m)
 {
     for (int a = 0; a < 3; a++) {
         double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
-        if (!(length >= TRIP_VOXEL_WORLD_LEAST && length <= TRIP_VOXEL_WORLD_MOST))
+        if (!(length >= TRIP_VOXEL_WORLD_MIN && length <= TRIP_VOXEL_WORLD_MAX))
             return trip_fail(TRIP_USAGE, "camera", "index to world",
                              "voxels are %.3g world units long; %g to %g can be computed with",
-                             length, TRIP_VOXEL_WORLD_LEAST, TRIP_VOXEL_WORLD_MOST);
+                             length, TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
     }
     return 0;
 }
@@ -130,11 +130,11 @@ static int check_voxel(const trip_affine *m)
 static int check_range(const trip_camera *c)
 {
     double far = trip_length(c->eye), x = trip_length(c->rx), y = trip_length(c->ry);
-    const double most = TRIP_CAMERA_PIXEL_VOXELS;
-    if (!(x >= 1 / most && y >= 1 / most && x <= most && y <= most))
+    const double max = TRIP_CAMERA_PIXEL_VOXELS;
+    if (!(x >= 1 / max && y >= 1 / max && x <= max && y <= max))
         return trip_fail(TRIP_USAGE, "camera", c->ortho ? "ortho height" : "fov",
                          "a pixel would be %.3g x %.3g voxels; %.3g to %.3g can be computed with",
-                         x, y, 1 / most, most);
+                         x, y, 1 / max, max);
     if (!(far <= TRIP_CAMERA_FARTHEST_VOXELS))
         return trip_fail(TRIP_USAGE, "camera", "eye",
                          "lies %.3g voxels from the first voxel; at most %.3g can be computed with",

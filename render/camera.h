@@ -21,7 +21,7 @@
 #include "geometry.h"
 
 /* Of a picture, along either side. */
-enum { TRIP_PICTURE_MOST_PX = 65536 };
+enum { TRIP_PICTURE_MAX_PX = 65536 };
 
 typedef struct trip_camera_params {
     trip_vec3 eye, look, up; /* world space */

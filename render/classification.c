@@ -10,18 +10,18 @@
 /* Of all that frames of level 0 may read. */
 static void find_held(trip_classification *c, const trip_dataset *data)
 {
-    unsigned least = UINT16_MAX, most = 0;
+    unsigned min = UINT16_MAX, max = 0;
     for (unsigned i = 0; i < data->list_count; i++) {
         const trip_list *list = &data->lists[i];
         if (list->level > 0 || !trip_kind_of(list->kind)->lattice)
             continue;
         for (uint64_t n = 0; n < list->brick_count; n++) {
-            least = list->bricks[n].code_min < least ? list->bricks[n].code_min : least;
-            most = list->bricks[n].code_max > most ? list->bricks[n].code_max : most;
+            min = list->bricks[n].code_min < min ? list->bricks[n].code_min : min;
+            max = list->bricks[n].code_max > max ? list->bricks[n].code_max : max;
         }
     }
-    c->held_least = least;
-    c->held_most = most;
+    c->held_min = min;
+    c->held_max = max;
     c->has_codes = true;
 }
 
@@ -34,13 +34,13 @@ void trip_classification_codes(trip_classification *c, const trip_dataset *data,
         return;
     c->kernel = kernel;
     c->has_form = false;
-    c->code_least = c->held_least;
-    c->code_most = c->held_most;
-    if (c->held_least > c->held_most)
+    c->code_min = c->held_min;
+    c->code_max = c->held_max;
+    if (c->held_min > c->held_max)
         return;
-    trip_field_code_bounds(kernel, c->held_least, c->held_most, bounds);
-    c->code_least = (unsigned)fmax(0, floor(bounds[0]));
-    c->code_most = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
+    trip_field_code_bounds(kernel, c->held_min, c->held_max, bounds);
+    c->code_min = (unsigned)fmax(0, floor(bounds[0]));
+    c->code_max = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
 }
 
 /* No ray in the volume is longer: world units. */
@@ -59,8 +59,8 @@ void trip_classification_form(trip_classification *c, const trip_dataset *data, 
 {
     trip_classification_codes(c, data, kernel);
     if (!c->has_form)
-        c->not_closed = trip_closed_form_find(&c->closed, table, c->code_least, c->code_most,
-                                              longest_ray(data));
+        c->not_closed =
+            trip_closed_form_find(&c->closed, table, c->code_min, c->code_max, longest_ray(data));
     c->has_form = true;
 }
 

@@ -15,13 +15,13 @@
 typedef struct trip_classification {
     /* Of the kernel that was asked for last. It does not go by the bricks of a frame: a picture
      * does not depend on how these were cut. */
-    unsigned code_least, code_most; /* least > most: there are none */
+    unsigned code_min, code_max; /* least > most: there are none */
     trip_closed_form_fault not_closed;
     trip_closed_form closed; /* where not_closed is TRIP_CLOSED_FORM_FOUND */
     trip_code_set shown;     /* codes with extinction */
     /* What of this is known. */
     bool has_codes, has_form, has_shown;
-    unsigned held_least, held_most; /* codes that the data set holds */
+    unsigned held_min, held_max; /* codes that the data set holds */
     trip_kernel kernel;
 } trip_classification;
 

@@ -5,7 +5,7 @@
 
 void trip_clip_add(trip_clip *clip, trip_vec3 normal, double offset)
 {
-    assert(clip->count < TRIP_CLIP_MOST);
+    assert(clip->count < TRIP_CLIP_MAX);
     clip->planes[clip->count++] = (trip_half_space){ normal, offset };
 }
 
@@ -56,8 +56,8 @@ uint64_t trip_clip_square(const trip_clip *clip, int axis, int64_t sheet, int64_
         const double along_v = trip_component(p->normal, (axis + 2) % 3);
         double corner = trip_component(p->normal, axis) * (double)sheet + along_u * (double)u +
                         along_v * (double)v + p->offset;
-        double least = corner + 7 * (fmin(0, along_u) + fmin(0, along_v));
-        if (least < -TRIP_CLIP_SLACK)
+        double min = corner + 7 * (fmin(0, along_u) + fmin(0, along_v));
+        if (min < -TRIP_CLIP_SLACK)
             mask &= square_inside(corner, along_u, along_v);
     }
     return mask;
@@ -126,10 +126,10 @@ void trip_clip_simplify(trip_clip *clip, const uint64_t dims[3])
     int kept = 0;
     for (int i = 0; i < clip->count; i++) {
         const trip_half_space p = clip->planes[i];
-        double least = p.offset;
+        double min = p.offset;
         for (int a = 0; a < 3; a++)
-            least += fmin(0, trip_component(p.normal, a) * (double)(dims[a] - 1));
-        if (least < 0)
+            min += fmin(0, trip_component(p.normal, a) * (double)(dims[a] - 1));
+        if (min < 0)
             clip->planes[kept++] = p;
     }
     clip->count = kept;

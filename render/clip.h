@@ -17,7 +17,7 @@
 #include "geometry.h"
 
 /* Six of a box, six more, and two between which a level of detail is drawn (lod_parts.h). */
-enum { TRIP_CLIP_BOX_PLANES = 6, TRIP_CLIP_GIVEN_PLANES = 6, TRIP_CLIP_MOST = 14 };
+enum { TRIP_CLIP_BOX_PLANES = 6, TRIP_CLIP_GIVEN_PLANES = 6, TRIP_CLIP_MAX = 14 };
 
 /* Voxels so near to a plane are inside: on it, whatever rounding makes of the distance. In indices.
  */
@@ -31,7 +31,7 @@ typedef struct trip_half_space {
 
 typedef struct trip_clip {
     int count;
-    trip_half_space planes[TRIP_CLIP_MOST];
+    trip_half_space planes[TRIP_CLIP_MAX];
 } trip_clip;
 
 /* There is room for it. */

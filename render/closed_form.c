@@ -9,7 +9,7 @@ enum { TRIED = 64 };
 enum { FEWEST = 16 };
 
 /* Optical depths beyond this are left to tables: single precision ends. */
-#define MOST 1e15
+#define MAX 1e15
 
 /* The codes that show, of those there are. */
 typedef struct span {
@@ -37,23 +37,23 @@ static int edge(const trip_tf_entry *table, int shown, int hidden)
     return shown;
 }
 
-static bool find_span(const trip_tf_entry *table, int least, int most, span *s)
+static bool find_span(const trip_tf_entry *table, int min, int max, span *s)
 {
-    *s = (span){ .first = least, .last = most };
-    if (!shows(table, least) && !shows(table, most))
+    *s = (span){ .first = min, .last = max };
+    if (!shows(table, min) && !shows(table, max))
         return false;
-    s->up = table[most].extinction > table[least].extinction ? 1 : -1;
-    s->ramp = !shows(table, least) || !shows(table, most);
+    s->up = table[max].extinction > table[min].extinction ? 1 : -1;
+    s->ramp = !shows(table, min) || !shows(table, max);
     if (s->ramp && s->up > 0)
-        s->first = edge(table, most, least);
+        s->first = edge(table, max, min);
     else if (s->ramp)
-        s->last = edge(table, least, most);
+        s->last = edge(table, min, max);
     return true;
 }
 
 /* Where extinction would begin, by the parabola through three codes at its lower end: errors are
  * then in proportion to it. A ramp begins at most a code before them, else it is a step. */
-static bool set_places(trip_closed_form *form, const trip_tf_entry *table, span *s)
+static bool set_positions(trip_closed_form *form, const trip_tf_entry *table, span *s)
 {
     const int codes = s->last - s->first, low = s->up > 0 ? s->first : s->last;
     const int high = s->up > 0 ? s->last : s->first, step = s->ramp ? 1 : 1 + codes / 64;
@@ -146,13 +146,13 @@ static bool has_colour(const trip_closed_form *form, const trip_tf_entry *e, dou
 
 /* Whether every `step`th code from one to another is as the form has it; `least` is 1 / D. */
 static trip_closed_form_fault check(const trip_closed_form *form, const trip_tf_entry *table,
-                                    int from, int to, int step, double least)
+                                    int from, int to, int step, double min)
 {
     const double *c = form->k;
     for (int code = from; code <= to; code += step) {
-        const double place = form->scale * code + form->offset, x = place > 0 ? place : 0;
+        const double position = form->scale * code + form->offset, x = position > 0 ? position : 0;
         const double k = table[code].extinction, is = c[0] + x * (c[1] + x * (c[2] + x * c[3]));
-        if (!(distance(is, k) <= TRIP_CLOSED_FORM_ERROR * (k + least) && k <= MOST * least))
+        if (!(distance(is, k) <= TRIP_CLOSED_FORM_ERROR * (k + min) && k <= MAX * min))
             return TRIP_CLOSED_FORM_EXTINCTION;
         if (k > 0 && !has_colour(form, &table[code], x))
             return TRIP_CLOSED_FORM_COLOUR;
@@ -161,9 +161,9 @@ static trip_closed_form_fault check(const trip_closed_form *form, const trip_tf_
 }
 
 trip_closed_form_fault trip_closed_form_find(trip_closed_form *form, const trip_tf_entry *table,
-                                             unsigned least, unsigned most, double longest)
+                                             unsigned min, unsigned max, double longest)
 {
-    const int from = (int)least, to = (int)most;
+    const int from = (int)min, to = (int)max;
     span s;
     *form = (trip_closed_form){ .ramp = false };
     if (from > to || !find_span(table, from, to, &s))
@@ -171,7 +171,7 @@ trip_closed_form_fault trip_closed_form_find(trip_closed_form *form, const trip_
     if (s.last - s.first < FEWEST) {
         set_constant(form, table, &s);
     } else {
-        if (!set_places(form, table, &s))
+        if (!set_positions(form, table, &s))
             return TRIP_CLOSED_FORM_EXTINCTION;
         set_extinction(form, table, &s);
         set_colours(form, table, &s);

@@ -46,6 +46,6 @@ typedef enum trip_closed_form_fault {
 /* Of the codes from `least` to `most` of a table of 65536; `longest` is D, world units. Most
  * functions that have none are told by a few codes of the table. */
 trip_closed_form_fault trip_closed_form_find(trip_closed_form *form, const trip_tf_entry *table,
-                                             unsigned least, unsigned most, double longest);
+                                             unsigned min, unsigned max, double longest);
 
 #endif

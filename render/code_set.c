@@ -4,20 +4,20 @@
 #include <string.h>
 
 /* The least float that is no less. */
-static float at_least(double least)
+static float at_least(double min)
 {
-    float nearest = (float)least;
-    return (double)nearest < least ? nextafterf(nearest, INFINITY) : nearest;
+    float nearest = (float)min;
+    return (double)nearest < min ? nextafterf(nearest, INFINITY) : nearest;
 }
 
 /* A bit each of 64 entries. Eight bytes of 0 or 1 are moved into one by a product, whose terms do
  * not overlap; so the comparisons are left to the compiler to do several at a time. */
-static uint64_t with_extinction(const trip_tf_entry entries[64], float least)
+static uint64_t with_extinction(const trip_tf_entry entries[64], float min)
 {
     unsigned char is_in[64];
     uint64_t bits = 0, eight;
     for (int i = 0; i < 64; i++)
-        is_in[i] = entries[i].extinction >= least;
+        is_in[i] = entries[i].extinction >= min;
     for (int i = 0; i < 64; i += 8) {
         memcpy(&eight, is_in + i, sizeof eight);
         bits |= (eight * UINT64_C(0x0102040810204080) >> 56) << i;
@@ -25,9 +25,9 @@ static uint64_t with_extinction(const trip_tf_entry entries[64], float least)
     return bits;
 }
 
-void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double least)
+void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double min)
 {
-    const float limit = at_least(least);
+    const float limit = at_least(min);
     memset(set->some, 0, sizeof set->some);
     for (unsigned word = 0; word < 1024; word++) {
         set->codes[word] = with_extinction(table + word * 64, limit);
@@ -37,18 +37,17 @@ void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double l
 
 trip_code_range trip_code_set_range(const trip_code_set *set)
 {
-    unsigned least = 1, most = 0, count = 0;
+    unsigned min = 1, max = 0, count = 0;
     for (unsigned word = 0; word < 1024; word++) {
         const uint64_t bits = set->codes[word];
         if (bits && count == 0)
-            least = word * 64 + (unsigned)__builtin_ctzll(bits);
+            min = word * 64 + (unsigned)__builtin_ctzll(bits);
         if (bits)
-            most = word * 64 + 63 - (unsigned)__builtin_clzll(bits);
+            max = word * 64 + 63 - (unsigned)__builtin_clzll(bits);
         count += (unsigned)__builtin_popcountll(bits);
     }
-    return count > 0 && most - least + 1 == count
-               ? (trip_code_range){ (uint16_t)least, (uint16_t)most }
-               : (trip_code_range){ 1, 0 };
+    return count > 0 && max - min + 1 == count ? (trip_code_range){ (uint16_t)min, (uint16_t)max }
+                                               : (trip_code_range){ 1, 0 };
 }
 
 /* Whether some bit from first to last is set. */

@@ -9,7 +9,7 @@
 #include "transfer_function.h"
 
 typedef struct trip_code_range {
-    uint16_t least, most; /* least > most: no codes */
+    uint16_t min, max; /* least > most: no codes */
 } trip_code_range;
 
 typedef struct trip_code_set {
@@ -17,7 +17,7 @@ typedef struct trip_code_set {
 } trip_code_set;
 
 /* Of a table of 65536 entries: those with at least so much extinction, which is above 0. */
-void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double least);
+void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double min);
 
 /* Whether some code from first to last is in it. */
 bool trip_code_set_has_some(const trip_code_set *set, unsigned first, unsigned last);

@@ -37,7 +37,7 @@ trip_effects_view trip_effects_view_make(const trip_settings *s, const trip_came
     e.bias = TRIP_LIGHT_BIAS * grid.spacing * camera->voxel_world;
     trip_affine_invert(&camera->index_to_world, &e.to_index); /* it was checked on opening */
     e.point_light = s->point_light;
-    e.light = s->point_light ? trip_light_place(s, &camera->index_to_world)
+    e.light = s->point_light ? trip_light_position(s, &camera->index_to_world)
                              : trip_affine_vector(&e.to_index, s->light_direction);
     for (int k = 0; k < 3; k++)
         e.cue_rgb[k] = s->background[k];

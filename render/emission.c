@@ -109,10 +109,10 @@ static void set_colours(trip_emission *e, const double kelvin[2])
 
 static int voxels_along(const trip_dataset *data)
 {
-    uint64_t most = 1;
+    uint64_t max = 1;
     for (int a = 0; a < 3; a++)
-        most = data->header.dims[a] > most ? data->header.dims[a] : most;
-    return most < INT32_MAX ? (int)most : INT32_MAX;
+        max = data->header.dims[a] > max ? data->header.dims[a] : max;
+    return max < INT32_MAX ? (int)max : INT32_MAX;
 }
 
 int trip_emission_begin(trip_emission *e, const trip_emission_params *p)

@@ -13,7 +13,7 @@ enum {
 struct trip_field {
     trip_budget *budget;
     int64_t dims[3], cubes[3];
-    size_t places;       /* of the directory */
+    size_t positions;    /* of the directory */
     uint32_t *directory; /* by the cube's place in the grid: 1 + its number; 0: it has no voxels */
     trip_field_cube **chunks;
     size_t chunk_room, count;
@@ -24,12 +24,12 @@ static size_t chunks_of(size_t cubes)
     return cubes / CHUNK_CUBES + (cubes % CHUNK_CUBES > 0);
 }
 
-static int fail_memory(const char *what)
+static int fail_memory(const char *stage)
 {
     return trip_fail(TRIP_ERROR, "render", "field",
                      "%s does not fit the memory given: the whole volume is held, 16 bytes a "
                      "voxel; raise --memory",
-                     what);
+                     stage);
 }
 
 int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budget)
@@ -38,21 +38,21 @@ int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budg
     if (!f)
         return fail_memory("the volume");
     f->budget = budget;
-    f->places = 1;
+    f->positions = 1;
     bool fits = true;
     for (int a = 0; a < 3; a++) {
         f->dims[a] = dims[a];
         f->cubes[a] = (dims[a] + EDGE - 1) / EDGE;
-        fits &= !__builtin_mul_overflow(f->places, (size_t)f->cubes[a], &f->places);
+        fits &= !__builtin_mul_overflow(f->positions, (size_t)f->cubes[a], &f->positions);
     }
-    if (!fits || f->places >= UINT32_MAX) {
-        f->places = 0;
+    if (!fits || f->positions >= UINT32_MAX) {
+        f->positions = 0;
         trip_field_destroy(f);
         *out = NULL;
         return fail_memory("the directory of so large a grid");
     }
-    f->chunk_room = chunks_of(f->places);
-    f->directory = trip_budget_take(budget, f->places * sizeof *f->directory);
+    f->chunk_room = chunks_of(f->positions);
+    f->directory = trip_budget_take(budget, f->positions * sizeof *f->directory);
     f->chunks = trip_budget_take(budget, f->chunk_room * sizeof(trip_field_cube *));
     if (f->directory && f->chunks)
         return 0;
@@ -69,7 +69,7 @@ void trip_field_destroy(trip_field *f)
     for (size_t i = 0; i < chunks_of(f->count); i++)
         trip_budget_release(budget, f->chunks[i], CHUNK_CUBES * sizeof **f->chunks);
     trip_budget_release(budget, f->chunks, f->chunk_room * sizeof(trip_field_cube *));
-    trip_budget_release(budget, f->directory, f->places * sizeof *f->directory);
+    trip_budget_release(budget, f->directory, f->positions * sizeof *f->directory);
     trip_budget_release(budget, f, sizeof *f);
 }
 
@@ -93,7 +93,7 @@ const trip_field_cube *trip_field_cube_by_number(const trip_field *f, size_t num
     return cube_by_number(f, number);
 }
 
-static uint32_t *place_of(const trip_field *f, const int64_t at[3])
+static uint32_t *position_of(const trip_field *f, const int64_t at[3])
 {
     const size_t i = (size_t)at[0] / EDGE, j = (size_t)at[1] / EDGE, k = (size_t)at[2] / EDGE;
     return &f->directory[(k * (size_t)f->cubes[1] + j) * (size_t)f->cubes[0] + i];
@@ -107,7 +107,7 @@ static bool is_in_grid(const trip_field *f, const int64_t at[3])
 
 const trip_field_cube *trip_field_cube_at(const trip_field *f, const int64_t at[3])
 {
-    uint32_t number = is_in_grid(f, at) ? *place_of(f, at) : 0;
+    uint32_t number = is_in_grid(f, at) ? *position_of(f, at) : 0;
     return number ? cube_by_number(f, number - 1) : NULL;
 }
 
@@ -132,7 +132,7 @@ static trip_field_cube *begin_cube(trip_field *f, const int64_t at[3])
         !(f->chunks[chunk] = trip_budget_take(f->budget, CHUNK_CUBES * sizeof **f->chunks)))
         return NULL;
     trip_field_cube *cube = cube_by_number(f, f->count++);
-    *place_of(f, at) = (uint32_t)f->count;
+    *position_of(f, at) = (uint32_t)f->count;
     for (int a = 0; a < 3; a++)
         cube->at[a] = at[a] / EDGE * EDGE;
     cube->own[0] = INFINITY;
@@ -144,7 +144,7 @@ static trip_field_cube *begin_cube(trip_field *f, const int64_t at[3])
 
 int trip_field_put(trip_field *f, const int64_t at[3], double code, const double gradient[3])
 {
-    uint32_t number = *place_of(f, at);
+    uint32_t number = *position_of(f, at);
     trip_field_cube *cube = number ? cube_by_number(f, number - 1) : begin_cube(f, at);
     if (!cube)
         return fail_memory("the volume");
@@ -237,12 +237,12 @@ int trip_field_finish(trip_field *f, const trip_field_map *map)
 
 /* The weights of linear and gaussian are a mean, the absolute ones of cubic add up to at most 1.25
  * along each axis. */
-void trip_field_code_bounds(trip_kernel kernel, double least, double most, double bounds[2])
+void trip_field_code_bounds(trip_kernel kernel, double min, double max, double bounds[2])
 {
     double sum = kernel == TRIP_KERNEL_CUBIC ? 1.25 * 1.25 * 1.25 : 1;
-    double beyond = (sum - 1) / 2 * (most - least);
-    bounds[0] = least - beyond;
-    bounds[1] = most + beyond;
+    double beyond = (sum - 1) / 2 * (max - min);
+    bounds[0] = min - beyond;
+    bounds[1] = max + beyond;
 }
 
 static void set_bounds(trip_kernel kernel, trip_field_cell *cell)
@@ -255,8 +255,8 @@ static void set_bounds(trip_kernel kernel, trip_field_cell *cell)
         hi = code > hi ? code : hi;
     }
     trip_field_code_bounds(kernel, lo, hi, bounds);
-    cell->least = bounds[0];
-    cell->most = bounds[1];
+    cell->min = bounds[0];
+    cell->max = bounds[1];
 }
 
 static bool is_within_cube(const int64_t at[3])
@@ -292,16 +292,16 @@ static bool take_corners(const trip_field *f, const int64_t at[3], const trip_fi
 }
 
 /* Of place 0 to 3 along an axis, the voxel, cut to the grid. */
-static int64_t place_along(const trip_field *f, const int64_t at[3], int axis, int place)
+static int64_t position_along(const trip_field *f, const int64_t at[3], int axis, int position)
 {
-    int64_t i = at[axis] + place - 1, last = f->dims[axis] - 1;
+    int64_t i = at[axis] + position - 1, last = f->dims[axis] - 1;
     return i < 0 ? 0 : i > last ? last : i;
 }
 
 /* Of place 0 to 3 along an axis: which of the cell's two corners is next to it. */
-static int next_corner(int place)
+static int next_corner(int position)
 {
-    return place > 1;
+    return position > 1;
 }
 
 static void take_surroundings(const trip_field *f, const int64_t at[3],
@@ -310,8 +310,9 @@ static void take_surroundings(const trip_field *f, const int64_t at[3],
 {
     for (int n = 0; n < 64; n++) {
         int x = n % 4, y = n / 4 % 4, z = n / 16;
-        const trip_field_voxel *v = trip_field_at(
-            f, place_along(f, at, 0, x), place_along(f, at, 1, y), place_along(f, at, 2, z));
+        const trip_field_voxel *v =
+            trip_field_at(f, position_along(f, at, 0, x), position_along(f, at, 1, y),
+                          position_along(f, at, 2, z));
         voxels[n] = v ? v : corners[next_corner(x) + 2 * next_corner(y) + 4 * next_corner(z)];
     }
 }

@@ -71,11 +71,11 @@ typedef struct trip_field_cell {
     int64_t at[3];
     int edge; /* 2 or 4 */
     const trip_field_voxel *voxels[64];
-    double least, most; /* no code in the cell is beyond */
+    double min, max; /* no code in the cell is beyond */
 } trip_field_cell;
 
 /* What values interpolated from some in [least, most] can be. */
-void trip_field_code_bounds(trip_kernel kernel, double least, double most, double bounds[2]);
+void trip_field_code_bounds(trip_kernel kernel, double min, double max, double bounds[2]);
 
 /* False where the cell is empty. */
 bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t at[3],

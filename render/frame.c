@@ -85,14 +85,14 @@ static const trip_batch *newest_held(const trip_drawing *d)
 }
 
 /* Runs of the batch from the next one on: whole ones of `most` splats in all, or one. */
-static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t most)
+static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t max)
 {
     trip_batch piece = *batch;
     size_t end = d->next_run;
     uint64_t splats = 0;
     do
         splats += batch->runs[end++].count;
-    while (end < batch->run_count && splats + batch->runs[end].count <= most);
+    while (end < batch->run_count && splats + batch->runs[end].count <= max);
     piece.runs = batch->runs + d->next_run;
     piece.run_count = end - d->next_run;
     d->next_run = end;

@@ -64,9 +64,9 @@ int trip_image_check_path(const char *path, const trip_image_params *params)
                      f->extension);
 }
 
-static int start_helper(trip_image_files *files, const char *what)
+static int start_helper(trip_image_files *files, const char *stage)
 {
-    return files->helper ? 0 : trip_image_helper_start(&files->helper, what);
+    return files->helper ? 0 : trip_image_helper_start(&files->helper, stage);
 }
 
 void trip_image_close(trip_image_files *files)

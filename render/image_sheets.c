@@ -42,7 +42,7 @@ int trip_image_sheets_create(trip_image_sheets **out, const trip_camera *camera,
                              const trip_settings *settings, const uint64_t dims[3],
                              trip_budget *budget)
 {
-    const double most = 1e6;
+    const double max = 1e6;
     double depths[2];
     trip_image_sheets *s = *out = trip_budget_take(budget, sizeof *s);
     if (!s)
@@ -56,10 +56,10 @@ int trip_image_sheets_create(trip_image_sheets **out, const trip_camera *camera,
     find_depths(camera, settings, dims, depths);
     double first = floor(fmax(0, depths[0]) / s->thickness), end = ceil(depths[1] / s->thickness);
     s->first = (int)fmin(first, INT32_MAX);
-    s->count = end > first ? (int)fmin(end - first, most) : 0;
+    s->count = end > first ? (int)fmin(end - first, max) : 0;
     s->bytes =
         (size_t)s->width * (size_t)s->height * (size_t)s->count * s->channels * sizeof *s->sums;
-    s->sums = s->bytes && end - first <= most ? trip_budget_take(budget, s->bytes) : NULL;
+    s->sums = s->bytes && end - first <= max ? trip_budget_take(budget, s->bytes) : NULL;
     if (s->sums || !s->bytes)
         return 0;
     size_t bytes = s->bytes;

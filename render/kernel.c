@@ -23,16 +23,16 @@ static void gaussian_weights(double x, double weights[TRIP_KERNEL_TAPS])
         weights[i] /= sum;
 }
 
-void trip_kernel_weights(trip_kernel kernel, double place, double weights[TRIP_KERNEL_TAPS])
+void trip_kernel_weights(trip_kernel kernel, double position, double weights[TRIP_KERNEL_TAPS])
 {
     if (kernel == TRIP_KERNEL_CUBIC) {
-        cubic_weights(place, weights);
+        cubic_weights(position, weights);
     } else if (kernel == TRIP_KERNEL_GAUSSIAN) {
-        gaussian_weights(place, weights);
+        gaussian_weights(position, weights);
     } else {
         weights[0] = weights[3] = 0;
-        weights[1] = 1 - place;
-        weights[2] = place;
+        weights[1] = 1 - position;
+        weights[2] = position;
     }
 }
 

@@ -12,7 +12,7 @@ enum { TRIP_KERNEL_TAPS = 4 };
  * linear: of 0 and 1 alone. cubic: Catmull and Rom's spline. gaussian: of distances d,
  *     exp(-d^2 / (2 sigma^2)) - exp(-TRIP_CUTOFF^2 / 2), at least 0, over their sum,
  * sigma = 2 / TRIP_CUTOFF: the profile of a splat of radius 2, which smooths. */
-void trip_kernel_weights(trip_kernel kernel, double place, double weights[TRIP_KERNEL_TAPS]);
+void trip_kernel_weights(trip_kernel kernel, double position, double weights[TRIP_KERNEL_TAPS]);
 
 /* How far in indices, along each axis, a voxel has weight. */
 static inline int trip_kernel_reach(trip_kernel kernel)

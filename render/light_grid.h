@@ -1,8 +1,7 @@
 /* Numbers at the nodes of a coarse lattice over a volume: node i along an axis lies at the voxel
- * index i * spacing (the place, where spacing is uneven, see coordinates.h), from the first voxel to
- * the last or just beyond it. Between nodes they are
- * interpolated linearly, beyond them as at the nearest. Plain values; read-only once filled, for
- * any number of threads. */
+ * index i * spacing (the place, where spacing is uneven, see coordinates.h), from the first voxel
+ * to the last or just beyond it. Between nodes they are interpolated linearly, beyond them as at
+ * the nearest. Plain values; read-only once filled, for any number of threads. */
 #ifndef TRIP_LIGHT_GRID_H
 #define TRIP_LIGHT_GRID_H
 

@@ -153,7 +153,7 @@ static trip_vec3 to_index(const trip_light_source *s, trip_vec3 direction)
 /* Index space: the way to the light for a world unit, or its place. */
 static trip_vec3 light_of(const trip_light_source *s)
 {
-    return s->settings->point_light ? trip_light_place(s->settings, &s->data->index_to_world)
+    return s->settings->point_light ? trip_light_position(s->settings, &s->data->index_to_world)
                                     : to_index(s, s->settings->light_direction);
 }
 
@@ -198,7 +198,7 @@ static int take_grids(trip_light_map *m, const trip_light_source *s)
     m->open = trip_light_grid_over(s->data->header.dims, cells, TRIP_OPEN_STRIDE);
     m->nodes = trip_light_grid_count(&m->extinction);
     m->open_nodes = trip_light_grid_count(&m->open);
-    size_t columns = trip_light_sweep_most_bytes(&m->reached);
+    size_t columns = trip_light_sweep_max_bytes(&m->reached);
     bool fits = trip_budget_left_bytes(m->budget) > m->nodes * sizeof *m->memory + columns;
     m->memory = fits ? trip_budget_take(m->budget, m->nodes * sizeof *m->memory) : NULL;
     if (!m->memory)
@@ -399,7 +399,7 @@ static void gather_run(trip_light_map *m, const trip_batch *batch, const trip_ru
 {
     const trip_block block = trip_block_of(batch, run);
     const int axis = trip_batch_list(batch, run)->axis;
-    const trip_coordinates *places = &m->data->coordinates;
+    const trip_coordinates *positions = &m->data->coordinates;
     trip_block_voxels(&block, 0, run->count, m->voxels);
     for (uint32_t n = 0; n < run->count; n++) {
         const double extinction = (double)m->extinctions[trip_voxel_code(m->voxels[n])];
@@ -410,9 +410,9 @@ static void gather_run(trip_light_map *m, const trip_batch *batch, const trip_ru
         at[(axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(m->voxels[n]);
         at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(m->voxels[n]);
         const trip_vec3 voxel = trip_v3((double)at[0], (double)at[1], (double)at[2]);
-        if (!trip_clip_has(&m->clip, trip_coordinates_point(places, voxel)))
+        if (!trip_clip_has(&m->clip, trip_coordinates_point(positions, voxel)))
             continue;
-        if (trip_coordinates_uneven(places))
+        if (trip_coordinates_uneven(positions))
             add_shares(m, at, extinction);
         else
             add_voxel(m, at, extinction);
@@ -530,7 +530,7 @@ static int start_sweep(trip_light_map *m)
     for (int a = 0; a < 3; a++)
         m->sweep.last[a] = (double)m->data->header.dims[a] - 1;
     m->sweeping = begin_sweep(m);
-    return m->sweeping ? 0 : no_memory(out, trip_light_sweep_most_bytes(out));
+    return m->sweeping ? 0 : no_memory(out, trip_light_sweep_max_bytes(out));
 }
 
 /* Of the stage. */

@@ -16,16 +16,16 @@ static size_t column_bytes(const trip_light_sweep *s)
 }
 
 /* Those from a place spread widest where it is half as far from the lattice as that is wide. */
-size_t trip_light_sweep_most_bytes(const trip_light_grid *out)
+size_t trip_light_sweep_max_bytes(const trip_light_grid *out)
 {
-    size_t most = 0;
+    size_t max = 0;
     for (int axis = 0; axis < 3; axis++) {
         size_t columns = sizeof(double);
         for (int i = 1; i < 3; i++)
             columns *= (size_t)out->nodes[(axis + i) % 3] + 2 * (size_t)out->nodes[axis] + 4;
-        most = columns > most ? columns : most;
+        max = columns > max ? columns : max;
     }
-    return most;
+    return max;
 }
 
 static void set_axes(trip_light_sweep *s, int axis, bool descending)
@@ -279,9 +279,9 @@ static bool do_rows(trip_light_sweep *s, const trip_task_runner *runner,
                     void (*task)(void *sweep, unsigned band), int end, int length)
 {
     const int bands = PIECE / (BAND_ROWS * length + 1);
-    const int most = BAND_ROWS * (bands > 1 ? bands : 1);
+    const int max = BAND_ROWS * (bands > 1 ? bands : 1);
     s->rows[0] = s->rows[1];
-    s->rows[1] = end - s->rows[0] < most ? end : s->rows[0] + most;
+    s->rows[1] = end - s->rows[0] < max ? end : s->rows[0] + max;
     const int rows = s->rows[1] - s->rows[0];
     trip_run_tasks(runner, task, s, (unsigned)((rows + BAND_ROWS - 1) / BAND_ROWS));
     return s->rows[1] == end;

@@ -53,6 +53,6 @@ bool trip_light_sweep_begin_at(trip_light_sweep *s, trip_vec3 light, int region,
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner);
 void trip_light_sweep_end(trip_light_sweep *s);
 /* The most that the columns of any light take. */
-size_t trip_light_sweep_most_bytes(const trip_light_grid *out);
+size_t trip_light_sweep_max_bytes(const trip_light_grid *out);
 
 #endif

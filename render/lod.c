@@ -6,7 +6,7 @@
 
 /* Cubes as small as bricks of level 0 usually are, larger where there would be too many, or where
  * what is in them counts: then the largest tiles do not reach over them. */
-enum { CUBE_LOG2 = 6, LIMITED_CUBE_LOG2 = 7, MOST_CUBES = 1 << 22 };
+enum { CUBE_LOG2 = 6, LIMITED_CUBE_LOG2 = 7, MAX_CUBES = 1 << 22 };
 
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
 {
@@ -14,10 +14,10 @@ bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
            list->kind == (list->level ? TRIP_KIND_MEANS : TRIP_KIND_VOXELS);
 }
 
-static void choose_cubes(trip_lod *lod, const trip_dataset *data, int least_log2)
+static void choose_cubes(trip_lod *lod, const trip_dataset *data, int min_log2)
 {
     double cubes;
-    lod->cube_log2 = (int)lod->levels > least_log2 ? (int)lod->levels : least_log2;
+    lod->cube_log2 = (int)lod->levels > min_log2 ? (int)lod->levels : min_log2;
     lod->cube_log2--;
     do {
         lod->cube_log2++;
@@ -26,7 +26,7 @@ static void choose_cubes(trip_lod *lod, const trip_dataset *data, int least_log2
             lod->cubes[a] = (((int64_t)data->header.dims[a] - 1) >> lod->cube_log2) + 1;
             cubes *= (double)lod->cubes[a];
         }
-    } while (cubes > MOST_CUBES);
+    } while (cubes > MAX_CUBES);
 }
 
 double trip_lod_width_px(const trip_camera *camera, double depth)

@@ -12,7 +12,7 @@ typedef struct limiting {
     const trip_dataset *data;
     uint32_t *voxels; /* of level 0 in the cube; 0 where it is out of view */
     float *width;     /* px, of those voxels */
-    double bytes[1 + TRIP_DATASET_LEVELS_MOST]; /* of a voxel of level 0, drawn at a level, in all
+    double bytes[1 + TRIP_DATASET_LEVELS_MAX]; /* of a voxel of level 0, drawn at a level, in all
                                                    lists that are read */
 } limiting;
 
@@ -143,30 +143,30 @@ static double bytes_at(const limiting *l, double px)
 }
 
 /* The least width, to one part in 64, with which so many bytes suffice; `most` where none does. */
-static double least_px(const limiting *l, double bytes, double most)
+static double min_px(const limiting *l, double bytes, double max)
 {
     enum { PARTS = 64, DOUBLINGS = 40 };
     int enough = PARTS * DOUBLINGS, too_little = 0;
     while (enough - too_little > 1) {
         const int middle = (enough + too_little) / 2;
-        if (bytes_at(l, most * exp2((double)middle / PARTS - DOUBLINGS)) <= bytes)
+        if (bytes_at(l, max * exp2((double)middle / PARTS - DOUBLINGS)) <= bytes)
             enough = middle;
         else
             too_little = middle;
     }
-    return most * exp2((double)enough / PARTS - DOUBLINGS);
+    return max * exp2((double)enough / PARTS - DOUBLINGS);
 }
 
-static void choose(limiting *l, double most_bytes)
+static void choose(limiting *l, double max_bytes)
 {
     trip_lod *lod = l->lod;
     double widest = 0;
     for (size_t i = 0; i < lod->bytes; i++)
         widest = fmax(widest, l->voxels[i] ? (double)l->width[i] : 0);
     lod->limit.full_bytes = lod->limit.bytes = bytes_at(l, 0);
-    if (lod->limit.full_bytes <= most_bytes || !(widest > 0))
+    if (lod->limit.full_bytes <= max_bytes || !(widest > 0))
         return;
-    const double px = least_px(l, most_bytes, ldexp(widest, (int)lod->levels));
+    const double px = min_px(l, max_bytes, ldexp(widest, (int)lod->levels));
     lod->limit.px = px;
     lod->limit.bytes = bytes_at(l, px);
     for (size_t i = 0; i < lod->bytes; i++)

@@ -41,8 +41,8 @@ typedef struct choosing {
     const trip_dataset *data;
     const trip_camera *camera;
     const trip_settings *settings;
-    double px;     /* voxels may be so wide; 0: all are of level 0 */
-    unsigned most; /* levels */
+    double px;    /* voxels may be so wide; 0: all are of level 0 */
+    unsigned max; /* levels */
 } choosing;
 
 static double values_bytes(const choosing *c, unsigned level)
@@ -55,7 +55,7 @@ static double values_bytes(const choosing *c, unsigned level)
 static double share_of_next(const choosing *c, double width, unsigned level)
 {
     const double room = c->settings->max_bytes;
-    if (!(c->px > 0) || level >= c->most)
+    if (!(c->px > 0) || level >= c->max)
         return 0;
     const double share = 1 - log2(ldexp(width, (int)level + 1) / c->px) / MIXED_OCTAVES;
     if (!(share > 0) || (room > 0 && values_bytes(c, level) + values_bytes(c, level + 1) > room))
@@ -68,13 +68,13 @@ static double share_of_next(const choosing *c, double width, unsigned level)
 static void choose_one(trip_lod_parts *parts, const choosing *c, double width, bool mixes)
 {
     const double room = c->settings->max_bytes;
-    const unsigned wanted = c->px > 0 ? trip_lod_level(width, c->px, c->most) : 0;
+    const unsigned wanted = c->px > 0 ? trip_lod_level(width, c->px, c->max) : 0;
     unsigned level = wanted;
-    while (room > 0 && level < c->most && values_bytes(c, level) > room)
+    while (room > 0 && level < c->max && values_bytes(c, level) > room)
         level++;
     add_part(parts, level);
     parts->bounded = level > wanted;
-    if (room > 0 && c->most > 0)
+    if (room > 0 && c->max > 0)
         parts->bytes = values_bytes(c, level);
     parts->share = mixes && !parts->bounded ? share_of_next(c, width, level) : 0;
     if (parts->share > 0)
@@ -114,9 +114,9 @@ static void divide(trip_lod_parts *parts, const choosing *c, range depths)
     const double width = trip_lod_width_px(camera, 1);
     const double nearest =
         parts->bounded ? fmax(depths.nearest, TRIP_LOD_NEAREST_VOXELS) : depths.nearest;
-    unsigned level = trip_lod_level(width_at(camera, nearest), c->px, c->most);
+    unsigned level = trip_lod_level(width_at(camera, nearest), c->px, c->max);
     add_part(parts, level);
-    while (level < c->most) {
+    while (level < c->max) {
         const double depth = ldexp(width, (int)++level) / c->px;
         if (!(depth < depths.farthest))
             return;
@@ -145,8 +145,8 @@ int trip_lod_parts_make(trip_lod_parts *parts, const trip_dataset *data, const t
                                         depths.farthest < depths.nearest * exp2(MIXED_OCTAVES));
     *parts = (trip_lod_parts){ 0 };
     if (trip_settings_has_levels(settings))
-        c.most = count_levels(data);
-    if (one || thin || c.most == 0) {
+        c.max = count_levels(data);
+    if (one || thin || c.max == 0) {
         choose_one(parts, &c, width_at(camera, depths.nearest), !one);
         return 0;
     }

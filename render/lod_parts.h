@@ -21,15 +21,15 @@
 #include "dataset_level.h"
 #include "lod.h"
 
-enum { TRIP_LOD_PARTS_MOST = 1 + TRIP_DATASET_LEVELS_MOST };
+enum { TRIP_LOD_PARTS_MAX = 1 + TRIP_DATASET_LEVELS_MAX };
 
 typedef struct trip_lod_parts {
     int count; /* of pictures, 1 at least */
-    unsigned level[TRIP_LOD_PARTS_MOST];
+    unsigned level[TRIP_LOD_PARTS_MAX];
     /* Of each but the first that lies behind another: its half-space, in the world, and the
      * distance where it begins along the view. */
-    trip_half_space begin[TRIP_LOD_PARTS_MOST];
-    double distance[TRIP_LOD_PARTS_MOST];
+    trip_half_space begin[TRIP_LOD_PARTS_MAX];
+    double distance[TRIP_LOD_PARTS_MAX];
     double share; /* of the second of two that are mixed; 0: they lie behind one another */
     bool bounded; /* levels are coarser than lod_px calls for */
     double bytes; /* where there is a bound: that the levels chosen have */

@@ -4,7 +4,7 @@ void trip_normalise(float *rgba, size_t pixels, const double background[4])
 {
     for (size_t i = 0; i < pixels; i++, rgba += 4) {
         const double alpha = (double)rgba[3];
-        const int covered = alpha > TRIP_NORMALISE_LEAST;
+        const int covered = alpha > TRIP_NORMALISE_MIN;
         for (int c = 0; c < 3; c++)
             rgba[c] = (float)(covered ? (double)rgba[c] / alpha : background[c] * background[3]);
         rgba[3] = covered ? 1 : (float)background[3];

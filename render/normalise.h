@@ -6,7 +6,7 @@
 #include <stddef.h>
 
 /* Pixels of at most this opacity are the background: fragments of it are dropped in the paper. */
-#define TRIP_NORMALISE_LEAST 1e-4
+#define TRIP_NORMALISE_MIN 1e-4
 
 /* Of premultiplied pixels drawn over a transparent background, and the background (not
  * premultiplied) that is put behind. */

@@ -6,14 +6,14 @@
 #include "report.h"
 
 enum {
-    AXIS = 2,          /* the list that is read; all of a level hold the same voxels */
-    MOST_VOXELS = 128, /* along each side of the level */
-    PIXELS = 128,      /* along the longer side */
+    AXIS = 2,         /* the list that is read; all of a level hold the same voxels */
+    MAX_VOXELS = 128, /* along each side of the level */
+    PIXELS = 128,     /* along the longer side */
     CODES = 65536,
 };
 
-#define UNIT 4294967296.0    /* of optical depth */
-#define MOST_OF_A_VOXEL 16.0 /* so that the sum of all stays within 64 bits */
+#define UNIT 4294967296.0   /* of optical depth */
+#define MAX_OF_A_VOXEL 16.0 /* so that the sum of all stays within 64 bits */
 
 typedef struct pixel {
     uint64_t depth; /* optical, in 1 / UNIT */
@@ -56,7 +56,7 @@ static const trip_list *coarse_list(const trip_dataset *data)
     if (trip_coordinates_uneven(&data->coordinates))
         return NULL;
     for (int a = 0; a < 3; a++)
-        while ((data->header.dims[a] - 1) >> level >= MOST_VOXELS)
+        while ((data->header.dims[a] - 1) >> level >= MAX_VOXELS)
             level++;
     const trip_list *values =
         trip_dataset_find(data, AXIS, level, level ? TRIP_KIND_VALUES : TRIP_KIND_VOXELS);
@@ -168,7 +168,7 @@ static inline double part_in(int at, double lo, double hi)
 
 static inline void add_to(pixel *p, double optical, float z)
 {
-    p->depth += (uint64_t)((optical < MOST_OF_A_VOXEL ? optical : MOST_OF_A_VOXEL) * UNIT);
+    p->depth += (uint64_t)((optical < MAX_OF_A_VOXEL ? optical : MAX_OF_A_VOXEL) * UNIT);
     p->nearest = z < p->nearest ? z : p->nearest;
     p->farthest = z > p->farthest ? z : p->farthest;
 }

@@ -59,14 +59,14 @@ static bool is_by_ways(const planning *p)
 
 /* Places of a list along its axis: of the eye, and how far on either side of it splats of the other
  * side show. */
-typedef struct eye_place {
+typedef struct eye_position {
     double at, over;
-} eye_place;
+} eye_position;
 
-static eye_place place_of_eye(const planning *p, const trip_list *list)
+static eye_position position_of_eye(const planning *p, const trip_list *list)
 {
     const trip_plan_list *planned = &p->plan->lists[list->index];
-    eye_place eye = { .at = trip_component(planned->camera.eye, list->axis) };
+    eye_position eye = { .at = trip_component(planned->camera.eye, list->axis) };
     if (is_by_ways(p)) {
         const trip_cull cull = trip_cull_make(p->data, &planned->camera, &planned->grid,
                                               p->settings, p->plan->axis_of_view, NULL, NULL);
@@ -76,9 +76,9 @@ static eye_place place_of_eye(const planning *p, const trip_list *list)
 }
 
 /* First sheet that does not lie below a place, cut to [0, sheets]. */
-static int64_t first_sheet_beyond(const planning *p, const trip_list *list, double place)
+static int64_t first_sheet_beyond(const planning *p, const trip_list *list, double position)
 {
-    double index = trip_coordinates_index(&p->data->coordinates, list->axis, place);
+    double index = trip_coordinates_index(&p->data->coordinates, list->axis, position);
     return (int64_t)fmin((double)list->dims[list->axis], fmax(0, ceil(index)));
 }
 
@@ -86,7 +86,7 @@ static int add_selection(const planning *p, trip_plan_pass *pass, const trip_lis
 {
     trip_plan *plan = p->plan;
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
-    const eye_place eye = place_of_eye(p, list);
+    const eye_position eye = position_of_eye(p, list);
     /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round, where
      * it lies among them. */
     int64_t over = p->about ? trip_sheet_reach(p->settings->kernel) : 0;
@@ -140,8 +140,8 @@ static bool has_rays(const planning *p, int axis, trip_way way)
 static int add_passes(const planning *p, int axis)
 {
     const trip_camera *c = p->camera;
-    trip_vec3 gaze = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
-    bool upwards = trip_component(gaze, axis) > 0;
+    trip_vec3 view_direction = trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height);
+    bool upwards = trip_component(view_direction, axis) > 0;
     if (p->settings->traversal == TRIP_TRAVERSAL_ASCENDING)
         return add_pass(p, axis, ALL, false, upwards);
     if (c->ortho)
@@ -422,8 +422,8 @@ static void plan_classification(const planning *p)
         trip_classification_codes(c, p->data, p->settings->kernel);
     else
         trip_classification_form(c, p->data, p->settings->kernel, p->table);
-    plan->code_least = c->code_least;
-    plan->code_most = c->code_most;
+    plan->code_min = c->code_min;
+    plan->code_max = c->code_max;
     plan->not_closed = effects ? TRIP_CLOSED_FORM_EFFECTS : c->not_closed;
     plan->closed = c->closed;
 }
@@ -612,14 +612,14 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
     if (s->classify == TRIP_CLASSIFY_PRE)
         fprintf(out, "classify    pre: voxels are classified, then splatted\n");
     else
-        fprintf(out, "classify    post: values are interpolated in %d slice%s a sheet\n", s->slices,
-                s->slices == 1 ? "" : "s");
+        fprintf(out, "classify    post: values are interpolated in %d slice%s a sheet\n",
+                s->samples_per_sheet, s->samples_per_sheet == 1 ? "" : "s");
     if (trip_settings_sum_sheets(s))
         fprintf(out,
                 "compositing sheet: the splats of a sheet are summed, and composited as one\n");
     explain_footprints(s, out);
     fprintf(out, "saturation  below %g of transmittance a pixel takes no more\n",
-            trip_settings_saturation(s));
+            trip_settings_early_termination(s));
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out,
@@ -682,19 +682,19 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
 static void explain_limit(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     const trip_lod_limit *l = &plan->lod.limit;
-    char most[32], full[32], bytes[32];
+    char max[32], full[32], bytes[32];
     if (!plan->lod.level || !(s->max_bytes > 0) || plan->gathers)
         return;
-    trip_format_bytes((uint64_t)fmin(s->max_bytes, 1e18), most);
+    trip_format_bytes((uint64_t)fmin(s->max_bytes, 1e18), max);
     trip_format_bytes((uint64_t)l->full_bytes, full);
     trip_format_bytes((uint64_t)l->bytes, bytes);
     if (l->px > 0)
         fprintf(out,
                 "bound       of %s of codes and normals in view: levels are chosen as if voxels "
                 "could be %.3g pixels wide, which leaves %s of %s\n",
-                most, l->px, bytes, full);
+                max, l->px, bytes, full);
     else
-        fprintf(out, "bound       of %s of codes and normals in view: %s suffice\n", most, full);
+        fprintf(out, "bound       of %s of codes and normals in view: %s suffice\n", max, full);
 }
 
 static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *out)

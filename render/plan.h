@@ -58,7 +58,7 @@ typedef struct trip_plan {
     const trip_coordinates *coordinates; /* of the data set */
     unsigned planes;                     /* bit per trip_plane to read */
     /* post: as classification.h has them, but that frames with effects have no closed form. */
-    unsigned code_least, code_most;
+    unsigned code_min, code_max;
     trip_closed_form_fault not_closed;
     trip_closed_form closed; /* where not_closed is TRIP_CLOSED_FORM_FOUND */
     unsigned list_count;

@@ -85,8 +85,8 @@ static box place_box(const trip_cull *cull, int axis, const trip_brick_box *b)
     for (int i = 0; i < 3; i++) {
         int a = (axis + 1 + i) % 3;
         double eye = trip_component(cull->camera->eye, a);
-        r.lo[a] = trip_coordinates_place(cull->coordinates, a, b->lo[i]) - eye;
-        r.hi[a] = trip_coordinates_place(cull->coordinates, a, b->hi[i]) - eye;
+        r.lo[a] = trip_coordinates_position(cull->coordinates, a, b->lo[i]) - eye;
+        r.hi[a] = trip_coordinates_position(cull->coordinates, a, b->hi[i]) - eye;
     }
     return r;
 }
@@ -141,7 +141,7 @@ static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
     if (!cull->about)
         return true;
     trip_code_range range = trip_brick_ranges_about(cull->about, slab->slab, brick);
-    return !trip_code_set_has_some(cull->shown, range.least, range.most);
+    return !trip_code_set_has_some(cull->shown, range.min, range.max);
 }
 
 /* Of sheets a value counts that is within reach of a slice that a ray inside the clip, or its
@@ -171,7 +171,7 @@ static double radius_in(const trip_cull *cull, double depth)
 
 /* The least that a ray with weight goes along the axis for each step along that which it goes
  * farthest along. */
-static double least_slope(const trip_cull *cull, int axis)
+static double min_slope(const trip_cull *cull, int axis)
 {
     const double *scale = cull->grid->scale;
     double h = trip_settings_has_one_list(cull->settings) ? 0 : trip_weight_h(cull->settings);
@@ -187,7 +187,7 @@ static double least_slope(const trip_cull *cull, int axis)
 double trip_cull_reach_over_eye(const trip_cull *cull, int axis, const int64_t dims[3])
 {
     const trip_vec3 f = cull->camera->forward;
-    const double depth = fabs(f.x) + fabs(f.y) + fabs(f.z), slope = least_slope(cull, axis);
+    const double depth = fabs(f.x) + fabs(f.y) + fabs(f.z), slope = min_slope(cull, axis);
     const double turn2 = cull->low_pass2 * depth * depth; /* R grows by its root for each |c| */
     const double radius2 = 2 * cull->radius2;
     trip_brick_box all = { .lo = { 0, 0, 0 } };
@@ -218,8 +218,8 @@ trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_bric
 {
     if (is_transparent(cull, brick, slab))
         return TRIP_CULL_TRANSPARENT;
-    trip_brick_box place = trip_brick_box_of(cull->header, slab, brick);
-    box b = place_box(cull, axis, &place);
+    trip_brick_box position = trip_brick_box_of(cull->header, slab, brick);
+    box b = place_box(cull, axis, &position);
     if (is_clipped(cull, &b))
         return TRIP_CULL_CLIPPED;
     double depth = farthest_along(&b, cull->camera->forward), front = larger(depth, 0);

@@ -23,7 +23,7 @@ static int longest_axis(trip_vec3 v)
     return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
 }
 
-static const trip_coordinates *places(const samples *s)
+static const trip_coordinates *positions(const samples *s)
 {
     return &s->probe->data->coordinates;
 }
@@ -32,7 +32,7 @@ static const trip_coordinates *places(const samples *s)
 static double z_of(const samples *s, double sheet)
 {
     const trip_ray_probe *p = s->probe;
-    return (trip_coordinates_place(places(s), s->axis, sheet) -
+    return (trip_coordinates_position(positions(s), s->axis, sheet) -
             trip_component(p->origin, s->axis)) /
            trip_component(p->direction, s->axis);
 }
@@ -42,7 +42,7 @@ static double across(const samples *s, double sheet, int which)
 {
     const trip_ray_probe *p = s->probe;
     int axis = (s->axis + 1 + which) % 3;
-    return trip_coordinates_index(places(s), axis,
+    return trip_coordinates_index(positions(s), axis,
                                   trip_component(p->origin, axis) +
                                       z_of(s, sheet) * trip_component(p->direction, axis));
 }
@@ -70,13 +70,13 @@ static void find_sheets(samples *s)
         return;
     for (int a = 0; a < 3; a++)
         narrow(trip_component(p->origin, a), trip_component(p->direction, a),
-               trip_coordinates_place(places(s), a, -0.5),
-               trip_coordinates_place(places(s), a, (double)list->dims[a] - 0.5), &from, &to);
+               trip_coordinates_position(positions(s), a, -0.5),
+               trip_coordinates_position(positions(s), a, (double)list->dims[a] - 0.5), &from, &to);
     if (!(from <= to))
         return;
     double o = trip_component(p->origin, s->axis), d = trip_component(p->direction, s->axis);
-    double lo = trip_coordinates_index(places(s), s->axis, fmin(o + from * d, o + to * d));
-    double hi = trip_coordinates_index(places(s), s->axis, fmax(o + from * d, o + to * d));
+    double lo = trip_coordinates_index(positions(s), s->axis, fmin(o + from * d, o + to * d));
+    double hi = trip_coordinates_index(positions(s), s->axis, fmax(o + from * d, o + to * d));
     const double last = (double)(list->dims[s->axis] - 1);
     s->first = (int64_t)fmin(fmax(round(lo), 0), last);
     s->count = (int64_t)fmin(fmax(round(hi), 0), last) - s->first + 1;

@@ -15,7 +15,7 @@
 #include "report.h"
 #include "shade.h"
 #include "splat.h"
-#include "tint.h"
+#include "debug_view.h"
 #include "weight.h"
 
 /* One pixel of splats: the layer being drawn, and the sum over the layers before it. */
@@ -42,7 +42,7 @@ typedef struct reference {
     trip_splat_frame local;        /* where spacing is uneven */
     unsigned channels;             /* of a layer */
     double gradient_full;
-    double saturation; /* trip_settings_saturation() */
+    double early_termination; /* trip_settings_early_termination() */
     trip_effects_view effects;
     trip_compact_normals compact; /* where normals have 3 bytes */
     pixel *pixels;
@@ -140,7 +140,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->slabs = NULL;
     r->frame = frame;
     r->channels = trip_layer_channels(frame->settings);
-    r->saturation = trip_settings_saturation(frame->settings);
+    r->early_termination = trip_settings_early_termination(frame->settings);
     r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
     r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
                                            header->gradient_step);
@@ -171,7 +171,7 @@ static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
         double through = 1 - layer[TRIP_CHANNEL_ALPHA];
         keep = 1;
         add = alpha * through;
-        if (through < r->saturation)
+        if (through < r->early_termination)
             return;
     }
     for (unsigned c = 0; c < r->channels; c++)
@@ -394,7 +394,7 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
     rgb[0] = entry->r;
     rgb[1] = entry->g;
     rgb[2] = entry->b;
-    trip_tint_of(frame->settings, r->axis, frame->data->lists[r->number].level, rgb);
+    trip_debug_view_of(frame->settings, r->axis, frame->data->lists[r->number].level, rgb);
     const bool shaded = frame->settings->shading && normal;
     if (!shaded && !trip_effects_some(&frame->settings->effects))
         return;
@@ -436,7 +436,7 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     double growth = 1;
     r->splat = &r->constants;
     if (trip_coordinates_uneven(coordinates)) {
-        centre = trip_splat_place(&r->constants, coordinates, voxel, &r->local, &growth);
+        centre = trip_splat_position(&r->constants, coordinates, voxel, &r->local, &growth);
         voxel = trip_coordinates_point(coordinates, voxel);
         r->splat = &r->local;
     }

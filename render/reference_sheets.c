@@ -6,7 +6,7 @@
 #include "light_map.h"
 #include "segments.h"
 #include "shade.h"
-#include "tint.h"
+#include "debug_view.h"
 #include "sheet.h"
 
 struct trip_reference_sheets {
@@ -15,8 +15,8 @@ struct trip_reference_sheets {
     trip_affine to_index;
     const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
-    double saturation; /* trip_settings_saturation() */
-    trip_field *field; /* gradients are in index space, codes per index */
+    double early_termination; /* trip_settings_early_termination() */
+    trip_field *field;        /* gradients are in index space, codes per index */
     bool has_gradients;
     trip_field_fill fill;
     trip_segments segments;
@@ -37,7 +37,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     s->frame = frame;
     trip_affine_invert(&data->index_to_world, &s->to_index); /* it was checked on opening */
     s->coordinates = &data->coordinates;
-    s->saturation = trip_settings_saturation(frame->settings);
+    s->early_termination = trip_settings_early_termination(frame->settings);
     s->value_per_code = (h->code_hi - h->code_lo) / 65535;
     s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
@@ -126,11 +126,11 @@ typedef struct passage {
 } passage;
 
 /* Where the ray is at t, in a cell: its voxels, and their weights. */
-typedef struct place {
+typedef struct position {
     trip_field_cell cell;
     double weights[64];
     double code;
-} place;
+} position;
 
 static trip_vec3 point_at(const passage *p, double t)
 {
@@ -146,7 +146,7 @@ static trip_vec3 index_at(const passage *p, trip_vec3 point)
 }
 
 /* Of the cell's voxels, i fastest. */
-static void set_weights(trip_kernel kernel, place *at, trip_vec3 point)
+static void set_weights(trip_kernel kernel, position *at, trip_vec3 point)
 {
     const int edge = at->cell.edge, first = edge == 2;
     double w[3][TRIP_KERNEL_TAPS];
@@ -176,7 +176,7 @@ static bool take_corners(const passage *p, const int64_t cell[3], double coordin
 
 /* False where something is missing that it is interpolated from. */
 static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point, double coordinate,
-                        place *at)
+                        position *at)
 {
     const trip_kernel kernel = p->s->frame->settings->kernel;
     if (kernel == TRIP_KERNEL_LINEAR ? !take_corners(p, cell, coordinate, &at->cell)
@@ -192,14 +192,15 @@ static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point
 /* Where the ray is at a coordinate of the axis, in indices. */
 static double reached_at(const passage *p, double coordinate)
 {
-    return (trip_coordinates_place(p->s->coordinates, p->axis, coordinate) -
+    return (trip_coordinates_position(p->s->coordinates, p->axis, coordinate) -
             trip_component(p->origin, p->axis)) /
            trip_component(p->direction, p->axis);
 }
 
 /* At a coordinate, at the sheet of `cells` or between it and the next, where the ray is at t. False
  * in empty cells and beyond the grid. */
-static bool find_place(const passage *p, double coordinate, double t, int64_t cells, place *at)
+static bool find_position(const passage *p, double coordinate, double t, int64_t cells,
+                          position *at)
 {
     const int64_t *dims = trip_field_dims(p->s->field);
     trip_vec3 point = index_at(p, point_at(p, t));
@@ -213,7 +214,7 @@ static bool find_place(const passage *p, double coordinate, double t, int64_t ce
     return interpolate(p, cell, point, coordinate, at);
 }
 
-static trip_vec3 gradient_at(const place *at)
+static trip_vec3 gradient_at(const position *at)
 {
     double g[3] = { 0 };
     for (int n = 0; n < at->cell.edge * at->cell.edge * at->cell.edge; n++)
@@ -223,7 +224,7 @@ static trip_vec3 gradient_at(const place *at)
 }
 
 /* At the middle between two places. */
-static void light(const passage *p, const place ends[2], trip_vec3 middle, double rgb[3])
+static void light(const passage *p, const position ends[2], trip_vec3 middle, double rgb[3])
 {
     const trip_reference_sheets *s = p->s;
     const trip_frame *frame = s->frame;
@@ -246,7 +247,7 @@ static bool composite(const trip_reference_sheets *s, double layer[TRIP_CHANNELS
     for (int c = 0; c < TRIP_CHANNELS_MAX; c++)
         layer[c] += fragment[c] * alpha * through;
     double opacity = layer[TRIP_CHANNEL_ALPHA];
-    if (!(1 - opacity < s->saturation))
+    if (!(1 - opacity < s->early_termination))
         return true;
     for (int c = 0; c < TRIP_CHANNELS_MAX; c++)
         layer[c] /= opacity;
@@ -254,7 +255,7 @@ static bool composite(const trip_reference_sheets *s, double layer[TRIP_CHANNELS
 }
 
 /* The code at t, running straight from one end of a segment to the other. */
-static double code_at(const place ends[2], double t0, double t1, double t)
+static double code_at(const position ends[2], double t0, double t1, double t)
 {
     double a = ends[0].code, b = ends[1].code;
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
@@ -263,20 +264,21 @@ static double code_at(const place ends[2], double t0, double t1, double t)
 /* Between the slices at two coordinates. False once the pixel is saturated. */
 static bool add_segment(passage *p, double first, double last, int64_t cells)
 {
-    place ends[2];
+    position ends[2];
     const double t0 = reached_at(p, first), t1 = reached_at(p, last);
     const double from = fmax(t0, p->from), to = fmin(t1, p->to);
     double own[3];
     if (!(from < to))
         return true;
-    if (!find_place(p, first, t0, cells, &ends[0]) || !find_place(p, last, t1, cells, &ends[1]))
+    if (!find_position(p, first, t0, cells, &ends[0]) ||
+        !find_position(p, last, t1, cells, &ends[1]))
         return true;
     trip_segment segment =
         trip_segment_of(&p->s->segments, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to));
     if (!(segment.extinction > 0))
         return true;
     double t = 0.5 * (from + to);
-    if (trip_tint_of(p->s->frame->settings, p->axis, p->s->frame->plan->level, own))
+    if (trip_debug_view_of(p->s->frame->settings, p->axis, p->s->frame->plan->level, own))
         memcpy(segment.rgb, own, sizeof own);
     if (p->s->frame->settings->shading || trip_effects_some(&p->s->frame->settings->effects))
         light(p, ends, point_at(p, t), segment.rgb);
@@ -293,17 +295,18 @@ static bool add_segment(passage *p, double first, double last, int64_t cells)
  * the first of them. */
 static void add_segments(passage *p)
 {
-    const double slices = p->s->frame->settings->slices;
+    const double samples_per_sheet = p->s->frame->settings->samples_per_sheet;
     const double top = (double)trip_field_dims(p->s->field)[p->axis] - 1;
     const double o =
         trip_coordinates_index(p->s->coordinates, p->axis, trip_component(p->origin, p->axis));
     const double d = trip_component(p->direction, p->axis);
-    const double step = d > 0 ? 1 : -1, last = d > 0 ? top * slices : 0;
-    double n = d > 0 ? fmax(0, ceil(o * slices)) : fmin(top * slices, floor(o * slices));
+    const double step = d > 0 ? 1 : -1, last = d > 0 ? top * samples_per_sheet : 0;
+    double n = d > 0 ? fmax(0, ceil(o * samples_per_sheet))
+                     : fmin(top * samples_per_sheet, floor(o * samples_per_sheet));
     bool eye_within = !p->s->frame->camera->ortho && o > 0 && o < top;
-    double from = eye_within ? o : n / slices;
+    double from = eye_within ? o : n / samples_per_sheet;
     for (; (last - n) * step >= 0; n += step) {
-        double to = n / slices;
+        double to = n / samples_per_sheet;
         int64_t cells = (int64_t)fmin(floor(0.5 * (from + to)), top - 1);
         if (from != to && !add_segment(p, from, to, cells))
             return;

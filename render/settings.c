@@ -6,7 +6,7 @@ trip_settings trip_settings_default(void)
 {
     return (trip_settings){
         .classify = TRIP_CLASSIFY_PRE,
-        .slices = 2,
+        .samples_per_sheet = 2,
         .method = TRIP_METHOD_MERGE,
         .traversal = TRIP_TRAVERSAL_OUTWARD,
         .target = TRIP_TARGET_RGBA32F,
@@ -14,7 +14,7 @@ trip_settings trip_settings_default(void)
         .headlight = true,
         .light_direction = { 0, 0, 1 },
         .h = TRIP_H_AUTO,
-        .saturation = TRIP_SATURATION_AUTO,
+        .early_termination = TRIP_EARLY_TERMINATION_AUTO,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
         .flatten = 1,
         .background = { 0, 0, 0, 1 },

@@ -104,7 +104,7 @@ typedef struct trip_effects {
 #define TRIP_LIGHT_CELLS_MAX 1024
 
 /* Slices of a sheet: the most that settings may have. */
-#define TRIP_SLICES_MAX 16
+#define TRIP_SHEET_SAMPLES_MAX 16
 
 typedef struct trip_settings {
     trip_classify classify;
@@ -113,10 +113,10 @@ typedef struct trip_settings {
     trip_low_pass low_pass;       /* likewise */
     double
         flatten; /* of EWA footprints: how much flatter kernels are along the gradient, 1: round */
-    double sprite_px;    /* of fixed footprints: their width, trip_splat_sprite_px() */
-    bool vertex_weights; /* merge: weights of a splat's corners, interpolated over it (2008, 4.2);
-                            of pixels where it is near */
-    int slices;          /* of a sheet, post: 1 to TRIP_SLICES_MAX */
+    double sprite_px;      /* of fixed footprints: their width, trip_splat_sprite_px() */
+    bool vertex_weights;   /* merge: weights of a splat's corners, interpolated over it (2008, 4.2);
+                              of pixels where it is near */
+    int samples_per_sheet; /* of a sheet, post: 1 to TRIP_SHEET_SAMPLES_MAX */
     trip_method method;
     trip_traversal traversal;
     trip_target target;
@@ -125,20 +125,21 @@ typedef struct trip_settings {
     bool depth;                /* a picture of distances too, see layer.h; rgba32f only */
     bool shading;              /* diffuse and specular from the stored gradients */
     bool headlight;            /* light from the eye; otherwise from light_direction, */
-    bool point_light;          /* or from light_place, as bright at any distance */
+    bool point_light;          /* or from light_position, as bright at any distance */
     trip_vec3 light_direction; /* world space, towards the light, unit length */
-    trip_vec3 light_place;     /* world space */
+    trip_vec3 light_position;  /* world space */
     double h;                  /* 0 <= h < 1, or TRIP_H_AUTO: trip_settings_h() */
-    double saturation; /* compositing front to back, the transmittance below which a pixel takes no
-                          more: 0 (none is) to TRIP_SATURATION_MAX, or TRIP_SATURATION_AUTO */
-    double kernel_radius; /* voxels (index space) */
-    double background[4]; /* r, g, b, a; not premultiplied */
-    double lod_px;        /* what is far is drawn at the coarsest level whose voxels are at most so
-                             many pixels of the picture wide there (lod.h, lod_parts.h); 0: all at
-                             the finest */
-    double max_bytes;     /* and at coarser ones still, so that no more is read (lod_limit.h);
-                             0: no bound */
-    trip_kernel kernel;   /* of values, post and the integral */
+    double early_termination;  /* compositing front to back, the transmittance below which a pixel
+                           takes no  more: 0 (none is) to TRIP_EARLY_TERMINATION_MAX, or
+                           TRIP_EARLY_TERMINATION_AUTO */
+    double kernel_radius;      /* voxels (index space) */
+    double background[4];      /* r, g, b, a; not premultiplied */
+    double lod_px;      /* what is far is drawn at the coarsest level whose voxels are at most so
+                           many pixels of the picture wide there (lod.h, lod_parts.h); 0: all at
+                           the finest */
+    double max_bytes;   /* and at coarser ones still, so that no more is read (lod_limit.h);
+                           0: no bound */
+    trip_kernel kernel; /* of values, post and the integral */
     /* Of the integral renderer alone. */
     trip_field_kind field;
     double tolerance; /* of a component of a pixel, 0 to 1 */
@@ -159,10 +160,10 @@ typedef struct trip_settings {
 /* Where pixels are saturated, by how they are classified: what lies behind adds less than that to
  * any component. Of values it is half of 1/255, since a saturated pixel is opaque there (sheet.h).
  * At the most it is 26/255. */
-#define TRIP_SATURATION_AUTO (-1.0)
-#define TRIP_SATURATION_PRE (1.0 / 8192.0)
-#define TRIP_SATURATION_POST (1.0 / 512.0)
-#define TRIP_SATURATION_MAX 0.1
+#define TRIP_EARLY_TERMINATION_AUTO (-1.0)
+#define TRIP_EARLY_TERMINATION_PRE (1.0 / 8192.0)
+#define TRIP_EARLY_TERMINATION_POST (1.0 / 512.0)
+#define TRIP_EARLY_TERMINATION_MAX 0.1
 
 /* The defaults: pre, splat by splat, exact footprints, EWA's low-pass, 2 slices, merge, outward, h
  * and saturation by the classification, kernel radius 2, shading by headlight, rgba32f, no depth,
@@ -177,10 +178,12 @@ static inline double trip_settings_h(const trip_settings *s)
 }
 
 /* The transmittance below which a pixel takes no more. */
-static inline double trip_settings_saturation(const trip_settings *s)
+static inline double trip_settings_early_termination(const trip_settings *s)
 {
     const bool post = s->classify == TRIP_CLASSIFY_POST;
-    return s->saturation >= 0 ? s->saturation : post ? TRIP_SATURATION_POST : TRIP_SATURATION_PRE;
+    return s->early_termination >= 0 ? s->early_termination
+           : post                    ? TRIP_EARLY_TERMINATION_POST
+                                     : TRIP_EARLY_TERMINATION_PRE;
 }
 
 /* Whether splats are summed sheet by sheet. */

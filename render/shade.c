@@ -16,10 +16,10 @@ static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
 /* From the first voxel to the light, world space. */
 static trip_vec3 from_first_voxel(const trip_settings *s, const trip_affine *m)
 {
-    return trip_sub(s->light_place, trip_v3(m->m[0][3], m->m[1][3], m->m[2][3]));
+    return trip_sub(s->light_position, trip_v3(m->m[0][3], m->m[1][3], m->m[2][3]));
 }
 
-trip_vec3 trip_light_place(const trip_settings *s, const trip_affine *index_to_world)
+trip_vec3 trip_light_position(const trip_settings *s, const trip_affine *index_to_world)
 {
     trip_affine to_index;
     trip_affine_invert(index_to_world, &to_index); /* it was checked on opening */
@@ -28,7 +28,7 @@ trip_vec3 trip_light_place(const trip_settings *s, const trip_affine *index_to_w
 
 int trip_light_check(const trip_settings *s, const trip_affine *index_to_world)
 {
-    double far = s->point_light ? trip_length(trip_light_place(s, index_to_world)) : 0;
+    double far = s->point_light ? trip_length(trip_light_position(s, index_to_world)) : 0;
     return far <= TRIP_LIGHT_FARTHEST_VOXELS
                ? 0
                : trip_fail(TRIP_USAGE, "render", "light",

@@ -54,7 +54,7 @@ typedef struct trip_light {
 #define TRIP_LIGHT_FARTHEST_VOXELS TRIP_CAMERA_FARTHEST_VOXELS
 
 /* Of a light that is at a place: where in index space. */
-trip_vec3 trip_light_place(const trip_settings *s, const trip_affine *index_to_world);
+trip_vec3 trip_light_position(const trip_settings *s, const trip_affine *index_to_world);
 /* Fails (usage) where that is too far. */
 int trip_light_check(const trip_settings *s, const trip_affine *index_to_world);
 

@@ -36,8 +36,8 @@
  * picture (closed_form.h).
  *
  * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
- * below trip_settings_saturation() takes no more: its colour is divided by its opacity, which
- * is then 1, so that no component is off by more than that, of colours from 0 to 1. */
+ * below trip_settings_early_termination() takes no more: its colour is divided by its opacity,
+ * which is then 1, so that no component is off by more than that, of colours from 0 to 1. */
 #ifndef TRIP_SHEET_H
 #define TRIP_SHEET_H
 
@@ -49,7 +49,7 @@ static inline int trip_sheet_reach(trip_kernel kernel)
 {
     return trip_kernel_reach(kernel) + 1;
 }
-enum { TRIP_SHEET_REACH_MOST = 3 };
+enum { TRIP_SHEET_REACH_MAX = 3 };
 
 /* The distance in indices of the farthest ray that a voxel changes. */
 static inline double trip_sheet_radius(trip_kernel kernel)

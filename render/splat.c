@@ -50,8 +50,8 @@ trip_splat_frame trip_splat_frame_scaled(const trip_splat_frame *f, trip_vec3 un
     return out;
 }
 
-trip_vec3 trip_splat_place(const trip_splat_frame *f, const trip_coordinates *coordinates,
-                           trip_vec3 voxel, trip_splat_frame *frame, double *growth)
+trip_vec3 trip_splat_position(const trip_splat_frame *f, const trip_coordinates *coordinates,
+                              trip_vec3 voxel, trip_splat_frame *frame, double *growth)
 {
     *growth = 1;
     if (!trip_coordinates_uneven(coordinates)) {
@@ -66,8 +66,8 @@ trip_vec3 trip_splat_place(const trip_splat_frame *f, const trip_coordinates *co
 
 /* Centre and ray2 for a depth; the ray through the centre and `c`, the vector whose cross products
  * with rx and ry are A and B. */
-static void place(const trip_splat_frame *f, trip_vec3 v, trip_splat *s, trip_vec3 *ray,
-                  trip_vec3 *c)
+static void position(const trip_splat_frame *f, trip_vec3 v, trip_splat *s, trip_vec3 *ray,
+                     trip_vec3 *c)
 {
     const trip_camera *camera = &f->camera;
     if (camera->ortho) {
@@ -193,7 +193,7 @@ static bool project_fixed(const trip_splat_frame *f, trip_vec3 v, trip_splat *s)
     trip_vec3 ray, c;
     if (!(s->z > 0))
         return false;
-    place(f, v, s, &ray, &c);
+    position(f, v, s, &ray, &c);
     if (!(fabs(s->x) < farthest_px && fabs(s->y) < farthest_px))
         return *s = (trip_splat){ .z = s->z }, false;
     set_fixed(f, s->z, s);
@@ -251,7 +251,7 @@ static bool project_affine(const trip_splat_frame *f, trip_vec3 v, const trip_fl
                            trip_splat *s)
 {
     trip_vec3 ray, c;
-    place(f, v, s, &ray, &c);
+    position(f, v, s, &ray, &c);
     trip_ray_space j = trip_ray_space_at(&f->camera, v);
     if (!is_affine(f, ray, &j))
         return false;
@@ -377,7 +377,7 @@ double trip_splat_parallel_near(const trip_splat_frame *f)
 {
     trip_splat s = { .z = 1 };
     trip_vec3 ray, c;
-    place(f, f->camera.r0, &s, &ray, &c);
+    position(f, f->camera.r0, &s, &ray, &c);
     set_parallel_footprint(f, ray, c, &s);
     return (sqrt(f->cutoff2) + slant(f, &s)) * f->sigma / trip_length(f->camera.r0);
 }
@@ -386,7 +386,7 @@ static bool project_parallel(const trip_splat_frame *f, trip_vec3 v, const trip_
                              trip_splat *s)
 {
     trip_vec3 ray, c;
-    place(f, v, s, &ray, &c);
+    position(f, v, s, &ray, &c);
     set_parallel_footprint(f, ray, c, s);
     double unit = f->sigma / trip_length(f->camera.r0);
     double reach = (sqrt(f->cutoff2) + slant(f, s)) * unit;
@@ -426,7 +426,7 @@ bool trip_splat_project_flat(const trip_splat_frame *f, trip_vec3 voxel,
     if (f->affine)
         return (out->z > 0 && project_affine(f, v, flat, out)) || set_near(f, v, out);
     if (out->z > 0) {
-        place(f, v, out, &ray, &c);
+        position(f, v, out, &ray, &c);
         set_footprint(f, ray, c, out);
         double kernel2 = f->cutoff2 * f->sigma * f->sigma;
         bool ellipse = set_bounds(f, ray, out);

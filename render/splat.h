@@ -37,7 +37,7 @@
  * them. With settings.vertex_weights all pixels take the sheets beyond the eye's coordinate in
  * ascending order and then those below it in descending order, and with settings.traversal
  * ascending one order. Front to back, a pixel whose transmittance is below
- * trip_settings_saturation() takes no more of what is composited.
+ * trip_settings_early_termination() takes no more of what is composited.
  *
  * The support {m(p) <= TRIP_CUTOFF^2} is the inside of a conic. Writing k = TRIP_CUTOFF,
  *     E = S'^-1 - (k^2 / |r_c|^2) [rx.rx rx.ry; rx.ry ry.ry],  l = (k^2 / |r_c|^2) (r_c.rx, r_c.ry)
@@ -145,8 +145,8 @@ trip_splat_frame trip_splat_frame_scaled(const trip_splat_frame *f, trip_vec3 un
 
 /* Of a voxel of a grid: the frame in which its kernel is round, `f` itself where spacing is even,
  * and where the voxel lies there; lengths are up to `growth` times as long in that of `f`. */
-trip_vec3 trip_splat_place(const trip_splat_frame *f, const trip_coordinates *coordinates,
-                           trip_vec3 voxel, trip_splat_frame *frame, double *growth);
+trip_vec3 trip_splat_position(const trip_splat_frame *f, const trip_coordinates *coordinates,
+                              trip_vec3 voxel, trip_splat_frame *frame, double *growth);
 
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings);
 

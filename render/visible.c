@@ -5,23 +5,23 @@
 
 enum { AXIS = 2 }; /* the list that is read; all hold the same voxels */
 
-#define LEAST_OPACITY (1.0 / 255.0)
+#define MIN_OPACITY (1.0 / 255.0)
 #define SHARE_OF_DEPTH (1.0 / 16.0)
-#define LEAST_ALONE 0.1
+#define MIN_ALONE 0.1
 
 /* Of a wanted function in index space:
  * normal . p + offset + around |(across[0] . p + from[0], across[1] . p + from[1])| */
 typedef struct form {
     trip_vec3 normal;
     double offset, around;
-    double per_voxel;         /* how fast it grows at most */
-    double slack;             /* more than rounding makes of a bound; 0 where bounds are exact */
-    double best;              /* found so far, or known without looking; */
-    bool found;               /* found */
-    trip_visible_place where; /* there */
-    double step;              /* bounds are looked at in steps, the largest first */
-    double left;              /* the farthest that bricks which were not read may reach, */
-    double from;              /* and what those reach at least that are read next */
+    double per_voxel;            /* how fast it grows at most */
+    double slack;                /* more than rounding makes of a bound; 0 where bounds are exact */
+    double best;                 /* found so far, or known without looking; */
+    bool found;                  /* found */
+    trip_visible_position where; /* there */
+    double step;                 /* bounds are looked at in steps, the largest first */
+    double left;                 /* the farthest that bricks which were not read may reach, */
+    double from;                 /* and what those reach at least that are read next */
 } form;
 
 typedef struct trip_visible_search {
@@ -37,21 +37,21 @@ typedef struct trip_visible_search {
 } search;
 
 /* The extinction, per world unit, from which on voxels count. */
-static double least_extinction(const trip_visible *v)
+static double min_extinction(const trip_visible *v)
 {
     const trip_affine *m = &v->data->index_to_world;
     if (v->alone)
-        return -log1p(-LEAST_ALONE) / cbrt(fabs(trip_affine_determinant(m)));
+        return -log1p(-MIN_ALONE) / cbrt(fabs(trip_affine_determinant(m)));
     trip_vec3 diagonal =
         trip_v3(v->hi[0] - v->lo[0] + 1, v->hi[1] - v->lo[1] + 1, v->hi[2] - v->lo[2] + 1);
-    return -log1p(-LEAST_OPACITY) / (SHARE_OF_DEPTH * trip_length(trip_affine_vector(m, diagonal)));
+    return -log1p(-MIN_OPACITY) / (SHARE_OF_DEPTH * trip_length(trip_affine_vector(m, diagonal)));
 }
 
 void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone)
 {
     v->alone = alone;
     v->splats = 0;
-    trip_code_set_make(&v->codes, table, least_extinction(v));
+    trip_code_set_make(&v->codes, table, min_extinction(v));
 }
 
 /* Every operation rounds monotonically in x, y and z alone, so that the corners of a box bound the
@@ -74,14 +74,14 @@ static double value_at(const search *s, const form *f, double x, double y, doubl
 /* A convex function is greatest at a corner. */
 static double bound(const search *s, const form *f, const trip_brick_box *b)
 {
-    double most = -INFINITY;
+    double max = -INFINITY;
     if (f->around == 0)
         return linear(f, f->normal.x > 0 ? b->hi[0] : b->lo[0],
                       f->normal.y > 0 ? b->hi[1] : b->lo[1], f->normal.z > 0 ? b->hi[2] : b->lo[2]);
     for (int i = 0; i < 8; i++)
-        most = fmax(most, value_at(s, f, i & 1 ? b->hi[0] : b->lo[0], i & 2 ? b->hi[1] : b->lo[1],
-                                   i & 4 ? b->hi[2] : b->lo[2]));
-    return most + f->slack;
+        max = fmax(max, value_at(s, f, i & 1 ? b->hi[0] : b->lo[0], i & 2 ? b->hi[1] : b->lo[1],
+                                 i & 4 ? b->hi[2] : b->lo[2]));
+    return max + f->slack;
 }
 
 /* The longest image of a unit vector under the two rows. */
@@ -122,11 +122,11 @@ static form make_form(const search *s, trip_vec3 normal, double offset, double a
  * was found. */
 static bool bound_brick(search *s, uint64_t index, const trip_file_slab *slab, double *bounds)
 {
-    const trip_brick_box place =
+    const trip_brick_box position =
         trip_brick_box_of(&s->visible->data->header, slab, &s->list->bricks[index]);
     bool open = false;
     for (int i = 0; i < s->count; i++) {
-        bounds[i] = bound(s, &s->forms[i], &place);
+        bounds[i] = bound(s, &s->forms[i], &position);
         open |= bounds[i] > s->forms[i].best;
     }
     if (!open)
@@ -184,11 +184,11 @@ static bool select_bricks(search *s, trip_selection *selection)
 }
 
 /* The forms that may be greater in the box than what was found, a bit each. */
-static unsigned forms_beyond(const search *s, const trip_brick_box *place)
+static unsigned forms_beyond(const search *s, const trip_brick_box *position)
 {
     unsigned beyond = 0;
     for (int i = 0; i < s->count; i++)
-        if (bound(s, &s->forms[i], place) > s->forms[i].best)
+        if (bound(s, &s->forms[i], position) > s->forms[i].best)
             beyond |= 1u << i;
     return beyond;
 }
@@ -209,7 +209,7 @@ static trip_brick_box square_box(const trip_run *run, const trip_square *square)
     return (trip_brick_box){ { u, v, run->sheet }, { u + 7, v + 7, run->sheet } };
 }
 
-static void look_at_voxel(search *s, unsigned forms, const trip_visible_place *at)
+static void look_at_voxel(search *s, unsigned forms, const trip_visible_position *at)
 {
     for (; forms; forms &= forms - 1) {
         form *f = &s->forms[__builtin_ctz(forms)];
@@ -229,9 +229,9 @@ static void look_at_square(search *s, const trip_run *run, const trip_square *sq
     trip_square_voxels(square, voxels);
     s->visible->splats += square->count;
     for (uint32_t n = 0; n < square->count; n++) {
-        const trip_visible_place at = { run->u + (double)trip_voxel_u(voxels[n]),
-                                        run->v + (double)trip_voxel_v(voxels[n]), run->sheet,
-                                        trip_voxel_code(voxels[n]) };
+        const trip_visible_position at = { run->u + (double)trip_voxel_u(voxels[n]),
+                                           run->v + (double)trip_voxel_v(voxels[n]), run->sheet,
+                                           trip_voxel_code(voxels[n]) };
         if (trip_code_set_has(&s->visible->codes, at.code))
             look_at_voxel(s, forms, &at);
     }
@@ -246,8 +246,8 @@ static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
     const trip_block block = trip_block_of(batch, run);
     const uint32_t count = trip_block_squares(&block, s->squares);
     for (uint32_t i = 0; i < count; i++) {
-        const trip_brick_box place = square_box(run, &s->squares[i]);
-        const unsigned forms = forms_beyond(s, &place);
+        const trip_brick_box position = square_box(run, &s->squares[i]);
+        const unsigned forms = forms_beyond(s, &position);
         if (forms)
             look_at_square(s, run, &s->squares[i], forms);
     }
@@ -258,8 +258,8 @@ bool trip_visible_skip(void *user, const trip_selection *selection, const trip_r
     const search *s = ((const trip_visible *)user)->search;
     if (!s)
         return false;
-    const trip_brick_box place = run_box(selection->list, run);
-    return !forms_beyond(s, &place);
+    const trip_brick_box position = run_box(selection->list, run);
+    return !forms_beyond(s, &position);
 }
 
 static int read_selected(search *s, const trip_selection *selection)
@@ -312,20 +312,20 @@ static int find_in_list(search *s, const trip_list *list)
     return status;
 }
 
-static void begin_with_places(search *s)
+static void begin_with_positions(search *s)
 {
     const trip_visible *v = s->visible;
-    for (unsigned i = 0; i < v->place_count && i < TRIP_VISIBLE_PLACES; i++)
-        if (trip_code_set_has(&v->codes, v->places[i].code))
-            look_at_voxel(s, (1u << s->count) - 1, &v->places[i]);
+    for (unsigned i = 0; i < v->position_count && i < TRIP_VISIBLE_POSITIONS; i++)
+        if (trip_code_set_has(&v->codes, v->positions[i].code))
+            look_at_voxel(s, (1u << s->count) - 1, &v->positions[i]);
 }
 
-static void keep_places(const search *s)
+static void keep_positions(const search *s)
 {
     trip_visible *v = s->visible;
     for (int i = 0; i < s->count; i++)
         if (s->forms[i].found)
-            v->places[v->place_count++ % TRIP_VISIBLE_PLACES] = s->forms[i].where;
+            v->positions[v->position_count++ % TRIP_VISIBLE_POSITIONS] = s->forms[i].where;
 }
 
 /* What one list shows need not be looked for in the next where that reaches no farther. */
@@ -333,12 +333,12 @@ static int find(search *s)
 {
     const trip_list *list = NULL;
     int status = 0;
-    begin_with_places(s);
+    begin_with_positions(s);
     s->visible->search = s;
     while (!status && (list = trip_dataset_next(s->visible->data, list, AXIS, 0, TRIP_KIND_VOXELS)))
         status = find_in_list(s, list);
     s->visible->search = NULL;
-    keep_places(s);
+    keep_positions(s);
     return status;
 }
 

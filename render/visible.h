@@ -15,13 +15,13 @@
 #include "reader.h"
 #include "transfer_function.h"
 
-enum { TRIP_VISIBLE_PLACES = 32 };
+enum { TRIP_VISIBLE_POSITIONS = 32 };
 
 /* Of a voxel. */
-typedef struct trip_visible_place {
+typedef struct trip_visible_position {
     double u, v, sheet;
     unsigned code;
-} trip_visible_place;
+} trip_visible_position;
 
 typedef struct trip_visible {
     /* Set by the caller, and outliving this. */
@@ -35,8 +35,8 @@ typedef struct trip_visible {
     uint64_t splats;     /* looked at so far */
     trip_code_set codes; /* whose voxels are visible */
     /* Where earlier searches ended, the last ones: later ones begin with what reaches far there. */
-    trip_visible_place places[TRIP_VISIBLE_PLACES];
-    unsigned place_count;                     /* so far */
+    trip_visible_position positions[TRIP_VISIBLE_POSITIONS];
+    unsigned position_count;                  /* so far */
     const struct trip_visible_search *search; /* under way; NULL: none */
 } trip_visible;
 

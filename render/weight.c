@@ -68,8 +68,8 @@ trip_ray_bounds trip_ray_bounds_of(const double lo[3], const double hi[3])
     for (int a = 0; a < 3; a++) {
         b.lo[a] = lo[a];
         b.hi[a] = hi[a];
-        b.least[a] = larger(0, larger(lo[a], -hi[a]));
-        b.most[a] = larger(fabs(lo[a]), fabs(hi[a]));
+        b.min[a] = larger(0, larger(lo[a], -hi[a]));
+        b.max[a] = larger(fabs(lo[a]), fabs(hi[a]));
     }
     return b;
 }
@@ -93,14 +93,14 @@ bool trip_weight_may_lie(const trip_settings *s, int axis_of_view, const trip_ra
 {
     if (trip_settings_has_one_list(s))
         return axis == axis_of_view;
-    double least = larger(bounds->least[0], larger(bounds->least[1], bounds->least[2]));
-    return !(bounds->most[axis] * (1 + 1e-9) < trip_weight_h(s) * least); /* room for rounding */
+    double min = larger(bounds->min[0], larger(bounds->min[1], bounds->min[2]));
+    return !(bounds->max[axis] * (1 + 1e-9) < trip_weight_h(s) * min); /* room for rounding */
 }
 
 bool trip_way_may_lie(const trip_ray_bounds *bounds, int axis, trip_way way)
 {
-    const double *most = bounds->most;
-    double room = 1e-9 * larger(most[0], larger(most[1], most[2])); /* for rounding */
+    const double *max = bounds->max;
+    double room = 1e-9 * larger(max[0], larger(max[1], max[2])); /* for rounding */
     if (way == TRIP_WAY_UP)
         return bounds->hi[axis] >= -room;
     return way == TRIP_WAY_ANY || bounds->lo[axis] <= room;

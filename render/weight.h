@@ -43,7 +43,7 @@ static inline trip_way trip_ray_goes(trip_vec3 ray, int axis)
 
 /* Bounds of the components r_a over a set of rays, by axis, and of |r_a|. */
 typedef struct trip_ray_bounds {
-    double lo[3], hi[3], least[3], most[3];
+    double lo[3], hi[3], min[3], max[3];
 } trip_ray_bounds;
 
 /* Of the rays whose components lie in [lo, hi]. */

@@ -8,12 +8,12 @@
 
 #include "page_text.h"
 #include "report.h"
-#include "session.h"
+#include "serve_session.h"
 
 enum {
     TOKEN_BYTES = 16,
-    MOST_BODY = 64 << 10,
-    MOST_CONNECTIONS = 32,
+    MAX_BODY = 64 << 10,
+    MAX_CONNECTIONS = 32,
     TIMEOUT_SECONDS = 30,
 };
 #define WAIT_SECONDS 10
@@ -164,7 +164,7 @@ static enum MHD_Result post(server *s, struct MHD_Connection *c, const char *pat
 
 static void keep(body *b, const char *data, size_t bytes)
 {
-    char *text = b->bytes + bytes <= MOST_BODY ? realloc(b->text, b->bytes + bytes) : NULL;
+    char *text = b->bytes + bytes <= MAX_BODY ? realloc(b->text, b->bytes + bytes) : NULL;
     b->too_long |= !text;
     if (!text)
         return;
@@ -232,7 +232,7 @@ static int listen_here(server *s, int port)
     s->daemon = MHD_start_daemon(
         MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL, 0, NULL,
         NULL, handle, s, MHD_OPTION_SOCK_ADDR, &here, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)MOST_CONNECTIONS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)TIMEOUT_SECONDS,
+        (unsigned)MAX_CONNECTIONS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)TIMEOUT_SECONDS,
         MHD_OPTION_NOTIFY_COMPLETED, forget, NULL, MHD_OPTION_END);
     const union MHD_DaemonInfo *info =
         s->daemon ? MHD_get_daemon_info(s->daemon, MHD_DAEMON_INFO_BIND_PORT) : NULL;

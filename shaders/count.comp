@@ -65,7 +65,7 @@ void main()
 #ifdef UNEVEN
     use_width(r.width);
 #endif
-    if (!project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius))
+    if (!project(r.from_eye, r.position, s) || !may_reach(r.from_eye, s.radius))
         return;
     count(0);
     if (drawn(s))

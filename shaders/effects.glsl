@@ -16,7 +16,7 @@ layout(std140, binding = TRIP_GL_EFFECTS) uniform trip_gl_effects
 };
 
 // Of a place in the list's grid, list axes.
-vec3 place_of(vec3 voxel)
+vec3 position_of(vec3 voxel)
 {
     vec4 v = vec4(voxel, 1.0);
     return vec3(dot(index_0, v), dot(index_1, v), dot(index_2, v));
@@ -24,9 +24,9 @@ vec3 place_of(vec3 voxel)
 
 #ifdef CUED
 // What is farther fades into the background.
-vec3 cued(vec3 colour, vec3 place)
+vec3 cued(vec3 colour, vec3 position)
 {
-    return mix(colour, faded.rgb, faded.w * clamp(dot(cue, vec4(place, 1.0)), 0.0, 1.0));
+    return mix(colour, faded.rgb, faded.w * clamp(dot(cue, vec4(position, 1.0)), 0.0, 1.0));
 }
 #endif
 
@@ -71,12 +71,12 @@ vec3 aside(vec3 unit, float share)
 layout(binding = TRIP_GL_LIGHT_REACHED) uniform sampler3D light_reached;
 
 // Towards the light, but not beyond it.
-float reached_at(vec3 place, float strength, vec3 towards_light)
+float reached_at(vec3 position, float strength, vec3 towards_light)
 {
-    vec3 at = place + aside(towards_light, strength);
+    vec3 at = position + aside(towards_light, strength);
     vec3 end = vec3(aside_0.w, aside_1.w, aside_2.w);
     if (phase.w > 0.0)
-        at = clamp(at, min(place, end), max(place, end));
+        at = clamp(at, min(position, end), max(position, end));
     return lattice_at(light_reached, at * per_voxel.x);
 }
 
@@ -90,27 +90,27 @@ float phase_of(vec3 towards_light, vec3 eye)
 #ifdef OCCLUSION
 layout(binding = TRIP_GL_LIGHT_OPEN) uniform sampler3D light_open;
 
-float open_at(vec3 place, surface s)
+float open_at(vec3 position, surface s)
 {
     vec3 shift = aside(s.normal, s.strength);
-    float one = lattice_at(light_open, (place + shift) * per_voxel.y);
+    float one = lattice_at(light_open, (position + shift) * per_voxel.y);
     if (s.strength > 0.0)
-        one = max(one, lattice_at(light_open, (place - shift) * per_voxel.y));
+        one = max(one, lattice_at(light_open, (position - shift) * per_voxel.y));
     return min(1.0, (1.0 + s.strength) * one);
 }
 #endif
 
 #ifdef LIT
 // `towards_light` and `eye`, towards that, are anything without SHADOWS.
-vec3 lit_at(vec3 colour, surface s, vec3 place, vec3 towards_light, vec3 eye)
+vec3 lit_at(vec3 colour, surface s, vec3 position, vec3 towards_light, vec3 eye)
 {
     float reached = 1.0, open = 1.0, scattered = 1.0;
 #ifdef SHADOWS
-    reached = reached_at(place, s.strength, towards_light);
+    reached = reached_at(position, s.strength, towards_light);
     scattered = phase_of(towards_light, eye);
 #endif
 #ifdef OCCLUSION
-    open = open_at(place, s);
+    open = open_at(position, s);
 #endif
     float matt = AMBIENT * open + DIFFUSE * reached * mix(scattered, s.diffuse, s.strength);
     return clamp(colour * matt + s.gloss * reached, 0.0, 1.0);
@@ -124,9 +124,9 @@ layout(std140, binding = TRIP_GL_HEAT_COLOURS) uniform trip_gl_heat_colours
     vec4 heat_colours[TRIP_GL_EMISSION_STEPS + 1];
 };
 
-vec3 emission_at(vec3 place)
+vec3 emission_at(vec3 position)
 {
-    vec4 p = vec4(place, 1.0);
+    vec4 p = vec4(position, 1.0);
     vec3 at = vec3(dot(heat_0, p), dot(heat_1, p), dot(heat_2, p));
     vec3 within = 1.0 - clamp(max(-at, at - heat_last.xyz), 0.0, 1.0);
     float share = within.x * within.y * within.z;

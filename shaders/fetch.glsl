@@ -20,16 +20,16 @@ layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip
 // Entry 3 i + a: of voxel i along axis a of the data the place, then the width, each the sum of two
 // floats.
 #ifdef INDEXED
-#define VOXEL_PLACES TRIP_GL_VOXEL_PLACES_INDEXED
+#define VOXEL_POSITIONS TRIP_GL_VOXEL_POSITIONS_INDEXED
 #else
-#define VOXEL_PLACES TRIP_GL_VOXEL_PLACES
+#define VOXEL_POSITIONS TRIP_GL_VOXEL_POSITIONS
 #endif
-layout(std430, binding = VOXEL_PLACES) readonly buffer trip_gl_voxel_places { vec4 voxel_places[]; };
+layout(std430, binding = VOXEL_POSITIONS) readonly buffer trip_gl_voxel_positions { vec4 voxel_positions[]; };
 #endif
 
 struct record {
     real3 from_eye; // list axes
-    real3 place;    // to_x . c, to_y . c in pixels from the image's centre, forward . c
+    real3 position;    // to_x . c, to_y . c in pixels from the image's centre, forward . c
     uint code, normal;
 #ifdef UNEVEN
     real3 width;    // list axes
@@ -80,10 +80,10 @@ uint even_bits(uint n)
 
 real3 offset_of(trip_gl_square square, uint k, out uint code)
 {
-    uint place = find_bit(square.mask_low, square.mask_high, k);
-    code = code_at(square.codes, square.least_width, k) * uint(edge.y);
-    return real3(0.0, (square.corner & 0xffffu) + even_bits(place),
-                 (square.corner >> 16) + even_bits(place >> 1));
+    uint position = find_bit(square.mask_low, square.mask_high, k);
+    code = code_at(square.codes, square.min_width, k) * uint(edge.y);
+    return real3(0.0, (square.corner & 0xffffu) + even_bits(position),
+                 (square.corner >> 16) + even_bits(position >> 1));
 }
 #endif
 
@@ -105,13 +105,13 @@ uint normal_at(uint at)
 #ifdef UNEVEN
 // Of a voxel and an offset from it, list axes: how far the other's place is from its place, and the
 // other's width.
-real3 place_offset(ivec3 origin, ivec3 offset, out real3 width)
+real3 position_offset(ivec3 origin, ivec3 offset, out real3 width)
 {
     real3 apart;
     for (int i = 0; i < 3; i++) {
         int axis = (int(weight.z) + i) % 3;
-        vec4 from = voxel_places[3 * origin[i] + axis];
-        vec4 to = voxel_places[3 * (origin[i] + offset[i]) + axis];
+        vec4 from = voxel_positions[3 * origin[i] + axis];
+        vec4 to = voxel_positions[3 * (origin[i] + offset[i]) + axis];
         apart[i] = (real(to.x) - real(from.x)) + (real(to.y) - real(from.y));
         width[i] = real(to.z) + real(to.w);
     }
@@ -135,7 +135,7 @@ record fetch_record(uint position)
     ivec3 origin = ivec3(run.unused, run.first, run.step);
 #endif
 #ifdef UNEVEN
-    offset = place_offset(origin, ivec3(offset), r.width);
+    offset = position_offset(origin, ivec3(offset), r.width);
 #endif
     // In this order: base + offset cancels almost exactly near the eye.
     r.from_eye = (real3(run.base) + offset) + real3(run.base_low);
@@ -145,19 +145,19 @@ record fetch_record(uint position)
     r.voxel = corner + offset;
 #endif
 #ifdef TRIP_DOUBLE
-    r.place = real3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
+    r.position = real3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
                     dot(forward.xyz, r.from_eye));
 #ifdef PARALLEL
-    r.place.xy -= screen.xy;
+    r.position.xy -= screen.xy;
 #endif
 #else
-    r.place = run.place + vec3(dot(to_x.xyz, offset), dot(to_y.xyz, offset),
+    r.position = run.position + vec3(dot(to_x.xyz, offset), dot(to_y.xyz, offset),
                                dot(forward.xyz, offset));
 #ifdef FIXED
     // Sprites are as large at the eye as anywhere: about it no depth may be what rounding left of
     // the run's, and that of the voxel that the eye is at is 0.
     if (dot(r.from_eye, r.from_eye) < dot(offset, offset))
-        r.place = vec3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
+        r.position = vec3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
                        dot(forward.xyz, r.from_eye));
 #endif
 #endif

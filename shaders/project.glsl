@@ -48,12 +48,12 @@ real4 flattened(real4 s, real3 gx, real3 gy, real along)
 #ifdef PARALLEL
 // Sets `along`; false where all of the splat is behind the plane of the eye. `half_size` is of the
 // support of the round kernel.
-bool project_near(real3 place, real2 half_size, inout splat s)
+bool project_near(real3 position, real2 half_size, inout splat s)
 {
     real3 ray = own_vector(ray_0.xyz), x = own_vector(ray_x.xyz), y = own_vector(ray_y.xyz);
     real unit = 1.0 / (length(ray) * sqrt(own_sigma2())), k = sqrt(kernel.y);
     real2 slope = real2(dot(ray, x), dot(ray, y)) * (-ray_x.w * unit);
-    real middle = place.z * dot(ray, ray) * unit;
+    real middle = position.z * dot(ray, ray) * unit;
     real reach = k + dot(abs(slope), half_size);
     s.near = !(middle >= reach);
     s.along = real3(middle - dot(slope, s.centre), slope);
@@ -91,7 +91,7 @@ real3 form_of(real3 e, real scale)
 }
 
 // The forms, and of near splats the bounds and the amplitude too; false where nothing shows.
-bool project_near(real3 c, real3 place, inout splat s)
+bool project_near(real3 c, real3 position, inout splat s)
 {
     real3 size = abs(c), v = c;
     real3 other = size.x <= size.y && size.x <= size.z ? real3(1.0, 0.0, 0.0)
@@ -100,7 +100,7 @@ bool project_near(real3 c, real3 place, inout splat s)
     if (!(dot(v, v) > 0.0))
         v = other.yzx;
     real3 e0 = normalize(cross(v, other)), e1 = normalize(cross(v, e0));
-    real depth = max(place.z, real(0.0)) * ray_x.w, low = kernel.z * depth * depth / own_sigma2();
+    real depth = max(position.z, real(0.0)) * ray_x.w, low = kernel.z * depth * depth / own_sigma2();
     real3 ray_dx = own_vector(ray_x.xyz), ray_dy = own_vector(ray_y.xyz);
     real2 x = real2(dot(e0, ray_dx), dot(e1, ray_dx));
     real2 y = real2(dot(e0, ray_dy), dot(e1, ray_dy));
@@ -122,10 +122,10 @@ bool project_near(real3 c, real3 place, inout splat s)
     s.radius = 1e18;
     real2 columns, rows;
     real3 z = own_gradient(forward.xyz);
-    bool seen = bound_along(own_gradient(to_x.xyz), z, place.x, place.z, reach, screen.x, columns) &&
-                bound_along(own_gradient(to_y.xyz), z, place.y, place.z, reach, screen.y, rows);
+    bool seen = bound_along(own_gradient(to_x.xyz), z, position.x, position.z, reach, screen.x, columns) &&
+                bound_along(own_gradient(to_y.xyz), z, position.y, position.z, reach, screen.y, rows);
     s.bounds = real4(columns.x, rows.x, columns.y, rows.y);
-    return seen && place.z >= -sqrt(2.0 * own_sigma2() * kernel.y * dot(z, z));
+    return seen && position.z >= -sqrt(2.0 * own_sigma2() * kernel.y * dot(z, z));
 }
 #endif
 #endif
@@ -137,8 +137,8 @@ bool project_near(real3 c, real3 place, inout splat s)
 void shape_footprint(inout splat s, inout real2 half_size)
 {
     real3 x = own_gradient(to_x.xyz), y = own_gradient(to_y.xyz), ray = own_vector(ray_0.xyz);
-    real most = max(dot(x, x), dot(y, y)), sigma2 = own_sigma2() * most;
-    real3 gx = x * inversesqrt(most), gy = y * inversesqrt(most), area = cross(gx, gy);
+    real largest = max(dot(x, x), dot(y, y)), sigma2 = own_sigma2() * largest;
+    real3 gx = x * inversesqrt(largest), gy = y * inversesqrt(largest), area = cross(gx, gy);
     real low = kernel.z / sigma2, det_s = dot(area, area);
     real4 shape = real4(dot(gx, gx), dot(gx, gy), dot(gy, gy), det_s);
 #ifdef UNEVEN
@@ -162,10 +162,10 @@ void shape_footprint(inout splat s, inout real2 half_size)
 }
 #endif
 
-bool project_own(real3 c, real3 place, out splat s)
+bool project_own(real3 c, real3 position, out splat s)
 {
     real2 half_size = parallel_size.xy;
-    s.centre = place.xy;
+    s.centre = position.xy;
     s.conic = parallel.xyz;
     s.ray2 = 1.0;
     s.amplitude = parallel.w;
@@ -175,18 +175,18 @@ bool project_own(real3 c, real3 place, out splat s)
     shape_footprint(s, half_size);
 #endif
 #ifdef NEAR
-    return project_near(place, half_size, s);
+    return project_near(position, half_size, s);
 #else
-    return place.z > 0.0;
+    return position.z > 0.0;
 #endif
 }
 #else
 #ifdef FIXED
-bool project_far(real3 c, real3 place, out splat s)
+bool project_far(real3 c, real3 position, out splat s)
 {
-    if (!(place.z > 0.0))
+    if (!(position.z > 0.0))
         return false;
-    s.centre = place.xy / place.z;
+    s.centre = position.xy / position.z;
     s.conic = parallel.xyz;
     s.ray2 = 1.0;
     s.amplitude = parallel.w;
@@ -194,23 +194,23 @@ bool project_far(real3 c, real3 place, out splat s)
     s.amplitude *= sqrt(world_ray2(s.centre) / own_ray2(s.centre));
 #endif
     s.bounds = real4(s.centre - parallel_size.xy, s.centre + parallel_size.xy);
-    s.radius = parallel_size.z * place.z;
+    s.radius = parallel_size.z * position.z;
     return max(abs(s.centre.x), abs(s.centre.y)) < 1e9;
 }
 #else
-bool project_far(real3 c, real3 place, out splat s)
+bool project_far(real3 c, real3 position, out splat s)
 {
-    if (!(place.z > 0.0))
+    if (!(position.z > 0.0))
         return false;
-    real inverse = 1.0 / place.z;
+    real inverse = 1.0 / position.z;
     real3 ray = c * inverse;
-    s.centre = place.xy * inverse;
+    s.centre = position.xy * inverse;
     s.ray2 = dot(ray, ray);
 
     // u S = [b.b -a.b; -a.b a.a]. Beyond 1e17 splats are 1e-8 pixels and only products would suffer.
     real3 rx = own_vector(ray_x.xyz), ry = own_vector(ray_y.xyz);
     real3 a = cross(ray, rx), b = cross(ray, ry);
-    real to_sigma = forward.w / own_size, u = min(to_sigma * to_sigma * (place.z * place.z), real(1e17));
+    real to_sigma = forward.w / own_size, u = min(to_sigma * to_sigma * (position.z * position.z), real(1e17));
     real low = kernel.z * u;
     real sxx = dot(b, b), sxy = -dot(a, b), syy = dot(a, a);
     real det_s = ray_y.w * s.ray2, det_shape = det_s;
@@ -236,7 +236,7 @@ bool project_far(real3 c, real3 place, out splat s)
     s.radius = sqrt(own_sigma2() * kernel.y * (1.0 + low * largest / det_s));
 
 #ifdef AFFINE
-    if (!(s.ray2 * u * (AFFINE_MOST * AFFINE_MOST) >= kernel.y * ray_x.w * ray_x.w * spread))
+    if (!(s.ray2 * u * (AFFINE_MAX * AFFINE_MAX) >= kernel.y * ray_x.w * ray_x.w * spread))
         return false;
     real2 half_size = sqrt(real2(sxx + low, syy + low) * (kernel.y / u));
     s.bounds = real4(s.centre - half_size, s.centre + half_size);
@@ -266,9 +266,9 @@ bool project_far(real3 c, real3 place, out splat s)
 }
 #endif
 
-bool project_own(real3 c, real3 place, out splat s)
+bool project_own(real3 c, real3 position, out splat s)
 {
-    bool far = project_far(c, place, s);
+    bool far = project_far(c, position, s);
 #if defined(NEAR) && defined(FIXED)
     s.near = false;
     s.a = s.b = s.along = real3(0.0);
@@ -276,19 +276,19 @@ bool project_own(real3 c, real3 place, out splat s)
 #elif defined(NEAR) && defined(AFFINE)
     s.near = !far;
     s.a = s.b = s.along = real3(0.0);
-    return far || project_near(c, place, s);
+    return far || project_near(c, position, s);
 #elif defined(NEAR)
     s.near = !(far && dot(c, c) >= own_sigma2() * kernel.y + s.radius * s.radius);
-    return project_near(c, place, s);
+    return project_near(c, position, s);
 #else
     return far;
 #endif
 }
 #endif
 
-bool project(real3 c, real3 place, out splat s)
+bool project(real3 c, real3 position, out splat s)
 {
-    bool seen = project_own(own_vector(c), place, s);
+    bool seen = project_own(own_vector(c), position, s);
 #ifdef UNEVEN
     s.radius *= max(own_width.x, max(own_width.y, own_width.z));
 #endif

@@ -10,7 +10,7 @@ layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_closed_form
     vec4 x, k, q0, q1; // as trip_gl_closed has it
 } form;
 
-float place_of(float code)
+float position_of(float code)
 {
 #ifdef WIDE
     code = clamp(code, 0.0, 65535.0);
@@ -20,7 +20,7 @@ float place_of(float code)
 
 vec4 segment_between(float a, float b, float unit)
 {
-    float from = place_of(a), to = place_of(b), x = max(from, 0.0), y = max(to, 0.0);
+    float from = position_of(a), to = position_of(b), x = max(from, 0.0), y = max(to, 0.0);
     float m = 0.5 * (x + y), dd = (y - x) * (y - x) / 12.0;
     vec4 k = form.k;
     float extinction = ((k.w * m + k.z) * m + k.y) * m + k.x + (3.0 * k.w * m + k.z) * dd;

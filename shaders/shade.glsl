@@ -104,7 +104,7 @@ vec3 shade(vec3 colour, uint normal, vec3 from_eye)
 
 #ifdef LIT
 // The same where effects are looked up, at a place in index space.
-vec3 lit_here(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye, vec3 place)
+vec3 lit_here(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye, vec3 position)
 {
     surface s = surface(0.0, 0.0, 0.0, vec3(0.0));
     vec3 towards_light = vec3(0.0);
@@ -114,10 +114,10 @@ vec3 lit_here(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye, vec3 place)
 #ifdef SHADED
     s = surface_of(gradient, towards_light, eye);
 #endif
-    return lit_at(colour, s, place, towards_light, eye);
+    return lit_at(colour, s, position, towards_light, eye);
 }
 
-vec3 shade_here(vec3 colour, uint normal, vec3 from_eye, vec3 place)
+vec3 shade_here(vec3 colour, uint normal, vec3 from_eye, vec3 position)
 {
     vec3 eye = vec3(0.0);
     vec4 gradient = vec4(0.0);
@@ -127,6 +127,6 @@ vec3 shade_here(vec3 colour, uint normal, vec3 from_eye, vec3 place)
 #ifdef SHADED
     gradient = unpack_normal(normal);
 #endif
-    return lit_here(colour, gradient, eye, from_eye, place);
+    return lit_here(colour, gradient, eye, from_eye, position);
 }
 #endif

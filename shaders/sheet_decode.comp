@@ -25,7 +25,7 @@ void main()
     if ((word & bit) == 0u)
         return;
     uint before = uint(bitCount(word & (bit - 1u))) + (n < 32u ? 0u : uint(bitCount(square.mask_low)));
-    uint code = code_at(square.codes, square.least_width, before) * form.y;
-    uvec2 place = uvec2(square.corner, square.corner >> 16) + uvec2(even_bits(n), even_bits(n >> 1));
-    imageStore(sheet, ivec2(place & 0xffffu), vec4(code));
+    uint code = code_at(square.codes, square.min_width, before) * form.y;
+    uvec2 position = uvec2(square.corner, square.corner >> 16) + uvec2(even_bits(n), even_bits(n >> 1));
+    imageStore(sheet, ivec2(position & 0xffffu), vec4(code));
 }

@@ -30,9 +30,9 @@ layout(binding = TRIP_GL_SHEET_GRADIENTS) uniform sampler2DArray gradients;
 #endif
 #ifdef UNEVEN
 // Of voxels along u, then along v: whole and the rest.
-layout(std430, binding = TRIP_GL_PLACES) readonly buffer trip_gl_places
+layout(std430, binding = TRIP_GL_POSITIONS) readonly buffer trip_gl_positions
 {
-    vec2 places[];
+    vec2 positions[];
 };
 #endif
 // x: of the image, in which the band's row 0 lies; y, z: rows of the band, the latter not drawn;
@@ -52,7 +52,7 @@ struct ray {
 };
 
 // Of a ray at an end.
-struct place {
+struct position {
     ivec2 cell;
     vec2 part; // of it
     bool there; // all that it is interpolated from is
@@ -142,7 +142,7 @@ struct tap {
 
 // Number n of a place between the sheets of an end. Beyond the grid its edge repeats; another voxel
 // that is missing is the corner next to it.
-tap tap_of(place at, trip_gl_sheet_end end, vec4 weights[3], int n)
+tap tap_of(position at, trip_gl_sheet_end end, vec4 weights[3], int n)
 {
     ivec3 i = ivec3(n & 3, n >> 2 & 3, n >> 4);
     int layer = i.z == 0 ? end.outer_before : i.z == 1 ? end.before : i.z == 2 ? end.behind : end.outer_behind;
@@ -158,7 +158,7 @@ tap tap_of(place at, trip_gl_sheet_end end, vec4 weights[3], int n)
 
 // By differences from a corner, so that one value all around is that value, however weights are
 // rounded.
-float wide_code(place at, trip_gl_sheet_end end, float corner)
+float wide_code(position at, trip_gl_sheet_end end, float corner)
 {
     vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
     float sum = 0.0;
@@ -174,7 +174,7 @@ float wide_code(place at, trip_gl_sheet_end end, float corner)
 // How far a place is beyond that of a voxel.
 float beyond(int voxel, int base, float rest)
 {
-    return (float(base) - places[voxel].x) + (rest - places[voxel].y);
+    return (float(base) - positions[voxel].x) + (rest - positions[voxel].y);
 }
 
 // The cell of a place among `count` voxels, from `first` of `places` on; `rest` is then the part of
@@ -197,9 +197,9 @@ int find_cell(int first, int count, int base, inout float rest)
 }
 #endif
 
-place place_at(ray r, trip_gl_sheet_end end)
+position position_at(ray r, trip_gl_sheet_end end)
 {
-    place at;
+    position at;
 #ifdef PARALLEL
     vec2 p = vec2(end.first_u, end.first_v) + r.shift;
 #else
@@ -243,7 +243,7 @@ place place_at(ray r, trip_gl_sheet_end end)
 
 #ifdef SHADED
 #ifdef WIDE
-vec3 gradient_at(place at, trip_gl_sheet_end end)
+vec3 gradient_at(position at, trip_gl_sheet_end end)
 {
     vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
     vec3 g = vec3(0.0);
@@ -254,7 +254,7 @@ vec3 gradient_at(place at, trip_gl_sheet_end end)
     return g;
 }
 #else
-vec3 sheet_gradient(place at, int sheet)
+vec3 sheet_gradient(position at, int sheet)
 {
     vec4 w = corner_weights(at.part);
     return w.x * texelFetch(gradients, ivec3(at.cell + ivec2(0, 1), sheet), 0).xyz +
@@ -263,7 +263,7 @@ vec3 sheet_gradient(place at, int sheet)
            w.w * texelFetch(gradients, ivec3(at.cell, sheet), 0).xyz;
 }
 
-vec3 gradient_at(place at, trip_gl_sheet_end end)
+vec3 gradient_at(position at, trip_gl_sheet_end end)
 {
     vec3 g = vec3(0.0);
     if (end.part < 1.0)
@@ -275,7 +275,7 @@ vec3 gradient_at(place at, trip_gl_sheet_end end)
 #endif
 
 // As unpack_normal() has it: the mean of the gradients of a segment's ends.
-vec4 gradient_between(place a, place b, trip_gl_sheet_end from, trip_gl_sheet_end to)
+vec4 gradient_between(position a, position b, trip_gl_sheet_end from, trip_gl_sheet_end to)
 {
     vec3 sum = gradient_at(a, from) + gradient_at(b, to);
     vec3 g = 0.5 * (gradient_0.xyz * sum.x + gradient_1.xyz * sum.y + gradient_2.xyz * sum.z);
@@ -289,13 +289,13 @@ vec4 gradient_between(place a, place b, trip_gl_sheet_end from, trip_gl_sheet_en
 // Of a part of the way from a voxel to the next.
 float place_between(int voxel, float part)
 {
-    vec2 from = places[voxel], to = places[voxel + 1];
+    vec2 from = positions[voxel], to = positions[voxel + 1];
     return from.x + (from.y + part * ((to.x - from.x) + (to.y - from.y)));
 }
 #endif
 
 // In the grid, list axes.
-vec3 voxel_of(place at, trip_gl_sheet_end end)
+vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
 #ifdef UNEVEN
     return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
@@ -306,7 +306,7 @@ vec3 voxel_of(place at, trip_gl_sheet_end end)
 #endif
 
 // Puts the segment between two ends behind what a pixel holds: colour and opacity, and depth.
-void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, place b, inout vec4 pixel,
+void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
                  inout float pixel_depth)
 {
     // In depths; shares of the segment are inside.
@@ -335,18 +335,18 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, place a, p
     vec3 eye = vec3(0.0), from_eye = eye;
 #endif
 #ifdef PLACED
-    vec3 middle_place = place_of(mix(voxel_of(a, from), voxel_of(b, to), 0.5 * (first + last)));
+    vec3 middle_position = position_of(mix(voxel_of(a, from), voxel_of(b, to), 0.5 * (first + last)));
 #endif
 #ifdef LIT
-    colour = lit_here(colour, gradient, eye, from_eye, middle_place);
+    colour = lit_here(colour, gradient, eye, from_eye, middle_position);
 #elif defined(SHADED)
     colour = lit(colour, gradient, eye, from_eye);
 #endif
 #ifdef EMISSION
-    colour += emission_at(middle_place);
+    colour += emission_at(middle_position);
 #endif
 #ifdef CUED
-    colour = cued(colour, middle_place);
+    colour = cued(colour, middle_position);
 #endif
     float through = 1.0 - pixel.a, add = opacity(medium.a * (last - first) * abs(to.step) * r.world) * through;
     pixel += vec4(colour * add, add);
@@ -372,10 +372,10 @@ void main()
     pixel_depth = imageLoad(layer_depths, at).r;
 #endif
     bool drawn = false;
-    place last;
+    position last;
     last.there = false;
     for (int i = 0; i < rows.w && pixel.a < 1.0; i++) {
-        place next = place_at(r, ends[i]);
+        position next = position_at(r, ends[i]);
         bool visible = ends[i].step != 0.0 && next.there && last.there;
 #ifdef PARALLEL
         // What begins behind the eye's plane is left out.

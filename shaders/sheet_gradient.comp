@@ -12,26 +12,26 @@ layout(location = TRIP_GL_SHEET_SIZE) uniform ivec3 size; // width, height, the 
 #ifdef UNEVEN
 // To the sheets below and above; of voxels along u, then along v, whole and the rest.
 layout(location = TRIP_GL_SHEET_APART) uniform vec2 sheets_apart;
-layout(std430, binding = TRIP_GL_PLACES) readonly buffer trip_gl_places
+layout(std430, binding = TRIP_GL_POSITIONS) readonly buffer trip_gl_positions
 {
-    vec2 places[];
+    vec2 positions[];
 };
 #endif
 
 // Below 0: there is none.
-float code_at(ivec2 place, int layer)
+float code_at(ivec2 position, int layer)
 {
-    if (layer < 0 || any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, size.xy)))
+    if (layer < 0 || any(lessThan(position, ivec2(0))) || any(greaterThanEqual(position, size.xy)))
         return -1.0;
-    return texelFetch(codes, ivec3(place, layer), 0).r;
+    return texelFetch(codes, ivec3(position, layer), 0).r;
 }
 
 // From voxel i, of `count` from `first` of `places` on, to those before and after it.
 vec2 voxels_apart(int first, int i, int count)
 {
 #ifdef UNEVEN
-    vec2 here = places[first + i];
-    vec2 before = here - places[first + max(i - 1, 0)], after = places[first + min(i + 1, count - 1)] - here;
+    vec2 here = positions[first + i];
+    vec2 before = here - positions[first + max(i - 1, 0)], after = positions[first + min(i + 1, count - 1)] - here;
     return vec2(before.x + before.y, after.x + after.y);
 #else
     return vec2(1.0);

@@ -95,7 +95,7 @@ void main()
     n = own_gradient(n);
     flattening = vec4(n / max(length(n), 1e-15), min(1.0, g.w) * to_x.w);
 #endif
-    if (entry.a <= 0.0 || !project(r.from_eye, r.place, s) || !may_reach(r.from_eye, s.radius)) {
+    if (entry.a <= 0.0 || !project(r.from_eye, r.position, s) || !may_reach(r.from_eye, s.radius)) {
         drop();
         return;
     }
@@ -110,19 +110,19 @@ void main()
     if (tint.w > 0.0)
         entry.rgb = vec3(tint.xyz);
 #ifdef LIT
-    entry.rgb = shade_here(entry.rgb, r.normal, r.from_eye, place_of(r.voxel));
+    entry.rgb = shade_here(entry.rgb, r.normal, r.from_eye, position_of(r.voxel));
 #elif defined(SHADED)
     entry.rgb = shade(entry.rgb, r.normal, r.from_eye);
 #endif
 #ifdef EMISSION
-    entry.rgb += emission_at(place_of(r.voxel));
+    entry.rgb += emission_at(position_of(r.voxel));
 #endif
 #ifdef CUED
-    entry.rgb = cued(entry.rgb, place_of(r.voxel));
+    entry.rgb = cued(entry.rgb, position_of(r.voxel));
 #endif
     colour = vec4(entry.rgb, entry.a * s.amplitude);
 #ifdef DEPTH
-    centre_depth = max(r.place.z, 0.0) * depth.x;
+    centre_depth = max(r.position.z, 0.0) * depth.x;
 #endif
 #ifdef OWN_RAYS
     width = own_width;

@@ -11,7 +11,7 @@
     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4) | ((n)&2) << 7 | ((n)&8) << 6 | ((n)&32) << 5)
 #define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
 #define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
-static const uint32_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
+static const uint32_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
 /* u and v of a square's corner in the tile, by its Morton number. */
 static uint32_t corner_of(uint32_t square)
@@ -43,7 +43,7 @@ static uint32_t form_words(uint32_t groups)
     return (groups + 1) / 2;
 }
 
-uint32_t trip_block_most_words(const trip_block_form *f)
+uint32_t trip_block_max_words(const trip_block_form *f)
 {
     uint32_t records = 1u << 2 * f->tile_log2, squares = records / 64;
     return trip_block_present_words(f->tile_log2) + squares +
@@ -55,13 +55,13 @@ bool trip_block_words_fit(const trip_block_form *f, uint32_t records, uint32_t w
     uint32_t all = 1u << 2 * f->tile_log2, present = trip_block_present_words(f->tile_log2);
     if (records < 1 || records > all)
         return false;
-    uint32_t least = (records + 63) / 64, most = records < all / 64 ? records : all / 64;
+    uint32_t min = (records + 63) / 64, max = records < all / 64 ? records : all / 64;
     if (f->code_bytes == 1) {
         uint32_t codes = code_words(records);
-        return words >= present + least + codes && words <= present + most + codes;
+        return words >= present + min + codes && words <= present + max + codes;
     }
-    return words > present + least &&
-           words <= present + most + form_words(most) + code_words(2 * records);
+    return words > present + min &&
+           words <= present + max + form_words(max) + code_words(2 * records);
 }
 
 /* ---- groups ---- */
@@ -180,11 +180,11 @@ static bool find_numbers(unsigned tile_log2, const uint32_t *voxels, uint32_t co
 
 /* Sets the bits of presence and masks; the number of squares, or 0 when voxels are not in order or
  * not in the tile. */
-static uint32_t pack_places(unsigned tile_log2, const uint32_t *voxels, uint32_t count,
-                            uint64_t *present, uint64_t *masks)
+static uint32_t pack_positions(unsigned tile_log2, const uint32_t *voxels, uint32_t count,
+                               uint64_t *present, uint64_t *masks)
 {
     enum { AT_ONCE = 64 };
-    uint32_t numbers[AT_ONCE], squares = 0, last_square = UINT32_MAX, least = 0;
+    uint32_t numbers[AT_ONCE], squares = 0, last_square = UINT32_MAX, min = 0;
     uint64_t mask = 0;
     for (uint32_t first = 0; first < count; first += AT_ONCE) {
         const uint32_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
@@ -192,7 +192,7 @@ static uint32_t pack_places(unsigned tile_log2, const uint32_t *voxels, uint32_t
             return 0;
         for (uint32_t i = 0; i < some; i++) {
             const uint32_t number = numbers[i], square = number / 64;
-            if (number < least)
+            if (number < min)
                 return 0;
             if (square != last_square) {
                 present[square / 64] |= UINT64_C(1) << square % 64;
@@ -202,7 +202,7 @@ static uint32_t pack_places(unsigned tile_log2, const uint32_t *voxels, uint32_t
             mask |= UINT64_C(1) << number % 64;
             masks[squares - 1] = mask;
             last_square = square;
-            least = number + 1;
+            min = number + 1;
         }
     }
     return squares;
@@ -230,29 +230,28 @@ static bool are_steps(const uint32_t *voxels, uint32_t count)
 /* The form that fits the codes. */
 static uint32_t form_of(const uint32_t *voxels, uint32_t count, uint32_t step)
 {
-    uint32_t least = UINT16_MAX, most = 0;
+    uint32_t min = UINT16_MAX, max = 0;
     for (uint32_t i = 0; i < count; i++) {
         uint32_t code = trip_voxel_code(voxels[i]);
-        least = code < least ? code : least;
-        most = code > most ? code : most;
+        min = code < min ? code : min;
+        max = code > max ? code : max;
     }
-    least /= step;
-    most /= step;
-    uint32_t width = most > least ? 32 - (uint32_t)__builtin_clz(most - least) : 0;
-    return least | (width + width % 2) << 16;
+    min /= step;
+    max /= step;
+    uint32_t width = max > min ? 32 - (uint32_t)__builtin_clz(max - min) : 0;
+    return min | (width + width % 2) << 16;
 }
 
 /* A square's codes; returns the bytes. */
 INLINE uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t step, uint32_t form,
                             unsigned char *out)
 {
-    const uint32_t least = form & UINT16_MAX, width = width_of(form),
-                   bytes = (count * width + 7) / 8;
+    const uint32_t min = form & UINT16_MAX, width = width_of(form), bytes = (count * width + 7) / 8;
     unsigned char packed[2 * 64 + sizeof(uint64_t)];
     for (uint32_t i = 0; i < count; i += 4) { /* four begin at a whole byte */
         uint64_t four = 0;
         for (uint32_t k = 0; k < 4 && i + k < count; k++)
-            four |= (uint64_t)(trip_voxel_code(voxels[i + k]) / step - least) << k * width;
+            four |= (uint64_t)(trip_voxel_code(voxels[i + k]) / step - min) << k * width;
         memcpy(packed + i / 4 * width / 2, &four, sizeof four);
     }
     memcpy(out, packed, bytes);
@@ -288,7 +287,7 @@ TRIP_ALSO_V3 uint32_t trip_block_pack(const trip_block_form *f, const uint32_t *
     memset(block, 0, present * sizeof *block);
     if (count > 1u << 2 * f->tile_log2)
         return 0;
-    uint32_t squares = pack_places(f->tile_log2, voxels, count, block, block + present);
+    uint32_t squares = pack_positions(f->tile_log2, voxels, count, block, block + present);
     uint64_t *behind = block + present + squares;
     uint32_t words = code_words(count);
     if (squares == 0)
@@ -333,15 +332,15 @@ TRIP_ALSO_V3 uint32_t trip_block_squares(const trip_block *b,
                                         .number = 64 * w + (uint32_t)__builtin_ctzll(bits),
                                         .first = first,
                                         .count = count,
-                                        .least = groups - 1 /* whose it is */ };
+                                        .min = groups - 1 /* whose it is */ };
             first += count;
         }
     const void *behind = b->masks + b->squares + (packed ? form_words(groups) : 0);
     const unsigned char *codes = behind;
     for (uint32_t i = 0; i < n; i++) {
         trip_square *s = &squares[i];
-        const uint32_t form = packed ? forms[s->least] : TRIP_CODE_FIRST | 8u << 16;
-        s->least = form & UINT16_MAX;
+        const uint32_t form = packed ? forms[s->min] : TRIP_CODE_FIRST | 8u << 16;
+        s->min = form & UINT16_MAX;
         s->width = width_of(form);
         s->step = b->step;
         s->codes = codes;
@@ -366,11 +365,11 @@ static void copy_codes(const trip_square *s, packed_codes *p)
  * take at most 8. */
 INLINE uint64_t four_above(const packed_codes *p, uint32_t width, uint32_t i)
 {
-    const uint64_t most = (UINT64_C(1) << width) - 1;
+    const uint64_t max = (UINT64_C(1) << width) - 1;
     uint64_t four;
     memcpy(&four, p->bytes + i / 4 * width / 2, sizeof four);
-    return (four & most) | (four >> width & most) << 16 | (four >> 2 * width & most) << 32 |
-           (four >> 3 * width & most) << 48;
+    return (four & max) | (four >> width & max) << 16 | (four >> 2 * width & max) << 32 |
+           (four >> 3 * width & max) << 48;
 }
 
 /* `with` is compiled for each width that there is. */
@@ -411,17 +410,17 @@ static void unpack_square(const trip_square *s, uint16_t above[64])
 
 TRIP_ALSO_V3 void trip_square_codes(const trip_square *s, uint16_t codes[64])
 {
-    const uint32_t least = s->least, step = s->step;
+    const uint32_t min = s->min, step = s->step;
     if (s->width == 8) {
         unsigned char bytes[64]; /* a copy cannot overlap the output */
         memcpy(bytes, s->codes, s->count);
         for (uint32_t i = 0; i < s->count; i++)
-            codes[i] = (uint16_t)((bytes[i] + least) * step);
+            codes[i] = (uint16_t)((bytes[i] + min) * step);
         return;
     }
     unpack_square(s, codes);
     for (uint32_t i = 0; i < 64; i++)
-        codes[i] = (uint16_t)((codes[i] + least) * step);
+        codes[i] = (uint16_t)((codes[i] + min) * step);
 }
 
 /* ---- checking ---- */
@@ -470,7 +469,7 @@ static uint64_t bits_within(const trip_file_brick *b, uint32_t corner)
            bits_below(rows_below, b->v_max + 1, v) & ~bits_below(rows_below, b->v_min, v);
 }
 
-static const char *check_places(const trip_block *b, const trip_file_brick *brick)
+static const char *check_positions(const trip_block *b, const trip_file_brick *brick)
 {
     uint32_t records = 0;
     uint64_t outside = 0;
@@ -495,17 +494,17 @@ static const char *check_places(const trip_block *b, const trip_file_brick *bric
 static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
 {
     const unsigned char *codes = trip_block_codes(b);
-    uint8_t least = UINT8_MAX, most = 0;
+    uint8_t min = UINT8_MAX, max = 0;
     for (uint32_t i = 0; i < b->count; i++) {
-        least = codes[i] < least ? codes[i] : least;
-        most = codes[i] > most ? codes[i] : most;
+        min = codes[i] < min ? codes[i] : min;
+        max = codes[i] > max ? codes[i] : max;
     }
-    return (least + TRIP_CODE_FIRST) * TRIP_CODE_STEP >= brick->code_min &&
-           (most + TRIP_CODE_FIRST) * TRIP_CODE_STEP <= brick->code_max;
+    return (min + TRIP_CODE_FIRST) * TRIP_CODE_STEP >= brick->code_min &&
+           (max + TRIP_CODE_FIRST) * TRIP_CODE_STEP <= brick->code_max;
 }
 
 /* Whether no code is further above the least one. */
-static bool are_above_at_most(const trip_square *s, uint32_t most)
+static bool are_above_at_most(const trip_square *s, uint32_t max)
 {
     uint16_t above[64] = { 0 }, greatest = 0;
     unpack_square(s, above);
@@ -513,17 +512,17 @@ static bool are_above_at_most(const trip_square *s, uint32_t most)
         above[i] = 0;
     for (uint32_t i = 0; i < 64; i++)
         greatest = above[i] > greatest ? above[i] : greatest;
-    return greatest <= most;
+    return greatest <= max;
 }
 
 /* Codes are looked at where the width's bits could say more than the brick's range has. */
 static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
 {
-    if (s->least * s->step < brick->code_min)
+    if (s->min * s->step < brick->code_min)
         return false;
-    const uint32_t most = brick->code_max / s->step;
-    return s->least + (1u << s->width) - 1 <= most ||
-           (s->least <= most && are_above_at_most(s, most - s->least));
+    const uint32_t max = brick->code_max / s->step;
+    return s->min + (1u << s->width) - 1 <= max ||
+           (s->min <= max && are_above_at_most(s, max - s->min));
 }
 
 static const char wrong_length[] = "a run's block has not the length of its codes",
@@ -561,7 +560,7 @@ static const char *check_packed(const trip_block *b, const trip_file_brick *bric
 
 TRIP_ALSO_V3 const char *trip_block_check(const trip_block *b, const trip_file_brick *brick)
 {
-    const char *fault = check_places(b, brick);
+    const char *fault = check_positions(b, brick);
     if (fault)
         return fault;
     return b->code_bytes == 1 ? check_bytes(b, brick) : check_packed(b, brick);
@@ -595,19 +594,19 @@ bool trip_block_is_padded(const trip_block *b)
 /* ---- decoding ---- */
 
 /* The places of at most `count` bits of a mask, the first `skip` left out; how many. */
-static uint32_t square_places(uint64_t mask, uint32_t corner, uint32_t skip, uint32_t count,
-                              uint32_t *voxels)
+static uint32_t square_positions(uint64_t mask, uint32_t corner, uint32_t skip, uint32_t count,
+                                 uint32_t *voxels)
 {
     uint32_t n = 0;
     if (mask == UINT64_MAX && skip == 0 && count >= 64) {
         for (; n < 64; n++)
-            voxels[n] = corner + places[n];
+            voxels[n] = corner + positions[n];
         return n;
     }
     for (; skip > 0; skip--)
         mask &= mask - 1;
     for (; mask && n < count; mask &= mask - 1)
-        voxels[n++] = corner + places[__builtin_ctzll(mask)];
+        voxels[n++] = corner + positions[__builtin_ctzll(mask)];
     return n;
 }
 
@@ -620,7 +619,7 @@ void trip_square_voxels(const trip_square *s, uint32_t voxels[64])
 {
     uint16_t codes[64];
     trip_square_codes(s, codes);
-    square_places(s->mask, corner_of(s->number), 0, s->count, voxels);
+    square_positions(s->mask, corner_of(s->number), 0, s->count, voxels);
     for (uint32_t i = 0; i < s->count; i++)
         voxels[i] |= (uint32_t)codes[i] << 16;
 }
@@ -659,7 +658,7 @@ void trip_block_voxels(const trip_block *b, uint32_t first, uint32_t count, uint
                 continue;
             }
             uint32_t corner = corner_of(64 * w + (uint32_t)__builtin_ctzll(bits));
-            done += square_places(*mask, corner, skip, count - done, voxels + done);
+            done += square_positions(*mask, corner, skip, count - done, voxels + done);
             skip = 0;
         }
     add_codes(b, first, count, voxels);

@@ -58,7 +58,7 @@ typedef struct trip_square {
     uint64_t mask;
     uint32_t number;       /* Morton number in the tile */
     uint32_t first, count; /* records of the run */
-    uint32_t least, width, step;
+    uint32_t min, width, step;
     const unsigned char *codes;
 } trip_square;
 
@@ -94,7 +94,7 @@ static inline unsigned trip_block_present_words(unsigned tile_log2)
 }
 
 /* Words of the largest block of a tile. */
-uint32_t trip_block_most_words(const trip_block_form *f);
+uint32_t trip_block_max_words(const trip_block_form *f);
 /* How far a block's first `words` determine where it goes on: the end of the next part of it, or of
  * all of it, which is `words` where that is there. */
 uint32_t trip_block_end(const trip_block_form *f, const uint64_t *block, uint32_t words);

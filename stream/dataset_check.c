@@ -437,8 +437,8 @@ static int check_coordinates(const unsigned char *index, const trip_file_header 
     return TRIP_OK;
 }
 
-static int check_places(const unsigned char *index, const trip_file_header *h, const char *where,
-                        sections *s)
+static int check_positions(const unsigned char *index, const trip_file_header *h, const char *where,
+                           sections *s)
 {
     if (!add_section(s, h, h->lists_offset, h->list_count, sizeof(trip_file_list), 8))
         return FAIL_FIELD(lists_offset, "the lists lie outside the file");
@@ -464,7 +464,7 @@ int trip_dataset_check_tables(const unsigned char *index, const trip_file_header
     sections s = { calloc(TABLES_PER_LIST * (size_t)h->list_count + 3, sizeof *s.items), 0 };
     if (!s.items)
         return trip_fail(TRIP_ERROR, "open", where, "out of memory");
-    int status = check_places(index, h, where, &s);
+    int status = check_positions(index, h, where, &s);
     free(s.items);
     if (status < 0)
         return status;

@@ -8,7 +8,7 @@
 unsigned trip_dataset_levels(const trip_dataset *d, trip_kind kind)
 {
     unsigned level = 0;
-    while (level < TRIP_DATASET_LEVELS_MOST && trip_dataset_find(d, 0, level + 1, kind) &&
+    while (level < TRIP_DATASET_LEVELS_MAX && trip_dataset_find(d, 0, level + 1, kind) &&
            trip_dataset_find(d, 1, level + 1, kind) && trip_dataset_find(d, 2, level + 1, kind))
         level++;
     return level;

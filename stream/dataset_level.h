@@ -7,7 +7,7 @@
 #include "dataset.h"
 
 /* No grid has a level beyond that has more than a voxel along any axis. */
-enum { TRIP_DATASET_LEVELS_MOST = 31 };
+enum { TRIP_DATASET_LEVELS_MAX = 31 };
 
 /* How many coarse levels have lists of a kind along each axis, without a gap: those that are drawn.
  */

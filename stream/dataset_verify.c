@@ -40,8 +40,8 @@ static uint64_t mix(uint64_t x)
 
 static void add_voxel(voxel_sums *s, const uint64_t p[3], uint32_t code, uint32_t normal)
 {
-    uint64_t place = mix(p[0] | p[1] << 32) + mix(p[2] | (uint64_t)code << 32);
-    uint64_t voxel = mix(place + mix(normal + UINT64_C(0x9e3779b97f4a7c15)));
+    uint64_t position = mix(p[0] | p[1] << 32) + mix(p[2] | (uint64_t)code << 32);
+    uint64_t voxel = mix(position + mix(normal + UINT64_C(0x9e3779b97f4a7c15)));
     s->sum += voxel;
     s->twist += mix(voxel ^ UINT64_C(0xd1b54a32d192ed03));
 }
@@ -141,7 +141,7 @@ static int check_list(list_verifier *v, trip_budget *budget)
 /* ---- lists against one another ---- */
 
 /* Order of runs in lists of the same grid and axis. */
-static int compare_places(const trip_run *a, const trip_run *b)
+static int compare_positions(const trip_run *a, const trip_run *b)
 {
     uint64_t m = trip_morton((uint32_t)a->u, (uint32_t)a->v);
     uint64_t n = trip_morton((uint32_t)b->u, (uint32_t)b->v);
@@ -173,7 +173,7 @@ static int compare_streams(run_stream *a, run_stream *b)
 {
     int status_a = next_run(a), status_b = next_run(b);
     while (status_a == 1 && status_b == 1) {
-        int order = compare_places(&a->run, &b->run);
+        int order = compare_positions(&a->run, &b->run);
         if (order == 0 && share_voxels(&a->block, &b->block))
             return fail_run(a->all.data, b->all.list, &b->run,
                             "a voxel is in a list of another kind too");

@@ -13,7 +13,7 @@ static size_t paged_bytes(const trip_planner *p, uint64_t low, uint64_t high)
     return (size_t)(page_floor(p, high + p->page_bytes - 1) - page_floor(p, low));
 }
 
-size_t trip_planner_least_slot(const trip_dataset *d, unsigned planes)
+size_t trip_planner_min_slot(const trip_dataset *d, unsigned planes)
 {
     trip_block_form form = trip_block_form_of(&d->header, TRIP_KIND_VOXELS);
     size_t page = (size_t)1 << d->header.page_log2, bytes = 0;
@@ -21,11 +21,11 @@ size_t trip_planner_least_slot(const trip_dataset *d, unsigned planes)
         unsigned own = trip_kind_of(d->lists[i].kind)->code_bytes;
         form.code_bytes = own > form.code_bytes ? own : form.code_bytes;
     }
-    size_t most[TRIP_PLANES] = { 8 * (size_t)trip_block_most_words(&form),
-                                 ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes };
+    size_t max[TRIP_PLANES] = { 8 * (size_t)trip_block_max_words(&form),
+                                ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes };
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (planes >> plane & 1) /* from anywhere in a page */
-            bytes += (most[plane] + page - 1) / page * page + page;
+            bytes += (max[plane] + page - 1) / page * page + page;
     return bytes;
 }
 
@@ -118,12 +118,12 @@ static void join(trip_piece *piece, const trip_piece *next)
 }
 
 /* Puts the next run into the extent; false when there is no room for it. */
-static bool place(trip_planner *p, trip_extent *e)
+static bool position(trip_planner *p, trip_extent *e)
 {
     const trip_piece next = piece_of(p);
     trip_piece *piece = find_piece(p, e, &next);
-    unsigned most = p->one_piece ? 1 : TRIP_PIECES_MAX;
-    if (!piece && e->piece_count == most)
+    unsigned max = p->one_piece ? 1 : TRIP_PIECES_MAX;
+    if (!piece && e->piece_count == max)
         return false;
     size_t bytes = e->bytes + (piece ? bytes_more(p, piece, &next) : piece_bytes(p, &next));
     if (bytes > p->slot_bytes && e->run_count > 0)
@@ -184,8 +184,8 @@ static bool is_in(const trip_byte_range *s, const trip_list *list, int plane, ui
 
 /* Turns a place in a plane file into one in the slot's part for the plane. `from` is the range
  * that the last one was in: neighbours mostly are in the same. */
-static size_t place_in_slot(const trip_extent *e, const trip_list *list, int plane, uint64_t offset,
-                            size_t bytes, unsigned *from)
+static size_t position_in_slot(const trip_extent *e, const trip_list *list, int plane,
+                               uint64_t offset, size_t bytes, unsigned *from)
 {
     unsigned i = *from;
     while (!is_in(&e->ranges[i], list, plane, offset, bytes))
@@ -203,9 +203,10 @@ static void place_runs(const trip_planner *p, trip_extent *e)
         const trip_list *list = p->it.pass->selections[run->selection].list;
         for (int plane = 0; plane < TRIP_PLANES; plane++) {
             size_t bytes = run_bytes(p, run, plane);
-            run->at[plane] = is_read(p, list, plane) ? place_in_slot(e, list, plane, run->at[plane],
-                                                                     bytes, &from[plane])
-                                                     : 0;
+            run->at[plane] =
+                is_read(p, list, plane)
+                    ? position_in_slot(e, list, plane, run->at[plane], bytes, &from[plane])
+                    : 0;
         }
     }
 }
@@ -218,7 +219,7 @@ bool trip_planner_fill(trip_planner *p, trip_extent *e)
     while (e->run_count < e->run_room) {
         if (!p->has_run && !(p->has_run = trip_pass_next(&p->it, &p->run)))
             break;
-        if (!skip_run(p) && !place(p, e))
+        if (!skip_run(p) && !position(p, e))
             break;
     }
     place_pieces(p, e);

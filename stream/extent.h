@@ -51,7 +51,7 @@ typedef struct trip_planner {
 } trip_planner;
 
 /* Bytes of the smallest slot that holds any run of the data set. */
-size_t trip_planner_least_slot(const trip_dataset *d, unsigned planes);
+size_t trip_planner_min_slot(const trip_dataset *d, unsigned planes);
 
 /* slot_bytes is a multiple of page_bytes and not less than the least, gap_bytes at least
  * page_bytes. What was skipped adds up over passes. There is a cursor for each selection of the

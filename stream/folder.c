@@ -111,29 +111,30 @@ static int check_target(const trip_folder *f)
     return check_all_known(f->path);
 }
 
-static int check_own(int fd, const char *path, const char *what)
+static int check_own(int fd, const char *path, const char *stage)
 {
     struct stat st;
     if (fstat(fd, &st) < 0)
-        return trip_fail_errno(what, path, "cannot open");
+        return trip_fail_errno(stage, path, "cannot open");
     if (st.st_uid != geteuid())
-        return trip_fail(TRIP_ERROR, what, path,
+        return trip_fail(TRIP_ERROR, stage, path,
                          "belongs to another user: remove it, or write elsewhere");
     return TRIP_OK;
 }
 
 /* What was made just now is not checked: some file servers give it to another user. */
-int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *what, const char *busy)
+int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *stage,
+                         const char *busy)
 {
     bool made = mkdir(path, mode) == 0;
     if (!made && errno != EEXIST)
-        return trip_fail_errno(what, path, "cannot create");
+        return trip_fail_errno(stage, path, "cannot create");
     *fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (*fd < 0)
-        return trip_fail_errno(what, path, "cannot open");
-    int status = made ? TRIP_OK : check_own(*fd, path, what);
+        return trip_fail_errno(stage, path, "cannot open");
+    int status = made ? TRIP_OK : check_own(*fd, path, stage);
     if (status == TRIP_OK && flock(*fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)
-        status = trip_fail(TRIP_ERROR, what, path, "%s", busy);
+        status = trip_fail(TRIP_ERROR, stage, path, "%s", busy);
     if (status < 0) {
         close(*fd);
         *fd = -1;
@@ -141,17 +142,17 @@ int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *wha
     return status;
 }
 
-static int check_file(int fd, const char *where, const char *what)
+static int check_file(int fd, const char *where, const char *stage)
 {
     struct stat st;
-    int status = check_own(fd, where, what);
+    int status = check_own(fd, where, stage);
     if (status == TRIP_OK && (fstat(fd, &st) < 0 || !S_ISREG(st.st_mode) || st.st_nlink != 1))
-        status = trip_fail(TRIP_ERROR, what, where, "is not a file of this program's: remove it");
+        status = trip_fail(TRIP_ERROR, stage, where, "is not a file of this program's: remove it");
     return status;
 }
 
 int trip_folder_open_file(int *fd, int folder, const char *path, const char *name, int flags,
-                          const char *what)
+                          const char *stage)
 {
     char where[4096];
     snprintf(where, sizeof where, "%s/%s", path, name);
@@ -163,10 +164,10 @@ int trip_folder_open_file(int *fd, int folder, const char *path, const char *nam
     if (*fd < 0 && errno == ENOENT && !(flags & O_CREAT))
         return TRIP_OK;
     if (*fd < 0 && errno == ELOOP)
-        return trip_fail(TRIP_ERROR, what, where, "is a link, which is not followed: remove it");
+        return trip_fail(TRIP_ERROR, stage, where, "is a link, which is not followed: remove it");
     if (*fd < 0)
-        return trip_fail_errno(what, where, "cannot open");
-    int status = check_file(*fd, where, what);
+        return trip_fail_errno(stage, where, "cannot open");
+    int status = check_file(*fd, where, stage);
     if (status < 0) {
         close(*fd);
         *fd = -1;

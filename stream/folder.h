@@ -9,13 +9,13 @@
 /* Opens a folder for temporary data, which is made if it is not there, and locks it. Reports as
  * `what` and returns a negative status when it is a link, another user's, or when another process
  * has locked it (the reason given is `busy`). */
-int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *what,
+int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *stage,
                          const char *busy);
 /* Opens a file in such a folder, `path` standing for the folder in reports. Links, and what is not
  * a regular file of this user's alone, are a reported failure. With O_CREAT in `flags` a missing
  * file is made; without it, that is no failure, and *fd is -1. */
 int trip_folder_open_file(int *fd, int folder, const char *path, const char *name, int flags,
-                          const char *what);
+                          const char *stage);
 
 /* Unnamed files have such a name, of mkostemp(), between their creation and their removal. */
 #define TRIP_SPOOL_PREFIX "spool."

@@ -125,10 +125,10 @@ static int enter_slab(trip_list_cursor *c)
 }
 
 /* The block of a run, and with it what fits of `words`. */
-static int fetch_block(const trip_list_writer *l, const trip_list_place *place, uint64_t words,
-                       trip_list_buffer *to, const uint64_t **block)
+static int fetch_block(const trip_list_writer *l, const trip_list_position *position,
+                       uint64_t words, trip_list_buffer *to, const uint64_t **block)
 {
-    const uint64_t at = place->at[TRIP_PLANE_VOXELS], own = 8 * (uint64_t)place->run.words;
+    const uint64_t at = position->at[TRIP_PLANE_VOXELS], own = 8 * (uint64_t)position->run.words;
     int status = TRIP_OK;
     if (to->list != l || at < to->first || at + own > to->past) {
         const uint64_t wanted = 8 * words < sizeof to->blocks ? 8 * words : sizeof to->blocks;
@@ -148,37 +148,38 @@ static int fail_changed(const trip_list_writer *l)
                      "is not what was written: the disk, or another program, changed it");
 }
 
-int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place, uint64_t words,
-                          trip_list_buffer *to, trip_block *out)
+int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *position,
+                          uint64_t words, trip_list_buffer *to, trip_block *out)
 {
     const trip_list_writer *l = c->list;
-    const trip_file_run *r = &place->run;
+    const trip_file_run *r = &position->run;
     const bool normals = c->normals;
     const uint64_t *block;
     if (!trip_block_words_fit(&l->form, r->records, r->words)) /* nor would the buffer do */
         return fail_changed(l);
-    int status = fetch_block(l, place, words, to, &block);
+    int status = fetch_block(l, position, words, to, &block);
     if (status == TRIP_OK && normals)
-        status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], place->at[TRIP_PLANE_NORMALS],
+        status = trip_output_read(&l->planes[TRIP_PLANE_NORMALS], position->at[TRIP_PLANE_NORMALS],
                                   to->packed, (size_t)r->records * l->form.normal_bytes);
     if (status < 0)
         return status;
     *out = trip_block_make(&l->form, r->records, r->words, block, normals ? to->packed : NULL);
-    return trip_block_check(out, &place->brick) ? fail_changed(l) : TRIP_OK;
+    return trip_block_check(out, &position->brick) ? fail_changed(l) : TRIP_OK;
 }
 
 /* Goes on to the next run of the slab; true where *place is of one that is wanted. */
-static bool take_run(trip_list_cursor *c, trip_list_place *place)
+static bool take_run(trip_list_cursor *c, trip_list_position *position)
 {
     const uint64_t sheets = c->writer->params.slab_sheets;
     const trip_file_run *r = &c->runs[c->brick * sheets + c->sheet];
     const uint64_t sheet = c->slab.slab * sheets + c->sheet;
     const bool wanted = r->records > 0 && sheet % 2 == c->odd;
     if (wanted)
-        *place = (trip_list_place){ .sheet = (uint32_t)sheet,
-                                    .brick = c->bricks[c->brick],
-                                    .run = *r,
-                                    .at = { c->at[TRIP_PLANE_VOXELS], c->at[TRIP_PLANE_NORMALS] } };
+        *position =
+            (trip_list_position){ .sheet = (uint32_t)sheet,
+                                  .brick = c->bricks[c->brick],
+                                  .run = *r,
+                                  .at = { c->at[TRIP_PLANE_VOXELS], c->at[TRIP_PLANE_NORMALS] } };
     c->at[TRIP_PLANE_VOXELS] += 8 * (uint64_t)r->words;
     c->at[TRIP_PLANE_NORMALS] += (uint64_t)r->records * c->list->form.normal_bytes;
     if (++c->brick == c->slab.brick_count) {
@@ -188,14 +189,14 @@ static bool take_run(trip_list_cursor *c, trip_list_place *place)
     return wanted;
 }
 
-int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place)
+int trip_list_cursor_next(trip_list_cursor *c, trip_list_position *position)
 {
     int status = 0;
     while (status == 0) {
         bool in_slab = c->next_slab > 0 && c->sheet < c->writer->params.slab_sheets;
         if (!in_slab && c->next_slab == c->list->slab_count)
             return 0;
-        status = in_slab ? take_run(c, place) : enter_slab(c);
+        status = in_slab ? take_run(c, position) : enter_slab(c);
     }
     return status;
 }

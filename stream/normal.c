@@ -18,19 +18,19 @@ static inline double clamp(double x)
 }
 
 /* Octahedral coordinates in [0, most]. */
-static void pack_octahedral(const double g[3], double most, uint32_t to[2])
+static void pack_octahedral(const double g[3], double max, uint32_t to[2])
 {
     double sum = fabs(g[0]) + fabs(g[1]) + fabs(g[2]), x = g[0] / sum, y = g[1] / sum;
     double a = g[2] < 0 ? fold(x, y) : x, b = g[2] < 0 ? fold(y, x) : y;
-    to[0] = (uint32_t)(clamp(a * 0.5 + 0.5) * most + 0.5);
-    to[1] = (uint32_t)(clamp(b * 0.5 + 0.5) * most + 0.5);
+    to[0] = (uint32_t)(clamp(a * 0.5 + 0.5) * max + 0.5);
+    to[1] = (uint32_t)(clamp(b * 0.5 + 0.5) * max + 0.5);
 }
 
 /* To a vector of the given length. */
-static void unpack_octahedral(uint32_t first, uint32_t second, double most, double length,
+static void unpack_octahedral(uint32_t first, uint32_t second, double max, double length,
                               double g[3])
 {
-    double a = first * (2 / most) - 1, b = second * (2 / most) - 1, z = 1 - fabs(a) - fabs(b);
+    double a = first * (2 / max) - 1, b = second * (2 / max) - 1, z = 1 - fabs(a) - fabs(b);
     double x = z < 0 ? fold(a, b) : a, y = z < 0 ? fold(b, a) : b;
     double scale = length / sqrt(x * x + y * y + z * z);
     g[0] = x * scale;
@@ -107,10 +107,10 @@ void trip_normal_unpack(uint32_t normal, double full, double gradient[3])
 }
 
 /* `unit` divided by the power of two with which the steps still reach `most`, or not at all. */
-static double finest_step(double unit, double most)
+static double finest_step(double unit, double max)
 {
-    int halvings = (int)fmax(0, ilogb(unit * STEPS_MAX / most));
-    return unit * STEPS_MAX >= most ? ldexp(unit, -halvings) : most / STEPS_MAX;
+    int halvings = (int)fmax(0, ilogb(unit * STEPS_MAX / max));
+    return unit * STEPS_MAX >= max ? ldexp(unit, -halvings) : max / STEPS_MAX;
 }
 
 bool trip_compact_normals_choose(const trip_affine *index_to_world, double full, double unit,
@@ -120,9 +120,9 @@ bool trip_compact_normals_choose(const trip_affine *index_to_world, double full,
     bool exact = true;
     for (int a = 0; a < 3; a++) {
         /* The component along an axis of what is as long as `full` in world space, at most. */
-        double most = full * trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
-        step[a] = finest_step(unit, most);
-        exact = exact && unit * STEPS_MAX >= most;
+        double max = full * trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
+        step[a] = finest_step(unit, max);
+        exact = exact && unit * STEPS_MAX >= max;
     }
     return exact;
 }

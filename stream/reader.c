@@ -30,12 +30,12 @@ static size_t border_bytes(const trip_reader *r)
 
 size_t trip_reader_slot_bytes(const trip_dataset *d, unsigned planes, size_t wanted)
 {
-    size_t page = (size_t)1 << d->header.page_log2, least = trip_planner_least_slot(d, planes);
+    size_t page = (size_t)1 << d->header.page_log2, min = trip_planner_min_slot(d, planes);
     size_t bytes = wanted
                        ? wanted
                        : DEFAULT_SLOT_BYTES * (size_t)__builtin_popcount(planes & d->header.planes);
     bytes = (bytes + page - 1) / page * page;
-    return bytes > least ? bytes : least;
+    return bytes > min ? bytes : min;
 }
 
 static void set_defaults(trip_reader *r)
@@ -60,12 +60,12 @@ static int check_params(const trip_reader *r)
         return trip_fail(TRIP_ERROR, "read", r->data->path, "the data set has no normals");
     if (p->slots < 2 || p->slots > 4096)
         return trip_fail(TRIP_USAGE, "read", r->data->path, "%u slots: 2 to 4096", p->slots);
-    size_t least = trip_planner_least_slot(r->data, p->planes);
-    if (p->slot_bytes % ((size_t)1 << h->page_log2) || p->slot_bytes < least ||
+    size_t min = trip_planner_min_slot(r->data, p->planes);
+    if (p->slot_bytes % ((size_t)1 << h->page_log2) || p->slot_bytes < min ||
         p->slot_bytes > SLOT_BYTES_MAX)
         return trip_fail(TRIP_USAGE, "read", r->data->path,
                          "slots of %zu bytes: a multiple of the page size %u, %zu to %zu",
-                         p->slot_bytes, 1u << h->page_log2, least, (size_t)SLOT_BYTES_MAX);
+                         p->slot_bytes, 1u << h->page_log2, min, (size_t)SLOT_BYTES_MAX);
     return TRIP_OK;
 }
 

@@ -487,12 +487,12 @@ static int check_summary(const trip_writer *w, const trip_writer_summary *s)
     return TRIP_OK;
 }
 
-static int for_planes(trip_list_writer *l, int (*what)(trip_output *))
+static int for_planes(trip_list_writer *l, int (*stage)(trip_output *))
 {
     int status = TRIP_OK;
     for (int plane = 0; plane < TRIP_PLANES && status == TRIP_OK; plane++)
         if (l->planes_present >> plane & 1)
-            status = what(&l->planes[plane]);
+            status = stage(&l->planes[plane]);
     return status;
 }
 

@@ -86,12 +86,12 @@ void trip_writer_abort(trip_writer *w);
 typedef struct trip_list_cursor trip_list_cursor;
 
 /* Where a run is. */
-typedef struct trip_list_place {
+typedef struct trip_list_position {
     uint32_t sheet;
     trip_file_brick brick;
     trip_file_run run;
     uint64_t at[TRIP_PLANES];
-} trip_list_place;
+} trip_list_position;
 
 /* What a thread reads a run into. */
 typedef struct trip_list_buffer trip_list_buffer;
@@ -101,7 +101,7 @@ int trip_list_cursor_open(trip_list_cursor **out, trip_writer *w, unsigned list,
                           bool normals, trip_budget *budget);
 void trip_list_cursor_close(trip_list_cursor *c);
 /* 1: *place is that of the next one; 0: there is none; negative: failed. */
-int trip_list_cursor_next(trip_list_cursor *c, trip_list_place *place);
+int trip_list_cursor_next(trip_list_cursor *c, trip_list_position *position);
 
 int trip_list_buffer_create(trip_list_buffer **out, const trip_writer *w, trip_budget *budget);
 void trip_list_buffer_destroy(trip_list_buffer *b, trip_budget *budget);
@@ -109,8 +109,8 @@ uint64_t trip_list_buffer_bytes(void);
 /* The run there, checked, in the buffer; its normals NULL where they are not read. `words`: of its
  * block and of those right behind it that will be read next into the same buffer, which are fetched
  * with it; 0: none will be. */
-int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_place *place, uint64_t words,
-                          trip_list_buffer *to, trip_block *out);
+int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *position,
+                          uint64_t words, trip_list_buffer *to, trip_block *out);
 
 uint64_t trip_writer_bytes(const trip_writer *w);
 /* Of a list, by its number. */

@@ -21,15 +21,15 @@ void __wrap__skip(const char *file, int line);
 int __wrap__cmocka_run_group_tests(const char *name, const struct CMUnitTest *tests, size_t count,
                                    CMFixtureFunction setup, CMFixtureFunction teardown);
 
-void test_lacks(const char *what)
+void test_lacks(const char *label)
 {
     for (int i = 0; i < skipped && i < 16; i++)
-        if (named[i] && !strcmp(named[i], what))
+        if (named[i] && !strcmp(named[i], label))
             return;
     if (skipped < 16)
-        named[skipped] = what;
+        named[skipped] = label;
     skipped++;
-    print_message("[  SKIPPED ] in part: this machine lacks %s\n", what);
+    print_message("[  SKIPPED ] in part: this machine lacks %s\n", label);
 }
 
 void __wrap__skip(const char *file, int line)

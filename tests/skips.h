@@ -5,6 +5,6 @@
 #define TEST_SKIPS_H
 
 /* A part of the running test is left out, for lack of `what`; the rest of it goes on. */
-void test_lacks(const char *what);
+void test_lacks(const char *name);
 
 #endif

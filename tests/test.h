@@ -22,27 +22,27 @@
 #define assert_close(actual, expected, tolerance)                                                  \
     test_close((actual), (expected), (tolerance), #actual, __FILE__, __LINE__)
 
-static inline void test_close(double actual, double expected, double tolerance, const char *what,
+static inline void test_close(double actual, double expected, double tolerance, const char *name,
                               const char *file, int line)
 {
     double scale = fmax(1, fmax(fabs(actual), fabs(expected)));
     if (fabs(actual - expected) <= tolerance * scale)
         return;
-    print_error("%s is %.17g, expected %.17g within %g\n", what, actual, expected, tolerance);
+    print_error("%s is %.17g, expected %.17g within %g\n", name, actual, expected, tolerance);
     _fail(file, line);
 }
 
 /* The largest difference. Not by fmax(), on which GCC 12 for 64-bit ARM fails with an internal
  * error here. */
-static inline double test_most_apart(const float *a, const float *b, size_t count)
+static inline double test_max_apart(const float *a, const float *b, size_t count)
 {
-    double most = 0;
+    double max = 0;
     for (size_t i = 0; i < count; i++) {
         double apart = fabs((double)a[i] - (double)b[i]);
-        if (!(apart <= most))
-            most = apart;
+        if (!(apart <= max))
+            max = apart;
     }
-    return most;
+    return max;
 }
 
 /* Uniform in [0, 1), the same sequence in every run (a 64-bit linear congruential generator). */

@@ -96,20 +96,20 @@ void trip_annotation_edges(const trip_annotation_box *box, const trip_navigation
     }
 }
 
-double trip_annotation_round(double least)
+double trip_annotation_round(double min)
 {
-    double power = pow(10, floor(log10(least)));
+    double power = pow(10, floor(log10(min)));
     static const double steps[] = { 1, 2, 5, 10, 20 };
     int i = 0;
-    while (i < 4 && steps[i] * power < least * (1 - 1e-12))
+    while (i < 4 && steps[i] * power < min * (1 - 1e-12))
         i++;
     return steps[i] * power;
 }
 
 /* The greatest of them that is not above `most`. */
-static double round_down(double most)
+static double round_down(double max)
 {
-    double power = pow(10, floor(log10(most * (1 + 1e-12)))), lead = most * (1 + 1e-12) / power;
+    double power = pow(10, floor(log10(max * (1 + 1e-12)))), lead = max * (1 + 1e-12) / power;
     return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
 }
 
@@ -132,14 +132,14 @@ static void print(char *text, size_t bytes, double value, double step)
 }
 
 trip_annotation_bar trip_annotation_scale_bar(const trip_navigation *n, int height, double depth,
-                                              double most_px, const char *unit)
+                                              double max_px, const char *unit)
 {
-    double size = trip_navigation_pixel(n, height, depth), most = size * most_px;
+    double size = trip_navigation_pixel(n, height, depth), max = size * max_px;
     trip_annotation_bar bar = { 0 };
     char number[32];
-    if (!(most > 1e-290 && most < 1e290))
+    if (!(max > 1e-290 && max < 1e290))
         return bar;
-    bar.length = round_down(most);
+    bar.length = round_down(max);
     bar.px = bar.length / size;
     print(number, sizeof number, bar.length, bar.length);
     snprintf(bar.text, sizeof bar.text, "%s%s%.6s", number, unit ? " " : "", unit ? unit : "");
@@ -206,10 +206,10 @@ static void fill_axis(const scale *s, const trip_annotation_edge *edge, trip_ann
 {
     double px = hypot(edge->to[0] - edge->from[0], edge->to[1] - edge->from[1]);
     double lo = fmin(s->first, s->last), hi = fmax(s->first, s->last);
-    double most = fmin(px / TICKS_APART_PX, TRIP_ANNOTATION_TICKS - 2);
-    if (!(most >= 1) || !(hi > lo))
+    double max = fmin(px / TICKS_APART_PX, TRIP_ANNOTATION_TICKS - 2);
+    if (!(max >= 1) || !(hi > lo))
         return;
-    double step = trip_annotation_round((hi - lo) / most), slack = 1e-9 * step;
+    double step = trip_annotation_round((hi - lo) / max), slack = 1e-9 * step;
     for (double k = ceil((lo - slack) / step);
          k * step <= hi + slack && axis->count < TRIP_ANNOTATION_TICKS; k++)
         add_tick(s, k * step, step, axis);

@@ -52,17 +52,17 @@ typedef struct trip_annotation_axis {
 void trip_annotation_axes(const trip_annotation_box *box, const trip_navigation *n, int width,
                           int height, const char *unit, trip_annotation_axis axes[3]);
 
-/* The length 1, 2 or 5 times a power of ten that takes at most `most_px` at this distance along the
+/* The length 1, 2 or 5 times a power of ten that takes at most `max_px` at this distance along the
  * gaze, and what it takes. */
 typedef struct trip_annotation_bar {
     double length, px;
     char text[40]; /* "20 mm" */
 } trip_annotation_bar;
 trip_annotation_bar trip_annotation_scale_bar(const trip_navigation *n, int height, double depth,
-                                              double most_px, const char *unit);
+                                              double max_px, const char *unit);
 
 /* The least 1, 2 or 5 times a power of ten that is not below `least`, which is above 0. */
-double trip_annotation_round(double least);
+double trip_annotation_round(double min);
 
 #ifdef __cplusplus
 }

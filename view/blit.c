@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "report.h"
-#include "shader_text.h"
+#include "view_shader_text.h"
 
 struct trip_blit {
     GLuint program, texture, vertices;

@@ -39,8 +39,8 @@ int trip_camera_path_add(trip_camera_path *p, double seconds, const trip_navigat
 
 static double fps(const trip_camera_path *p)
 {
-    enum { USUAL_FPS = 30 };
-    return p->frames_per_second > 0 ? p->frames_per_second : USUAL_FPS;
+    enum { DEFAULT_FPS = 30 };
+    return p->frames_per_second > 0 ? p->frames_per_second : DEFAULT_FPS;
 }
 
 /* A loop takes two keys. */
@@ -91,9 +91,9 @@ static size_t key_before(const trip_camera_path *p, double seconds)
 
 /* A time between two keys: share `s` of the way, of `step` seconds; the steps before and after,
  * 0 where there is no further key. */
-typedef struct place {
+typedef struct position {
     double s, step, before, after;
-} place;
+} position;
 
 /* The derivative at a key, over the step that counts: Catmull and Rom's, of unequal steps the one
  * of the parabola through three keys. At an end, so that two keys make a straight line, the
@@ -112,7 +112,7 @@ static double hermite(double change, double start, double end, double s)
 }
 
 /* Between v[1] and v[2]. */
-static double spline(const double v[4], const place *at)
+static double spline(const double v[4], const position *at)
 {
     double change = v[2] - v[1];
     double start = tangent(v[1] - v[0], at->before, change, at->step);
@@ -193,7 +193,7 @@ static void numbers_of(const trip_navigation *n, double out[NUMBERS])
 }
 
 /* The rotation between keys i and i + 1 of the four, spline-wise as the numbers are. */
-static trip_vec3 spline_turn(const rotation r[4], const place *at)
+static trip_vec3 spline_turn(const rotation r[4], const position *at)
 {
     trip_vec3 turns[3], out;
     for (int i = 0; i < 3; i++)
@@ -258,10 +258,10 @@ trip_navigation trip_camera_path_view(const trip_camera_path *p, double seconds)
     if (seconds >= near[2].seconds)
         return keys[four[2]].camera;
     const double step = near[2].seconds - near[1].seconds;
-    const place at = { .step = step,
-                       .s = (seconds - near[1].seconds) / step,
-                       .before = near[1].seconds - near[0].seconds,
-                       .after = near[3].seconds - near[2].seconds };
+    const position at = { .step = step,
+                          .s = (seconds - near[1].seconds) / step,
+                          .before = near[1].seconds - near[0].seconds,
+                          .after = near[3].seconds - near[2].seconds };
     double numbers[4][NUMBERS], now[NUMBERS];
     rotation r[4];
     for (int i = 0; i < 4; i++) {

@@ -15,12 +15,12 @@
 #include "new_file.h"
 #include "report.h"
 
-enum { MOST_BYTES = 64 << 20, VERSION = 1 };
+enum { MAX_BYTES = 64 << 20, VERSION = 1 };
 
 #define FAR 1e300
-#define MOST_SECONDS 1e6
-#define MOST_FPS 1000
-#define MOST_HEIGHT 1e100
+#define MAX_SECONDS 1e6
+#define MAX_FPS 1000
+#define MAX_HEIGHT 1e100
 
 /* ---- to text ---- */
 
@@ -141,7 +141,7 @@ static const char *read_camera(trip_navigation *n, const cJSON *key)
     if (fov &&
         !trip_exact_read(fov, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES, &n->fov_degrees))
         return "\"fov\" is not an angle from 1e-6 to 179.999 degrees";
-    if (ortho && !trip_exact_read(ortho, 1 / MOST_HEIGHT, MOST_HEIGHT, &n->ortho_height))
+    if (ortho && !trip_exact_read(ortho, 1 / MAX_HEIGHT, MAX_HEIGHT, &n->ortho_height))
         return "\"ortho\" is not a height above 0";
     trip_navigation_axes axes = trip_navigation_get_axes(n);
     double length = hypot(hypot(axes.up[0], axes.up[1]), axes.up[2]);
@@ -195,7 +195,7 @@ static const char *read_key(trip_camera_path *p, const cJSON *key)
     const trip_path_key *before = p->count ? k - 1 : NULL;
     if (!cJSON_IsObject(key))
         return "is not an object";
-    if (!trip_exact_read(item_of(key, "seconds"), -MOST_SECONDS, MOST_SECONDS, &k->seconds))
+    if (!trip_exact_read(item_of(key, "seconds"), -MAX_SECONDS, MAX_SECONDS, &k->seconds))
         return "\"seconds\" is not a time";
     if (before && !(k->seconds > before->seconds))
         return "is not later than the key before";
@@ -243,10 +243,10 @@ static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
     if (version != VERSION)
         return trip_fail(TRIP_ERROR, "path", name, "is of version %g; %d can be read", version,
                          VERSION);
-    if (fps && !trip_exact_read(fps, 1e-3, MOST_FPS, &p->frames_per_second))
+    if (fps && !trip_exact_read(fps, 1e-3, MAX_FPS, &p->frames_per_second))
         return trip_fail(TRIP_ERROR, "path", name, "\"frames_per_second\" is not from 0.001 to %d",
-                         MOST_FPS);
-    if (loop && !trip_exact_read(loop, 1e-3, MOST_SECONDS, &p->loop_seconds))
+                         MAX_FPS);
+    if (loop && !trip_exact_read(loop, 1e-3, MAX_SECONDS, &p->loop_seconds))
         return trip_fail(TRIP_ERROR, "path", name, "\"loop\" is not a time above 0");
     static const char *const known[] = { "triptych_path", "frames_per_second", "loop", "keys",
                                          NULL };
@@ -290,13 +290,13 @@ int trip_camera_path_parse(trip_camera_path *p, const char *name, const char *te
 int trip_camera_path_load(trip_camera_path *p, const char *path)
 {
     int fd = trip_input_open(path);
-    char *text = fd < 0 ? NULL : malloc(MOST_BYTES + 1);
-    ssize_t bytes = text ? trip_input_read(fd, text, MOST_BYTES + 1) : -1;
+    char *text = fd < 0 ? NULL : malloc(MAX_BYTES + 1);
+    ssize_t bytes = text ? trip_input_read(fd, text, MAX_BYTES + 1) : -1;
     int status = 0;
     if (bytes < 0)
         status = trip_fail_errno("path", path, "cannot read");
-    else if (bytes > MOST_BYTES)
-        status = trip_fail(TRIP_ERROR, "path", path, "is longer than %d MiB", MOST_BYTES >> 20);
+    else if (bytes > MAX_BYTES)
+        status = trip_fail(TRIP_ERROR, "path", path, "is longer than %d MiB", MAX_BYTES >> 20);
     else
         text[bytes] = 0;
     if (fd >= 0)

@@ -16,13 +16,13 @@ void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info)
     }
 }
 
-void trip_clipping_set_face(triptych_clip *c, int axis, int face, double place)
+void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position)
 {
-    const double least = 0.01; /* that is left of it */
+    const double min = 0.01; /* that is left of it */
     if (face)
-        c->box_hi[axis] = fmax(place, c->box_lo[axis] + least);
+        c->box_hi[axis] = fmax(position, c->box_lo[axis] + min);
     else
-        c->box_lo[axis] = fmin(place, c->box_hi[axis] - least);
+        c->box_lo[axis] = fmin(position, c->box_hi[axis] - min);
 }
 
 bool trip_clipping_add_plane(triptych_clip *c, const trip_navigation *n)

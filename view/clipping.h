@@ -14,7 +14,7 @@ enum { TRIP_CLIPPING_PLANES = 6 };
 /* The whole of what was kept, half a voxel around it included, in voxels. */
 void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info);
 /* Moves a face of the box, which stays a box: face 0 or 1 of an axis, 0 the lower. */
-void trip_clipping_set_face(triptych_clip *c, int axis, int face, double place);
+void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position);
 
 /* A plane through the point looked at, that faces the eye: what lies before it is cut away. False
  * where there is no room for one. */

@@ -126,12 +126,12 @@ trip_frames_status trip_frames_get_status(trip_frames *f)
     return status;
 }
 
-int trip_frames_get_times(trip_frames *f, int most, float *ms)
+int trip_frames_get_times(trip_frames *f, int max, float *ms)
 {
     pthread_mutex_lock(&f->lock);
     const uint64_t moving = f->status.moving;
     uint64_t count = moving < TRIP_FRAMES_TIMES ? moving : TRIP_FRAMES_TIMES;
-    count = count < (uint64_t)most ? count : (uint64_t)most;
+    count = count < (uint64_t)max ? count : (uint64_t)max;
     for (uint64_t i = 0; i < count; i++)
         ms[i] = f->times[(moving - count + i) % TRIP_FRAMES_TIMES];
     pthread_mutex_unlock(&f->lock);
@@ -181,8 +181,8 @@ void trip_frames_probe(trip_frames *f, double x, double y)
 {
     pthread_mutex_lock(&f->lock);
     f->looks = true;
-    f->place[0] = x;
-    f->place[1] = y;
+    f->position[0] = x;
+    f->position[1] = y;
     pthread_cond_signal(&f->come);
     pthread_mutex_unlock(&f->lock);
 }

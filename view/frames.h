@@ -109,7 +109,7 @@ trip_frames_status trip_frames_get_status(trip_frames *f);
 
 /* How long the last frames of moving views took, in ms, the latest last: so many, up to `most`. */
 enum { TRIP_FRAMES_TIMES = 4096 };
-int trip_frames_get_times(trip_frames *f, int most, float *ms);
+int trip_frames_get_times(trip_frames *f, int max, float *ms);
 /* The plan of the last whole picture, in words, for free(); NULL: there is none. */
 char *trip_frames_explain(trip_frames *f);
 

@@ -29,7 +29,7 @@ struct trip_frames {
     bool has_opened;
     char *plan;
     bool looks; /* at a place: */
-    double place[2];
+    double position[2];
     trip_probed probed;
 
     /* The window looks at it only where it gets this lock at once; the drawing thread holds it only

@@ -28,8 +28,8 @@ static void wake(trip_frames *f)
  * keeps to that by detail alone: where it would take so many times as long as it has, what is near
  * becomes coarse too. */
 #define MOVING_SHARE 0.85
-#define MOVING_MOST 1.5
-#define USUAL_FPS 30.0
+#define MOVING_MAX 1.5
+#define DEFAULT_FPS 30.0
 
 /* ---- what there is to say ---- */
 
@@ -233,14 +233,14 @@ static int use_function(trip_frames *f)
         return 0;
     }
     int left_out = 0;
-    triptych_function wanted = { .name = w->text ? NULL : w->function,
-                                 .text = w->text,
-                                 .opacity_scale = w->opacity_scale,
-                                 .left_out = &left_out };
-    int status = triptych_set_function(f->t, &wanted);
+    triptych_transfer_function wanted = { .name = w->text ? NULL : w->function,
+                                          .text = w->text,
+                                          .opacity_scale = w->opacity_scale,
+                                          .left_out = &left_out };
+    int status = triptych_set_transfer_function(f->t, &wanted);
     wanted.left_out = NULL;
     if (!status && left_out) /* with a warning that names the command */
-        status = triptych_set_function(f->t, &wanted);
+        status = triptych_set_transfer_function(f->t, &wanted);
     pthread_mutex_lock(&f->lock);
     f->status.left_out = !status && left_out;
     pthread_mutex_unlock(&f->lock);
@@ -254,7 +254,7 @@ static int use_function(trip_frames *f)
 
 /* Those that are wanted, with levels at least so coarse. Not where memory is short: pictures of
  * several levels take more of it. */
-static triptych_settings with_levels(const trip_frames *f, double lod_px, double most_ms)
+static triptych_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
     triptych_settings s = f->now.settings;
     if (f->plain)
@@ -263,7 +263,7 @@ static triptych_settings with_levels(const trip_frames *f, double lod_px, double
     if (f->by_values && s.classify == TRIPTYCH_PRE)
         s.classify = TRIPTYCH_CLASSIFY_AUTO;
     s.lod_px = fmax(s.lod_px, lod_px);
-    s.max_ms = s.max_ms > 0 ? fmin(s.max_ms, most_ms) : most_ms;
+    s.max_ms = s.max_ms > 0 ? fmin(s.max_ms, max_ms) : max_ms;
     return s;
 }
 
@@ -420,12 +420,12 @@ typedef struct frame {
     double begun_ms;
 } frame;
 
-enum { STEP_NS = 10000000, PART_MS = 150, MOST_MS = 1000 };
+enum { STEP_NS = 10000000, PART_MS = 150, MAX_MS = 1000 };
 
 /* Frames that show that the view moves are given up only where they take long. */
 static bool gives_up(trip_frames *f, const frame *d)
 {
-    return has_newer(f) && (!d->first || now_ms() - d->begun_ms > MOST_MS || has_other(f));
+    return has_newer(f) && (!d->first || now_ms() - d->begun_ms > MAX_MS || has_other(f));
 }
 
 static int step(trip_frames *f, const frame *d)
@@ -553,9 +553,9 @@ static int draw_moving(trip_frames *f, double target_ms)
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
     triptych_settings settings =
-        with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MOST * target_ms);
-    if (settings.slices == 0)
-        settings.slices = MOVING_SLICES;
+        with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
+    if (settings.samples_per_sheet == 0)
+        settings.samples_per_sheet = MOVING_SLICES;
     return draw(f, scale, detail, &settings, true);
 }
 
@@ -575,7 +575,7 @@ static int draw_wanted(trip_frames *f)
     enum { LONG_MS = 1500 };
     const triptych_settings *whole = &f->now.settings;
     const double wanted = f->params.frames_per_second;
-    const double target_ms = 1000 / (wanted > 0 ? wanted : USUAL_FPS);
+    const double target_ms = 1000 / (wanted > 0 ? wanted : DEFAULT_FPS);
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, wanted_pixels(f));
     if (whole_ms > 0 && whole_ms < target_ms)
         return draw(f, 1, 1, whole, true);
@@ -677,7 +677,7 @@ static void look(trip_frames *f)
     pthread_mutex_lock(&f->lock);
     const bool looks = f->looks && f->whole;
     trip_probed probed = {
-        .valid = true, .x = f->place[0], .y = f->place[1], .navigation = f->now.navigation
+        .valid = true, .x = f->position[0], .y = f->position[1], .navigation = f->now.navigation
     };
     f->looks = f->looks && !looks;
     pthread_mutex_unlock(&f->lock);

@@ -86,15 +86,15 @@ static int write_text(const char *path, const char *text)
 
 int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *path)
 {
-    const int most = (int)(TRIP_FRAMES_TIMES + TRIP_GAUGES_ANSWERS);
+    const int max = (int)(TRIP_FRAMES_TIMES + TRIP_GAUGES_ANSWERS);
     cJSON *root = cJSON_CreateObject();
-    float *ms = malloc((size_t)most * sizeof *ms);
+    float *ms = malloc((size_t)max * sizeof *ms);
     char *text = NULL;
     if (root && ms) {
         const trip_frames_status status = trip_frames_get_status(v->frames);
         add_document(root, v);
         add_status(root, &status);
-        add_times(root, "moving_ms", ms, trip_frames_get_times(v->frames, most, ms));
+        add_times(root, "moving_ms", ms, trip_frames_get_times(v->frames, max, ms));
         const int answers =
             (int)(g->answered < TRIP_GAUGES_ANSWERS ? g->answered : TRIP_GAUGES_ANSWERS);
         memcpy(ms, g->answers, (size_t)answers * sizeof *ms);

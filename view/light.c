@@ -136,16 +136,16 @@ static bool may_glow(const triptych_settings *s, const char *heat)
 }
 
 /* Where it is not the usual one, and some of the effects that it is of may run. */
-static void put_number(FILE *out, const char *option, double number, double usual, int some)
+static void put_number(FILE *out, const char *option, double number, double defaults, int some)
 {
     char text[32];
-    if (some && number != usual)
+    if (some && number != defaults)
         fprintf(out, " %s %s", option, trip_text_from_double(number, text));
 }
 
 static void put_effects(FILE *out, const triptych_settings *s, const char *heat)
 {
-    const triptych_settings usual = triptych_default_settings();
+    const triptych_settings defaults = triptych_default_settings();
     const char *before = " --effects ";
     for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++)
         if (s->effects & trip_effect_switches[i].bit) {
@@ -153,9 +153,9 @@ static void put_effects(FILE *out, const triptych_settings *s, const char *heat)
             before = ",";
         }
     const int some = s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : s->effects;
-    put_number(out, "--anisotropy", s->anisotropy, usual.anisotropy, some & TRIPTYCH_SHADOWS);
-    put_number(out, "--cueing", s->cueing, usual.cueing, some & TRIPTYCH_CUEING);
-    put_number(out, "--light-cells", s->light_cells, usual.light_cells, some & LATTICES);
+    put_number(out, "--anisotropy", s->anisotropy, defaults.anisotropy, some & TRIPTYCH_SHADOWS);
+    put_number(out, "--cueing", s->cueing, defaults.cueing, some & TRIPTYCH_CUEING);
+    put_number(out, "--light-cells", s->light_cells, defaults.light_cells, some & LATTICES);
     if (!may_glow(s, heat))
         return;
     char lo[32], hi[32];

@@ -27,9 +27,9 @@ typedef struct pose {
 static pose pose_of(const trip_navigation *n)
 {
     pose p = { .eye = vector(n->eye), .look = vector(n->look) };
-    trip_vec3 gaze = trip_sub(p.look, p.eye);
-    p.distance = trip_length(gaze);
-    p.forward = trip_normalize(gaze);
+    trip_vec3 view_direction = trip_sub(p.look, p.eye);
+    p.distance = trip_length(view_direction);
+    p.forward = trip_normalize(view_direction);
     p.right = trip_normalize(trip_cross(p.forward, vector(n->up)));
     p.up = trip_cross(p.right, p.forward);
     return p;
@@ -69,8 +69,9 @@ static trip_vec3 turned(trip_vec3 v, trip_vec3 axis, double degrees)
 
 trip_navigation trip_navigation_from_camera(const triptych_camera *camera, const double *upright)
 {
-    enum { USUAL_FOV = 30 };
-    trip_navigation n = { .fov_degrees = camera->fov_degrees > 0 ? camera->fov_degrees : USUAL_FOV,
+    enum { DEFAULT_FOV = 30 };
+    trip_navigation n = { .fov_degrees =
+                              camera->fov_degrees > 0 ? camera->fov_degrees : DEFAULT_FOV,
                           .ortho_height = camera->ortho_height };
     memcpy(n.eye, camera->eye, sizeof n.eye);
     memcpy(n.look, camera->look, sizeof n.look);
@@ -197,10 +198,10 @@ void trip_navigation_turn(trip_navigation *n, double right_degrees, double up_de
     pose p = pose_of(n);
     trip_vec3 upright = vector(n->upright);
     double right = trip_dot(p.up, upright) < 0 ? right_degrees : -right_degrees;
-    trip_vec3 gaze = trip_sub(p.look, p.eye);
-    gaze = turned(turned(gaze, p.right, up_degrees), upright, right);
+    trip_vec3 view_direction = trip_sub(p.look, p.eye);
+    view_direction = turned(turned(view_direction, p.right, up_degrees), upright, right);
     trip_vec3 up = turned(turned(p.up, p.right, up_degrees), upright, right);
-    apply(n, p.eye, trip_add(p.eye, gaze), up);
+    apply(n, p.eye, trip_add(p.eye, view_direction), up);
 }
 
 void trip_navigation_roll(trip_navigation *n, double degrees)

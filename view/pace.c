@@ -5,7 +5,7 @@
 /* What a frame's sums keep when the next is noted. */
 static const double kept = 0.7;
 
-#define MOST_GROWTH 3.0
+#define MAX_GROWTH 3.0
 
 void trip_pace_note(trip_pace *p, double pixels, double ms)
 {
@@ -26,12 +26,12 @@ static void fit(const trip_pace *p, double *fixed, double *slope)
     const double mean_px = p->px / p->weight, mean_ms = p->ms / p->weight;
     const double variance = p->px_px / p->weight - mean_px * mean_px;
     const double both = p->px_ms / p->weight - mean_px * mean_ms;
-    const double most = mean_ms / mean_px;
-    *slope = most;
+    const double max = mean_ms / mean_px;
+    *slope = max;
     if (variance > 1e-4 * mean_px * mean_px) {
         const double rest = p->ms_ms / p->weight - mean_ms * mean_ms - both * both / variance;
         const double error = sqrt(fmax(rest, 0) / (variance * p->weight));
-        *slope = fmin(fmax(both / variance, 0) + error, most);
+        *slope = fmin(fmax(both / variance, 0) + error, max);
     }
     *fixed = fmax(mean_ms - *slope * mean_px, 0);
 }
@@ -53,7 +53,7 @@ double trip_pace_scale(const trip_pace *p, double pixels, double target_ms)
     fit(p, &fixed, &slope);
     const double left = fmax(target_ms - fixed, fixed / 4);
     const double all = slope * pixels * 1e-6;
-    const double known = MOST_GROWTH * 1e6 * p->px / p->weight;
+    const double known = MAX_GROWTH * 1e6 * p->px / p->weight;
     const double part = sqrt(fmin(fmin(all > left ? left / all : 1, known / pixels), 1));
-    return fmin(fmax(part, TRIP_PACE_LEAST), 1);
+    return fmin(fmax(part, TRIP_PACE_MIN), 1);
 }

@@ -19,10 +19,10 @@ void trip_pace_note(trip_pace *p, double pixels, double ms);
 double trip_pace_expect_ms(const trip_pace *p, double pixels);
 
 /* Less shows nothing. */
-#define TRIP_PACE_LEAST 0.03125
+#define TRIP_PACE_MIN 0.03125
 
 /* The part of the width and height of a picture of so many pixels with which a frame keeps to
- * `target_ms`, TRIP_PACE_LEAST to 1; a half where nothing is known. Where what every frame costs
+ * `target_ms`, TRIP_PACE_MIN to 1; a half where nothing is known. Where what every frame costs
  * leaves too little, pixels get a quarter of that cost: fewer would gain nothing. A frame has at
  * most three times the pixels of those noted, in the mean: beyond them the cost is not known. */
 double trip_pace_scale(const trip_pace *p, double pixels, double target_ms);

@@ -222,38 +222,38 @@ ImU32 colour_of(const trip_rgba &c, double alpha)
 
 void draw_histogram(ImDrawList *list, const Canvas &c, const triptych_histogram &h)
 {
-    uint64_t most = 0;
+    uint64_t max = 0;
     for (uint64_t count : h.counts)
-        most = count > most ? count : most;
+        max = count > max ? count : max;
     if (!h.total || !(h.lo < h.hi))
         return;
     for (float x = c.lo.x; x < c.hi.x; x++) {
-        const double place = (c.value(x + 0.5f) - h.lo) / (h.hi - h.lo) * TRIPTYCH_HISTOGRAM_BINS;
-        if (!(place >= 0 && place < TRIPTYCH_HISTOGRAM_BINS))
+        const double position =
+            (c.value(x + 0.5f) - h.lo) / (h.hi - h.lo) * TRIPTYCH_HISTOGRAM_BINS;
+        if (!(position >= 0 && position < TRIPTYCH_HISTOGRAM_BINS))
             continue;
-        const double part = std::log1p(static_cast<double>(h.counts[static_cast<int>(place)])) /
-                            std::log1p(static_cast<double>(most));
+        const double part = std::log1p(static_cast<double>(h.counts[static_cast<int>(position)])) /
+                            std::log1p(static_cast<double>(max));
         const float top = c.hi.y - static_cast<float>(part) * (c.hi.y - c.lo.y);
         list->AddLine(ImVec2(x, c.hi.y), ImVec2(x, top), IM_COL32(90, 96, 110, 255));
     }
 }
 
-void draw_curve(ImDrawList *list, const Canvas &c, const trip_function_editor *e)
+void draw_curve(ImDrawList *list, const Canvas &c, const trip_tf_editor *e)
 {
     for (float x = c.lo.x; x < c.hi.x; x++) {
-        const trip_rgba from = trip_function_editor_evaluate(e, c.value(x));
-        const trip_rgba to = trip_function_editor_evaluate(e, c.value(x + 1));
+        const trip_rgba from = trip_tf_editor_evaluate(e, c.value(x));
+        const trip_rgba to = trip_tf_editor_evaluate(e, c.value(x + 1));
         list->AddLine(ImVec2(x, c.hi.y), ImVec2(x, c.y(from.opacity)), colour_of(from, 0.45));
         list->AddLine(ImVec2(x, c.y(from.opacity)), ImVec2(x + 1, c.y(to.opacity)),
                       colour_of(from, 1), 1.5f);
     }
 }
 
-void draw_points(ImDrawList *list, const Canvas &c, const trip_panel *p,
-                 const trip_function_editor *e)
+void draw_points(ImDrawList *list, const Canvas &c, const trip_panel *p, const trip_tf_editor *e)
 {
     size_t count;
-    const trip_tf_point *points = trip_function_editor_points(e, &count);
+    const trip_tf_point *points = trip_tf_editor_points(e, &count);
     const float r = 4 * static_cast<float>(p->scale);
     for (size_t i = 0; i < count; i++) {
         const ImVec2 at(c.x(points[i].value), c.y(points[i].colour.opacity));
@@ -267,7 +267,7 @@ void draw_points(ImDrawList *list, const Canvas &c, const trip_panel *p,
 
 void edit_points(trip_panel *p, const Canvas &c, trip_document *d)
 {
-    trip_function_editor *e = d->editor;
+    trip_tf_editor *e = d->editor;
     const ImVec2 at = ImGui::GetIO().MousePos;
     const double reach = 8 * p->scale, width = static_cast<double>(c.hi.x - c.lo.x);
     const double value = c.value(at.x), opacity = c.opacity(at.y);
@@ -275,7 +275,7 @@ void edit_points(trip_panel *p, const Canvas &c, trip_document *d)
         size_t count;
         int found = -1;
         double best = reach * reach;
-        const trip_tf_point *points = trip_function_editor_points(e, &count);
+        const trip_tf_point *points = trip_tf_editor_points(e, &count);
         for (size_t i = 0; i < count; i++) {
             const double dx = static_cast<double>(c.x(points[i].value) - at.x);
             const double dy = static_cast<double>(c.y(points[i].colour.opacity) - at.y);
@@ -288,26 +288,26 @@ void edit_points(trip_panel *p, const Canvas &c, trip_document *d)
     };
     (void)width;
     if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(0)) {
-        trip_function_editor_begin(e);
+        trip_tf_editor_begin(e);
         p->dragging = true;
         p->point = nearest();
         if (p->point < 0) {
-            p->point = trip_function_editor_add(e, value, opacity);
+            p->point = trip_tf_editor_add(e, value, opacity);
             d->edited = true;
         }
     }
     if (p->dragging && ImGui::IsMouseDragging(0, 1)) {
-        trip_function_editor_move(e, p->point, value, opacity);
+        trip_tf_editor_move(e, p->point, value, opacity);
         d->edited = true;
     }
     if (p->dragging && !ImGui::IsMouseDown(0)) {
-        trip_function_editor_end(e);
+        trip_tf_editor_end(e);
         p->dragging = false;
     }
     if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(1) && !p->dragging) {
         const int found = nearest();
         if (found >= 0) {
-            trip_function_editor_remove(e, found);
+            trip_tf_editor_remove(e, found);
             d->edited = true;
             p->point = -1;
         }
@@ -346,22 +346,22 @@ void draw_editor(trip_panel *p, trip_document *d)
 void draw_point(trip_panel *p, trip_document *d)
 {
     size_t count;
-    const trip_tf_point *points = trip_function_editor_points(d->editor, &count);
+    const trip_tf_point *points = trip_tf_editor_points(d->editor, &count);
     if (p->point < 0 || static_cast<size_t>(p->point) >= count)
         return;
     const trip_rgba c = points[p->point].colour;
     float rgb[3] = { static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b) };
     const bool changed = ImGui::ColorEdit3("Colour", rgb);
     if (ImGui::IsItemActivated())
-        trip_function_editor_begin(d->editor);
+        trip_tf_editor_begin(d->editor);
     mark_beside(p, "Colour", changed);
     if (changed) {
-        trip_function_editor_set_colour(d->editor, p->point, static_cast<double>(rgb[0]),
-                                        static_cast<double>(rgb[1]), static_cast<double>(rgb[2]));
+        trip_tf_editor_set_colour(d->editor, p->point, static_cast<double>(rgb[0]),
+                                  static_cast<double>(rgb[1]), static_cast<double>(rgb[2]));
         d->edited = true;
     }
     if (ImGui::IsItemDeactivated())
-        trip_function_editor_end(d->editor);
+        trip_tf_editor_end(d->editor);
 }
 
 void draw_presets(trip_panel *p, trip_viewer *v, trip_document *d)
@@ -392,7 +392,7 @@ void draw_function_file(trip_panel *p, trip_viewer *v, trip_document *d)
         trip_viewer_set_function(v, p->path);
     ImGui::SameLine();
     if (button(p, "Save") && p->path[0]) {
-        const bool wrote = trip_function_editor_save(d->editor, p->path) == 0;
+        const bool wrote = trip_tf_editor_save(d->editor, p->path) == 0;
         std::snprintf(line, sizeof line, wrote ? "wrote %s" : "%s cannot be written", p->path);
         trip_viewer_say(v, line);
     }
@@ -424,13 +424,13 @@ void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
     draw_left_out(p, v, d);
     draw_editor(p, d);
     draw_point(p, d);
-    if (button(p, "Undo") && trip_function_editor_can_undo(d->editor)) {
-        trip_function_editor_undo(d->editor);
+    if (button(p, "Undo") && trip_tf_editor_can_undo(d->editor)) {
+        trip_tf_editor_undo(d->editor);
         d->edited = true;
     }
     ImGui::SameLine();
-    if (button(p, "Redo") && trip_function_editor_can_redo(d->editor)) {
-        trip_function_editor_redo(d->editor);
+    if (button(p, "Redo") && trip_tf_editor_can_redo(d->editor)) {
+        trip_tf_editor_redo(d->editor);
         d->edited = true;
     }
     v->changed |=
@@ -440,7 +440,7 @@ void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
 
 // ---- light, quality ----
 
-bool draw_light_place(trip_panel *p, trip_document *d)
+bool draw_light_position(trip_panel *p, trip_document *d)
 {
     trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     const bool far = c.distance >= TRIP_LIGHT_FARTHEST;
@@ -501,7 +501,7 @@ bool draw_light(trip_panel *p, trip_document *d)
         ImGui::TextDisabled("No normals: splats cannot be shaded.");
     changed |= check(p, "Light from the eye", &s->headlight); /* which lights effects, too */
     if (!s->headlight)
-        changed |= draw_light_place(p, d);
+        changed |= draw_light_position(p, d);
     float rgb[3];
     for (int i = 0; i < 3; i++)
         rgb[i] = static_cast<float>(s->background[i]);
@@ -520,9 +520,9 @@ bool draw_quality(trip_panel *p, trip_document *d)
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
     bool changed = choose(p, "Classify", &s->classify, classes, 3);
     if (s->classify != TRIPTYCH_PRE) {
-        changed |= mark_beside(
-            p, "Slices",
-            ImGui::SliderInt("Slices", &s->slices, 0, 16, s->slices ? "%d" : "by the view"));
+        changed |= mark_beside(p, "Slices",
+                               ImGui::SliderInt("Slices", &s->samples_per_sheet, 0, 16,
+                                                s->samples_per_sheet ? "%d" : "by the view"));
     } else {
         static const char *const sums[] = { "Splat by splat", "Sheet by sheet" };
         changed |= choose(p, "Compositing", &s->compositing, sums, 2);
@@ -538,10 +538,11 @@ bool draw_quality(trip_panel *p, trip_document *d)
     }
     {
         const double leftmost = -0.001;
-        double saturation = s->saturation >= 0 ? s->saturation : leftmost;
-        changed |= slide(p, "Saturation", &saturation, leftmost, 0.1,
-                         saturation < 0 ? "by the classification" : "%.3f");
-        s->saturation = saturation >= 0 ? saturation : TRIPTYCH_SATURATION_AUTO;
+        double early_termination = s->early_termination >= 0 ? s->early_termination : leftmost;
+        changed |= slide(p, "Saturation", &early_termination, leftmost, 0.1,
+                         early_termination < 0 ? "by the classification" : "%.3f");
+        s->early_termination =
+            early_termination >= 0 ? early_termination : TRIPTYCH_EARLY_TERMINATION_AUTO;
     }
     changed |= mark_beside(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
     return changed;
@@ -572,10 +573,10 @@ bool draw_clip_box(trip_panel *p, trip_document *d)
         trip_clipping_box_of_all(c, &d->info);
     for (int i = 0; i < 6 && c->box && c->box_of_voxels; i++) {
         const int axis = i / 2, face = i % 2;
-        double place = face ? c->box_hi[axis] : c->box_lo[axis];
-        if (slide(p, labels[axis][face], &place, static_cast<double>(d->info.first[axis]) - 0.5,
+        double position = face ? c->box_hi[axis] : c->box_lo[axis];
+        if (slide(p, labels[axis][face], &position, static_cast<double>(d->info.first[axis]) - 0.5,
                   static_cast<double>(d->info.last[axis]) + 0.5, "%.1f")) {
-            trip_clipping_set_face(c, axis, face, place);
+            trip_clipping_set_face(c, axis, face, position);
             changed = true;
         }
     }
@@ -739,8 +740,8 @@ void draw_probe(ImDrawList *list, trip_viewer *v, const trip_document *d)
     if (!probed.valid || std::memcmp(&probed.navigation, &d->navigation, sizeof d->navigation))
         return;
     const triptych_hit &h = probed.hit;
-    const ImVec2 place(static_cast<float>(probed.x), static_cast<float>(probed.y));
-    list->AddCircle(place, 5, IM_COL32_WHITE);
+    const ImVec2 position(static_cast<float>(probed.x), static_cast<float>(probed.y));
+    list->AddCircle(position, 5, IM_COL32_WHITE);
     if (ImGui::GetIO().WantCaptureMouse) // the pointer is over the panel or a list
         return;
     if (!(h.opacity > 0)) {

@@ -82,9 +82,9 @@ static int play_random(trip_player *p, const trip_player_window *w, const trip_e
     return 0;
 }
 
-static bool is_late(const trip_player *p, double seconds, double most)
+static bool is_late(const trip_player *p, double seconds, double max)
 {
-    return seconds - p->since > most;
+    return seconds - p->since > max;
 }
 
 /* Whether a control is in sight and where it was a picture ago: it may be on its way there. */
@@ -94,9 +94,9 @@ static bool lies_still(trip_player *p, const trip_player_window *w, const trip_e
     if (!w->find(w->user, e->text, box))
         return false;
     const double x = box[0] + (box[2] - box[0]) * e->x, y = (box[1] + box[3]) / 2;
-    const bool still = x == p->place[0] && y == p->place[1];
-    p->place[0] = x;
-    p->place[1] = y;
+    const bool still = x == p->position[0] && y == p->position[1];
+    p->position[0] = x;
+    p->position[1] = y;
     return still;
 }
 
@@ -110,7 +110,7 @@ static int play_click(trip_player *p, const trip_player_window *w, const trip_ev
                    : 1;
     if (p->phase == 0)
         w->send(w->user,
-                &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = p->place[0], .y = p->place[1] });
+                &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = p->position[0], .y = p->position[1] });
     else if (p->phase >= 2)
         w->send(w->user, &(trip_event){ .kind = TRIP_EVENT_BUTTON,
                                         .code = TRIP_BUTTON_LEFT,
@@ -170,7 +170,7 @@ int trip_player_step(trip_player *p, const trip_player_window *w, double seconds
         p->next++;
         p->phase = 0;
         p->since = 0;
-        p->place[0] = p->place[1] = -1;
+        p->position[0] = p->position[1] = -1;
     }
     return 1;
 }

@@ -11,15 +11,15 @@ extern "C" {
 
 typedef struct trip_player {
     trip_script script;
-    size_t next;       /* event */
-    uint64_t state;    /* of the chances of the random events under way, */
-    uint64_t left;     /* so many to come */
-    double until;      /* that is slept to, in seconds */
-    int phase;         /* of an event that takes several pictures */
-    double since;      /* that began */
-    double place[2];   /* where a control was a picture ago */
-    int width, height; /* of the window, for random events */
-    const char *drops; /* what random events drop; NULL: nothing */
+    size_t next;        /* event */
+    uint64_t state;     /* of the chances of the random events under way, */
+    uint64_t left;      /* so many to come */
+    double until;       /* that is slept to, in seconds */
+    int phase;          /* of an event that takes several pictures */
+    double since;       /* that began */
+    double position[2]; /* where a control was a picture ago */
+    int width, height;  /* of the window, for random events */
+    const char *drops;  /* what random events drop; NULL: nothing */
 } trip_player;
 
 /* What the window does for it. */

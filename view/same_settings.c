@@ -18,9 +18,10 @@ static bool same_clip(const triptych_clip *a, const triptych_clip *b)
 static bool same_form(const triptych_settings *a, const triptych_settings *b)
 {
     return a->classify == b->classify && a->compositing == b->compositing &&
-           a->slices == b->slices && a->method == b->method && a->traversal == b->traversal &&
-           a->target == b->target && a->indexed == b->indexed && a->triangles == b->triangles &&
-           a->h == b->h && a->saturation == b->saturation && a->kernel_radius == b->kernel_radius &&
+           a->samples_per_sheet == b->samples_per_sheet && a->method == b->method &&
+           a->traversal == b->traversal && a->target == b->target && a->indexed == b->indexed &&
+           a->triangles == b->triangles && a->h == b->h &&
+           a->early_termination == b->early_termination && a->kernel_radius == b->kernel_radius &&
            a->lod_px == b->lod_px && a->max_bytes == b->max_bytes && a->max_ms == b->max_ms &&
            a->field == b->field && a->kernel == b->kernel && a->tolerance == b->tolerance &&
            a->samples == b->samples;

@@ -13,10 +13,10 @@
 
 enum {
     LINE_BYTES = 4096,
-    MOST_BYTES = 8 << 20,
-    MOST_EVENTS = 1 << 20,
-    MOST_STEPS = 10000,
-    MOST_WORDS = 10,
+    MAX_BYTES = 8 << 20,
+    MAX_EVENTS = 1 << 20,
+    MAX_STEPS = 10000,
+    MAX_WORDS = 10,
 };
 
 typedef struct parser {
@@ -24,7 +24,7 @@ typedef struct parser {
     long line;
     trip_script *script;
     size_t room;
-    char *words[MOST_WORDS]; /* of the line, the command first */
+    char *words[MAX_WORDS]; /* of the line, the command first */
     int count;
     unsigned modifiers; /* of its last words */
 } parser;
@@ -35,9 +35,9 @@ static int add(parser *p, trip_event event)
 {
     trip_script *s = p->script;
     event.modifiers = p->modifiers;
-    if (s->count == MOST_EVENTS) {
+    if (s->count == MAX_EVENTS) {
         free(event.text);
-        return fail_at(p, "more than %d events", MOST_EVENTS);
+        return fail_at(p, "more than %d events", MAX_EVENTS);
     }
     if (s->count == p->room) {
         size_t room = p->room ? 2 * p->room : 64;
@@ -56,13 +56,13 @@ static int add(parser *p, trip_event event)
 /* Values of words */
 
 /* Positions, sizes and times lie within this. */
-#define MOST_NUMBER 1e6
+#define MAX_NUMBER 1e6
 
 static int number(const parser *p, int word, double *out)
 {
-    if (trip_text_to_double(p->words[word], out) && fabs(*out) <= MOST_NUMBER)
+    if (trip_text_to_double(p->words[word], out) && fabs(*out) <= MAX_NUMBER)
         return 0;
-    return fail_at(p, "`%.40s` is not a number up to %g", p->words[word], MOST_NUMBER);
+    return fail_at(p, "`%.40s` is not a number up to %g", p->words[word], MAX_NUMBER);
 }
 
 static int whole(const parser *p, int word, double lo, double hi, double *out)
@@ -143,7 +143,7 @@ static int parse_drag(parser *p)
     for (int i = 0; i < 4 && !status; i++)
         status = number(p, 2 + i, &at[i]);
     if (!status)
-        status = whole(p, 6, 1, MOST_STEPS, &steps);
+        status = whole(p, 6, 1, MAX_STEPS, &steps);
     return status ? status : add_drag(p, code, at, (int)steps);
 }
 
@@ -166,11 +166,11 @@ static int parse_key(parser *p)
 
 static int parse_resize(parser *p)
 {
-    enum { MOST_SIZE = 16384 };
+    enum { MAX_SIZE = 16384 };
     trip_event e = { .kind = TRIP_EVENT_RESIZE };
-    int status = whole(p, 1, 1, MOST_SIZE, &e.x);
+    int status = whole(p, 1, 1, MAX_SIZE, &e.x);
     if (!status)
-        status = whole(p, 2, 1, MOST_SIZE, &e.y);
+        status = whole(p, 2, 1, MAX_SIZE, &e.y);
     return status ? status : add(p, e);
 }
 
@@ -186,14 +186,14 @@ static int parse_plain(parser *p)
 static int parse_sleep(parser *p)
 {
     trip_event e = { .kind = TRIP_EVENT_SLEEP };
-    int status = whole(p, 1, 0, MOST_NUMBER, &e.x);
+    int status = whole(p, 1, 0, MAX_NUMBER, &e.x);
     return status ? status : add(p, e);
 }
 
 static int parse_random(parser *p)
 {
     double count = 0, seed = 0;
-    int status = whole(p, 1, 0, MOST_NUMBER, &count);
+    int status = whole(p, 1, 0, MAX_NUMBER, &count);
     if (!status)
         status = whole(p, 2, 0, 0x1p53, &seed);
     return status ? status
@@ -300,8 +300,8 @@ static int cut_words(parser *p, char *rest)
 {
     char *next = NULL;
     for (char *w = strtok_r(rest, " \t", &next); w; w = strtok_r(NULL, " \t", &next)) {
-        if (p->count == MOST_WORDS)
-            return fail_at(p, "more than %d words", MOST_WORDS);
+        if (p->count == MAX_WORDS)
+            return fail_at(p, "more than %d words", MAX_WORDS);
         p->words[p->count++] = w;
     }
     return 0;
@@ -372,11 +372,11 @@ int trip_script_parse(trip_script *out, const char *name, const char *text, size
 static int read_file(const char *path, char **text, ssize_t *bytes)
 {
     int fd = trip_input_open(path);
-    *text = fd < 0 ? NULL : malloc(MOST_BYTES + 1);
-    *bytes = *text ? trip_input_read(fd, *text, MOST_BYTES + 1) : -1;
+    *text = fd < 0 ? NULL : malloc(MAX_BYTES + 1);
+    *bytes = *text ? trip_input_read(fd, *text, MAX_BYTES + 1) : -1;
     int status = *bytes < 0 ? trip_fail_errno("script", path, "cannot read") : 0;
-    if (*bytes > MOST_BYTES)
-        status = trip_fail(TRIP_ERROR, "script", path, "is longer than %d MiB", MOST_BYTES >> 20);
+    if (*bytes > MAX_BYTES)
+        status = trip_fail(TRIP_ERROR, "script", path, "is longer than %d MiB", MAX_BYTES >> 20);
     if (fd >= 0)
         close(fd);
     return status;

@@ -20,7 +20,7 @@
 #include "text.h"
 #include "transfer_function.h"
 
-enum { MOST_BYTES = 16 << 20, VERSION = 1 };
+enum { MAX_BYTES = 16 << 20, VERSION = 1 };
 
 /* What numbers a state has, where they lie in it, and between what. */
 typedef enum kind { NUMBERS, WHOLE, YES_OR_NO } kind;
@@ -50,7 +50,7 @@ static const entry camera_entries[] = {
 static const entry setting_entries[] = {
     { "classify", SETTING(classify), WHOLE, 1, TRIPTYCH_PRE, TRIPTYCH_CLASSIFY_AUTO },
     { "compositing", SETTING(compositing), WHOLE, 1, TRIPTYCH_BY_SPLAT, TRIPTYCH_BY_SHEET },
-    { "slices", SETTING(slices), WHOLE, 1, 0, 16 },
+    { "samples_per_sheet", SETTING(samples_per_sheet), WHOLE, 1, 0, 16 },
     { "method", SETTING(method), WHOLE, 1, TRIPTYCH_MERGE, TRIPTYCH_AXIS },
     { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
     { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },
@@ -62,7 +62,8 @@ static const entry setting_entries[] = {
     { "kelvin", SETTING(kelvin), NUMBERS, 2, 0, 100000 },
     { "light_cells", SETTING(light_cells), WHOLE, 1, 8, 1024 },
     { "h", SETTING(h), NUMBERS, 1, TRIPTYCH_H_AUTO, 0.999999 },
-    { "saturation", SETTING(saturation), NUMBERS, 1, TRIPTYCH_SATURATION_AUTO, 0.1 },
+    { "early_termination", SETTING(early_termination), NUMBERS, 1, TRIPTYCH_EARLY_TERMINATION_AUTO,
+      0.1 },
     { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
     { "background", SETTING(background), NUMBERS, 4, 0, 1 },
     { "lod_px", SETTING(lod_px), NUMBERS, 1, 0, 1000 },
@@ -358,7 +359,7 @@ static int read_file(const char *path, char **text)
     *text = NULL;
     if (fd < 0)
         return errno == ENOENT ? 0 : trip_fail_errno("read", path, "cannot open");
-    bool regular = fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size <= MOST_BYTES;
+    bool regular = fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size <= MAX_BYTES;
     size_t room = regular ? (size_t)st.st_size : 0;
     char *bytes = regular ? calloc(room + 1, 1) : NULL;
     ssize_t got = bytes ? trip_input_read(fd, bytes, room) : -1;
@@ -369,7 +370,7 @@ static int read_file(const char *path, char **text)
     }
     free(bytes);
     return trip_fail(TRIP_ERROR, "read", path, "is not a file of at most %d MiB that can be read",
-                     MOST_BYTES >> 20);
+                     MAX_BYTES >> 20);
 }
 
 int trip_state_file_load(trip_view_state *s, const char *data)

@@ -33,7 +33,7 @@ static void free_document(trip_document *d)
     free(d->source);
     free(d->heat);
     free(d->function);
-    trip_function_editor_destroy(d->editor);
+    trip_tf_editor_destroy(d->editor);
     trip_camera_path_release(&d->path);
     free(d->path_file);
     free(d);
@@ -50,7 +50,7 @@ static void keep(const trip_viewer *v, const trip_document *d)
     char *path = v->fresh || !d->opened ? NULL : path_of(d);
     if (!path)
         return;
-    char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    char *text = d->edited ? trip_tf_editor_text(d->editor) : NULL;
     char *heat = d->heat ? realpath(d->heat, NULL) : NULL; /* it may be away for a while */
     triptych_settings settings = d->settings;
     if (!d->heat)
@@ -89,7 +89,7 @@ static void take_state(trip_viewer *v, trip_document *d, trip_view_state *s)
     }
     if (!(v->opacity_scale > 0))
         d->opacity_scale = s->opacity_scale;
-    if (!v->function && s->text && trip_function_editor_set_text(d->editor, d->input, s->text) == 0)
+    if (!v->function && s->text && trip_tf_editor_set_text(d->editor, d->input, s->text) == 0)
         d->edited = true;
     if (!v->function && s->function) {
         d->function = s->function;
@@ -143,7 +143,7 @@ static trip_document *make_document(trip_viewer *v, const char *input)
     *d = (trip_document){ .input = strdup(input),
                           .function = v->function ? strdup(v->function) : NULL,
                           .heat = v->heat ? strdup(v->heat) : NULL,
-                          .editor = trip_function_editor_create(),
+                          .editor = trip_tf_editor_create(),
                           .start = v->start,
                           .settings = v->settings,
                           .clips = v->settings.clip.box || v->settings.clip.planes > 0,
@@ -219,7 +219,7 @@ static void want(trip_viewer *v)
     trip_document *d = trip_viewer_document(v);
     if (!d || v->picture_width < 1 || v->height < 1)
         return;
-    char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    char *text = d->edited ? trip_tf_editor_text(d->editor) : NULL;
     trip_frames_want(v->frames, &(trip_wanted){ .document = d->number,
                                                 .input = d->input,
                                                 .keep_all = d->keep_all,
@@ -233,7 +233,7 @@ static void want(trip_viewer *v)
                                                 .text = text,
                                                 .opacity_scale = d->opacity_scale,
                                                 .settings = trip_viewer_settings(d) });
-    d->revision = trip_function_editor_revision(d->editor);
+    d->revision = trip_tf_editor_revision(d->editor);
     free(text);
     v->changed = false;
 }
@@ -267,8 +267,8 @@ static void take_opened(trip_viewer *v)
     if (d && o.first)
         describe(d, &o);
     if (d && o.function && !d->edited) {
-        trip_function_editor_set_text(d->editor, d->input, o.function);
-        d->revision = trip_function_editor_revision(d->editor);
+        trip_tf_editor_set_text(d->editor, d->input, o.function);
+        d->revision = trip_tf_editor_revision(d->editor);
     }
     trip_opened_free(&o);
 }
@@ -463,7 +463,7 @@ void trip_viewer_take_picture(trip_viewer *v)
 static int add_key(trip_document *d)
 {
     trip_camera_path *p = &d->path;
-    char *text = d->edited ? trip_function_editor_text(d->editor) : NULL;
+    char *text = d->edited ? trip_tf_editor_text(d->editor) : NULL;
     int status =
         trip_camera_path_add(p, SECONDS_BETWEEN_KEYS * (double)p->count, &d->navigation, text);
     if (!status && !text && d->function)
@@ -763,7 +763,7 @@ bool trip_viewer_tick(trip_viewer *v, double seconds)
     const bool vanishes = v->message[0] && v->message_seconds > SECONDS_SAID && !v->status.failed;
     if (vanishes)
         v->message[0] = 0;
-    if (d && d->edited && d->revision != trip_function_editor_revision(d->editor))
+    if (d && d->edited && d->revision != trip_tf_editor_revision(d->editor))
         v->changed = true;
     const bool flies = fly(v, seconds);
     if (v->changed)

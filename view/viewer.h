@@ -6,7 +6,7 @@
 #include "camera_path.h"
 #include "event.h"
 #include "frames.h"
-#include "function_editor.h"
+#include "tf_editor.h"
 #include "maker.h"
 
 #ifdef __cplusplus
@@ -30,7 +30,7 @@ typedef struct trip_document {
     trip_navigation navigation;
     char *function; /* preset or file; NULL: its own */
     bool edited;    /* the editor's in its place */
-    trip_function_editor *editor;
+    trip_tf_editor *editor;
     uint64_t revision; /* of the editor, that is wanted */
     double opacity_scale;
     triptych_settings settings; /* but for clipping: */

@@ -175,7 +175,7 @@ void trip_netcdf_file::set_type(int type)
 }
 
 /* A dimension has its coordinates from a variable of its name, in its group or one around. */
-void trip_netcdf_file::place(int axis, int dimension)
+void trip_netcdf_file::position(int axis, int dimension)
 {
     char name[NC_MAX_NAME + 1] = "";
     check(nc_inq_dimname(group_, dimension, name));
@@ -226,9 +226,9 @@ void trip_netcdf_file::keep_chunks(uint64_t memory_bytes)
         throw trip_netcdf_error("its chunks do not fit the memory allowed; a larger --memory would "
                                 "do");
     /* A hash table with a hundred times as many places as chunks, as HDF5 recommends. */
-    const size_t places = 100 * (size_t)std::min(across, 1e5) + 1;
-    check(nc_set_var_chunk_cache(group_, variable_, (size_t)all, places, 1.0F));
-    about.helper_bytes += (uint64_t)(all + one) + places * sizeof(void *);
+    const size_t positions = 100 * (size_t)std::min(across, 1e5) + 1;
+    check(nc_set_var_chunk_cache(group_, variable_, (size_t)all, positions, 1.0F));
+    about.helper_bytes += (uint64_t)(all + one) + positions * sizeof(void *);
 }
 
 void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_bytes)
@@ -256,7 +256,7 @@ void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_by
         throw trip_netcdf_error("its slices do not fit the memory allowed; a larger --memory would "
                                 "do");
     for (int a = 0; a < 3; a++)
-        place(a, dimensions[(size_t)(count_ - 1 - a)]);
+        position(a, dimensions[(size_t)(count_ - 1 - a)]);
     std::strncpy(about.name, found.name.c_str(), sizeof about.name - 1);
     about.others = found.volumes > 1;
     about.deeper = count_ > 3;

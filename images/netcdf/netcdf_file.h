@@ -39,7 +39,7 @@ class trip_netcdf_file
     void open_variable(const std::string &name, uint64_t memory_bytes);
     void find(int group, const std::string &prefix, const std::string &name, variable &found);
     void set_type(int type);
-    void place(int axis, int dimension);
+    void position(int axis, int dimension);
     void keep_chunks(uint64_t memory_bytes);
 
     int file_ = -1;

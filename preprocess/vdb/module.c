@@ -18,14 +18,14 @@ trip_vdb_module(const trip_vdb_host *program)
 
 /* The functions of the program that the module calls, under their names. */
 
-int(trip_fail)(int status, const char *what, const char *where, const char *why, ...)
+int(trip_fail)(int status, const char *stage, const char *where, const char *why, ...)
 {
     char text[2048];
     va_list args;
     va_start(args, why);
     vsnprintf(text, sizeof text, why, args);
     va_end(args);
-    return host->fail(status, what, where, "%s", text);
+    return host->fail(status, stage, where, "%s", text);
 }
 
 void *trip_budget_take(trip_budget *b, size_t bytes)

@@ -16,7 +16,7 @@ extern "C" {
 
 typedef struct trip_vdb_host {
     const char *version; /* of the program; a module of another version refuses it */
-    int (*fail)(int status, const char *what, const char *where, const char *why, ...);
+    int (*fail)(int status, const char *stage, const char *where, const char *why, ...);
     void *(*take)(trip_budget *budget, size_t bytes);
     void (*release)(trip_budget *budget, void *memory, size_t bytes);
     uint64_t (*left_bytes)(const trip_budget *budget);

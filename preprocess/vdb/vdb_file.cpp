@@ -46,11 +46,11 @@ void split_type(std::string type, trip_vdb_entry &entry)
     if (entry.half)
         type.resize(suffix);
     const std::string prefix = "Tree_", layout = "_5_4_3";
-    entry.usual_tree = type.size() > prefix.size() + layout.size() &&
-                       type.compare(0, prefix.size(), prefix) == 0 &&
-                       type.compare(type.size() - layout.size(), layout.size(), layout) == 0;
+    entry.default_tree = type.size() > prefix.size() + layout.size() &&
+                         type.compare(0, prefix.size(), prefix) == 0 &&
+                         type.compare(type.size() - layout.size(), layout.size(), layout) == 0;
     entry.type = type;
-    if (entry.usual_tree)
+    if (entry.default_tree)
         entry.type = type.substr(prefix.size(), type.size() - prefix.size() - layout.size());
 }
 

@@ -107,7 +107,7 @@ struct trip_vdb_entry {
     std::string name;        /* as shown to users: "density", or "density[1]" */
     std::string type;        /* "float", "vec3s", ... */
     std::string parent;      /* unique name of the grid whose tree this one uses, or empty */
-    bool usual_tree;         /* of the 5-4-3 layout that all writers use */
+    bool default_tree;       /* of the 5-4-3 layout that all writers use */
     bool half;               /* floats are stored as 16 bits */
     int64_t offset;          /* of the grid in the file */
     int64_t end;             /* of its data in the file; 0: unknown */

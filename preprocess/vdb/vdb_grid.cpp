@@ -427,7 +427,7 @@ const ScalarType scalar_types[] = {
 const ScalarType *find_type(const trip_vdb_entry &entry)
 {
     for (const ScalarType &t : scalar_types)
-        if (entry.usual_tree && entry.type == t.name)
+        if (entry.default_tree && entry.type == t.name)
             return &t;
     return nullptr;
 }
@@ -440,12 +440,12 @@ trip_vdb_reservation::~trip_vdb_reservation()
         trip_budget_release(budget_, memory_, bytes_);
 }
 
-void trip_vdb_reservation::take(trip_budget *budget, uint64_t bytes, const char *what)
+void trip_vdb_reservation::take(trip_budget *budget, uint64_t bytes, const char *stage)
 {
     char needed[32], left[32];
     memory_ = trip_budget_take(budget, bytes);
     if (!memory_)
-        throw trip_vdb_error(std::string(what) + " needs " + trip_format_bytes(bytes, needed) +
+        throw trip_vdb_error(std::string(stage) + " needs " + trip_format_bytes(bytes, needed) +
                              ", but " + trip_format_bytes(trip_budget_left_bytes(budget), left) +
                              " are left of the memory allowed; a larger --memory would do");
     budget_ = budget;

@@ -28,7 +28,7 @@ class trip_vdb_reservation
     trip_vdb_reservation &operator=(const trip_vdb_reservation &) = delete;
     ~trip_vdb_reservation();
     /* Throws when it does not fit; `what` names the purpose in the message. Called once only. */
-    void take(trip_budget *budget, uint64_t bytes, const char *what);
+    void take(trip_budget *budget, uint64_t bytes, const char *stage);
 
   private:
     trip_budget *budget_ = nullptr;

@@ -1,6 +1,6 @@
 #include "cpu/count.h"
 
-#include "cpu/batch.h"
+#include "cpu/cpu_batch.h"
 #include "report.h"
 #include "weight.h"
 
@@ -38,7 +38,7 @@ static bool is_reaching(const trip_cpu_view *view, const trip_cpu_staged *staged
     trip_splat_frame local;
     double growth;
     trip_vec3 position =
-        trip_splat_place(&view->splat, &view->of->data->coordinates, voxel, &local, &growth);
+        trip_splat_position(&view->splat, &view->of->data->coordinates, voxel, &local, &growth);
     trip_splat s;
     return trip_splat_project(&local, position, &s) &&
            trip_weight_may_reach(view->of->settings, view->of->camera, view->of->plan->axis_of_view,

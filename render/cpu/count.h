@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_COUNT_H
 #define TRIP_CPU_COUNT_H
 
-#include "cpu/state.h"
+#include "cpu/cpu_state.h"
 
 #define TRIP_CPU_COUNT_TABLE_BYTES (65536 * sizeof(trip_tf_entry))
 

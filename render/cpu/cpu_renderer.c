@@ -9,12 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cpu/batch.h"
+#include "cpu/cpu_batch.h"
 #include "cpu/count.h"
 #include "cpu/occlusion.h"
-#include "cpu/sheets/sheets.h"
+#include "cpu/sheets/cpu_sheets.h"
 #include "cpu/panes.h"
-#include "cpu/view.h"
+#include "cpu/cpu_view.h"
 #include "light_map.h"
 #include "report.h"
 #include "sheet.h"

@@ -9,7 +9,7 @@
  * what the slack is for. */
 #define SLACK_PX 0.05
 #define NEAREST_RADII 8.0
-#define MOST_GROWTH 0.23
+#define MAX_GROWTH 0.23
 
 enum { TEXEL = 4, TEXELS = TRIP_CPU_PANE / TEXEL };
 
@@ -90,7 +90,7 @@ static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px
 }
 
 /* |rx| / |r_c|, or |ry| where that is more, is at most this. */
-static double most_turn(const trip_cpu_view *view)
+static double max_turn(const trip_cpu_view *view)
 {
     return sqrt(fmax(view->splat.rxrx, view->splat.ryry)) * view->forward_length;
 }
@@ -127,11 +127,11 @@ static trip_cpu_occlusion find_outline(const trip_cpu_view *view, const trip_cpu
     out->x = projection_of(view, view->along_x, along_z, box, inverse, out->inverse_nearest);
     out->y = projection_of(view, view->along_y, along_z, box, inverse, out->inverse_nearest);
     if (!view->splat.camera.ortho) {
-        double most = out->x.support > out->y.support ? out->x.support : out->y.support;
-        growth = sqrt(2) * most * most_turn(view);
+        double max = out->x.support > out->y.support ? out->x.support : out->y.support;
+        growth = sqrt(2) * max * max_turn(view);
     }
     out->grown = 1 / (1 - growth);
-    return growth > MOST_GROWTH ? TRIP_CPU_PARTLY : TRIP_CPU_VISIBLE;
+    return growth > MAX_GROWTH ? TRIP_CPU_PARTLY : TRIP_CPU_VISIBLE;
 }
 
 trip_cpu_occlusion trip_cpu_box_occlusion(const trip_cpu_view *view, const trip_cpu_mask *mask,

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "cpu/layout.h"
-#include "cpu/sheets/sheets.h"
+#include "cpu/sheets/cpu_sheets.h"
 #include "report.h"
 #include "weight.h"
 
@@ -163,7 +163,7 @@ static void blend_portion(void *context, unsigned task, unsigned thread)
     atomic_fetch_and_explicit(&r->mask.panes[p->pane], open, memory_order_relaxed);
 }
 
-static int most_first(const void *a, const void *b)
+static int max_first(const void *a, const void *b)
 {
     const trip_cpu_portion *p = a, *q = b;
     return p->splats < q->splats ? 1 : p->splats > q->splats ? -1 : 0;
@@ -191,7 +191,7 @@ static void make_portions(trip_cpu *r, const trip_cpu_buffer *f)
             r->portions[r->portion_count++] = (trip_cpu_portion){ t, 15, n };
         }
     }
-    qsort(r->portions, r->portion_count, sizeof *r->portions, most_first);
+    qsort(r->portions, r->portion_count, sizeof *r->portions, max_first);
 }
 
 void trip_cpu_blend_filled(trip_cpu *r)

@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_PANES_H
 #define TRIP_CPU_PANES_H
 
-#include "cpu/state.h"
+#include "cpu/cpu_state.h"
 
 /* Memory for the frame's panes, and for their lists in the splat buffers. */
 int trip_cpu_fit_panes(trip_cpu *r, int width, int height);

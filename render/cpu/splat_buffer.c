@@ -137,7 +137,7 @@ static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_s
 
 typedef struct span {
     uint32_t first, last; /* panes counted, inclusive */
-    uint64_t places;
+    uint64_t positions;
 } span;
 
 /* Panes of a splat that lies in many. */
@@ -160,7 +160,7 @@ static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *c
             counts[r.first + y * across + x]++;
     uint32_t last = r.first + (r.down - 1) * across + r.across - 1;
     s->last = last > s->last ? last : s->last;
-    s->places += (uint64_t)r.across * r.down;
+    s->positions += (uint64_t)r.across * r.down;
 }
 
 /* Whether it also lies in the pane to the right, and in the one below: 0 or 1. */
@@ -180,7 +180,7 @@ static span count(const trip_cpu_splat *splats, const trip_cpu_series *series, u
                   uint32_t across, uint32_t *counts)
 {
     span s = { UINT32_MAX, 0, 0 };
-    uint32_t places = 0, last = 0, from = 0;
+    uint32_t positions = 0, last = 0, from = 0;
     for (uint32_t i = 0; i < n; i++) {
         uint32_t panes = series[i].panes, first = panes & TRIP_CPU_PANES_FIRST;
         uint32_t right = right_of(panes), below = below_of(panes), here = series[i].end - from;
@@ -194,13 +194,13 @@ static span count(const trip_cpu_splat *splats, const trip_cpu_series *series, u
             c[1] += here * right;
             c[across] += here * below;
             c[across + 1] += here * (right & below);
-            places += here * (right + 1) * (below + 1);
+            positions += here * (right + 1) * (below + 1);
         }
         from = series[i].end;
     }
     last += across + 1;
     s.last = last > s.last ? last : s.last;
-    s.places += places;
+    s.positions += positions;
     return s;
 }
 
@@ -215,19 +215,19 @@ static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *n
 
 /* Consecutive splats, in vectors that every processor of the target has. */
 typedef uint16_t eight __attribute__((vector_size(AT_A_TIME / 2 * sizeof(uint16_t))));
-typedef struct places {
+typedef struct positions {
     eight low, high;
-} places;
+} positions;
 
-static inline places places_from(uint32_t first)
+static inline positions positions_from(uint32_t first)
 {
     const eight ahead = { 0, 1, 2, 3, 4, 5, 6, 7 };
     const eight low = ahead + (uint16_t)first;
-    return (places){ low, low + AT_A_TIME / 2 };
+    return (positions){ low, low + AT_A_TIME / 2 };
 }
 
 /* `count` splats from `first` on to the next places of a pane; more may be written behind them. */
-static inline void put(uint16_t *order, uint32_t *next, places first, uint32_t count)
+static inline void put(uint16_t *order, uint32_t *next, positions first, uint32_t count)
 {
     memcpy(order + *next, &first.low, sizeof first.low);
     memcpy(order + *next + AT_A_TIME / 2, &first.high, sizeof first.high);
@@ -236,7 +236,7 @@ static inline void put(uint16_t *order, uint32_t *next, places first, uint32_t c
 
 /* The next `count` places, of all panes that the splats lie in. */
 static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uint32_t panes,
-                           places first, uint32_t count)
+                           positions first, uint32_t count)
 {
     uint32_t *c = next + (panes & TRIP_CPU_PANES_FIRST);
     uint32_t right = right_of(panes), below = below_of(panes);
@@ -250,8 +250,8 @@ static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uin
 }
 
 /* `next` holds where each pane's next place is. */
-static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
-                  uint32_t across, uint32_t *next, uint16_t *order)
+static void position(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
+                     uint32_t across, uint32_t *next, uint16_t *order)
 {
     uint32_t from = 0;
     for (uint32_t i = 0; i < n; i++) {
@@ -262,8 +262,8 @@ static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, u
             continue;
         }
         for (; end - from > AT_A_TIME; from += AT_A_TIME)
-            put_all(order, next, across, panes, places_from(from), AT_A_TIME);
-        put_all(order, next, across, panes, places_from(from), end - from);
+            put_all(order, next, across, panes, positions_from(from), AT_A_TIME);
+        put_all(order, next, across, panes, positions_from(from), end - from);
         from = end;
     }
 }
@@ -271,7 +271,7 @@ static void place(const trip_cpu_splat *splats, const trip_cpu_series *series, u
 /* Turns counts into places and makes a bucket of every pane that has some. Behind each is room for
  * what put() writes too much. */
 static uint32_t make_buckets(trip_cpu_buffer *f, const trip_cpu_chunk *chunk, const span *s,
-                             uint32_t place_at, uint32_t *counts)
+                             uint32_t position_at, uint32_t *counts)
 {
     uint32_t made = chunk->first_bucket;
     for (uint32_t t = s->first; t <= s->last; t++) {
@@ -281,11 +281,11 @@ static uint32_t make_buckets(trip_cpu_buffer *f, const trip_cpu_chunk *chunk, co
         f->buckets[made++] = (trip_cpu_bucket){
             .pane = t,
             .chunk = (uint32_t)(chunk - f->chunks),
-            .first = place_at,
+            .first = position_at,
             .count = n,
         };
-        counts[t] = place_at;
-        place_at += n + AT_A_TIME;
+        counts[t] = position_at;
+        position_at += n + AT_A_TIME;
     }
     return made - chunk->first_bucket;
 }
@@ -308,14 +308,14 @@ void trip_cpu_sort_chunk(trip_cpu_buffer *f, trip_cpu_chunk *chunk, trip_cpu_gri
     uint32_t n = find_series(splats, chunk->splats, sorting->series);
     span s = count(splats, sorting->series, n, grid.across, counts);
     uint32_t buckets = occupied(counts, &s);
-    uint64_t room = s.places + buckets * AT_A_TIME;
+    uint64_t room = s.positions + buckets * AT_A_TIME;
     uint64_t bucket = atomic_fetch_add_explicit(&f->buckets_used, buckets, memory_order_relaxed);
     uint64_t at = atomic_fetch_add_explicit(&f->orders_used, room, memory_order_relaxed);
     chunk->unsorted = bucket + buckets > f->bucket_capacity || at + room > f->order_capacity;
     if (!chunk->unsorted) {
         chunk->first_bucket = (uint32_t)bucket;
         chunk->buckets = make_buckets(f, chunk, &s, (uint32_t)at, counts);
-        place(splats, sorting->series, n, grid.across, counts, f->order);
+        position(splats, sorting->series, n, grid.across, counts, f->order);
     }
     memset(counts + s.first, 0, (s.last - s.first + 1) * sizeof *counts);
 }

@@ -77,6 +77,6 @@ static inline bool trip_cpu_part_has(const trip_cpu_part *p, unsigned square)
 /* All squares of a run after the first `skip` in draw order, as long as their voxels are at most
  * `most`. */
 void trip_cpu_part_make(trip_cpu_part *part, const trip_run *run, const trip_block *block,
-                        bool reversed, uint32_t skip, uint32_t most);
+                        bool reversed, uint32_t skip, uint32_t max);
 
 #endif

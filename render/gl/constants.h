@@ -6,8 +6,8 @@
 
 #include <epoxy/gl.h>
 
-#include "gl/batch.h"
-#include "gl/context.h"
+#include "gl/gl_batch.h"
+#include "gl/gl_context.h"
 
 typedef struct trip_gl_constants {
     GLuint blocks, table;

@@ -9,7 +9,7 @@
 #include "normal.h"
 #include "shade.h"
 #include "splat.h"
-#include "tint.h"
+#include "debug_view.h"
 #include "weight.h"
 
 /* Components of a vector of the data's axes in list axes; an even permutation, so that cross
@@ -128,7 +128,7 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const tr
     f->light = as_it_is(frame->settings->light_direction, 0);
     if (frame->settings->point_light)
         f->light = in_list_axes(
-            trip_sub(trip_light_place(frame->settings, &c->index_to_world), c->eye), axis, 1);
+            trip_sub(trip_light_position(frame->settings, &c->index_to_world), c->eye), axis, 1);
     f->to_eye =
         as_it_is(trip_scale(c->world_forward, -1), fmin(header->gradient_full / full, 1e30));
 }
@@ -179,10 +179,11 @@ static void make(trip_gl_frame_double *out, const trip_frame *frame, const trip_
     out->background = (trip_gl_double4){ { b[0], b[1], b[2], b[3] } };
 }
 
-static void set_tint(trip_gl_frame_double *out, const trip_settings *s, int axis, unsigned level)
+static void set_debug_view(trip_gl_frame_double *out, const trip_settings *s, int axis,
+                           unsigned level)
 {
     double rgb[3];
-    if (trip_tint_of(s, axis, level, rgb))
+    if (trip_debug_view_of(s, axis, level, rgb))
         out->tint = (trip_gl_double4){ { rgb[0], rgb[1], rgb[2], 1 } };
 }
 
@@ -205,7 +206,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
     const trip_plan_list *planned = &frame->plan->lists[list->index];
     const double *scale = planned->grid.scale;
     make(out, frame, &planned->camera, list->axis);
-    set_tint(out, frame->settings, list->axis, list->level);
+    set_debug_view(out, frame->settings, list->axis, list->level);
     const trip_block_form form = trip_block_form_of(&frame->data->header, list->kind);
     out->edge.v[1] = trip_block_step(&form);
     if (trip_kind_of(list->kind)->axis_bits > 0)
@@ -217,7 +218,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
 void trip_gl_frame_make_layer(trip_gl_frame_double *out, const trip_frame *frame, int axis)
 {
     make(out, frame, frame->camera, axis);
-    set_tint(out, frame->settings, axis, frame->plan->level);
+    set_debug_view(out, frame->settings, axis, frame->plan->level);
 }
 
 void trip_gl_frame_round(trip_gl_frame_float *out, const trip_gl_frame_double *in)

@@ -12,20 +12,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "gl/batch.h"
+#include "gl/gl_batch.h"
 #include "gl/constants.h"
-#include "gl/context.h"
+#include "gl/gl_context.h"
 #include "gl/frame_block.h"
 #include "gl/lattices.h"
 #include "gl/queue.h"
 #include "gl/resident.h"
 #include "gl/ring.h"
-#include "gl/sheets.h"
+#include "gl/gl_sheets.h"
 #include "gl/slots.h"
 #include "gl/sums.h"
 #include "gl/target.h"
 #include "gl/variant.h"
-#include "gl/voxel_places.h"
+#include "gl/voxel_positions.h"
 #include "report.h"
 #include "weight.h"
 
@@ -54,7 +54,7 @@ typedef struct gl_renderer {
     GLuint vertex_array, quad_indices;
     GLuint counts;
     trip_gl_constants constants;
-    trip_gl_voxel_places places;
+    trip_gl_voxel_positions positions;
     trip_gl_lattices lattices; /* frames with effects that look light or heat up only */
     trip_gl_sheets sheets;     /* frames that classify after interpolation only */
     trip_gl_sums sums;         /* frames that composite splats sheet by sheet only */
@@ -86,7 +86,7 @@ static void destroy(trip_renderer *base)
         trip_gl_slots_release(&r->slots);
         trip_gl_resident_release(&r->resident);
         trip_gl_constants_release(&r->constants);
-        trip_gl_voxel_places_release(&r->places);
+        trip_gl_voxel_positions_release(&r->positions);
         trip_gl_lattices_release(&r->lattices);
         trip_gl_sheets_release(&r->sheets);
     }
@@ -98,13 +98,13 @@ static void destroy(trip_renderer *base)
 
 static int check_size(const gl_renderer *r, const trip_camera *camera)
 {
-    int most = trip_gl_context_limits(r->context)->image_px;
-    if (camera->width <= most && camera->height <= most)
+    int max = trip_gl_context_limits(r->context)->image_px;
+    if (camera->width <= max && camera->height <= max)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", "image",
                      "%d x %d px exceed the %d px either way that this driver can draw; "
                      "use another renderer or a smaller size",
-                     camera->width, camera->height, most);
+                     camera->width, camera->height, max);
 }
 
 /* Room for the counts of so many lists. */
@@ -160,7 +160,7 @@ static int prepare(gl_renderer *r)
     if (classifies_post(r))
         status = trip_gl_sheets_begin_frame(&r->sheets, frame);
     else
-        status = trip_gl_voxel_places_set(&r->places, &frame->data->coordinates);
+        status = trip_gl_voxel_positions_set(&r->positions, &frame->data->coordinates);
     if (status)
         return status;
     r->prepared = true;
@@ -175,14 +175,14 @@ static int prepare_when_done(gl_renderer *r)
 }
 
 /* Splats are all blended, which is within the default of what saturated pixels are. */
-static int check_saturation(const trip_settings *s)
+static int check_early_termination(const trip_settings *s)
 {
-    if (s->classify == TRIP_CLASSIFY_POST || s->saturation <= TRIP_SATURATION_PRE)
+    if (s->classify == TRIP_CLASSIFY_POST || s->early_termination <= TRIP_EARLY_TERMINATION_PRE)
         return TRIP_OK;
     return trip_fail(TRIP_USAGE, "render", "gl",
                      "draws all splats, however little is seen of them: a saturation of %g is of "
                      "cpu and reference, or of --classify post",
-                     s->saturation);
+                     s->early_termination);
 }
 
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
@@ -190,7 +190,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     gl_renderer *r = (gl_renderer *)base;
     int status = check_size(r, frame->camera);
     if (!status)
-        status = check_saturation(frame->settings);
+        status = check_early_termination(frame->settings);
     if (!status)
         status = trip_gl_context_use(r->context);
     if (status)
@@ -458,7 +458,7 @@ static void prepare_drawing(gl_renderer *r, bool front_to_back)
         draw_masked(r);
     r->sums.front_to_back = front_to_back;
     bind_batch(&r->batch);
-    trip_gl_voxel_places_bind(&r->places, r->frame->settings->indexed);
+    trip_gl_voxel_positions_bind(&r->positions, r->frame->settings->indexed);
     trip_gl_lattices_bind(&r->lattices);
 }
 
@@ -754,8 +754,8 @@ static void set_up_sheets(gl_renderer *r)
     s->target = &r->target;
     r->sums.variants = &r->variants;
     r->sums.target = &r->target;
-    s->textures.budget = s->function.budget = s->places.budget = r->budget;
-    r->places.budget = r->budget;
+    s->textures.budget = s->function.budget = s->positions.budget = r->budget;
+    r->positions.budget = r->budget;
 }
 
 int trip_gl_create(trip_renderer **out, trip_budget *budget)

@@ -84,8 +84,8 @@ static void find_sources(const trip_frame *frame, source out[TRIP_GL_LATTICES])
 static void upload_part(trip_gl_lattice *l, const trip_light_grid *grid)
 {
     const size_t layer = (size_t)l->nodes[0] * (size_t)l->nodes[1];
-    const size_t most = PART_BYTES / (layer * sizeof(float));
-    const int left = l->nodes[2] - l->layers, count = most < 1 ? 1 : (int)most;
+    const size_t max = PART_BYTES / (layer * sizeof(float));
+    const int left = l->nodes[2] - l->layers, count = max < 1 ? 1 : (int)max;
     const int layers = left < count ? left : count;
     glTextureSubImage3D(l->texture, 0, 0, 0, l->layers, l->nodes[0], l->nodes[1], layers, GL_RED,
                         GL_FLOAT, grid->at + (size_t)l->layers * layer);
@@ -136,8 +136,8 @@ static trip_gl_float4 row(double x, double y, double z, double w)
 }
 
 /* From the list's grid, list axes, to index space of level 0; the eye in the list's grid. */
-static void set_places(trip_gl_effects_block *b, const trip_frame *frame, const trip_list *list,
-                       int axis)
+static void set_positions(trip_gl_effects_block *b, const trip_frame *frame, const trip_list *list,
+                          int axis)
 {
     const trip_plan_list *planned = list ? &frame->plan->lists[list->index] : NULL;
     const trip_camera *camera = planned ? &planned->camera : frame->camera;
@@ -193,7 +193,7 @@ trip_gl_effects_block trip_gl_effects_block_of(const trip_frame *frame, const tr
     trip_gl_effects_block b = { 0 };
     source sources[TRIP_GL_LATTICES];
     find_sources(frame, sources);
-    set_places(&b, frame, list, list ? list->axis : axis);
+    set_positions(&b, frame, list, list ? list->axis : axis);
     for (int i = 0; i < TRIP_GL_LATTICES; i++)
         b.per_voxel.v[i] = nodes_per_voxel(sources[i].grid);
     const trip_effects_view view =

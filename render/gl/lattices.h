@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 #include "budget.h"
-#include "gl/context.h"
+#include "gl/gl_context.h"
 #include "gl/shared.h"
 #include "light_grid.h"
 #include "renderer.h"

@@ -31,7 +31,7 @@ struct trip_gl_loading {
     size_t next_run;
     /* Of the present piece. */
     uint32_t piece; /* records */
-    uint32_t places[TRIP_FRAME_PIECE], normals[TRIP_FRAME_PIECE];
+    uint32_t positions[TRIP_FRAME_PIECE], normals[TRIP_FRAME_PIECE];
     uint32_t voxels[TRIP_RUN_RECORDS_MAX];
 };
 
@@ -42,7 +42,7 @@ static const trip_list *base_of(const trip_gl_loading *l)
 
 /* ---- places ---- */
 
-static void place_of(int axis, const trip_run *run, uint32_t voxel, uint32_t p[3])
+static void position_of(int axis, const trip_run *run, uint32_t voxel, uint32_t p[3])
 {
     p[axis] = (uint32_t)run->sheet;
     p[(axis + 1) % 3] = (uint32_t)run->u + trip_voxel_u(voxel);
@@ -80,10 +80,10 @@ static void add_vertices(trip_gl_loading *l, const trip_run *run)
 {
     for (uint32_t k = 0; k < run->count; k++) {
         uint32_t p[3];
-        place_of(l->list->axis, run, l->voxels[k], p);
+        position_of(l->list->axis, run, l->voxels[k], p);
         l->vertices[l->filled + k] =
             (trip_gl_vertex){ p[0] | p[1] << 16, p[2] | trip_voxel_code(l->voxels[k]) << 16 };
-        l->places[l->piece + k] = (uint32_t)(l->filled + k);
+        l->positions[l->piece + k] = (uint32_t)(l->filled + k);
     }
     l->sheet_firsts[run->sheet + 1] = l->filled + run->count;
 }
@@ -93,13 +93,13 @@ static int find_vertices(trip_gl_loading *l, const trip_run *run)
     const trip_list *base = base_of(l);
     for (uint32_t k = 0; k < run->count; k++) {
         uint32_t p[3];
-        place_of(l->list->axis, run, l->voxels[k], p);
+        position_of(l->list->axis, run, l->voxels[k], p);
         int64_t at = find_vertex(l, p);
         if (at < 0)
             return trip_fail(TRIP_ERROR, "gl", l->to->data->path,
                              "voxel (%u, %u, %u) of list %c is not in list %c", p[0], p[1], p[2],
                              "xyz"[l->list->axis], "xyz"[base->axis]);
-        l->places[l->piece + k] = (uint32_t)at;
+        l->positions[l->piece + k] = (uint32_t)at;
     }
     return TRIP_OK;
 }
@@ -139,9 +139,9 @@ static void upload(trip_gl_loading *l)
     const trip_gl_resident_list *at = &to->lists[l->list->index];
     uint64_t first = l->filled - l->piece, vertex = at->vertex_first + first;
     for (uint32_t k = 0; k < l->piece; k++)
-        l->places[k] += (uint32_t)at->vertex_first;
-    upload_part(to->order[l->list->axis], at->order_first + first, l->piece, sizeof *l->places,
-                l->places);
+        l->positions[k] += (uint32_t)at->vertex_first;
+    upload_part(to->order[l->list->axis], at->order_first + first, l->piece, sizeof *l->positions,
+                l->positions);
     if (l->list != base_of(l))
         return;
     upload_part(to->vertices, vertex, l->piece, sizeof *l->vertices, l->vertices + first);

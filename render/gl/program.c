@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "gl/shader_text.h"
+#include "gl/gl_shader_text.h"
 #include "report.h"
 
 /* Some compilers drop the file number of #line, so that the line number carries it. */

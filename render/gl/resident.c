@@ -54,16 +54,16 @@ static int check_size(const trip_gl_resident *r, size_t block_bytes)
                                  "indexed lists take up to %d voxels either way; use replicated "
                                  "lists",
                                  MAX_COORDINATE);
-    uint64_t most = r->vertex_count;
+    uint64_t max = r->vertex_count;
     for (int a = 0; a < AXES; a++)
-        most = r->order_counts[a] > most ? r->order_counts[a] : most;
-    if (most <= block_bytes / sizeof(trip_gl_vertex) && most <= INT32_MAX)
+        max = r->order_counts[a] > max ? r->order_counts[a] : max;
+    if (max <= block_bytes / sizeof(trip_gl_vertex) && max <= INT32_MAX)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", data->path,
                      "indexed lists of %" PRIu64
                      " splats exceed the %zu bytes of a buffer of this driver; "
                      "use replicated lists",
-                     most, block_bytes);
+                     max, block_bytes);
 }
 
 static int no_memory(const trip_gl_resident *r)

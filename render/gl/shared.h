@@ -24,10 +24,10 @@
 #define TRIP_GL_ORDER 7
 /* Likewise, for frames that classify after interpolation. */
 #define TRIP_GL_SUMS 7
-#define TRIP_GL_PLACES 5
+#define TRIP_GL_POSITIONS 5
 /* Likewise, for splats of grids with uneven spacing, and where these are indexed. */
-#define TRIP_GL_VOXEL_PLACES 7
-#define TRIP_GL_VOXEL_PLACES_INDEXED 0
+#define TRIP_GL_VOXEL_POSITIONS 7
+#define TRIP_GL_VOXEL_POSITIONS_INDEXED 0
 /* Texture units: the layer of axis a is unit a, its depths unit 3 + a. */
 #define TRIP_GL_LAYER 0
 #define TRIP_GL_LAYER_DEPTH 3
@@ -64,40 +64,40 @@
 
 /* Constants of one list of a frame, or of a layer by level 0's map; R is float for drawing, double
  * for counting and weights. */
-#define TRIP_GL_FRAME_FIELDS(R4)                                                                     \
-    R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */     \
-    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective); w of the first: how much     \
-                          kernels are flattened, trip_splat_frame.flatten */                         \
-    R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's         \
-                          centre; w: step, and (r . ray_x x ray_y)^2 */                              \
-    R4 ray_0;          /* xyz: the ray at the image's centre */                                      \
-    R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */                 \
-    R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                        \
-    R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                  \
-    R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                        \
-    R4 compact_0, compact_1,                                                                         \
-        compact_2; /* 3-byte normals: xyz: columns of the map from steps to                          \
-                      world space, over full shading; w of the first: length of                      \
-                      those of which the direction alone is kept, likewise */                        \
-    R4 light;  /* xyz: towards the light, world space; with w its place from the eye, list axes */   \
-    R4 to_eye; /* xyz: towards the eye in parallel views; w: gradient_full of the header             \
-                  over that at full shading */                                                       \
-    R4 screen; /* xy: the image's centre, pixels; zw: width, height */                               \
-    R4 kernel; /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */                \
-    R4 edge;   /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: step of codes;       \
-                  z: 1 / (2 erf(cutoff / sqrt 2)) */                                                 \
-    R4 means;  /* of lists of means: x: the length of a voxel along the axis, else 0; yz: lo and     \
-                  width of trip_mean_scale */                                                        \
-    R4 parallel; /* the one footprint of a parallel view, or of FIXED: conic xx, xy, yy, amplitude   \
-                  */                                                                                 \
-    R4 parallel_size; /* its half extents in x and y, its radius in index space (FIXED: at depth     \
-                         1), its amplitude without low-pass */                                       \
-    R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;      \
-                         w: the largest of them */                                                   \
-    R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along   \
-                      the ray at the image's centre; y: world units a voxel of level 0 */            \
-    R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                   \
-    R4 background; /* r, g, b, a; not premultiplied */                                               \
+#define TRIP_GL_FRAME_FIELDS(R4)                                                                   \
+    R4 forward;        /* xyz: depth = forward . c; w: pixels to a sigma at depth 1, inverted */   \
+    R4 to_x, to_y;     /* xyz: pixel = to . c (/ depth in perspective); w of the first: how much   \
+                          kernels are flattened, trip_splat_frame.flatten */                       \
+    R4 ray_x, ray_y;   /* xyz: d ray / d (pixel times step), rays of length 1 at the image's       \
+                          centre; w: step, and (r . ray_x x ray_y)^2 */                            \
+    R4 ray_0;          /* xyz: the ray at the image's centre */                                    \
+    R4 ray2_a, ray2_b; /* |ray|^2 of a pixel: a . (1, x, y, x x) + b . (x y, y y) */               \
+    R4 world2_a, world2_b;              /* |J ray|^2 / voxel_world^2 alike */                      \
+    R4 camera_r0, camera_rx, camera_ry; /* as in trip_camera, in the data's axes */                \
+    R4 world_0, world_1, world_2;       /* xyz: columns of J / voxel_world */                      \
+    R4 compact_0, compact_1,                                                                       \
+        compact_2; /* 3-byte normals: xyz: columns of the map from steps to                        \
+                      world space, over full shading; w of the first: length of                    \
+                      those of which the direction alone is kept, likewise */                      \
+    R4 light;  /* xyz: towards the light, world space; with w its place from the eye, list axes */ \
+    R4 to_eye; /* xyz: towards the eye in parallel views; w: gradient_full of the header           \
+                  over that at full shading */                                                     \
+    R4 screen; /* xy: the image's centre, pixels; zw: width, height */                             \
+    R4 kernel; /* sigma^2, cutoff^2, low_pass^2, amplitude * world units per voxel */              \
+    R4 edge;   /* x: what every footprint is lowered by, exp(-cutoff^2 / 2); y: step of codes;     \
+                  z: 1 / (2 erf(cutoff / sqrt 2)) */                                               \
+    R4 means;  /* of lists of means: x: the length of a voxel along the axis, else 0; yz: lo and   \
+                  width of trip_mean_scale */                                                      \
+    R4 parallel; /* the one footprint of a parallel view, or of FIXED: conic xx, xy, yy, amplitude \
+                  */                                                                               \
+    R4 parallel_size; /* its half extents in x and y, its radius in index space (FIXED: at depth   \
+                         1), its amplitude without low-pass */                                     \
+    R4 to_grid;       /* xyz: from the list's grid to that of level 0, where weights are taken;    \
+                         w: the largest of them */                                                 \
+    R4 depth;      /* x: of a layer's depth over forward . c, the first in voxels of level 0 along \
+                      the ray at the image's centre; y: world units a voxel of level 0 */          \
+    R4 weight;     /* h, sqrt(1 + h^2), list axis, axis of view */                                 \
+    R4 background; /* r, g, b, a; not premultiplied */                                             \
     R4 tint;       /* rgb: of all that is drawn, before it is lit, where w is not 0 */
 
 /* Constants of the effects of a list, or of a layer of sheets (render/effects.h,
@@ -192,7 +192,7 @@ typedef struct trip_gl_sheet_end {
 struct trip_gl_square {
     TRIP_GL_UINT mask_low, mask_high;
     TRIP_GL_UINT codes, normals; /* bytes up to those of its first voxel */
-    TRIP_GL_UINT least_width;    /* of its codes, 16 bits each */
+    TRIP_GL_UINT min_width;      /* of its codes, 16 bits each */
     TRIP_GL_UINT run;
     TRIP_GL_UINT corner; /* u and v in the tile, 16 bits each */
 };
@@ -202,7 +202,7 @@ struct trip_gl_square {
 struct trip_gl_sheet_square {
     TRIP_GL_UINT mask_low, mask_high;
     TRIP_GL_UINT codes;
-    TRIP_GL_UINT least_width;
+    TRIP_GL_UINT min_width;
     TRIP_GL_UINT corner;
 };
 
@@ -230,7 +230,7 @@ struct trip_gl_run {
     TRIP_GL_INT first;
     TRIP_GL_VEC3 base_low;
     TRIP_GL_INT step;
-    TRIP_GL_VEC3 place;
+    TRIP_GL_VEC3 position;
     TRIP_GL_INT unused;
 };
 

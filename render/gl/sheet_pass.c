@@ -81,7 +81,7 @@ static double inner(const double a[3], const double b[3])
 /* Rays begin at `start`, at depth 0. */
 static void set_clip(trip_gl_sheet_view *v, const rays *r, const trip_clip *clip)
 {
-    static_assert((int)TRIP_CLIP_MOST == 14, "shared.h");
+    static_assert((int)TRIP_CLIP_MAX == 14, "shared.h");
     v->constants.clips.v[0] = clip->count;
     for (int i = 0; i < clip->count; i++) {
         double n[3];
@@ -120,7 +120,7 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
         v.constants.extent.v[2 + a] = (int32_t)((int64_t)dims[(axis + 1 + a) % 3] - 1 - first[a]);
     }
     v.constants.across_u.v[3] = (float)unit;
-    v.constants.across_v.v[3] = (float)trip_settings_saturation(frame->settings);
+    v.constants.across_v.v[3] = (float)trip_settings_early_termination(frame->settings);
     v.constants.clips.v[3] = (int32_t)frame->settings->kernel;
     v.constants.along = linear(r.r0[0], r.rx[0], r.ry[0], way);
     v.constants.start = linear(0, r.x_start[0], r.y_start[0], 0);
@@ -130,10 +130,10 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
 }
 
 /* Whole voxels and the rest, from the sheets' first voxel on. */
-static int32_t split(double place, int64_t first, float *rest)
+static int32_t split(double position, int64_t first, float *rest)
 {
-    double whole = fmin(fmax(floor(place), -0x1p40), 0x1p40);
-    *rest = (float)fmin(fmax(place - whole, -0x1p28), 0x1p28);
+    double whole = fmin(fmax(floor(position), -0x1p40), 0x1p40);
+    *rest = (float)fmin(fmax(position - whole, -0x1p28), 0x1p28);
     return (int32_t)fmin(fmax(whole - (double)first, -0x1p28), 0x1p28);
 }
 

@@ -13,27 +13,27 @@ void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
     *t = (trip_gl_sheet_textures){ .budget = t->budget };
 }
 
-static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned least,
+static int no_memory(const trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned min,
                      uint64_t bytes)
 {
     uint64_t taken = trip_budget_limit_bytes(t->budget) - trip_budget_left_bytes(t->budget);
     return trip_fail(TRIP_ERROR, "gl", "sheets",
                      "%u sheets of %lld x %lld voxels do not fit the memory given; raise --memory "
                      "to more than %llu MiB, or use --renderer cpu or --classify pre",
-                     least, (long long)width, (long long)height,
+                     min, (long long)width, (long long)height,
                      (unsigned long long)((taken + bytes) >> 20));
 }
 
 static int check_size(int64_t width, int64_t height)
 {
-    GLint most = 0;
-    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
-    if (width <= most && height <= most)
+    GLint max = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &max);
+    if (width <= max && height <= max)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", "sheets",
                      "%lld x %lld voxels exceed the %d either way that this driver's textures "
                      "hold; use another renderer, or --classify pre",
-                     (long long)width, (long long)height, most);
+                     (long long)width, (long long)height, max);
 }
 
 static GLuint make_texture(const trip_gl_sheet_textures *t, GLenum format)
@@ -48,16 +48,16 @@ static GLuint make_texture(const trip_gl_sheet_textures *t, GLenum format)
     return texture;
 }
 
-static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned least,
+static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsigned min,
                 bool gradients)
 {
     uint64_t sheet = (uint64_t)width * (uint64_t)height;
     sheet *= gradients ? CODE_BYTES + GRADIENT_BYTES : CODE_BYTES;
     uint64_t layers = trip_budget_left_bytes(t->budget) / SHARE / sheet;
-    layers = layers < least ? least : layers;
+    layers = layers < min ? min : layers;
     layers = layers > TRIP_GL_SHEETS_MAX ? TRIP_GL_SHEETS_MAX : layers;
     if (!trip_budget_charge(t->budget, layers * sheet))
-        return no_memory(t, width, height, least, layers * sheet);
+        return no_memory(t, width, height, min, layers * sheet);
     t->bytes = layers * sheet;
     t->width = (int)width;
     t->height = (int)height;
@@ -73,14 +73,14 @@ static int make(trip_gl_sheet_textures *t, int64_t width, int64_t height, unsign
 }
 
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
-                               unsigned least, bool gradients)
+                               unsigned min, bool gradients)
 {
-    if (t->codes && width <= t->width && height <= t->height && t->layers >= (int)least &&
+    if (t->codes && width <= t->width && height <= t->height && t->layers >= (int)min &&
         gradients == (t->gradients != 0))
         return TRIP_OK;
     trip_gl_sheet_textures_release(t);
     int status = check_size(width, height);
-    return status ? status : make(t, width, height, least, gradients);
+    return status ? status : make(t, width, height, min, gradients);
 }
 
 void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height)

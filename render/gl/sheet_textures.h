@@ -22,7 +22,7 @@ typedef struct trip_gl_sheet_textures {
 
 /* Room for at least so many sheets of width x height voxels. */
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
-                               unsigned least, bool gradients);
+                               unsigned min, bool gradients);
 /* No voxel is in the first width x height of a layer. */
 void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width,
                                   int height);

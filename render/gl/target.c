@@ -99,17 +99,17 @@ static int make_stencil(const trip_gl_target *t, trip_gl_band *band)
     return TRIP_OK;
 }
 
-static int at_least_one_at_most(int count, int most)
+static int at_least_one_at_most(int count, int max)
 {
-    return count < 1 ? 1 : count > most ? most : count;
+    return count < 1 ? 1 : count > max ? max : count;
 }
 
 static void lay_out(trip_gl_target *t)
 {
     int pixels = t->software ? TRIP_GL_SOFTWARE_BAND_PIXELS : TRIP_GL_BAND_PIXELS;
-    int least = (t->height + TRIP_GL_BANDS_MAX - 1) / TRIP_GL_BANDS_MAX;
+    int min = (t->height + TRIP_GL_BANDS_MAX - 1) / TRIP_GL_BANDS_MAX;
     int rows = at_least_one_at_most(pixels / t->width, t->height);
-    rows = rows < least ? least : rows;
+    rows = rows < min ? min : rows;
     for (int y = 0; y < t->height; y += rows) {
         int left = t->height - y;
         t->bands[t->band_count++] =

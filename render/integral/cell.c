@@ -2,10 +2,10 @@
 
 #include <string.h>
 
-enum { FOUR = 4, MOST = TRIP_POLYNOMIAL_DEGREE + 1 };
+enum { FOUR = 4, MAX = TRIP_POLYNOMIAL_DEGREE + 1 };
 
 /* Code and gradient as polynomials: [power][component]. */
-typedef double coefficients[MOST][FOUR];
+typedef double coefficients[MAX][FOUR];
 
 /* The weights of the `edge` voxels along an axis, at `start` + `rise` x of the way from one corner
  * of the cell to the other: [voxel][power]. */

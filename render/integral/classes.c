@@ -16,7 +16,7 @@ static void get_components(const trip_tf_entry *e, double out[COMPONENTS])
 
 /* Lines from a point that stay close to all points so far: slopes between these bounds. */
 typedef struct cone {
-    double from[COMPONENTS], least[COMPONENTS], most[COMPONENTS];
+    double from[COMPONENTS], min[COMPONENTS], max[COMPONENTS];
 } cone;
 
 static cone begin_cone(const trip_tf_entry *e)
@@ -24,8 +24,8 @@ static cone begin_cone(const trip_tf_entry *e)
     cone c;
     get_components(e, c.from);
     for (int i = 0; i < COMPONENTS; i++) {
-        c.least[i] = -INFINITY;
-        c.most[i] = INFINITY;
+        c.min[i] = -INFINITY;
+        c.max[i] = INFINITY;
     }
     return c;
 }
@@ -36,7 +36,7 @@ static bool cone_holds(const cone *c, const trip_tf_entry *e, double steps)
     get_components(e, to);
     for (int i = 0; i < COMPONENTS; i++) {
         double slope = (to[i] - c->from[i]) / steps;
-        if (slope < c->least[i] || slope > c->most[i])
+        if (slope < c->min[i] || slope > c->max[i])
             return false;
     }
     return true;
@@ -49,9 +49,9 @@ typedef struct slack {
 
 static slack slack_at(const trip_tf_entry *e, double voxel_world, double tolerance)
 {
-    double depth = e->extinction * voxel_world, least = KNOT_TOLERANCE * tolerance;
-    return (slack){ .colour = depth < 1 ? least / depth : least,
-                    .extinction = least * fmax(1, depth) / voxel_world };
+    double depth = e->extinction * voxel_world, min = KNOT_TOLERANCE * tolerance;
+    return (slack){ .colour = depth < 1 ? min / depth : min,
+                    .extinction = min * fmax(1, depth) / voxel_world };
 }
 
 static void narrow_cone(cone *c, const trip_tf_entry *e, double steps, slack s)
@@ -60,8 +60,8 @@ static void narrow_cone(cone *c, const trip_tf_entry *e, double steps, slack s)
     get_components(e, to);
     for (int i = 0; i < COMPONENTS; i++) {
         double off = i == 3 ? s.extinction : s.colour;
-        c->least[i] = fmax(c->least[i], (to[i] - off - c->from[i]) / steps);
-        c->most[i] = fmin(c->most[i], (to[i] + off - c->from[i]) / steps);
+        c->min[i] = fmax(c->min[i], (to[i] - off - c->from[i]) / steps);
+        c->max[i] = fmin(c->max[i], (to[i] + off - c->from[i]) / steps);
     }
 }
 
@@ -110,9 +110,9 @@ static double clamp(double code)
     return code < 0 ? 0 : code > last ? last : code;
 }
 
-bool trip_classes_visible(const trip_classes *c, double least, double most)
+bool trip_classes_visible(const trip_classes *c, double min, double max)
 {
-    return c->next_visible[(unsigned)clamp(least)] < clamp(most) + 1;
+    return c->next_visible[(unsigned)clamp(min)] < clamp(max) + 1;
 }
 
 size_t trip_classes_knot_above(const trip_classes *c, double code)

@@ -29,7 +29,7 @@ void trip_classes_make(trip_classes *c, const trip_tf_entry *table, double voxel
                        double tolerance);
 
 /* False only when no code from `least` to `most` has extinction. */
-bool trip_classes_visible(const trip_classes *c, double least, double most);
+bool trip_classes_visible(const trip_classes *c, double min, double max);
 /* The first knot above a code, and the first that is not below it: its place, or knot_count. */
 size_t trip_classes_knot_above(const trip_classes *c, double code);
 size_t trip_classes_knot_from(const trip_classes *c, double code);

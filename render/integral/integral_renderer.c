@@ -239,7 +239,7 @@ static void make_pane(void *context, unsigned pane, unsigned thread)
 /* Small, so that threads are busy to the end, but for the pool's bound of their number. */
 static unsigned divide_picture(integral *r)
 {
-    enum { FIRST_PANE_PX = 8, MOST_PANES = 1 << 19 };
+    enum { FIRST_PANE_PX = 8, MAX_PANES = 1 << 19 };
     const trip_camera *c = r->in.camera;
     int64_t panes;
     r->pane_px = FIRST_PANE_PX / 2;
@@ -247,7 +247,7 @@ static unsigned divide_picture(integral *r)
         r->pane_px *= 2;
         r->panes_x = (c->width + r->pane_px - 1) / r->pane_px;
         panes = (int64_t)r->panes_x * ((c->height + r->pane_px - 1) / r->pane_px);
-    } while (panes > MOST_PANES);
+    } while (panes > MAX_PANES);
     return (unsigned)panes;
 }
 

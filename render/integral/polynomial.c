@@ -5,7 +5,7 @@
 
 /* Roots closer to one another than this part of the interval are taken for none: between them the
  * polynomial is flat. */
-enum { MOST_HALVINGS = 20 };
+enum { MAX_HALVINGS = 20 };
 
 static trip_polynomial derivative(const trip_polynomial *p)
 {
@@ -106,7 +106,7 @@ static void find_roots(roots *r, const bernstein *p, double from, double to, int
     double margin = 1e-9 * (to - from), middle = 0.5 * (from + to);
     if (changes == 1)
         add_root(r, trip_polynomial_find(r->of, 0, from + margin, to - margin));
-    if (changes < 2 || halvings == MOST_HALVINGS)
+    if (changes < 2 || halvings == MAX_HALVINGS)
         return;
     bernstein first, last;
     halve(p, &first, &last);

@@ -6,7 +6,7 @@
 
 /* After so many halvings a piece is too short to matter. */
 /* Pieces that were halved so often are few where all is well. */
-enum { MOST_HALVINGS = 40, POLLED_HALVINGS = 12 };
+enum { MAX_HALVINGS = 40, POLLED_HALVINGS = 12 };
 
 /* How many times closer halves bring Simpson's rule to the integral of what is smooth. */
 #define CLOSER 15.0
@@ -66,12 +66,12 @@ static void set_both(part *p, const part *front, const part *back)
 
 static double distance(const part *a, const part *b)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < 3; i++) {
         double apart = fabs(a->rgb[i] - b->rgb[i]);
-        most = apart > most ? apart : most;
+        max = apart > max ? apart : max;
     }
-    return most + fabs(a->opacity - b->opacity);
+    return max + fabs(a->opacity - b->opacity);
 }
 
 /* What both come to where the integrand is smooth. */
@@ -131,7 +131,7 @@ static void add(trip_ray_sum *s, const piece *p, int halvings, trip_ray_sampler 
     set_piece(&first, p->from, &p->middle, sampler, user);
     set_piece(&last, &p->middle, p->to, sampler, user);
     set_both(&finer, &first.whole, &last.whole);
-    if (halvings == MOST_HALVINGS || is_close(s, p, &finer, is_smooth(&first, &last))) {
+    if (halvings == MAX_HALVINGS || is_close(s, p, &finer, is_smooth(&first, &last))) {
         append(s, &p->whole, &finer);
         return;
     }

@@ -6,29 +6,33 @@ static void options_say_all_of_a_setting(void **state)
 {
     (void)state;
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
-    const triptych_settings usual = triptych_default_settings();
-    int count = accuracy_settings(all, &usual);
+    const triptych_settings defaults = triptych_default_settings();
+    int count = accuracy_settings(all, &defaults);
     assert_true(count > 40 && count <= ACCURACY_SETTINGS_MAX);
     for (int i = 0; i < count; i++) {
         accuracy_option options[ACCURACY_OPTIONS_MAX];
-        accuracy_setting again = { .settings = usual };
+        accuracy_setting again = { .settings = defaults };
         int n = accuracy_setting_options(&all[i], options);
         for (int k = 0; k < n; k++)
             assert_true(accuracy_setting_read_option(&again, options[k].name, options[k].value));
         if (all[i].renderer == TRIPTYCH_RENDERER_INTEGRAL) /* which has no layers */
             again.settings.classify = all[i].settings.classify;
         assert_int_equal(again.renderer, all[i].renderer);
-        assert_memory_equal(&again.settings, &all[i].settings, sizeof usual);
+        assert_memory_equal(&again.settings, &all[i].settings, sizeof defaults);
     }
 }
 
 static void unknown_options_are_refused(void **state)
 {
     (void)state;
-    static const char *const pairs[][2] = { { "h", "much" },       { "h", "" },
-                                            { "slices", "1.5" },   { "slices", "-1" },
-                                            { "samples", "1e9" },  { "classify", "late" },
-                                            { "sharpness", "1" },  { "method", "" },
+    static const char *const pairs[][2] = { { "h", "much" },
+                                            { "h", "" },
+                                            { "samples_per_sheet", "1.5" },
+                                            { "samples_per_sheet", "-1" },
+                                            { "samples", "1e9" },
+                                            { "classify", "late" },
+                                            { "sharpness", "1" },
+                                            { "method", "" },
                                             { "renderer", "cpu " } };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
         accuracy_setting s = { .settings = triptych_default_settings() };
@@ -46,32 +50,48 @@ static void unknown_options_are_refused(void **state)
 static const char report[] =
     REPORT(ROW("slow", "90", "0.1", "\"renderer\":\"reference\",\"classify\":\"post\"") "," ROW(
         "fine", "40", "0.5",
-        "\"renderer\":\"cpu\",\"slices\":\"4\"") "," ROW("quick", "10", "2",
-                                                         "\"renderer\":\"gl\",\"slices\":"
-                                                         "\"1\"") "," ROW("odd", "1", "0",
-                                                                          "\"renderer\":"
-                                                                          "\"cpu\","
-                                                                          "\"sharpness\":"
-                                                                          "\"1\"") ","
-                                                                                   "{\"name"
-                                                                                   "\":"
-                                                                                   "\"other"
-                                                                                   "\","
-                                                                                   "\"data_"
-                                                                                   "set\":"
-                                                                                   "\"b."
-                                                                                   "trip\","
-                                                                                   "\"ms\":"
-                                                                                   "1,"
-                                                                                   "\"total"
-                                                                                   "\":{"
-                                                                                   "\"worst_"
-                                                                                   "percenti"
-                                                                                   "le_99\":"
-                                                                                   "0},"
-                                                                                   "\"option"
-                                                                                   "s\":{}"
-                                                                                   "}");
+        "\"renderer\":\"cpu\",\"samples_per_sheet\":\"4\"") "," ROW("quick", "10", "2",
+                                                                    "\"renderer\":\"gl\",\"samples_"
+                                                                    "per_sheet\":"
+                                                                    "\"1\"") "," ROW("odd", "1",
+                                                                                     "0",
+                                                                                     "\"renderer\":"
+                                                                                     "\"cpu\","
+                                                                                     "\"sharpness\""
+                                                                                     ":"
+                                                                                     "\"1\"") ","
+                                                                                              "{\"n"
+                                                                                              "ame"
+                                                                                              "\":"
+                                                                                              "\"ot"
+                                                                                              "her"
+                                                                                              "\","
+                                                                                              "\"da"
+                                                                                              "ta_"
+                                                                                              "set"
+                                                                                              "\":"
+                                                                                              "\"b."
+                                                                                              "trip"
+                                                                                              "\","
+                                                                                              "\"ms"
+                                                                                              "\":"
+                                                                                              "1,"
+                                                                                              "\"to"
+                                                                                              "tal"
+                                                                                              "\":{"
+                                                                                              "\"wo"
+                                                                                              "rst_"
+                                                                                              "perc"
+                                                                                              "enti"
+                                                                                              "le_"
+                                                                                              "99\""
+                                                                                              ":"
+                                                                                              "0},"
+                                                                                              "\"op"
+                                                                                              "tion"
+                                                                                              "s\":"
+                                                                                              "{}"
+                                                                                              "}");
 
 static const struct {
     double error;

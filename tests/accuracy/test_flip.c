@@ -27,7 +27,7 @@ static double flip(void)
 }
 
 /* L*, a*, b* of green and blue of sRGB under D65, as colour tables have them. */
-static double most_apart(void)
+static double max_apart(void)
 {
     const double green[3] = { 87.7347, -86.1827, 83.1793 },
                  blue[3] = { 32.2970, 79.1875, -107.8602 };
@@ -38,8 +38,8 @@ static double most_apart(void)
 
 static double of_distance(double distance)
 {
-    double e = pow(distance, 0.7), most = most_apart(), knee = 0.4 * most;
-    return e < knee ? 0.95 * e / knee : 0.95 + 0.05 * (e - knee) / (most - knee);
+    double e = pow(distance, 0.7), max = max_apart(), knee = 0.4 * max;
+    return e < knee ? 0.95 * e / knee : 0.95 + 0.05 * (e - knee) / (max - knee);
 }
 
 static void a_picture_is_not_far_from_itself(void **state)

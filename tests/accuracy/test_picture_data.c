@@ -81,7 +81,7 @@ static void differences_keep_the_largest(void **state)
     (void)state;
     float a[4 * 4 * 4] = { 0 }, b[4 * 4 * 4] = { 0 };
     uint8_t rows[2 * (3 * 2 + 1)];
-    b[4 * 5 + 3] = (float)(ACCURACY_DIFFERENCE_MOST / 3 / 255);
+    b[4 * 5 + 3] = (float)(ACCURACY_DIFFERENCE_MAX / 3 / 255);
     a[4 * 10] = 1;
     decode(accuracy_difference_data(a, b, 4, 4, 2), 2, 2, rows);
     const uint8_t red[3] = { 255, 0, 0 }, black[3] = { 0 }, white[3] = { 255, 255, 255 };

@@ -173,8 +173,9 @@ static void stream_of_post_reads_what_it_interpolates(void **state)
     program_call(&r,
                  "brick block.raw --size 20,18,16 --type uint8 --range 100:255 -o upper.trip -q");
     assert_int_equal(r.exit_status, 0);
-    cJSON *root = bench("stream upper.trip --renderer cpu --classify post --slices 2 --size 64x64 "
-                        "--repeat 2 --memory 64M");
+    cJSON *root =
+        bench("stream upper.trip --renderer cpu --classify post --samples-per-sheet 2 --size 64x64 "
+              "--repeat 2 --memory 64M");
     const cJSON *rows = rows_of(root, "stages");
     const cJSON *summary = cJSON_GetArrayItem(rows_of(root, "summary"), 0);
     double planes = file_bytes("upper.trip/x0.voxels") + file_bytes("upper.trip/y0.voxels") +
@@ -317,8 +318,8 @@ static void a_plot_takes_the_place_of_nothing_that_is_read(void **state)
 static void forms_compares_what_the_papers_do_with_the_usual_picture(void **state)
 {
     (void)state;
-    cJSON *root = bench("forms block.trip --size 24x24");
-    const cJSON *rows = rows_of(root, "forms"), *row;
+    cJSON *root = bench("variants block.trip --size 24x24");
+    const cJSON *rows = rows_of(root, "variants"), *row;
     assert_int_equal(cJSON_GetArraySize(rows), 7);
     cJSON_ArrayForEach(row, rows)
     {
@@ -334,7 +335,8 @@ static void forms_compares_what_the_papers_do_with_the_usual_picture(void **stat
 static void popping_is_of_axis_alone(void **state)
 {
     (void)state;
-    const char *const models[] = { "", "--compositing sheet", "--classify post --slices 1" };
+    const char *const models[] = { "", "--compositing sheet",
+                                   "--classify post --samples-per-sheet 1" };
     for (int i = 0; i < 3; i++) {
         char arguments[128];
         snprintf(arguments, sizeof arguments,
@@ -456,16 +458,16 @@ static void levels_without_a_data_set_samples_an_object_and_plots_it(void **stat
 
 /* On the axis of view, by the formulas of render/splat.h: with t the distance from the centre in
  * standard deviations, the exact form divides t^2 by 1 + (t sigma / distance)^2. */
-static double most_on_axis(double radii)
+static double max_on_axis(double radii)
 {
     const double k = 10.0 / 3, edge = exp(-k * k / 2);
-    double most = 0;
+    double max = 0;
     for (double t = 0; t < 1.2 * k; t += 1e-3) {
         double exact = t * t / (1 + pow(t / (k * radii), 2));
         double is = t < k ? exp(-t * t / 2) - edge : 0;
-        most = fmax(most, fabs(is - fmax(0, exp(-exact / 2) - edge)));
+        max = fmax(max, fabs(is - fmax(0, exp(-exact / 2) - edge)));
     }
-    return 100 * most / (1 - edge);
+    return 100 * max / (1 - edge);
 }
 
 static void ewa_compares_splats_and_pictures(void **state)
@@ -478,7 +480,7 @@ static void ewa_compares_splats_and_pictures(void **state)
     {
         if (number(row, "angle") > 0)
             continue;
-        double expected = most_on_axis(number(row, "distance"));
+        double expected = max_on_axis(number(row, "distance"));
         assert_true(fabs(number(row, "most") - expected) < 0.01 * expected + 1e-4);
         assert_true(number(row, "sum") <= 0 && -number(row, "sum") <= number(row, "mean") + 1e-9);
         checked++;

@@ -5,14 +5,14 @@
 #include "test.h"
 
 /* What is kept under a scope whose lines are caught: why a part of a table was left out. */
-static void fail_in_scope(char why[256], bool cancelled, int status, const char *what)
+static void fail_in_scope(char why[256], bool cancelled, int status, const char *name)
 {
     trip_scope scope = { .around = trip_scope_current() };
     trip_scope *before = trip_scope_enter(&scope);
     if (cancelled)
         trip_scope_cancel(before);
     bench_keep_report(why);
-    assert_int_equal(trip_fail(status, "a", "b", "%s", what), status);
+    assert_int_equal(trip_fail(status, "a", "b", "%s", name), status);
     bench_keep_report(NULL);
     trip_scope_enter(before);
     trip_scope_renew(before);

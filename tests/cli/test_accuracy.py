@@ -145,7 +145,7 @@ class Accuracy(program.ProgramTest):
                             "--levels-for", "both").returncode == 0
         run = program.call(
             "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", "--pictures", "--source", "a.nrrd",
-            "--settings", "post,post-slices-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2,popping-post",
+            "--settings", "post,post-samples-per-sheet-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2,popping-post",
             program=program.QUICK_PROGRAM)
         assert run.returncode == 0, run.stderr
         assert run.stderr == "", run.stderr
@@ -160,7 +160,7 @@ class Accuracy(program.ProgramTest):
                    program.read_exr(f"report/truth-{view}.exr"))
 
     def test_figures_are_those_of_the_pictures(self):
-        for name in "post", "post-slices-1", "pre", "pre-rgba8":
+        for name in "post", "post-samples-per-sheet-1", "pre", "pre-rgba8":
             total, pairs = self.rows[name]["total"], list(self.pictures(name))
             errors = [covered_errors(*pair) for pair in pairs]
             every = numpy.concatenate(errors)
@@ -356,11 +356,11 @@ class Accuracy(program.ProgramTest):
     def test_qualities_are_settings(self):
         """Options beside a quality go before what it says, wherever they stand."""
         draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
-        same = {("--quality", "draft"): ("--slices", "1"),
+        same = {("--quality", "draft"): ("--samples-per-sheet", "1"),
                 ("--quality", "normal"): (),
-                ("--quality", "high"): ("--slices", "8"),
-                ("--quality", "exact"): ("--slices", "16", "--saturation", 1 / 8192),
-                ("--slices", "2", "--quality", "exact"): ("--slices", "2", "--saturation", 1 / 8192),
+                ("--quality", "high"): ("--samples-per-sheet", "8"),
+                ("--quality", "exact"): ("--samples-per-sheet", "16", "--early-termination", 1 / 8192),
+                ("--samples-per-sheet", "2", "--quality", "exact"): ("--samples-per-sheet", "2", "--early-termination", 1 / 8192),
                 ("--quality", "draft", "--classify", "pre"): ("--classify", "pre")}
         pictures = [draw(*options) for options in same]
         for options, picture in zip(same, pictures):
@@ -434,11 +434,11 @@ for line in sys.stdin:
         print("{}", flush=True)
 """)
         self.works("accuracy", "a.trip", "-o", "others", *SMALL, "--no-ladder", "--source", "a.nrrd",
-                   "--tf", "a.tf", "--settings", "post", "--pictures", "--beside",
-                   f"{sys.executable} beside.py", "--beside", "exit 3")
+                   "--tf", "a.tf", "--settings", "post", "--pictures", "--compare",
+                   f"{sys.executable} beside.py", "--compare", "exit 3")
         with open("others/accuracy.json", encoding="utf-8") as f:
             report = json.load(f)
-        [row] = report["beside"]
+        [row] = report["compared"]
         self.assertEqual([row["name"], row["version"], row["ms"]], ["nothing", "1.5", 12.5])
         errors = [covered_errors(numpy.zeros_like(truth), truth)
                   for truth in (program.read_exr(f"others/truth-{view}.exr") for view in range(2))]
@@ -448,8 +448,8 @@ for line in sys.stdin:
         self.assertIn("the program has ended", left_out["why"])
         with open("others/index.html", encoding="utf-8") as f:
             page = f.read()
-        self.assertEqual(page.count("<rect class=beside"), 2)
-        self.assertFalse(os.path.exists("others/beside.raw"))
+        self.assertEqual(page.count("<rect class=program"), 2)
+        self.assertFalse(os.path.exists("others/program.raw"))
 
     def test_vtk_stands_beside_where_it_is_installed(self):
         worker = os.path.join(os.path.dirname(program.DATASETS), "accuracy", "vtk_worker.py")
@@ -458,24 +458,24 @@ for line in sys.stdin:
                 capture_output=True).returncode:
             self.skipTest("VTK for Python or xvfb-run is not installed")
         self.works("accuracy", "a.trip", "-o", "vtk", *SMALL, "--no-ladder", "--source", "a.nrrd", "--tf",
-                   "a.tf", "--no-shading", "--settings", "post", "--beside",
+                   "a.tf", "--no-shading", "--settings", "post", "--compare",
                    f"xvfb-run -a {sys.executable} {worker} --step 0.5")
         with open("vtk/accuracy.json", encoding="utf-8") as f:
-            [row] = json.load(f)["beside"]
+            [row] = json.load(f)["compared"]
         self.assertEqual(row["name"], "vtk-cpu-step-0.5")
         self.assertLess(row["total"]["mean"], 8)
         # Of itself, and not where it is not wanted.
         path = {**os.environ, "PATH": os.path.dirname(sys.executable) + ":" + os.environ["PATH"]}
         for arguments, beside in (["--settings", "post,vtk"], [row["name"]]), (
-                ["--settings", "post,vtk", "--beside", "none"], []), (["--settings", "post"], []):
+                ["--settings", "post,vtk", "--compare", "none"], []), (["--settings", "post"], []):
             self.works("accuracy", "a.trip", "-o", "vtk", "--force", *SMALL, "--no-ladder", "--source",
                        "a.nrrd", "--tf", "a.tf", "--no-shading", *arguments, env=path)
             with open("vtk/accuracy.json", encoding="utf-8") as f:
                 report = json.load(f)
-            self.assertEqual([one["name"] for one in report["beside"]], beside)
+            self.assertEqual([one["name"] for one in report["compared"]], beside)
             if beside:
-                self.assertEqual(report["beside"][0]["total"], row["total"])
-        self.fails(2, "accuracy", "a.trip", "--beside", "none", "--beside", "true", says="--beside")
+                self.assertEqual(report["compared"][0]["total"], row["total"])
+        self.fails(2, "accuracy", "a.trip", "--compare", "none", "--compare", "true", says="--compare")
 
     # Trouble
 

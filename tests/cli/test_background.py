@@ -54,7 +54,7 @@ class Background(program.ProgramTest):
     def ways(self, volume, data):
         """Of drawing a volume and its data set."""
         yield data, "--renderer", "reference"
-        yield data, "--renderer", "cpu", "--slices", "4"
+        yield data, "--renderer", "cpu", "--samples-per-sheet", "4"
         yield data, "--renderer", "integral"
         yield volume, "--renderer", "integral", "--field", "source"
         if "GL" not in program.SWITCHED_OFF:

@@ -82,7 +82,7 @@ class Look(program.ProgramTest):
         view = ["--eye=9.5,-60,9.5", "--look=9.5,9.5,9.5", "--ortho=24", "--size=32x32"]
         view += ["--renderer", "reference", "--method", "axis", "--tf", "viridis"]
         for classify, saturated in ("pre", 1 / 8192), ("post", 1 / 512), ("post", 1 / 50):
-            by = [*view, "--classify", classify, "--saturation", saturated]
+            by = [*view, "--classify", classify, "--early-termination", saturated]
             once = self.picture("ball.trip", *by)[..., 3].astype(float)
             self.assertGreater(once.max(), 0.5)
             for scale in (0.25, 1, 3):
@@ -97,21 +97,21 @@ class Look(program.ProgramTest):
     def test_saturation_is_set_where_there_is_some(self):
         pre = ["--classify", "pre"]
         for options, says in (
-            (["--saturation=0.11"], "0.11 is not between 0 and 0.1"),
-            (["--saturation=-0.01"], "-0.01 is not between 0 and 0.1"),
-            (["--saturation=little"], "not a number"),
-            (["--saturation=0.01", "--renderer", "integral"], "does not apply to --renderer integral"),
-            (["--saturation=0.01", "--traversal", "ascending"], "goes with --traversal outward"),
-            *(([*pre, "--saturation=0.01", "--renderer", gl], "draws all splats") for gl in program.GL),
+            (["--early-termination=0.11"], "0.11 is not between 0 and 0.1"),
+            (["--early-termination=-0.01"], "-0.01 is not between 0 and 0.1"),
+            (["--early-termination=little"], "not a number"),
+            (["--early-termination=0.01", "--renderer", "integral"], "does not apply to --renderer integral"),
+            (["--early-termination=0.01", "--traversal", "ascending"], "goes with --traversal outward"),
+            *(([*pre, "--early-termination=0.01", "--renderer", gl], "draws all splats") for gl in program.GL),
         ):
             self.fails(2, "render", "ball.trip", "-o", "a.png", "--size=32x32", *options, says=says)
-        for options, saturation in (pre, 1 / 8192), (["--classify", "post"], 1 / 512), (["--saturation=0.02"], 0.02):
+        for options, saturation in (pre, 1 / 8192), (["--classify", "post"], 1 / 512), (["--early-termination=0.02"], 0.02):
             run = self.works("render", "ball.trip", "-o", "a.png", "--size=32x32", "--renderer", "cpu", "--explain",
                              *options, "--stats", "a.json")
             os.unlink("a.png")
             self.assertIn(f"below {saturation:g} of transmittance".encode(), run.stdout)
             with open("a.json") as f:
-                self.assertEqual(json.load(f)["saturation"], saturation)
+                self.assertEqual(json.load(f)["early_termination"], saturation)
             os.unlink("a.json")
 
     def test_a_window_is_the_function_moved(self):

@@ -157,7 +157,7 @@ class Depth(program.ProgramTest):
             for slices in 1, 4:
                 z = self.distances(
                     renderer, "--eye=7.5,7.5,46", "--look=7.5,7.5,6", "--up=0,1,0", "--ortho=8",
-                    "--classify=post", f"--slices={slices}",
+                    "--classify=post", f"--samples-per-sheet={slices}",
                 )
                 self.assertGreater(z.min(), 39.5 - 0.5 / slices, (renderer, slices))
                 self.assertLess(z.max(), 39.75 + 0.5 / slices, (renderer, slices))

@@ -99,7 +99,7 @@ RENDER = {
     "--emission": [],
     "--temperature": NUMBERS + ["5", "5:", ":5", "2000:1000", "nan:5", "1:2:3"],
     "--h": NUMBERS + ["1", "-0.1", "1.5"],
-    "--saturation": NUMBERS + ["-0.1", "0.11"],
+    "--early-termination": NUMBERS + ["-0.1", "0.11"],
     "--quality": NAMES + ["best"],
     "--error": NUMBERS + ["0", "-1", "256"],
     "--report": [],
@@ -114,7 +114,7 @@ RENDER = {
     "--submit": NAMES + ["sprites,", ",", "sprites,triangles", "sprites,sprites"],
     "--classify": NAMES,
     "--compositing": NAMES + ["sheets"],
-    "--slices": COUNTS + ["17"],
+    "--samples-per-sheet": COUNTS + ["17"],
     "--traversal": NAMES,
     "--occluded": NAMES,
     "--field": NAMES,
@@ -226,7 +226,7 @@ class Options(program.ProgramTest):
                 render + ["--tolerance=0.01"],
                 render + ["--kernel=ewa", "--renderer=integral"],
                 render + ["--kernel=ewa", "--classify=post"],
-                render + ["--kernel=ewa", "--slices=2"],
+                render + ["--kernel=ewa", "--samples-per-sheet=2"],
                 render + ["--low-pass=none", "--classify=post"],
                 render + ["--low-pass=uniform", "--kernel=ewa"],
                 render + ["--low-pass=uniform", "--renderer=reference"],
@@ -258,9 +258,9 @@ class Options(program.ProgramTest):
                 render + ["--max-bytes=1M", "--renderer=integral"],
                 render + ["--classify=pre", "--renderer=integral"],
                 render + ["--classify=post", "--renderer=integral"],
-                render + ["--slices=4", "--renderer=integral"],
+                render + ["--samples-per-sheet=4", "--renderer=integral"],
                 render + ["--depth=d.tif", "--show=merge"],
-                render + ["--error=1", "--slices=4"],
+                render + ["--error=1", "--samples-per-sheet=4"],
                 render + ["--classify=pre", "--error=1"],
                 render + ["--error=1", "--samples=2"],
                 ["render", "a.trip", "b.trip", "-o", "a.png", "--lod=8"],
@@ -290,8 +290,8 @@ class Options(program.ProgramTest):
 
     def test_what_is_refused_is_named(self):
         render = ["render", "a.trip", "-o", "a.png"]
-        self.fails(2, *render, "--slices=4", "--renderer=integral", says="--slices: ")
-        self.fails(2, *render, "--error=1", "--slices=4", says="--slices among them")
+        self.fails(2, *render, "--samples-per-sheet=4", "--renderer=integral", says="--samples-per-sheet: ")
+        self.fails(2, *render, "--error=1", "--samples-per-sheet=4", says="--samples-per-sheet among them")
 
     def test_every_value_works(self):
         render = ["--size=24x20"]

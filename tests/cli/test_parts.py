@@ -72,7 +72,7 @@ class Parts(program.ProgramTest):
         for renderer in ("reference", "cpu", *program.GL):
             self.assert_alike(self.halves, 0, "--renderer", renderer)
         self.assert_alike(self.octants, 0, "--renderer", "cpu")
-        self.assert_alike(self.octants[::-1], 0, "--renderer", "cpu", "--slices", 3)
+        self.assert_alike(self.octants[::-1], 0, "--renderer", "cpu", "--samples-per-sheet", 3)
 
     def test_nor_have_they_inside_the_volume_with_light_distances_and_little_memory(self):
         inside = ("--eye", "20.7,19,18", "--look", "40,30,20", "--fov", 100)

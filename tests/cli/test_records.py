@@ -150,7 +150,7 @@ class Records(program.ProgramTest):
         )
         shutil.copytree("a.trip", "far.trip")
         data.write("far.trip")
-        post = ("--classify=post", "--slices=2")  # by the view they depend on the grid
+        post = ("--classify=post", "--samples-per-sheet=2")  # by the view they depend on the grid
         for name in self.renderers:
             for by in ("--classify=pre",), post:
                 if by == post and name == "reference":

@@ -51,10 +51,10 @@ static void brightness(const picture *p, double *rim, double *all)
     *rim = *all = 0;
     for (int i = 0; i < p->width * p->height; i++) {
         int x = i % p->width, y = i / p->width;
-        double most = fmax(at(p, x, y)[0], fmax(at(p, x, y)[1], at(p, x, y)[2]));
-        *all = fmax(*all, most);
+        double max = fmax(at(p, x, y)[0], fmax(at(p, x, y)[1], at(p, x, y)[2]));
+        *all = fmax(*all, max);
         if (x == 0 || y == 0 || x == p->width - 1 || y == p->height - 1)
-            *rim = fmax(*rim, most);
+            *rim = fmax(*rim, max);
     }
 }
 

@@ -59,7 +59,7 @@ class Transitions(program.ProgramTest):
     def test_clip_shows_lines_where_merge_shows_none(self):
         self.assertGreater(self.bends_at_borders("--classify", "pre", "--method", "clip"), 10)
         # Noise at 20 pixels a voxel: where slices are few their own pattern shows.
-        for by in ("--classify", "pre"), ("--classify", "post", "--slices", "8"):
+        for by in ("--classify", "pre"), ("--classify", "post", "--samples-per-sheet", "8"):
             self.assertLess(self.bends_at_borders(*by), 1.5)
             self.assertLess(self.bends_at_borders(*by, "--h", "0.5"), 1.5)
 

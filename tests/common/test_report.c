@@ -16,7 +16,7 @@ static void failure_is_one_line_with_stage_place_and_cause(void **state)
     assert_one_report("triptych: read: a.nrrd: line 3: 4 axes, not 3");
 }
 
-static void empty_place_is_left_out(void **state)
+static void empty_position_is_left_out(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -353,7 +353,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(failure_is_one_line_with_stage_place_and_cause),
-        cmocka_unit_test(empty_place_is_left_out),
+        cmocka_unit_test(empty_position_is_left_out),
         cmocka_unit_test(control_characters_are_made_visible),
         cmocka_unit_test(letters_beyond_ascii_stay),
         cmocka_unit_test(bad_utf8_and_marks_of_direction_are_made_visible),

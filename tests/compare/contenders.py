@@ -153,7 +153,7 @@ NAMES = ["triptych-cpu", POST + "1", POST + "2", POST + "4", "triptych-gl", "vtk
 def make(name, prepared, threads):
     if name.startswith(POST):
         return Triptych(prepared, "cpu", threads, name,
-                        ["--classify", "post", "--slices", name[len(POST):]])
+                        ["--classify", "post", "--samples-per-sheet", name[len(POST):]])
     if name == "vtk-cpu-half":
         return Vtk(prepared, "cpu", threads, name, 0.5)
     if name.startswith("triptych-"):

@@ -69,7 +69,7 @@ static void check_sequences(const trip_spill *spill)
     uint64_t end = 0;
     for (size_t i = 0; i < trip_spill_count(spill); i++) {
         const trip_sequence *s = trip_spill_sequence(spill, i);
-        FUZZ_PROMISE(s->list < TRIP_MOST_LISTS && s->offset >= end && s->bytes <= PIECES_BYTES);
+        FUZZ_PROMISE(s->list < TRIP_MAX_LISTS && s->offset >= end && s->bytes <= PIECES_BYTES);
         end = s->offset + s->bytes;
         FUZZ_PROMISE(end <= PIECES_BYTES);
     }

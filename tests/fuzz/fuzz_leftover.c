@@ -13,7 +13,7 @@
 #include "dataset.h"
 #include "resume.h"
 
-enum { VOXELS_A_SIDE = 4096, SCANNED = 1 << 24, MOST_RUNS = 64 };
+enum { VOXELS_A_SIDE = 4096, SCANNED = 1 << 24, MAX_RUNS = 64 };
 
 typedef struct given_run {
     uint16_t sheet, u, v, splats;
@@ -23,7 +23,7 @@ typedef struct given_run {
 typedef struct given {
     trip_block_form form;
     trip_piece_format format;
-    given_run runs[MOST_RUNS];
+    given_run runs[MAX_RUNS];
     size_t run_count;
     const uint8_t *planes[TRIP_PLANES];
     size_t bytes[TRIP_PLANES];
@@ -55,7 +55,7 @@ static void take_apart(given *g, const uint8_t *data, size_t size)
                                      .quantised = true,
                                      .normals = g->form.normal_bytes > 0 };
     data++, size--;
-    while (size >= sizeof *g->runs && g->run_count < MOST_RUNS) {
+    while (size >= sizeof *g->runs && g->run_count < MAX_RUNS) {
         given_run *run = &g->runs[g->run_count];
         memcpy(run, data, sizeof *run);
         data += sizeof *run;
@@ -87,10 +87,10 @@ static uint32_t checksum_of(const given *g, uint32_t splats, size_t at[TRIP_PLAN
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
     const uint8_t edge = (uint8_t)((1u << g->form.tile_log2) - 1);
     const trip_file_brick tile = { .code_max = UINT16_MAX, .u_max = edge, .v_max = edge };
-    const uint32_t most = trip_block_most_words(&g->form);
+    const uint32_t max = trip_block_max_words(&g->form);
     uint32_t count = 0;
     for (uint32_t end; (end = trip_block_end(&g->form, words, count)) > count; count = end) {
-        if (end > most || g->bytes[0] - at[0] < end * sizeof *words)
+        if (end > max || g->bytes[0] - at[0] < end * sizeof *words)
             return 0;
         memcpy(words, g->planes[0] + at[0], end * sizeof *words);
     }

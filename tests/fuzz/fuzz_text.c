@@ -2,7 +2,7 @@
  * that can be drawn with. */
 #include "fuzz.h"
 
-#include "dataset_text.h"
+#include "dataset_metadata.h"
 
 #include <math.h>
 #include <string.h>
@@ -13,19 +13,19 @@ static bool is_axis(trip_vec3 v)
     return length == 0 || length == 1;
 }
 
-static void use(const trip_dataset_text *text, const trip_dataset *d)
+static void use(const trip_dataset_metadata *text, const trip_dataset *d)
 {
     double range[2];
     trip_tf *tf = NULL;
     trip_camera_framing framing = { .width = 8, .height = 8 };
-    trip_dataset_text_frame(text, d, &framing);
+    trip_dataset_metadata_frame(text, d, &framing);
     FUZZ_PROMISE(is_axis(framing.up) && is_axis(framing.front));
     for (int a = 0; a < 3; a++)
         FUZZ_PROMISE(isfinite(framing.lo[a]) && framing.lo[a] <= framing.hi[a]);
-    if (trip_dataset_text_tf(text, d, &tf) != 0)
+    if (trip_dataset_metadata_tf(text, d, &tf) != 0)
         return;
     trip_tf_denormalise(tf, d->header.value_min, d->header.value_max);
-    FUZZ_PROMISE(trip_dataset_text_culled(text, tf, range) >= 0);
+    FUZZ_PROMISE(trip_dataset_metadata_culled(text, tf, range) >= 0);
     trip_tf_destroy(tf);
 }
 
@@ -33,16 +33,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     char path[] = "fuzz";
     trip_dataset d = { .path = path, .index_to_world = trip_affine_identity() };
-    trip_dataset_text *text;
+    trip_dataset_metadata *text;
     for (int a = 0; a < 3; a++)
         d.header.dims[a] = 20;
     d.header.code_hi = d.header.value_max = 100;
     d.text = malloc(size + 1);
     memcpy(d.text, data, size);
     d.text[size] = 0;
-    if (trip_dataset_text_parse(&text, &d) == 0) {
+    if (trip_dataset_metadata_parse(&text, &d) == 0) {
         use(text, &d);
-        trip_dataset_text_destroy(text);
+        trip_dataset_metadata_destroy(text);
     }
     free(d.text);
     return 0;

@@ -7,14 +7,14 @@
 
 #include "state_file.h"
 
-static trip_view_state usual(void)
+static trip_view_state defaults(void)
 {
     return (trip_view_state){ .opacity_scale = 1, .settings = triptych_default_settings() };
 }
 
 static void check_again(const trip_view_state *s)
 {
-    trip_view_state again = usual();
+    trip_view_state again = defaults();
     char *text = trip_view_state_print(s, "/d");
     FUZZ_PROMISE(text && trip_view_state_parse(&again, "/d", text, "again") == 1);
     FUZZ_PROMISE(memcmp(&again.navigation, &s->navigation, sizeof s->navigation) == 0);
@@ -26,7 +26,7 @@ static void check_again(const trip_view_state *s)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    trip_view_state s = usual();
+    trip_view_state s = defaults();
     char *text = calloc(1, size + 1);
     memcpy(text, data, size);
     if (trip_view_state_parse(&s, "/d", text, "fuzz") == 1) {

@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { MEMORY_BYTES = 64 << 20, MOST_BYTES = 100000, PATIENCE_MS = 1 };
+enum { MEMORY_BYTES = 64 << 20, MAX_BYTES = 100000, PATIENCE_MS = 1 };
 
 static struct {
     const uint8_t *data;
@@ -84,7 +84,7 @@ static void read_picture(trip_image_files *files)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    if (size < 1 || size > MOST_BYTES)
+    if (size < 1 || size > MAX_BYTES)
         return -1;
     trip_image_files files = { 0 };
     answer.data = data + 1;

@@ -24,10 +24,10 @@ static void fuzz_decode(const trip_volume *v, const trip_volume_portion *b)
 
 static void fuzz_read_through(trip_volume *v)
 {
-    enum { MOST_BLOCKS = 64 };
+    enum { MAX_BLOCKS = 64 };
     const trip_volume_info *info = trip_volume_get_info(v);
     trip_volume_portion b;
-    for (int i = 0; i < MOST_BLOCKS && trip_volume_next(v, 1, &b) == 1; i++) {
+    for (int i = 0; i < MAX_BLOCKS && trip_volume_next(v, 1, &b) == 1; i++) {
         for (int a = 0; a < 3; a++) {
             FUZZ_PROMISE(info->dims[a] >= 1 && b.size[a] >= 1);
             FUZZ_PROMISE(b.origin[a] >= 0 && b.origin[a] <= info->dims[a] - b.size[a]);

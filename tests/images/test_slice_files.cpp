@@ -172,25 +172,25 @@ void other_files_and_folders_beside_slices_are_passed_over(void **)
 
 void places_in_equal_steps_have_no_gap(void **)
 {
-    assert_true(trip_check_places({}, {}, false) == 1);
-    assert_true(trip_check_places({ 3 }, { "a" }, false) == 1);
-    assert_true(trip_check_places({ 3, 9 }, { "a", "b" }, false) == 1);
-    assert_true(trip_check_places({ 0, 1.5, 3, 4.5 }, { "a", "b", "c", "d" }, false) == 1);
+    assert_true(trip_check_positions({}, {}, false) == 1);
+    assert_true(trip_check_positions({ 3 }, { "a" }, false) == 1);
+    assert_true(trip_check_positions({ 3, 9 }, { "a", "b" }, false) == 1);
+    assert_true(trip_check_positions({ 0, 1.5, 3, 4.5 }, { "a", "b", "c", "d" }, false) == 1);
 }
 
 /* Neither twice the usual step nor thrice: uneven, but nothing is missing. */
 void places_in_uneven_steps_have_no_gap(void **)
 {
-    assert_true(trip_check_places({ 0, 1, 2.3, 3.8 }, { "a", "b", "c", "d" }, false) == 1);
+    assert_true(trip_check_positions({ 0, 1, 2.3, 3.8 }, { "a", "b", "c", "d" }, false) == 1);
 }
 
 /* Steps of 2, 2, 6 and 2, whose mean is 3. */
 void a_place_that_is_left_out_is_named_by_its_neighbours(void **)
 {
-    const std::vector<double> places = { 0, 2, 4, 10, 12 };
+    const std::vector<double> positions = { 0, 2, 4, 10, 12 };
     const std::vector<std::string> names = { "a", "b", "c", "d", "e" };
     try {
-        trip_check_places(places, names, false);
+        trip_check_positions(positions, names, false);
         fail_msg("%s", "no gap is found");
     } catch (const trip_slice_error &e) {
         assert_string_equal(e.where.c_str(), "c");
@@ -198,7 +198,7 @@ void a_place_that_is_left_out_is_named_by_its_neighbours(void **)
                                       "on; --allow-gaps goes on as if its neighbours touched");
     }
     warnings = 0;
-    const double squeeze = trip_check_places(places, names, true);
+    const double squeeze = trip_check_positions(positions, names, true);
     assert_true(squeeze > 0.6666 && squeeze < 0.6667);
     assert_int_equal(warnings, 1);
 }

@@ -82,8 +82,9 @@ static triptych *open_at(triptych_renderer renderer, const double eye[3])
                                  .up = (double[]){ 0, 1, 0 },
                                  .fov_degrees = 25 };
     assert_int_equal(triptych_open(t, DATA_SET, &resources), TRIPTYCH_OK);
-    assert_int_equal(triptych_set_function(t, &(triptych_function){ .text = function }),
-                     TRIPTYCH_OK);
+    assert_int_equal(
+        triptych_set_transfer_function(t, &(triptych_transfer_function){ .text = function }),
+        TRIPTYCH_OK);
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
     return t;
 }
@@ -108,7 +109,7 @@ static uint64_t draw(triptych *t, const triptych_settings *s, float *rgba)
     return stats.splats;
 }
 
-static void assert_near(const float *a, const float *b, double mean, double most)
+static void assert_near(const float *a, const float *b, double mean, double max)
 {
     double sum = 0, greatest = 0;
     for (int i = 0; i < FLOATS; i++) {
@@ -116,7 +117,7 @@ static void assert_near(const float *a, const float *b, double mean, double most
         sum += d;
         greatest = fmax(greatest, d);
     }
-    if (!(255 * sum / FLOATS <= mean && 255 * greatest <= most))
+    if (!(255 * sum / FLOATS <= mean && 255 * greatest <= max))
         fail_msg("%.3f in the mean, at most %.3f of 255", 255 * sum / FLOATS, 255 * greatest);
 }
 
@@ -359,10 +360,10 @@ static void levels_of_a_thin_grid_have_cells(void **state)
     triptych_settings s = plain(100);
     s.clip = (triptych_clip){ 0 };
     draw(t, &s, thin);
-    float most = 0;
+    float max = 0;
     for (int i = 3; i < FLOATS; i += 4)
-        most = fmaxf(most, thin[i]);
-    assert_true(most > 0.01F);
+        max = fmaxf(max, thin[i]);
+    assert_true(max > 0.01F);
     triptych_destroy(t);
 }
 

@@ -274,32 +274,32 @@ static void check_classified(triptych *t, const triptych_settings *s, triptych_c
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
     assert_int_equal(triptych_get_frame_stats(t, &frame), TRIPTYCH_OK);
     assert_int_equal(frame.classify, expected);
-    assert_int_equal(frame.slices > 0, expected == TRIPTYCH_POST);
+    assert_int_equal(frame.samples_per_sheet > 0, expected == TRIPTYCH_POST);
 }
 
 static void what_only_splats_have_is_drawn_by_them(void **state)
 {
     (void)state;
     triptych *t = new_context();
-    triptych_settings usual = triptych_default_settings(), s = usual;
-    assert_int_equal(usual.classify, TRIPTYCH_CLASSIFY_AUTO);
+    triptych_settings defaults = triptych_default_settings(), s = defaults;
+    assert_int_equal(defaults.classify, TRIPTYCH_CLASSIFY_AUTO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     check_classified(t, &s, TRIPTYCH_POST, "by the view");
-    s.slices = 4;
+    s.samples_per_sheet = 4;
     check_classified(t, &s, TRIPTYCH_POST, "in 4 slices");
-    s = usual;
+    s = defaults;
     s.kernel_radius = 1.75;
     check_classified(t, &s, TRIPTYCH_PRE, "in place of post: a kernel radius");
-    s = usual;
+    s = defaults;
     s.lod_px = 2;
     check_classified(t, &s, TRIPTYCH_POST, "the data set has none");
-    s = usual;
+    s = defaults;
     s.target = TRIPTYCH_RGBA8;
     check_classified(t, &s, TRIPTYCH_PRE, "in place of post: the target");
-    s = usual;
+    s = defaults;
     s.traversal = TRIPTYCH_ASCENDING;
     check_classified(t, &s, TRIPTYCH_PRE, "in place of post: lists");
-    s = usual;
+    s = defaults;
     s.count = 1;
     check_classified(t, &s, TRIPTYCH_PRE, "in place of post: splats are counted");
     s.count = 0;
@@ -383,7 +383,8 @@ static void a_probe_finds_what_is_seen(void **state)
     settings.background[3] = 0;
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(
-        triptych_set_function(t, &(triptych_function){ .text = "700 0 0 0 0\n701 1 1 1 0.99\n" }),
+        triptych_set_transfer_function(
+            t, &(triptych_transfer_function){ .text = "700 0 0 0 0\n701 1 1 1 0.99\n" }),
         TRIPTYCH_OK);
     for (int parallel = 0; parallel < 2; parallel++) {
         const triptych_view view = {
@@ -448,20 +449,20 @@ static void a_function_is_taken_as_text(void **state)
     triptych *t = new_context();
     char *text = NULL;
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    triptych_function f = { .name = "bone" };
-    assert_int_equal(triptych_set_function(t, &f), TRIPTYCH_OK);
+    triptych_transfer_function f = { .name = "bone" };
+    assert_int_equal(triptych_set_transfer_function(t, &f), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, named), TRIPTYCH_OK);
     assert_int_equal(triptych_convert(t, &(triptych_conversion){ .function = "bone" }, &text),
                      TRIPTYCH_OK);
-    assert_int_equal(triptych_set_function(t, NULL), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_transfer_function(t, NULL), TRIPTYCH_OK);
     f.text = text;
-    assert_fails(t, triptych_set_function(t, &f), TRIPTYCH_USAGE, "not both");
+    assert_fails(t, triptych_set_transfer_function(t, &f), TRIPTYCH_USAGE, "not both");
     f.name = NULL;
-    assert_int_equal(triptych_set_function(t, &f), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_transfer_function(t, &f), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, worded), TRIPTYCH_OK);
     assert_memory_equal(named, worded, sizeof named);
     f.text = "0 0 0 0 2\n";
-    assert_fails(t, triptych_set_function(t, &f), TRIPTYCH_ERROR, "line 1");
+    assert_fails(t, triptych_set_transfer_function(t, &f), TRIPTYCH_ERROR, "line 1");
     free(text);
     triptych_destroy(t);
 }
@@ -667,7 +668,9 @@ static void what_fails_says_why_and_the_context_goes_on(void **state)
     assert_fails(t, triptych_set_view(t, &(triptych_view){ .up = (double[3]){ 0 } }),
                  TRIPTYCH_USAGE, "up is zero");
     assert_fails(t, triptych_turn(t, INFINITY), TRIPTYCH_USAGE, "finite");
-    assert_fails(t, triptych_set_function(t, &(triptych_function){ .name = "preset:no-such" }),
+    assert_fails(t,
+                 triptych_set_transfer_function(
+                     t, &(triptych_transfer_function){ .name = "preset:no-such" }),
                  TRIPTYCH_USAGE, "no-such");
     assert_fails(t, triptych_write(t, "p.gif", SIZE, SIZE, rgba), TRIPTYCH_USAGE, "p.gif");
     assert_fails(t, triptych_prepare_write(t, "p.gif", NULL), TRIPTYCH_USAGE, "p.gif");
@@ -675,7 +678,7 @@ static void what_fails_says_why_and_the_context_goes_on(void **state)
     assert_int_equal(triptych_prepare_write(t, "p.png", "z.exr"), TRIPTYCH_OK);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "end it first");
-    assert_fails(t, triptych_set_function(t, NULL), TRIPTYCH_USAGE, "end it first");
+    assert_fails(t, triptych_set_transfer_function(t, NULL), TRIPTYCH_USAGE, "end it first");
     assert_fails(t, triptych_open(t, DATA_SET, NULL), TRIPTYCH_USAGE, "end it first");
     triptych_end(t);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
@@ -699,10 +702,10 @@ static void messages_go_to_whoever_takes_them(void **state)
     dup2(ends[1], STDERR_FILENO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     /* Nothing of the volume lies there. */
-    const triptych_function none = { .window = 1, .level = 1e9, .name = "grey" };
-    int silent = triptych_set_function(t, &none);
+    const triptych_transfer_function none = { .window = 1, .level = 1e9, .name = "grey" };
+    int silent = triptych_set_transfer_function(t, &none);
     triptych_set_messages(t, count_message, &messages);
-    int reported = triptych_set_function(t, &none);
+    int reported = triptych_set_transfer_function(t, &none);
     int failed = triptych_open(t, "none.trip", NULL);
     dup2(keep, STDERR_FILENO);
     close(keep);
@@ -714,9 +717,9 @@ static void messages_go_to_whoever_takes_them(void **state)
     assert_int_equal(failed, TRIPTYCH_ERROR);
     assert_int_equal(messages, 2);
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    assert_int_equal(
-        triptych_set_function(t, &(triptych_function){ .name = "grey", .left_out = &left_out }),
-        TRIPTYCH_OK);
+    assert_int_equal(triptych_set_transfer_function(
+                         t, &(triptych_transfer_function){ .name = "grey", .left_out = &left_out }),
+                     TRIPTYCH_OK);
     assert_int_equal(left_out, 0);
     triptych_destroy(t);
 }
@@ -854,16 +857,16 @@ static void more_samples_are_the_mean_of_a_larger_picture(void **state)
     s.samples = SIDE;
     assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
-    double most = 0;
+    double max = 0;
     for (int n = 0; n < FLOATS; n++) {
         int x = n / 4 % SIZE * SIDE, y = n / 4 / SIZE * SIDE;
         double sum = 0;
         for (int i = 0; i < SIDE * SIDE; i++)
             sum += (double)large[4 * ((y + i / SIDE) * LARGE + x + i % SIDE) + n % 4];
         assert_float_equal(rgba[n], sum / (SIDE * SIDE), 1e-6);
-        most = fmax(most, fabs((double)large[4 * (y * LARGE + x) + n % 4] - (double)rgba[n]));
+        max = fmax(max, fabs((double)large[4 * (y * LARGE + x) + n % 4] - (double)rgba[n]));
     }
-    assert_true(most > 0.01);
+    assert_true(max > 0.01);
     s.depth = 1;
     assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "one a pixel");
@@ -931,16 +934,16 @@ static void a_level_is_mixed_into_the_one_before_it(void **state)
     const double octaves[] = { 0.2, 0.05 };
     for (int i = 0; i < 2; i++) {
         const double share = 1 - octaves[i] / 0.25;
-        double most = 0;
+        double max = 0;
         assert_int_equal(draw_at(t, octaves[i], mixed).splats, of_fine + of_coarse);
         for (int n = 0; n < FLOATS; n++) {
             double a = fine[n], b = coarse[n];
-            most = fmax(most, fabs(a - b));
+            max = fmax(max, fabs(a - b));
             assert_float_equal(mixed[n], a + share * (b - a), 1e-6);
         }
         assert_int_equal(triptych_draw(t, again), TRIPTYCH_OK);
         assert_memory_equal(again, mixed, sizeof again);
-        assert_true(most > 0.01);
+        assert_true(max > 0.01);
     }
     triptych_destroy(t);
     assert_int_equal(system("rm -r levels.trip"), 0);
@@ -1095,10 +1098,11 @@ static void effects_cost_what_is_asked_for_and_are_kept_from_view_to_view(void *
     assert_true(draw(other, again).light_bytes_read > 0);
     assert_true(are_same(turned, again));
 
-    assert_int_equal(triptych_set_function(t, &(triptych_function){ .opacity_scale = 0.5 }),
-                     TRIPTYCH_OK);
+    assert_int_equal(
+        triptych_set_transfer_function(t, &(triptych_transfer_function){ .opacity_scale = 0.5 }),
+        TRIPTYCH_OK);
     assert_true(draw(t, turned).light_bytes_read > 0);
-    assert_int_equal(triptych_set_function(t, NULL), TRIPTYCH_OK);
+    assert_int_equal(triptych_set_transfer_function(t, NULL), TRIPTYCH_OK);
     assert_int_equal(triptych_turn(t, 0), TRIPTYCH_OK);
     assert_int_equal(triptych_set_settings(t, &none), TRIPTYCH_OK);
     with = draw(t, again);
@@ -1174,7 +1178,8 @@ static void assert_drawn_afresh(triptych *t, const char *function, const triptyc
         assert_int_equal(triptych_add(other, "high.trip"), TRIPTYCH_OK);
     triptych *both[2] = { t, other };
     for (int i = 0; i < 2; i++) {
-        assert_int_equal(triptych_set_function(both[i], &(triptych_function){ .text = function }),
+        assert_int_equal(triptych_set_transfer_function(
+                             both[i], &(triptych_transfer_function){ .text = function }),
                          TRIPTYCH_OK);
         assert_int_equal(triptych_set_settings(both[i], s), TRIPTYCH_OK);
         assert_int_equal(
@@ -1197,24 +1202,24 @@ static void whether_a_function_is_looked_up_goes_by_what_is_drawn_now(void **sta
     static const char *const line = LOOK "255 .9 .6 .3 .1\n";
     /* Up to 140 as before; the greatest value of the lower part and about it is 136. */
     static const char *const bent = LOOK "140 .9 .6 .3 .054902\n255 .1 .6 .9 .9\n";
-    triptych_settings usual = triptych_default_settings(), cued = usual, cubic = usual;
+    triptych_settings defaults = triptych_default_settings(), cued = defaults, cubic = defaults;
     cued.effects = TRIPTYCH_CUEING;
     cubic.kernel = TRIPTYCH_CUBIC; /* which overshoots that */
     brick_rising_volume();
     triptych *t = new_context();
     assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
-    assert_drawn_afresh(t, line, &usual, false, true);
-    assert_drawn_afresh(t, LOOK "60 .9 .6 .3 .02\n255 .1 .6 .9 .9\n", &usual, false, false);
-    assert_drawn_afresh(t, bent, &usual, false, true);
+    assert_drawn_afresh(t, line, &defaults, false, true);
+    assert_drawn_afresh(t, LOOK "60 .9 .6 .3 .02\n255 .1 .6 .9 .9\n", &defaults, false, false);
+    assert_drawn_afresh(t, bent, &defaults, false, true);
     assert_drawn_afresh(t, bent, &cued, false, false);
     assert_drawn_afresh(t, bent, &cubic, false, false);
     assert_drawn_afresh(t, line, &cubic, false, true);
-    assert_drawn_afresh(t, bent, &usual, false, true);
+    assert_drawn_afresh(t, bent, &defaults, false, true);
     assert_int_equal(triptych_add(t, "high.trip"), TRIPTYCH_OK);
-    assert_drawn_afresh(t, bent, &usual, true, false);
-    assert_drawn_afresh(t, line, &usual, true, true);
+    assert_drawn_afresh(t, bent, &defaults, true, false);
+    assert_drawn_afresh(t, line, &defaults, true, true);
     assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
-    assert_drawn_afresh(t, bent, &usual, false, true);
+    assert_drawn_afresh(t, bent, &defaults, false, true);
     triptych_destroy(t);
     assert_int_equal(system("rm -r low.trip high.trip rising.nrrd"), 0);
 }
@@ -1224,17 +1229,17 @@ static void the_device_names_the_kernels_that_draw(void **state)
 {
     (void)state;
     static float rgba[FLOATS];
-    char usual[64];
+    char defaults[64];
     triptych *t = new_context();
     triptych_settings s = triptych_default_settings();
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    snprintf(usual, sizeof usual, "%s", draw(t, rgba).device);
+    snprintf(defaults, sizeof defaults, "%s", draw(t, rgba).device);
     for (int i = 0; i < 4; i++) {
         s.kernel = i == 1 ? TRIPTYCH_CUBIC : i == 2 ? TRIPTYCH_GAUSSIAN : TRIPTYCH_LINEAR;
         s.classify = i == 3 ? TRIPTYCH_PRE : TRIPTYCH_POST;
         assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
         assert_string_equal(draw(t, rgba).device,
-                            i == 1 || i == 2 ? "CPU, plain, 2 threads" : usual);
+                            i == 1 || i == 2 ? "CPU, plain, 2 threads" : defaults);
     }
     triptych_destroy(t);
 }

@@ -263,23 +263,23 @@ static long happen(void *user, void *data, uint64_t offset, size_t bytes, long r
 
 /* One read of the frame in fifteen, another one for each mishap. A frame gets over what is short or
  * interrupted. */
-static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int what,
+static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int name,
                           const float *wanted)
 {
     static float rgba[SIZE * SIZE * 4];
     mishap m = { .countdown = -1 };
     drawing d;
-    m.kind = what;
+    m.kind = name;
     trip_reader_params params = {
         .engine = engine, .slots = 3, .slot_bytes = 8192, .fault = happen, .fault_user = &m
     };
     assert_int_equal(open_drawing(&d, kind, params), 0);
-    for (int at = what;; at += 15) {
+    for (int at = name;; at += 15) {
         m.countdown = at;
         test_catch_reports();
         int status = draw_frame(&d, rgba);
         bool happened = m.countdown < 0;
-        bool fatal = what == FAILS || what == ENDS || what == COMES_CHANGED;
+        bool fatal = name == FAILS || name == ENDS || name == COMES_CHANGED;
         assert_int_equal(test_caught_reports(), fatal && happened);
         assert_int_equal(status < 0, fatal && happened);
         if (status == 0)
@@ -303,9 +303,9 @@ static void a_read_that_fails_comes_short_or_damaged_in_mid_frame(void **state)
         assert_int_equal(open_drawing(&d, kinds[k], (trip_reader_params){ 0 }), 0);
         assert_int_equal(draw_frame(&d, wanted), 0);
         close_drawing(&d);
-        for (int what = 0; what < MISHAPS; what++)
+        for (int name = 0; name < MISHAPS; name++)
             for (int engine = 0; engine < 2; engine++)
-                check_mishaps(kinds[k], engines[engine], what, wanted);
+                check_mishaps(kinds[k], engines[engine], name, wanted);
     }
 }
 

@@ -3,7 +3,7 @@
  * checking and drawing each of them by all renderers ends well or with one line; a picture that
  * comes out holds finite numbers. */
 #include "cloud.h"
-#include "dataset_text.h"
+#include "dataset_metadata.h"
 #include "hostile.h"
 #include "rounds.h"
 #include "scenes.h"
@@ -49,11 +49,11 @@ static int tear_down(void **state)
 }
 
 /* A failure is said once, and success is silent. */
-static void check_reports(const char *what, const char *step, int status)
+static void check_reports(const char *label, const char *step, int status)
 {
     int reports = test_caught_reports();
     if (reports != (status < 0))
-        fail_msg("%s: %s gave %d and %d lines, the last: %s", what, step, status, reports,
+        fail_msg("%s: %s gave %d and %d lines, the last: %s", label, step, status, reports,
                  test_last_report);
 }
 
@@ -103,33 +103,33 @@ static int draw(const trip_dataset *data, const scene_renderer *by, trip_classif
     return status;
 }
 
-static void check_picture(const char *what, const trip_dataset *data, const scene_renderer *by,
+static void check_picture(const char *label, const trip_dataset *data, const scene_renderer *by,
                           trip_classify classify, trip_budget *budget)
 {
     static float rgba[SIZE * SIZE * 4];
     test_catch_reports();
     int status = draw(data, by, classify, budget, rgba);
-    check_reports(what, by->name, status);
+    check_reports(label, by->name, status);
     if (status)
         return;
     counts.drawn++;
     for (int i = 0; i < SIZE * SIZE * 4; i++)
         if (!(rgba[i] >= -0.001 && rgba[i] <= 1.001))
-            fail_msg("%s: %s, %s draws %g", what, by->name,
+            fail_msg("%s: %s, %s draws %g", label, by->name,
                      classify == TRIP_CLASSIFY_POST ? "post" : "pre", (double)rgba[i]);
 }
 
-static void check_text(const char *what, const trip_dataset *data)
+static void check_text(const char *label, const trip_dataset *data)
 {
-    trip_dataset_text *text = NULL;
+    trip_dataset_metadata *text = NULL;
     trip_tf *tf = NULL;
     test_catch_reports();
-    int status = trip_dataset_text_parse(&text, data);
+    int status = trip_dataset_metadata_parse(&text, data);
     if (!status)
-        status = trip_dataset_text_tf(text, data, &tf);
-    check_reports(what, "its text", status);
+        status = trip_dataset_metadata_tf(text, data, &tf);
+    check_reports(label, "its text", status);
     trip_tf_destroy(tf);
-    trip_dataset_text_destroy(text);
+    trip_dataset_metadata_destroy(text);
 }
 
 /* The CPU renderer draws every data set, under sanitizers by each classification in turn; the slow
@@ -142,7 +142,7 @@ static bool takes_part(const scene_renderer *r, trip_classify classify, bool slo
 }
 
 /* Opens, checks and draws what lies there. */
-static void judge(const char *what, bool slow)
+static void judge(const char *label, bool slow)
 {
     trip_budget *budget;
     trip_dataset *data = NULL;
@@ -150,32 +150,32 @@ static void judge(const char *what, bool slow)
     counts.tried++;
     test_catch_reports();
     int status = trip_dataset_open(&data, shared.path, budget);
-    check_reports(what, "open", status);
+    check_reports(label, "open", status);
     if (!status) {
         counts.opened++;
-        check_text(what, data);
+        check_text(label, data);
         test_catch_reports();
         int verified = trip_dataset_verify(data, budget);
-        check_reports(what, "verify", verified);
+        check_reports(label, "verify", verified);
         counts.verified += verified == 0;
         for (const scene_renderer *r = shared.renderers; r->name; r++)
             if (takes_part(r, TRIP_CLASSIFY_PRE, slow))
-                check_picture(what, data, r, TRIP_CLASSIFY_PRE, budget);
+                check_picture(label, data, r, TRIP_CLASSIFY_PRE, budget);
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++)
             if (takes_part(r, TRIP_CLASSIFY_POST, slow))
-                check_picture(what, data, r, TRIP_CLASSIFY_POST, budget);
+                check_picture(label, data, r, TRIP_CLASSIFY_POST, budget);
         trip_dataset_close(data);
     }
     trip_budget_destroy(budget);
 }
 
 /* The sound data set but for `bytes` bytes of one file. */
-static void judge_changed(const char *what, hostile *h, bool slow)
+static void judge_changed(const char *label, hostile *h, bool slow)
 {
     hostile_seal(h, &shared.sound);
     hostile_write(h, &shared.disk, shared.path);
     hostile_free(h);
-    judge(what, slow);
+    judge(label, slow);
 }
 
 static const uint64_t whole_numbers[] = {
@@ -215,7 +215,7 @@ enum { REAL_NUMBERS = sizeof real_numbers / sizeof real_numbers[0] };
 
 /* Sets one whole number of the index to each of the values, and a little more and less than it is.
  */
-static void try_whole(const char *what, size_t at, size_t bytes)
+static void try_whole(const char *label, size_t at, size_t bytes)
 {
     uint64_t was = 0;
     memcpy(&was, shared.sound.index.data + at, bytes);
@@ -226,19 +226,19 @@ static void try_whole(const char *what, size_t at, size_t bytes)
             i < WHOLE_NUMBERS ? whole_numbers[i] : was + (i == WHOLE_NUMBERS ? 1u : -1u);
         if (bytes < 8 && value >> 8 * bytes)
             continue;
-        snprintf(name, sizeof name, "%s at byte %zu = %llu", what, at, (unsigned long long)value);
+        snprintf(name, sizeof name, "%s at byte %zu = %llu", label, at, (unsigned long long)value);
         hostile_copy(&h, &shared.sound);
         memcpy(h.index.data + at, &value, bytes);
         judge_changed(name, &h, i % 9 == 0);
     }
 }
 
-static void try_real(const char *what, size_t at)
+static void try_real(const char *label, size_t at)
 {
     for (int i = 0; i < REAL_NUMBERS; i++) {
         char name[96];
         hostile h;
-        snprintf(name, sizeof name, "%s at byte %zu = %g", what, at, real_numbers[i]);
+        snprintf(name, sizeof name, "%s at byte %zu = %g", label, at, real_numbers[i]);
         hostile_copy(&h, &shared.sound);
         memcpy(h.index.data + at, &real_numbers[i], sizeof real_numbers[i]);
         judge_changed(name, &h, true);
@@ -307,15 +307,15 @@ static size_t list_at(unsigned list)
     return hostile_header(&shared.sound)->lists_offset + list * sizeof(trip_file_list);
 }
 
-static void try_list(const char *what, unsigned list)
+static void try_list(const char *label, unsigned list)
 {
     for (size_t at = 0; at < offsetof(trip_file_list, dims); at += 4)
-        try_whole(what, list_at(list) + at, 4);
+        try_whole(label, list_at(list) + at, 4);
     for (size_t at = offsetof(trip_file_list, dims); at < sizeof(trip_file_list); at += 8)
-        try_whole(what, list_at(list) + at, 8);
+        try_whole(label, list_at(list) + at, 8);
     for (size_t at = offsetof(trip_file_list, index_to_world);
          at < offsetof(trip_file_list, records); at += 8)
-        try_real(what, list_at(list) + at);
+        try_real(label, list_at(list) + at);
 }
 
 static void the_lists(void **state)
@@ -379,7 +379,7 @@ static void exchange(unsigned a, unsigned b)
     judge_changed(name, &h, true);
 }
 
-static void lists_that_change_places(void **state)
+static void lists_that_change_positions(void **state)
 {
     (void)state;
     for (unsigned a = 0; a < CLOUD_LISTS; a++)
@@ -387,7 +387,7 @@ static void lists_that_change_places(void **state)
             exchange(a, b);
 }
 
-static void try_tables(const char *what, unsigned number)
+static void try_tables(const char *label, unsigned number)
 {
     const trip_file_list *list = hostile_list(&shared.sound, &shared.sound, number);
     size_t slab = list->slabs_offset + sizeof(trip_file_slab); /* the second */
@@ -395,17 +395,17 @@ static void try_tables(const char *what, unsigned number)
     size_t run = list->runs_offset + 5 * sizeof(trip_file_run);
     assert_true(list->slab_count > 1 && list->brick_count > 2);
     for (size_t at = 0; at < 24; at += 8)
-        try_whole(what, slab + at, 8);
+        try_whole(label, slab + at, 8);
     for (size_t at = 24; at < sizeof(trip_file_slab); at += 4)
-        try_whole(what, slab + at, 4);
+        try_whole(label, slab + at, 4);
     for (size_t at = 0; at < 12; at += 4)
-        try_whole(what, brick + at, 4);
+        try_whole(label, brick + at, 4);
     for (size_t at = 12; at < 16; at += 2)
-        try_whole(what, brick + at, 2);
+        try_whole(label, brick + at, 2);
     for (size_t at = 16; at < sizeof(trip_file_brick); at++)
-        try_whole(what, brick + at, 1);
+        try_whole(label, brick + at, 1);
     for (size_t at = 0; at < 5 * sizeof(trip_file_run); at += 2)
-        try_whole(what, run + at, 2);
+        try_whole(label, run + at, 2);
 }
 
 static void slabs_bricks_and_runs(void **state)
@@ -467,7 +467,7 @@ int main(void)
         cmocka_unit_test(the_scale_of_the_map_and_of_the_values),
         cmocka_unit_test(the_lists),
         cmocka_unit_test(the_grid_of_a_level),
-        cmocka_unit_test(lists_that_change_places),
+        cmocka_unit_test(lists_that_change_positions),
         cmocka_unit_test(slabs_bricks_and_runs),
         cmocka_unit_test(records),
         cmocka_unit_test(spans_of_the_index),

@@ -53,7 +53,7 @@ class Hidden(limits.Test):
             for saturation in "0", None, "0.03125", "0.1":
                 look = ["--tf", haze, "--classify", classify, "--fov", 60, "--look", "96,96,96",
                         "--eye", "96,-64,96"]
-                look += ["--saturation", saturation] if saturation else []
+                look += ["--early-termination", saturation] if saturation else []
                 wanted = self.stats(data, *look, "--occluded", "draw", size="256x256")[1]
                 stats, picture = self.stats(data, *look, "--occluded", "skip", size="256x256")
                 self.assertEqual(picture, wanted)
@@ -62,7 +62,7 @@ class Hidden(limits.Test):
                 self.assertEqual(picture, wanted)
                 read.append(bytes_read(stats))
                 usual = 1 / 8192 if classify == "pre" else 1 / 512
-                self.assertEqual(stats["saturation"], float(saturation or usual))
+                self.assertEqual(stats["early_termination"], float(saturation or usual))
             self.note(f"{classify}: {', '.join(map(limits.text_bytes, read))} with 0, the default, "
                       "1/32, 0.1")
             self.assertEqual(read[0], max(read))

@@ -6,12 +6,12 @@
 #include "volume_files.h"
 
 /* Coordinates: x is 1, 2, 4, 8, 16, z is 6, 5, 4 ... 0. */
-static inline int x_place(int i)
+static inline int x_position(int i)
 {
     return 1 << i;
 }
 
-static inline int z_place(int k)
+static inline int z_position(int k)
 {
     return NZ - 1 - k;
 }
@@ -37,7 +37,7 @@ static inline void assert_placed(const char *path, const char *name)
 }
 
 /* Of variables whose attribute says that they have no sign, while their type has one. */
-static inline int unsigned_x_place(int i)
+static inline int unsigned_x_position(int i)
 {
     return 100 + 25 * i;
 }

@@ -168,7 +168,7 @@ static inline void append_exr(bytes *b, trip_scalar type, int k)
 typedef struct dicom {
     const char *series, *number, *position, *orientation, *spacing, *thickness, *slope, *inter;
     const char *frames;
-    const char *const *frame_slopes, *const *frame_places; /* of each frame, or NULL */
+    const char *const *frame_slopes, *const *frame_positions; /* of each frame, or NULL */
     unsigned stored, shift; /* bits that hold the value, and unused ones below; 0: all, none */
     trip_scalar type;
 } dicom;
@@ -224,10 +224,10 @@ static inline void append_frame_groups(bytes *b, const dicom *d, int count)
 {
     bytes frames = { .count = 0 };
     for (int k = 0; k < count; k++) {
-        bytes frame = { .count = 0 }, place = { .count = 0 }, scale = { .count = 0 };
-        if (d->frame_places) {
-            append_dicom_text(&place, 0x20, 0x32, "DS", d->frame_places[k]);
-            append_group(&frame, 0x20, 0x9113, &place);
+        bytes frame = { .count = 0 }, position = { .count = 0 }, scale = { .count = 0 };
+        if (d->frame_positions) {
+            append_dicom_text(&position, 0x20, 0x32, "DS", d->frame_positions[k]);
+            append_group(&frame, 0x20, 0x9113, &position);
         }
         if (d->frame_slopes) {
             append_dicom_text(&scale, 0x28, 0x1053, "DS", d->frame_slopes[k]);
@@ -266,7 +266,7 @@ static inline void append_dicom(bytes *b, const dicom *d, int first, int count)
     append_dicom_u16(b, 0x28, 0x103, is_signed(d->type));
     append_dicom_text(b, 0x28, 0x1052, "DS", d->inter);
     append_dicom_text(b, 0x28, 0x1053, "DS", d->slope);
-    if (d->frame_slopes || d->frame_places)
+    if (d->frame_slopes || d->frame_positions)
         append_frame_groups(b, d, count);
     for (int k = first; k < first + count; k++)
         for (int j = 0; j < NY; j++)

@@ -392,7 +392,7 @@ static void gradients_of_uneven_grids_are_those_of_the_world(void **state)
     (void)state;
     const int size[3] = { NX, NY, NZ };
     const double slope[3] = { 2, -1, 0.5 };
-    double places[3][NX];
+    double positions[3][NX];
     char files[400], paths[3][128];
     test_lists l;
     trip_brick_summary s;
@@ -401,15 +401,15 @@ static void gradients_of_uneven_grids_are_those_of_the_world(void **state)
         snprintf(paths[a], sizeof paths[a], "%s.%c", p.input, 'x' + a);
         FILE *f = fopen(paths[a], "w");
         for (int i = 0; i < size[a]; i++) { /* steps of 1, 2, 3, 1, 2, 3 ... */
-            places[a][i] = i / 3 * 6 + (i % 3 == 0 ? 0 : i % 3 == 1 ? 1 : 3);
-            fprintf(f, "%g\n", places[a][i]);
+            positions[a][i] = i / 3 * 6 + (i % 3 == 0 ? 0 : i % 3 == 1 ? 1 : 3);
+            fprintf(f, "%g\n", positions[a][i]);
         }
         fclose(f);
     }
     snprintf(files, sizeof files, "%s,%s,%s", paths[0], paths[1], paths[2]);
     for (int i = 0; i < N; i++)
-        floats[i] = (float)(slope[0] * places[0][i % NX] + slope[1] * places[1][i / NX % NY] +
-                            slope[2] * places[2][i / NX / NY]);
+        floats[i] = (float)(slope[0] * positions[0][i % NX] + slope[1] * positions[1][i / NX % NY] +
+                            slope[2] * positions[2][i / NX / NY]);
     test_write("v.raw", floats, sizeof floats);
     p.volume.coordinates = files;
     p.keep_all = true;
@@ -617,16 +617,16 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
     p.memory_bytes = 1 << 20;
     check_refused(p, "--memory");
     for (unsigned threads = 1; threads < 4; threads++) { /* what it says that it needs suffices */
-        unsigned least = 0;
+        unsigned min = 0;
         char same[200];
         p.memory_bytes = 1 << 20;
         p.threads = threads;
         check_refused(p, "threads need --memory ");
-        assert_int_equal(sscanf(strstr(test_report, "--memory "), "--memory %uM", &least), 1);
+        assert_int_equal(sscanf(strstr(test_report, "--memory "), "--memory %uM", &min), 1);
         snprintf(same, sizeof same, "%s", strstr(test_report, "slices of"));
-        p.memory_bytes = (uint64_t)(least - 2) << 20;
+        p.memory_bytes = (uint64_t)(min - 2) << 20;
         check_refused(p, same);
-        p.memory_bytes = (uint64_t)least << 20;
+        p.memory_bytes = (uint64_t)min << 20;
         assert_int_equal(trip_brick(&p, &(trip_brick_summary){ 0 }), 0);
         assert_int_equal(rename(p.output, test_path(threads > 1 ? threads > 2 ? "3" : "2" : "1")),
                          0);

@@ -8,14 +8,14 @@
 #include "normal.h"
 #include "reader.h"
 
-enum { NX = 300, NY = 70, NZ = 41, N = NX * NY * NZ, LEAST = 200 };
+enum { NX = 300, NY = 70, NZ = 41, N = NX * NY * NZ, MIN = 200 };
 
 static uint8_t bytes[N];
 
 static bool is_kept(int64_t x, int64_t y, int64_t z)
 {
     return x >= 0 && y >= 0 && z >= 0 && x < NX && y < NY && z < NZ &&
-           bytes[(z * NY + y) * NX + x] >= LEAST;
+           bytes[(z * NY + y) * NX + x] >= MIN;
 }
 
 /* Kept, or next to what is. */
@@ -42,14 +42,13 @@ static void make_bytes(uint64_t seed, unsigned rare)
     for (int i = 0; i < N; i++) {
         int x = i % NX - 260, y = i / NX % NY - 30, z = i / NX / NY - 21;
         bool kept = x * x + y * y + z * z < 300 || test_random(&random) % rare == 0;
-        bytes[i] =
-            (uint8_t)(kept ? LEAST + test_random(&random) % 56 : test_random(&random) % LEAST);
+        bytes[i] = (uint8_t)(kept ? MIN + test_random(&random) % 56 : test_random(&random) % MIN);
     }
     test_write("v.raw", bytes, sizeof bytes);
     find_known();
 }
 
-static const trip_value_range high = { LEAST, 255 };
+static const trip_value_range high = { MIN, 255 };
 
 static trip_brick_summary brick_to(const char *output, trip_brick_params p)
 {
@@ -126,9 +125,9 @@ typedef struct base {
     double value, around; /* codes; the latter the least of what is not kept */
 } base;
 
-enum { MOST_LEVEL = 2, MOST = (NX / 2 + 1) * (NY / 2 + 1) * (NZ / 2 + 1) };
+enum { MAX_LEVEL = 2, MAX = (NX / 2 + 1) * (NY / 2 + 1) * (NZ / 2 + 1) };
 
-static base bases[1 + MOST_LEVEL][MOST];
+static base bases[1 + MAX_LEVEL][MAX];
 
 static int64_t size_of(int axis, unsigned level)
 {
@@ -146,39 +145,39 @@ static base *base_at(int64_t x, int64_t y, int64_t z, unsigned level)
 
 /* The least of what was not kept in it: of the halo, or of level 1 what voxels have around, or
  * their value where none is kept. */
-static double least_in(const int64_t at[3], unsigned level)
+static double min_in(const int64_t at[3], unsigned level)
 {
-    double least = INFINITY;
+    double min = INFINITY;
     for (int n = 0; n < 8; n++) {
         const int64_t x = 2 * at[0] + n % 2, y = 2 * at[1] + n / 2 % 2, z = 2 * at[2] + n / 4;
         const base *below = level > 1 ? base_at(x, y, z, level - 1) : NULL;
         if (below && below->there)
-            least = fmin(least, below->kept ? below->around : below->value);
+            min = fmin(min, below->kept ? below->around : below->value);
         if (level == 1 && x < NX && y < NY && z < NZ && known[(z * NY + y) * NX + x] &&
             !is_kept(x, y, z))
-            least = fmin(least, 85.0 * (258 + bytes[(z * NY + y) * NX + x]));
+            min = fmin(min, 85.0 * (258 + bytes[(z * NY + y) * NX + x]));
     }
-    return least;
+    return min;
 }
 
 /* A voxel of level 2 that covers none known, beside some that cover kept ones, has the least that
  * these have around. */
 static void add_halo(const int64_t at[3], unsigned level, base *b)
 {
-    double least = INFINITY;
+    double min = INFINITY;
     for (int n = 0; n < 27; n++) {
         const base *beside =
             base_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1, level);
         if (beside && beside->kept)
-            least = fmin(least, beside->around);
+            min = fmin(min, beside->around);
     }
-    if (level > 1 && !b->there && least < INFINITY)
-        *b = (base){ .there = true, .added = true, .value = least };
+    if (level > 1 && !b->there && min < INFINITY)
+        *b = (base){ .there = true, .added = true, .value = min };
 }
 
 static void find_bases(void)
 {
-    for (unsigned level = 1; level <= MOST_LEVEL; level++)
+    for (unsigned level = 1; level <= MAX_LEVEL; level++)
         for (int pass = 0; pass < 2; pass++) {
             int64_t at[3];
             for (at[2] = 0; at[2] < size_of(2, level); at[2]++)
@@ -190,7 +189,7 @@ static void find_bases(void)
                             *b = (base){ .kept = c.kept > 0,
                                          .there = c.known > 0,
                                          .value = c.value,
-                                         .around = least_in(at, level) };
+                                         .around = min_in(at, level) };
                         else
                             add_halo(at, level, b);
                     }
@@ -339,12 +338,12 @@ static uint64_t check_added(const char *name, int shown_from, int shown_to)
 
 static void what_is_added_about_kept_voxels_does_not_show(void **state)
 {
-    static const trip_value_range low = { 0, 255 - LEAST };
+    static const trip_value_range low = { 0, 255 - MIN };
     trip_brick_params p = { .levels = 2 };
     (void)state;
     make_bytes(12, 2000);
     brick_to("a.trip", p);
-    const uint64_t count = check_added("a.trip", LEAST, 255);
+    const uint64_t count = check_added("a.trip", MIN, 255);
     assert_true(count > 100);
     for (int i = 0; i < N; i++)
         bytes[i] = (uint8_t)(255 - bytes[i]); /* what is known remains so */
@@ -352,7 +351,7 @@ static void what_is_added_about_kept_voxels_does_not_show(void **state)
     p.ranges = &low;
     p.range_count = 1;
     brick_to("a.trip", p);
-    assert_int_equal(check_added("a.trip", 0, 255 - LEAST), count);
+    assert_int_equal(check_added("a.trip", 0, 255 - MIN), count);
 }
 
 /* Below all values that codes have, and above. */
@@ -367,7 +366,7 @@ static void spread_bytes(const trip_value_range *kept, unsigned count)
         const trip_value_range *in = &kept[bytes[i] % count];
         const int width = (int)(in->hi - in->lo) + 1, byte = bytes[i];
         const bool below = (i % NX + i / NX % NY + i / NX / NY) % 2;
-        if (byte >= LEAST)
+        if (byte >= MIN)
             bytes[i] = (uint8_t)(in->lo + byte / (int)count % width);
         else
             bytes[i] = (uint8_t)(below ? byte % lo : 255 - byte % (255 - hi));

@@ -54,14 +54,14 @@ static void coordinates_are_places_and_a_map(void **state)
     const trip_volume_info *info = trip_volume_get_info(v);
     assert_map(&info->index_to_world,
                (const double[3][4]){ { 1, 0, 0, -1 }, { 0, 1, 0, 0 }, { 0, 0, -2, 10 } });
-    const double places[3][NZ] = { { 0, 1, 1.5, 3, 4 },
-                                   { 0, 1, 2, 3 },
-                                   { 0, 0.5, 1.5, 2, 3, 4, 6 } };
+    const double positions[3][NZ] = { { 0, 1, 1.5, 3, 4 },
+                                      { 0, 1, 2, 3 },
+                                      { 0, 0.5, 1.5, 2, 3, 4, 6 } };
     const int64_t dims[3] = { NX, NY, NZ };
     for (int a = 0; a < 3; a++) {
         assert_null(trip_coordinates_fault(info->coordinates[a], dims[a]));
         for (int i = 0; i < dims[a]; i++)
-            assert_true(fabs(info->coordinates[a][i] - places[a][i]) < 1e-12);
+            assert_true(fabs(info->coordinates[a][i] - positions[a][i]) < 1e-12);
     }
     trip_volume_close(v);
     trip_budget_destroy(budget);
@@ -96,7 +96,7 @@ static void what_is_left_out_leaves_the_others_where_they_are(void **state)
     const char *z = write_text('z', "0 1 3 4 9 10 16");
     char *files = option("", "", z);
     trip_volume_params p = raw_params(files);
-    p.most_voxels = VOXELS / 4;
+    p.max_voxels = VOXELS / 4;
     assert_int_equal(trip_budget_create(&budget, 1 << 20), 0);
     assert_int_equal(trip_volume_open(&v, sample_file(), &p, budget), 0);
     const trip_volume_info *info = trip_volume_get_info(v);
@@ -163,7 +163,7 @@ static const char *write_hole(const char *name, const char *header, int64_t data
 static void no_table_is_made_of_an_axis_that_is_too_long(void **state)
 {
     (void)state;
-    const int64_t voxels = TRIP_VOLUME_AXIS_MOST + 1;
+    const int64_t voxels = TRIP_VOLUME_AXIS_MAX + 1;
     char *files = option(write_text('x', "0 1 5"), "", "");
     const trip_volume_params p = { .raw_dims = { 3, voxels, 1 },
                                    .raw_type = "uint8",
@@ -221,7 +221,7 @@ static void coordinates_may_come_through_a_pipe(void **state)
 }
 
 /* Place and index are one another's inverse, beyond the ends too. */
-static void places_and_indices_are_inverse(void **state)
+static void positions_and_indices_are_inverse(void **state)
 {
     (void)state;
     const double x[] = { 0, 0.25, 2.5, 3 }, one[] = { 0 };
@@ -230,9 +230,9 @@ static void places_and_indices_are_inverse(void **state)
     const double pairs[][2] = { { -1, -0.25 }, { 0, 0 },      { 0.5, 0.125 },
                                 { 1, 0.25 },   { 2.5, 2.75 }, { 4, 3.5 } };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        assert_true(fabs(trip_coordinates_place(&c, 0, pairs[i][0]) - pairs[i][1]) < 1e-12);
+        assert_true(fabs(trip_coordinates_position(&c, 0, pairs[i][0]) - pairs[i][1]) < 1e-12);
         assert_true(fabs(trip_coordinates_index(&c, 0, pairs[i][1]) - pairs[i][0]) < 1e-12);
-        assert_true(trip_coordinates_place(&c, 1, pairs[i][0]) == pairs[i][0]);
+        assert_true(trip_coordinates_position(&c, 1, pairs[i][0]) == pairs[i][0]);
     }
     assert_true(fabs(trip_coordinates_width(&c, 0, 0) - 0.25) < 1e-12);
     assert_true(fabs(trip_coordinates_width(&c, 0, 1) - 1.25) < 1e-12);
@@ -249,7 +249,7 @@ static void places_of_voxels_are_those_of_the_table(void **state)
         const trip_coordinates c = trip_coordinates_make((const double *const[3]){ x, x, x },
                                                          (const int64_t[3]){ 4, 4, 4 });
         for (int k = 0; k < 4; k++)
-            assert_true(trip_coordinates_place(&c, 0, k) == x[k]);
+            assert_true(trip_coordinates_position(&c, 0, k) == x[k]);
     }
 }
 
@@ -263,7 +263,7 @@ int main(void)
         cmocka_unit_test(no_table_is_made_of_an_axis_that_is_too_long),
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(coordinates_may_come_through_a_pipe),
-        cmocka_unit_test(places_and_indices_are_inverse),
+        cmocka_unit_test(positions_and_indices_are_inverse),
         cmocka_unit_test(places_of_voxels_are_those_of_the_table),
     };
     return cmocka_run_group_tests_name("coordinates", tests, make_folder, remove_folder);

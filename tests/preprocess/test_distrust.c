@@ -10,7 +10,7 @@
 #include "image_helper.h"
 #include "volume.h"
 
-enum { SLICE_VOXELS = 64 * 64, SLICES = 64, MOST_BYTES = 4096, MEMORY_BYTES = 16 << 20 };
+enum { SLICE_VOXELS = 64 * 64, SLICES = 64, MAX_BYTES = 4096, MEMORY_BYTES = 16 << 20 };
 
 static char folder[] = "distrust-XXXXXX";
 
@@ -26,15 +26,15 @@ static int leave_folder(void **state)
     return chdir("..") == 0 ? rmdir(folder) : -1;
 }
 
-static size_t read_kept(const char *name, unsigned char bytes[MOST_BYTES])
+static size_t read_kept(const char *name, unsigned char bytes[MAX_BYTES])
 {
     char path[512];
     snprintf(path, sizeof path, TRIP_SOURCE_DIR "/tests/regress/%s", name);
     FILE *f = fopen(path, "rb");
     assert_non_null(f);
-    size_t count = fread(bytes, 1, MOST_BYTES, f);
+    size_t count = fread(bytes, 1, MAX_BYTES, f);
     fclose(f);
-    assert_true(count > 0 && count < MOST_BYTES);
+    assert_true(count > 0 && count < MAX_BYTES);
     return count;
 }
 
@@ -51,7 +51,7 @@ static int resume(const char *name, trip_budget *budget)
     static const trip_journal_params params = { .resume = true,
                                                 .voxels = SLICE_VOXELS * SLICES,
                                                 .slice_voxels = SLICE_VOXELS };
-    unsigned char bytes[MOST_BYTES];
+    unsigned char bytes[MAX_BYTES];
     trip_spill *spill;
     trip_journal *journal;
     size_t count = read_kept(name, bytes);
@@ -93,7 +93,7 @@ static void journals_are_not_trusted(void **state)
 }
 
 static struct {
-    unsigned char bytes[MOST_BYTES];
+    unsigned char bytes[MAX_BYTES];
     size_t count;
     int fd;
 } answer;

@@ -101,7 +101,7 @@ static void a_sample_without_values_says_nothing_of_the_volume(void **state)
     for (int ranges = 0; ranges < 2; ranges++) {
         p.ranges = &(trip_value_range){ 100, 200 };
         p.range_count = (size_t)ranges;
-        p.most_bytes = 1 << 20; /* for which the run looks at a sample, too */
+        p.max_bytes = 1 << 20; /* for which the run looks at a sample, too */
         p.replace = true;
         assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
         assert_int_equal(trip_brick(&p, &s), 0);

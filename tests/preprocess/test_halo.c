@@ -263,10 +263,10 @@ static void samples_of_a_sparse_volume_have_their_halo_within_the_grid(void **st
     generate("v.vdb");
     p.ranges = &all;
     for (int64_t step = 1; step < 8; step++) {
-        p.volume.most_voxels = 0;
+        p.volume.max_voxels = 0;
         for (int a = 0; a < 3 && step > 1; a++)
-            p.volume.most_voxels =
-                (a ? p.volume.most_voxels : 1) * (uint64_t)((whole[a] - 1) / step + 1);
+            p.volume.max_voxels =
+                (a ? p.volume.max_voxels : 1) * (uint64_t)((whole[a] - 1) / step + 1);
         brick_to(p, "a.trip");
         test_read_lists("a.trip", &l);
         test_check_lists(&l);

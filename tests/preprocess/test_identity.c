@@ -29,7 +29,7 @@ static const trip_brick_params different[] = {
     { .volume.spacing = { 1, 1, 2 } },
     { .volume.spacing = { 2, 1, 1 } },
     { .volume.axes = "PIR" },
-    { .volume.most_voxels = 1000 },
+    { .volume.max_voxels = 1000 },
     { .functions = functions, .function_count = 1 },
     { .functions = functions + 1, .function_count = 1 },
     { .functions = functions, .function_count = 2 },
@@ -79,7 +79,7 @@ static void options_that_change_nothing_change_no_text(void **state)
     static const trip_brick_params alike[] = {
         { .input = "a", .output = "b" },
         { .replace = true, .resume = true },
-        { .memory_bytes = 1 << 30, .threads = 3, .slices = 5, .most_bytes = 1 },
+        { .memory_bytes = 1 << 30, .threads = 3, .slices = 5, .max_bytes = 1 },
         { .levels_for = TRIP_LEVELS_FOR_POST }, /* as where nothing is said */
     };
     char *text = text_of(&different[0]);

@@ -11,7 +11,7 @@
 #include "journal.h"
 
 enum { NX = 128, NY = 96, NZ = 128, N = NX * NY * NZ };
-enum { START = 1, CHECKPOINT = 2, OUTPUT = 3, MOST_RECORDS = 16 };
+enum { START = 1, CHECKPOINT = 2, OUTPUT = 3, MAX_RECORDS = 16 };
 
 /* As journal.c lays it out. */
 typedef struct record {
@@ -19,7 +19,7 @@ typedef struct record {
     unsigned char *body;
 } record;
 
-static record records[MOST_RECORDS];
+static record records[MAX_RECORDS];
 static size_t record_count;
 
 static uint8_t values[N];
@@ -85,7 +85,7 @@ static void read_journal(void)
     assert_non_null(f);
     record_count = 0;
     for (record *r = records; fread(r, 8, 3, f) == 3; r++, record_count++) {
-        assert_true(record_count < MOST_RECORDS);
+        assert_true(record_count < MAX_RECORDS);
         r->body = malloc(r->bytes);
         if (fread(r->body, 1, r->bytes, f) == r->bytes)
             continue;
@@ -212,9 +212,9 @@ static void check_attacks(const attack *attacks, size_t count, const char *why, 
 ATTACK(exponent_far_below, checkpoint()->tally.exponent = -100000)
 ATTACK(exponent_far_above, checkpoint()->tally.exponent = 100000)
 ATTACK(exponent_wider_than_the_range, checkpoint()->tally.exponent += 1)
-ATTACK(exponent_least, checkpoint()->tally.exponent = INT32_MIN)
+ATTACK(exponent_min, checkpoint()->tally.exponent = INT32_MIN)
 ATTACK(first_bin_elsewhere, checkpoint()->tally.first += 100)
-ATTACK(first_bin_least, checkpoint()->tally.first = INT64_MIN)
+ATTACK(first_bin_min, checkpoint()->tally.first = INT64_MIN)
 ATTACK(bin_behind_the_range, checkpoint()->tally.counts[TRIP_TALLY_BINS - 1] = 1)
 ATTACK(bins_overflowing, checkpoint()->tally.counts[0] = UINT64_MAX)
 ATTACK(value_not_a_number, checkpoint()->tally.value_min = NAN)
@@ -224,7 +224,7 @@ ATTACK(range_upside_down, checkpoint()->tally.value_max = checkpoint()->tally.va
 ATTACK(none_finite_but_counted, checkpoint()->tally.finite = 0)
 ATTACK(a_voxel_more, checkpoint()->tally.voxels++)
 ATTACK(a_voxel_less, checkpoint()->tally.voxels--)
-ATTACK(most_voxels, checkpoint()->tally.voxels = UINT64_MAX)
+ATTACK(max_voxels, checkpoint()->tally.voxels = UINT64_MAX)
 ATTACK(more_finite_than_voxels, checkpoint()->tally.finite++)
 ATTACK(scanned_voxel_more, start()->tally.voxels++)
 ATTACK(scanned_exponent, start()->tally.exponent = 1 << 20)
@@ -232,16 +232,16 @@ ATTACK(not_scanned, start()->scanned = 0)
 ATTACK(scanned, start()->scanned = 1)
 ATTACK(another_identity, start()->identity++)
 ATTACK(done_beyond_the_end, checkpoint()->done = NZ + 1)
-ATTACK(most_done, checkpoint()->done = UINT64_MAX)
+ATTACK(max_done, checkpoint()->done = UINT64_MAX)
 ATTACK(done_before, checkpoint()->done = 0)
 ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
 /* Of all values, those of the slices that were read are fewer. */
 ATTACK(more_kept_than_read, checkpoint()->kept = checkpoint()->done * NX * NY + 1)
 ATTACK(halo_without_room, checkpoint()->halo = 1)
-ATTACK(most_halo, checkpoint()->halo = UINT64_MAX)
+ATTACK(max_halo, checkpoint()->halo = UINT64_MAX)
 ATTACK(more_in_order_than_there_are, checkpoint()->ordered_splats = N + 1)
-ATTACK(most_runs, checkpoint()->runs = UINT64_MAX / 16)
-ATTACK(most_sequences, checkpoint()->sequences = UINT64_MAX)
+ATTACK(max_runs, checkpoint()->runs = UINT64_MAX / 16)
+ATTACK(max_sequences, checkpoint()->sequences = UINT64_MAX)
 ATTACK(sequences_that_wrap, checkpoint()->sequences += UINT64_C(1) << 59)
 ATTACK(fewer_sequences, checkpoint()->sequences--)
 ATTACK(sequence_of_no_list, sequences()->list = 6)
@@ -264,9 +264,9 @@ static void numbers_that_no_run_writes_are_refused(void **state)
         { "exponent far below", exponent_far_below },
         { "exponent far above", exponent_far_above },
         { "exponent wider than the range", exponent_wider_than_the_range },
-        { "exponent least", exponent_least },
+        { "exponent least", exponent_min },
         { "first bin elsewhere", first_bin_elsewhere },
-        { "first bin least", first_bin_least },
+        { "first bin least", first_bin_min },
         { "bin behind the range", bin_behind_the_range },
         { "bins overflowing", bins_overflowing },
         { "value not a number", value_not_a_number },
@@ -276,18 +276,18 @@ static void numbers_that_no_run_writes_are_refused(void **state)
         { "none finite but counted", none_finite_but_counted },
         { "a voxel more", a_voxel_more },
         { "a voxel less", a_voxel_less },
-        { "most voxels", most_voxels },
+        { "most voxels", max_voxels },
         { "more finite than voxels", more_finite_than_voxels },
         { "scanned", scanned },
         { "done beyond the end", done_beyond_the_end },
-        { "most done", most_done },
+        { "most done", max_done },
         { "done before", done_before },
         { "more kept than there are", more_kept_than_there_are },
         { "halo without room", halo_without_room },
-        { "most halo", most_halo },
+        { "most halo", max_halo },
         { "more in order than there are", more_in_order_than_there_are },
-        { "most runs", most_runs },
-        { "most sequences", most_sequences },
+        { "most runs", max_runs },
+        { "most sequences", max_sequences },
         { "sequences that wrap", sequences_that_wrap },
         { "fewer sequences", fewer_sequences },
         { "record of another kind", record_of_another_kind },
@@ -556,7 +556,7 @@ static void a_record_that_is_longer_than_any_is_none(void **state)
     make_volume();
     leave_killed_run(p);
     read_journal();
-    assert_true(record_count < MOST_RECORDS);
+    assert_true(record_count < MAX_RECORDS);
     records[record_count++] =
         (record){ .kind = CHECKPOINT, .bytes = (4 << 20) + 8, .body = calloc(1, (4 << 20) + 8) };
     write_journal();
@@ -635,7 +635,7 @@ static void add_output(uint64_t device, uint64_t inode)
 {
     trip_journal_output *noted = malloc(sizeof *noted);
     read_journal();
-    assert_true(record_count < MOST_RECORDS);
+    assert_true(record_count < MAX_RECORDS);
     *noted = (trip_journal_output){ device, inode };
     records[record_count++] = (record){ OUTPUT, sizeof *noted, 0, (void *)noted };
     write_journal();

@@ -89,8 +89,8 @@ static void put_row(trip_list_builder *b, unsigned producer, unsigned axis, cons
         p[step_axis] = from[step_axis] + i;
         if (!is_splat(p[0], p[1], p[2]))
             continue;
-        uint64_t place = trip_morton(p[u] % 32, p[v] % 32);
-        bitmap[place / 64] |= UINT64_C(1) << place % 64;
+        uint64_t position = trip_morton(p[u] % 32, p[v] % 32);
+        bitmap[position / 64] |= UINT64_C(1) << position % 64;
         codes[splats] = (uint16_t)(hash_of(p[0], p[1], p[2]) >> 8);
         normals[splats++] = hash_of(p[0], p[1], p[2]) | 1u << 24;
     }
@@ -200,13 +200,13 @@ static void lists_hold_the_splats_in_order(void **state)
 static void memory_producers_and_order_make_no_difference(void **state)
 {
     (void)state;
-    uint64_t spilled, least = trip_list_builder_min_bytes(&format, 1);
+    uint64_t spilled, min = trip_list_builder_min_bytes(&format, 1);
     const run_params ways[] = {
         { (uint64_t)1 << 27, 1, false, false, false },
-        { least, 1, false, false, false },
-        { least, 1, false, true, false },
-        { 2 * least, 2, true, true, false },
-        { 3 * least, 4, false, true, false },
+        { min, 1, false, false, false },
+        { min, 1, false, true, false },
+        { 2 * min, 2, true, true, false },
+        { 3 * min, 4, false, true, false },
     };
     assert_int_equal(
         run("a.trip", &(run_params){ (uint64_t)1 << 27, 3, true, true, false }, &spilled), 0);

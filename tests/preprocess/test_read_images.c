@@ -207,15 +207,15 @@ static void dicom_without_positions_is_ordered_by_number(void **state)
 }
 
 /* Writes slices of these places, opens them, and gives the first report, if any. */
-static const char *report_of_places(const char *const places[NZ], const char *orientation,
-                                    int expected_status)
+static const char *report_of_positions(const char *const positions[NZ], const char *orientation,
+                                       int expected_status)
 {
     static float values[VOXELS];
     for (int k = 0; k < NZ; k++) {
         char name[32];
         snprintf(name, sizeof name, "p%d.dcm", k);
         const dicom d = { .type = TRIP_U8,
-                          .position = places[k],
+                          .position = positions[k],
                           .orientation = orientation,
                           .spacing = "0.5\\0.5" };
         write_dicom(name, &d, k, 1);
@@ -241,17 +241,17 @@ static void dicom_slices_beside_their_line_are_refused(void **state)
     const char *const uneven[NZ] = { "0\\0\\0",   "0\\1\\2",    "0\\2\\4",   "0\\3\\6",
                                      "0\\4.5\\9", "0\\5.5\\11", "0\\6.5\\13" };
     const char *axial = "1\\0\\0\\0\\1\\0";
-    assert_string_equal(report_of_places(straight, axial, 0), "");
-    assert_non_null(strstr(report_of_places(crooked, axial, TRIP_ERROR),
+    assert_string_equal(report_of_positions(straight, axial, 0), "");
+    assert_non_null(strstr(report_of_positions(crooked, axial, TRIP_ERROR),
                            "p0.dcm: slice 4 of its series lies 0.3 beside the line"));
     assert_non_null(
-        strstr(report_of_places(gap, axial, TRIP_ERROR), "p3.dcm: a slice is missing after it"));
-    assert_non_null(strstr(report_of_places(uneven, axial, 0), "perhaps some are missing"));
+        strstr(report_of_positions(gap, axial, TRIP_ERROR), "p3.dcm: a slice is missing after it"));
+    assert_non_null(strstr(report_of_positions(uneven, axial, 0), "perhaps some are missing"));
     assert_int_equal(reports, 1);
-    assert_non_null(strstr(report_of_places(straight, "1\\0\\0\\0.5\\1\\0", TRIP_ERROR),
+    assert_non_null(strstr(report_of_positions(straight, "1\\0\\0\\0.5\\1\\0", TRIP_ERROR),
                            "not at right angles"));
-    assert_non_null(
-        strstr(report_of_places(straight, "0\\0\\0\\0\\0\\0", TRIP_ERROR), "not at right angles"));
+    assert_non_null(strstr(report_of_positions(straight, "0\\0\\0\\0\\0\\0", TRIP_ERROR),
+                           "not at right angles"));
 }
 
 /* Their order along the patient is a guess, and so are left and right. */
@@ -311,14 +311,14 @@ static void dicom_frames_are_rescaled_each_by_its_own_slope(void **state)
 {
     (void)state;
     static const char *const slopes[NZ] = { "1", "2", "3", "4", "5", "6", "7" };
-    static const char *const places[NZ] = { "0\\0\\6", "0\\0\\5", "0\\0\\4", "0\\0\\3",
-                                            "0\\0\\2", "0\\0\\1", "0\\0\\0" };
+    static const char *const positions[NZ] = { "0\\0\\6", "0\\0\\5", "0\\0\\4", "0\\0\\3",
+                                               "0\\0\\2", "0\\0\\1", "0\\0\\0" };
     const dicom d = { .type = TRIP_U16,
                       .frames = "7",
                       .orientation = "1\\0\\0\\0\\1\\0",
                       .inter = "5",
                       .frame_slopes = slopes,
-                      .frame_places = places };
+                      .frame_positions = positions };
     float values[VOXELS];
     trip_volume_info info;
     write_dicom("frames.dcm", &d, 0, NZ);

@@ -81,9 +81,9 @@ static void end_variable(file *f, int number, int type, uint64_t vsize)
 /* Writes where a variable's values begin, which is here. */
 static void begin_values(file *f, int number)
 {
-    bytes place = { .count = 0 };
-    append_word(&place, f->b.count, f->form == 1 ? 4 : 8, true);
-    memcpy(f->b.data + f->begin[number], place.data, place.count);
+    bytes position = { .count = 0 };
+    append_word(&position, f->b.count, f->form == 1 ? 4 : 8, true);
+    memcpy(f->b.data + f->begin[number], position.data, position.count);
 }
 
 static void pad(file *f)
@@ -150,9 +150,9 @@ static const char *write_contents(const char *name, const contents *c)
         begin_values(&f, 1);
         for (int i = 0; i < NX; i++)
             if (c->is_unsigned)
-                append_value(&f.b, TRIP_U8, unsigned_x_place(i), true);
+                append_value(&f.b, TRIP_U8, unsigned_x_position(i), true);
             else
-                append_value(&f.b, TRIP_F64, x_place(i), true);
+                append_value(&f.b, TRIP_F64, x_position(i), true);
         pad(&f);
     }
     begin_values(&f, 0);
@@ -161,7 +161,7 @@ static const char *write_contents(const char *name, const contents *c)
         if (c->coordinates)
             begin_values(&f, 2);
         for (int k = 0; k < NZ && c->coordinates; k++)
-            append_value(&f.b, TRIP_I32, z_place(k), true);
+            append_value(&f.b, TRIP_I32, z_position(k), true);
         return write_file(name, &f.b);
     }
     for (int k = 0; k < NZ; k++) {
@@ -169,7 +169,7 @@ static const char *write_contents(const char *name, const contents *c)
         if (k == 0 && c->coordinates)
             begin_values(&f, 2);
         if (c->coordinates)
-            append_value(&f.b, TRIP_I32, z_place(k), true);
+            append_value(&f.b, TRIP_I32, z_position(k), true);
     }
     return write_file(name, &f.b);
 }
@@ -187,7 +187,7 @@ static void every_form_holds_the_sample(void **state)
     }
 }
 
-static void coordinates_become_places(void **state)
+static void coordinates_become_positions(void **state)
 {
     (void)state;
     for (int records = 0; records < 2; records++) {
@@ -235,7 +235,7 @@ static const char *write_row(uint32_t voxels, uint32_t squares)
 }
 
 /* More than are read at once. */
-static void many_coordinates_become_places(void **state)
+static void many_coordinates_become_positions(void **state)
 {
     (void)state;
     enum { MANY = 40000 };
@@ -480,8 +480,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_form_holds_the_sample),
-        cmocka_unit_test(coordinates_become_places),
-        cmocka_unit_test(many_coordinates_become_places),
+        cmocka_unit_test(coordinates_become_positions),
+        cmocka_unit_test(many_coordinates_become_positions),
         cmocka_unit_test(too_many_coordinates_are_not_read),
         cmocka_unit_test(an_interruption_ends_the_reading_of_coordinates),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),

@@ -41,13 +41,14 @@ static void put_coordinates(int file, int x, int z, int no_sign)
     int variable;
     assert_int_equal(nc_def_var(file, "x", no_sign ? NC_BYTE : NC_DOUBLE, 1, &x, &variable), 0);
     for (size_t i = 0; i < NX; i++) {
-        const int place = no_sign ? (signed char)unsigned_x_place((int)i) : x_place((int)i);
-        assert_int_equal(nc_put_var1_int(file, variable, &i, &place), 0);
+        const int position =
+            no_sign ? (signed char)unsigned_x_position((int)i) : x_position((int)i);
+        assert_int_equal(nc_put_var1_int(file, variable, &i, &position), 0);
     }
     put_no_sign(file, variable, no_sign);
     assert_int_equal(nc_def_var(file, "z", NC_INT, 1, &z, &variable), 0);
     for (size_t k = 0; k < NZ; k++)
-        assert_int_equal(nc_put_var1_int(file, variable, &k, &(int){ z_place((int)k) }), 0);
+        assert_int_equal(nc_put_var1_int(file, variable, &k, &(int){ z_position((int)k) }), 0);
 }
 
 static const char *write_contents(const char *name, const contents *c)
@@ -110,7 +111,7 @@ static void every_type_holds_the_sample(void **state)
         }
 }
 
-static void coordinates_become_places(void **state)
+static void coordinates_become_positions(void **state)
 {
     (void)state;
     for (int inside = 0; inside < 2; inside++) {
@@ -328,7 +329,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_type_holds_the_sample),
-        cmocka_unit_test(coordinates_become_places),
+        cmocka_unit_test(coordinates_become_positions),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
         cmocka_unit_test(what_is_said_to_have_no_sign_has_none),
         cmocka_unit_test(a_variable_is_chosen_by_name),

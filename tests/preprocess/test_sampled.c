@@ -68,9 +68,9 @@ static void slices_are_sampled_along_each_axis(void **state)
         trip_volume *v;
         trip_budget *budget = new_budget();
         trip_volume_params params = plain;
-        params.most_voxels = 1;
+        params.max_voxels = 1;
         for (int a = 0; a < 3; a++) /* as many as there are at this step, and no fewer at another */
-            params.most_voxels *= (uint64_t)((dims[a] - 1) / step + 1);
+            params.max_voxels *= (uint64_t)((dims[a] - 1) / step + 1);
         assert_int_equal(trip_volume_open(&v, "v.raw", &params, budget), 0);
         const trip_volume_info *info = trip_volume_get_info(v);
         for (int a = 0; a < 3; a++) {
@@ -93,7 +93,7 @@ static void slices_are_skipped_by_samples(void **state)
     (void)state;
     const trip_volume_params params = { .raw_dims = { 23, 17, 13 },
                                         .raw_type = "uint8",
-                                        .most_voxels = 12 * 9 * 7 };
+                                        .max_voxels = 12 * 9 * 7 };
     trip_volume *v;
     trip_budget *budget = new_budget();
     trip_volume_portion p;
@@ -188,10 +188,10 @@ static void portions_have_their_samples_and_what_is_beside_them(void **state)
         trip_volume_info info = { .dims = { dims[0], dims[1], dims[2] },
                                   .index_to_world = trip_affine_identity(),
                                   .type = TRIP_F32 };
-        uint64_t most = 1;
+        uint64_t max = 1;
         for (int a = 0; a < 3; a++)
-            most *= (uint64_t)((dims[a] - 1) / step + 1);
-        assert_int_equal(trip_sampled_wrap(&reader, &of, &info, most, budget), 0);
+            max *= (uint64_t)((dims[a] - 1) / step + 1);
+        assert_int_equal(trip_sampled_wrap(&reader, &of, &info, max, budget), 0);
         trip_volume_portion p;
         int64_t seen = 0;
         while (reader->next(of, &p) > 0) {
@@ -215,7 +215,7 @@ static void portions_have_their_samples_and_what_is_beside_them(void **state)
             seen += p.size[0] * p.size[1] * p.size[2];
             reader->release(of, &p);
         }
-        assert_int_equal(seen, most);
+        assert_int_equal(seen, max);
         assert_int_equal(seen, info.dims[0] * info.dims[1] * info.dims[2]);
         reader->close(of);
         trip_budget_destroy(budget);

@@ -18,8 +18,8 @@ typedef struct bench {
     trip_splatter *splatter;
     trip_piece_format format;
     trip_quantiser quantiser;
-    unsigned char *memory[TRIP_MOST_LISTS]; /* pieces, one after the other */
-    size_t used[TRIP_MOST_LISTS];
+    unsigned char *memory[TRIP_MAX_LISTS]; /* pieces, one after the other */
+    size_t used[TRIP_MAX_LISTS];
     int refusal; /* the status with which pieces are refused; 0: they are kept */
 } bench;
 
@@ -48,7 +48,7 @@ static void open_bench(bench *b, const int64_t dims[3], const float *values, uns
     assert_int_equal(trip_workers_create(&b->workers, 1), 0);
     assert_int_equal(trip_volume_open(&b->volume, test_path("v.raw"), &p, b->budget), 0);
     b->info = *trip_volume_get_info(b->volume);
-    for (int list = 0; list < TRIP_MOST_LISTS; list++)
+    for (int list = 0; list < TRIP_MAX_LISTS; list++)
         b->memory[list] = aligned_alloc(8, PIECE_MEMORY);
 }
 
@@ -97,7 +97,7 @@ static void close_bench(bench *b)
     trip_volume_close(b->volume);
     trip_workers_destroy(b->workers);
     trip_budget_destroy(b->budget);
-    for (int list = 0; list < TRIP_MOST_LISTS; list++)
+    for (int list = 0; list < TRIP_MAX_LISTS; list++)
         free(b->memory[list]);
 }
 
@@ -196,7 +196,7 @@ static void check_halo(bench *b, const float *values, float lo, float hi)
     uint32_t *voxels = malloc(count * sizeof *voxels), *normals = malloc(count * sizeof *normals);
     uint64_t halo = 0;
     assert_true(voxels && normals);
-    for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS; list++) {
+    for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MAX_LISTS; list++) {
         gather(b, list, voxels, normals);
         for (size_t i = 0; i < count; i++) {
             bool kept = values[i] >= lo && values[i] <= hi;
@@ -255,7 +255,7 @@ static void without_a_border_of_what_is_kept_there_is_no_halo(void **state)
         b.format.halo = true;
         splat_all(&b, &e, 7);
         assert_int_equal(trip_splatter_halo(b.splatter), 0);
-        for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MOST_LISTS; list++)
+        for (unsigned list = TRIP_HALO_LISTS; list < TRIP_MAX_LISTS; list++)
             assert_int_equal(b.used[list], 0);
         assert_int_equal(trip_splatter_kept(b.splatter), all ? N * N * N : 0);
         close_bench(&b);

@@ -34,7 +34,7 @@ static void expect_near(const hard_view *view, unsigned form, const scene_pictur
 {
     double apart = scene_difference(expected, p);
     if (!(apart <= tolerance))
-        fail_msg("%s, %s: %s is %.3f of 255 apart", view->what, name_of(form), name, 255 * apart);
+        fail_msg("%s, %s: %s is %.3f of 255 apart", view->name, name_of(form), name, 255 * apart);
 }
 
 static double tolerance_of(const hard_view *view, unsigned form, const scene_renderer *r)
@@ -67,9 +67,9 @@ static void check_gl(const scene *s, const hard_view *view, unsigned form,
 
 static void expect_shown(const hard_view *view, unsigned form, const scene_picture *p)
 {
-    const double most = scene_most_opaque(p);
-    if (view->shows && !(most > 0.5))
-        fail_msg("%s, %s: the reference shows %g at most", view->what, name_of(form), most);
+    const double max = scene_max_opaque(p);
+    if (view->shows && !(max > 0.5))
+        fail_msg("%s, %s: the reference shows %g at most", view->name, name_of(form), max);
 }
 
 void hard_check(const scene *s, const hard_view *view)

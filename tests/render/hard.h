@@ -10,7 +10,7 @@ enum { HARD_SPLATS = 1, HARD_SHEETS = 2, HARD_POST = 4, HARD_ALL = 7 };
 
 /* What of it is looked at. */
 typedef struct hard_view {
-    const char *what;
+    const char *name;
     trip_camera_params camera;
     trip_settings settings; /* classify and compositing are set by the form */
     unsigned forms;

@@ -11,11 +11,11 @@
 
 const trip_affine scene_sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
 
-trip_settings scene_post(int slices)
+trip_settings scene_post(int samples_per_sheet)
 {
     trip_settings s = trip_settings_default();
     s.classify = TRIP_CLASSIFY_POST;
-    s.slices = slices;
+    s.samples_per_sheet = samples_per_sheet;
     s.shading = false;
     s.background[3] = 0;
     return s;
@@ -431,22 +431,22 @@ bool scene_take_turn(scene_turn *t)
     return true;
 }
 
-double scene_most_opaque(const scene_picture *p)
+double scene_max_opaque(const scene_picture *p)
 {
-    double most = 0;
+    double max = 0;
     for (int y = 0; y < p->height; y++)
         for (int x = 0; x < p->width; x++) {
             const double opacity = scene_pixel(p, x, y)[3];
-            most = opacity > most ? opacity : most;
+            max = opacity > max ? opacity : max;
         }
-    return most;
+    return max;
 }
 
 double scene_difference(const scene_picture *a, const scene_picture *b)
 {
     assert_int_equal(a->width, b->width);
     assert_int_equal(a->height, b->height);
-    return test_most_apart(a->rgba, b->rgba, 4 * (size_t)a->width * (size_t)a->height);
+    return test_max_apart(a->rgba, b->rgba, 4 * (size_t)a->width * (size_t)a->height);
 }
 
 void scene_compare_counts(const trip_list_stats *expected, const trip_list_stats *counts,

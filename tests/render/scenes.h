@@ -56,7 +56,7 @@ typedef struct scene {
 extern const trip_affine scene_sheared;
 
 /* Values are interpolated, in so many slices, not shaded, before no background. */
-trip_settings scene_post(int slices);
+trip_settings scene_post(int samples_per_sheet);
 /* The same with shadows of light from a direction. */
 trip_settings scene_with_shadows(trip_vec3 to_light);
 
@@ -133,7 +133,7 @@ static inline const float *scene_pixel(const scene_picture *p, int x, int y)
 }
 
 /* The greatest opacity of a pixel. */
-double scene_most_opaque(const scene_picture *p);
+double scene_max_opaque(const scene_picture *p);
 
 /* Largest difference of any component. */
 double scene_difference(const scene_picture *a, const scene_picture *b);

@@ -72,10 +72,10 @@ static void squares_hold_the_voxels_that_are_inside(void **state)
 static void squares_of_uneven_grids_hold_the_voxels_that_are_inside(void **state)
 {
     (void)state;
-    enum { MOST = 32 };
-    double tables[3][MOST];
+    enum { MAX = 32 };
+    double tables[3][MAX];
     for (int a = 0; a < 3; a++)
-        for (int i = 0; i < MOST; i++)
+        for (int i = 0; i < MAX; i++)
             tables[a][i] = i + 0.3 * sin(1.1 * i + a);
     const int64_t voxels[3] = { 13, 21, 19 }, corner[3] = { 8, 16, 5 };
     const trip_coordinates c =
@@ -113,7 +113,7 @@ static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
             trip_normalize(trip_v3(test_random() - 0.5, test_random() - 0.5, test_random() - 0.5));
         const trip_vec3 at = trip_v3(50 * test_random(), -30 * test_random(), 7);
         const double margin = n % 2 * 4 * test_random(), offset = 100 * test_random() - 50;
-        double lo[3], hi[3], most = -INFINITY;
+        double lo[3], hi[3], max = -INFINITY;
         for (int a = 0; a < 3; a++) {
             lo[a] = 40 * test_random() - 20;
             hi[a] = lo[a] + 10 * test_random();
@@ -122,15 +122,15 @@ static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
             const trip_vec3 corner = trip_v3(i & 1 ? hi[0] + margin : lo[0] - margin,
                                              i & 2 ? hi[1] + margin : lo[1] - margin,
                                              i & 4 ? hi[2] + margin : lo[2] - margin);
-            most = fmax(most, trip_dot(normal, trip_add(at, corner)) + offset);
+            max = fmax(max, trip_dot(normal, trip_add(at, corner)) + offset);
         }
         trip_clip clip = { 0 };
         trip_clip_add(&clip, normal, offset);
-        if (most > -TRIP_CLIP_SLACK)
+        if (max > -TRIP_CLIP_SLACK)
             assert_false(trip_clip_misses(&clip, at, lo, hi, margin));
-        if (most < -3 * TRIP_CLIP_SLACK)
+        if (max < -3 * TRIP_CLIP_SLACK)
             assert_true(trip_clip_misses(&clip, at, lo, hi, margin));
-        missed += most < 0;
+        missed += max < 0;
     }
     assert_in_range(missed, 200, 800);
 }
@@ -158,10 +158,10 @@ static trip_half_space random_half_space(void)
 /* How far inside of all half-spaces a point is; below 0: outside of one. */
 static double room_at(const trip_clip *clip, trip_vec3 p)
 {
-    double least = INFINITY;
+    double min = INFINITY;
     for (int i = 0; i < clip->count; i++)
-        least = fmin(least, trip_dot(clip->planes[i].normal, p) + clip->planes[i].offset);
-    return least;
+        min = fmin(min, trip_dot(clip->planes[i].normal, p) + clip->planes[i].offset);
+    return min;
 }
 
 /* What is left of a ray from 1 to 20 is inside, what is beside that is not; where nothing is left
@@ -354,7 +354,7 @@ static void what_is_left_of_the_path_has_its_opacity(void **state)
         trip_camera_params view = scene_view(&s, direction, 80, 4, 5);
         view.ortho_height = i / 3 % 2 ? 4 : 0;
         trip_settings settings = clear(TRIP_CLASSIFY_POST);
-        settings.slices = 1 + i % 4;
+        settings.samples_per_sheet = 1 + i % 4;
         add_plane(&settings, &s.data->index_to_world, planes[which]);
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
             scene_picture p = scene_draw(&s, r, &view, &settings);
@@ -582,7 +582,7 @@ static bool lumps(void *user, int i, int j, int k, unsigned *code, double gradie
  * and gradients from beyond the cut, the farther the steeper they are over a sheet. */
 enum { WIDE = 48 };
 
-static void compare_what_is_left_out(const trip_coordinates *coordinates, double middle_place)
+static void compare_what_is_left_out(const trip_coordinates *coordinates, double middle_position)
 {
     enum { SIZE = 16 };
     scene parts, whole;
@@ -599,15 +599,16 @@ static void compare_what_is_left_out(const trip_coordinates *coordinates, double
         const bool steep = i % 3 == 2; /* along a list that the view is far from */
         const bool straight = i % 3 == 1;
         const trip_vec3 along = { i / 3 % 3 == 0, i / 3 % 3 == 1, i / 3 % 3 == 2 };
-        const trip_vec3 middle = { middle_place, middle_place, middle_place };
+        const trip_vec3 middle = { middle_position, middle_position, middle_position };
         trip_half_space cut = random_half_space();
-        trip_vec3 gaze = random_half_space().normal;
+        trip_vec3 view_direction = random_half_space().normal;
         if (straight) /* of a list the cut is between two sheets, which the view is along */
-            cut.normal = gaze = trip_scale(along, i / 9 % 2 ? 1 : -1);
-        trip_camera_params view = scene_view(&whole, gaze, i % 4 ? 70 : 10, steep ? 120 : 40, SIZE);
+            cut.normal = view_direction = trip_scale(along, i / 9 % 2 ? 1 : -1);
+        trip_camera_params view =
+            scene_view(&whole, view_direction, i % 4 ? 70 : 10, steep ? 120 : 40, SIZE);
         view.ortho_height = i % 4 == 1 ? 50 : 0;
         trip_settings settings = clear(TRIP_CLASSIFY_POST);
-        settings.slices = 1 + i % 2;
+        settings.samples_per_sheet = 1 + i % 2;
         settings.shading = i % 5 > 0;
         settings.kernel = coordinates ? TRIP_KERNEL_LINEAR : (trip_kernel)(i / 2 % 3);
         settings.h = straight ? TRIP_H_AUTO : 0.3;

@@ -34,20 +34,20 @@ static double component(const trip_tf_entry *e, int i)
     return i == 0 ? (double)e->r : i == 1 ? (double)e->g : (double)e->b;
 }
 
-static trip_closed_form_fault find(unsigned least, unsigned most)
+static trip_closed_form_fault find(unsigned min, unsigned max)
 {
     trip_closed_form form;
-    return trip_closed_form_find(&form, table, least, most, LONGEST);
+    return trip_closed_form_find(&form, table, min, max, LONGEST);
 }
 
 /* Every code is as the table has it. */
-static void assert_found(unsigned least, unsigned most, bool ramp, bool coloured)
+static void assert_found(unsigned min, unsigned max, bool ramp, bool coloured)
 {
     trip_closed_form f;
-    assert_int_equal(trip_closed_form_find(&f, table, least, most, LONGEST), 0);
+    assert_int_equal(trip_closed_form_find(&f, table, min, max, LONGEST), 0);
     assert_int_equal(f.ramp, ramp);
     assert_int_equal(f.coloured, coloured);
-    for (unsigned code = least; code <= most; code++) {
+    for (unsigned code = min; code <= max; code++) {
         const double x = fmax(0, f.scale * code + f.offset), k = (double)table[code].extinction;
         const double is = f.k[0] + f.k[1] * x + f.k[2] * x * x + f.k[3] * x * x * x;
         assert_true(x <= 1 + 1e-9);

@@ -30,14 +30,14 @@ static void codes_without_a_gap_are_a_range(void **state)
             show(ends[i], ends[k], UINT32_MAX);
             trip_code_set set = set_of_table();
             trip_code_range range = trip_code_set_range(&set);
-            assert_int_equal(range.least, ends[i]);
-            assert_int_equal(range.most, ends[k]);
+            assert_int_equal(range.min, ends[i]);
+            assert_int_equal(range.max, ends[k]);
             if (ends[k] - ends[i] < 2)
                 continue;
             show(ends[i], ends[k], (ends[i] + ends[k]) / 2);
             set = set_of_table();
             range = trip_code_set_range(&set);
-            assert_true(range.least > range.most);
+            assert_true(range.min > range.max);
         }
 }
 
@@ -47,7 +47,7 @@ static void no_codes_are_no_range(void **state)
     show(1, 0, 0);
     const trip_code_set set = set_of_table();
     const trip_code_range range = trip_code_set_range(&set);
-    assert_true(range.least > range.most);
+    assert_true(range.min > range.max);
     assert_false(trip_code_set_has_some(&set, 0, 65535));
 }
 

@@ -104,18 +104,18 @@ static void splats_of_a_sheet_add_up_and_sheets_cover_one_another(void **state)
         trip_settings settings = by(TRIP_COMPOSITING_SHEET);
         scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
-            double most = 0;
+            double max = 0;
             for (int n = 0; n < 48 * 48; n++) {
                 trip_vec3 o, ray;
                 double expected[3];
                 scene_ray(&s, &view, n % 48, n / 48, &o, &ray);
                 expected_of_few(&s, axis, d[axis] > 0, o, ray, expected);
-                most = fmax(most, expected[2]);
+                max = fmax(max, expected[2]);
                 assert_close(turn.picture.rgba[4 * n], expected[0], 2e-3);
                 assert_close(turn.picture.rgba[4 * n + 2], expected[1], 2e-3);
                 assert_close(turn.picture.rgba[4 * n + 3], expected[2], 2e-3);
             }
-            assert_true(most > 0.9);
+            assert_true(max > 0.9);
         }
         scene_destroy(&s);
     }
@@ -261,10 +261,10 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
     scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings);
     scene_turn turn = scene_turns(scene_renderers() + 1, s, view, settings);
     while (scene_take_turn(&turn)) {
-        double most = scene_difference(&turn.picture, &expected),
+        double max = scene_difference(&turn.picture, &expected),
                mean = mean_apart(&turn.picture, &expected);
-        if (!(most <= 1.0 / 255 && mean <= 0.1 / 255))
-            fail_msg("%s: %g of 255 apart, on average %g", turn.renderer->name, 255 * most,
+        if (!(max <= 1.0 / 255 && mean <= 0.1 / 255))
+            fail_msg("%s: %g of 255 apart, on average %g", turn.renderer->name, 255 * max,
                      255 * mean);
         for (unsigned i = 0; i < s->data->list_count; i++)
             scene_compare_counts(&expected.lists[i], &turn.picture.lists[i], turn.renderer->name);
@@ -435,15 +435,15 @@ enum { ARRANGEMENTS = 6 };
 
 /* The largest mean difference, from the volume as it is, of the first so many arrangements: three
  * mirrored volumes, two with their axes in turn, and one moved. */
-static double most_apart(const scene_renderer *r, const trip_settings *settings, bool parallel,
-                         int arrangements)
+static double max_apart(const scene_renderer *r, const trip_settings *settings, bool parallel,
+                        int arrangements)
 {
     const trip_affine moved = {
         { { 0.36, 0.48, -0.8, 30 }, { -0.8, 0.6, 0, -9 }, { 0.48, 0.64, 0.6, 4 } }
     };
     arrangement as = { { 16, 18, 20 }, -1, 0, trip_affine_identity() };
     scene_picture first = draw_arranged(r, settings, as, parallel);
-    double most = 0;
+    double max = 0;
     for (int i = 1; i <= arrangements; i++) {
         as.mirrored = i < 4 ? i - 1 : -1;
         as.turned = i < 4 || i == 6 ? 0 : i - 3;
@@ -451,11 +451,11 @@ static double most_apart(const scene_renderer *r, const trip_settings *settings,
         scene_picture p = draw_arranged(r, settings, as, parallel);
         if (as.mirrored >= 0)
             flip(&p);
-        most = fmax(most, mean_apart(&p, &first));
+        max = fmax(max, mean_apart(&p, &first));
         scene_picture_free(&p);
     }
     scene_picture_free(&first);
-    return most;
+    return max;
 }
 
 /* By sheets alone: splats cover one another in the order of their sheet, which changes. */
@@ -466,9 +466,9 @@ static void mirrored_turned_and_moved_it_is_the_same_picture(void **state)
         for (int parallel = 0; parallel < 2; parallel++) {
             trip_settings settings = by(TRIP_COMPOSITING_SHEET);
             settings.h = 0.3;
-            double sheets = most_apart(r, &settings, parallel, ARRANGEMENTS);
+            double sheets = max_apart(r, &settings, parallel, ARRANGEMENTS);
             settings.compositing = TRIP_COMPOSITING_SPLAT;
-            double splats = most_apart(r, &settings, parallel, 1);
+            double splats = max_apart(r, &settings, parallel, 1);
             if (!(sheets < 0.1 / 255 && splats > 0.5 / 255))
                 fail_msg("%s: on average %g of 255 apart by sheets, %g by splats", r->name,
                          255 * sheets, 255 * splats);

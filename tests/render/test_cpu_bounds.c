@@ -1,7 +1,7 @@
 /* Pixels that the kernels give a splat, against its support in double precision: grids of any
  * shape, kernels of any size, views of any angle, voxels of up to 10^5 pixels. */
 #include "cpu/kernels/isa.h"
-#include "cpu/view.h"
+#include "cpu/cpu_view.h"
 #include "scenes.h"
 #include "splat.h"
 #include "test.h"
@@ -35,7 +35,7 @@ static trip_affine grid_of(int i)
     return m;
 }
 
-static trip_vec3 random_place(void)
+static trip_vec3 random_position(void)
 {
     return trip_v3(EDGE * test_random(), EDGE * test_random(), EDGE * test_random());
 }
@@ -51,7 +51,7 @@ static trip_vec3 random_direction(void)
 static trip_camera_params random_view(int i, const trip_affine *grid, trip_vec3 look)
 {
     const double angles[6] = { 1e-3, 0.1, 10, 90, 150, 170 };
-    trip_camera_params p = { .eye = trip_affine_point(grid, random_place()),
+    trip_camera_params p = { .eye = trip_affine_point(grid, random_position()),
                              .look = trip_affine_point(grid, look),
                              .up = { 0.31, 0.2, 0.93 },
                              .fov_degrees = angles[i % 6],
@@ -72,7 +72,7 @@ static void look(fixture *f, const scene *s, int i)
 {
     const double radii[4] = { 2, 0.7, 6, 25 };
     trip_affine grid = grid_of(i);
-    f->looked_at = random_place();
+    f->looked_at = random_position();
     trip_camera_params view = random_view(i, &grid, f->looked_at);
     f->settings = trip_settings_default();
     f->settings.kernel_radius = radii[i % 4];
@@ -131,10 +131,10 @@ static void check(fixture *f, const trip_cpu_kernels *k, int u, int v, int sheet
 }
 
 /* A list along z: u is x and v is y. */
-static void check_some(fixture *f, const trip_cpu_kernels *k, trip_vec3 place)
+static void check_some(fixture *f, const trip_cpu_kernels *k, trip_vec3 position)
 {
-    check(f, k, (int)place.x + (int)(3 * test_random()) - 1, (int)place.y,
-          (int)place.z + (int)(3 * test_random()) - 1);
+    check(f, k, (int)position.x + (int)(3 * test_random()) - 1, (int)position.y,
+          (int)position.z + (int)(3 * test_random()) - 1);
 }
 
 static void every_pixel_of_a_support_is_among_those_of_the_splat(void **state)
@@ -150,7 +150,7 @@ static void every_pixel_of_a_support_is_among_those_of_the_splat(void **state)
         for (int i = 0; i < VIEWS; i++) {
             look(f, &s, i);
             for (int n = 0; n < VOXELS; n++)
-                check_some(f, *isa, n % 2 ? f->looked_at : random_place());
+                check_some(f, *isa, n % 2 ? f->looked_at : random_position());
         }
     assert_true(f->checked > 10000 && f->near > 1000);
     scene_destroy(&s);

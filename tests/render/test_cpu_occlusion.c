@@ -1,7 +1,7 @@
 /* What counts as occluded: never a voxel with a pixel of its support in an open cell, by the
  * definition of splats in double precision. */
 #include "cpu/kernels/isa.h"
-#include "cpu/view.h"
+#include "cpu/cpu_view.h"
 #include "cpu/cull.h"
 #include "scenes.h"
 #include "test.h"

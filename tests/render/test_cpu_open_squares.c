@@ -54,7 +54,7 @@ static int tear_down(void **state)
 static void look(fixture *f, const trip_camera_params *params, int axis, int64_t way,
                  trip_kernel kernel)
 {
-    static const trip_cpu_function function;
+    static const trip_cpu_tf function;
     f->settings = trip_settings_default();
     f->settings.kernel = kernel;
     assert_int_equal(trip_camera_make(&f->camera, params, &f->scene.data->index_to_world), 0);
@@ -116,7 +116,7 @@ static bool ray_at(const fixture *f, int x, int y, double coordinate, double at[
 }
 
 /* The voxels of a sheet that what lies at (u, v) depends on. */
-static void check_place(fixture *f, const double at[2])
+static void check_position(fixture *f, const double at[2])
 {
     const int reach = trip_sheet_reach(f->settings.kernel), axis = f->sheets.axis;
     const int64_t u0 = (int64_t)floor(at[0]), v0 = (int64_t)floor(at[1]);
@@ -145,7 +145,7 @@ static void check_sheets(fixture *f, int64_t first)
             for (int n = -4 * reach; pixel_is_open(f, x, y) && n <= 4 * (7 + reach); n++) {
                 double at[2];
                 if (ray_at(f, x, y, (double)first + 0.25 * n * (double)f->sheets.way, at))
-                    check_place(f, at);
+                    check_position(f, at);
             }
 }
 

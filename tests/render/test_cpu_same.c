@@ -50,7 +50,7 @@ static void check_view(const scene *a, const scene *b, trip_camera_params view, 
                 continue;
             settings.target = (trip_target)(form % TARGETS);
             settings.compositing = (trip_compositing)(form / TARGETS);
-            settings.saturation = turn % 2 ? 0.04 : TRIP_SATURATION_AUTO;
+            settings.early_termination = turn % 2 ? 0.04 : TRIP_EARLY_TERMINATION_AUTO;
             cpu_scenes_threads = 1;
             scene_picture p = scene_draw(a, &cpu_scenes_cpu, &view, &settings);
             cpu_scenes_threads = threads;

@@ -1,7 +1,7 @@
 /* Which splats every instruction set leaves out over saturated cells: those without an open cell
  * among the pixels of their support, cell by cell. */
 #include "cpu/kernels/isa.h"
-#include "cpu/view.h"
+#include "cpu/cpu_view.h"
 #include "scenes.h"
 #include "test.h"
 

@@ -1,5 +1,5 @@
 /* The short form of a thin splat's opacity against its definition, in double precision. */
-#include "cpu/scalar.h"
+#include "cpu/cpu_scalar.h"
 #include "test.h"
 
 #include <math.h>

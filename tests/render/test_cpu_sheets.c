@@ -58,11 +58,11 @@ static void make_waves(scene *s, unsigned tile, double opacity)
     scene_colour(s, 57000, 65535, 1, 1, 0.6, opacity);
 }
 
-static trip_settings post(int slices)
+static trip_settings post(int samples_per_sheet)
 {
     trip_settings settings = trip_settings_default();
     settings.classify = TRIP_CLASSIFY_POST;
-    settings.slices = slices;
+    settings.samples_per_sheet = samples_per_sheet;
     return settings;
 }
 
@@ -389,7 +389,7 @@ static int code_at(int raster, int u, int v)
 /* Few different codes, the greatest and least among them, and missing ones. */
 static void fill_rasters(void)
 {
-    static const int16_t codes[] = { TRIP_CPU_CODE_LEAST,  -20000, -1, 0, 1, 2, 300, INT16_MAX,
+    static const int16_t codes[] = { TRIP_CPU_CODE_MIN,    -20000, -1, 0, 1, 2, 300, INT16_MAX,
                                      TRIP_CPU_CODE_MISSING };
     memset(rasters, 0, sizeof rasters);
     for (int b = 0; b < RASTERS; b++)
@@ -443,22 +443,22 @@ static void check_ranges(const trip_cpu_kernels *k, uint64_t squares)
     trip_cpu_square_ranges ranges;
     k->sheet_ranges(&rasters[0], squares, &ranges);
     for (int square = 0; square < 64; square++) {
-        int least = INT16_MAX, most = INT16_MIN;
+        int min = INT16_MAX, max = INT16_MIN;
         for (int i = 0; i < 81 && squares >> square & 1; i++) {
             int code = code_at(0, square % 8 * 8 + i % 9, square / 8 * 8 + i / 9);
-            least = !is_missing(code) && code < least ? code : least;
-            most = code > most ? code : most;
+            min = !is_missing(code) && code < min ? code : min;
+            max = code > max ? code : max;
         }
-        assert_int_equal(ranges.least[square], least);
-        assert_int_equal(ranges.most[square], most);
+        assert_int_equal(ranges.min[square], min);
+        assert_int_equal(ranges.max[square], max);
     }
 }
 
-static void check_cells(const trip_cpu_kernels *k, int16_t least, int16_t most)
+static void check_cells(const trip_cpu_kernels *k, int16_t min, int16_t max)
 {
     const uint64_t squares = UINT64_C(0xfedcba9876543210);
     trip_cpu_cells cells;
-    k->sheet_cells(&rasters[0], &rasters[4], squares, least, most, &cells);
+    k->sheet_cells(&rasters[0], &rasters[4], squares, min, max, &cells);
     for (int v = 0; v < 64; v++)
         for (int u = 0; u < 64; u++) {
             int low = INT16_MAX, high = INT16_MIN, corners[2] = { 0 };
@@ -468,7 +468,7 @@ static void check_cells(const trip_cpu_kernels *k, int16_t least, int16_t most)
                 low = !is_missing(code) && code < low ? code : low;
                 high = code > high ? code : high;
             }
-            bool expected = (corners[0] == 4 || corners[1] == 4) && low <= most && high >= least;
+            bool expected = (corners[0] == 4 || corners[1] == 4) && low <= max && high >= min;
             expected = expected && squares >> (v / 8 * 8 + u / 8) & 1;
             assert_int_equal(cells.rows[v] >> u & 1, expected);
         }
@@ -513,7 +513,7 @@ static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
         check_gradients(*isa, UINT64_MAX);
         check_gradients(*isa, UINT64_C(0x8040201008040281));
         check_cells(*isa, -5, 1);
-        check_cells(*isa, TRIP_CPU_CODE_LEAST, INT16_MAX);
+        check_cells(*isa, TRIP_CPU_CODE_MIN, INT16_MAX);
         check_cells(*isa, 2, 290);
         check_between(*isa, 8192, true, UINT64_MAX);
         check_between(*isa, 5461, true, UINT64_C(0x8040201008040281));
@@ -521,7 +521,7 @@ static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
     }
 }
 
-static void assert_same_function(const trip_cpu_function *a, const trip_cpu_function *b)
+static void assert_same_function(const trip_cpu_tf *a, const trip_cpu_tf *b)
 {
     const trip_cpu_integrals *p = &a->integrals, *q = &b->integrals;
     const size_t entries = (65536u >> q->entry_log2) + 1;
@@ -550,19 +550,19 @@ static void kept_integrals_are_those_made_anew(void **state)
     };
     (void)state;
     trip_budget *budget;
-    trip_cpu_function kept, anew;
-    assert_int_equal(trip_budget_create(&budget, 4 * trip_cpu_function_bytes()), 0);
-    assert_true(trip_cpu_function_create(&kept, budget));
+    trip_cpu_tf kept, anew;
+    assert_int_equal(trip_budget_create(&budget, 4 * trip_cpu_tf_bytes()), 0);
+    assert_true(trip_cpu_tf_create(&kept, budget));
     for (size_t i = 0; i < sizeof frames / sizeof *frames; i++) {
         memset(table, 0, sizeof table);
         table[frames[i].visible] = (trip_tf_entry){ 0.2f, 0.5f, 1, 3 };
-        assert_true(trip_cpu_function_create(&anew, budget));
-        trip_cpu_function_set(&kept, table, NULL, frames[i].codes, frames[i].voxel_world);
-        trip_cpu_function_set(&anew, table, NULL, frames[i].codes, frames[i].voxel_world);
+        assert_true(trip_cpu_tf_create(&anew, budget));
+        trip_cpu_tf_set(&kept, table, NULL, frames[i].codes, frames[i].voxel_world);
+        trip_cpu_tf_set(&anew, table, NULL, frames[i].codes, frames[i].voxel_world);
         assert_same_function(&kept, &anew);
-        trip_cpu_function_destroy(&anew, budget);
+        trip_cpu_tf_destroy(&anew, budget);
     }
-    trip_cpu_function_destroy(&kept, budget);
+    trip_cpu_tf_destroy(&kept, budget);
     trip_budget_destroy(budget);
 }
 
@@ -589,8 +589,8 @@ static void what_has_few_codes_is_drawn_as_closely(void **state)
         scene_colour(&s, (unsigned)(FEW_FIRST + i), (unsigned)(FEW_FIRST + i), 0.2 + 0.02 * i, 0.5,
                      1 - 0.02 * i, i < FEW / 2 ? 0 : 0.01 * (i - FEW / 2));
     const trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.6), 70, 30, 48);
-    for (int slices = 1; slices <= 4; slices += 3) {
-        const trip_settings settings = post(slices);
+    for (int samples_per_sheet = 1; samples_per_sheet <= 4; samples_per_sheet += 3) {
+        const trip_settings settings = post(samples_per_sheet);
         scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
         scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
         assert_shows(&q);
@@ -718,7 +718,7 @@ static void beside_holes_it_is_as_in_the_reference(void **state)
     const struct {
         trip_vec3 from;
         double distance, fov_degrees, ortho_height;
-        int slices;
+        int samples_per_sheet;
     } views[] = {
         { { 1, 0.83, 0.61 }, 50, 35, 0, 1 },    { { -0.57, -1, 0.71 }, 50, 35, 0, 2 },
         { { 0.37, 0.53, -1 }, 50, 35, 0, 1 },   { { -0.53, 0.41, 0.97 }, 6.3, 100, 0, 1 },
@@ -733,7 +733,7 @@ static void beside_holes_it_is_as_in_the_reference(void **state)
                                           .user = one_in[n] });
         scene_colour(&s, 20000, 65535, 0.2, 0.5, 1, 0.05);
         for (size_t i = 0; i < sizeof views / sizeof views[0]; i++) {
-            trip_settings settings = post(views[i].slices);
+            trip_settings settings = post(views[i].samples_per_sheet);
             trip_camera_params view =
                 scene_view(&s, views[i].from, views[i].distance, views[i].fov_degrees, 48);
             view.ortho_height = views[i].ortho_height;
@@ -796,8 +796,9 @@ static bool sparks(void *user, int i, int j, int k, unsigned *code, double gradi
 {
     (void)user;
     (void)gradient;
-    static const int places[3] = { 62 % 21, 63 % 21, 65 % 21 }; /* beside a raster's border */
-    const bool shows = k % 3 == 1 && i % 21 == places[k / 9 % 3] && j % 21 == places[k / 3 % 3];
+    static const int positions[3] = { 62 % 21, 63 % 21, 65 % 21 }; /* beside a raster's border */
+    const bool shows =
+        k % 3 == 1 && i % 21 == positions[k / 9 % 3] && j % 21 == positions[k / 3 % 3];
     *code = shows ? 65535 : 0;
     return true;
 }

@@ -1,7 +1,7 @@
 /* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
  * first, and in which order panes get their splats back. */
 #include "cpu/splat_buffer.h"
-#include "cpu/scalar.h"
+#include "cpu/cpu_scalar.h"
 #include "test.h"
 
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Squares of blocks: walked, cut into parts, and decoded by the kernels as by trip_block_voxels().
  */
 #include "cpu/squares.h"
-#include "cpu/view.h"
+#include "cpu/cpu_view.h"
 
 #include "test.h"
 
@@ -12,14 +12,14 @@
 
 #include "cpu/kernels/isa.h"
 
-enum { MOST = TRIP_RUN_RECORDS_MAX };
+enum { MAX = TRIP_RUN_RECORDS_MAX };
 
 /* A run's block and what is in it. */
 typedef struct fixture {
     trip_block_form form;
-    uint32_t voxels[MOST], normals[MOST], count;
+    uint32_t voxels[MAX], normals[MAX], count;
     uint64_t words[TRIP_BLOCK_WORDS_MAX];
-    unsigned char packed_normals[4 * MOST];
+    unsigned char packed_normals[4 * MAX];
     trip_block block;
     trip_cpu_staged staged;
 } fixture;
@@ -104,16 +104,16 @@ static void parts_of_a_run_hold_every_square_once(void **state)
         uint32_t skip = 0, voxels = 0, squares;
         fill(f, 4 + (unsigned)i % 4, 2, 4);
         for (; voxels < f->count; skip += squares) {
-            uint32_t most = 64 + (uint32_t)(test_random() * 500);
+            uint32_t max = 64 + (uint32_t)(test_random() * 500);
             trip_cpu_part p;
-            trip_cpu_part_make(&p, &run, &f->block, reversed, skip, most);
+            trip_cpu_part_make(&p, &run, &f->block, reversed, skip, max);
             squares = 0;
             for (unsigned w = 0; w < f->block.present_words; w++) {
                 assert_int_equal(p.squares[w] & (seen[w] | ~f->block.present[w]), 0);
                 seen[w] |= p.squares[w];
                 squares += (uint32_t)__builtin_popcountll(p.squares[w]);
             }
-            assert_true(squares > 0 && p.voxels <= most);
+            assert_true(squares > 0 && p.voxels <= max);
             voxels += p.voxels;
         }
         assert_int_equal(voxels, f->count);
@@ -142,7 +142,7 @@ static trip_cpu_square square_at(const fixture *f, const trip_square *at, square
                               .v = 2000 + 8 * trip_cpu_square_v(at->number),
                               .sheet = 77,
                               .mask = at->mask,
-                              .least = at->least,
+                              .min = at->min,
                               .width = at->width,
                               .codes = bytes->codes,
                               .normals = bytes->normals };

@@ -114,7 +114,7 @@ static unsigned occlusion_of(const trip_splat_frame *f, double x, double y)
 /* A blend rounds a pixel by at most half a step. In colour that adds up to n halves; the same in
  * alpha lets other light through, which again adds up to at most as much: what an error of the
  * transmittance shows is that error times the opacity of all that lies behind. Merging takes
- * averages. The rest is what single precision and closing at TRIP_SATURATION_PRE may do. */
+ * averages. The rest is what single precision and closing at TRIP_EARLY_TERMINATION_PRE may do. */
 static void targets_are_off_by_at_most_a_step_a_splat(void **state)
 {
     (void)state;
@@ -128,7 +128,7 @@ static void targets_are_off_by_at_most_a_step_a_splat(void **state)
     scene_picture expected = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
-        double steps[3] = { 0, 1.0 / 2048, 1.0 / 255 }, most[3] = { 0 };
+        double steps[3] = { 0, 1.0 / 2048, 1.0 / 255 }, max[3] = { 0 };
         for (int target = TRIP_TARGET_RGBA16F; target <= TRIP_TARGET_RGBA8; target++) {
             settings.target = (trip_target)target;
             scene_picture p = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
@@ -137,14 +137,14 @@ static void targets_are_off_by_at_most_a_step_a_splat(void **state)
                 for (int c = 0; c < 4; c++) {
                     double off = fabs((double)p.rgba[4 * i + c] - (double)expected.rgba[4 * i + c]);
                     assert_true(off <= n * steps[target] + 0.5 / 255);
-                    most[target] = fmax(most[target], off);
+                    max[target] = fmax(max[target], off);
                 }
             }
             scene_picture_free(&p);
         }
         print_message("%s: rgba16f off by %.3f, rgba8 by %.3f of 1/255\n", (*isa)->isa,
-                      255 * most[TRIP_TARGET_RGBA16F], 255 * most[TRIP_TARGET_RGBA8]);
-        assert_true(most[TRIP_TARGET_RGBA8] > most[TRIP_TARGET_RGBA16F]);
+                      255 * max[TRIP_TARGET_RGBA16F], 255 * max[TRIP_TARGET_RGBA8]);
+        assert_true(max[TRIP_TARGET_RGBA8] > max[TRIP_TARGET_RGBA16F]);
     }
     unsetenv("TRIPTYCH_ISA");
     scene_picture_free(&expected);

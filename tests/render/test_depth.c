@@ -213,13 +213,13 @@ static void where_nothing_is_seen_is_infinitely_far(void **state)
 /* Depths times the opacity that they are divided by, in units of the object's size. */
 static double depth_difference(const scene_picture *a, const scene_picture *b, double size)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < a->width * a->height; i++) {
         double alpha = (double)a->rgba[4 * i + 3];
         if (alpha > 1e-3)
-            most = fmax(most, alpha * fabs((double)a->depth[i] - (double)b->depth[i]) / size);
+            max = fmax(max, alpha * fabs((double)a->depth[i] - (double)b->depth[i]) / size);
     }
-    return most;
+    return max;
 }
 
 /* No more than 1/255 of the object's size off, and the colours are those of a picture without to

@@ -27,7 +27,7 @@ static trip_camera_params along_z(const scene *s)
 }
 
 /* Where the ray of a pixel is along x. */
-static double place_x(const scene *s, const trip_camera_params *view, int x, int y)
+static double position_x(const scene *s, const trip_camera_params *view, int x, int y)
 {
     trip_vec3 o, d;
     scene_ray(s, view, x, y, &o, &d);
@@ -60,7 +60,7 @@ static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         for (int x = 0; x < SIZE; x++) {
             double expected =
-                lit_from_the_side(place_x(&s, &view, x, 4), settings.effects.anisotropy);
+                lit_from_the_side(position_x(&s, &view, x, 4), settings.effects.anisotropy);
             assert_close(scene_pixel(&exact, x, 4)[0], expected, 2e-5);
         }
         while (scene_take_turn(&turn))
@@ -85,11 +85,12 @@ static void what_is_cut_away_casts_no_shadow(void **state)
     scene_picture exact = integrate(&s, &view, &settings);
     int left = 0;
     for (int x = 0; x < SIZE; x++) {
-        const double place = place_x(&s, &view, x, 4);
-        const double expected =
-            place > at ? 0 : (1 - exp(-FOG * (EDGE - 1))) * (0.3 + 0.7 * exp(-FOG * (at - place)));
+        const double position = position_x(&s, &view, x, 4);
+        const double expected = position > at ? 0
+                                              : (1 - exp(-FOG * (EDGE - 1))) *
+                                                    (0.3 + 0.7 * exp(-FOG * (at - position)));
         assert_close(scene_pixel(&exact, x, 4)[0], expected, 2e-5);
-        left += place < at;
+        left += position < at;
     }
     assert_in_range(left, 2, SIZE - 2);
     while (scene_take_turn(&turn))
@@ -108,7 +109,7 @@ static void what_is_left_of_a_segment_fades_where_it_is(void **state)
     create_fog(&s, 50);
     const trip_camera_params view = along_z(&s);
     trip_settings settings = scene_post(1);
-    settings.saturation = 0;
+    settings.early_termination = 0;
     settings.effects.cueing = 1;
     settings.depth = true;
     trip_clip_add(&settings.clip, trip_v3(0, 0, 1), -from);
@@ -144,11 +145,11 @@ static void fog_lit_from_the_front_scatters_backwards(void **state)
     scene_destroy(&s);
 }
 
-static trip_settings with_point_light(trip_vec3 place)
+static trip_settings with_point_light(trip_vec3 position)
 {
     trip_settings s = scene_with_shadows(trip_v3(0, 0, 1));
     s.point_light = true;
-    s.light_place = place;
+    s.light_position = position;
     return s;
 }
 
@@ -166,7 +167,7 @@ static double length_in_box(trip_vec3 from, trip_vec3 to)
 }
 
 /* The integral along a pixel's ray, from above down z: Simpson's rule. */
-static double lit_from_a_place(double x, double y, trip_vec3 light, double g)
+static double lit_from_a_position(double x, double y, trip_vec3 light, double g)
 {
     enum { STEPS = 2000 };
     const double depth = EDGE - 1;
@@ -208,7 +209,8 @@ static void fog_is_lit_from_a_place(void **state)
             trip_vec3 o, d;
             scene_ray(&s, &view, i % SIZE, i / SIZE, &o, &d);
             assert_close(scene_pixel(&exact, i % SIZE, i / SIZE)[0],
-                         lit_from_a_place(o.x, o.y, lights[n], settings.effects.anisotropy), 5e-5);
+                         lit_from_a_position(o.x, o.y, lights[n], settings.effects.anisotropy),
+                         5e-5);
         }
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
@@ -261,7 +263,7 @@ static void a_box_casts_its_shadow_on_the_next(void **state)
     scene_picture exact = integrate(&s, &view, &settings);
     int seen = 0;
     for (int x = 0; x < SIZE; x++) {
-        double beyond, here = slabs_at(place_x(&s, &view, x, 4), &beyond);
+        double beyond, here = slabs_at(position_x(&s, &view, x, 4), &beyond);
         double expected = (1 - exp(-0.4 * here * (EDGE - 1))) * (0.3 + 0.7 * exp(-0.4 * beyond));
         assert_close(scene_pixel(&exact, x, 4)[0], expected, 1e-4);
         seen += here > 0;
@@ -302,9 +304,9 @@ static void create_ball(scene *s, double extinction, const trip_affine *map)
 /* Lights of the ball: in a direction, beside it, above a corner of its box, and in it. */
 static trip_settings with_light(int number)
 {
-    const trip_vec3 places[] = { { 40, 8, 14 }, { 36, 36, -2 }, { 20.4, 12, 16 } };
+    const trip_vec3 positions[] = { { 40, 8, 14 }, { 36, 36, -2 }, { 20.4, 12, 16 } };
     return number == 0 ? scene_with_shadows(trip_v3(0.8, -0.3, 0.6))
-                       : with_point_light(places[number - 1]);
+                       : with_point_light(positions[number - 1]);
 }
 
 /* Against the double integral: from a place of the ray, on towards the light. */
@@ -346,13 +348,13 @@ static void a_light_far_away_is_one_in_a_direction(void **state)
     trip_settings direction = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
     direction.shading = true;
     for (double far = 1e7; far < 1e13; far *= 1e5) {
-        trip_settings place = with_point_light(trip_scale(direction.light_direction, far));
-        place.shading = true;
+        trip_settings position = with_point_light(trip_scale(direction.light_direction, far));
+        position.shading = true;
         for (int i = 0; i < 3; i++) {
             scene_picture a = i < 2 ? scene_draw(&s, &scene_renderers()[i], &view, &direction)
                                     : integrate(&s, &view, &direction);
-            scene_picture b = i < 2 ? scene_draw(&s, &scene_renderers()[i], &view, &place)
-                                    : integrate(&s, &view, &place);
+            scene_picture b = i < 2 ? scene_draw(&s, &scene_renderers()[i], &view, &position)
+                                    : integrate(&s, &view, &position);
             double apart = scene_difference(&a, &b);
             if (!(apart < 1e-4))
                 fail_msg("renderer %d, at %g: %g apart", i, far, apart);
@@ -394,7 +396,7 @@ static void every_renderer_draws_them_alike(void **state)
     trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.5), 60, 50, 24);
     for (int n = 0; n < 16; n++) {
         trip_settings settings = with_light(n / 8 * (1 + n / 2 % 3));
-        settings.light_place = trip_affine_point(&scene_sheared, settings.light_place);
+        settings.light_position = trip_affine_point(&scene_sheared, settings.light_position);
         settings.classify = n & 1 ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
         settings.shading = n & 2;
         settings.effects.occlusion = n & 4;
@@ -580,7 +582,7 @@ static void light_is_looked_up_beside_surfaces_by_the_lattices_cells(void **stat
                  1e-12);
 }
 
-static double note_place(const void *user, trip_vec3 voxel)
+static double note_position(const void *user, trip_vec3 voxel)
 {
     *(trip_vec3 *)(size_t)user = voxel;
     return 1;
@@ -596,7 +598,7 @@ static void light_at_a_place_is_not_passed(void **state)
                             .bias = 3,
                             .point_light = true,
                             .user = &asked,
-                            .reached = note_place };
+                            .reached = note_position };
     const trip_light light = {
         .eye = { 0, 0, 1 }, .light = { 0, 0.6, 0.8 }, .half = { 0, 0.6, 0.8 }, .gradient_full = 1
     };
@@ -701,9 +703,10 @@ static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
     (void)state;
     for (int n = 0; n < 60; n++) {
         const trip_vec3 middle = trip_affine_point(&scene_sheared, trip_v3(10, 15, 20));
-        const trip_vec3 gaze = trip_effects_direction(n % TRIP_OPEN_DIRECTIONS);
-        const trip_camera_params view = { .eye = trip_sub(middle, trip_scale(gaze, n % 3 ? 90 : 5)),
-                                          .look = trip_add(middle, gaze),
+        const trip_vec3 view_direction = trip_effects_direction(n % TRIP_OPEN_DIRECTIONS);
+        const trip_camera_params view = { .eye = trip_sub(
+                                              middle, trip_scale(view_direction, n % 3 ? 90 : 5)),
+                                          .look = trip_add(middle, view_direction),
                                           .up = { 0.1, 0.2, 0.3 },
                                           .fov_degrees = 30,
                                           .ortho_height = n % 2 ? 50 : 0,
@@ -715,7 +718,7 @@ static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
         settings.effects.cueing = 1;
         for (int i = 0; i < 8; i++) {
             const trip_vec3 corner = trip_affine_point(&scene_sheared, box_corner(i));
-            z[i] = trip_dot(gaze, trip_sub(corner, view.eye));
+            z[i] = trip_dot(view_direction, trip_sub(corner, view.eye));
             near = fmin(near, fmax(0, z[i]));
             far = fmax(far, z[i]);
         }
@@ -920,17 +923,17 @@ static bool is_on_rim(trip_vec3 node)
 
 /* Between two places of a line that are one apart and `part` of that from the first: by how much
  * the mean of their transmittances by distance differs from that of the place itself. */
-static double mean_is_off(trip_vec3 place, trip_vec3 along, double part, trip_vec3 light)
+static double mean_is_off(trip_vec3 position, trip_vec3 along, double part, trip_vec3 light)
 {
-    const trip_vec3 before = trip_sub(place, trip_scale(along, part));
+    const trip_vec3 before = trip_sub(position, trip_scale(along, part));
     const double mean = (1 - part) * exp(-FOG * length_in_box(before, light)) +
                         part * exp(-FOG * length_in_box(trip_add(before, along), light));
-    return fabs(mean - exp(-FOG * length_in_box(place, light)));
+    return fabs(mean - exp(-FOG * length_in_box(position, light)));
 }
 
 /* What a node in fog may be off: columns are exact there, and at most a node apart in a layer, so
  * it is what linear interpolation between two is off, wherever they lie, along both of its axes. */
-static double most_off(trip_vec3 node, trip_vec3 light)
+static double max_off(trip_vec3 node, trip_vec3 light)
 {
     const trip_vec3 way = trip_sub(node, light),
                     axes[3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
@@ -941,10 +944,10 @@ static double most_off(trip_vec3 node, trip_vec3 light)
         if (fabs(trip_component(way, a)) > fabs(trip_component(way, longest)))
             longest = a;
     for (int i = 1; i < 3; i++) {
-        double most = 0;
+        double max = 0;
         for (int n = 1; n < 8; n++)
-            most = fmax(most, mean_is_off(node, axes[(longest + i) % 3], n / 8.0, light));
-        sum += most;
+            max = fmax(max, mean_is_off(node, axes[(longest + i) % 3], n / 8.0, light));
+        sum += max;
     }
     return sum;
 }
@@ -976,7 +979,7 @@ static void every_node_is_lit_from_a_place_once(void **state)
                 const trip_vec3 node = trip_v3(i % EDGE, i / EDGE % EDGE, i / EDGE / EDGE);
                 const double expected = exp(-fog * FOG * length_in_box(node, lights[n]));
                 double apart = fabs((double)reached[i] - expected);
-                if (!(fog && is_on_rim(node)) && !(apart <= (fog ? most_off(node, lights[n]) : 0)))
+                if (!(fog && is_on_rim(node)) && !(apart <= (fog ? max_off(node, lights[n]) : 0)))
                     fail_msg("light %zu, node %g %g %g: %g, not %g", n, node.x, node.y, node.z,
                              (double)reached[i], expected);
             }
@@ -1123,12 +1126,12 @@ static void a_lattice_that_does_not_fit_is_refused(void **state)
         .data = s.data, .settings = &settings, .clip = &none, .table = s.table, .threads = 1
     };
     assert_int_equal(trip_light_map_create(&m, s.budget), 0);
-    uint64_t most = trip_budget_left_bytes(s.budget) - 100000;
-    assert_true(trip_budget_charge(s.budget, most));
+    uint64_t max = trip_budget_left_bytes(s.budget) - 100000;
+    assert_true(trip_budget_charge(s.budget, max));
     test_catch_reports();
     assert_true(trip_light_map_begin(m, &source) < 0);
     assert_one_report("33 x 33 x 33 nodes");
-    trip_budget_discharge(s.budget, most);
+    trip_budget_discharge(s.budget, max);
     trip_light_map_destroy(m);
     scene_destroy(&s);
 }

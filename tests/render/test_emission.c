@@ -53,7 +53,7 @@ static trip_settings with_emission(void)
 {
     trip_settings s = trip_settings_default();
     s.classify = TRIP_CLASSIFY_POST;
-    s.slices = 4;
+    s.samples_per_sheet = 4;
     s.shading = false;
     s.background[3] = 0;
     s.tolerance = 1e-5;

@@ -384,14 +384,14 @@ static void pictures_are_sums_of_gaussians(void **state)
         trip_camera c;
         assert_int_equal(trip_camera_make(&c, &view, &map), 0);
         scene_picture p = scene_draw(&s, scene_renderers(), &view, &settings);
-        double most = 0;
+        double max = 0;
         for (int y = 0; y < p.height; y++)
             for (int x = 0; x < p.width; x++) {
                 double depth = expected_depth(&c, &settings, (double)0.7f, x + 0.5, y + 0.5);
-                most = fmax(most, -expm1(-depth));
+                max = fmax(max, -expm1(-depth));
                 assert_close((double)scene_pixel(&p, x, y)[3], -expm1(-depth), 1e-5);
             }
-        assert_true(most > 0.01);
+        assert_true(max > 0.01);
         scene_picture_free(&p);
     }
     scene_destroy(&s);
@@ -403,9 +403,9 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
     scene_picture expected = scene_draw(s, scene_renderers(), view, settings);
     for (const scene_renderer *r = scene_renderers() + 1; r->name; r++) {
         scene_picture p = scene_draw(s, r, view, settings);
-        double most = scene_difference(&expected, &p);
-        if (!(most <= r->tolerance))
-            fail_msg("%s: %.3f of 1/255, %.3f allowed", r->name, 255 * most, 255 * r->tolerance);
+        double max = scene_difference(&expected, &p);
+        if (!(max <= r->tolerance))
+            fail_msg("%s: %.3f of 1/255, %.3f allowed", r->name, 255 * max, 255 * r->tolerance);
         for (int axis = 0; axis < 3 && settings->flatten <= 1; axis++)
             scene_compare_counts(&expected.lists[axis], &p.lists[axis], r->name);
         scene_picture_free(&p);

@@ -207,10 +207,10 @@ static void without_memory_for_its_pixels_the_reference_says_so(void **state)
  * is still what it was. */
 typedef struct lazy {
     trip_renderer base;
-    unsigned most, drawn, done; /* batches: that may be held, drawn, done with */
-    unsigned fail_at;           /* the draw that fails; 0: none */
-    bool awaited;               /* since a batch was done with */
-    uint32_t sums[64];          /* of batches, by their number modulo 64 */
+    unsigned max, drawn, done; /* batches: that may be held, drawn, done with */
+    unsigned fail_at;          /* the draw that fails; 0: none */
+    bool awaited;              /* since a batch was done with */
+    uint32_t sums[64];         /* of batches, by their number modulo 64 */
 } lazy;
 
 static uint32_t sum_of(const trip_batch *batch)
@@ -246,7 +246,7 @@ static int lazy_draw(trip_renderer *r, const trip_batch *batch, bool front_to_ba
     lazy *l = (lazy *)r;
     (void)front_to_back;
     l->sums[l->drawn++ % 64] = sum_of(batch);
-    assert_true(l->drawn - l->done <= l->most + 1);
+    assert_true(l->drawn - l->done <= l->max + 1);
     return l->drawn == l->fail_at ? trip_fail(TRIP_ERROR, "test", "draw", "fails") : 0;
 }
 
@@ -303,7 +303,7 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
     trip_camera_params view = scene_view(&s, trip_v3(1, 2, 1), 80, 30, 16);
     const unsigned slots[] = { 2, 3, 8, 64 }, held[] = { 1, 1, 4, 15 };
     for (int i = 0; i < 4; i++) {
-        lazy l = { .base = { .ops = &lazy_ops }, .most = held[i] };
+        lazy l = { .base = { .ops = &lazy_ops }, .max = held[i] };
         trip_reader *reader =
             make_reader(&s, (trip_reader_params){ .slots = slots[i], .slot_bytes = 16384 });
         assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), 0);

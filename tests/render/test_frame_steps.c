@@ -302,7 +302,7 @@ static void check_stopping(const scene *s, const scene_renderer *kind, trip_read
     static float whole[4 * PIXELS], after[4 * PIXELS];
     gate g = closed_gate();
     desk d;
-    double least = 1;
+    double min = 1;
     set_up(&d, s, kind, small_slots);
     draw_whole(&d, whole);
     put_away(&d);
@@ -313,11 +313,11 @@ static void check_stopping(const scene *s, const scene_renderer *kind, trip_read
     set_up(&d, s, kind, params);
     for (unsigned reads = 0; reads < 12; reads += 4) {
         double seconds = stop_at_gate(&d, &g, reads);
-        least = seconds < least ? seconds : least;
+        min = seconds < min ? seconds : min;
         open_gate(&g);
     }
-    if (!(least < 0.005))
-        fail_msg("%s: giving up takes %g s of processor time", kind->name, least);
+    if (!(min < 0.005))
+        fail_msg("%s: giving up takes %g s of processor time", kind->name, min);
     draw_whole(&d, after);
     assert_memory_equal(whole, after, sizeof whole);
     put_away(&d);

@@ -18,19 +18,20 @@ static trip_camera_params frame(const trip_camera_framing *f, trip_affine m)
 }
 
 /* The picture's axes in world space, worked out from the parameters alone. */
-static void axes_of(const trip_camera_params *p, trip_vec3 *right, trip_vec3 *up, trip_vec3 *gaze)
+static void axes_of(const trip_camera_params *p, trip_vec3 *right, trip_vec3 *up,
+                    trip_vec3 *view_direction)
 {
-    *gaze = trip_normalize(trip_sub(p->look, p->eye));
-    *right = trip_normalize(trip_cross(*gaze, p->up));
-    *up = trip_cross(*right, *gaze);
+    *view_direction = trip_normalize(trip_sub(p->look, p->eye));
+    *right = trip_normalize(trip_cross(*view_direction, p->up));
+    *up = trip_cross(*right, *view_direction);
 }
 
 /* Where a world point is in the picture: half widths to the right, half heights up. */
-static void place_of(const trip_camera_params *p, trip_vec3 point, double at[2])
+static void position_of(const trip_camera_params *p, trip_vec3 point, double at[2])
 {
-    trip_vec3 right, up, gaze, d = trip_sub(point, p->eye);
-    axes_of(p, &right, &up, &gaze);
-    double depth = trip_dot(d, gaze);
+    trip_vec3 right, up, view_direction, d = trip_sub(point, p->eye);
+    axes_of(p, &right, &up, &view_direction);
+    double depth = trip_dot(d, view_direction);
     double half = 0.5 * p->ortho_height;
     assert_true(depth > 0);
     if (!(half > 0))
@@ -53,7 +54,7 @@ static void box_bounds(const trip_camera_framing *f, trip_affine m, const trip_c
     hi[0] = hi[1] = -INFINITY;
     for (int corner = 0; corner < 8; corner++) {
         double at[2];
-        place_of(p, corner_of(f, m, corner), at);
+        position_of(p, corner_of(f, m, corner), at);
         for (int a = 0; a < 2; a++) {
             lo[a] = fmin(lo[a], at[a]);
             hi[a] = fmax(hi[a], at[a]);
@@ -119,17 +120,17 @@ static void a_sphere_is_as_far_off_as_its_cone_of_sight_calls_for(void **state)
                               .height = 100,
                               .fov_degrees = 50 };
     trip_camera_params p = frame(&f, trip_affine_identity());
-    trip_vec3 to = trip_sub(trip_v3(1, -2, 3), p.eye), gaze = trip_sub(p.look, p.eye);
+    trip_vec3 to = trip_sub(trip_v3(1, -2, 3), p.eye), view_direction = trip_sub(p.look, p.eye);
     assert_true(calls > 0);
     assert_close(trip_length(to), 4 / sin(atan(0.9 * tan(25 * DEGREE))), 1e-9);
-    assert_close(trip_dot(trip_normalize(to), trip_normalize(gaze)), 1, 1e-9);
+    assert_close(trip_dot(trip_normalize(to), trip_normalize(view_direction)), 1, 1e-9);
     f.parallel = true;
     p = frame(&f, trip_affine_identity());
     assert_close(p.ortho_height, 8 / 0.9, 1e-9);
     to = trip_sub(trip_v3(1, -2, 3), p.eye);
-    gaze = trip_normalize(trip_sub(p.look, p.eye));
-    assert_close(trip_length(trip_cross(to, gaze)), 0, 1e-9);
-    assert_true(trip_dot(to, gaze) > 4); /* the eye is in front of it */
+    view_direction = trip_normalize(trip_sub(p.look, p.eye));
+    assert_close(trip_length(trip_cross(to, view_direction)), 0, 1e-9);
+    assert_true(trip_dot(to, view_direction) > 4); /* the eye is in front of it */
 }
 
 static int reach_fails(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
@@ -204,9 +205,9 @@ static void an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margin
         trip_camera_params first = frame(&f, m);
         double lowest[2], highest[2];
         turned_bounds(&f, m, &first, lowest, highest);
-        double most = fmax(fmax(highest[0], -lowest[0]), fmax(highest[1], -lowest[1]));
-        assert_true(most <= 0.9 + 1e-9);
-        assert_close(most, 0.9, 1e-4);
+        double max = fmax(fmax(highest[0], -lowest[0]), fmax(highest[1], -lowest[1]));
+        assert_true(max <= 0.9 + 1e-9);
+        assert_close(max, 0.9, 1e-4);
         /* Its axis goes through the middle of the box. */
         assert_close(first.look.x, d[0] / 2, 1e-9);
         assert_close(first.look.y, d[1] / 2, 1e-9);
@@ -304,15 +305,15 @@ static void azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise(void
     f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .elevation_degrees = 135 };
     seen_from(f, &p); /* over the top: upside down, from behind */
     assert_true(p.eye.y > 4.5 && p.eye.z > 4.5);
-    place_of(&p, trip_v3(4.5, 4.5, 9), at);
+    position_of(&p, trip_v3(4.5, 4.5, 9), at);
     assert_true(at[1] < 0);
     f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .roll_degrees = 90 };
     seen_from(f, &p);
-    place_of(&p, trip_v3(4.5, 4.5, 9), at); /* what was at the top is on the right */
+    position_of(&p, trip_v3(4.5, 4.5, 9), at); /* what was at the top is on the right */
     assert_true(at[0] > 0.5 && fabs(at[1]) < 1e-9);
     f.roll_degrees = 180;
     seen_from(f, &p);
-    place_of(&p, trip_v3(4.5, 4.5, 9), at);
+    position_of(&p, trip_v3(4.5, 4.5, 9), at);
     assert_true(at[1] < -0.5 && fabs(at[0]) < 1e-9);
 }
 

@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "gl/context.h"
+#include "gl/gl_context.h"
 #include "scenes.h"
 #include "splat.h"
 #include "test.h"
@@ -76,20 +76,20 @@ static void assert_same_counts(const scene_picture *a, const scene_picture *b)
 }
 
 /* The bound that a float layer is held to. */
-static void assert_agrees(const char *what, const scene_picture *a, const scene_picture *b)
+static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b)
 {
-    double most = scene_difference(a, b), mean = mean_difference(a, b);
-    print_message("%-36s most %.4f mean %.5f of 1/255\n", what, 255 * most, 255 * mean);
-    assert_true(most <= 1.0 / 255);
+    double max = scene_difference(a, b), mean = mean_difference(a, b);
+    print_message("%-36s most %.4f mean %.5f of 1/255\n", label, 255 * max, 255 * mean);
+    assert_true(max <= 1.0 / 255);
     assert_true(mean < 0.05 / 255);
 }
 
-static void compare(const char *what, const scene *s, const trip_camera_params *view,
+static void compare(const char *label, const scene *s, const trip_camera_params *view,
                     const trip_settings *settings)
 {
     scene_picture a = scene_draw(s, &reference, view, settings);
     scene_picture b = scene_draw(s, &gl, view, settings);
-    assert_agrees(what, &a, &b);
+    assert_agrees(label, &a, &b);
     assert_same_counts(&a, &b);
     scene_picture_free(&a);
     scene_picture_free(&b);
@@ -163,19 +163,19 @@ static void grids_that_are_not_cubic_agree_with_the_reference(void **state)
     trip_settings settings = trip_settings_default();
     for (int i = 0; i < 3; i++) {
         scene s;
-        char what[64];
+        char label[64];
         make_shells(&s, grids[i]);
         double size = cbrt(fabs(trip_affine_determinant(grids[i]))) * 40;
         trip_camera_params view = scene_view(&s, trip_v3(0.5, 1, 0.7), 1.8 * size, 45, 100);
         compare(names[i], &s, &view, &settings);
         view.ortho_height = 1.3 * size;
-        snprintf(what, sizeof what, "%s, parallel", names[i]);
-        compare(what, &s, &view, &settings);
+        snprintf(label, sizeof label, "%s, parallel", names[i]);
+        compare(label, &s, &view, &settings);
         view.ortho_height = 0;
         view.eye = trip_add(view.look, trip_scale(trip_v3(0.1, 0.07, 0.03), size));
         view.fov_degrees = 160;
-        snprintf(what, sizeof what, "%s, from inside, 160 degrees", names[i]);
-        compare(what, &s, &view, &settings);
+        snprintf(label, sizeof label, "%s, from inside, 160 degrees", names[i]);
+        compare(label, &s, &view, &settings);
         scene_destroy(&s);
     }
 }
@@ -193,7 +193,7 @@ static void light_and_kernel_settings_agree_with_the_reference(void **state)
     settings.light_direction = trip_normalize(trip_v3(1, -0.2, -0.4));
     compare("light from behind", &s, &view, &settings);
     settings.point_light = true;
-    settings.light_place = trip_affine_point(&sheared, trip_v3(8, 31, 26.5));
+    settings.light_position = trip_affine_point(&sheared, trip_v3(8, 31, 26.5));
     compare("light in the volume", &s, &view, &settings);
     view.ortho_height = 50;
     compare("light in the volume, parallel", &s, &view, &settings);
@@ -331,7 +331,7 @@ static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
     static const struct {
         trip_target target;
         const char *name;
-        double most;
+        double max;
     } targets[] = { { TRIP_TARGET_RGBA16F, "rgba16f", 8.0 / 255 },
                     { TRIP_TARGET_RGBA8, "rgba8", 60.0 / 255 } };
     for (int i = 0; i < 2; i++) {
@@ -339,7 +339,7 @@ static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
         scene_picture p = scene_draw(&s, &gl, &view, &settings);
         print_message("%s: most %.3f mean %.4f of 1/255\n", targets[i].name,
                       255 * scene_difference(&expected, &p), 255 * mean_difference(&expected, &p));
-        assert_true(scene_difference(&expected, &p) < targets[i].most);
+        assert_true(scene_difference(&expected, &p) < targets[i].max);
         scene_picture_free(&p);
     }
     scene_picture_free(&expected);
@@ -386,12 +386,12 @@ static void put_away(bench *b)
 
 /* Draws a frame in the shortest steps there are, at most so many; returns their number. One that is
  * not done is given up. */
-static int draw_in_steps(bench *b, int most, float *rgba)
+static int draw_in_steps(bench *b, int max, float *rgba)
 {
     trip_drawing drawing;
     int status = TRIP_FRAME_MORE, steps = 0;
     assert_int_equal(trip_frame_begin(&drawing, b->renderer, b->reader, &b->frame), 0);
-    while (status > 0 && steps < most) {
+    while (status > 0 && steps < max) {
         status = trip_frame_step(&drawing, 0);
         steps += status == TRIP_FRAME_MORE;
         if (status == TRIP_FRAME_WAITS)
@@ -450,8 +450,8 @@ static void indexed_lists_are_loaded_in_steps_and_once(void **state)
     set_up(&b, &s, &view, &settings);
     assert_true(s.data->header.kept > TRIP_FRAME_PIECE);
     uint64_t before = trip_budget_left_bytes(s.budget);
-    for (int most = 1; most < 9; most += 2) /* none is done */
-        assert_int_equal(draw_in_steps(&b, most, rgba), most);
+    for (int max = 1; max < 9; max += 2) /* none is done */
+        assert_int_equal(draw_in_steps(&b, max, rgba), max);
     int first = draw_in_steps(&b, INT_MAX, rgba);
     assert_memory_equal(rgba, whole.rgba, sizeof rgba);
     int second = draw_in_steps(&b, INT_MAX, rgba);
@@ -563,13 +563,13 @@ static void what_does_not_fit_is_refused_and_the_next_frame_draws(void **state)
     assert_true(try_frame(&s, r, &huge, &settings) < 0);
 
     /* All but a little of the budget is gone. */
-    size_t most = (size_t)trip_budget_left_bytes(s.budget) - (48u << 20);
-    void *taken = trip_budget_take(s.budget, most);
+    size_t max = (size_t)trip_budget_left_bytes(s.budget) - (48u << 20);
+    void *taken = trip_budget_take(s.budget, max);
     assert_non_null(taken);
     trip_camera_params wide = view;
     wide.width = wide.height = 2048;
     assert_true(try_frame(&s, r, &wide, &settings) < 0);
-    trip_budget_release(s.budget, taken, most);
+    trip_budget_release(s.budget, taken, max);
 
     assert_int_equal(try_frame(&s, r, &view, &settings), 0);
     r->ops->destroy(r);

@@ -104,7 +104,7 @@ static trip_settings with_all(const lit_scene *l, trip_classify classify)
     s.classify = classify;
     s.headlight = false;
     s.light_direction = trip_normalize(trip_v3(0.8, -0.3, 0.6));
-    s.light_place = trip_affine_point(l->map, trip_v3(9, 24.3, 20.1));
+    s.light_position = trip_affine_point(l->map, trip_v3(9, 24.3, 20.1));
     s.effects = (trip_effects){ .shadows = true,
                                 .occlusion = true,
                                 .emission = true,
@@ -114,14 +114,14 @@ static trip_settings with_all(const lit_scene *l, trip_classify classify)
     return s;
 }
 
-static void compare(const char *what, const lit_scene *l, const trip_camera_params *view,
+static void compare(const char *label, const lit_scene *l, const trip_camera_params *view,
                     const trip_settings *settings)
 {
     scene_picture a = scene_draw(&l->s, &reference, view, settings);
     scene_picture b = scene_draw(&l->s, &gl, view, settings);
-    double most = scene_difference(&a, &b);
-    print_message("%-28s most %.4f of 1/255\n", what, 255 * most);
-    assert_true(most <= 1.0 / 255);
+    double max = scene_difference(&a, &b);
+    print_message("%-28s most %.4f of 1/255\n", label, 255 * max);
+    assert_true(max <= 1.0 / 255);
     scene_picture_free(&a);
     scene_picture_free(&b);
 }
@@ -138,15 +138,15 @@ static void every_set_of_effects_agrees_with_the_reference(void **state)
     for (int n = 0; n < 32; n++) {
         trip_camera_params view = scene_view(&l.s, trip_v3(0.4, -1, 0.5), 80, 28, SIZE);
         trip_settings settings = with_all(&l, both[n / 16]);
-        char what[64];
-        snprintf(what, sizeof what, "%s, effects %d", class_names[n / 16], n % 16);
+        char label[64];
+        snprintf(label, sizeof label, "%s, effects %d", class_names[n / 16], n % 16);
         settings.effects.shadows = n & 1;
         settings.effects.occlusion = n & 2;
         settings.effects.emission = n & 4;
         settings.shading = n & 8;
         settings.headlight = !settings.effects.shadows && n & 4;
         settings.point_light = n & 2;
-        compare(what, &l, &view, &settings);
+        compare(label, &l, &view, &settings);
     }
     destroy(&l);
 }
@@ -196,8 +196,8 @@ static void every_form_agrees_with_the_reference(void **state)
     const trip_camera_params view = scene_view(&l.s, trip_v3(0.9, 0.8, 0.7), 80, 28, SIZE);
     for (int form = 0; form < 10; form++) {
         trip_settings settings = with_all(&l, both[form / 7]);
-        char what[32];
-        snprintf(what, sizeof what, "form %d", form);
+        char label[32];
+        snprintf(label, sizeof label, "form %d", form);
         settings.triangles = form < 4 && form & 1;
         settings.indexed = form < 4 && form & 2;
         if (form == 4)
@@ -212,8 +212,8 @@ static void every_form_agrees_with_the_reference(void **state)
             settings.lod_px = 4;
         if (form >= 8)
             settings.kernel = form == 8 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_GAUSSIAN;
-        settings.slices = form == 9 ? 5 : 2;
-        compare(what, &l, &view, &settings);
+        settings.samples_per_sheet = form == 9 ? 5 : 2;
+        compare(label, &l, &view, &settings);
     }
     destroy(&l);
 }
@@ -308,7 +308,7 @@ static void a_changed_lattice_is_copied_anew(void **state)
         case 6: /* one at the same address, maybe */
             trip_light_map_destroy(d.light);
             assert_int_equal(trip_light_map_create(&d.light, l.s.budget), 0);
-            settings.light_place.x -= 3;
+            settings.light_position.x -= 3;
             break;
         case 7:
             settings.effects.cells = 9;

@@ -1,7 +1,7 @@
 /* The GPU's work in parts: none is begun once the frame is given up. */
 #include "gl/queue.h"
 
-#include "gl/context.h"
+#include "gl/gl_context.h"
 #include "report.h"
 #include "test.h"
 

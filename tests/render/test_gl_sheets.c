@@ -58,24 +58,24 @@ static trip_settings post(void)
     return s;
 }
 
-static void assert_agrees(const char *what, const scene_picture *a, const scene_picture *b)
+static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b)
 {
     size_t count = 4 * (size_t)a->width * (size_t)a->height;
-    double most = scene_difference(a, b), sum = 0;
+    double max = scene_difference(a, b), sum = 0;
     for (size_t i = 0; i < count; i++)
         sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
-    print_message("%-36s most %.4f mean %.5f of 1/255\n", what, 255 * most,
+    print_message("%-36s most %.4f mean %.5f of 1/255\n", label, 255 * max,
                   255 * sum / (double)count);
-    assert_true(most <= 1.0 / 255);
+    assert_true(max <= 1.0 / 255);
     assert_true(sum / (double)count < 0.05 / 255);
 }
 
-static void compare(const char *what, const scene *s, const trip_camera_params *view,
+static void compare(const char *label, const scene *s, const trip_camera_params *view,
                     const trip_settings *settings)
 {
     scene_picture a = scene_draw(s, &reference, view, settings);
     scene_picture b = scene_draw(s, &gl, view, settings);
-    assert_agrees(what, &a, &b);
+    assert_agrees(label, &a, &b);
     scene_picture_free(&a);
     scene_picture_free(&b);
 }
@@ -108,7 +108,7 @@ static void grids_of_any_shape_agree_with_the_reference(void **state)
         view.ortho_height = 35 * unit;
         compare(names[i], &s, &view, &settings);
         settings.point_light = true;
-        settings.light_place = trip_affine_point(&maps[i], trip_v3(8, 31, 26.5));
+        settings.light_position = trip_affine_point(&maps[i], trip_v3(8, 31, 26.5));
         compare(names[i], &s, &view, &settings);
         view.ortho_height = 0;
         compare(names[i], &s, &view, &settings);
@@ -129,7 +129,7 @@ static void codes_of_one_byte_agree_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-static void every_method_and_number_of_slices_agrees_with_the_reference(void **state)
+static void every_method_and_number_of_samples_per_sheet_agrees_with_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -139,7 +139,7 @@ static void every_method_and_number_of_slices_agrees_with_the_reference(void **s
         trip_settings settings = post();
         settings.method = (trip_method)(i % 3);
         settings.h = 0.3;
-        settings.slices = i % 2 ? TRIP_SLICES_MAX : 1 + i;
+        settings.samples_per_sheet = i % 2 ? TRIP_SHEET_SAMPLES_MAX : 1 + i;
         settings.shading = i < 4;
         compare("methods", &s, &view, &settings);
     }
@@ -177,7 +177,7 @@ static void every_kernel_agrees_with_the_reference(void **state)
         view.ortho_height = i == 3 ? 45 : 0;
         trip_settings settings = post();
         settings.kernel = i / 2 ? TRIP_KERNEL_GAUSSIAN : TRIP_KERNEL_CUBIC;
-        settings.slices = 1 + i % 2;
+        settings.samples_per_sheet = 1 + i % 2;
         compare("kernels", &s, &view, &settings);
     }
     scene_destroy(&s);
@@ -256,7 +256,7 @@ static void layers_of_two_bands_are_whole(void **state)
         s.table[code] = (trip_tf_entry){ 1, 1, 1, 0.2F };
     trip_settings settings = post();
     settings.shading = false;
-    settings.slices = 1;
+    settings.samples_per_sheet = 1;
     settings.background[3] = 0;
     trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 40, 40, 64);
     view.width = 8192;
@@ -315,12 +315,12 @@ static void put_away(bench *b)
 
 /* Draws a frame in the shortest steps there are, at most so many; returns their number. One that is
  * not done is given up. */
-static int draw_in_steps(bench *b, int most, float *rgba)
+static int draw_in_steps(bench *b, int max, float *rgba)
 {
     trip_drawing drawing;
     int status = TRIP_FRAME_MORE, steps = 0;
     assert_int_equal(trip_frame_begin(&drawing, b->renderer, b->reader, &b->frame), 0);
-    while (status > 0 && steps < most) {
+    while (status > 0 && steps < max) {
         status = trip_frame_step(&drawing, 0);
         steps += status == TRIP_FRAME_MORE;
         if (status == TRIP_FRAME_WAITS)
@@ -345,8 +345,8 @@ static void frames_given_up_anywhere_leave_the_next_as_it_is(void **state)
     int all = draw_in_steps(&b, INT_MAX, rgba);
     assert_memory_equal(rgba, whole.rgba, sizeof rgba);
     assert_true(all > 40); /* by parts, not at once */
-    for (int most = 1; most < all; most += all / 8) {
-        assert_int_equal(draw_in_steps(&b, most, rgba), most);
+    for (int max = 1; max < all; max += all / 8) {
+        assert_int_equal(draw_in_steps(&b, max, rgba), max);
         memset(rgba, 0, sizeof rgba);
         assert_int_equal(draw_in_steps(&b, INT_MAX, rgba), all);
         assert_memory_equal(rgba, whole.rgba, sizeof rgba);
@@ -368,14 +368,14 @@ static void keep_line(const char *line, void *user)
 static int draw_with(bench *b, uint64_t left, float *rgba)
 {
     trip_frame_stats stats;
-    size_t most = (size_t)(trip_budget_left_bytes(b->scene->budget) - left);
-    void *taken = trip_budget_take(b->scene->budget, most);
+    size_t max = (size_t)(trip_budget_left_bytes(b->scene->budget) - left);
+    void *taken = trip_budget_take(b->scene->budget, max);
     assert_non_null(taken);
     last_line[0] = 0;
     trip_report_redirect(keep_line, NULL);
     int status = trip_frame_draw(b->renderer, b->reader, &b->frame, rgba, NULL, &stats);
     trip_report_redirect(NULL, NULL);
-    trip_budget_release(b->scene->budget, taken, most);
+    trip_budget_release(b->scene->budget, taken, max);
     return status;
 }
 
@@ -422,7 +422,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(grids_of_any_shape_agree_with_the_reference),
         cmocka_unit_test(codes_of_one_byte_agree_with_the_reference),
-        cmocka_unit_test(every_method_and_number_of_slices_agrees_with_the_reference),
+        cmocka_unit_test(every_method_and_number_of_samples_per_sheet_agrees_with_the_reference),
         cmocka_unit_test(from_within_and_far_away_it_agrees_with_the_reference),
         cmocka_unit_test(every_kernel_agrees_with_the_reference),
         cmocka_unit_test(fog_is_as_dense_whatever_other_codes_are),

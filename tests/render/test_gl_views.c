@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "brick.h"
-#include "dataset_text.h"
+#include "dataset_metadata.h"
 #include "scenes.h"
 #include "test.h"
 
@@ -17,7 +17,7 @@ static void open_volume(scene *s, const char *name, trip_brick_levels_for levels
 {
     char input[512];
     trip_brick_summary summary;
-    trip_dataset_text *text;
+    trip_dataset_metadata *text;
     trip_tf *tf;
     memset(s, 0, sizeof *s);
     snprintf(s->folder, sizeof s->folder, "/tmp/trip-views-XXXXXX");
@@ -34,14 +34,14 @@ static void open_volume(scene *s, const char *name, trip_brick_levels_for levels
     assert_int_equal(trip_dataset_open(&s->data, s->path, s->budget), 0);
     s->table = calloc(65536, sizeof *s->table);
     assert_non_null(s->table);
-    assert_int_equal(trip_dataset_text_parse(&text, s->data), 0);
-    assert_int_equal(trip_dataset_text_tf(text, s->data, &tf), 0);
+    assert_int_equal(trip_dataset_metadata_parse(&text, s->data), 0);
+    assert_int_equal(trip_dataset_metadata_tf(text, s->data, &tf), 0);
     const trip_file_header *h = &s->data->header;
     trip_tf_denormalise(tf, h->value_min, h->value_max);
     double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
     trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel, s->table);
     trip_tf_destroy(tf);
-    trip_dataset_text_destroy(text);
+    trip_dataset_metadata_destroy(text);
 }
 
 /* Half the diagonal of the volume in world units. */
@@ -85,18 +85,18 @@ static trip_camera_params make_view(const scene *s, int i)
 }
 
 typedef struct tally {
-    double most, sum, components;
+    double max, sum, components;
 } tally;
 
 static void add(tally *t, const scene_picture *a, const scene_picture *b, const char *view)
 {
-    double sum = 0, most = scene_difference(a, b);
+    double sum = 0, max = scene_difference(a, b);
     size_t n = 4 * (size_t)a->width * (size_t)a->height;
     for (size_t i = 0; i < n; i++)
         sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
-    if (!(most <= 1.0 / 255 && sum / (double)n < 0.05 / 255))
-        fail_msg("%s: most %.4f, mean %.5f of 1/255", view, 255 * most, 255 * sum / (double)n);
-    t->most = fmax(t->most, most);
+    if (!(max <= 1.0 / 255 && sum / (double)n < 0.05 / 255))
+        fail_msg("%s: most %.4f, mean %.5f of 1/255", view, 255 * max, 255 * sum / (double)n);
+    t->max = fmax(t->max, max);
     t->sum += sum;
     t->components += (double)n;
 }
@@ -148,7 +148,7 @@ static void check_volume(const char *name, trip_classify classify, bool hard, in
         if (tallies[r].components > 0)
             print_message("%s, %llu splats: %s most %.4f mean %.5f of 1/255\n", name,
                           (unsigned long long)s.data->header.kept, scene_renderers()[r].name,
-                          255 * tallies[r].most, 255 * tallies[r].sum / tallies[r].components);
+                          255 * tallies[r].max, 255 * tallies[r].sum / tallies[r].components);
     scene_destroy(&s);
 }
 

@@ -38,16 +38,16 @@ static double opacity_of(fog *f, const scene_renderer *r, double depth,
     return alpha;
 }
 
-static void expect_off(double alpha, double depth, double most, const char *what)
+static void expect_off(double alpha, double depth, double max, const char *label)
 {
     double off = fabs(alpha + expm1(-depth));
-    if (!(off <= most))
-        fail_msg("%s, optical depth %g: off by %.3f of 255, at most %.3f", what, depth, 255 * off,
-                 255 * most);
+    if (!(off <= max))
+        fail_msg("%s, optical depth %g: off by %.3f of 255, at most %.3f", label, depth, 255 * off,
+                 255 * max);
 }
 
 /* 720,000 on a ray, at 12.8 of opacity 1e-4 each. Each is rounded once, to 2^-25 at most; pixels
- * take no more below TRIP_SATURATION_PRE. */
+ * take no more below TRIP_EARLY_TERMINATION_PRE. */
 static void a_million_splats_lose_what_roundings_can(void **state)
 {
     (void)state;
@@ -94,7 +94,7 @@ static void opacities_may_be_zero_denormal_or_one(void **state)
         const float extinctions[] = { 0, 1e-42F, 9.2F, 1e30F };
         for (int code = 0; code < 65536; code++)
             s.table[code].extinction = extinctions[i];
-        hard_view v = { .what = "opacity", .settings = hard_settings(), .forms = HARD_ALL };
+        hard_view v = { .name = "opacity", .settings = hard_settings(), .forms = HARD_ALL };
         v.camera = scene_view(&s, trip_v3(0.3, 1, 0.2), 25, 30, 12);
         v.shows = i > 1;
         v.gl = HARD_ALL;

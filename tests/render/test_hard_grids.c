@@ -9,9 +9,9 @@
 enum { SIZE = 16 };
 
 /* A view of the middle from `direction` in index space, in which the whole grid is seen. */
-static hard_view view_of(const scene *s, const char *what, trip_vec3 direction, bool ortho)
+static hard_view view_of(const scene *s, const char *label, trip_vec3 direction, bool ortho)
 {
-    hard_view v = { .what = what, .settings = hard_settings(), .forms = HARD_ALL, .shows = true };
+    hard_view v = { .name = label, .settings = hard_settings(), .forms = HARD_ALL, .shows = true };
     const uint64_t *dims = s->data->header.dims;
     const trip_affine *world = &s->data->index_to_world;
     double half = 0;
@@ -24,13 +24,13 @@ static hard_view view_of(const scene *s, const char *what, trip_vec3 direction, 
     return v;
 }
 
-static void check_grid(const char *what, trip_affine world, const int64_t dims[3])
+static void check_grid(const char *label, trip_affine world, const int64_t dims[3])
 {
     const trip_vec3 directions[] = { { 0.3, -1, 0.4 }, { 1, 0.1, 0.2 }, { 0, 0, 1 }, { 1, 1, 1 } };
     scene s;
     hard_lumps(&s, dims, &world);
     for (int i = 0; i < 4; i++) {
-        hard_view v = view_of(&s, what, directions[i], i % 2);
+        hard_view v = view_of(&s, label, directions[i], i % 2);
         v.settings.shading = i == 1;
         v.gl = i < 2 ? HARD_SPLATS | HARD_POST : 0;
         v.shows = false;

@@ -26,7 +26,7 @@ static int ascending(const void *a, const void *b)
 
 /* The mean change of a component in the step where it is most, over that of the median step, which
  * is the motion's. */
-static double most_over_median(const scene *s, trip_method method, double h, unsigned form)
+static double max_over_median(const scene *s, trip_method method, double h, unsigned form)
 {
     double changes[STEPS];
     hard_view v = { .settings = hard_settings() };
@@ -58,16 +58,16 @@ static void one_list_a_frame_pops_and_lists_by_pixel_do_not(void **state)
     scene s;
     hard_lumps(&s, (const int64_t[3]){ 14, 14, 14 }, NULL);
     for (unsigned form = HARD_SPLATS; form <= HARD_POST; form *= 2) {
-        double axis = most_over_median(&s, TRIP_METHOD_AXIS, 0, form);
-        double clip = most_over_median(&s, TRIP_METHOD_CLIP, 0, form);
+        double axis = max_over_median(&s, TRIP_METHOD_AXIS, 0, form);
+        double clip = max_over_median(&s, TRIP_METHOD_CLIP, 0, form);
         print_message("form %u: axis %.2f, clip %.2f\n", form, axis, clip);
         assert_true(axis > 10);
         assert_true(clip < axis / 8);
-        const double hs[] = { 0, 0.85, 0.99 }, most[] = { 1.5, 1.5, 2 };
+        const double hs[] = { 0, 0.85, 0.99 }, max[] = { 1.5, 1.5, 2 };
         for (int i = 0; i < 3; i++) {
-            double merge = most_over_median(&s, TRIP_METHOD_MERGE, hs[i], form);
+            double merge = max_over_median(&s, TRIP_METHOD_MERGE, hs[i], form);
             print_message("  merge, h %g: %.2f\n", hs[i], merge);
-            assert_true(merge < most[i]);
+            assert_true(merge < max[i]);
         }
     }
     scene_destroy(&s);

@@ -18,7 +18,7 @@ typedef struct field {
 
 /* From a voxel of the transformed grid to one of the field's, and from its world to the new one. */
 typedef struct transform {
-    const char *what;
+    const char *name;
     int axis[3]; /* of the field, by the grid's */
     bool mirrored[3];
     double scale;
@@ -27,17 +27,17 @@ typedef struct transform {
 } transform;
 
 static const transform transforms[] = {
-    { .what = "permuted", .axis = { 2, 0, 1 }, .scale = 1 },
-    { .what = "two axes exchanged", .axis = { 1, 0, 2 }, .scale = 1, .splats = 8 },
-    { .what = "mirrored",
+    { .name = "permuted", .axis = { 2, 0, 1 }, .scale = 1 },
+    { .name = "two axes exchanged", .axis = { 1, 0, 2 }, .scale = 1, .splats = 8 },
+    { .name = "mirrored",
       .axis = { 0, 1, 2 },
       .mirrored = { true, false, true },
       .scale = 1,
       .splats = 22 },
-    { .what = "scaled up", .axis = { 0, 1, 2 }, .scale = 1e4 },
-    { .what = "scaled down", .axis = { 0, 1, 2 }, .scale = 3e-7 },
-    { .what = "moved", .axis = { 0, 1, 2 }, .scale = 1, .moved = true },
-    { .what = "all of it",
+    { .name = "scaled up", .axis = { 0, 1, 2 }, .scale = 1e4 },
+    { .name = "scaled down", .axis = { 0, 1, 2 }, .scale = 3e-7 },
+    { .name = "moved", .axis = { 0, 1, 2 }, .scale = 1, .moved = true },
+    { .name = "all of it",
       .axis = { 1, 2, 0 },
       .mirrored = { true, true, true },
       .scale = 0.3,
@@ -174,7 +174,7 @@ static void make_view(const field *f, int number, trip_affine *own, hard_view *v
         .height = SIZE,
     };
     v->settings.h = uniform(0, 0.95);
-    v->settings.slices = 1 + number % 3;
+    v->settings.samples_per_sheet = 1 + number % 3;
     v->settings.method = number == 3 ? TRIP_METHOD_CLIP : TRIP_METHOD_MERGE;
 }
 
@@ -194,10 +194,10 @@ static void expect_same(const scene *a, const scene *b, const hard_view *v, cons
     scene_picture before = hard_draw(a, r, v, form), after = hard_draw(b, r, moved, form);
     const bool reference = r == &cpu_scenes_reference;
     double apart = 255 * scene_difference(&before, &after);
-    double *most = &worst[reference][t - transforms][form];
-    *most = fmax(*most, apart);
+    double *max = &worst[reference][t - transforms][form];
+    *max = fmax(*max, apart);
     if (!(apart <= bound_of(t, form, reference)))
-        fail_msg("%s, form %u, %s: %.6f of 255 apart", t->what, form, r->name, apart);
+        fail_msg("%s, form %u, %s: %.6f of 255 apart", t->name, form, r->name, apart);
     scene_picture_free(&before);
     scene_picture_free(&after);
 }
@@ -245,7 +245,7 @@ static void transformed_scenes_give_the_same_picture(void **state)
     for (int i = 0; i < TRANSFORMS; i++)
         print_message("%s: by splats %.4f, by sheets %.4f, post %.4f of 255; reference %.2g, %.2g, "
                       "%.2g\n",
-                      transforms[i].what, worst[0][i][1], worst[0][i][2], worst[0][i][4],
+                      transforms[i].name, worst[0][i][1], worst[0][i][2], worst[0][i][4],
                       worst[1][i][1], worst[1][i][2], worst[1][i][4]);
 }
 

@@ -21,9 +21,9 @@ static int tear_down(void **state)
     return 0;
 }
 
-static hard_view view_from(const char *what, trip_vec3 eye, trip_vec3 towards, double fov)
+static hard_view view_from(const char *name, trip_vec3 eye, trip_vec3 towards, double fov)
 {
-    hard_view v = { .what = what, .settings = hard_settings(), .forms = HARD_ALL };
+    hard_view v = { .name = name, .settings = hard_settings(), .forms = HARD_ALL };
     trip_vec3 d = trip_normalize(towards);
     v.camera = (trip_camera_params){ .eye = eye,
                                      .look = trip_add(eye, trip_scale(d, 10)),
@@ -35,11 +35,11 @@ static hard_view view_from(const char *what, trip_vec3 eye, trip_vec3 towards, d
 }
 
 /* Towards the middle of the grid, from so far. */
-static hard_view view_of(const char *what, trip_vec3 from, double distance, double fov)
+static hard_view view_of(const char *name, trip_vec3 from, double distance, double fov)
 {
     const double c = 0.5 * (EDGE - 1);
     trip_vec3 d = trip_normalize(from);
-    return view_from(what, trip_add(trip_v3(c, c, c), trip_scale(d, distance)), trip_scale(d, -1),
+    return view_from(name, trip_add(trip_v3(c, c, c), trip_scale(d, distance)), trip_scale(d, -1),
                      fov);
 }
 
@@ -47,9 +47,9 @@ static void the_eye_may_be_anywhere(void **state)
 {
     (void)state;
     static const struct {
-        const char *what;
+        const char *name;
         trip_vec3 eye;
-    } places[] = {
+    } positions[] = {
         { "inside a cell", { 4.3, 5.7, 6.2 } },
         { "on a voxel", { 4, 5, 6 } },
         { "on a sheet", { 4, 5.3, 6.7 } },
@@ -61,10 +61,10 @@ static void the_eye_may_be_anywhere(void **state)
         { "inside a splat beside the grid", { -0.7, 5.2, 6.1 } },
         { "where a splat's support ends", { -2, 5, 6 } },
     };
-    for (size_t i = 0; i < sizeof places / sizeof *places; i++)
+    for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         for (int wide = 0; wide < 2; wide++) {
-            hard_view v =
-                view_from(places[i].what, places[i].eye, trip_v3(0.6, 0.35, -0.2), wide ? 100 : 40);
+            hard_view v = view_from(positions[i].name, positions[i].eye, trip_v3(0.6, 0.35, -0.2),
+                                    wide ? 100 : 40);
             v.gl = wide ? 1u << i % 3 : 0;
             v.settings.h = 0.3 + 0.5 * wide;
             hard_check(&lumps, &v);
@@ -75,7 +75,7 @@ static void rays_may_lie_along_axes_and_diagonals(void **state)
 {
     (void)state;
     static const struct {
-        const char *what;
+        const char *name;
         trip_vec3 towards;
     } rays[] = {
         { "along X", { 1, 0, 0 } },
@@ -92,7 +92,7 @@ static void rays_may_lie_along_axes_and_diagonals(void **state)
     for (size_t i = 0; i < sizeof rays / sizeof *rays; i++)
         for (int n = 0; n < 12; n++) {
             hard_view v =
-                view_of(rays[i].what, trip_scale(rays[i].towards, -1), n % 2 ? 20 : 40, 40);
+                view_of(rays[i].name, trip_scale(rays[i].towards, -1), n % 2 ? 20 : 40, 40);
             v.camera.ortho_height = n % 2 ? EDGE : 0;
             v.settings.method = n / 2 < 4    ? TRIP_METHOD_MERGE
                                 : n / 2 == 4 ? TRIP_METHOD_CLIP
@@ -134,12 +134,12 @@ static void a_voxel_may_be_a_thousand_pixels_or_a_fraction_of_one(void **state)
     static const double voxel_px[] = { 1000, 100, 1.0 / 8, 1.0 / 64, 1.0 / 256 };
     for (int i = 0; i < 5; i++)
         for (int ortho = 0; ortho < 2; ortho++) {
-            char what[64];
+            char name[64];
             double height = SIZE / voxel_px[i];
-            snprintf(what, sizeof what, "%g pixels a voxel, %s", voxel_px[i],
+            snprintf(name, sizeof name, "%g pixels a voxel, %s", voxel_px[i],
                      ortho ? "parallel" : "perspective");
             double distance = ortho ? 40 : 0.5 * height / tan(15 * 3.14159265358979 / 180);
-            hard_view v = view_of(what, trip_v3(0.4, -1, 0.3), fmax(distance, 14), 30);
+            hard_view v = view_of(name, trip_v3(0.4, -1, 0.3), fmax(distance, 14), 30);
             if (!ortho && distance < 14)
                 v.camera.fov_degrees = 360 / 3.14159265358979 * atan(0.5 * height / 14);
             v.camera.ortho_height = ortho ? height : 0;

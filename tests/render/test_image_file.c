@@ -75,7 +75,7 @@ static double round_trip(const char *name, const trip_image_params *params)
     assert_int_equal(trip_image_read(&files, path_of(name), &width, &height, &back), 0);
     assert_int_equal(width, W);
     assert_int_equal(height, H);
-    double worst = test_most_apart(rgba, back, W * H * 4);
+    double worst = test_max_apart(rgba, back, W * H * 4);
     free(back);
     return worst;
 }
@@ -151,7 +151,7 @@ static void the_curve_of_exr_loses_nothing_outside_its_range(void **state)
     int width, height;
     assert_int_equal(trip_image_write(&files, path_of("o.exr"), 2, 1, rgba[0], NULL), 0);
     assert_int_equal(trip_image_read(&files, path_of("o.exr"), &width, &height, &back), 0);
-    assert_true(test_most_apart(rgba[0], back, 8) < 1e-6);
+    assert_true(test_max_apart(rgba[0], back, 8) < 1e-6);
     free(back);
 }
 

@@ -292,7 +292,7 @@ static double error_of_ball(const scene *s, double radius, const scene_making *h
     trip_camera_params view = scene_view(s, trip_v3(0.2, -1, 0.4), 200, 20, SIZE);
     view.ortho_height = 2 * radius;
     scene_picture p = scene_integrate(s, &view, &settings, how);
-    double most = 0;
+    double max = 0;
     for (int n = 0; n < SIZE * SIZE; n++) {
         double x = (n % SIZE + 0.5) / SIZE * 2 - 1, y = (n / SIZE + 0.5) / SIZE * 2 - 1;
         if (x * x + y * y > 0.64)
@@ -300,10 +300,10 @@ static double error_of_ball(const scene *s, double radius, const scene_making *h
         double facing = sqrt(1 - x * x - y * y); /* of normal, light and half vector alike */
         double red = 0.6 * (TRIP_AMBIENT + TRIP_DIFFUSE * facing) +
                      TRIP_SPECULAR * pow(facing, TRIP_SHININESS);
-        most = fmax(most, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
+        max = fmax(max, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
     }
     scene_picture_free(&p);
-    return most;
+    return max;
 }
 
 /* Light at so many degrees from the eye: what is lit is seen, and does not shine, from behind. */
@@ -326,7 +326,7 @@ static void a_ball_shines_where_the_light_falls_on_what_is_seen(void **state)
     trip_vec3 eye = trip_normalize(trip_sub(view.eye, view.look));
     trip_vec3 right = trip_normalize(trip_cross(view.up, eye)), up = trip_cross(eye, right);
     for (int degrees = 20; degrees < 180; degrees += 50) {
-        double angle = degrees * (3.14159265358979323846 / 180), most = 0, brightest = 0;
+        double angle = degrees * (3.14159265358979323846 / 180), max = 0, brightest = 0;
         settings.light_direction =
             trip_add(trip_scale(eye, cos(angle)), trip_scale(right, sin(angle)));
         scene_picture p = integrate(&s, &view, &settings);
@@ -341,10 +341,10 @@ static void a_ball_shines_where_the_light_falls_on_what_is_seen(void **state)
             double shine = TRIP_SPECULAR * pow(trip_dot(normal, half), TRIP_SHININESS);
             shine *= fmin(1, fmax(0, 4 * to_light * trip_dot(normal, eye)));
             double red = 0.6 * (TRIP_AMBIENT + TRIP_DIFFUSE * fabs(to_light)) + shine;
-            most = fmax(most, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
+            max = fmax(max, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
             brightest = fmax(brightest, shine);
         }
-        assert_true(most < 0.002);
+        assert_true(max < 0.002);
         assert_true(degrees <= 120 ? brightest > 0.15 : brightest < 0.01);
         scene_picture_free(&p);
     }
@@ -487,8 +487,8 @@ static void one_splat_about_the_eye_comes_to_its_integral(void **state)
         scene_picture exact = integrate(&s, &view, &settings);
         for (const scene_renderer *r = scene_renderers(); r->name; r++) {
             scene_picture p = scene_draw(&s, r, &view, &settings);
-            double most = scene_difference(&exact, &p);
-            assert_true(most < 0.008);
+            double max = scene_difference(&exact, &p);
+            assert_true(max < 0.008);
             scene_picture_free(&p);
         }
         scene_picture_free(&exact);
@@ -676,7 +676,7 @@ static void the_reference_comes_to_the_integral_of_its_splats(void **state)
         for (int n = 0; n < SIZE * SIZE; n++) {
             const float *drawn =
                 scene_pixel(&splats, n % SIZE * finer + finer / 2, n / SIZE * finer + finer / 2);
-            errors[i] = fmax(errors[i], test_most_apart(drawn, truth.rgba + 4 * n, 4));
+            errors[i] = fmax(errors[i], test_max_apart(drawn, truth.rgba + 4 * n, 4));
         }
         scene_picture_free(&splats);
     }

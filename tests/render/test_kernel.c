@@ -6,10 +6,10 @@
 #include "test.h"
 
 /* The sum of weights times the voxel's coordinate to a power. */
-static double moment(trip_kernel kernel, double place, int power)
+static double moment(trip_kernel kernel, double position, int power)
 {
     double weights[TRIP_KERNEL_TAPS], sum = 0;
-    trip_kernel_weights(kernel, place, weights);
+    trip_kernel_weights(kernel, position, weights);
     for (int i = 0; i < TRIP_KERNEL_TAPS; i++)
         sum += weights[i] * pow(i - 1, power);
     return sum;

@@ -97,14 +97,14 @@ static void destroy(levels *l)
 
 typedef struct item {
     double coordinate;
-    trip_vec3 place; /* in the world */
+    trip_vec3 position; /* in the world */
     int level;
     uint64_t morton;
     const trip_tf_entry *entry;
     trip_splat splat;
 } item;
 
-static int by_place(const void *a, const void *b)
+static int by_position(const void *a, const void *b)
 {
     const item *p = a, *q = b;
     if (p->coordinate != q->coordinate)
@@ -140,7 +140,7 @@ static void add(brute *b, int level, int axis, const int at[3])
         !trip_splat_project(&b->frames[level], trip_v3(at[0], at[1], at[2]), &i->splat))
         return;
     i->coordinate = scale * at[axis] + 0.5 * (scale - 1);
-    i->place =
+    i->position =
         trip_affine_point(&b->frames[level].camera.index_to_world, trip_v3(at[0], at[1], at[2]));
     i->level = level;
     i->morton = trip_morton((unsigned)at[(axis + 1) % 3], (unsigned)at[(axis + 2) % 3]);
@@ -158,7 +158,7 @@ static void collect(brute *b, int axis)
             add(b, level, axis,
                 (int[3]){ i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1] });
     }
-    qsort(b->items, b->count, sizeof *b->items, by_place);
+    qsort(b->items, b->count, sizeof *b->items, by_position);
 }
 
 /* Along the ray of a pixel to the plane of the splat's centre that faces the eye's; not behind it.
@@ -167,7 +167,7 @@ static double distance_of(const brute *b, const item *i, double x, double y)
 {
     const trip_camera *c = &b->frames[0].camera;
     trip_vec3 ray = trip_affine_vector(&c->index_to_world, trip_camera_ray(c, x, y));
-    trip_vec3 from_eye = trip_sub(i->place, c->params.eye);
+    trip_vec3 from_eye = trip_sub(i->position, c->params.eye);
     return fmax(0, trip_dot(from_eye, c->world_forward)) * trip_length(ray) /
            trip_dot(ray, c->world_forward);
 }
@@ -178,7 +178,7 @@ static void put_behind(const brute *b, const item *i, double x, double y, double
     const trip_splat *s = &i->splat;
     double m = trip_splat_radius2(f, s, x, y);
     if (x < s->x0 || x > s->x1 || y < s->y0 || y > s->y1 || m > f->cutoff2 ||
-        1 - layer[3] < TRIP_SATURATION_PRE)
+        1 - layer[3] < TRIP_EARLY_TERMINATION_PRE)
         return;
     double depth = (double)i->entry->extinction * trip_splat_stretch(f, x, y) * s->amplitude *
                    (exp(-m / 2) - f->edge) * trip_splat_front(f, s, x, y);
@@ -229,23 +229,23 @@ static float *draw_by_hand(brute *b)
 
 static double largest_difference(const scene_picture *p, const float *merged)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < SIZE_PX * SIZE_PX; i++)
         for (int c = 0; c < 4; c++)
-            most = fmax(most, fabs((double)p->rgba[4 * i + c] - (double)merged[CHANNELS * i + c]));
-    return most;
+            max = fmax(max, fabs((double)p->rgba[4 * i + c] - (double)merged[CHANNELS * i + c]));
+    return max;
 }
 
 /* Of depths times opacity, as parts of the object's size. */
 static double largest_depth_difference(const scene_picture *p, const float *merged)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < SIZE_PX * SIZE_PX; i++) {
         double alpha = (double)merged[CHANNELS * i + 3], sum = (double)merged[CHANNELS * i + 4];
         if (alpha > 1e-3)
-            most = fmax(most, fabs((double)p->depth[i] * alpha - sum) / N);
+            max = fmax(max, fabs((double)p->depth[i] * alpha - sum) / N);
     }
-    return most;
+    return max;
 }
 
 static void expect_close(const levels *l, const scene_renderer *r, const trip_camera_params *view,

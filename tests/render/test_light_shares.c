@@ -2,7 +2,7 @@
 #include "light_shares.h"
 #include "test.h"
 
-enum { MOST = 64 };
+enum { MAX = 64 };
 
 static trip_budget *open_budget(uint64_t bytes)
 {
@@ -12,12 +12,12 @@ static trip_budget *open_budget(uint64_t bytes)
 }
 
 /* Steps that differ by up to `most` times, along the first axis; the others have one voxel. */
-static trip_coordinates random_coordinates(double table[MOST], int64_t voxels, double most)
+static trip_coordinates random_coordinates(double table[MAX], int64_t voxels, double max)
 {
     static const double one[] = { 0 };
     table[0] = 0;
     for (int64_t i = 1; i < voxels; i++)
-        table[i] = table[i - 1] + pow(most, test_random());
+        table[i] = table[i - 1] + pow(max, test_random());
     const double last = table[voxels - 1];
     for (int64_t i = 1; i < voxels; i++)
         table[i] *= (double)(voxels - 1) / last;
@@ -42,8 +42,8 @@ static void with_even_steps_a_voxel_counts_where_it_is_near(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
-    double table[MOST];
-    for (int64_t voxels = 1; voxels < MOST; voxels += 7)
+    double table[MAX];
+    for (int64_t voxels = 1; voxels < MAX; voxels += 7)
         for (int spacing = 1; spacing < 6; spacing++) {
             const trip_coordinates c = random_coordinates(table, voxels, 1);
             const int nodes = nodes_over(voxels, spacing);
@@ -65,9 +65,9 @@ static void shares_make_what_lies_about_a_voxel(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
-    double table[MOST];
+    double table[MAX];
     for (int round = 0; round < 40; round++) {
-        const int64_t voxels = 2 + (int64_t)(test_random() * (MOST - 2));
+        const int64_t voxels = 2 + (int64_t)(test_random() * (MAX - 2));
         const double spacing = 1 + round % 5;
         const trip_coordinates c = random_coordinates(table, voxels, 1 + round);
         const int nodes = nodes_over(voxels, spacing);
@@ -102,14 +102,14 @@ static void a_ramp_stays_near_to_itself(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
-    double table[MOST];
+    double table[MAX];
     for (int round = 0; round < 20; round++) {
-        const trip_coordinates c = random_coordinates(table, MOST, 1 + 2 * round);
+        const trip_coordinates c = random_coordinates(table, MAX, 1 + 2 * round);
         trip_light_shares s;
-        assert_true(trip_light_shares_make(&s, &c, 0, 4, nodes_over(MOST, 4), b));
+        assert_true(trip_light_shares_make(&s, &c, 0, 4, nodes_over(MAX, 4), b));
         for (int n = 1; n < s.nodes - 2; n++) {
             double sum = 0;
-            for (int64_t i = 0; i < MOST; i++)
+            for (int64_t i = 0; i < MAX; i++)
                 sum += share_of(&s, i, n) * table[i];
             assert_close(sum / s.sums[n], 4 * n, 0.25);
         }
@@ -122,13 +122,13 @@ static void what_does_not_fit_is_refused_and_nothing_kept(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
-    double table[MOST];
-    const trip_coordinates c = random_coordinates(table, MOST, 5);
+    double table[MAX];
+    const trip_coordinates c = random_coordinates(table, MAX, 5);
     const uint64_t whole = trip_budget_left_bytes(b);
     for (uint64_t left = 0; left < 4 * 4096; left += 4096) {
         trip_light_shares s;
         assert_true(trip_budget_charge(b, whole - left));
-        assert_false(trip_light_shares_make(&s, &c, 0, 2, nodes_over(MOST, 2), b));
+        assert_false(trip_light_shares_make(&s, &c, 0, 2, nodes_over(MAX, 2), b));
         assert_int_equal(trip_budget_left_bytes(b), left);
         trip_budget_discharge(b, whole - left);
     }

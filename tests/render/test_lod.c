@@ -263,19 +263,19 @@ static void no_seam_shows_where_levels_meet(void **state)
     const trip_settings finest = settings_at(0), mixed = settings_at(0.7);
     scene_picture a = scene_draw(&s, cpu, &view, &finest), b = scene_draw(&s, cpu, &view, &mixed);
     assert_true(b.stats.all.splats_read < a.stats.all.splats_read / 2);
-    double most = 0, sum = 0;
+    double max = 0, sum = 0;
     int inside = 0;
     for (int i = 0; i < SIZE_PX * SIZE_PX; i++) {
         double off = fabs((double)a.rgba[4 * i + 3] - (double)b.rgba[4 * i + 3]);
         if (a.rgba[4 * i + 3] < 0.5f)
             continue;
-        most = fmax(most, off);
+        max = fmax(max, off);
         sum += off;
         inside++;
     }
     assert_true(inside > 200);
-    if (!(most < 0.1 && sum / inside < 4e-3))
-        fail_msg("off by %g, by %g in the mean", most, sum / inside);
+    if (!(max < 0.1 && sum / inside < 4e-3))
+        fail_msg("off by %g, by %g in the mean", max, sum / inside);
     scene_picture_free(&a);
     scene_picture_free(&b);
     scene_destroy(&s);

@@ -53,9 +53,10 @@ static void reaches(const trip_outline *o, const trip_camera_params *view, doubl
                     double cone, double values[2])
 {
     const trip_reach_origin origin = { .index = { MIDDLE, MIDDLE, MIDDLE } };
-    trip_vec3 gaze = trip_normalize(trip_sub(view->look, view->eye));
-    trip_vec3 right = trip_normalize(trip_cross(gaze, view->up)), up = trip_cross(right, gaze);
-    trip_vec3 nearer = trip_scale(gaze, -cone);
+    trip_vec3 view_direction = trip_normalize(trip_sub(view->look, view->eye));
+    trip_vec3 right = trip_normalize(trip_cross(view_direction, view->up)),
+              up = trip_cross(right, view_direction);
+    trip_vec3 nearer = trip_scale(view_direction, -cone);
     const trip_reach wanted[2] = { { .along = trip_add(right, nearer) },
                                    { .along = trip_sub(nearer, up) } };
     trip_outline_reach(o, &origin, wanted, 2, values);

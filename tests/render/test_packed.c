@@ -49,7 +49,7 @@ static trip_settings lit(bool headlight)
     return settings;
 }
 
-static void compare(const scene *a, const scene *b, const scene_renderer *r, double most)
+static void compare(const scene *a, const scene *b, const scene_renderer *r, double max)
 {
     for (int i = 0; i < 4; i++) {
         trip_settings settings = lit(i % 2);
@@ -59,7 +59,7 @@ static void compare(const scene *a, const scene *b, const scene_renderer *r, dou
         scene_picture expected = scene_draw(a, &scene_renderers()[0], &view, &settings);
         scene_picture p = scene_draw(b, r, &view, &settings);
         double off = scene_difference(&expected, &p);
-        if (!(off <= most))
+        if (!(off <= max))
             fail_msg("%s: off by %g", r->name, off);
         scene_picture_free(&expected);
         scene_picture_free(&p);

@@ -214,7 +214,8 @@ static void a_way_that_no_ray_with_weight_goes_has_no_pass(void **state)
     scene_destroy(&s);
 }
 
-static void ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze(void **state)
+static void
+ascending_traversal_reads_forwards_and_takes_the_blend_from_the_view_direction(void **state)
 {
     (void)state;
     scene s;
@@ -534,8 +535,8 @@ static void what_is_known_of_a_function_is_kept_from_plan_to_plan(void **state)
                                           : i < 4 ? TRIP_CLOSED_FORM_FOUND
                                                   : TRIP_CLOSED_FORM_EXTINCTION);
         trip_plan afresh = make_plan(&s, &c, &settings);
-        assert_int_equal(plan.code_least, afresh.code_least);
-        assert_int_equal(plan.code_most, afresh.code_most);
+        assert_int_equal(plan.code_min, afresh.code_min);
+        assert_int_equal(plan.code_max, afresh.code_max);
         trip_plan_release(&plan, s.budget);
         trip_plan_release(&afresh, s.budget);
     }
@@ -574,7 +575,8 @@ int main(void)
         cmocka_unit_test(inside_the_volume_each_list_is_read_from_the_eye_outwards),
         cmocka_unit_test(between_values_what_lies_behind_the_eye_has_no_pass),
         cmocka_unit_test(a_way_that_no_ray_with_weight_goes_has_no_pass),
-        cmocka_unit_test(ascending_traversal_reads_forwards_and_takes_the_blend_from_the_gaze),
+        cmocka_unit_test(
+            ascending_traversal_reads_forwards_and_takes_the_blend_from_the_view_direction),
         cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
         cmocka_unit_test(a_voxel_about_the_eye_is_never_left_out),
         cmocka_unit_test(bricks_that_the_transfer_function_hides_are_not_read),

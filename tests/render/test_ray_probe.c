@@ -92,8 +92,8 @@ static void values_are_interpolated_whatever_the_tiles(void **state)
             trip_vec3 eye = trip_sub(inside, trip_scale(d, 3 + n % 5));
             trip_ray_hit hit = find(&s, eye, d, 1);
             trip_vec3 p = trip_add(eye, trip_scale(d, hit.z));
-            double most = fmax(fabs(d.x), fmax(fabs(d.y), fabs(d.z)));
-            double slope = fabs(100 * d.x + 200 * d.y + 300 * d.z) / most;
+            double max = fmax(fabs(d.x), fmax(fabs(d.y), fabs(d.z)));
+            double slope = fabs(100 * d.x + 200 * d.y + 300 * d.z) / max;
             double value = 1000 + 100 * p.x + 200 * p.y + 300 * p.z;
             assert_true(fabs(hit.code - value) <= slope / 2 + 1e-6);
             assert_true(hit.opacity > 0.5);

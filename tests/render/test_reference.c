@@ -77,8 +77,8 @@ static void small_kernels_leave_the_ripple_that_the_formula_gives(void **state)
         trip_settings settings = unlit(TRIP_METHOD_MERGE, 0.5);
         settings.kernel_radius = radii[i];
         trip_splat_ripple ripple = trip_splat_ripple_of(radii[i]);
-        double most = ripple.through > 1 ? ripple.through : 1;
-        s.table[65535] = (trip_tf_entry){ 1, 1, 1, (float)(0.2 / most) };
+        double max = ripple.through > 1 ? ripple.through : 1;
+        s.table[65535] = (trip_tf_entry){ 1, 1, 1, (float)(0.2 / max) };
         for (int between = 0; between < 2; between++) {
             trip_camera_params view = { .eye = { -20, 8 - 0.5 * between, 8 - 0.5 * between },
                                         .up = { 0, 0, 1 },
@@ -90,7 +90,7 @@ static void small_kernels_leave_the_ripple_that_the_formula_gives(void **state)
                 scene_picture p = scene_draw(&s, r, &view, &settings);
                 double depth = -log1p(-(double)p.rgba[3]);
                 double sum = between ? ripple.between : ripple.through;
-                assert_close(depth * most / (0.2 * SHEETS), sum, 1e-3);
+                assert_close(depth * max / (0.2 * SHEETS), sum, 1e-3);
                 scene_picture_free(&p);
             }
         }
@@ -199,13 +199,13 @@ static void inside_a_room_outward_order_is_right_and_ascending_order_fails(void 
     scene_create(&s, &(scene_params){ .dims = { 80, 80, 80 }, .voxel = double_walls });
     colour_codes(&s);
     const double fields[] = { 100, 130, 160 };
-    const trip_vec3 gazes[] = {
+    const trip_vec3 view_directions[] = {
         { 1, 0.1, 0.2 }, { 0.1, -1, 0.1 }, { 0.1, 1, -0.2 }, { 0.1, 0.2, -1 }
     };
     for (int i = 0; i < 12; i++) {
         trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 1, fields[i % 3], 96);
         view.eye = trip_v3(38.3, 40.1, 41.2);
-        view.look = trip_add(view.eye, gazes[i / 3]);
+        view.look = trip_add(view.eye, view_directions[i / 3]);
         view.up = trip_v3(0.3, 0.2, 0.5);
         trip_settings outward = unlit((trip_method)(i % 2), 0.85), ascending = outward;
         ascending.traversal = TRIP_TRAVERSAL_ASCENDING;
@@ -230,7 +230,7 @@ static bool confetti(void *user, int i, int j, int k, unsigned *code, double gra
     return true;
 }
 
-static int most_aligned_axis(const trip_camera *c, int x, int y)
+static int max_aligned_axis(const trip_camera *c, int x, int y)
 {
     trip_settings clip = unlit(TRIP_METHOD_CLIP, 0);
     trip_vec3 ray = trip_camera_ray(c, x + 0.5, y + 0.5);
@@ -249,7 +249,7 @@ static double step_across_lines(const scene_picture *p, const trip_camera *c)
     for (int y = 0; y < p->height; y++) {
         for (int x = 0; x + 1 < p->width; x++) {
             const float *a = scene_pixel(p, x, y), *b = scene_pixel(p, x + 1, y);
-            int line = most_aligned_axis(c, x, y) != most_aligned_axis(c, x + 1, y);
+            int line = max_aligned_axis(c, x, y) != max_aligned_axis(c, x + 1, y);
             sum[line] += fabs(a[0] - b[0]) + fabs(a[1] - b[1]) + fabs(a[2] - b[2]);
             count[line]++;
         }
@@ -302,7 +302,7 @@ static void from_outside_ascending_order_gives_the_same_picture(void **state)
             scene_picture a = scene_draw(&s, r, &view, &outward);
             scene_picture b = scene_draw(&s, r, &view, &ascending);
             /* Saturation stops front-to-back drawing only. */
-            assert_true(scene_difference(&a, &b) < 2 * TRIP_SATURATION_PRE + r->tolerance);
+            assert_true(scene_difference(&a, &b) < 2 * TRIP_EARLY_TERMINATION_PRE + r->tolerance);
             scene_picture_free(&a);
             scene_picture_free(&b);
         }

@@ -23,10 +23,10 @@ static bool blob(void *user, int i, int j, int k, unsigned *code, double gradien
 }
 
 /* `place` has voxels of about this length. Gradients grow as voxels shrink. */
-static void create(scene *s, trip_affine place, double voxel)
+static void create(scene *s, trip_affine position, double voxel)
 {
     scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
-                                     .index_to_world = place,
+                                     .index_to_world = position,
                                      .tile_voxels = 16,
                                      .slab_sheets = 8,
                                      .normals = true,
@@ -54,13 +54,13 @@ static trip_camera_params view_of(const scene *s, double voxel, double fov_degre
     return view;
 }
 
-static void expect_alike(const scene *s, const trip_camera_params *view, const char *what)
+static void expect_alike(const scene *s, const trip_camera_params *view, const char *label)
 {
     trip_settings settings = trip_settings_default();
     const scene_renderer *all = scene_renderers();
     scene_picture expected = scene_draw(s, &all[0], view, &settings);
-    if (!(scene_most_opaque(&expected) > 0.5))
-        fail_msg("%s: the reference shows nothing", what);
+    if (!(scene_max_opaque(&expected) > 0.5))
+        fail_msg("%s: the reference shows nothing", label);
     for (const scene_renderer *r = all + 1; r->name; r++) {
         bool cpu = strcmp(r->name, "cpu") == 0;
         for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa += cpu ? 1 : 0) {
@@ -68,7 +68,7 @@ static void expect_alike(const scene *s, const trip_camera_params *view, const c
             scene_picture p = scene_draw(s, r, view, &settings);
             double apart = scene_difference(&expected, &p);
             if (!(apart <= r->tolerance))
-                fail_msg("%s: %s, %s: %.3f of 1/255", what, r->name, (*isa)->isa, 255 * apart);
+                fail_msg("%s: %s, %s: %.3f of 1/255", label, r->name, (*isa)->isa, 255 * apart);
             scene_picture_free(&p);
             if (!cpu)
                 break;
@@ -83,14 +83,14 @@ static void voxels_of_any_size_look_as_in_the_reference(void **state)
     (void)state;
     for (int power = -12; power <= 12; power += power == -4 || power == 2 ? 2 : 4) {
         double voxel = pow(10, power);
-        char what[64];
+        char label[64];
         scene s;
         create(&s, grid(voxel, 3 * voxel), voxel);
         for (int ortho = 0; ortho < 2; ortho++) {
             trip_camera_params view = view_of(&s, voxel, 30, ortho);
-            snprintf(what, sizeof what, "voxels of %g, %s", voxel,
+            snprintf(label, sizeof label, "voxels of %g, %s", voxel,
                      ortho ? "parallel" : "perspective");
-            expect_alike(&s, &view, what);
+            expect_alike(&s, &view, label);
         }
         scene_destroy(&s);
     }
@@ -101,15 +101,15 @@ static void voxels_of_any_shape_and_size_look_as_in_the_reference(void **state)
     (void)state;
     for (int power = -12; power <= 12; power += 6) {
         double voxel = pow(10, power);
-        trip_affine place = cpu_scenes_sheared();
+        trip_affine position = cpu_scenes_sheared();
         for (int i = 0; i < 12; i++)
-            place.m[i / 4][i % 4] *= voxel;
-        char what[64];
+            position.m[i / 4][i % 4] *= voxel;
+        char label[64];
         scene s;
-        create(&s, place, voxel);
+        create(&s, position, voxel);
         trip_camera_params view = view_of(&s, voxel, 40, false);
-        snprintf(what, sizeof what, "sheared voxels of %g", voxel);
-        expect_alike(&s, &view, what);
+        snprintf(label, sizeof label, "sheared voxels of %g", voxel);
+        expect_alike(&s, &view, label);
         scene_destroy(&s);
     }
 }
@@ -123,10 +123,10 @@ static void views_of_any_width_look_as_in_the_reference(void **state)
         scene s;
         create(&s, grid(voxels[v], 0), voxels[v]);
         for (size_t i = v; i < sizeof degrees / sizeof degrees[0]; i += v == 0 ? 1 : 4) {
-            char what[64];
+            char label[64];
             trip_camera_params view = view_of(&s, voxels[v], degrees[i], false);
-            snprintf(what, sizeof what, "%g degrees, voxels of %g", degrees[i], voxels[v]);
-            expect_alike(&s, &view, what);
+            snprintf(label, sizeof label, "%g degrees, voxels of %g", degrees[i], voxels[v]);
+            expect_alike(&s, &view, label);
         }
         scene_destroy(&s);
     }
@@ -138,10 +138,10 @@ static void one_voxel_may_be_larger_than_the_picture_by_far(void **state)
     scene s;
     create(&s, grid(1e4, 0), 1e4);
     for (double degrees = 1e-6; degrees < 1; degrees *= 100) {
-        char what[64];
+        char label[64];
         trip_camera_params view = scene_view(&s, trip_v3(0.6, -1, 0.4), 20e4, degrees, SIZE_PX);
-        snprintf(what, sizeof what, "%g degrees nearby", degrees);
-        expect_alike(&s, &view, what);
+        snprintf(label, sizeof label, "%g degrees nearby", degrees);
+        expect_alike(&s, &view, label);
     }
     scene_destroy(&s);
 }
@@ -149,14 +149,14 @@ static void one_voxel_may_be_larger_than_the_picture_by_far(void **state)
 static void far_from_the_worlds_origin_volumes_look_as_in_the_reference(void **state)
 {
     (void)state;
-    const double places[][2] = { { 1, 1e15 }, { 0.1, 1e12 }, { 1e-3, 1e11 }, { 1e9, 1e15 } };
+    const double positions[][2] = { { 1, 1e15 }, { 0.1, 1e12 }, { 1e-3, 1e11 }, { 1e9, 1e15 } };
     for (int i = 0; i < 4; i++) {
-        char what[64];
+        char label[64];
         scene s;
-        create(&s, grid(places[i][0], places[i][1]), places[i][0]);
-        trip_camera_params view = view_of(&s, places[i][0], 30, false);
-        snprintf(what, sizeof what, "voxels of %g at %g", places[i][0], places[i][1]);
-        expect_alike(&s, &view, what);
+        create(&s, grid(positions[i][0], positions[i][1]), positions[i][0]);
+        trip_camera_params view = view_of(&s, positions[i][0], 30, false);
+        snprintf(label, sizeof label, "voxels of %g at %g", positions[i][0], positions[i][1]);
+        expect_alike(&s, &view, label);
         scene_destroy(&s);
     }
 }

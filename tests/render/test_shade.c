@@ -77,11 +77,11 @@ static void a_light_at_a_place_shines_from_there(void **state)
     trip_settings s = trip_settings_default();
     s.headlight = false;
     s.point_light = true;
-    s.light_place = trip_v3(5, 0, 0);
+    s.light_position = trip_v3(5, 0, 0);
     assert_close(lit(&s, 9, 0, 0), 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE), 1e-12);
-    s.light_place = trip_v3(0, 3, -4);
+    s.light_position = trip_v3(0, 3, -4);
     assert_close(lit(&s, 0, 9, 0), 0.5 * (TRIP_AMBIENT + 0.6 * TRIP_DIFFUSE), 1e-12);
-    s.light_place = trip_v3(0, 0, 0);
+    s.light_position = trip_v3(0, 0, 0);
     assert_close(lit(&s, 0, 9, 0), 0.5 * TRIP_AMBIENT, 1e-12);
 }
 
@@ -164,10 +164,10 @@ static void a_light_farther_than_can_be_computed_with_is_refused(void **state)
     trip_settings s = trip_settings_default();
     s.headlight = false;
     s.point_light = true;
-    s.light_place = trip_v3(0, 0.99 * TRIP_LIGHT_FARTHEST_VOXELS, 0);
+    s.light_position = trip_v3(0, 0.99 * TRIP_LIGHT_FARTHEST_VOXELS, 0);
     assert_int_equal(trip_light_check(&s, &m), 0);
     test_catch_reports();
-    s.light_place = trip_v3(0, -1.01 * TRIP_LIGHT_FARTHEST_VOXELS, 0);
+    s.light_position = trip_v3(0, -1.01 * TRIP_LIGHT_FARTHEST_VOXELS, 0);
     assert_int_equal(trip_light_check(&s, &m), TRIP_USAGE);
     assert_int_equal(test_caught_reports(), 1);
 }
@@ -231,10 +231,10 @@ static double error_of(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec3 e
 
 /* Light and eye are moved to where the error is larger, as long as that seems worth it. */
 static double worst_about(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec3 eye,
-                          bool headlight, double most, uint64_t *random)
+                          bool headlight, double max, uint64_t *random)
 {
     double error = error_of(g, back, light, eye), reach = 0.2;
-    for (int step = 0; step < 60 && error > 0.6 * most; step++, reach *= 0.93) {
+    for (int step = 0; step < 60 && error > 0.6 * max; step++, reach *= 0.93) {
         trip_vec3 e = trip_normalize(trip_add(eye, trip_scale(random_direction(random), reach)));
         trip_vec3 l = trip_normalize(trip_add(light, trip_scale(random_direction(random), reach)));
         l = headlight ? e : l;

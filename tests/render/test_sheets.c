@@ -79,7 +79,7 @@ static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradien
 
 /* A peak much narrower than a slice counts whole, wherever it lies between slices: its depth is its
  * integral over codes, by how fast the ray passes codes. */
-static void a_narrow_peak_is_seen_whole_at_any_slices(void **state)
+static void a_narrow_peak_is_seen_whole_at_any_samples_per_sheet(void **state)
 {
     (void)state;
     enum { HALF = 20 };
@@ -262,10 +262,11 @@ static void a_parallel_view_from_within_begins_at_the_next_slice(void **state)
     fill_table(&s, 1, 1, 1, 0.1);
     for (int i = 0; i < 36; i++) {
         const double at = (double[]){ 7.3, 7, 12.6 }[i / 12], sign = i / 3 % 2 ? 1 : -1;
-        const int slices = 1 + i / 6 % 2 * 2;
-        const double next = sign > 0 ? ceil(at * slices) / slices : floor(at * slices) / slices;
+        const int samples_per_sheet = 1 + i / 6 % 2 * 2;
+        const double next = sign > 0 ? ceil(at * samples_per_sheet) / samples_per_sheet
+                                     : floor(at * samples_per_sheet) / samples_per_sheet;
         trip_camera_params view = pixel_along(i % 3, sign, at, 9.4, 8.7);
-        trip_settings settings = scene_post(slices);
+        trip_settings settings = scene_post(samples_per_sheet);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn))
             assert_close(turn.picture.rgba[3], 1 - exp(-0.1F * (sign > 0 ? EDGE - 1 - next : next)),
@@ -283,10 +284,10 @@ static void rays_beside_the_grid_meet_nothing(void **state)
     scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
     fill_table(&s, 1, 1, 1, 0.1);
     for (int i = 0; i < 30; i++) {
-        const double place = beside[i / 3 % 5], other = 8.3;
-        const bool within = place > 0 && place < last;
+        const double position = beside[i / 3 % 5], other = 8.3;
+        const bool within = position > 0 && position < last;
         trip_camera_params view =
-            pixel_along(i % 3, 1, -20, i / 15 ? place : other, i / 15 ? other : place);
+            pixel_along(i % 3, 1, -20, i / 15 ? position : other, i / 15 ? other : position);
         trip_settings settings = scene_post(1 + i % 2);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn))
@@ -374,13 +375,13 @@ static void a_saturated_pixel_is_opaque(void **state)
     for (int i = 0; i < 5; i++) {
         scene s;
         scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
-        const double saturation = i < 2 ? TRIP_SATURATION_POST : i < 4 ? 0.06 : 0;
-        const double through = i < 4 ? saturation * (i % 2 ? 0.9 : 1.1) : 1e-4;
+        const double early_termination = i < 2 ? TRIP_EARLY_TERMINATION_POST : i < 4 ? 0.06 : 0;
+        const double through = i < 4 ? early_termination * (i % 2 ? 0.9 : 1.1) : 1e-4;
         fill_table(&s, 0.75, 1, 1, -log(through) / (EDGE - 1));
         trip_camera_params view = scene_view(&s, trip_v3(1, 0, 0), 60, 20, 1);
         view.ortho_height = 0.1;
         trip_settings settings = scene_post(2);
-        settings.saturation = i < 2 ? TRIP_SATURATION_AUTO : saturation;
+        settings.early_termination = i < 2 ? TRIP_EARLY_TERMINATION_AUTO : early_termination;
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             if (i % 2)
@@ -397,7 +398,7 @@ static void a_saturated_pixel_is_opaque(void **state)
 
 static void light_comes_by_differences_of_values(void **state)
 {
-    double most = 0;
+    double max = 0;
     (void)state;
     for (int i = 0; i < 12; i++) {
         int axis = i % 3;
@@ -428,7 +429,7 @@ static void light_comes_by_differences_of_values(void **state)
         trip_shade(&settings, &camera,
                    trip_shade_gradient_full(&s.data->header, camera.voxel_world, 0),
                    trip_v3(0, 0, 0), g, rgb);
-        most = fmax(most, fabs(rgb[0] - unlit[0]));
+        max = fmax(max, fabs(rgb[0] - unlit[0]));
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             for (int c = 0; c < 3; c++)
@@ -437,7 +438,7 @@ static void light_comes_by_differences_of_values(void **state)
         }
         scene_destroy(&s);
     }
-    assert_true(most > 0.1); /* by light, not by nothing */
+    assert_true(max > 0.1); /* by light, not by nothing */
 }
 
 /* Far to the left two cells with a gap between them, one below what shows and one above; far to the
@@ -697,7 +698,7 @@ static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, t
     double errors[3] = { 0 };
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
         for (int n = 0; n < 3; n++) {
-            settings.slices = 1 << 2 * n;
+            settings.samples_per_sheet = 1 << 2 * n;
             scene_picture p = scene_draw(&s, r, &view, &settings);
             double error = mean_apart(&p, &truth);
             if (r->tolerance > 0) /* after the reference */
@@ -714,7 +715,7 @@ static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, t
     scene_destroy(&s);
 }
 
-static void the_error_falls_with_the_square_of_the_slices(void **state)
+static void the_error_falls_with_the_square_of_the_samples_per_sheet(void **state)
 {
     (void)state;
     const trip_kernel linear = TRIP_KERNEL_LINEAR;
@@ -766,19 +767,19 @@ static double value_at(const layers *l, trip_kernel kernel, double z)
 
 /* Rays along the axis; extinction that is linear in the code has the depth of the trapezoids
  * between slices. */
-static void along_the_sheets_slices_have_the_values_of_the_kernel(void **state)
+static void along_the_sheets_samples_per_sheet_have_the_values_of_the_kernel(void **state)
 {
     (void)state;
     for (int i = 0; i < 12; i++) {
         const trip_kernel kernel = i / 3 % 2 ? TRIP_KERNEL_CUBIC : TRIP_KERNEL_GAUSSIAN;
-        const int slices = 2 + i / 6 * 3;
+        const int samples_per_sheet = 2 + i / 6 * 3;
         layers l = { .axis = i % 3 };
         double sum = 0;
         for (int n = 0; n < EDGE; n++)
             l.codes[n] = 20000 + scene_hash(n, i, 7) % 20000;
-        for (int n = 0; n <= (EDGE - 1) * slices; n++)
-            sum += value_at(&l, kernel, (double)n / slices) / slices /
-                   (n % ((EDGE - 1) * slices) ? 1 : 2);
+        for (int n = 0; n <= (EDGE - 1) * samples_per_sheet; n++)
+            sum += value_at(&l, kernel, (double)n / samples_per_sheet) / samples_per_sheet /
+                   (n % ((EDGE - 1) * samples_per_sheet) ? 1 : 2);
         scene s;
         scene_create(
             &s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = layer_code, .user = &l });
@@ -787,7 +788,7 @@ static void along_the_sheets_slices_have_the_values_of_the_kernel(void **state)
         trip_vec3 direction = { l.axis == 0, l.axis == 1, l.axis == 2 };
         trip_camera_params view = scene_view(&s, direction, 60, 20, 1);
         view.ortho_height = 0.1;
-        trip_settings settings = scene_post(slices);
+        trip_settings settings = scene_post(samples_per_sheet);
         settings.kernel = kernel;
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
             scene_picture p = scene_draw(&s, r, &view, &settings);
@@ -896,7 +897,7 @@ static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
 }
 
 /* Noise, in which a cell goes from what shows to what does not on every side. */
-enum { NOISE_LEAST = 30000, NOISE_MOST = 38000 };
+enum { NOISE_MIN = 30000, NOISE_MAX = 38000 };
 
 static unsigned noise_code(int i, int j, int k)
 {
@@ -906,7 +907,7 @@ static unsigned noise_code(int i, int j, int k)
 static bool noise_shows(int i, int j, int k)
 {
     const unsigned code = noise_code(i, j, k);
-    return is_within(i, j, k, 0, EDGE - 1) && code >= NOISE_LEAST && code < NOISE_MOST;
+    return is_within(i, j, k, 0, EDGE - 1) && code >= NOISE_MIN && code < NOISE_MAX;
 }
 
 static bool noise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -935,7 +936,7 @@ static void what_lies_beyond_the_halo_is_left_out_alike(void **state)
     scene_create(
         &s, &(scene_params){
                 .dims = { EDGE, EDGE, EDGE }, .voxel = noise, .parts = &halo, .part_count = 1 });
-    scene_colour(&s, NOISE_LEAST, NOISE_MOST, 0.9, 0.6, 0.3, 0.6);
+    scene_colour(&s, NOISE_MIN, NOISE_MAX, 0.9, 0.6, 0.3, 0.6);
     for (int i = 0; i < 8; i++) {
         trip_settings settings = scene_post(1 + i / 4);
         trip_camera_params view =
@@ -991,21 +992,21 @@ static void one_value_is_that_value_by_every_kernel(void **state)
 
 /* The largest change of a pixel from one picture to the next while the camera is turned in steps of
  * 0.1 degrees across 45 degrees, where the layer of most weight changes. */
-static double most_change(const scene *s, const scene_renderer *r, const trip_settings *settings)
+static double max_change(const scene *s, const scene_renderer *r, const trip_settings *settings)
 {
     scene_picture last = { 0 };
-    double most = 0;
+    double max = 0;
     for (int step = -8; step <= 8; step++) {
         double angle = (45 + 0.1 * step) * 3.14159265358979323846 / 180;
         trip_camera_params view = scene_view(s, trip_v3(cos(angle), sin(angle), 0.3), 60, 17, 32);
         scene_picture p = scene_draw(s, r, &view, settings);
         if (last.rgba)
-            most = fmax(most, scene_difference(&p, &last));
+            max = fmax(max, scene_difference(&p, &last));
         scene_picture_free(&last);
         last = p;
     }
     scene_picture_free(&last);
-    return most;
+    return max;
 }
 
 /* Edges of one slice a sheet, the worst case. */
@@ -1020,9 +1021,9 @@ static void turning_across_45_degrees_nothing_pops(void **state)
     settings.shading = true;
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
         settings.method = TRIP_METHOD_MERGE;
-        double merged = most_change(&s, r, &settings);
+        double merged = max_change(&s, r, &settings);
         settings.method = TRIP_METHOD_AXIS;
-        double popped = most_change(&s, r, &settings);
+        double popped = max_change(&s, r, &settings);
         assert_true(popped > 0.5);
         assert_true(merged < 0.15 + r->tolerance); /* as much as the object's own motion makes */
     }
@@ -1085,7 +1086,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slab_has_the_opacity_of_the_path_through_it),
-        cmocka_unit_test(a_narrow_peak_is_seen_whole_at_any_slices),
+        cmocka_unit_test(a_narrow_peak_is_seen_whole_at_any_samples_per_sheet),
         cmocka_unit_test(values_fall_to_those_of_the_halo_and_end_without_it),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
         cmocka_unit_test(from_within_what_lies_before_the_eye_is_seen),
@@ -1099,9 +1100,9 @@ int main(void)
         cmocka_unit_test(what_a_segment_leaps_over_is_seen_and_lit),
         cmocka_unit_test(depth_is_the_mean_distance_of_what_is_seen),
         cmocka_unit_test(mirrored_turned_and_moved_it_is_the_same_picture),
-        cmocka_unit_test(the_error_falls_with_the_square_of_the_slices),
+        cmocka_unit_test(the_error_falls_with_the_square_of_the_samples_per_sheet),
         cmocka_unit_test(by_the_cubic_kernel_it_is_the_cubic_integral),
-        cmocka_unit_test(along_the_sheets_slices_have_the_values_of_the_kernel),
+        cmocka_unit_test(along_the_sheets_samples_per_sheet_have_the_values_of_the_kernel),
         cmocka_unit_test(beyond_the_halo_voxels_count_as_those_next_to_them),
         cmocka_unit_test(what_lies_beyond_the_halo_is_left_out_alike),
         cmocka_unit_test(one_value_is_that_value_by_every_kernel),

@@ -38,12 +38,12 @@ static trip_camera camera_of(const scene *s, const trip_camera_params *view)
 
 /* Within twice what a renderer may be off by. */
 static void expect_same(const scene_renderer *r, const scene_picture *p, const scene_picture *q,
-                        const char *what)
+                        const char *label)
 {
     const double apart = scene_difference(p, q);
-    const double most = strcmp(r->name, "reference") ? 2 * r->tolerance : 1e-4;
-    if (!(apart <= most))
-        fail_msg("%s, %s: %.4f of 255 apart, at most %.4f", r->name, what, 255 * apart, 255 * most);
+    const double max = strcmp(r->name, "reference") ? 2 * r->tolerance : 1e-4;
+    if (!(apart <= max))
+        fail_msg("%s, %s: %.4f of 255 apart, at most %.4f", r->name, label, 255 * apart, 255 * max);
 }
 
 /* ---- a picture does not jump ---- */
@@ -85,13 +85,13 @@ static void compare_sides(const scene *s, const scene_renderer *r, int axis, dou
     at[axis] = sheet;
     const trip_vec3 eye = { at[0], at[1], at[2] }, side = { step[0], step[1], step[2] };
     const trip_vec3 towards = { axis == 0 ? 0.1 : 1, axis == 1 ? -0.2 : 0.8, axis == 2 ? 0.1 : -1 };
-    char what[64];
-    snprintf(what, sizeof what, "sheet %g of axis %d", sheet, axis);
+    char label[64];
+    snprintf(label, sizeof label, "sheet %g of axis %d", sheet, axis);
     const trip_camera_params above = view_from(trip_add(eye, side), towards);
     const trip_camera_params below = view_from(trip_sub(eye, side), towards);
     scene_picture p = scene_draw(s, r, &above, settings);
     scene_picture q = scene_draw(s, r, &below, settings);
-    expect_same(r, &p, &q, what);
+    expect_same(r, &p, &q, label);
     scene_picture_free(&q);
     q = scene_draw(s, scene_renderers(), &above, settings);
     if (!trip_coordinates_uneven(&s->data->coordinates)) /* near ones, summed, are not cpu's best */
@@ -264,10 +264,10 @@ static void expect_pixel(const scene *s, const few *all, const trip_splat_frame 
         for (int c = 0; c < 4; c++)
             merged[c] += w * w * layer[c];
     }
-    const double most = strcmp(r->name, "reference") ? r->tolerance : 1e-6;
+    const double max = strcmp(r->name, "reference") ? r->tolerance : 1e-6;
     for (int c = 0; c < 4; c++) {
         const double off = fabs((double)p->rgba[4 * pixel + c] - merged[c] / weights);
-        if (!(off <= most))
+        if (!(off <= max))
             fail_msg("%s, %d splats, pixel %d: off by %.4f of 255", r->name, all->count, pixel,
                      255 * off);
     }
@@ -349,9 +349,9 @@ static void a_splat_just_behind_the_eye_is_seen_before_those_beyond(void **state
     for (const scene_renderer *r = scene_renderers(); r->name; r++) {
         scene_picture p = scene_draw(&s, r, &view, &settings);
         const float *middle = scene_pixel(&p, 7, 7);
-        const double most = strcmp(r->name, "reference") ? r->tolerance : 1e-6;
-        assert_true(fabs((double)middle[0] - red) <= most);
-        assert_true(fabs((double)middle[2] - (1 - red)) <= most);
+        const double max = strcmp(r->name, "reference") ? r->tolerance : 1e-6;
+        assert_true(fabs((double)middle[0] - red) <= max);
+        assert_true(fabs((double)middle[2] - (1 - red)) <= max);
         scene_picture_free(&p);
     }
     scene_destroy(&s);

@@ -14,7 +14,7 @@ typedef struct uneven {
     trip_coordinates coordinates;
 } uneven;
 
-static void make_uneven(uneven *u, double most)
+static void make_uneven(uneven *u, double max)
 {
     const double *along[3];
     const int64_t voxels[3] = { EDGE, EDGE, EDGE };
@@ -22,7 +22,7 @@ static void make_uneven(uneven *u, double most)
         double *x = u->tables[a];
         x[0] = 0;
         for (int i = 1; i < EDGE; i++)
-            x[i] = x[i - 1] + pow(most, (scene_hash(a, i, 7) % 1000) / 999.0);
+            x[i] = x[i - 1] + pow(max, (scene_hash(a, i, 7) % 1000) / 999.0);
         const double last = x[EDGE - 1];
         for (int i = 1; i < EDGE; i++)
             x[i] *= (EDGE - 1) / last;
@@ -41,11 +41,11 @@ static trip_settings plain(double tolerance)
     return s;
 }
 
-static trip_settings post(int slices)
+static trip_settings post(int samples_per_sheet)
 {
     trip_settings s = plain(1e-5);
     s.classify = TRIP_CLASSIFY_POST;
-    s.slices = slices;
+    s.samples_per_sheet = samples_per_sheet;
     return s;
 }
 
@@ -252,7 +252,7 @@ static double away_from(const scene_picture *truth, const scene *s, const scene_
     return away;
 }
 
-static void slices_come_to_the_integral(void **state)
+static void samples_per_sheet_come_to_the_integral(void **state)
 {
     (void)state;
     for (int i = 0; i < 20; i++) {
@@ -333,11 +333,11 @@ static void a_splat_is_as_wide_as_its_voxel(void **state)
     enum { SIZE = 15 };
     const double cutoff = TRIP_CUTOFF, edge = exp(-cutoff * cutoff / 2), extinction = 3;
     uneven u;
-    double place[3], width[3];
+    double position[3], width[3];
     make_uneven(&u, 6);
     for (int a = 0; a < 3; a++) {
         const double *x = u.tables[a] + lone[a];
-        place[a] = x[0];
+        position[a] = x[0];
         width[a] = (x[1] - x[-1]) / 2;
     }
     for (int i = 0; i < 8; i++) {
@@ -352,7 +352,7 @@ static void a_splat_is_as_wide_as_its_voxel(void **state)
         settings.kernel_radius = i % 2 ? 3 : 2;
         const double sigma = settings.kernel_radius / cutoff;
         trip_camera_params view = view_of(&s, i / 2, SIZE);
-        view.look = trip_v3(place[0], place[1], place[2]);
+        view.look = trip_v3(position[0], position[1], position[2]);
         view.eye = trip_add(view.look, trip_scale(trip_sub(view.look, view.eye), 0.3));
         view.fov_degrees = 30;
         view.ortho_height = i / 4 ? 8 : 0;
@@ -416,7 +416,7 @@ static void splats_of_one_colour_come_to_their_integral(void **state)
         for (int n = 0; n < SIZE * SIZE; n++) {
             const float *drawn =
                 scene_pixel(&p, n % SIZE * finer + finer / 2, n / SIZE * finer + finer / 2);
-            errors[i] = fmax(errors[i], test_most_apart(drawn, truth.rgba + 4 * n, 4));
+            errors[i] = fmax(errors[i], test_max_apart(drawn, truth.rgba + 4 * n, 4));
         }
         scene_picture_free(&p);
     }
@@ -428,19 +428,19 @@ static void splats_of_one_colour_come_to_their_integral(void **state)
 }
 
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings,
-                    double most)
+                    double max)
 {
     scene_picture p = scene_draw(s, &cpu_scenes_reference, view, settings);
     for (unsigned threads = 1; threads <= 3; threads += 2) {
         cpu_scenes_threads = threads;
         scene_picture q = scene_draw(s, &cpu_scenes_cpu, view, settings);
-        assert_true(scene_difference(&p, &q) <= most);
+        assert_true(scene_difference(&p, &q) <= max);
         scene_picture_free(&q);
     }
     cpu_scenes_threads = 3;
     scene_turn turn = scene_turns(scene_renderers() + 2, s, view, settings); /* gl */
     while (scene_take_turn(&turn)) {
-        assert_true(scene_difference(&p, &turn.picture) <= most);
+        assert_true(scene_difference(&p, &turn.picture) <= max);
         const bool counted = settings->flatten <= 1 && settings->clip.count == 0;
         for (unsigned i = 0; i < s->data->list_count && counted; i++)
             scene_compare_counts(&p.lists[i], &turn.picture.lists[i], turn.renderer->name);
@@ -545,13 +545,13 @@ static void gl_draws_exact_and_near_kernels(void **state)
 
 /* By the reference and by others. */
 static void compare_sheets(const scene *s, const trip_camera_params *view,
-                           const trip_settings *settings, double most)
+                           const trip_settings *settings, double max)
 {
     scene_picture p = { 0 };
     scene_turn turn = scene_turns(scene_renderers_post(), s, view, settings);
     while (scene_take_turn(&turn))
         if (p.rgba) {
-            assert_true(scene_difference(&p, &turn.picture) <= most);
+            assert_true(scene_difference(&p, &turn.picture) <= max);
         } else {
             p = turn.picture; /* the reference's */
             turn.picture = (scene_picture){ 0 };
@@ -753,7 +753,7 @@ int main(void)
         cmocka_unit_test(a_ramp_is_as_steep_wherever_it_was_sampled),
         cmocka_unit_test(a_ramp_has_one_gradient),
         cmocka_unit_test(a_gaussian_has_its_line_integral),
-        cmocka_unit_test(slices_come_to_the_integral),
+        cmocka_unit_test(samples_per_sheet_come_to_the_integral),
         cmocka_unit_test(splats_have_the_mass_of_their_voxels),
         cmocka_unit_test(a_splat_is_as_wide_as_its_voxel),
         cmocka_unit_test(splats_of_one_colour_come_to_their_integral),

@@ -73,7 +73,7 @@ static trip_camera_params along_z(const scene *s)
     return view;
 }
 
-static double place_x(const scene *s, const trip_camera_params *view, int x)
+static double position_x(const scene *s, const trip_camera_params *view, int x)
 {
     trip_vec3 o, d;
     scene_ray(s, view, x, SIZE / 2, &o, &d);
@@ -100,7 +100,7 @@ static void fog_lit_from_the_side_is_as_dark_as_it_is_thick(void **state)
         scene_picture p = draw(i, &s, &view, &settings);
         for (int x = 0; x < SIZE; x++) {
             double expected = (1 - exp(-FOG * depth)) *
-                              (0.3 + 0.7 * phase * exp(-FOG * (depth - place_x(&s, &view, x))));
+                              (0.3 + 0.7 * phase * exp(-FOG * (depth - position_x(&s, &view, x))));
             assert_close(scene_pixel(&p, x, SIZE / 2)[0], expected, i < renderers() ? 5e-4 : 2e-5);
         }
         scene_picture_free(&p);
@@ -152,7 +152,7 @@ static void a_box_casts_its_shadow_on_the_next(void **state)
         scene_picture p = draw(i, &s, &view, &settings);
         int seen = 0;
         for (int x = 0; x < SIZE; x++) {
-            double beyond, here = boxes_at(&u, place_x(&s, &view, x), &beyond);
+            double beyond, here = boxes_at(&u, position_x(&s, &view, x), &beyond);
             double expected =
                 (1 - exp(-0.4 * here * (EDGE - 1))) * (0.3 + 0.7 * exp(-0.4 * beyond));
             assert_close(scene_pixel(&p, x, SIZE / 2)[0], expected, i < renderers() ? 0.05 : 1e-4);
@@ -258,7 +258,7 @@ static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
         settings.effects.cueing = n < 2 ? 0 : 0.6;
         settings.tolerance = n < 4 ? 1e-5 : 1e-3;
         settings.point_light = n >= 2;
-        settings.light_place = trip_affine_point(map, trip_v3(18, 3, 15));
+        settings.light_position = trip_affine_point(map, trip_v3(18, 3, 15));
         scene_picture truth = integrate(&all, &view, &settings);
         scene_picture same = integrate(&few, &view, &settings);
         assert_true(scene_difference(&truth, &same) < (n < 4 ? 1e-4 : 3e-3));
@@ -358,7 +358,7 @@ static void every_renderer_draws_them_alike(void **state)
     for (int n = 0; n < 32; n++) {
         trip_settings settings = some_effects(n);
         settings.point_light = n & 16;
-        settings.light_place = trip_affine_point(&scene_sheared, trip_v3(18, 3, 15));
+        settings.light_position = trip_affine_point(&scene_sheared, trip_v3(18, 3, 15));
         view.ortho_height = n & 2 ? 50 : 0;
         scene_picture reference = scene_draw(&s, &scene_renderers()[0], &view, &settings);
         for (int i = 1; i < renderers(); i++) {
@@ -398,7 +398,7 @@ static void what_is_cut_away_casts_no_shadow(void **state)
         scene_picture p = draw(i, &s, &view, &settings);
         int seen = 0;
         for (int x = 0; x < SIZE; x++) {
-            double at = place_x(&s, &view, x), beyond, all, here = boxes_at(&u, at, &beyond);
+            double at = position_x(&s, &view, x), beyond, all, here = boxes_at(&u, at, &beyond);
             boxes_at(&u, cut, &all);
             if (at < cut)
                 here = 0;

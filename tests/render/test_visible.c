@@ -119,7 +119,7 @@ static void values_are_raised_where_visible_voxels_reach_farther(void **state)
         double reach[TRIP_REACHES_MAX], raised[TRIP_REACHES_MAX], known[TRIP_REACHES_MAX];
         any_reaches(&origin, wanted);
         assert_int_equal(trip_visible_reach(&v, &origin, wanted, TRIP_REACHES_MAX, reach), 0);
-        v.place_count = t % 2 ? v.place_count : 0;
+        v.position_count = t % 2 ? v.position_count : 0;
         for (int n = 0; n < TRIP_REACHES_MAX; n++)
             raised[n] = known[n] = n % 4 == 0   ? -INFINITY
                                    : n % 4 == 1 ? reach[n]
@@ -138,22 +138,22 @@ static void bounds_are_those_of_the_visible_voxels(void **state)
     scene s;
     make(&s, 32, 8);
     trip_visible v = { .data = s.data, .budget = s.budget, .kernel_radius = 2 };
-    double lo[3], hi[3], least[3] = { NX, NY, NZ }, most[3] = { 0 };
+    double lo[3], hi[3], min[3] = { NX, NY, NZ }, max[3] = { 0 };
     for (int i = 0; i < NX * NY * NZ; i++) {
         const int at[3] = { i % NX, i / NX % NY, i / NX / NY };
         unsigned code;
         bool there = cigar(NULL, at[0], at[1], at[2], &code, NULL) && code >= 41000;
         for (int a = 0; a < 3 && there; a++) {
-            least[a] = fmin(least[a], at[a]);
-            most[a] = fmax(most[a], at[a]);
+            min[a] = fmin(min[a], at[a]);
+            max[a] = fmax(max[a], at[a]);
         }
     }
     assert_int_equal(trip_reader_create(&v.reader, s.data, &(trip_reader_params){ 0 }, s.budget),
                      0);
     trip_visible_start(&v, s.table, false);
     assert_int_equal(trip_visible_bounds(&v, lo, hi), 0);
-    assert_memory_equal(lo, least, sizeof lo);
-    assert_memory_equal(hi, most, sizeof hi);
+    assert_memory_equal(lo, min, sizeof lo);
+    assert_memory_equal(hi, max, sizeof hi);
     trip_reader_destroy(v.reader);
     scene_destroy(&s);
 }

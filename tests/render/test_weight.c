@@ -81,10 +81,10 @@ static void at_every_pixel_of_any_camera_a_weight_is_one(void **state)
         for (int y = 0; y < c.height; y++) {
             for (int x = 0; x < c.width; x++) {
                 trip_vec3 ray = trip_camera_ray(&c, x + 0.5, y + 0.5);
-                double most = 0;
+                double max = 0;
                 for (int a = 0; a < 3; a++)
-                    most = fmax(most, trip_weight(&s, view, ray, a));
-                assert_close(most, 1, 0);
+                    max = fmax(max, trip_weight(&s, view, ray, a));
+                assert_close(max, 1, 0);
             }
         }
     }
@@ -192,7 +192,7 @@ static void bounds_over_a_rectangle_hold_for_every_ray_in_it(void **state)
                                             from[1] + (to[1] - from[1]) * test_random());
             for (int a = 0; a < 3; a++) {
                 double r = fabs(trip_component(ray, a)), room = 1e-9 * trip_length(ray);
-                assert_true(r >= b.least[a] - room && r <= b.most[a] + room);
+                assert_true(r >= b.min[a] - room && r <= b.max[a] + room);
                 if (!trip_weight_may_lie(&s, 0, &b, a)) {
                     assert_close(trip_weight(&s, 0, ray, a), 0, 0);
                     ruled_out++;

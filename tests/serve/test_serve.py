@@ -157,8 +157,8 @@ class Serve(program.ProgramTest):
             ("method", "axis", [*flat, "--method=axis"]),
             ("method", "merge", flat),
             ("h", "0.2", [*flat, "--h=0.2"]),
-            ("saturation", "0.05", [*flat, "--h=0.2", "--saturation=0.05"]),
-            ("saturation", "-1", [*flat, "--h=0.2"]),
+            ("early_termination", "0.05", [*flat, "--h=0.2", "--early-termination=0.05"]),
+            ("early_termination", "-1", [*flat, "--h=0.2"]),
             ("opacity", "0.1", [*flat, "--h=0.2", "--opacity-scale=0.1"]),
         ):
             status, _, data = self.ask("/set", "POST", name=name, value=value)
@@ -170,7 +170,7 @@ class Serve(program.ProgramTest):
             self.assertTrue((picture != before).any(), (name, value))
         for name, value in (
             ("classify", "x"), ("classify", ""), ("shading", "2"), ("h", "1"), ("h", "nan"),
-            ("saturation", "0.11"), ("saturation", "-2"), ("saturation", "x"),
+            ("early_termination", "0.11"), ("early_termination", "-2"), ("early_termination", "x"),
             ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2"),
             ("light", "nan,0,9"), ("light", "0,91,9"), ("light", "0,0,0"), ("light", "1,2,3,4"),
             ("light", "," * 500), ("samples", "64"), ("", ""), ("shadows", "1"), ("emission", "1"),
@@ -181,7 +181,7 @@ class Serve(program.ProgramTest):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, (name, value))
         self.assertEqual(self.ask("/set", "POST", name="light", value="30,45,1.5")[0], 204)
         self.assertEqual(self.status()["settings"], {
-            "classify": "pre", "method": "merge", "show": "picture", "shading": 0, "h": 0.2, "saturation": -1})
+            "classify": "pre", "method": "merge", "show": "picture", "shading": 0, "h": 0.2, "early_termination": -1})
         self.assertIn("bone", json.loads(self.ask("/presets")[2]))
 
     def test_a_light_at_a_place_is_drawn_as_the_options_have_it(self):

@@ -57,9 +57,9 @@ static run *make_run(trip_block_form form, double density, uint64_t seed)
         uint64_t random = fixture_random(&seed);
         if ((double)(random >> 40) >= density * (1 << 24) && n + 1 < edge * edge)
             continue;
-        uint32_t place = by_number[n], u = place & 255, v = place >> 8;
+        uint32_t position = by_number[n], u = position & 255, v = position >> 8;
         uint32_t code = random_code(&form, random);
-        r->voxels[r->count++] = place | code << 16;
+        r->voxels[r->count++] = position | code << 16;
         b->u_min = (uint8_t)(u < b->u_min ? u : b->u_min);
         b->u_max = (uint8_t)(u > b->u_max ? u : b->u_max);
         b->v_min = (uint8_t)(v < b->v_min ? v : b->v_min);
@@ -88,7 +88,7 @@ static void what_is_packed_is_decoded_from_any_record_on(void **state)
                 const run *r = make_run(form_of(log2, form), densities[i], i);
                 const trip_block b = block_of(r);
                 assert_true(trip_block_words_fit(&r->form, r->count, r->words));
-                assert_true(r->words <= trip_block_most_words(&r->form));
+                assert_true(r->words <= trip_block_max_words(&r->form));
                 assert_null(trip_block_check(&b, &r->brick));
                 assert_true(trip_block_is_padded(&b));
                 trip_block_voxels(&b, 0, r->count, out);
@@ -273,15 +273,15 @@ static void records_outside_their_brick_are_found(void **state)
 }
 
 /* Codes that span so many bits, and the most of them. */
-static run *make_narrow_run(unsigned bits, double density, uint64_t seed, uint32_t *most)
+static run *make_narrow_run(unsigned bits, double density, uint64_t seed, uint32_t *max)
 {
     run *r = make_run(form_of(5, CODES), density, seed);
-    const uint32_t span = (1u << bits) - 1, least = (uint32_t)(seed * 977) % (65536 - span);
-    *most = 0;
+    const uint32_t span = (1u << bits) - 1, min = (uint32_t)(seed * 977) % (65536 - span);
+    *max = 0;
     for (uint32_t i = 0; i < r->count; i++) {
-        const uint32_t code = least + ((r->voxels[i] >> 16) & span);
+        const uint32_t code = min + ((r->voxels[i] >> 16) & span);
         r->voxels[i] = (r->voxels[i] & UINT16_MAX) | code << 16;
-        *most = code > *most ? code : *most;
+        *max = code > *max ? code : *max;
     }
     r->words = trip_block_pack(&r->form, r->voxels, r->count, r->block);
     r->brick.code_min = 0;
@@ -294,14 +294,14 @@ static void bounds_of_codes_are_exact_whatever_their_width(void **state)
     (void)state;
     for (unsigned bits = 0; bits <= 16; bits++)
         for (uint64_t seed = 0; seed < 20; seed++) {
-            uint32_t most;
-            run *r = make_narrow_run(bits, seed % 2 ? 0.03 : 0.8, seed, &most);
+            uint32_t max;
+            run *r = make_narrow_run(bits, seed % 2 ? 0.03 : 0.8, seed, &max);
             const trip_block b = block_of(r);
             for (int i = 0; i < 20; i++) {
                 const uint32_t by = (uint32_t)(fixture_random(&random) % (1u << bits));
-                const uint32_t bound = i == 0 ? most : i == 1 ? most - (most > 0) : most + 9 - by;
+                const uint32_t bound = i == 0 ? max : i == 1 ? max - (max > 0) : max + 9 - by;
                 r->brick.code_max = (uint16_t)(bound > UINT16_MAX ? UINT16_MAX : bound);
-                if (most > r->brick.code_max)
+                if (max > r->brick.code_max)
                     expect_fault(r, "outside its brick's range");
                 else
                     assert_null(trip_block_check(&b, &r->brick));

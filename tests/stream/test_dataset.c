@@ -513,7 +513,7 @@ static void coordinates_are_read_as_written_and_bad_ones_refused(void **state)
     static double tables[34 + 20 + 18];
     const double *along[3] = { tables, tables + 34, tables + 54 };
     const int64_t dims[3] = { 34, 20, 18 };
-    const fixture usual = shared;
+    const fixture defaults = shared;
     trip_dataset *d;
     static crafted c;
     for (int a = 0, n = 0; a < 3; a++)
@@ -540,7 +540,7 @@ static void coordinates_are_read_as_written_and_bad_ones_refused(void **state)
     REFUSE(PLACES[71] = 17.5, "do not run from 0");
     REFUSE(c.header->coordinates_offset = c.header->lists_offset, "");
     fixture_free(&shared);
-    shared = usual;
+    shared = defaults;
 }
 
 int main(void)

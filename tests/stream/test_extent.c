@@ -232,8 +232,8 @@ static void the_least_slot_holds_the_largest_run(void **state)
     plan_test t;
     (void)state;
     start(&t, false, 1 << 20, 1);
-    assert_int_equal(trip_planner_least_slot(t.d, 1), 2 * 4096);
-    assert_int_equal(trip_planner_least_slot(t.d, 3), 4 * 4096);
+    assert_int_equal(trip_planner_min_slot(t.d, 1), 2 * 4096);
+    assert_int_equal(trip_planner_min_slot(t.d, 3), 4 * 4096);
     finish(&t);
 }
 
@@ -244,9 +244,9 @@ static void the_least_slot_holds_a_run_of_any_kind(void **state)
     (void)state;
     fixture_make(&t.f, &(fixture_params){ .code_bytes = 1, .page_bytes = 4096, .in_memory = true });
     assert_int_equal(trip_dataset_open(&t.d, t.f.path, t.f.budget), TRIP_OK);
-    assert_int_equal(trip_planner_least_slot(t.d, 1), (2 + 1) * 4096);
+    assert_int_equal(trip_planner_min_slot(t.d, 1), (2 + 1) * 4096);
     t.d->lists[2].kind = TRIP_KIND_MEANS;
-    assert_int_equal(trip_planner_least_slot(t.d, 1), (3 + 1) * 4096);
+    assert_int_equal(trip_planner_min_slot(t.d, 1), (3 + 1) * 4096);
     trip_dataset_close(t.d);
     fixture_free(&t.f);
 }

@@ -96,10 +96,10 @@ static void what_has_no_direction_is_zero(void **state)
 
 static void the_longest_gradients_are_cut(void **state)
 {
-    double b[3], most = 3 * (1 + 127.0 / 32) * (1 + 127.0 / 32);
+    double b[3], max = 3 * (1 + 127.0 / 32) * (1 + 127.0 / 32);
     (void)state;
     trip_normal_unpack(trip_normal_pack((double[]){ 0, 0, 1e300 }, 3), 3, b);
-    assert_true(fabs(b[2] - most) < 1e-2 * most);
+    assert_true(fabs(b[2] - max) < 1e-2 * max);
 }
 
 static trip_affine stretched(double x, double y, double z)

@@ -579,8 +579,8 @@ static void a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line(void **sta
 static void run_backwards(void *user, void (*task)(void *context, unsigned number), void *context,
                           unsigned count)
 {
-    unsigned *most = user;
-    *most = count > *most ? count : *most;
+    unsigned *max = user;
+    *max = count > *max ? count : *max;
     while (count-- > 0)
         task(context, count);
 }

@@ -106,12 +106,12 @@ static void a_scale_bar_is_the_longest_that_fits(void **state)
     (void)state;
     trip_navigation n = parallel(0, -100, 0); /* 10 px a unit */
     static const struct {
-        double most_px, length;
+        double max_px, length;
         const char *text;
     } bars[] = { { 200, 20, "20 mm" }, { 199, 10, "10 mm" },   { 99, 5, "5 mm" },
                  { 49, 2, "2 mm" },    { 9.9, 0.5, "0.5 mm" }, { 12000, 1000, "1000 mm" } };
     for (size_t i = 0; i < sizeof bars / sizeof *bars; i++) {
-        trip_annotation_bar bar = trip_annotation_scale_bar(&n, HEIGHT, 100, bars[i].most_px, "mm");
+        trip_annotation_bar bar = trip_annotation_scale_bar(&n, HEIGHT, 100, bars[i].max_px, "mm");
         assert_close(bar.length, bars[i].length, 1e-12);
         assert_close(bar.px, 10 * bars[i].length, 1e-9);
         assert_string_equal(bar.text, bars[i].text);

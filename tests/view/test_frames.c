@@ -150,7 +150,8 @@ static void assert_drawn_alike(const copy *c, const char *path, const trip_wante
     assert_int_equal(triptych_create(&t), 0);
     assert_int_equal(
         triptych_open(t, path, &(triptych_resources){ .renderer = TRIPTYCH_RENDERER_CPU }), 0);
-    assert_int_equal(triptych_set_function(t, &(triptych_function){ .name = w->function }), 0);
+    assert_int_equal(
+        triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = w->function }), 0);
     assert_int_equal(triptych_set_settings(t, &w->settings), 0);
     assert_int_equal(triptych_set_view(t, &view), 0);
     assert_int_equal(triptych_draw(t, rgba), 0);

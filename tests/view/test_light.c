@@ -16,9 +16,9 @@ static void a_light_stands_about_the_middle_of_the_data(void **state)
     trip_light_control_set(&s, &box, &(trip_light_control){ 90, 30, 2 });
     assert_false(s.headlight);
     assert_true(s.point_light);
-    const double place[3] = { 1, 2 + 12 * sqrt(0.75), 9 };
+    const double position[3] = { 1, 2 + 12 * sqrt(0.75), 9 };
     for (int i = 0; i < 3; i++)
-        assert_close(s.light[i], place[i], 1e-12);
+        assert_close(s.light[i], position[i], 1e-12);
 }
 
 static void from_the_farthest_on_it_is_a_direction(void **state)
@@ -176,12 +176,12 @@ static void numbers_of_effects_keep_within_their_bounds(void **state)
     for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
         const trip_effect_number *n = &trip_effect_numbers[i];
         triptych_settings s = triptych_default_settings();
-        const double usual = trip_effect_number_get(n, &s);
+        const double defaults = trip_effect_number_get(n, &s);
         const double bad[] = { n->lo - 0.001, n->hi + 0.001, NAN, INFINITY, n->lo + 0.5 };
-        assert_true(usual >= n->lo && usual <= n->hi);
+        assert_true(defaults >= n->lo && defaults <= n->hi);
         for (int k = 0; k < (n->whole ? 5 : 4); k++) {
             assert_false(trip_effect_number_set(n, bad[k], &s));
-            assert_true(trip_effect_number_get(n, &s) == usual);
+            assert_true(trip_effect_number_get(n, &s) == defaults);
         }
         assert_true(trip_effect_number_set(n, n->lo, &s));
         assert_true(trip_effect_number_get(n, &s) == n->lo && s.kelvin[0] < s.kelvin[1]);

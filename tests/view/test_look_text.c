@@ -31,12 +31,12 @@ static void splats_and_values_have_options_of_their_own(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
-    s.slices = 3;
+    s.samples_per_sheet = 3;
     s.compositing = TRIPTYCH_BY_SHEET;
     s.kernel_radius = 2.5;
-    assert_text(&s, NULL, 1, " --slices 3");
+    assert_text(&s, NULL, 1, " --samples-per-sheet 3");
     s.classify = TRIPTYCH_POST;
-    assert_text(&s, NULL, 1, " --classify post --slices 3");
+    assert_text(&s, NULL, 1, " --classify post --samples-per-sheet 3");
     s.classify = TRIPTYCH_PRE;
     assert_text(&s, NULL, 1, " --classify pre --compositing sheet --kernel-radius 2.5");
 }
@@ -46,10 +46,10 @@ static void what_the_panel_has_is_written(void **state)
     (void)state;
     triptych_settings s = triptych_default_settings();
     s.h = 0.25;
-    s.saturation = 0;
+    s.early_termination = 0;
     s.lod_px = 1.5;
     s.samples = 2;
-    assert_text(&s, NULL, 1, " --h 0.25 --saturation 0 --lod 1.5 --samples 2");
+    assert_text(&s, NULL, 1, " --h 0.25 --early-termination 0 --lod 1.5 --samples 2");
     s = triptych_default_settings();
     s.method = TRIPTYCH_AXIS;
     s.h = 0.25; /* of merge alone */

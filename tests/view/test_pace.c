@@ -27,7 +27,7 @@ static void the_size_meets_the_time(void **state)
     assert_true(fabs(trip_pace_scale(&p, 1e6, 33) - sqrt(0.23)) < 1e-6);
     assert_true(fabs(trip_pace_expect_ms(&p, 1e6) - 110) < 1e-6);
     assert_true(trip_pace_scale(&p, 1e6, 111) == 1);
-    assert_true(trip_pace_scale(&p, 1e9, 10.001) == TRIP_PACE_LEAST);
+    assert_true(trip_pace_scale(&p, 1e9, 10.001) == TRIP_PACE_MIN);
 }
 
 /* 100 ms whatever the size, and 40 ms a megapixel: pixels get 25 ms. */
@@ -61,7 +61,7 @@ static void frames_that_scatter_do_not_make_the_next_one_large(void **state)
 }
 
 /* Of one frame all of the time is taken to be of its pixels: 33 ms would be 132e3 of them. */
-static void frames_grow_threefold_at_most(void **state)
+static void frames_grow_threefold_at_max(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -103,7 +103,7 @@ int main(void)
         cmocka_unit_test(the_size_meets_the_time),
         cmocka_unit_test(where_the_time_cannot_be_met_pixels_are_not_thrown_away),
         cmocka_unit_test(frames_that_scatter_do_not_make_the_next_one_large),
-        cmocka_unit_test(frames_grow_threefold_at_most),
+        cmocka_unit_test(frames_grow_threefold_at_max),
         cmocka_unit_test(pixels_that_seem_to_cost_nothing_may_cost_what_scatter_hides),
         cmocka_unit_test(following_it_comes_to_the_time),
     };

@@ -21,7 +21,7 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
     MEMBER(vertex_weights);
     MEMBER(normalise);
     MEMBER(flatten);
-    MEMBER(slices);
+    MEMBER(samples_per_sheet);
     MEMBER(method);
     MEMBER(traversal);
     MEMBER(target);
@@ -32,7 +32,7 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
     MEMBER(point_light);
     MEMBER(light);
     MEMBER(h);
-    MEMBER(saturation);
+    MEMBER(early_termination);
     MEMBER(kernel_radius);
     MEMBER(background);
     MEMBER(lod_px);
@@ -87,7 +87,7 @@ static void every_member_counts(void **state)
     COUNTS(vertex_weights);
     COUNTS(normalise);
     COUNTS(flatten);
-    COUNTS(slices);
+    COUNTS(samples_per_sheet);
     COUNTS(method);
     COUNTS(traversal);
     COUNTS(target);
@@ -98,7 +98,7 @@ static void every_member_counts(void **state)
     COUNTS(point_light);
     COUNTS(light[2]);
     COUNTS(h);
-    COUNTS(saturation);
+    COUNTS(early_termination);
     COUNTS(kernel_radius);
     COUNTS(background[3]);
     COUNTS(lod_px);

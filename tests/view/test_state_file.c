@@ -5,14 +5,14 @@
 
 #include "state_file.h"
 
-static trip_view_state usual(void)
+static trip_view_state defaults(void)
 {
     return (trip_view_state){ .opacity_scale = 1, .settings = triptych_default_settings() };
 }
 
 static trip_view_state unusual(void)
 {
-    trip_view_state s = usual();
+    trip_view_state s = defaults();
     s.has_navigation = true;
     s.navigation = (trip_navigation){ .eye = { 1.0 / 3, -2e-17, 5e20 },
                                       .look = { 0, 1e-3, 4 },
@@ -24,9 +24,9 @@ static trip_view_state unusual(void)
     s.heat = strdup("/data/heat of it.trip");
     s.opacity_scale = 2.5;
     s.settings.classify = TRIPTYCH_POST;
-    s.settings.slices = 3;
+    s.settings.samples_per_sheet = 3;
     s.settings.compositing = TRIPTYCH_BY_SHEET;
-    s.settings.saturation = 1.0 / 96;
+    s.settings.early_termination = 1.0 / 96;
     s.settings.lod_px = 1.5;
     s.settings.headlight = 0;
     s.settings.point_light = 1;
@@ -68,7 +68,7 @@ static void assert_same(const trip_view_state *a, const trip_view_state *b)
     assert_memory_equal(a->settings.light, b->settings.light, sizeof a->settings.light);
     assert_true(a->settings.background[2] == b->settings.background[2]);
     assert_int_equal(a->settings.classify, b->settings.classify);
-    assert_int_equal(a->settings.slices, b->settings.slices);
+    assert_int_equal(a->settings.samples_per_sheet, b->settings.samples_per_sheet);
     assert_int_equal(a->settings.compositing, b->settings.compositing);
     assert_true(a->settings.lod_px == b->settings.lod_px);
     assert_same_clip(&a->settings.clip, &b->settings.clip);
@@ -98,7 +98,7 @@ static int remove_folder(void **state)
 static void what_is_kept_is_found_again_to_the_last_bit(void **state)
 {
     (void)state;
-    trip_view_state kept = unusual(), found = usual();
+    trip_view_state kept = unusual(), found = defaults();
     found.function = strdup("bone");
     assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 0);
     assert_string_equal(found.function, "bone");
@@ -120,7 +120,7 @@ static void what_is_kept_is_found_again_to_the_last_bit(void **state)
 static void functions_with_long_comments_that_are_no_utf8_are_kept(void **state)
 {
     (void)state;
-    trip_view_state kept = usual(), found = usual();
+    trip_view_state kept = defaults(), found = defaults();
     char text[1100] = "0 0 0 0 0\n1 1 1 1 0.5 # ";
     const size_t begun = strlen(text);
     memset(text + begun, 0xe9, 1000);
@@ -168,8 +168,8 @@ static void what_is_no_state_is_refused_whole(void **state)
     (void)state;
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t1e9", "opacity_scale");
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t\"2\"", "opacity_scale");
-    assert_refused("\"slices\":\t3", "\"slices\":\t2.5", "slices");
-    assert_refused("\"slices\":\t3", "\"slices\":\t17", "slices");
+    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t2.5", "slices");
+    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t17", "slices");
     assert_refused("\"lod_px\":\t1.5", "\"lod_px\":\t-1", "lod_px");
     assert_refused("\"compositing\":\t1", "\"compositing\":\t2", "compositing");
     assert_refused("\"fov_degrees\":\t30", "\"fov_degrees\":\t230", "fov_degrees");
@@ -185,7 +185,7 @@ static void what_is_no_state_is_refused_whole(void **state)
     assert_refused("1 1 1 1 0.5", "1 1 1 1 7.5", "opacity");
     assert_refused("-0.142", "x", "is not what the viewer keeps");
     assert_refused("\"triptych_view\":\t1", "\"triptych_view\":\t\"1\"", "is not what the viewer");
-    trip_view_state s = usual();
+    trip_view_state s = defaults();
     test_catch_reports();
     assert_int_equal(trip_view_state_parse(&s, "/d", "[[[", "state.json"), TRIP_ERROR);
     assert_one_report("is not what the viewer keeps");
@@ -194,7 +194,7 @@ static void what_is_no_state_is_refused_whole(void **state)
 static void other_versions_and_data_sets_are_no_state(void **state)
 {
     (void)state;
-    trip_view_state s = usual(), before = s;
+    trip_view_state s = defaults(), before = s;
     char *text = trip_view_state_print(&s, "/d");
     assert_int_equal(trip_view_state_parse(&s, "/e", text, "f"), 0);
     assert_int_equal(
@@ -209,7 +209,7 @@ static void other_versions_and_data_sets_are_no_state(void **state)
 static void a_folder_in_its_place_is_reported(void **state)
 {
     (void)state;
-    trip_view_state s = usual();
+    trip_view_state s = defaults();
     char *path;
     assert_int_equal(trip_state_file_path(&path, "/data/folder.trip"), 0);
     assert_int_equal(trip_state_file_save(&s, "/data/folder.trip"), 0);

@@ -2,10 +2,10 @@
 #version 150
 
 uniform sampler2D picture;
-in vec2 place;
+in vec2 position;
 out vec4 colour;
 
 void main()
 {
-    colour = vec4(texture(picture, place).rgb, 1);
+    colour = vec4(texture(picture, position).rgb, 1);
 }

@@ -3,10 +3,10 @@
 #version 150
 
 uniform vec4 corners[4];
-out vec2 place;
+out vec2 position;
 
 void main()
 {
-    place = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    position = vec2(gl_VertexID & 1, gl_VertexID >> 1);
     gl_Position = corners[gl_VertexID];
 }

@@ -72,7 +72,7 @@ INLINE vf stamp_y(unsigned number)
 /* ---- blending ---- */
 
 /* Where transpose() leaves a word. */
-INLINE unsigned place_of(unsigned word)
+INLINE unsigned position_of(unsigned word)
 {
     return word % 8 * 8 + word / 8;
 }
@@ -187,15 +187,15 @@ INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, vf g)
 /* Optical depth of other splats, likewise, but for the stretch. */
 INLINE vf long_depth(const patch *p, const trip_cpu_splat *splat, vf u)
 {
-    vf y = v_fma(u, p->cutoff, v_set(splat->c[TRIP_CPU_LEAST]));
+    vf y = v_fma(u, p->cutoff, v_set(splat->c[TRIP_CPU_MIN]));
     return exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
 }
 
 /* Of those with rays of their own, whose edge is what the least comes to. */
 INLINE vf own_depth(const patch *p, const trip_cpu_splat *splat, vf u)
 {
-    vf least = v_set(splat->c[TRIP_CPU_LEAST]);
-    return exp2_biased_less(v_fma(u, p->cutoff, least), exp2_biased_less(least, v_set(0)));
+    vf min = v_set(splat->c[TRIP_CPU_MIN]);
+    return exp2_biased_less(v_fma(u, p->cutoff, min), exp2_biased_less(min, v_set(0)));
 }
 
 /* Near splats are few: not inlined, and by values, so that loops over the others keep their stamp
@@ -259,7 +259,7 @@ INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, float depth, 
 INLINE void put_behind(patch *p, const trip_cpu_splat *splat, float depth, vf opacity,
                        trip_target target)
 {
-    vm open = v_ge(p->t, v_load(p->pane->saturation));
+    vm open = v_ge(p->t, v_load(p->pane->early_termination));
     vf left = v_fnma_where(open, p->t, opacity, p->t), taken = p->t - left;
     p->r = kept(v_fma(taken, v_set(splat->r), p->r), target);
     p->g = kept(v_fma(taken, v_set(splat->g), p->g), target);
@@ -293,12 +293,12 @@ INLINE void put_over(patch *p, const trip_cpu_splat *splat, float depth, vf opti
 
 INLINE bool any_open(const trip_cpu_scratch *s, vf t)
 {
-    return vm_any(v_ge(t, v_load(s->saturation)));
+    return vm_any(v_ge(t, v_load(s->early_termination)));
 }
 
 INLINE bool all_open(const patch *p)
 {
-    return vm_all(v_ge(p->t, v_load(p->pane->saturation)));
+    return vm_all(v_ge(p->t, v_load(p->pane->early_termination)));
 }
 
 static void set_rays(trip_cpu_scratch *s, unsigned number);
@@ -428,7 +428,7 @@ INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays
     touching t = { .local = s->local, .depths = s->local_depths };
     uint64_t thick = 0;
     for (unsigned word = 0; word < (s->splats + 63) / 64; word++) {
-        t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
+        t.splats[word] = s->touched[number / 64][word][position_of(number % 64)];
         thick |= t.splats[word] & s->thick[word];
     }
     bool simple = front_to_back && target == TRIP_TARGET_RGBA32F && !thick;
@@ -504,7 +504,7 @@ INLINE void exchange_all(words8 rows[8], unsigned step, uint64_t low4, uint64_t 
         exchange(&rows[i], &rows[i + 1], step, low1);
 }
 
-/* Bit i of word k becomes bit k of word i, which then lies at place_of(i): steps of 32, 16 and 8
+/* Bit i of word k becomes bit k of word i, which then lies at position_of(i): steps of 32, 16 and 8
  * words are between vectors of eight, and so are the smaller ones once the vectors are transposed
  * themselves. */
 static void transpose(uint64_t words[64])
@@ -768,7 +768,7 @@ static void pane_begin(const trip_cpu_view *view, trip_cpu_scratch *s, int x, in
     s->sums = sums;
     s->splats = 0;
     s->blend = choose_blend(view);
-    v_store(s->saturation, v_set(view->saturation));
+    v_store(s->early_termination, v_set(view->early_termination));
     memset(s->rays_known, 0, sizeof s->rays_known);
     find_open(s, quarters);
 }

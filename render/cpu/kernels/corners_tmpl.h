@@ -80,10 +80,10 @@ typedef struct four_corners {
 INLINE four_corners corners_from(const trip_cpu_group *g, vi at)
 {
     const int16_t *pool = (const int16_t *)g->pool;
-    int32_t places[V];
-    vi_store(places, at);
-    return (four_corners){ two_codes(pool, places),
-                           two_codes(pool + TRIP_CPU_RASTER_STRIDE, places) };
+    int32_t positions[V];
+    vi_store(positions, at);
+    return (four_corners){ two_codes(pool, positions),
+                           two_codes(pool + TRIP_CPU_RASTER_STRIDE, positions) };
 }
 
 /* The index, and which rays have all corners. */
@@ -93,8 +93,8 @@ INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi
     const four_corners c = corners_from(g, at);
     vi sum =
         (vi)WIDE(madd_epi16)(c.top, (wide)s->top) + (vi)WIDE(madd_epi16)(c.bottom, (wide)s->bottom);
-    wide least = WIDE(min_epi16)(c.top, c.bottom); /* missing ones are the least there are */
-    s->there = vi_is_0((vi)((halves)least == missing));
+    wide min = WIDE(min_epi16)(c.top, c.bottom); /* missing ones are the least there are */
+    s->there = vi_is_0((vi)((halves)min == missing));
     s->index = index_of(in, sum);
 }
 

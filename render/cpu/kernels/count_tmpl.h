@@ -110,12 +110,13 @@ static void reaching(const trip_cpu_view *view, const trip_cpu_reach *reach,
 {
     perspective persp = perspective_of(view);
     for (uint32_t i = 0; i < count; i += V) {
-        place(view, staged, i, lanes);
-        vm usual = view->splat.camera.ortho ? v_ge(v_load(lanes->z + i), v_set(view->near))
-                                            : footprint_of(&persp, view, lanes, NULL, i).usual;
+        position(view, staged, i, lanes);
+        vm defaults = view->splat.camera.ortho
+                          ? v_ge(v_load(lanes->z + i), v_set(view->near))
+                          : footprint_of(&persp, view, lanes, NULL, i).defaults;
         unsigned front = vm_bits(vm_first(count - i)) &
                          ~vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
-        unsigned by_lanes = view->coordinates ? 0 : vm_bits(usual);
+        unsigned by_lanes = view->coordinates ? 0 : vm_bits(defaults);
         lanes->kept[i / V] = front & by_lanes;
         lanes->scalar[i / V] = front & ~by_lanes;
         if (reach->bounded)

@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_EFFECTS_TMPL_H
 #define TRIP_CPU_EFFECTS_TMPL_H
 
-#include "cpu/kernels/effects.h"
+#include "cpu/kernels/kernel_effects.h"
 #include "cpu/kernels/simd_tmpl.h"
 #include "shade.h"
 
@@ -19,13 +19,13 @@ INLINE vf within_01(vf a)
 }
 
 /* At places of level 0. */
-INLINE vf light_at(const trip_cpu_light *g, const vf place[3])
+INLINE vf light_at(const trip_cpu_light *g, const vf position[3])
 {
     vf part[3];
     vi cell = vi_set(0);
     for (int a = 0; a < 3; a++) {
         const vf last = v_set(g->last[a]);
-        vf node = v_max(place[a] * v_set(g->per_voxel), v_set(0)); /* 0 for what is no number */
+        vf node = v_max(position[a] * v_set(g->per_voxel), v_set(0)); /* 0 for what is no number */
         node = v_min(node, last);
         vi whole = v_truncate(v_min(node, last - v_set(0.5f)));
         part[a] = node - v_from_int(whole);
@@ -60,41 +60,41 @@ INLINE vf aside_of(const trip_cpu_effects *e, int axis, const vf unit[3], vf sha
 }
 
 /* Where light that reaches a surface is looked up: towards the light, but not beyond it. */
-INLINE void towards_light(const trip_cpu_effects *e, const vf place[3], const surface *s,
+INLINE void towards_light(const trip_cpu_effects *e, const vf position[3], const surface *s,
                           const vf light[3], vf out[3])
 {
     for (int a = 0; a < 3; a++) {
         const vf end = v_set(e->light[a]);
-        out[a] = place[a] + aside_of(e, a, light, s->strength);
+        out[a] = position[a] + aside_of(e, a, light, s->strength);
         if (e->point_light)
-            out[a] = v_min(v_max(out[a], v_min(place[a], end)), v_max(place[a], end));
+            out[a] = v_min(v_max(out[a], v_min(position[a], end)), v_max(position[a], end));
     }
 }
 
-INLINE vf open_of(const trip_cpu_effects *e, const vf place[3], const surface *s)
+INLINE vf open_of(const trip_cpu_effects *e, const vf position[3], const surface *s)
 {
     vf one[3], other[3];
     for (int a = 0; a < 3; a++) {
         const vf aside = aside_of(e, a, s->normal, s->strength);
-        one[a] = place[a] + aside;
-        other[a] = place[a] - aside;
+        one[a] = position[a] + aside;
+        other[a] = position[a] - aside;
     }
     vf open = v_max(light_at(&e->open, one), light_at(&e->open, other));
     return v_min(v_set(1), (v_set(1) + s->strength) * open);
 }
 
-INLINE void light_places(const trip_cpu_effects *e, const vf place[3], const surface *s,
-                         const vf light[3], const vf to_eye[3], vf rgb[3])
+INLINE void light_positions(const trip_cpu_effects *e, const vf position[3], const surface *s,
+                            const vf light[3], const vf to_eye[3], vf rgb[3])
 {
     vf reached = v_set(1), open = v_set(1), phase = v_set(1);
     if (e->reached.at) {
         vf nearer[3];
-        towards_light(e, place, s, light, nearer);
+        towards_light(e, position, s, light, nearer);
         reached = light_at(&e->reached, nearer);
         phase = phase_of(e, light, to_eye);
     }
     if (e->open.at)
-        open = open_of(e, place, s);
+        open = open_of(e, position, s);
     vf direct = v_fma(s->strength, s->diffuse - phase, phase) * reached;
     vf matt = v_fma(v_set((float)TRIP_DIFFUSE), direct, v_set((float)TRIP_AMBIENT) * open);
     for (int k = 0; k < 3; k++)
@@ -102,13 +102,13 @@ INLINE void light_places(const trip_cpu_effects *e, const vf place[3], const sur
 }
 
 /* As trip_emission_at(). */
-INLINE void add_emission(const trip_cpu_emission *e, const vf place[3], vf rgb[3])
+INLINE void add_emission(const trip_cpu_emission *e, const vf position[3], vf rgb[3])
 {
     vf at[3], share = v_set(1);
     for (int a = 0; a < 3; a++) {
         at[a] = v_set(e->to_heat[a][3]);
         for (int k = 0; k < 3; k++)
-            at[a] = v_fma(place[k], v_set(e->to_heat[a][k]), at[a]);
+            at[a] = v_fma(position[k], v_set(e->to_heat[a][k]), at[a]);
         const vf beyond = v_max(v_set(0) - at[a], at[a] - v_set(e->last[a]));
         share = share * (v_set(1) - within_01(beyond));
     }
@@ -128,11 +128,11 @@ static __attribute__((noinline)) void effects_on(const trip_cpu_effects *e, cons
                                                  const surface *s, const vf light[3],
                                                  const vf to_eye[3], vf rgb[3])
 {
-    vf place[3];
+    vf position[3];
     for (int a = 0; a < 3; a++)
-        place[a] = v_fma(at[a], v_set(e->scale[a]), v_set(e->offset[a]));
+        position[a] = v_fma(at[a], v_set(e->scale[a]), v_set(e->offset[a]));
     if (e->lit) {
-        light_places(e, place, s, light, to_eye, rgb);
+        light_positions(e, position, s, light, to_eye, rgb);
     } else {
         const vf back = v_set((float)(TRIP_AMBIENT - 1));
         vf matt = v_fma(s->strength, v_fma(s->diffuse, v_set((float)TRIP_DIFFUSE), back), v_set(1));
@@ -140,12 +140,12 @@ static __attribute__((noinline)) void effects_on(const trip_cpu_effects *e, cons
             rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss));
     }
     if (e->emission.heat.at)
-        add_emission(&e->emission, place, rgb);
+        add_emission(&e->emission, position, rgb);
     if (!e->cued)
         return;
     vf f = v_set(e->cue[3]);
     for (int a = 0; a < 3; a++)
-        f = v_fma(place[a], v_set(e->cue[a]), f);
+        f = v_fma(position[a], v_set(e->cue[a]), f);
     f = within_01(f) * v_set(e->cueing);
     for (int k = 0; k < 3; k++)
         rgb[k] = v_fma(v_set(e->cue_rgb[k]) - rgb[k], f, rgb[k]);

@@ -8,7 +8,7 @@
 #include <stdatomic.h>
 #include <stdint.h>
 
-#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/kernel_sheets.h"
 #include "layer.h"
 #include "renderer.h"
 #include "splat.h"
@@ -38,7 +38,7 @@
 /* What is kept instead of c[] by a splat that is thick, near or in a view whose stretch varies; of
  * near splats (splat.h) alone, what `along` is at the image's corner and its change by x and y; of
  * those with rays of their own, in place of the edge, |c|^2 / sigma^2. */
-enum { TRIP_CPU_LEAST, TRIP_CPU_EDGE, TRIP_CPU_ALONG, TRIP_CPU_ALONG_X, TRIP_CPU_ALONG_Y };
+enum { TRIP_CPU_MIN, TRIP_CPU_EDGE, TRIP_CPU_ALONG, TRIP_CPU_ALONG_X, TRIP_CPU_ALONG_Y };
 enum { TRIP_CPU_AWAY2 = TRIP_CPU_EDGE };
 
 /* One splat, ready to blend; 64 bytes, a cache line. With (x, y) a pixel's position from the corner
@@ -110,9 +110,9 @@ typedef struct trip_cpu_view {
     /* |r|^2 and |J r|^2 / stretch^2 at (x, y) from the image's middle: 1, x, y, x^2, x y and y^2
      * times these. */
     float ray2[6], world2[6];
-    float cutoff;     /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
-    float saturation; /* trip_cpu_saturation() */
-    float thin;       /* the largest optical depth, stretch aside, of thin splats */
+    float cutoff;            /* how far below its peak a support ends, in TRIP_CPU_EXP_UNIT */
+    float early_termination; /* trip_cpu_saturation() */
+    float thin;              /* the largest optical depth, stretch aside, of thin splats */
     int panes_across;
     double along_x[4], along_y[4], along_z[4]; /* X, Y, z of a voxel: [u, v, sheet, constant] */
     double forward_length;                     /* most that z changes by over an index length */
@@ -149,9 +149,9 @@ static inline bool trip_cpu_own_rays(const trip_cpu_view *view)
 
 /* A square of 8 x 8 voxels of a run, as its block (block.h) has it. */
 typedef struct trip_cpu_square {
-    int u, v, sheet;       /* of its corner */
-    uint64_t mask;         /* which voxels are there, by Morton number */
-    uint32_t least, width; /* of its codes, as trip_square has them */
+    int u, v, sheet;     /* of its corner */
+    uint64_t mask;       /* which voxels are there, by Morton number */
+    uint32_t min, width; /* of its codes, as trip_square has them */
     /* Of the first voxel; normals are read only with shading. TRIP_CPU_READABLE bytes behind those
      * of the square may be read too. */
     const unsigned char *codes, *normals;
@@ -161,7 +161,7 @@ typedef struct trip_cpu_square {
 
 /* For each byte of a mask, the places of its bits in a square, u + 8 v, a byte each, the lowest
  * bit's first. */
-extern const uint64_t trip_cpu_places[256];
+extern const uint64_t trip_cpu_positions[256];
 /* And their numbers. */
 extern const uint64_t trip_cpu_bits_set[256];
 
@@ -211,7 +211,7 @@ typedef struct trip_cpu_reach {
 
 /* What one thread needs while it blends a pane. */
 typedef struct trip_cpu_scratch {
-    _Alignas(64) float saturation[16];                 /* of the view, in every lane */
+    _Alignas(64) float early_termination[16];          /* of the view, in every lane */
     _Alignas(64) float rays[2 * TRIP_CPU_PANE_PIXELS]; /* by stamp: G[V], stretch[V] */
     _Alignas(64) trip_cpu_splat local[TRIP_CPU_LOCAL];
     float local_depths[TRIP_CPU_LOCAL]; /* of layers with depth */
@@ -312,7 +312,7 @@ typedef struct trip_cpu_kernels {
     /* Which cells of the squares lie between two sheets on some code from `least` to `most`
      * (biased): none that lacks corners at both sheets, and none of other squares. */
     void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
-                        int16_t least, int16_t most, trip_cpu_cells *out);
+                        int16_t min, int16_t max, trip_cpu_cells *out);
     /* Gradients of the squares' voxels that are there. Beside the raster lie those to the left of
      * it and above, of the same sheet, and those of the sheets before and behind in index order.
      * Codes alone are read. */

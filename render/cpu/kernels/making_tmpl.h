@@ -9,7 +9,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
-#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/kernel_sheets.h"
 #include "cpu/kernels/slice_tmpl.h"
 
 static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients,
@@ -100,7 +100,7 @@ INLINE uint64_t squares_from_to(int32_t u0, int32_t u1, int32_t v0, int32_t v1)
 static void make_slice(const trip_cpu_group *g, bool gradients, unsigned slice, size_t at,
                        uint64_t squares, uint64_t needed)
 {
-    const trip_cpu_making *m = g->slices[slice].making;
+    const trip_cpu_making *m = g->samples_per_sheet[slice].making;
     if (m->rasters[at] && (gradients || m->from))
         make_squares(g, m, gradients, at, g->leaps && !m->from ? squares : squares & needed);
 }

@@ -1,8 +1,8 @@
 /* Kernels that begin and finish the pixels of a pane: weights of the lists, the merge (equation 3
  * of Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
  * The weights are what the operations of weight.c in their order give in double precision, so that
- * a list begins at the same pixel wherever that is computed, and what is near there is exact for any
- * h. */
+ * a list begins at the same pixel wherever that is computed, and what is near there is exact for
+ * any h. */
 #ifndef TRIP_CPU_MERGE_H
 #define TRIP_CPU_MERGE_H
 
@@ -53,7 +53,7 @@ INLINE vl is_largest(const rays *r, int axis)
     return axis == 1 ? y : ~x & ~y;
 }
 
-INLINE vd most_of(const rays *r)
+INLINE vd max_of(const rays *r)
 {
     return vd_max(r->r[0], vd_max(r->r[1], r->r[2]));
 }
@@ -71,7 +71,7 @@ INLINE vd weight_half(const trip_cpu_view *view, const trip_settings *s, int axi
     if (s->method == TRIP_METHOD_CLIP)
         return vd_select(is_largest(r, axis), vd_set(1), vd_set(0));
     const double h = trip_settings_h(s);
-    return vd_max(vd_set(0), (magnitude(r, axis) / most_of(r) - vd_set(h)) / vd_set(1 - h));
+    return vd_max(vd_set(0), (magnitude(r, axis) / max_of(r) - vd_set(h)) / vd_set(1 - h));
 }
 
 INLINE vd_pair centres(int first, const float offsets[V])
@@ -85,7 +85,7 @@ INLINE vd_pair centres(int first, const float offsets[V])
 typedef struct pixel_rays {
     rays lo, hi;
     vd_pair inverse;
-    vm usual;
+    vm defaults;
 } pixel_rays;
 
 typedef struct pixel_centres {
@@ -108,12 +108,12 @@ INLINE pixel_rays pixel_rays_at(const trip_cpu_view *view, int x, int y, int col
     const pixel_centres p = centres_at(x, y, column, row);
     const trip_camera *camera = view->of->camera;
     rays lo = rays_at(camera, p.x.lo, p.y.lo), hi = rays_at(camera, p.x.hi, p.y.hi);
-    vd_pair most = { most_of(&lo), most_of(&hi) };
-    vf z = v_narrow(most.lo, most.hi), inverse = v_set(1) / z;
+    vd_pair max = { max_of(&lo), max_of(&hi) };
+    vf z = v_narrow(max.lo, max.hi), inverse = v_set(1) / z;
     return (pixel_rays){
         lo,
         hi,
-        { refine(most.lo, vd_low(inverse)), refine(most.hi, vd_high(inverse)) },
+        { refine(max.lo, vd_low(inverse)), refine(max.hi, vd_high(inverse)) },
         vm_and(v_gt(z, v_set(0x1p-60f)), v_gt(v_set(0x1p60f), z)),
     };
 }
@@ -131,7 +131,7 @@ INLINE vf weight(const trip_cpu_view *view, int axis, const pixel_rays *r)
         const vd off = vd_set(slack);
         vf below = v_max(v_narrow(lo - off, hi - off), v_set(0));
         vf above = v_max(v_narrow(lo + off, hi + off), v_set(0));
-        if (vm_all(vm_and(r->usual, v_ge(below, above))))
+        if (vm_all(vm_and(r->defaults, v_ge(below, above))))
             return below;
     }
     return v_narrow(weight_half(view, s, axis, &r->lo), weight_half(view, s, axis, &r->hi));

@@ -10,7 +10,7 @@
 #include "cpu/kernels/exp_tmpl.h"
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/rays_tmpl.h"
-#include "cpu/scalar.h"
+#include "cpu/cpu_scalar.h"
 #include "cpu/kernels/simd_tmpl.h"
 #include "cpu/kernels/effects_tmpl.h"
 #include "shade.h"
@@ -23,24 +23,24 @@
 /* ---- staging: squares of voxels to lanes ---- */
 
 /* Room for loads and stores that end behind the last byte. */
-enum { PLACES_ROOM = 64 + V };
+enum { POSITIONS_ROOM = 64 + V };
 
 /* The places of a mask's voxels in the square, u + 8 v. */
-INLINE void places_of(uint64_t mask, uint8_t places[PLACES_ROOM])
+INLINE void positions_of(uint64_t mask, uint8_t bit_positions[POSITIONS_ROOM])
 {
 #ifdef V_PACKS_BITS
     v_bytes all;
     for (unsigned i = 0; i < 64; i++)
         all[i] = (uint8_t)((i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i & 2) << 2 | (i & 8) << 1 |
                            (i & 32));
-    v_pack_bytes(places, mask, all);
+    v_pack_bytes(bit_positions, mask, all);
 #else
     uint32_t n = 0;
     for (unsigned i = 0; i < 8; i++) {
         unsigned byte = mask >> 8 * i & 255;
         uint64_t row = (i & 1) << 4 | (i & 2) << 1 | (i & 4) << 3;
-        uint64_t eight = trip_cpu_places[byte] + row * UINT64_C(0x0101010101010101);
-        memcpy(places + n, &eight, sizeof eight);
+        uint64_t eight = trip_cpu_positions[byte] + row * UINT64_C(0x0101010101010101);
+        memcpy(bit_positions + n, &eight, sizeof eight);
         n += (uint32_t)__builtin_popcount(byte);
     }
 #endif
@@ -53,7 +53,7 @@ INLINE vi load_codes(const trip_cpu_square *square, unsigned code_bytes, int32_t
     if (code_bytes == 1)
         return vi_load_bytes(square->codes + at);
     const uint32_t width = square->width;
-    return (vi_load_bits(square->codes + (size_t)at * width / 8, width) + (int32_t)square->least) &
+    return (vi_load_bits(square->codes + (size_t)at * width / 8, width) + (int32_t)square->min) &
            UINT16_MAX;
 }
 
@@ -76,8 +76,8 @@ INLINE unsigned lanes_seen(const trip_cpu_view *view, vi code, bool in_range)
 {
     if (in_range) {
         const vf at = v_from_int(code);
-        return vm_bits(vm_and(v_ge(at, v_set((float)view->shown.least)),
-                              v_ge(v_set((float)view->shown.most), at)));
+        return vm_bits(vm_and(v_ge(at, v_set((float)view->shown.min)),
+                              v_ge(v_set((float)view->shown.max), at)));
     }
     return vm_bits(v_gt(v_gather(&trip_cpu_rows(view)->extinction, code * 4), v_set(0)));
 }
@@ -93,29 +93,28 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
     int32_t count = __builtin_popcountll(square->mask), all = (count + V - 1) / V * V;
     uint64_t seen = UINT64_MAX >> (64 - count);
     if (bytes_in_range)
-        seen &=
-            v_bytes_within(square->codes, (uint8_t)view->shown.least, (uint8_t)view->shown.most);
+        seen &= v_bytes_within(square->codes, (uint8_t)view->shown.min, (uint8_t)view->shown.max);
     if (seen == 0)
         return filled;
-    uint8_t places[PLACES_ROOM];
-    places_of(square->mask, places);
+    uint8_t bit_positions[POSITIONS_ROOM];
+    positions_of(square->mask, bit_positions);
     const uint64_t in_order = reversed ? reversed_bits(seen) >> (64 - all) : seen;
     for (int32_t i = 0; i < all; i += V) {
         int32_t at = reversed ? all - V - i : i;
         unsigned lanes = (unsigned)(in_order >> i) & ((1u << V) - 1);
-        vi place = vi_load_bytes(places + at), code = load_codes(square, code_bytes, at);
+        vi position = vi_load_bytes(bit_positions + at), code = load_codes(square, code_bytes, at);
         vi normal = vi_set(0);
         if (view->shading || view->flattens)
             normal = load_normals(square->normals, view->normal_bytes, at);
         if (reversed) {
-            place = vi_reverse(place);
+            position = vi_reverse(position);
             code = vi_reverse(code);
             normal = vi_reverse(normal);
         }
         if (!bytes_in_range)
             lanes &= lanes_seen(view, code, in_range);
-        vi_store_packed(staged->u + filled, lanes, u + (place & 7));
-        vi_store_packed(staged->v + filled, lanes, v + v_shift_right(place, 3));
+        vi_store_packed(staged->u + filled, lanes, u + (position & 7));
+        vi_store_packed(staged->v + filled, lanes, v + v_shift_right(position, 3));
         vi_store(staged->sheet + filled, sheet);
         vi_store_packed(staged->code + filled, lanes, code);
         if (view->shading || view->flattens)
@@ -128,7 +127,7 @@ INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *s
 static uint32_t stage(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled)
 {
-    const bool in_range = view->shown.least <= view->shown.most;
+    const bool in_range = view->shown.min <= view->shown.max;
     if (view->code_bytes == 1 && in_range)
         return reversed ? stage_square(view, square, 1, true, true, staged, filled)
                         : stage_square(view, square, 1, true, false, staged, filled);
@@ -190,8 +189,8 @@ INLINE vd_pair positions(const trip_cpu_view *view, int axis, const int32_t *vox
     return out;
 }
 
-INLINE void place(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
-                  trip_cpu_lanes *lanes)
+INLINE void position(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at,
+                     trip_cpu_lanes *lanes)
 {
     vd_pair u = positions(view, view->u_axis, staged->u + at);
     vd_pair v = positions(view, view->v_axis, staged->v + at);
@@ -228,9 +227,9 @@ INLINE vf dot(v3 a, v3 b)
 /* Lengths below 1e-15 count as 0. */
 INLINE v3 unit_of(v3 a, vf *length)
 {
-    const vf least = v_set(1e-30f);
-    vf squared = dot(a, a), root = v_sqrt(v_max(squared, least)), inverse = v_set(1) / root;
-    *length = v_select(v_ge(squared, least), root, v_set(0));
+    const vf min = v_set(1e-30f);
+    vf squared = dot(a, a), root = v_sqrt(v_max(squared, min)), inverse = v_set(1) / root;
+    *length = v_select(v_ge(squared, min), root, v_set(0));
     return (v3){ a.x * inverse, a.y * inverse, a.z * inverse };
 }
 
@@ -323,7 +322,7 @@ typedef struct footprint {
     vf l11, l21, l22; /* as in trip_cpu_splat */
     vf det_ratio;     /* |S| / |S'|; of affine splats times the stretch squared */
     vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
-    vm usual;                            /* the numbers are good */
+    vm defaults;                         /* the numbers are good */
 } footprint;
 
 /* Constants of a perspective view as floats; rays relative to the image's middle, pixel steps X =
@@ -511,9 +510,9 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
      * times k^2 / |r_c|^2. Where E is positive definite by twice that, |v - eye|^2 also exceeds 4
      * R^2 and R^2 + radius^2 of splat.h, so that no near splat is usual. What is not a number is
      * not usual. */
-    out.usual = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
+    out.defaults = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
     if (p->affine) {
-        out.usual = vm_and(out.usual, exact);
+        out.defaults = vm_and(out.defaults, exact);
         bound_affine(&out, sxx, syy, v_set((float)f->cutoff2) / u);
         if (p->uneven)
             out.det_ratio =
@@ -525,8 +524,8 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
        eyy = v_fnma(t_step, p->YY, sxx * inverse_det);
     vf exy = v_fnma(t_step, p->XY, -sxy * inverse_det);
     if (p->uneven)
-        out.usual =
-            vm_and(vm_and(out.usual, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
+        out.defaults =
+            vm_and(vm_and(out.defaults, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
     bound(&out, exx, exy, eyy, t * rx, t * ry, t * rr * p->inverse_step);
     return out;
 }
@@ -536,24 +535,24 @@ INLINE footprint footprint_flat_parallel(const trip_cpu_view *view, const flatte
 {
     const trip_splat_frame *f = &view->splat;
     const trip_camera *c = &f->camera;
-    double xx = trip_dot(c->to_x, c->to_x), yy = trip_dot(c->to_y, c->to_y), most = fmax(xx, yy);
-    double area = trip_length(trip_cross(c->to_x, c->to_y)) / most, root = 1 / sqrt(most);
+    double xx = trip_dot(c->to_x, c->to_x), yy = trip_dot(c->to_y, c->to_y), max = fmax(xx, yy);
+    double area = trip_length(trip_cross(c->to_x, c->to_y)) / max, root = 1 / sqrt(max);
     v3 gx = in_list_axes(view, trip_scale(c->to_x, root));
     v3 gy = in_list_axes(view, trip_scale(c->to_y, root));
     vf along = dot(in_list_axes(view, trip_normalize(c->r0)), flat->normal);
     /* S, S' and the low-pass over sigma^2 `most`. */
-    spread s = { v_set((float)(xx / most)), v_set((float)(trip_dot(c->to_x, c->to_y) / most)),
-                 v_set((float)(yy / most)), v_set((float)(area * area)) };
-    vf det_s = s.det, low_pass = v_set((float)(f->low_pass2 / (f->sigma * f->sigma * most)));
+    spread s = { v_set((float)(xx / max)), v_set((float)(trip_dot(c->to_x, c->to_y) / max)),
+                 v_set((float)(yy / max)), v_set((float)(area * area)) };
+    vf det_s = s.det, low_pass = v_set((float)(f->low_pass2 / (f->sigma * f->sigma * max)));
     s = flattened(s, flat, gx, gy, along * along, v_set(1));
     vf det = v_fma(low_pass, s.xx + s.yy + low_pass, s.det);
     vf sxx = s.xx + low_pass, syy = s.yy + low_pass;
-    vf unit = v_set((float)(1 / (f->cutoff2 * f->sigma * f->sigma * most)));
+    vf unit = v_set((float)(1 / (f->cutoff2 * f->sigma * f->sigma * max)));
     footprint out = { .det_ratio = det_s / det };
     out.l11 = v_sqrt(unit * (syy / det));
     out.l21 = -(s.xy / syy) * out.l11;
     out.l22 = v_sqrt(unit / syy);
-    bound_affine(&out, sxx, syy, v_set((float)(f->cutoff2 * f->sigma * f->sigma * most)));
+    bound_affine(&out, sxx, syy, v_set((float)(f->cutoff2 * f->sigma * f->sigma * max)));
     return out;
 }
 
@@ -586,12 +585,12 @@ INLINE vf offset(vd_pair a, double eye)
 }
 
 /* From the voxel to a place, world space, not normalised. */
-INLINE v3 towards(const trip_cpu_view *view, const double place[3], const trip_cpu_staged *staged,
-                  uint32_t at)
+INLINE v3 towards(const trip_cpu_view *view, const double position[3],
+                  const trip_cpu_staged *staged, uint32_t at)
 {
-    vf c[3] = { offset(positions(view, view->u_axis, staged->u + at), place[0]),
-                offset(positions(view, view->v_axis, staged->v + at), place[1]),
-                offset(positions(view, view->axis, staged->sheet + at), place[2]) };
+    vf c[3] = { offset(positions(view, view->u_axis, staged->u + at), position[0]),
+                offset(positions(view, view->v_axis, staged->v + at), position[1]),
+                offset(positions(view, view->axis, staged->sheet + at), position[2]) };
     vf w[3];
     for (int i = 0; i < 3; i++)
         w[i] = -v_fma(
@@ -657,24 +656,24 @@ INLINE colour shaded(const surface *s, colour c)
                      v_min(v_set(1), v_fma(c.b, matt, s->gloss)) };
 }
 
-INLINE vf place_along(const trip_cpu_view *view, int axis, const int32_t *voxels)
+INLINE vf position_along(const trip_cpu_view *view, int axis, const int32_t *voxels)
 {
     if (!view->coordinates)
         return v_from_int(vi_load(voxels));
-    const vd_pair places = positions(view, axis, voxels);
-    return v_narrow(places.lo, places.hi);
+    const vd_pair bit_positions = positions(view, axis, voxels);
+    return v_narrow(bit_positions.lo, bit_positions.hi);
 }
 
 /* With effects; `s` of strength 0 where nothing is shaded. */
 INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, v3 light, const surface *s,
                            const trip_cpu_staged *staged, uint32_t at)
 {
-    const vf place[3] = { place_along(view, view->u_axis, staged->u + at),
-                          place_along(view, view->v_axis, staged->v + at),
-                          place_along(view, view->axis, staged->sheet + at) };
+    const vf position[3] = { position_along(view, view->u_axis, staged->u + at),
+                             position_along(view, view->v_axis, staged->v + at),
+                             position_along(view, view->axis, staged->sheet + at) };
     const vf to_light[3] = { light.x, light.y, light.z }, to_eye[3] = { eye.x, eye.y, eye.z };
     vf rgb[3] = { c.r, c.g, c.b };
-    effects_on(&view->effects, place, s, to_light, to_eye, rgb);
+    effects_on(&view->effects, position, s, to_light, to_eye, rgb);
     return (colour){ rgb[0], rgb[1], rgb[2] };
 }
 
@@ -820,7 +819,7 @@ static void replace_scalar(const trip_cpu_view *view, trip_cpu_splat *out, const
         trip_cpu_splat *s = out + row[i] / 16;
         trip_cpu_splat n = splats[i];
         if (has_edge(view, &n))
-            n.c[TRIP_CPU_EDGE] = exp2_biased(v_set(n.c[TRIP_CPU_LEAST]))[0];
+            n.c[TRIP_CPU_EDGE] = exp2_biased(v_set(n.c[TRIP_CPU_MIN]))[0];
         n.r = s->r;
         n.g = s->g;
         n.b = s->b;
@@ -861,9 +860,9 @@ INLINE void thin_terms(vf depth, vf c[TRIP_CPU_TERMS])
 INLINE void long_terms(const trip_cpu_view *view, vf depth, vm which, vf c[TRIP_CPU_TERMS])
 {
     vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
-    vf least = v_fma(log2_of(depth), one, bias) - v_set(view->cutoff);
-    c[TRIP_CPU_LEAST] = v_select(which, least, c[TRIP_CPU_LEAST]);
-    c[TRIP_CPU_EDGE] = v_select(which, exp2_biased(least), c[TRIP_CPU_EDGE]);
+    vf min = v_fma(log2_of(depth), one, bias) - v_set(view->cutoff);
+    c[TRIP_CPU_MIN] = v_select(which, min, c[TRIP_CPU_MIN]);
+    c[TRIP_CPU_EDGE] = v_select(which, exp2_biased(min), c[TRIP_CPU_EDGE]);
 }
 
 /* The lanes that are kept, as splats to be summed. */
@@ -959,7 +958,7 @@ INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
         persp.affine = false;
     }
     for (uint32_t i = 0; i < count; i += V)
-        place(view, staged, i, lanes);
+        position(view, staged, i, lanes);
     for (uint32_t i = 0; i < count; i += V) {
         footprint f = parallel;
         flattening flat;
@@ -970,11 +969,11 @@ INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
         if (!ortho)
             f = footprint_of(&persp, view, lanes, flattens ? &flat : NULL, i);
         else
-            f.usual = v_ge(v_load(lanes->z + i), v_set(view->near));
+            f.defaults = v_ge(v_load(lanes->z + i), v_set(view->near));
         unsigned valid = vm_bits(vm_first(count - i));
         unsigned behind = vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
-        unsigned usual = view->coordinates ? 0 : vm_bits(f.usual);
-        unsigned scalar = valid & ~behind & ~usual;
+        unsigned defaults = view->coordinates ? 0 : vm_bits(f.defaults);
+        unsigned scalar = valid & ~behind & ~defaults;
         vf entry[4];
         v_load_rows(&trip_cpu_rows(view)->r, staged->code + i, entry);
         unsigned kept = complete(view, &f, entry[3], lanes, i) & valid & ~scalar;

@@ -56,7 +56,7 @@ typedef struct pane_path {
     float gradient[3][3]; /* as the view's, of sums of weights 2^WEIGHT_LOG2 */
     /* How far inside each half-space a ray is at the grid's middle, in perspective times the length
      * of `toward`, and by how much that grows over a sheet the pass's way, likewise. */
-    float clip_at[TRIP_CLIP_MOST][3], clip_toward[TRIP_CLIP_MOST][3];
+    float clip_at[TRIP_CLIP_MAX][3], clip_toward[TRIP_CLIP_MAX][3];
     /* Where spacing is uneven positions are places, from the grid's first voxel; else NULL. */
     const trip_coordinates *coordinates;
     int axes[2];       /* u and v */
@@ -116,10 +116,10 @@ static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double 
     b.whole = all;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < 2; a++) {
-            double s = b.slope[i][a], most = view->steepest;
+            double s = b.slope[i][a], max = view->steepest;
             if (!all) /* some rays may go any way */
-                s = (a ? i >> 1 : i & 1) ? most : -most;
-            b.slope[i][a] = s < -most ? -most : s > most ? most : s;
+                s = (a ? i >> 1 : i & 1) ? max : -max;
+            b.slope[i][a] = s < -max ? -max : s > max ? max : s;
             b.whole &= b.slope[i][a] == s;
         }
     return b;
@@ -137,9 +137,9 @@ INLINE void beam_bounds(const beam *b, int a, double along, double bounds[2])
     }
 }
 
-static double within(double a, double least, double most)
+static double within(double a, double min, double max)
 {
-    return a < least ? least : a > most ? most : a;
+    return a < min ? min : a > max ? max : a;
 }
 
 static double greatest_of(const double v[3])
@@ -227,12 +227,12 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
         path->start[a] = b.start[0][a];
     }
     for (unsigned n = 0; n <= g->segments; n++) {
-        double along = from_start(view, g->slices[n].coordinate);
+        double along = from_start(view, g->samples_per_sheet[n].coordinate);
         path->along[n] = (float)along;
-        path->middle[n] = (float)(g->slices[n].coordinate - view->middle);
+        path->middle[n] = (float)(g->samples_per_sheet[n].coordinate - view->middle);
         if (n > 0)
-            path->sheets[n - 1] =
-                (float)fabs(g->slices[n].coordinate - g->slices[n - 1].coordinate);
+            path->sheets[n - 1] = (float)fabs(g->samples_per_sheet[n].coordinate -
+                                              g->samples_per_sheet[n - 1].coordinate);
         for (int a = 0; a < 2; a++) {
             double bounds[2];
             beam_bounds(&b, a, along, bounds);
@@ -290,10 +290,10 @@ INLINE vi vi_greater(vi a, vi b)
 
 #endif
 
-INLINE vi vi_within(vi a, int32_t least, int32_t most)
+INLINE vi vi_within(vi a, int32_t min, int32_t max)
 {
     const vi zero = { 0 };
-    return vi_lesser(vi_greater(a, zero + least), zero + most);
+    return vi_lesser(vi_greater(a, zero + min), zero + max);
 }
 
 /* Rounded down; at most 2^28 from 0. */
@@ -342,21 +342,21 @@ typedef struct cell_boxes {
 
 /* In voxels of the grid, and a cell at most beyond that; the place mostly lies about voxel `near`,
  * which is then the one before it. */
-static double index_near(const pane_path *path, int a, double place, int32_t *near)
+static double index_near(const pane_path *path, int a, double position, int32_t *near)
 {
     const trip_coordinates *c = path->coordinates;
     const int axis = path->axes[a];
     const int32_t last = (int32_t)c->voxels[axis] - 2;
     const double *x = c->along[axis];
     int32_t k = *near;
-    for (int step = 0; step < 4 && k < last && place >= x[k + 1]; step++)
+    for (int step = 0; step < 4 && k < last && position >= x[k + 1]; step++)
         k++;
-    for (int step = 0; step < 4 && k > 0 && place < x[k]; step++)
+    for (int step = 0; step < 4 && k > 0 && position < x[k]; step++)
         k--;
-    if ((k > 0 && place < x[k]) || (k < last && place >= x[k + 1]))
-        k = (int32_t)within(floor(trip_coordinates_index(c, axis, place)), 0, last);
+    if ((k > 0 && position < x[k]) || (k < last && position >= x[k + 1]))
+        k = (int32_t)within(floor(trip_coordinates_index(c, axis, position)), 0, last);
     *near = k;
-    return within(k + (place - x[k]) / (x[k + 1] - x[k]), -1, last + 2) - path->corner[a];
+    return within(k + (position - x[k]) / (x[k + 1] - x[k]), -1, last + 2) - path->corner[a];
 }
 
 static vi uneven_cells(const pane_path *path, int a, unsigned n, vf at)
@@ -423,15 +423,15 @@ INLINE cell_box box_of_segment(const cell_boxes *of, unsigned n)
 }
 
 /* From what rays meet at slices to what they meet of segments, of those from first to last. */
-static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *slices,
+static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *samples_per_sheet,
                                cell_boxes *out)
 {
     for (unsigned n = first / V * V; n <= last; n += V)
         for (int a = 0; a < 2; a++) {
-            vi_store(out->lo[a] + n,
-                     vi_lesser(vi_load(slices->lo[a] + n), vi_load(slices->lo[a] + n + 1)));
-            vi_store(out->hi[a] + n,
-                     vi_greater(vi_load(slices->hi[a] + n), vi_load(slices->hi[a] + n + 1)));
+            vi_store(out->lo[a] + n, vi_lesser(vi_load(samples_per_sheet->lo[a] + n),
+                                               vi_load(samples_per_sheet->lo[a] + n + 1)));
+            vi_store(out->hi[a] + n, vi_greater(vi_load(samples_per_sheet->hi[a] + n),
+                                                vi_load(samples_per_sheet->hi[a] + n + 1)));
         }
 }
 
@@ -514,7 +514,7 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
     if (!whole || u != boxes->hi[0][n] >> log2 || v != boxes->hi[1][n] >> log2 ||
         !is_within(g, u, v))
         return;
-    area->raster[n] = g->slices[n].rasters[v * g->across + u] * RASTER_NUMBERS;
+    area->raster[n] = g->samples_per_sheet[n].rasters[v * g->across + u] * RASTER_NUMBERS;
     area->within[n] =
         (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
@@ -530,13 +530,13 @@ static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group 
                           const pane_path *path, int x, int y, pane_segments *out)
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
-    cell_boxes slices;
+    cell_boxes samples_per_sheet;
     out->some = 0;
-    out->made = g->slices[0].making ? 0 : UINT64_MAX;
-    find_boxes(g, path, &r, 0, g->segments, &slices);
-    if (!some_square_of(g, g->some, both_boxes(&slices, 0, g->segments)))
+    out->made = g->samples_per_sheet[0].making ? 0 : UINT64_MAX;
+    find_boxes(g, path, &r, 0, g->segments, &samples_per_sheet);
+    if (!some_square_of(g, g->some, both_boxes(&samples_per_sheet, 0, g->segments)))
         return;
-    find_segment_boxes(0, g->segments - 1, &slices, &out->boxes);
+    find_segment_boxes(0, g->segments - 1, &samples_per_sheet, &out->boxes);
     for (unsigned n = 0; n < g->segments; n++)
         if (some_square_of(g, g->visible[n], box_of_segment(&out->boxes, n)))
             out->some |= UINT64_C(1) << n;
@@ -548,11 +548,11 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, 8);
     unsigned placed = UINT32_MAX;
-    cell_boxes slices, boxes;
+    cell_boxes samples_per_sheet, boxes;
     const unsigned first = (unsigned)__builtin_ctzll(segments);
     const unsigned last = 63 - (unsigned)__builtin_clzll(segments);
-    find_boxes(g, path, &r, first, last + 1, &slices);
-    find_segment_boxes(first, last, &slices, &boxes);
+    find_boxes(g, path, &r, first, last + 1, &samples_per_sheet);
+    find_segment_boxes(first, last, &samples_per_sheet, &boxes);
     area->segments = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
@@ -561,8 +561,8 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             continue;
         area->segments |= UINT64_C(1) << n;
         if (placed != n)
-            find_raster(g, path, n, r.whole, &slices, area);
-        find_raster(g, path, n + 1, r.whole, &slices, area);
+            find_raster(g, path, n, r.whole, &samples_per_sheet, area);
+        find_raster(g, path, n + 1, r.whole, &samples_per_sheet, area);
         placed = n + 1;
     }
 }
@@ -623,8 +623,8 @@ static corners uneven_corners(const pane_path *path, unsigned n, corners at, int
         vi_store(whole, at.whole[a]);
         v_store(part, at.part[a]);
         for (int i = 0; i < V; i++) {
-            double place = (double)(base + whole[i]) + (double)part[i];
-            double index = index_near(path, a, place, &near[a]);
+            double position = (double)(base + whole[i]) + (double)part[i];
+            double index = index_near(path, a, position, &near[a]);
             double cell = floor(index);
             whole[i] = (int32_t)cell - base;
             part[i] = (float)(index - cell);
@@ -643,25 +643,25 @@ INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
 
 /* With kernels of 64 voxels: the cells that rays are in, voxels of the grid of rasters, and the
  * places in them along u, v and the sheets. */
-typedef struct wide_place {
+typedef struct wide_position {
     const trip_cpu_about *about;
     int32_t cell[2][V];
     float part[2][V], between;
-} wide_place;
+} wide_position;
 
 /* What rays meet at a slice: the entry of the function's integrals nearest to the code (where
  * segments have a closed form the code itself, biased, times 2^WEIGHT_LOG2), and what the rest is
  * worked out from where it is needed. */
 typedef struct sample {
     vi index;
-    vm there;         /* all corners are */
-    vi top, bottom;   /* weights of two corners, the right one's in the higher 16 bits */
-    vi gradient_at;   /* of the first corner, as 16-bit numbers from the pool's first */
-    vi gradient[3];   /* times 2^WEIGHT_LOG2 */
-    vi sums[4];       /* of the integrals, at the entry */
-    bool lit, summed; /* gradient is there; sums are */
-    int32_t near[2];  /* with uneven spacing: voxels that rays were near to, at any slice */
-    wide_place *wide; /* with kernels of 64 voxels: where that is */
+    vm there;            /* all corners are */
+    vi top, bottom;      /* weights of two corners, the right one's in the higher 16 bits */
+    vi gradient_at;      /* of the first corner, as 16-bit numbers from the pool's first */
+    vi gradient[3];      /* times 2^WEIGHT_LOG2 */
+    vi sums[4];          /* of the integrals, at the entry */
+    bool lit, summed;    /* gradient is there; sums are */
+    int32_t near[2];     /* with uneven spacing: voxels that rays were near to, at any slice */
+    wide_position *wide; /* with kernels of 64 voxels: where that is */
 } sample;
 
 /* Bilinear weights, 2^WEIGHT_LOG2 in all. */
@@ -694,7 +694,7 @@ INLINE void find_cells(const trip_cpu_group *g, const pane_path *path, unsigned 
 }
 
 /* Where cells lie in their rasters, and where these begin in the pool: 16-bit numbers. */
-INLINE vi place_in_raster(const vi whole[2])
+INLINE vi position_in_raster(const vi whole[2])
 {
     return (whole[1] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
            (whole[0] & (TRIP_CPU_RASTER - 1));
@@ -712,8 +712,8 @@ INLINE vi raster_starts(const trip_cpu_group *g, const int32_t *rasters, const v
 
 /* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
  * their gradients. With uneven spacing weights are set anew. */
-INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
-                      unsigned n, const corners *c, sample *s)
+INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
+                         unsigned n, const corners *c, sample *s)
 {
     if (area->raster[n] >= 0) {
         vi in = c->whole[1] * TRIP_CPU_RASTER_STRIDE + c->whole[0] + area->within[n];
@@ -728,7 +728,8 @@ INLINE vi find_places(const trip_cpu_group *g, const pane_path *path, const patc
     } else {
         find_cells(g, path, n, c, whole);
     }
-    vi in = place_in_raster(whole), from = raster_starts(g, g->slices[n].rasters, whole);
+    vi in = position_in_raster(whole),
+       from = raster_starts(g, g->samples_per_sheet[n].rasters, whole);
     s->gradient_at = from + (in * 3 + GRADIENTS_FROM);
     return from + in;
 }
@@ -750,7 +751,7 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 {
     corners c = corners_at(path, l, n);
     set_weights(c.part, s);
-    find_codes(g, in, find_places(g, path, area, n, &c, s), s);
+    find_codes(g, in, find_positions(g, path, area, n, &c, s), s);
     s->lit = s->summed = false;
 }
 
@@ -839,7 +840,7 @@ INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sa
         s.rgb[i] = f->coloured ? v_fma(at, v_set(f->q1[i]), v_set(f->q0[i])) : v_set(f->q0[i]);
     if (!f->ramp)
         return s;
-    s.extinction = v_select(v_gt(v_max(from, to), v_set(f->least)), k, none);
+    s.extinction = v_select(v_gt(v_max(from, to), v_set(f->min)), k, none);
     const vm cut = vm_and(open, v_gt(none, v_min(from, to)));
     if (vm_any(cut)) {
         const vf whole = v_select(v_gt(v_abs(to - from), none), to - from, v_set(1));
@@ -966,8 +967,8 @@ INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
 }
 
 /* Where the rays of slice n are `further` along: voxels of the list, or places. */
-INLINE void places_at(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
-                      unsigned n, vf further, vf at[3])
+INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
+                         unsigned n, vf further, vf at[3])
 {
     const int64_t origin[2] = { is_uneven(path) ? 0 : g->first_u,
                                 is_uneven(path) ? 0 : g->first_v };
@@ -977,7 +978,7 @@ INLINE void places_at(const trip_cpu_group *g, const pane_path *path, const stam
         at[a] = v_fma(l->slope[a], v_set(path->along[n]), v_set(first) + l->shift[a]);
         at[a] = v_fma(slope, further, at[a]);
     }
-    at[2] = v_set((float)g->slices[n].coordinate) + further;
+    at[2] = v_set((float)g->samples_per_sheet[n].coordinate) + further;
 }
 
 /* Puts a segment behind what the pixels hold; false where it shows in none of them. */
@@ -1013,14 +1014,14 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     if (!vm_any(open))
         return false;
     surface lit = { .strength = v_set(0), .gloss = v_set(0) };
-    light_way of_place;
+    light_way of_position;
     const light_way *way = &l->way;
     vf at[3];
     if (TRIP_CPU_EFFECTS || view->point_light)
-        places_at(g, path, l, n, middle - v_set(path->along[n]), at);
+        positions_at(g, path, l, n, middle - v_set(path->along[n]), at);
     if (view->point_light) {
-        find_way(view, at, l->to_eye, &of_place);
-        way = &of_place;
+        find_way(view, at, l->to_eye, &of_position);
+        way = &of_position;
     }
     if (view->shading) {
         find_light(view, g, a);
@@ -1047,7 +1048,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
 /* A pixel of which this is left is saturated: it takes no more, and its colour counts for all. */
 INLINE void finish_saturated(const trip_cpu_sheet_view *view, vf pixel[CHANNELS])
 {
-    vm saturated = vm_and(v_gt(v_set(view->saturation), pixel[3]), v_gt(pixel[3], v_set(0)));
+    vm saturated = vm_and(v_gt(v_set(view->early_termination), pixel[3]), v_gt(pixel[3], v_set(0)));
     if (!vm_any(saturated))
         return;
     vf whole = v_set(1) / (v_set(1) - pixel[3]);
@@ -1095,7 +1096,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
                       stamp_rays *l)
 {
     const vf x = stamp_x(number), y = stamp_y(number), none = v_set(0);
-    const vf most = v_set((float)view->steepest * (1 + 1e-6f));
+    const vf max = v_set((float)view->steepest * (1 + 1e-6f));
     vf toward = form_of(path->toward, x, y);
     l->along = v_gt(toward * v_set((float)view->direction), none);
     toward = v_select(l->along, toward, v_set((float)view->direction));
@@ -1106,7 +1107,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
         l->slope[a] = (view->ortho ? first : first + beside) * inverse;
         l->shift[a] = view->ortho ? beside : none;
         vf slope = l->slope[a] + v_set((float)path->slope[a]);
-        l->along = vm_and(l->along, v_ge(most, v_abs(slope)));
+        l->along = vm_and(l->along, v_ge(max, v_abs(slope)));
     }
     for (int k = 0; k < 3; k++)
         l->to_eye[k] = none - form_of(path->world[k], x, y);
@@ -1143,14 +1144,14 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     uint64_t segments = area->segments;
     vf pixel[CHANNELS];
     sample ends[2];
-    wide_place places[2];
+    wide_position positions[2];
     unsigned sampled = UINT32_MAX; /* slice, in ends[sampled % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
     for (int i = 0; i < 4 && is_uneven(path); i++)
         ends[i / 2].near[i % 2] = 0;
     for (int i = 0; i < 2 && is_wide(g); i++)
-        ends[i].wide = &places[i];
+        ends[i].wide = &positions[i];
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
         if (!(passed->made >> n & 1)) {
@@ -1186,27 +1187,27 @@ INLINE bool stamp_is_open(const float *stamp)
 enum { PATCH_STAMPS = 2 * 8 / STAMP_ROWS };
 
 /* Of the pane's stamps, one of a patch. */
-INLINE unsigned patch_stamp(unsigned place, unsigned i)
+INLINE unsigned patch_stamp(unsigned position, unsigned i)
 {
-    return (place / 4 * (8 / STAMP_ROWS) + i / 2) * STAMPS_ACROSS + place % 4 * 2 + i % 2;
+    return (position / 4 * (8 / STAMP_ROWS) + i / 2) * STAMPS_ACROSS + position % 4 * 2 + i % 2;
 }
 
 static void draw_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                       const pane_path *path, pane_segments *passed, int x, int y, unsigned place,
-                       float *pixels)
+                       const pane_path *path, pane_segments *passed, int x, int y,
+                       unsigned position, float *pixels)
 {
     bool open = false;
     for (unsigned i = 0; i < PATCH_STAMPS; i++)
-        open |= stamp_is_open(pixels + STAMP_FLOATS * patch_stamp(place, i));
+        open |= stamp_is_open(pixels + STAMP_FLOATS * patch_stamp(position, i));
     if (!open)
         return;
     patch_path area;
-    find_patch(view, g, path, passed->some, x + (int)(place % 4) * 8, y + (int)(place / 4) * 8,
-               &area);
+    find_patch(view, g, path, passed->some, x + (int)(position % 4) * 8,
+               y + (int)(position / 4) * 8, &area);
     if (!area.segments)
         return;
     for (unsigned i = 0; i < PATCH_STAMPS; i++) {
-        unsigned number = patch_stamp(place, i);
+        unsigned number = patch_stamp(position, i);
         float *stamp = pixels + STAMP_FLOATS * number;
         if (!stamp_is_open(stamp))
             continue;
@@ -1227,8 +1228,8 @@ static uint64_t sheet_pane(const trip_cpu_sheet_view *view, const trip_cpu_group
     find_path(view, g, x, y, &path);
     pane_segments passed;
     find_segments(view, g, &path, x, y, &passed);
-    for (unsigned place = 0; place < TRIP_CPU_PANE_PIXELS / 64 && passed.some; place++)
-        draw_patch(view, g, &path, &passed, x, y, place, pixels);
+    for (unsigned position = 0; position < TRIP_CPU_PANE_PIXELS / 64 && passed.some; position++)
+        draw_patch(view, g, &path, &passed, x, y, position, pixels);
     for (unsigned i = 0; i < STAMPS; i++)
         if (stamp_is_open(pixels + STAMP_FLOATS * i))
             open |= UINT64_C(1) << (i / STAMPS_ACROSS * STAMP_ROWS / 4 * 8 + i % STAMPS_ACROSS);

@@ -141,10 +141,9 @@ INLINE int4 int4_widened(uint64_t four)
     return (int4)_mm_cvtepu16_epi32(_mm_cvtsi64_si128((int64_t)four));
 }
 
-INLINE int4 int4_within(int4 a, int32_t least, int32_t most)
+INLINE int4 int4_within(int4 a, int32_t min, int32_t max)
 {
-    return (int4)_mm_min_epi32(_mm_max_epi32((__m128i)a, _mm_set1_epi32(least)),
-                               _mm_set1_epi32(most));
+    return (int4)_mm_min_epi32(_mm_max_epi32((__m128i)a, _mm_set1_epi32(min)), _mm_set1_epi32(max));
 }
 
 #else
@@ -154,10 +153,10 @@ INLINE int4 int4_widened(uint64_t four)
     return (int4){ four & 0xffff, four >> 16 & 0xffff, four >> 32 & 0xffff, four >> 48 };
 }
 
-INLINE int4 int4_within(int4 a, int32_t least, int32_t most)
+INLINE int4 int4_within(int4 a, int32_t min, int32_t max)
 {
-    int4 low = a<least, high = a> most;
-    return (least & low) | (most & high) | (a & ~low & ~high);
+    int4 low = a<min, high = a> max;
+    return (min & low) | (max & high) | (a & ~low & ~high);
 }
 
 #endif
@@ -356,10 +355,10 @@ INLINE uint32_t v_pack_bytes(uint8_t *out, uint64_t bits, v_bytes from)
 /* The places of a word's bits, from `first` on, likewise. */
 INLINE uint32_t v_pack_bits(uint8_t *out, uint64_t bits, unsigned first)
 {
-    v_bytes place;
+    v_bytes position;
     for (int i = 0; i < 64; i++)
-        place[i] = (uint8_t)i;
-    return v_pack_bytes(out, bits, place + (uint8_t)first);
+        position[i] = (uint8_t)i;
+    return v_pack_bytes(out, bits, position + (uint8_t)first);
 }
 #endif
 
@@ -823,24 +822,24 @@ INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 #endif
 
 /* Of 64 bytes, a bit each: whether they lie from `least` to `most`, which is no less. */
-INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t least, uint8_t most)
+INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t min, uint8_t max)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX512
-    __m512i above = _mm512_sub_epi8(_mm512_loadu_si512(from), _mm512_set1_epi8((char)least));
-    return _mm512_cmple_epu8_mask(above, _mm512_set1_epi8((char)(most - least)));
+    __m512i above = _mm512_sub_epi8(_mm512_loadu_si512(from), _mm512_set1_epi8((char)min));
+    return _mm512_cmple_epu8_mask(above, _mm512_set1_epi8((char)(max - min)));
 #elif TRIP_SIMD == TRIP_SIMD_AVX2
     uint64_t bits = 0;
     for (int i = 0; i < 2; i++) {
         __m256i a = _mm256_loadu_si256((const void *)(from + 32 * i));
-        __m256i limited = _mm256_min_epu8(_mm256_max_epu8(a, _mm256_set1_epi8((char)least)),
-                                          _mm256_set1_epi8((char)most));
+        __m256i limited = _mm256_min_epu8(_mm256_max_epu8(a, _mm256_set1_epi8((char)min)),
+                                          _mm256_set1_epi8((char)max));
         bits |= (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(a, limited)) << 32 * i;
     }
     return bits;
 #else
     uint64_t bits = 0;
     for (int i = 0; i < 64; i++)
-        bits |= (uint64_t)(from[i] >= least && from[i] <= most) << i;
+        bits |= (uint64_t)(from[i] >= min && from[i] <= max) << i;
     return bits;
 #endif
 }
@@ -912,7 +911,7 @@ static const bits_of_width bits_of_widths[9] = { BITS_OF(0),  BITS_OF(2),  BITS_
 INLINE vi vi_load_bits(const unsigned char *from, uint32_t width)
 {
     const bits_of_width *of = &bits_of_widths[width / 2];
-    const vi most = vi_set((1 << width) - 1);
+    const vi max = vi_set((1 << width) - 1);
 #if TRIP_SIMD == TRIP_SIMD_AVX512
     const uint32_t four = width / 2;
     __m512i bits = _mm512_castsi128_si512(_mm_loadu_si128((const void *)from));
@@ -923,7 +922,7 @@ INLINE vi vi_load_bits(const unsigned char *from, uint32_t width)
         _mm512_shuffle_epi8(bits, _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)of->bytes)));
     return (vi)_mm512_srlv_epi32(
                bits, _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)of->before))) &
-           most;
+           max;
 #elif TRIP_SIMD == TRIP_SIMD_AVX2
     __m256i bits = _mm256_castsi128_si256(_mm_loadu_si128((const void *)from));
     bits = _mm256_inserti128_si256(bits, _mm_loadu_si128((const void *)(from + width / 2)), 1);
@@ -931,7 +930,7 @@ INLINE vi vi_load_bits(const unsigned char *from, uint32_t width)
         bits, _mm256_broadcastsi128_si256(_mm_loadu_si128((const void *)of->bytes)));
     return (vi)_mm256_srlv_epi32(
                bits, _mm256_broadcastsi128_si256(_mm_loadu_si128((const void *)of->before))) &
-           most;
+           max;
 #else
     vi a;
     for (int i = 0; i < V; i++) {
@@ -939,7 +938,7 @@ INLINE vi vi_load_bits(const unsigned char *from, uint32_t width)
         memcpy(&word, from + of->bytes[4 * i], sizeof word);
         a[i] = word >> of->before[i];
     }
-    return a & most;
+    return a & max;
 #endif
 }
 

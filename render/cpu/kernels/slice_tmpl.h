@@ -66,8 +66,8 @@ INLINE vh vh_max(vh a, vh b)
 /* (a - b) / 2, rounded down: the mean, rounded up, of a and -1 - b as the instruction has them. */
 INLINE vh vh_half_difference(vh a, vh b)
 {
-    const vh least = vh_set(INT16_MIN);
-    return (vh)_mm_avg_epu16((__m128i)(a ^ least), (__m128i)(b ^ ~least)) ^ least;
+    const vh min = vh_set(INT16_MIN);
+    return (vh)_mm_avg_epu16((__m128i)(a ^ min), (__m128i)(b ^ ~min)) ^ min;
 }
 
 /* A bit for each number that is set. */
@@ -85,7 +85,7 @@ INLINE vh vh_between(vh a, vh b, int32_t weights)
     return (vh)_mm_packs_epi32(_mm_srai_epi32(low, 14), _mm_srai_epi32(high, 14));
 }
 
-INLINE int16_t vh_least(vh a)
+INLINE int16_t vh_lowest(vh a)
 {
     __m128i m = _mm_minpos_epu16(_mm_xor_si128((__m128i)a, _mm_set1_epi16(INT16_MIN)));
     return (int16_t)(_mm_cvtsi128_si32(m) ^ INT16_MIN);
@@ -147,12 +147,12 @@ INLINE vh vh_between(vh a, vh b, int32_t weights)
     return a;
 }
 
-INLINE int16_t vh_least(vh a)
+INLINE int16_t vh_lowest(vh a)
 {
-    int16_t least = a[0];
+    int16_t min = a[0];
     for (int i = 1; i < 8; i++)
-        least = a[i] < least ? a[i] : least;
-    return least;
+        min = a[i] < min ? a[i] : min;
+    return min;
 }
 
 INLINE void vh_store_3(int16_t *p, vh a, vh b, vh c)
@@ -176,13 +176,13 @@ INLINE int square_first(int square)
 }
 
 /* The least code that is there of a square some of which is missing; INT16_MAX: none is. */
-static int16_t least_there(const int16_t *at)
+static int16_t min_there(const int16_t *at)
 {
     /* A missing code is the least, and less 1 it is the greatest. */
-    vh least = vh_set(INT16_MAX);
+    vh min = vh_set(INT16_MAX);
     for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE)
-        least = vh_min(least, vh_min(vh_less_1(vh_load(at)), vh_less_1(vh_load(at + 1))));
-    int low = vh_least(least);
+        min = vh_min(min, vh_min(vh_less_1(vh_load(at)), vh_less_1(vh_load(at + 1))));
+    int low = vh_lowest(min);
     return (int16_t)(low == INT16_MAX ? low : low + 1);
 }
 
@@ -190,28 +190,28 @@ static void sheet_ranges(const trip_cpu_voxels *raster, uint64_t squares,
                          trip_cpu_square_ranges *out)
 {
     for (int i = 0; i < 64; i++) {
-        out->least[i] = INT16_MAX;
-        out->most[i] = INT16_MIN;
+        out->min[i] = INT16_MAX;
+        out->max[i] = INT16_MIN;
     }
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         const int square = __builtin_ctzll(rest);
         const int16_t *first = raster->codes + square_first(square), *at = first;
-        vh least = vh_set(INT16_MAX), most = vh_set(INT16_MIN);
+        vh min = vh_set(INT16_MAX), max = vh_set(INT16_MIN);
         for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE) {
             vh a = vh_load(at), b = vh_load(at + 1);
-            most = vh_max(most, vh_max(a, b));
-            least = vh_min(least, vh_min(a, b));
+            max = vh_max(max, vh_max(a, b));
+            min = vh_min(min, vh_min(a, b));
         }
-        out->least[square] = vh_least(least);
-        out->most[square] = (int16_t)~vh_least(~most);
-        if (out->least[square] == TRIP_CPU_CODE_MISSING)
-            out->least[square] = least_there(first);
+        out->min[square] = vh_lowest(min);
+        out->max[square] = (int16_t)~vh_lowest(~max);
+        if (out->min[square] == TRIP_CPU_CODE_MISSING)
+            out->min[square] = min_there(first);
     }
 }
 
 /* The least and greatest of two voxels beside each other at two sheets. */
 typedef struct extremes {
-    vh least, most;
+    vh min, max;
 } extremes;
 
 INLINE extremes extremes_at(const int16_t *from, const int16_t *to)
@@ -222,28 +222,28 @@ INLINE extremes extremes_at(const int16_t *from, const int16_t *to)
 
 /* The least code that is there of each of a row of cells, and which of these have all four corners
  * at neither sheet. */
-static __attribute__((noinline)) vh least_of_faces(const int16_t *from, const int16_t *to, vh *lack)
+static __attribute__((noinline)) vh min_of_faces(const int16_t *from, const int16_t *to, vh *lack)
 {
-    vh least = vh_set(INT16_MAX), faces = vh_set(0);
+    vh min = vh_set(INT16_MAX), faces = vh_set(0);
     for (int sheet = 0; sheet < 2; sheet++) {
         const int16_t *at = sheet ? to : from;
         vh face = vh_set(INT16_MIN);
         for (int n = 0; n < 4; n++) {
             /* A missing code is the least, and less 1 it is the greatest. */
             vh code = vh_less_1(vh_load(at + n / 2 * TRIP_CPU_RASTER_STRIDE + n % 2));
-            least = vh_min(least, code);
+            min = vh_min(min, code);
             face = vh_max(face, code);
         }
         faces |= (vh)(face != INT16_MAX);
     }
     *lack = ~faces;
-    return (vh)((vhu)least + 1);
+    return (vh)((vhu)min + 1);
 }
 
 static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
-                        int16_t least, int16_t most, trip_cpu_cells *out)
+                        int16_t min, int16_t max, trip_cpu_cells *out)
 {
-    const vh lowest = vh_set(least), highest = vh_set(most);
+    const vh lowest = vh_set(min), highest = vh_set(max);
     *out = (trip_cpu_cells){ .rows = { 0 } };
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         int square = __builtin_ctzll(rest), at = square_first(square);
@@ -253,11 +253,11 @@ static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, 
         for (int v = 0; v < 8; v++) {
             at += TRIP_CPU_RASTER_STRIDE;
             extremes below = extremes_at(from->codes + at, to->codes + at);
-            vh low = vh_min(above.least, below.least), high = vh_max(above.most, below.most);
+            vh low = vh_min(above.min, below.min), high = vh_max(above.max, below.max);
             vh lack = vh_is_missing(low), below_all = (vh)(lowest > high);
             if (vh_bits(lack & ~below_all))
-                low = least_of_faces(from->codes + at - TRIP_CPU_RASTER_STRIDE,
-                                     to->codes + at - TRIP_CPU_RASTER_STRIDE, &lack);
+                low = min_of_faces(from->codes + at - TRIP_CPU_RASTER_STRIDE,
+                                   to->codes + at - TRIP_CPU_RASTER_STRIDE, &lack);
             vh out_of = (vh)(low > highest) | below_all | lack;
             row[v] |= (uint64_t)(~vh_bits(out_of) & 0xff) << u;
             above = below;
@@ -277,10 +277,10 @@ INLINE bool all_are_missing(vh codes)
 
 INLINE bool some_is_missing(const neighbours *n)
 {
-    vh least = vh_min(n->before[0], n->behind[0]);
+    vh min = vh_min(n->before[0], n->behind[0]);
     for (int a = 1; a < 3; a++)
-        least = vh_min(least, vh_min(n->before[a], n->behind[a]));
-    return vh_bits(vh_is_missing(least)) != 0;
+        min = vh_min(min, vh_min(n->before[a], n->behind[a]));
+    return vh_bits(vh_is_missing(min)) != 0;
 }
 
 /* Half of central differences; where a neighbour is missing, of the difference to the other. */

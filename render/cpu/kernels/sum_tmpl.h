@@ -46,7 +46,7 @@ INLINE void put_sheet_behind(const trip_cpu_view *view, float *pixels, const pat
                              trip_target target)
 {
     vf t = v_load(pixels + 3 * V), w = t * mean_transmittance(sum->t);
-    w = v_select(v_ge(t, v_set(view->saturation)), w, v_set(0));
+    w = v_select(v_ge(t, v_set(view->early_termination)), w, v_set(0));
     add_behind(pixels, w, sum->r, target);
     add_behind(pixels + V, w, sum->g, target);
     add_behind(pixels + 2 * V, w, sum->b, target);
@@ -164,7 +164,7 @@ INLINE bool sum_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays kind)
     uint64_t before = sheet_of_stamp(s->sums, number);
     touching t = { .local = s->local, .depths = s->local_depths };
     for (unsigned word = 0; word < (s->splats + 63) / 64; word++)
-        t.splats[word] = s->touched[number / 64][word][place_of(number % 64)];
+        t.splats[word] = s->touched[number / 64][word][position_of(number % 64)];
     p.number = number;
     p.sheet = (int32_t)before;
     if (before >> 32 != s->view->list->level && before != TRIP_CPU_NO_SHEET)

@@ -18,8 +18,8 @@
 #include "cpu/kernels/sum_tmpl.h"
 
 /* Defines the table `name` of the instruction set called `isa`, or with depth the one that `name`
- * names for layers with depth; with TRIP_CPU_CLOSED or TRIP_CPU_EFFECTS what either has for segments
- * in closed form or for frames with effects. */
+ * names for layers with depth; with TRIP_CPU_CLOSED or TRIP_CPU_EFFECTS what either has for
+ * segments in closed form or for frames with effects. */
 #if TRIP_CPU_DEPTH
 #define TRIP_CPU_TABLE(name, isa_name) DEFINE(name##_depth, isa_name, NULL)
 #else

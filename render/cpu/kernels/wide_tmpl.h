@@ -34,8 +34,8 @@ INLINE bool take_tap(const trip_cpu_group *g, const int32_t *rasters, tap_line u
 
 /* Those of one ray: u fastest, then v, then the sheets. False where the cell is empty or beyond the
  * grid. Outermost rasters have no voxels. */
-static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g, const wide_place *p,
-                      int lane, tap taps[64])
+static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                      const wide_position *p, int lane, tap taps[64])
 {
     const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
     const int64_t origin[2] = { g->first_u, g->first_v };
@@ -66,7 +66,7 @@ static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
     return true;
 }
 
-static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_place *p, int lane,
+static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_position *p, int lane,
                              float weights[64])
 {
     double w[3][TRIP_KERNEL_TAPS];
@@ -79,7 +79,7 @@ static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_place *
 
 /* Of one ray: by differences from a corner of its cell, so that one value all around is the value
  * there to the last bit, however weights are rounded. */
-static double interpolated_code(const trip_cpu_sheet_view *view, const wide_place *p, int lane,
+static double interpolated_code(const trip_cpu_sheet_view *view, const wide_position *p, int lane,
                                 const tap taps[64])
 {
     enum { CORNER = 1 + 4 + 16 };
@@ -92,16 +92,16 @@ static double interpolated_code(const trip_cpu_sheet_view *view, const wide_plac
 }
 
 /* Where the rays of slice n are, in cells of a segment. The grid's last voxels are within it. */
-INLINE void find_wide_places(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                             const pane_path *path, const stamp_rays *l, unsigned n,
-                             unsigned segment, wide_place *p)
+INLINE void find_wide_positions(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                                const pane_path *path, const stamp_rays *l, unsigned n,
+                                unsigned segment, wide_position *p)
 {
     const corners c = corners_at(path, l, n);
     const int64_t origin[2] = { g->first_u, g->first_v };
     vi whole[2];
     find_cells(g, path, n, &c, whole);
     p->about = &g->about[segment];
-    p->between = (float)(g->slices[n].coordinate - (double)p->about->number);
+    p->between = (float)(g->samples_per_sheet[n].coordinate - (double)p->about->number);
     for (int a = 0; a < 2; a++) {
         vi_store(p->cell[a], whole[a]);
         v_store(p->part[a], c.part[a]);
@@ -119,13 +119,13 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
                            sample *s)
 {
     vi code = { 0 }, lack = { 0 };
-    find_wide_places(view, g, path, l, n, segment, s->wide);
+    find_wide_positions(view, g, path, l, n, segment, s->wide);
     for (int i = 0; i < V; i++) {
         tap taps[64];
         lack[i] = !take_taps(view, g, s->wide, i, taps);
         if (!lack[i])
-            code[i] = (int32_t)(within(interpolated_code(view, s->wide, i, taps),
-                                       TRIP_CPU_CODE_LEAST, INT16_MAX) *
+            code[i] = (int32_t)(within(interpolated_code(view, s->wide, i, taps), TRIP_CPU_CODE_MIN,
+                                       INT16_MAX) *
                                 (1 << WEIGHT_LOG2));
     }
     s->there = vi_is_0(lack);

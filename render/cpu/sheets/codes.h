@@ -13,7 +13,7 @@ typedef struct trip_cpu_codes {
 } trip_cpu_codes;
 
 /* Of frames whose values have codes between these; least > most: they have none. */
-trip_cpu_codes trip_cpu_codes_of(unsigned least, unsigned most);
+trip_cpu_codes trip_cpu_codes_of(unsigned min, unsigned max);
 
 static inline uint16_t trip_cpu_code(trip_cpu_codes c, uint16_t code)
 {

@@ -5,36 +5,36 @@
 
 #include "segments.h"
 
-enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MOST, LOG2_MOST = 2 };
+enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MAX, LOG2_MAX = 2 };
 
 /* The greatest of the integrals, so that differences fit 32 bits with a sign. */
 #define GREATEST 0x1p30
 
-uint64_t trip_cpu_function_bytes(void)
+uint64_t trip_cpu_tf_bytes(void)
 {
     return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t);
 }
 
-bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget)
+bool trip_cpu_tf_create(trip_cpu_tf *f, trip_budget *budget)
 {
     trip_cpu_integrals *in = &f->integrals;
-    *f = (trip_cpu_function){ 0 };
+    *f = (trip_cpu_tf){ 0 };
     in->sums = trip_budget_take(budget, ENTRIES * sizeof *in->sums);
     in->at = trip_budget_take(budget, ENTRIES * sizeof *in->at);
     f->next_visible = trip_budget_take(budget, CODES * sizeof *f->next_visible);
     if (in->sums && in->at && f->next_visible)
         return true;
-    trip_cpu_function_destroy(f, budget);
+    trip_cpu_tf_destroy(f, budget);
     return false;
 }
 
-void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget)
+void trip_cpu_tf_destroy(trip_cpu_tf *f, trip_budget *budget)
 {
     trip_cpu_integrals *in = &f->integrals;
     trip_budget_release(budget, in->sums, ENTRIES * sizeof *in->sums);
     trip_budget_release(budget, in->at, ENTRIES * sizeof *in->at);
     trip_budget_release(budget, f->next_visible, CODES * sizeof *f->next_visible);
-    *f = (trip_cpu_function){ 0 };
+    *f = (trip_cpu_tf){ 0 };
 }
 
 static trip_tf_entry between(const trip_tf_entry *a, const trip_tf_entry *b, float part)
@@ -89,20 +89,20 @@ static void widen_visible(uint32_t *next, uint32_t entry_codes)
     }
 }
 
-static void set_next_visible(trip_cpu_function *f, const trip_tf_entry *table)
+static void set_next_visible(trip_cpu_tf *f, const trip_tf_entry *table)
 {
     const int log2 = f->integrals.entry_log2;
     uint32_t next = CODES;
-    int32_t most = -1;
+    int32_t max = -1;
     for (int code = CODES - 1; code >= 0; code--) {
         if (entry_at(table, f->codes, code).extinction > 0) {
             next = (uint32_t)code;
-            most = most < 0 ? code : most;
+            max = max < 0 ? code : max;
         }
         f->next_visible[code] = next;
     }
     f->integrals.first = (int32_t)(next >> log2);
-    f->integrals.last = most < 0 ? -1 : (most + (1 << log2) - 1) >> log2;
+    f->integrals.last = max < 0 ? -1 : (max + (1 << log2) - 1) >> log2;
     widen_visible(f->next_visible, 1u << log2);
     const uint32_t first = f->next_visible[0];
     uint32_t last = first;
@@ -133,7 +133,7 @@ static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes)
 /* Whether two media are much alike, in what a voxel's length of them adds to a picture. */
 static bool are_alike(const trip_tf_entry *a, const trip_tf_entry *b, double voxel_world)
 {
-    double colour = 0, most = 0;
+    double colour = 0, max = 0;
     for (int i = 0; i < 3; i++)
         colour = fmax(colour, fabs(component(a, i) - component(b, i)));
     if (voxel_world * fabs((double)a->extinction - b->extinction) + colour <= ENTRY_TOLERANCE)
@@ -141,20 +141,20 @@ static bool are_alike(const trip_tf_entry *a, const trip_tf_entry *b, double vox
     const double of_a = -expm1(-voxel_world * a->extinction);
     const double of_b = -expm1(-voxel_world * b->extinction);
     for (int i = 0; i < 3; i++)
-        most = fmax(most, fabs(of_a * component(a, i) - of_b * component(b, i)));
-    return fmax(most, fabs(of_a - of_b)) <= ENTRY_TOLERANCE;
+        max = fmax(max, fabs(of_a * component(a, i) - of_b * component(b, i)));
+    return fmax(max, fabs(of_a - of_b)) <= ENTRY_TOLERANCE;
 }
 
 /* Whether entries so far apart stand for the codes that are nearest to them. */
 static bool suffices(const trip_tf_entry *table, trip_cpu_codes codes, int log2, double voxel_world)
 {
-    const int step = 1 << log2, most = CODES - 1;
+    const int step = 1 << log2, max = CODES - 1;
     if (log2 == 0 || codes.shift >= 8)
         return true;
     for (int code = 0; code < CODES; code++) {
         const int nearest = (code + step / 2) >> log2 << log2;
         const trip_tf_entry is = entry_at(table, codes, code);
-        const trip_tf_entry taken = entry_at(table, codes, nearest < most ? nearest : most);
+        const trip_tf_entry taken = entry_at(table, codes, nearest < max ? nearest : max);
         if (!are_alike(&is, &taken, voxel_world))
             return false;
     }
@@ -193,12 +193,12 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
     }
 }
 
-static void set_integrals(trip_cpu_function *f, const trip_tf_entry *table)
+static void set_integrals(trip_cpu_tf *f, const trip_tf_entry *table)
 {
     const double all = whole_integral(table, f->codes);
     /* A function of one code alone still has what at[] is in units of. */
     const double factor = all > 0 ? GREATEST / all : 1;
-    f->integrals.entry_log2 = LOG2_MOST;
+    f->integrals.entry_log2 = LOG2_MAX;
     while (!suffices(table, f->codes, f->integrals.entry_log2, f->voxel_world))
         f->integrals.entry_log2--;
     set_sums(&f->integrals, table, f->codes, factor);
@@ -215,8 +215,8 @@ static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cp
     f.scale = (float)(scale / TRIP_CPU_CODE_PARTS);
     f.offset = (float)(form->offset + form->scale * codes.first + scale * TRIP_CPU_CODE_BIAS);
     /* Code 0 is taken for 1, where a ramp has begun: by half a code more, for what floats round. */
-    f.least = (float)fmax(
-        0, form->scale > 0 ? form->offset + form->scale * codes.first + 1.5 * scale : 0);
+    f.min = (float)fmax(0, form->scale > 0 ? form->offset + form->scale * codes.first + 1.5 * scale
+                                           : 0);
     for (int i = 0; i < 4; i++)
         f.k[i] = (float)(form->k[i] * voxel_world);
     for (int i = 0; i < 3; i++) {
@@ -226,7 +226,7 @@ static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cp
     return f;
 }
 
-static bool is_of(const trip_cpu_function *f, XXH128_hash_t table, const trip_closed_form *closed,
+static bool is_of(const trip_cpu_tf *f, XXH128_hash_t table, const trip_closed_form *closed,
                   trip_cpu_codes codes, double voxel_world)
 {
     return f->voxel_world == voxel_world && f->integrals.is_closed == (closed != NULL) &&
@@ -234,7 +234,7 @@ static bool is_of(const trip_cpu_function *f, XXH128_hash_t table, const trip_cl
            f->table_hash[0] == table.low64 && f->table_hash[1] == table.high64;
 }
 
-static void set(trip_cpu_function *f, const trip_tf_entry *table, XXH128_hash_t hash,
+static void set(trip_cpu_tf *f, const trip_tf_entry *table, XXH128_hash_t hash,
                 const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
 {
     if (closed) /* goes by more than what is compared below */
@@ -257,54 +257,53 @@ static XXH128_hash_t hash_of(const trip_tf_entry *table)
     return XXH3_128bits(table, CODES * sizeof *table);
 }
 
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
-                           const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
+void trip_cpu_tf_set(trip_cpu_tf *f, const trip_tf_entry *table, const trip_closed_form *closed,
+                     trip_cpu_codes codes, double voxel_world)
 {
     set(f, table, hash_of(table), closed, codes, voxel_world);
 }
 
 /* ---- those that are kept ---- */
 
-bool trip_cpu_functions_create(trip_cpu_functions *f, trip_budget *budget)
+bool trip_cpu_tfs_create(trip_cpu_tfs *f, trip_budget *budget)
 {
-    *f = (trip_cpu_functions){ 0 };
-    return trip_cpu_function_create(&f->kept[0], budget);
+    *f = (trip_cpu_tfs){ 0 };
+    return trip_cpu_tf_create(&f->kept[0], budget);
 }
 
-void trip_cpu_functions_destroy(trip_cpu_functions *f, trip_budget *budget)
+void trip_cpu_tfs_destroy(trip_cpu_tfs *f, trip_budget *budget)
 {
-    for (int i = 0; i < TRIP_CPU_FUNCTIONS; i++)
+    for (int i = 0; i < TRIP_CPU_TFS; i++)
         if (f->kept[i].next_visible)
-            trip_cpu_function_destroy(&f->kept[i], budget);
+            trip_cpu_tf_destroy(&f->kept[i], budget);
 }
 
 /* Where the next is set. */
-static int place_of_next(trip_cpu_functions *f, trip_budget *budget)
+static int position_of_next(trip_cpu_tfs *f, trip_budget *budget)
 {
     enum { SMALL_PART = 32 };
     int longest = 0;
-    for (int i = 0; i < TRIP_CPU_FUNCTIONS; i++) {
+    for (int i = 0; i < TRIP_CPU_TFS; i++) {
         if (!f->kept[i].next_visible) {
             const uint64_t left = trip_budget_left_bytes(budget);
-            const bool is_small = trip_cpu_function_bytes() < left / SMALL_PART;
-            return is_small && trip_cpu_function_create(&f->kept[i], budget) ? i : longest;
+            const bool is_small = trip_cpu_tf_bytes() < left / SMALL_PART;
+            return is_small && trip_cpu_tf_create(&f->kept[i], budget) ? i : longest;
         }
         longest = f->turns[i] < f->turns[longest] ? i : longest;
     }
     return longest;
 }
 
-const trip_cpu_function *trip_cpu_functions_take(trip_cpu_functions *f, trip_budget *budget,
-                                                 const trip_tf_entry *table,
-                                                 const trip_closed_form *closed,
-                                                 trip_cpu_codes codes, double voxel_world)
+const trip_cpu_tf *trip_cpu_tfs_take(trip_cpu_tfs *f, trip_budget *budget,
+                                     const trip_tf_entry *table, const trip_closed_form *closed,
+                                     trip_cpu_codes codes, double voxel_world)
 {
     const XXH128_hash_t hash = hash_of(table);
     int at = 0;
-    while (at < TRIP_CPU_FUNCTIONS && !is_of(&f->kept[at], hash, closed, codes, voxel_world))
+    while (at < TRIP_CPU_TFS && !is_of(&f->kept[at], hash, closed, codes, voxel_world))
         at++;
-    if (at == TRIP_CPU_FUNCTIONS)
-        at = place_of_next(f, budget);
+    if (at == TRIP_CPU_TFS)
+        at = position_of_next(f, budget);
     f->turns[at] = ++f->turn;
     set(&f->kept[at], table, hash, closed, codes, voxel_world);
     return &f->kept[at];

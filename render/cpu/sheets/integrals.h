@@ -6,11 +6,11 @@
 
 #include "budget.h"
 #include "closed_form.h"
-#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/kernel_sheets.h"
 #include "cpu/sheets/codes.h"
 #include "transfer_function.h"
 
-typedef struct trip_cpu_function {
+typedef struct trip_cpu_tf {
     trip_cpu_integrals integrals;
     trip_cpu_codes codes; /* whose integrals they are, and so below */
     /* Codes that may show: those with extinction, and as many beside as an entry reaches. */
@@ -20,42 +20,40 @@ typedef struct trip_cpu_function {
     /* What all of this was made of, with the codes above. */
     uint64_t table_hash[2];
     double voxel_world; /* 0: nothing was made yet */
-} trip_cpu_function;
+} trip_cpu_tf;
 
 /* What it takes. */
-uint64_t trip_cpu_function_bytes(void);
+uint64_t trip_cpu_tf_bytes(void);
 /* Memory from the budget; false where it does not suffice. */
-bool trip_cpu_function_create(trip_cpu_function *f, trip_budget *budget);
-void trip_cpu_function_destroy(trip_cpu_function *f, trip_budget *budget);
+bool trip_cpu_tf_create(trip_cpu_tf *f, trip_budget *budget);
+void trip_cpu_tf_destroy(trip_cpu_tf *f, trip_budget *budget);
 
 /* Of a table of 65536 entries of the data set's codes, whose extinction is per world unit; with
  * `closed`, its form, no integrals are made. */
-void trip_cpu_function_set(trip_cpu_function *f, const trip_tf_entry *table,
-                           const trip_closed_form *closed, trip_cpu_codes codes,
-                           double voxel_world);
+void trip_cpu_tf_set(trip_cpu_tf *f, const trip_tf_entry *table, const trip_closed_form *closed,
+                     trip_cpu_codes codes, double voxel_world);
 
-enum { TRIP_CPU_FUNCTIONS = 6 };
+enum { TRIP_CPU_TFS = 6 };
 
-typedef struct trip_cpu_functions {
-    trip_cpu_function kept[TRIP_CPU_FUNCTIONS]; /* of the first there is memory from the start */
-    uint64_t turn, turns[TRIP_CPU_FUNCTIONS];   /* when each was last taken */
-} trip_cpu_functions;
+typedef struct trip_cpu_tfs {
+    trip_cpu_tf kept[TRIP_CPU_TFS];     /* of the first there is memory from the start */
+    uint64_t turn, turns[TRIP_CPU_TFS]; /* when each was last taken */
+} trip_cpu_tfs;
 
 /* Memory for one; false where the budget does not suffice. */
-bool trip_cpu_functions_create(trip_cpu_functions *f, trip_budget *budget);
-void trip_cpu_functions_destroy(trip_cpu_functions *f, trip_budget *budget);
-/* As set by trip_cpu_function_set(): one that is kept, else in the place of the one that was not
+bool trip_cpu_tfs_create(trip_cpu_tfs *f, trip_budget *budget);
+void trip_cpu_tfs_destroy(trip_cpu_tfs *f, trip_budget *budget);
+/* As set by trip_cpu_tf_set(): one that is kept, else in the place of the one that was not
  * taken for longest, or in memory of its own where that is a small part of what is left. */
-const trip_cpu_function *trip_cpu_functions_take(trip_cpu_functions *f, trip_budget *budget,
-                                                 const trip_tf_entry *table,
-                                                 const trip_closed_form *closed,
-                                                 trip_cpu_codes codes, double voxel_world);
+const trip_cpu_tf *trip_cpu_tfs_take(trip_cpu_tfs *f, trip_budget *budget,
+                                     const trip_tf_entry *table, const trip_closed_form *closed,
+                                     trip_cpu_codes codes, double voxel_world);
 
 /* Whether some code of [least, most] may show; biased codes. */
-static inline bool trip_cpu_function_shows(const trip_cpu_function *f, int16_t least, int16_t most)
+static inline bool trip_cpu_tf_shows(const trip_cpu_tf *f, int16_t min, int16_t max)
 {
-    return least <= most &&
-           f->next_visible[least + TRIP_CPU_CODE_BIAS] <= (uint32_t)(most + TRIP_CPU_CODE_BIAS);
+    return min <= max &&
+           f->next_visible[min + TRIP_CPU_CODE_BIAS] <= (uint32_t)(max + TRIP_CPU_CODE_BIAS);
 }
 
 #endif

@@ -1,6 +1,6 @@
 #include "cpu/sheets/need.h"
 
-#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/kernel_sheets.h"
 #include "report.h"
 
 typedef struct sheet {
@@ -9,7 +9,7 @@ typedef struct sheet {
 
 /* The last sheets, the latest last. */
 typedef struct row {
-    sheet sheets[TRIP_CPU_AT_HAND_MOST];
+    sheet sheets[TRIP_CPU_AT_HAND_MAX];
     int count;
 } row;
 

@@ -12,7 +12,7 @@ typedef struct trip_cpu_need {
 } trip_cpu_need;
 
 /* The most of `at_hand` of trip_cpu_need_find(). */
-enum { TRIP_CPU_AT_HAND_MOST = 6 };
+enum { TRIP_CPU_AT_HAND_MAX = 6 };
 
 /* Of sheets of so many rasters each at most, so many at hand at a time; TRIP_ERROR without the
  * memory to find it. */

@@ -24,13 +24,13 @@ typedef struct extent {
 
 /* Positions along u and v. */
 typedef struct bounds {
-    double least[2], most[2];
+    double min[2], max[2];
 } bounds;
 
 static void include(bounds *b, int a, double at)
 {
-    b->least[a] = at < b->least[a] ? at : b->least[a];
-    b->most[a] = at > b->most[a] ? at : b->most[a];
+    b->min[a] = at < b->min[a] ? at : b->min[a];
+    b->max[a] = at > b->max[a] ? at : b->max[a];
 }
 
 /* The rays of a pane's pixel positions at the corners of its patches. */
@@ -52,10 +52,10 @@ static void find_ray(const trip_cpu_sheet_view *view, const extent *e, double x,
     rays->along[i] = r[2] * view->direction > 0;
     if (!rays->along[i])
         return;
-    const double inverse = 1 / r[2], most = view->steepest;
+    const double inverse = 1 / r[2], max = view->steepest;
     for (int a = 0; a < 2; a++) {
         double start = view->eye[a], slope = r[a] * inverse;
-        slope = slope < -most ? -most : slope > most ? most : slope;
+        slope = slope < -max ? -max : slope > max ? max : slope;
         if (view->ortho) /* where the ray passes sheet 0 */
             start += beside[a] - (view->eye[2] + beside[2]) * slope;
         for (int end = 0; end < 2; end++)
@@ -81,8 +81,8 @@ static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
                               (int64_t)s->down * TRIP_CPU_RASTER };
     int64_t first[2], last[2];
     for (int a = 0; a < 2; a++) {
-        const double lo = b->least[a] - SLACK_VOXELS - reach - (double)origin[a];
-        const double hi = b->most[a] + SLACK_VOXELS + reach - (double)origin[a];
+        const double lo = b->min[a] - SLACK_VOXELS - reach - (double)origin[a];
+        const double hi = b->max[a] + SLACK_VOXELS + reach - (double)origin[a];
         if (!(hi >= 0 && lo < (double)size[a]))
             return;
         first[a] = lo > 0 ? (int64_t)lo / 8 : 0;

@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_SHEETS_OPEN_SQUARES_H
 #define TRIP_CPU_SHEETS_OPEN_SQUARES_H
 
-#include "cpu/sheets/state.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 
 /* Sets the store's open squares for a sheet whose first run is at hand. They are found for some
  * sheets at once, and again once pixels were drawn. */

@@ -2,10 +2,10 @@
 
 #include <math.h>
 
-#include "cpu/effects.h"
+#include "cpu/cpu_effects.h"
 #include "cpu/sheets/uneven.h"
 #include "shade.h"
-#include "tint.h"
+#include "debug_view.h"
 #include "weight.h"
 
 /* Rays that move farther along u or v from sheet to sheet are not drawn where several lists are:
@@ -45,10 +45,10 @@ static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, tri
 static void set_light(trip_cpu_sheet_view *view, const trip_frame *frame)
 {
     const trip_settings *s = frame->settings;
-    const trip_vec3 place = trip_light_place(s, &frame->camera->index_to_world);
+    const trip_vec3 position = trip_light_position(s, &frame->camera->index_to_world);
     const trip_vec3 forward = frame->camera->world_forward;
     for (int k = 0; k < 3; k++) {
-        view->light[k] = (float)(s->point_light ? trip_component(place, (view->axis + 1 + k) % 3)
+        view->light[k] = (float)(s->point_light ? trip_component(position, (view->axis + 1 + k) % 3)
                                                 : trip_component(s->light_direction, k));
         view->to_eye[k] = (float)-trip_component(forward, k);
     }
@@ -63,10 +63,10 @@ static void set_clip(trip_cpu_sheet_view *view, const trip_clip *clip)
     }
 }
 
-static void set_tint(trip_cpu_sheet_view *view, const trip_frame *frame)
+static void set_debug_view(trip_cpu_sheet_view *view, const trip_frame *frame)
 {
     double tint[3] = { 0 };
-    view->tinted = trip_tint_of(frame->settings, view->axis, frame->plan->level, tint);
+    view->tinted = trip_debug_view_of(frame->settings, view->axis, frame->plan->level, tint);
     for (int k = 0; k < 3; k++)
         view->tint[k] = (float)tint[k];
 }
@@ -79,16 +79,16 @@ static double steepest_of_view(const trip_frame *frame)
     const uint64_t *dims = frame->data->header.dims;
     const double grid = (double)(dims[0] + dims[1] + dims[2]);
     const double along = trip_component(c->r0, axis);
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < 4; i++) {
         const trip_vec3 ray = trip_camera_ray(c, i & 1 ? c->width : 0, i & 2 ? c->height : 0);
         const double r[3] = { ray.x, ray.y, ray.z };
         if (!(r[axis] * along > 0))
             return grid;
         const double across = fmax(fabs(r[(axis + 1) % 3]), fabs(r[(axis + 2) % 3]));
-        most = fmax(most, across / fabs(r[axis]));
+        max = fmax(max, across / fabs(r[axis]));
     }
-    return fmin(grid, most);
+    return fmin(grid, max);
 }
 
 double trip_cpu_pass_steepest(const trip_frame *frame)
@@ -101,7 +101,7 @@ double trip_cpu_pass_steepest(const trip_frame *frame)
 }
 
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
-                             bool descending, const trip_cpu_function *function)
+                             bool descending, const trip_cpu_tf *function)
 {
     const trip_camera *c = frame->camera;
     const trip_settings *s = frame->settings;
@@ -118,10 +118,10 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
         .shading = s->shading,
         .headlight = s->headlight,
         .point_light = s->point_light && !s->headlight,
-        .saturation = trip_cpu_saturation(s),
+        .early_termination = trip_cpu_early_termination(s),
         .direction = descending ? -1 : 1,
-        .middle = trip_coordinates_place(&frame->data->coordinates, axis,
-                                         0.5 * ((double)frame->data->header.dims[axis] - 1)),
+        .middle = trip_coordinates_position(&frame->data->coordinates, axis,
+                                            0.5 * ((double)frame->data->header.dims[axis] - 1)),
         .steepest = trip_cpu_pass_steepest(frame),
     };
     by_list(view, c->eye, view->eye);
@@ -139,6 +139,6 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
     set_gradient(view, frame, function->codes);
     set_light(view, frame);
     set_clip(view, &frame->plan->clip);
-    set_tint(view, frame);
+    set_debug_view(view, frame);
     trip_cpu_effects_make(&view->effects, frame, axis, NULL);
 }

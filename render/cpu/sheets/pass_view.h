@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_SHEETS_PASS_VIEW_H
 #define TRIP_CPU_SHEETS_PASS_VIEW_H
 
-#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/kernel_sheets.h"
 #include "cpu/sheets/integrals.h"
 #include "renderer.h"
 
@@ -11,6 +11,6 @@
 double trip_cpu_pass_steepest(const trip_frame *frame);
 
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
-                             bool descending, const trip_cpu_function *function);
+                             bool descending, const trip_cpu_tf *function);
 
 #endif

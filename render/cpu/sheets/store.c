@@ -38,9 +38,9 @@ static void release_voxels(trip_cpu_store *s)
 }
 
 /* Ends with so many rasters, or as many as there are where that is not far less. */
-static bool take_voxels(trip_cpu_store *s, uint64_t least, uint64_t wanted)
+static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
 {
-    if (s->rasters >= least && s->rasters >= wanted / 2)
+    if (s->rasters >= min && s->rasters >= wanted / 2)
         return true;
     release_voxels(s);
     s->rasters = (uint32_t)wanted;
@@ -77,7 +77,7 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         at = lay_out_making(sheet, memory, at, grid);
     }
     for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++) {
-        trip_cpu_sheet *slice = &s->slices[i];
+        trip_cpu_sheet *slice = &s->samples_per_sheet[i];
         slice->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *slice->rasters);
         at = lay_out_making(slice, memory, at, grid);
     }
@@ -154,18 +154,18 @@ uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
 }
 
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                        uint64_t least, uint64_t most, uint64_t room)
+                        uint64_t min, uint64_t max, uint64_t room)
 {
     const uint64_t greatest = TRIP_CPU_RASTERS_MAX - 1;
-    if (least > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, least) > room)
+    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, min) > room)
         return false;
-    most = most < greatest ? most : greatest;
+    max = max < greatest ? max : greatest;
     uint64_t fit = (room - grid_bytes(all, sheets)) / (raster_bytes + sizeof *s->free) - 1;
     s->sheet_room = sheets;
     set_grid(s, all);
     if (s->rasters > fit + 1)
         release_voxels(s);
-    if (!take_grids(s) || !take_voxels(s, 1 + least, 1 + (most < fit ? most : fit)))
+    if (!take_grids(s) || !take_voxels(s, 1 + min, 1 + (max < fit ? max : fit)))
         return false;
     trip_cpu_store_move(s, all);
     return true;
@@ -208,7 +208,7 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 #define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
 #define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
 
-static const uint16_t places[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
+static const uint16_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
 /* The codes of a square's records, stretched and biased; by copies, which overlap nothing, so that
  * the loops become vectors. */
@@ -233,11 +233,11 @@ static void decode_square(int16_t *to, const trip_square *at, trip_cpu_codes str
     square_codes(at, stretch, codes);
     if (at->mask == UINT64_MAX) { /* two voxels in a row follow one another */
         for (unsigned i = 0; i < 64; i += 2)
-            memcpy(to + places[i], codes + i, 2 * sizeof *codes);
+            memcpy(to + positions[i], codes + i, 2 * sizeof *codes);
         return;
     }
     for (uint64_t rest = at->mask; rest; rest &= rest - 1)
-        to[places[__builtin_ctzll(rest)]] = *next++;
+        to[positions[__builtin_ctzll(rest)]] = *next++;
 }
 
 static bool is_within(const trip_cpu_store *s, int64_t u, int64_t v)
@@ -275,7 +275,7 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
 typedef struct work_job {
     trip_cpu_store *store;
     const trip_cpu_sheet_work *work;
-    const trip_cpu_function *function;
+    const trip_cpu_tf *function;
     /* Of the rasters that are there. */
     void (*each)(const struct work_job *job, const trip_cpu_sheet_work *w, size_t at);
 } work_job;
@@ -358,10 +358,9 @@ void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, 
 }
 
 /* Whether the cell may show whose first voxel is `first`: of functions that show here and there. */
-static bool cell_shows(const trip_cpu_function *f, const int16_t *from, const int16_t *to,
-                       int first)
+static bool cell_shows(const trip_cpu_tf *f, const int16_t *from, const int16_t *to, int first)
 {
-    int16_t least = INT16_MAX, most = INT16_MIN;
+    int16_t min = INT16_MAX, max = INT16_MIN;
     int corners[2] = { 0 };
     for (int k = 0; k < 8; k++) {
         int16_t code =
@@ -369,13 +368,13 @@ static bool cell_shows(const trip_cpu_function *f, const int16_t *from, const in
         if (code == TRIP_CPU_CODE_MISSING)
             continue;
         corners[k >> 2]++;
-        least = code < least ? code : least;
-        most = code > most ? code : most;
+        min = code < min ? code : min;
+        max = code > max ? code : max;
     }
-    return (corners[0] == 4 || corners[1] == 4) && trip_cpu_function_shows(f, least, most);
+    return (corners[0] == 4 || corners[1] == 4) && trip_cpu_tf_shows(f, min, max);
 }
 
-static void find_cells_one_by_one(const trip_cpu_function *f, const trip_cpu_voxels *from,
+static void find_cells_one_by_one(const trip_cpu_tf *f, const trip_cpu_voxels *from,
                                   const trip_cpu_voxels *to, uint64_t squares, trip_cpu_cells *out)
 {
     for (int v = 0; v < TRIP_CPU_RASTER; v++) {
@@ -392,11 +391,11 @@ static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t
                        uint64_t squares)
 {
     const trip_cpu_store *s = job->store;
-    const trip_cpu_function *f = job->function;
+    const trip_cpu_tf *f = job->function;
     const trip_cpu_voxels *from = raster_at(s, w->sheet, at), *to = raster_at(s, w->other, at);
     trip_cpu_cells *cells = &w->sheet->cells[at];
     if (w->kernel != TRIP_KERNEL_LINEAR)
-        s->kernels->sheet_cells(from, to, squares, TRIP_CPU_CODE_LEAST, INT16_MAX, cells);
+        s->kernels->sheet_cells(from, to, squares, TRIP_CPU_CODE_MIN, INT16_MAX, cells);
     else if (f->in_a_row)
         s->kernels->sheet_cells(from, to, squares, f->first_visible, f->last_visible, cells);
     else
@@ -447,8 +446,8 @@ static void add_ranges_about(const trip_cpu_store *s, const trip_cpu_sheet *shee
             continue;
         const trip_cpu_square_ranges *r = &sheet->ranges[raster];
         const int i = (v + ACROSS) % ACROSS * ACROSS + (u + ACROSS) % ACROSS;
-        range[0] = r->least[i] < range[0] ? r->least[i] : range[0];
-        range[1] = r->most[i] > range[1] ? r->most[i] : range[1];
+        range[0] = r->min[i] < range[0] ? r->min[i] : range[0];
+        range[1] = r->max[i] > range[1] ? r->max[i] : range[1];
     }
 }
 
@@ -461,9 +460,8 @@ static bool shows_about(const work_job *job, const trip_cpu_sheet_work *w, size_
     for (int i = 0; i < 4; i++)
         add_ranges_about(job->store, about[i], at, square, range);
     trip_field_code_bounds(w->kernel, range[0], range[1], bounds);
-    return trip_cpu_function_shows(job->function,
-                                   (int16_t)fmax(TRIP_CPU_CODE_LEAST, floor(bounds[0])),
-                                   (int16_t)fmin(INT16_MAX, ceil(bounds[1])));
+    return trip_cpu_tf_shows(job->function, (int16_t)fmax(TRIP_CPU_CODE_MIN, floor(bounds[0])),
+                             (int16_t)fmin(INT16_MAX, ceil(bounds[1])));
 }
 
 static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
@@ -472,12 +470,11 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
     uint64_t visible = 0, *edges = w->sheet->edges[at];
     if (w->other->rasters[at])
         for (int i = 0; i < 64; i++) {
-            bool any = a->least[i] <= a->most[i] && b->least[i] <= b->most[i];
-            int16_t least = a->least[i] < b->least[i] ? a->least[i] : b->least[i];
-            int16_t most = a->most[i] > b->most[i] ? a->most[i] : b->most[i];
-            if (any && (w->kernel == TRIP_KERNEL_LINEAR
-                            ? trip_cpu_function_shows(job->function, least, most)
-                            : shows_about(job, w, at, i)))
+            bool any = a->min[i] <= a->max[i] && b->min[i] <= b->max[i];
+            int16_t min = a->min[i] < b->min[i] ? a->min[i] : b->min[i];
+            int16_t max = a->max[i] > b->max[i] ? a->max[i] : b->max[i];
+            if (any && (w->kernel == TRIP_KERNEL_LINEAR ? trip_cpu_tf_shows(job->function, min, max)
+                                                        : shows_about(job, w, at, i)))
                 visible |= UINT64_C(1) << i;
         }
     memset(edges, 0, sizeof w->sheet->edges[at]);
@@ -514,7 +511,7 @@ static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_
 }
 
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
-                                 const trip_cpu_function *f)
+                                 const trip_cpu_tf *f)
 {
     run_work(&(work_job){ .store = s, .work = work, .function = f, .each = find_visible }, count);
     run_work(&(work_job){ .store = s, .work = work, .each = find_needed }, count);
@@ -570,7 +567,8 @@ static void clear_raster(const work_job *job, const trip_cpu_sheet_work *w, size
     trip_cpu_store_clear(job->store, w->sheet->rasters[at]);
 }
 
-void trip_cpu_store_clear_slices(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
+void trip_cpu_store_clear_samples_per_sheet(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                            unsigned count)
 {
     run_work(&(work_job){ .store = s, .work = work, .each = clear_raster }, count);
 }

@@ -65,7 +65,7 @@ typedef struct trip_cpu_store {
     char *grids; /* of the sheets and slices below */
     size_t grids_bytes;
     unsigned sheet_room; /* sheets that there is room for */
-    trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], slices[TRIP_CPU_SLICES_MAX];
+    trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], samples_per_sheet[TRIP_CPU_SLICES_MAX];
     uint64_t *some; /* squares visible in any of the segments drawn at a time */
     uint64_t *open; /* squares of a sheet that voxels are decoded of; at first all */
 } trip_cpu_store;
@@ -77,7 +77,7 @@ uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
 /* Room for so many sheets of a rectangle, and for `least` to `most` rasters in at most `room`
  * bytes; every sheet is absent then. False where that is too little. */
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                        uint64_t least, uint64_t most, uint64_t room);
+                        uint64_t min, uint64_t max, uint64_t room);
 /* Moves to a rectangle that is no larger than the one there is room for; every sheet is absent. */
 void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to);
 void trip_cpu_store_release(trip_cpu_store *s);
@@ -129,7 +129,7 @@ void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, 
  * needed then. With kernels of 64 voxels all cells may that have four corners at a sheet, of
  * squares about which the function shows something. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
-                                 const trip_cpu_function *f);
+                                 const trip_cpu_tf *f);
 /* All gradients of prepared sheets' voxels. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
@@ -137,8 +137,8 @@ void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work 
  * it is empty. */
 bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
 /* All voxels of slices are missing; or are made. */
-void trip_cpu_store_clear_slices(trip_cpu_store *s, const trip_cpu_sheet_work *work,
-                                 unsigned count);
+void trip_cpu_store_clear_samples_per_sheet(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                            unsigned count);
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
 
 #endif

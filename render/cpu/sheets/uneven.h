@@ -4,7 +4,7 @@
 #define TRIP_CPU_SHEETS_UNEVEN_H
 
 #include "coordinates.h"
-#include "cpu/kernels/sheets.h"
+#include "cpu/kernels/kernel_sheets.h"
 
 /* What a gradient of one code over a unit of place is as it is kept, in 16 bits: half of what the
  * nearest voxels are apart, since steeper than over those no difference is; but of at least 1/64,

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "cpu/sheets/state.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 #include "report.h"
 
 /* ---- memory ---- */
@@ -31,17 +31,17 @@ static trip_cpu_rasters at_hand(const trip_cpu_rasters *all, const int64_t size[
     return b;
 }
 
-static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_slices)
+static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_samples_per_sheet)
 {
     return (uint64_t)((b->last[0] - b->first[0] + 1) * (b->last[1] - b->first[1] + 1)) *
-           (uint64_t)sheets_and_slices;
+           (uint64_t)sheets_and_samples_per_sheet;
 }
 
 static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,
-                         int sheets, int slices)
+                         int sheets, int samples_per_sheet)
 {
     trip_cpu_rasters b = at_hand(all, size, reach);
-    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + slices));
+    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + samples_per_sheet));
 }
 
 static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
@@ -49,11 +49,11 @@ static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
     return (uint64_t)sheets * sheet_bytes(need);
 }
 
-uint64_t trip_cpu_windows_least_bytes(const trip_cpu_rasters *all, int64_t reach,
-                                      const trip_cpu_need *need, int sheets, int slices)
+uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
+                                    const trip_cpu_need *need, int sheets, int samples_per_sheet)
 {
     const int64_t one[2] = { 1, 1 };
-    return kept_bytes(need, sheets) + bytes_of(all, one, reach, sheets, slices);
+    return kept_bytes(need, sheets) + bytes_of(all, one, reach, sheets, samples_per_sheet);
 }
 
 static bool take_runs(trip_cpu_windows *w, const trip_cpu_need *need, trip_budget *budget)
@@ -83,10 +83,10 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
                           const trip_cpu_need *need, uint64_t room)
 {
     trip_cpu_windows *w = &s->windows;
-    const int slices = s->of->frame->settings->slices;
+    const int samples_per_sheet = s->of->frame->settings->samples_per_sheet;
     const int sheets = trip_cpu_sheets_at_hand(s->of->frame);
     const uint64_t kept = kept_bytes(need, sheets);
-    if (trip_cpu_windows_least_bytes(all, reach, need, sheets, slices) > room)
+    if (trip_cpu_windows_min_bytes(all, reach, need, sheets, samples_per_sheet) > room)
         return false;
     w->room = sheets;
     w->about = trip_cpu_sheets_about(s->of->frame);
@@ -95,12 +95,12 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
     w->count = w->from = 0;
     for (int a = 0; a < 2; a++)
         w->size[a] = all->last[a] - all->first[a] + 1;
-    while (bytes_of(all, w->size, reach, sheets, slices) > room - kept) {
+    while (bytes_of(all, w->size, reach, sheets, samples_per_sheet) > room - kept) {
         int longer = w->size[0] > w->size[1] ? 0 : 1;
         w->size[longer] = (w->size[longer] + 1) / 2;
     }
     trip_cpu_rasters hand = at_hand(all, w->size, reach);
-    uint64_t rasters = rasters_of(&hand, sheets + slices);
+    uint64_t rasters = rasters_of(&hand, sheets + samples_per_sheet);
     w->used = take_runs(w, need, s->store.budget) &&
               trip_cpu_store_fit(&s->store, &hand, (unsigned)sheets, rasters, rasters, room - kept);
     return w->used;
@@ -204,7 +204,7 @@ static void find_interval(trip_cpu_sheets *s)
     const bool up = s->way > 0;
     const int taken = w->about - 1, last = last_about(w, taken), last_loaded = w->count - 1;
     trip_cpu_sheet *sheets = s->store.sheets, *a = &sheets[w->from];
-    trip_cpu_sheet_work work[TRIP_CPU_AT_HAND_MOST] = { 0 };
+    trip_cpu_sheet_work work[TRIP_CPU_AT_HAND_MAX] = { 0 };
     unsigned count = 0;
     for (int i = first_about(w, taken); i <= last; i++) {
         const trip_cpu_sheet *before = i > 0 ? &sheets[i - 1] : NULL;

@@ -34,7 +34,7 @@ typedef struct trip_cpu_windows {
     char *memory;
     size_t bytes;
     /* In a row, the last may not be complete: those that an interval depends on. */
-    trip_cpu_kept_sheet sheets[TRIP_CPU_AT_HAND_MOST];
+    trip_cpu_kept_sheet sheets[TRIP_CPU_AT_HAND_MAX];
     int room, about; /* sheets at most; before and behind the interval */
     int count;
     int from; /* the interval to be drawn next begins at this: `about`, but at first */
@@ -42,8 +42,8 @@ typedef struct trip_cpu_windows {
 
 /* What the smallest windows take; and readies the largest that do not take more than `room`: false
  * where that is too little. */
-uint64_t trip_cpu_windows_least_bytes(const trip_cpu_rasters *all, int64_t reach,
-                                      const trip_cpu_need *need, int at_hand, int slices);
+uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
+                                    const trip_cpu_need *need, int at_hand, int samples_per_sheet);
 bool trip_cpu_windows_fit(struct trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room);
 void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget);

@@ -1,0 +1,126 @@
+/* bench variants: what the papers' shortcuts, and the method they are an answer to, change in the
+ * picture, by the reference. */
+#include "bench_tables.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench_view.h"
+#include "normalise.h"
+#include "report.h"
+
+static const struct form {
+    const char *name;
+    trip_method method;
+    double h;
+    trip_footprint footprint;
+    bool vertex_weights, normalise;
+} variants[] = {
+    { "merge, h = 0.85", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_EXACT, false, false },
+    { "fixed sprites", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_FIXED, false, false },
+    { "weights of vertices", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_EXACT, true, false },
+    { "clip", TRIP_METHOD_CLIP, 0, TRIP_FOOTPRINT_EXACT, false, false },
+    { "axis", TRIP_METHOD_AXIS, 0, TRIP_FOOTPRINT_EXACT, false, false },
+    { "image-aligned sheets", TRIP_METHOD_IMAGE, 0, TRIP_FOOTPRINT_EXACT, false, false },
+    { "colour over opacity", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_EXACT, false, true },
+};
+
+enum { VARIANTS = sizeof variants / sizeof variants[0] };
+
+static const bench_column columns[] = {
+    { "form", "form", 0, 0 }, { "mean", "mean", 3, 0 }, { "percentile_99", "99 %", 2, 0 },
+    { "most", "most", 1, 0 }, { "ms", "ms", 0, 0 },
+};
+
+static int ascending(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* Over the components of those pixels that either covers; `apart` has room for all. */
+static void compare(const float *a, const float *b, size_t pixels, float *apart, cJSON *row)
+{
+    size_t count = 0;
+    double sum = 0;
+    for (size_t i = 0; i < 4 * pixels; i++)
+        if (a[i | 3] > 1.0F / 255 || b[i | 3] > 1.0F / 255)
+            sum += (double)(apart[count++] = fabsf(a[i] - b[i]));
+    qsort(apart, count, sizeof *apart, ascending);
+    const bool some = count > 0;
+    cJSON_AddNumberToObject(row, "mean", some ? 255 * sum / (double)count : 0);
+    cJSON_AddNumberToObject(row, "percentile_99",
+                            some ? 255 * (double)apart[(count - 1) * 99 / 100] : 0);
+    cJSON_AddNumberToObject(row, "most", some ? 255 * (double)apart[count - 1] : 0);
+}
+
+/* The first form's picture is kept in `usual`. */
+static int measure(bench_frame *frame, const bench_options *o, float *defaults, float *apart,
+                   bench_report *r)
+{
+    static const double none[4] = { 0 };
+    const size_t pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1];
+    cJSON *rows = bench_report_table(
+        r, "variants", "Oblique view: changes of the picture against the first row's, of 255",
+        columns, sizeof columns / sizeof columns[0]);
+    int status = 0;
+    frame->view = bench_view_oblique(frame->session, o->sizes[0]);
+    memset(frame->settings.background, 0, sizeof frame->settings.background);
+    for (int i = 0; i < VARIANTS && !status; i++) {
+        bench_cost cost;
+        frame->settings.method = variants[i].method;
+        frame->settings.h = variants[i].h;
+        frame->settings.footprint = variants[i].footprint;
+        frame->settings.vertex_weights = variants[i].vertex_weights;
+        status = bench_frame_draw(frame, false, &cost);
+        if (status)
+            break;
+        if (variants[i].normalise)
+            trip_normalise(frame->rgba, pixels, none);
+        if (i == 0)
+            memcpy(defaults, frame->rgba, 4 * pixels * sizeof *defaults);
+        cJSON *row = cJSON_CreateObject();
+        cJSON_AddStringToObject(row, "form", variants[i].name);
+        compare(defaults, frame->rgba, pixels, apart, row);
+        cJSON_AddNumberToObject(row, "ms", cost.ms);
+        cJSON_AddItemToArray(rows, row);
+    }
+    return status;
+}
+
+static void add_limits(bench_report *r)
+{
+    bench_report_limit(r, "By the reference, in double precision: times are of one frame each and "
+                          "say little. Components of the pixels that either picture covers, "
+                          "premultiplied, without background.");
+    bench_report_limit(r, "Fixed sprites: Hofsetz, Max & Bastos 2008, section 5.2, who call the "
+                          "difference negligible. Weights of vertices: section 4.2. Colour over "
+                          "opacity: Hofsetz & Max 2005, section 5, step 3. Image-aligned sheets: "
+                          "Mueller & Crawfis 1998.");
+}
+
+int bench_variants(const session *s, const bench_options *o, bench_report *r)
+{
+    bench_scene scene;
+    const size_t bytes =
+        4 * (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1] * sizeof *scene.frame.rgba;
+    float *defaults = NULL, *apart = NULL;
+    bench_progress_expect(o->progress, 1 + VARIANTS);
+    int status = bench_scene_open(&scene, s, o, r);
+    if (!status) {
+        defaults = trip_budget_take(s->budget, bytes);
+        apart = trip_budget_take(s->budget, bytes);
+        if (!defaults || !apart)
+            status = trip_fail(TRIP_ERROR, "bench", "variants",
+                               "two pictures more do not fit the memory given; raise --memory");
+    }
+    if (!status) {
+        add_limits(r);
+        status = measure(&scene.frame, o, defaults, apart, r);
+    }
+    trip_budget_release(s->budget, defaults, bytes);
+    trip_budget_release(s->budget, apart, bytes);
+    bench_scene_close(&scene);
+    return status;
+}

@@ -1,0 +1,452 @@
+/* triptych info: what is in a data set, for people or as JSON, and whether it is sound. */
+#include "commands.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "anatomy.h"
+#include "budget.h"
+#include "geometry.h"
+#include "json.h"
+#include "library.h"
+#include "options.h"
+#include "report.h"
+#include "text.h"
+
+typedef struct options {
+    const char *path;
+    bool verify, json;
+} options;
+
+static const struct argp_option option_table[] = {
+    { "verify", 'v', NULL, 0, "Read everything and check it", 0 },
+    { "json", 'j', NULL, 0, "Print JSON", 0 },
+    { 0 },
+};
+
+static error_t parse_option(int key, char *argument, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case 'v':
+        o->verify = true;
+        return 0;
+    case 'j':
+        o->json = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (o->path)
+            return trip_option_fail(argument, "one data set at a time");
+        o->path = argument;
+        return 0;
+    case ARGP_KEY_END:
+        return o->path
+                   ? 0
+                   : trip_option_fail("NAME.trip", "no data set given: `triptych info NAME.trip`");
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* A data set as it is shown. */
+typedef struct data_set {
+    const char *path;
+    triptych *t;
+    triptych_info info;
+    triptych_list *lists; /* info.lists of them */
+    trip_json source;     /* the notes, where they are JSON */
+} data_set;
+
+/* Along axis `axis` of a grid, in world space. */
+static trip_vec3 direction(const double m[3][4], int axis)
+{
+    return trip_v3(m[0][axis], m[1][axis], m[2][axis]);
+}
+
+/* The anatomical convention of world space; NULL where the data set gives none. */
+static const char *space_of(const cJSON *text)
+{
+    const char *space = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "space"));
+    return trip_anatomy_known(space) ? space : NULL;
+}
+
+/* The box of world space about the whole grid, from edge to edge. */
+static void grid_bounds(const triptych_info *info, double bounds[2][3])
+{
+    trip_affine map;
+    memcpy(map.m, info->index_to_world, sizeof map.m);
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3];
+        for (int a = 0; a < 3; a++)
+            p[a] = info->grid_edges[corner >> a & 1][a];
+        trip_vec3 world = trip_affine_point(&map, trip_v3(p[0], p[1], p[2]));
+        for (int a = 0; a < 3; a++) {
+            double v = trip_component(world, a);
+            bounds[0][a] = corner ? fmin(bounds[0][a], v) : v;
+            bounds[1][a] = corner ? fmax(bounds[1][a], v) : v;
+        }
+    }
+}
+
+static void kept_bounds(const triptych_info *info, double bounds[2][3])
+{
+    memcpy(bounds[0], info->lo, sizeof info->lo);
+    memcpy(bounds[1], info->hi, sizeof info->hi);
+}
+
+/* Every byte count below is exact in a double: files are far smaller than 2^53 bytes. */
+static cJSON *number(double value)
+{
+    char text[32];
+    return cJSON_CreateRaw(trip_text_from_double(value, text));
+}
+
+static cJSON *numbers(const double *values, int count)
+{
+    cJSON *array = cJSON_CreateArray();
+    for (int i = 0; i < count; i++)
+        cJSON_AddItemToArray(array, number(values[i]));
+    return array;
+}
+
+static uint64_t halo_bytes(const data_set *d)
+{
+    uint64_t bytes = 0;
+    for (unsigned i = 0; i < d->info.lists; i++)
+        bytes += strcmp(d->lists[i].kind, "halo") ? 0 : d->lists[i].bytes;
+    return bytes;
+}
+
+static void add_matrix(cJSON *root, const double index_to_world[3][4])
+{
+    cJSON *rows = cJSON_AddArrayToObject(root, "index_to_world");
+    for (int row = 0; row < 3; row++)
+        cJSON_AddItemToArray(rows, numbers(index_to_world[row], 4));
+}
+
+static cJSON *list_to_json(const triptych_list *list)
+{
+    const char axis[2] = { (char)('x' + list->axis), 0 };
+    double dims[3] = { (double)list->dims[0], (double)list->dims[1], (double)list->dims[2] };
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "axis", axis);
+    cJSON_AddItemToObject(root, "level", number(list->level));
+    cJSON_AddStringToObject(root, "kind", list->kind);
+    cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
+    add_matrix(root, list->index_to_world);
+    cJSON_AddItemToObject(root, "sheet_first", number(list->sheet_first));
+    cJSON_AddItemToObject(root, "sheet_step", number(list->sheet_step));
+    cJSON_AddItemToObject(root, "records", number((double)list->records));
+    cJSON_AddItemToObject(root, "slabs", number((double)list->slabs));
+    cJSON_AddItemToObject(root, "bricks", number((double)list->bricks));
+    cJSON_AddItemToObject(root, "bytes", number((double)list->bytes));
+    return root;
+}
+
+static void add_lists(cJSON *root, const data_set *d)
+{
+    cJSON *lists = cJSON_AddArrayToObject(root, "lists");
+    for (unsigned i = 0; i < d->info.lists; i++)
+        cJSON_AddItemToArray(lists, list_to_json(&d->lists[i]));
+}
+
+static void add_bounds(cJSON *root, const char *name, double bounds[2][3])
+{
+    cJSON *corners = cJSON_AddArrayToObject(root, name);
+    cJSON_AddItemToArray(corners, numbers(bounds[0], 3));
+    cJSON_AddItemToArray(corners, numbers(bounds[1], 3));
+}
+
+/* Where the volume lies: its map, its bounds and, of a patient, the ends that its axes point to. */
+static void add_world(cJSON *root, const triptych_info *info, const cJSON *text)
+{
+    const char *space = space_of(text);
+    double bounds[2][3];
+    add_matrix(root, info->index_to_world);
+    grid_bounds(info, bounds);
+    add_bounds(root, "bounds", bounds);
+    kept_bounds(info, bounds);
+    add_bounds(root, "kept_bounds", bounds);
+    if (!space)
+        return;
+    cJSON_AddStringToObject(root, "space", space);
+    cJSON *axes = cJSON_AddArrayToObject(root, "axes");
+    for (int a = 0; a < 3; a++) {
+        char ends[4];
+        trip_anatomy_ends(space, direction(info->index_to_world, a), ends);
+        cJSON_AddItemToArray(axes, cJSON_CreateString(ends));
+    }
+}
+
+static void add_normals(cJSON *root, const triptych_info *info)
+{
+    if (info->normal_bytes == 3)
+        cJSON_AddItemToObject(root, "gradient_step", numbers(info->gradient_step, 3));
+    if (info->normal_bytes)
+        cJSON_AddItemToObject(root, "gradient_full", number(info->gradient_full));
+}
+
+static bool is_uneven(const triptych_info *info)
+{
+    for (int a = 0; a < 3; a++)
+        if (info->spacing_min[a] < info->spacing_max[a])
+            return true;
+    return false;
+}
+
+static cJSON *to_json(const data_set *d, bool verified)
+{
+    const triptych_info *info = &d->info;
+    double dims[3], steps[3];
+    cJSON *root = cJSON_CreateObject();
+    for (int a = 0; a < 3; a++) {
+        dims[a] = (double)info->dims[a];
+        steps[a] = trip_length(direction(info->index_to_world, a));
+    }
+    cJSON_AddItemToObject(root, "format_version", number(info->format_version));
+    cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
+    cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
+    if (is_uneven(info)) {
+        cJSON_AddItemToObject(root, "spacing_least", numbers(info->spacing_min, 3));
+        cJSON_AddItemToObject(root, "spacing_most", numbers(info->spacing_max, 3));
+    }
+    add_world(root, info, d->source.root);
+    cJSON_AddItemToObject(root, "value_min", number(info->value_min));
+    cJSON_AddItemToObject(root, "value_max", number(info->value_max));
+    cJSON_AddItemToObject(root, "code_lo", number(info->code_lo));
+    cJSON_AddItemToObject(root, "code_hi", number(info->code_hi));
+    add_normals(root, info);
+    cJSON_AddItemToObject(root, "voxels", number((double)info->voxels));
+    cJSON_AddItemToObject(root, "kept", number((double)info->kept));
+    cJSON_AddItemToObject(root, "halo", number((double)info->halo));
+    cJSON_AddItemToObject(root, "bytes", number((double)info->bytes));
+    cJSON_AddItemToObject(root, "halo_bytes", number((double)halo_bytes(d)));
+    cJSON_AddItemToObject(root, "index_bytes", number((double)info->index_bytes));
+    cJSON_AddBoolToObject(root, "normals", info->normal_bytes > 0);
+    cJSON_AddItemToObject(root, "code_bytes", number(info->code_bytes));
+    cJSON_AddItemToObject(root, "normal_bytes", number(info->normal_bytes));
+    cJSON_AddItemToObject(root, "tile_voxels", number(info->tile_voxels));
+    cJSON_AddItemToObject(root, "slab_sheets", number(info->slab_sheets));
+    cJSON_AddItemToObject(root, "page_bytes", number(info->page_bytes));
+    if (verified)
+        cJSON_AddTrueToObject(root, "verified");
+    add_lists(root, d);
+    if (d->source.root)
+        cJSON_AddItemReferenceToObject(root, "source", d->source.root);
+    else
+        cJSON_AddStringToObject(root, "source", info->notes);
+    return root;
+}
+
+static int print_json(const data_set *d, bool verified)
+{
+    cJSON *root = to_json(d, verified);
+    char *text = trip_json_print(root, true);
+    cJSON_Delete(root);
+    if (!text)
+        return trip_fail(TRIP_ERROR, "info", d->path, "out of memory");
+    puts(text);
+    free(text);
+    return TRIP_OK;
+}
+
+static const char *shortest(double value, char *text)
+{
+    snprintf(text, 32, "%.7g", value);
+    return text;
+}
+
+static void print_range(const char *label, double lo, double hi)
+{
+    char a[32], b[32];
+    printf("%-12s %s to %s\n", label, shortest(lo, a), shortest(hi, b));
+}
+
+static void print_bounds(const char *label, double bounds[2][3])
+{
+    char lo[32], hi[32];
+    printf("%-12s", label);
+    for (int a = 0; a < 3; a++)
+        printf("%s %c %s to %s", a ? "," : "", 'x' + a, shortest(bounds[0][a], lo),
+               shortest(bounds[1][a], hi));
+    putchar('\n');
+}
+
+static void print_world(const triptych_info *info)
+{
+    char a[32], b[32], c[32], t[32];
+    double bounds[2][3];
+    printf("%-12s %s x %s x %s\n", "spacing",
+           shortest(trip_length(direction(info->index_to_world, 0)), a),
+           shortest(trip_length(direction(info->index_to_world, 1)), b),
+           shortest(trip_length(direction(info->index_to_world, 2)), c));
+    for (int axis = 0; axis < 3; axis++)
+        if (info->spacing_min[axis] < info->spacing_max[axis])
+            printf("%c %-10s %s to %s apart\n", 'i' + axis, "voxels",
+                   shortest(info->spacing_min[axis], a), shortest(info->spacing_max[axis], b));
+    for (int row = 0; row < 3; row++) {
+        const double *m = info->index_to_world[row];
+        printf("%-12s %12s %12s %12s %12s\n", row ? "" : "to world", shortest(m[0], a),
+               shortest(m[1], b), shortest(m[2], c), shortest(m[3], t));
+    }
+    grid_bounds(info, bounds);
+    print_bounds("bounds", bounds);
+    kept_bounds(info, bounds);
+    print_bounds("kept in", bounds);
+}
+
+/* Where x, y and z of the world, and i, j and k of the grid point in the patient. */
+static void print_anatomy(const triptych_info *info, const char *space)
+{
+    char words[TRIP_ANATOMY_WORDS];
+    printf("%-12s %s: x to %s, y to %s, z to %s\n", "space", space, trip_anatomy_end_name(space[0]),
+           trip_anatomy_end_name(space[1]), trip_anatomy_end_name(space[2]));
+    for (int a = 0; a < 3; a++)
+        printf("%c %-10s %s\n", 'i' + a, "points to",
+               trip_anatomy_words(space, direction(info->index_to_world, a), words));
+}
+
+/* The top-level texts and numbers of the notes that brick left. */
+static void print_notes(const cJSON *root)
+{
+    for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
+        if (cJSON_IsString(item) && strlen(item->valuestring) < 1024 &&
+            strlen(item->string) < 200 && !strchr(item->valuestring, '\n') &&
+            strcmp(item->string, "space") != 0) {
+            trip_text_write(stdout, item->string);
+            for (size_t i = strlen(item->string); i < 12; i++)
+                putchar(' ');
+            putchar(' ');
+            trip_text_write(stdout, item->valuestring);
+            putchar('\n');
+        }
+}
+
+static void print_sizes(const data_set *d)
+{
+    const triptych_info *info = &d->info;
+    char bytes[32], index[32], halo[32];
+    double kept = info->kept ? (double)info->kept : 1, around = (double)halo_bytes(d);
+    printf("%-12s %s, %.4g per kept voxel", "size", trip_format_bytes(info->bytes, bytes),
+           ((double)info->bytes - around) / kept);
+    if (info->halo)
+        printf(" and %s of halo, %.4g with it", trip_format_bytes(halo_bytes(d), halo),
+               (double)info->bytes / kept);
+    printf("; index %s (%.2g %%)\n", trip_format_bytes(info->index_bytes, index),
+           100.0 * (double)info->index_bytes / (double)info->bytes);
+    printf("%-12s %u byte%s a code", "planes", info->code_bytes, info->code_bytes > 1 ? "s" : "");
+    if (info->normal_bytes)
+        printf(", %u a normal", info->normal_bytes);
+    putchar('\n');
+}
+
+/* Length of a step along an axis of a list's grid, in those of the data set's. */
+static double ratio(const triptych_info *info, const triptych_list *list, int axis)
+{
+    return trip_length(direction(list->index_to_world, axis)) /
+           trip_length(direction(info->index_to_world, axis));
+}
+
+/* A list; its grid where that is not the data set's. */
+static void print_list(const triptych_info *info, const triptych_list *list)
+{
+    char bytes[32], name[32], text[3][32];
+    snprintf(name, sizeof name, "%c%u %s", 'x' + list->axis, list->level, list->kind);
+    printf("%-12s %llu records, %llu bricks, %s", name, (unsigned long long)list->records,
+           (unsigned long long)list->bricks, trip_format_bytes(list->bytes, bytes));
+    if (list->level > 0)
+        printf("; %lld x %lld x %lld, %s x %s x %s voxels of level 0 each",
+               (long long)list->dims[0], (long long)list->dims[1], (long long)list->dims[2],
+               shortest(ratio(info, list, 0), text[0]), shortest(ratio(info, list, 1), text[1]),
+               shortest(ratio(info, list, 2), text[2]));
+    putchar('\n');
+}
+
+static void print_text(const data_set *d)
+{
+    const triptych_info *info = &d->info;
+    double voxels = info->voxels ? (double)info->voxels : 1;
+    printf("%-12s ", "data set");
+    trip_text_write(stdout, d->path);
+    printf(" (format version %u)\n", info->format_version);
+    printf("%-12s %lld x %lld x %lld\n", "grid", (long long)info->dims[0], (long long)info->dims[1],
+           (long long)info->dims[2]);
+    print_world(info);
+    if (space_of(d->source.root))
+        print_anatomy(info, space_of(d->source.root));
+    print_range("values", info->value_min, info->value_max);
+    print_range("codes for", info->code_lo, info->code_hi);
+    printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);
+    printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
+           100.0 * (double)info->kept / voxels);
+    if (info->halo)
+        printf("%-12s %llu neighbours of those, likewise\n", "halo",
+               (unsigned long long)info->halo);
+    print_sizes(d);
+    printf("%-12s tiles of %u x %u voxels over %u sheets\n", "bricks", info->tile_voxels,
+           info->tile_voxels, info->slab_sheets);
+    for (unsigned i = 0; i < info->lists; i++)
+        print_list(info, &d->lists[i]);
+    print_notes(d->source.root);
+}
+
+static int read_lists(data_set *d)
+{
+    int status = 0;
+    d->lists = calloc(d->info.lists, sizeof *d->lists);
+    if (!d->lists)
+        return trip_fail(TRIP_ERROR, "info", d->path, "out of memory");
+    for (unsigned i = 0; i < d->info.lists && !status; i++)
+        status = triptych_get_list(d->t, i, &d->lists[i]);
+    return status;
+}
+
+static int show(const options *o, data_set *d, trip_budget *budget)
+{
+    int status = triptych_open(d->t, o->path, NULL);
+    if (status == TRIP_OK && o->verify)
+        status = triptych_verify(d->t);
+    if (status == TRIP_OK)
+        status = triptych_get_info(d->t, &d->info);
+    if (status == TRIP_OK)
+        status = read_lists(d);
+    if (status == TRIP_OK)
+        status = trip_json_parse(&d->source, d->info.notes, o->path, budget);
+    if (status == TRIP_OK && o->json)
+        status = print_json(d, o->verify);
+    else if (status == TRIP_OK)
+        print_text(d);
+    if (status == TRIP_OK && o->verify && !o->json)
+        printf("%-12s every page and record is as it was written\n", "verified");
+    return status;
+}
+
+int trip_command_info(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse_option,
+        .args_doc = "NAME.trip",
+        .doc = "Show what is in a data set: grid, values, sizes, where it came from.",
+    };
+    options o = { 0 };
+    data_set d = { 0 };
+    trip_budget *budget = NULL;
+    int status = trip_options_parse(&argp, argc, argv, &o);
+    d.path = o.path;
+    if (status == 0)
+        status = trip_budget_create(&budget, 0);
+    if (status == 0)
+        status = library_create(&d.t, NULL);
+    if (status == 0)
+        status = show(&o, &d, budget);
+    trip_json_free(&d.source);
+    free(d.lists);
+    triptych_destroy(d.t);
+    if (budget)
+        trip_budget_destroy(budget);
+    return trip_exit_status(status);
+}

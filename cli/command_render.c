@@ -1,0 +1,430 @@
+/* triptych render: data set -> plan -> reader -> renderer -> merge -> image files or a video. */
+#include "commands.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cached_volume.h"
+#include "flight.h"
+#include "library.h"
+#include "piped_tf.h"
+#include "render_files.h"
+#include "render_options.h"
+#include "render_stats.h"
+#include "render_view.h"
+#include "report.h"
+#include "sequence.h"
+#include "video.h"
+
+/* The context, whose helper for pictures ends with the program. */
+static triptych *context;
+
+/* Everything that lives as long as the command. */
+typedef struct drawing {
+    render_options o;
+    piped_tf function;
+    cached_volume volume; /* where the input is one */
+    triptych *t;
+    float *rgba, *depth; /* depth: NULL without --depth */
+    sequence sequence;
+    bool by_cameras; /* frames are set by the sequence, not by turning the view that was found */
+    video *video;    /* NULL: pictures are written */
+    render_stats *stats;
+    trip_progress progress;
+    int empty; /* pictures that show nothing */
+} drawing;
+
+/* What is kept of a volume: what is shown by default, and what functions show besides, so that
+ * nothing is missing; everything where a window moves them, so that the next window finds it in the
+ * cache. Without a sequence: what is shown by default alone. */
+static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
+{
+    enum { THREAD_LIMIT = 256 };
+    triptych_brick_options options = o->volume;
+    options.keep_all = shown && o->function.window > 0;
+    if (shown && !options.keep_all) {
+        options.functions = shown->names;
+        options.function_count = shown->name_count;
+        options.ranges = shown->ranges;
+        options.range_count = shown->range_count;
+    }
+    options.automatic = 1;
+    options.levels_for = o->levels_for;
+    options.memory_bytes = o->memory_bytes;
+    options.threads = (unsigned)(o->threads < THREAD_LIMIT ? o->threads : THREAD_LIMIT);
+    return options;
+}
+
+static int brick_volume(drawing *d)
+{
+    const render_options *o = &d->o;
+    const triptych_brick_options wanted = brick_options(o, &d->sequence);
+    int status = cached_volume_open(&d->volume, d->t, o->input, &wanted);
+    trip_progress_end(&d->progress);
+    if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
+        printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
+    return status;
+}
+
+static int open_data(drawing *d, const char *path)
+{
+    const render_options *o = &d->o;
+    int status =
+        triptych_open(d->t, path,
+                      &(triptych_resources){ .memory_bytes = o->memory_bytes,
+                                             .threads = (unsigned)o->threads,
+                                             .renderer = o->renderer,
+                                             .engine = o->engine,
+                                             .keep_pages = d->sequence.frames > 1,
+                                             .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
+                                             .name = o->input });
+    return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
+}
+
+/* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
+ * function shows; 0: it does not, or there are several. */
+static int open_default(drawing *d)
+{
+    triptych_transfer_function look = d->o.function;
+    const triptych_brick_options defaults = brick_options(&d->o, NULL);
+    const bool other = look.name || look.window > 0;
+    int missing = 0, status = other && !sequence_has_functions(&d->sequence)
+                                  ? cached_volume_find(&d->volume, d->t, d->o.input, &defaults)
+                                  : 0;
+    trip_progress_end(&d->progress);
+    if (status != 1)
+        return status;
+    look.left_out = &missing;
+    status = open_data(d, d->volume.path);
+    if (!status)
+        status = triptych_set_transfer_function(d->t, &look);
+    if (!missing || status < 0)
+        return status < 0 ? status : 1;
+    triptych_close(d->t);
+    cached_volume_close(&d->volume);
+    return 0;
+}
+
+static int open_from_cache(drawing *d)
+{
+    int status = open_default(d);
+    if (status != 0)
+        return status < 0 ? status : 0;
+    status = brick_volume(d);
+    if (!status)
+        status = open_data(d, d->volume.path);
+    return status ? status : triptych_set_transfer_function(d->t, &d->o.function);
+}
+
+/* What was chosen of the volume is said whether it was bricked now or before. */
+static int open_volume(drawing *d)
+{
+    int status = open_from_cache(d);
+    if (!status)
+        status = quality_options_check_data(d->o.measured, d->t, d->o.input);
+    if (!status && d->o.field == RENDER_FIELD_SOURCE)
+        status = triptych_set_source(d->t, d->o.input, &d->o.volume);
+    char *note = status == 0 ? library_note(d->t, "note") : NULL;
+    if (note)
+        trip_note(d->o.input, "%s", note);
+    free(note);
+    return status;
+}
+
+static int open_input(drawing *d)
+{
+    if (cached_volume_wanted(d->o.input))
+        return open_volume(d);
+    int status = open_data(d, d->o.input);
+    return status ? status : triptych_set_transfer_function(d->t, &d->o.function);
+}
+
+static int create_context(drawing *d)
+{
+    d->progress = trip_progress_start(false);
+    int status = library_create(&context, &d->progress);
+    d->t = context;
+    return status;
+}
+
+static const char *data_path(const drawing *d)
+{
+    return d->volume.path ? d->volume.path : d->o.input;
+}
+
+static int take_pictures(drawing *d)
+{
+    const render_options *o = &d->o;
+    int status = triptych_new_picture(d->t, o->width, o->height, 4, &d->rgba);
+    if (!status && o->depth)
+        status = triptych_new_picture(d->t, o->width, o->height, 1, &d->depth);
+    return status ? status : triptych_set_settings(d->t, &o->settings);
+}
+
+static int open_drawing(drawing *d)
+{
+    const triptych_view view = render_view(&d->o);
+    int status = sequence_find_shown(&d->sequence);
+    if (!status)
+        status = open_input(d);
+    if (!status)
+        status = take_pictures(d);
+    if (!status && !d->o.path)
+        status = triptych_set_view(d->t, &view);
+    if (!status && d->o.stats)
+        status = render_stats_create(&d->stats);
+    return status;
+}
+
+static void close_drawing(drawing *d)
+{
+    render_stats_destroy(d->stats);
+    video_abandon(d->video);
+    sequence_release(&d->sequence);
+    if (d->t) {
+        triptych_end(d->t);
+        triptych_close(d->t); /* the pictures too */
+    }
+    cached_volume_close(&d->volume);
+}
+
+/* A view of the orbit or the path. */
+static int set_frame(drawing *d, int index)
+{
+    if (d->by_cameras)
+        return sequence_set_frame(&d->sequence, d->t, index, false);
+    return triptych_turn(d->t, d->o.orbit ? 360.0 * index / d->o.orbit : 0);
+}
+
+/* Draws the frame that is begun. */
+static int draw_frame(drawing *d)
+{
+    enum { LOOK_NS = 20000000 };
+    int status = 0;
+    d->progress = trip_progress_start(false);
+    while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_WAITS)
+        status = triptych_await(d->t, LOOK_NS);
+    if (!status)
+        status = d->depth ? triptych_picture_and_depth(d->t, d->rgba, d->depth)
+                          : triptych_picture(d->t, d->rgba);
+    trip_progress_end(&d->progress);
+    return status;
+}
+
+/* The plan before the frame is drawn, what it cost afterwards. */
+static int draw_planned(drawing *d, int index)
+{
+    int status = set_frame(d, index);
+    if (!status)
+        status = triptych_begin(d->t);
+    if (!status && d->o.explain)
+        status = render_stats_explain_plan(d->t, stdout);
+    if (!status)
+        status = draw_frame(d);
+    triptych_end(d->t);
+    if (!status && d->o.explain)
+        status = render_stats_explain_cost(&d->o, d->t, stdout);
+    return status;
+}
+
+/* The picture and its distances, if the frame goes into files of its own. */
+static int write_image(void *user, triptych *t, int index, const float *rgba, const float *depth)
+{
+    const drawing *d = user;
+    char path[RENDER_FILE_BYTES];
+    int status = d->video ? 0 : render_file_name(&d->o, d->o.output, index, path);
+    if (!status && !d->video)
+        status = triptych_write(t, path, d->o.width, d->o.height, rgba);
+    if (!status && depth)
+        status = render_file_name(&d->o, d->o.depth, index, path);
+    if (!status && depth)
+        status = triptych_write_depth(t, path, d->o.width, d->o.height, depth);
+    return status;
+}
+
+/* Whether all that is to be seen is what lies behind the volume. */
+static bool is_empty(const render_options *o, const float *rgba)
+{
+    const double *ground = o->settings.background;
+    const size_t pixels = (size_t)o->width * (size_t)o->height;
+    double max = 0;
+    for (size_t i = 0; i < 4 * pixels && max < 1e-6; i++)
+        max = fabs((double)rgba[i] - (i % 4 < 3 ? ground[i % 4] : 1) * ground[3]);
+    return max < 1e-6;
+}
+
+static void warn_of_empty(const drawing *d)
+{
+    const int frames = d->sequence.frames;
+    char which[64] = "the picture shows";
+    if (frames > 1)
+        snprintf(which, sizeof which, "%d of %d pictures show", d->empty, frames);
+    if (d->empty)
+        trip_warn(d->o.output,
+                  "%s nothing but the background: the view, what is cut away and the function "
+                  "decide what is to be seen",
+                  which);
+}
+
+/* What follows in the order of the frames. */
+static int finish_image(void *user, triptych *t, int index, const float *rgba)
+{
+    drawing *d = user;
+    char path[RENDER_FILE_BYTES];
+    int status = d->video ? video_add(d->video, rgba) : 0;
+    d->empty += is_empty(&d->o, rgba);
+    if (!status)
+        status = render_file_name(&d->o, d->o.output, index, path);
+    if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
+        status = render_stats_summary(path, &d->o, t, stdout);
+    return status;
+}
+
+static int draw_image(drawing *d, int index)
+{
+    int status = draw_planned(d, index);
+    if (!status && d->stats)
+        status = render_stats_add_frame(d->stats, d->t);
+    if (!status)
+        status = write_image(d, d->t, index, d->rgba, d->depth);
+    return status ? status : finish_image(d, d->t, index, d->rgba);
+}
+
+/* How many frames are drawn at once: one where each is to be timed, or where a second
+ * would take what the first needs. */
+static int contexts_of(const drawing *d)
+{
+    enum { USUAL = 2 };
+    const render_options *o = &d->o;
+    bool slow = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ||
+                o->renderer == TRIPTYCH_RENDERER_REFERENCE || o->engine == TRIPTYCH_ENGINE_NULL;
+    if (d->sequence.frames < 2 || o->stats || o->explain || o->field == RENDER_FIELD_SOURCE)
+        return 1;
+    return o->in_flight ? o->in_flight : slow ? 1 : USUAL;
+}
+
+/* With all of the memory again, after frames in flight. */
+static int reopen(drawing *d)
+{
+    int status = open_data(d, data_path(d));
+    if (!status)
+        status = library_set_function_quietly(d->t, &d->o.function);
+    return status ? status : take_pictures(d);
+}
+
+/* From frame *first on, which is counted up. */
+static int draw_in_flight(drawing *d, int *first)
+{
+    const flight f = { .o = &d->o,
+                       .sequence = &d->sequence,
+                       .data = data_path(d),
+                       .contexts = contexts_of(d),
+                       .write = write_image,
+                       .then = finish_image,
+                       .user = d };
+    if (f.contexts < 2)
+        return 0;
+    triptych_close(d->t);
+    d->rgba = d->depth = NULL;
+    d->by_cameras = true;
+    int status = flight_draw(&f, first);
+    return status > 0 ? reopen(d) : status;
+}
+
+static int start_video(drawing *d)
+{
+    const render_options *o = &d->o;
+    if (!video_is_named(o->output))
+        return 0;
+    return video_create(&d->video, o->output, o->width, o->height,
+                        sequence_frames_per_second(&d->sequence));
+}
+
+static int draw_images(drawing *d)
+{
+    int first = 0,
+        status = d->sequence.frames > 1 || d->o.path ? sequence_prepare(&d->sequence, d->t) : 0;
+    d->by_cameras = d->o.path;
+    if (!status)
+        status = start_video(d);
+    if (!status)
+        status = draw_in_flight(d, &first);
+    for (int i = first; i < d->sequence.frames && !status; i++)
+        status = draw_image(d, i);
+    if (!status && d->video) {
+        status = video_finish(d->video);
+        d->video = NULL;
+    }
+    return status;
+}
+
+static int count_image(drawing *d, int index)
+{
+    int status = set_frame(d, index);
+    if (!status)
+        status = triptych_begin(d->t);
+    if (!status)
+        status = draw_frame(d);
+    triptych_end(d->t);
+    if (!status && d->stats)
+        status = render_stats_add_count(d->stats, index, d->t);
+    if (!status && d->o.explain)
+        status = render_stats_explain_count(d->t, stdout);
+    return status;
+}
+
+/* Counting comes after all pictures are there, with a reader of its own, so that it changes nothing
+ * that was timed. */
+static int count_images(drawing *d, int images)
+{
+    triptych_settings counted = d->o.settings;
+    counted.count = 1;
+    int status = triptych_set_settings(d->t, &counted);
+    for (int i = 0; i < images && !status; i++)
+        status = count_image(d, i);
+    return status;
+}
+
+/* That the program can write pictures of these kinds. */
+static int check_kinds(drawing *d)
+{
+    const render_options *o = &d->o;
+    bool is_video = video_is_named(o->output);
+    return is_video ? video_check(o->output, o->width, o->height)
+                    : triptych_prepare_write(d->t, o->output, o->depth);
+}
+
+int trip_command_render(int argc, char **argv)
+{
+    drawing d = { 0 };
+    int status = render_options_parse(&d.o, argc, argv);
+    if (!status)
+        status = create_context(&d);
+    if (!status)
+        status = check_kinds(&d);
+    if (!status)
+        status = sequence_load(&d.sequence, &d.o);
+    if (!status)
+        status = render_files_check(&d.sequence, d.t);
+    if (!status)
+        status = piped_tf_keep(&d.function, d.t, &d.o.function.name);
+    if (!status)
+        status = open_drawing(&d);
+    if (!status)
+        status = draw_images(&d);
+    if (!status)
+        warn_of_empty(&d);
+    if (!status && d.stats)
+        status = render_stats_describe(d.stats, &d.o, d.t);
+    if (!status && d.o.count)
+        status = count_images(&d, d.sequence.frames);
+    if (!status && d.stats)
+        status = render_stats_write(d.stats, &d.o);
+    if (status == TRIP_ERROR && d.volume.hold >= 0 && d.volume.path)
+        cached_volume_check(&d.volume, d.t, d.o.input);
+    close_drawing(&d);
+    piped_tf_release(&d.function);
+    return trip_exit_status(status);
+}

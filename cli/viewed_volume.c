@@ -1,0 +1,166 @@
+#include "viewed_volume.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "quality_options.h"
+#include "report.h"
+#include "transfer_function.h"
+
+/* Of volumes whose files are larger, at least, a version of so many voxels is made first. */
+#define LARGE_BYTES (UINT64_C(8) << 20)
+#define SMALL_VOXELS (UINT64_C(1) << 21)
+
+static triptych_brick_options options_of(const viewed_volume *s, bool keep_all)
+{
+    triptych_brick_options wanted = s->options;
+    wanted.functions = &s->function;
+    wanted.function_count = s->function && !keep_all;
+    wanted.automatic = !keep_all;
+    wanted.keep_all = keep_all;
+    return wanted;
+}
+
+static int pass_file(void *user, const char *path)
+{
+    (void)user, (void)path;
+    return 0;
+}
+
+static int check_volume(const viewed_volume *s, triptych *t, const char *volume)
+{
+    trip_tf *tf = NULL;
+    int status = triptych_list_files(t, volume, &s->options, pass_file, NULL);
+    if (!status && access(volume, R_OK) != 0 && !strpbrk(volume, "*?[%"))
+        status = trip_fail_errno("read", volume, "cannot open");
+    if (!status && s->function)
+        status = trip_tf_load(&tf, s->function);
+    trip_tf_destroy(tf);
+    return status;
+}
+
+int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
+                        const triptych_resources *resources)
+{
+    if (cached_volume_wanted(input))
+        return check_volume(s, t, input);
+    int status = triptych_open(t, input, resources);
+    if (!status) /* warnings are for whoever looks */
+        status =
+            library_set_function_quietly(t, &(triptych_transfer_function){ .name = s->function });
+    triptych_close(t);
+    return status;
+}
+
+/* The folder that it lies in, with the last slash, for free(). */
+static char *folder_of(const char *path)
+{
+    char *folder = strdup(path);
+    size_t n = folder ? strlen(folder) : 0;
+    while (n > 1 && folder[n - 1] == '/')
+        n--;
+    while (n > 0 && folder[n - 1] != '/')
+        n--;
+    if (folder)
+        folder[n] = 0;
+    return folder;
+}
+
+/* What a data set was made of, for free(); NULL where that is reported not to lie beside it. */
+static char *source_of(triptych *t, const char *data_set)
+{
+    char *name = triptych_open(t, data_set, NULL) == 0 ? library_note(t, "source") : NULL;
+    char *folder = name ? folder_of(data_set) : NULL, *path = NULL;
+    triptych_close(t);
+    if (folder && asprintf(&path, "%s%s", folder, name) < 0)
+        path = NULL;
+    if (!path || access(path, R_OK)) {
+        trip_fail(TRIP_ERROR, "brick", name ? name : data_set,
+                  "the volume it was made of is not beside it");
+        free(path);
+        path = NULL;
+    }
+    free(folder);
+    free(name);
+    return path;
+}
+
+/* Of the data set that a volume is drawn from at first: what is made of it later holds more. */
+static int check_measured(const viewed_volume *s, triptych *t, const char *path, const char *volume)
+{
+    if (!s->measured || strcmp(volume, s->measured_volume) != 0)
+        return 0;
+    int status = triptych_open(t, path, NULL);
+    if (!status)
+        status = quality_options_check_data(s->measured, t, volume);
+    triptych_close(t);
+    return status;
+}
+
+static int open_volume(const viewed_volume *s, cached_volume *cached, triptych *t,
+                       const char *input, bool keep_all)
+{
+    const triptych_brick_options wanted = options_of(s, keep_all);
+    char *volume = cached_volume_wanted(input) ? strdup(input) : source_of(t, input);
+    int status = volume ? cached_volume_open(cached, t, volume, &wanted) : TRIP_ERROR;
+    if (!status && !keep_all)
+        status = check_measured(s, t, cached->path, volume);
+    free(volume);
+    return status;
+}
+
+/* 1: a small one is to be made first. */
+static int is_large(const viewed_volume *s, triptych *t, const char *volume)
+{
+    const triptych_brick_options wanted = options_of(s, false);
+    cached_volume found = { .hold = -1 };
+    triptych_identity identity;
+    int there = cached_volume_find(&found, t, volume, &wanted);
+    if (there > 0)
+        cached_volume_close(&found);
+    if (there)
+        return there < 0 ? there : 0;
+    int status = triptych_identify(t, volume, &wanted, 0, &identity);
+    return status ? status : identity.bytes > LARGE_BYTES;
+}
+
+static int open_small(viewed_volume *s, triptych *t, const char *volume)
+{
+    triptych_brick_options wanted = options_of(s, false);
+    wanted.max_voxels = SMALL_VOXELS;
+    wanted.levels = -1;
+    return cached_volume_open(&s->cached, t, volume, &wanted);
+}
+
+int viewed_volume_find(void *user, triptych *t, const char *input, bool keep_all, bool *small,
+                       const char **path)
+{
+    viewed_volume *s = user;
+    *path = input;
+    if (!keep_all && !cached_volume_wanted(input))
+        return 0;
+    int status = s->samples && !keep_all ? is_large(s, t, input) : 0;
+    *small = status > 0;
+    if (*small)
+        status = open_small(s, t, input);
+    else if (!status)
+        status = open_volume(s, &s->cached, t, input, keep_all);
+    *path = s->cached.path;
+    return status;
+}
+
+void viewed_volume_release(void *user)
+{
+    viewed_volume *s = user;
+    cached_volume_close(&s->cached);
+}
+
+int viewed_volume_make(void *user, triptych *t, const char *input, bool keep_all)
+{
+    cached_volume made = { .hold = -1 };
+    const int status = open_volume(user, &made, t, input, keep_all);
+    cached_volume_close(&made);
+    return status;
+}

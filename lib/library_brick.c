@@ -1,0 +1,312 @@
+/* Data sets of volumes: triptych_brick.h. */
+#include "triptych_brick.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "anatomy.h"
+#include "brick.h"
+#include "library_context.h"
+#include "identity.h"
+#include "report.h"
+#include "source.h"
+#include "source_field.h"
+
+static trip_volume_params volume_params(const triptych_brick_options *o)
+{
+    return (trip_volume_params){
+        .grid = o->grid,
+        .level_set = (trip_level_set_mode)o->level_set,
+        .raw_dims = { o->raw_dims[0], o->raw_dims[1], o->raw_dims[2] },
+        .raw_type = o->raw_type,
+        .coordinates = o->coordinates,
+        .spacing = { o->spacing[0], o->spacing[1], o->spacing[2] },
+        .raw_endian = (int)o->raw_endian,
+        .raw_offset_bytes = o->raw_offset_bytes,
+        .axes = o->axes,
+        .allow_gaps = o->allow_gaps,
+        .max_voxels = o->max_voxels,
+    };
+}
+
+static trip_region region_of(const triptych_brick_options *o)
+{
+    return (trip_region){
+        .first = { o->region_first[0], o->region_first[1], o->region_first[2] },
+        .past = { o->region_past[0], o->region_past[1], o->region_past[2] },
+    };
+}
+
+/* `ranges`: the options', as the bricker takes them. */
+static trip_brick_params brick_params(triptych *t, const char *volume,
+                                      const triptych_brick_options *o,
+                                      const trip_value_range *ranges)
+{
+    return (trip_brick_params){
+        .input = volume,
+        .volume = volume_params(o),
+        .functions = o->functions,
+        .function_count = o->function_count,
+        .ranges = ranges,
+        .range_count = o->range_count,
+        .keep_all = o->keep_all,
+        .automatic = o->automatic,
+        .region = region_of(o),
+        .code_bits = (trip_brick_code_bits)o->code_bits,
+        .normals = (trip_brick_normals)o->normals,
+        .no_halo = o->no_halo,
+        .levels = o->levels,
+        .levels_for = (trip_brick_levels_for)o->levels_for,
+        .replace = o->replace,
+        .resume = o->resume,
+        .tile_voxels = o->tile_voxels,
+        .slab_sheets = o->slab_sheets,
+        .memory_bytes = o->memory_bytes,
+        .threads = trip_context_threads(o->threads),
+        .max_bytes = o->max_bytes,
+        .progress = t->show ? trip_context_show_stage : NULL,
+        .progress_user = t,
+    };
+}
+
+static const char *fault_of_volume(const triptych_brick_options *o)
+{
+    for (int a = 0; a < 3; a++) {
+        if (!(o->spacing[a] >= 0 && isfinite(o->spacing[a])))
+            return "the spacing of voxels is finite and not below 0";
+        if (o->raw_dims[a] < 0 || o->raw_dims[a] > INT32_MAX)
+            return "raw data has 1 to 2147483647 voxels along each axis";
+    }
+    if (o->axes && !trip_anatomy_axes_valid(o->axes))
+        return "the axes are three letters: one of R and L, of A and P and of S and I each";
+    if (o->raw_type && !triptych_is_raw_type(o->raw_type))
+        return "there is no such type of raw data";
+    if (o->raw_offset_bytes > UINT64_C(1) << 62)
+        return "raw data starts too far into the file";
+    if (o->level_set < TRIPTYCH_LEVEL_SET_DEFAULT || o->level_set > TRIPTYCH_LEVEL_SET_BAND ||
+        o->raw_endian < TRIPTYCH_ENDIAN_NATIVE || o->raw_endian > TRIPTYCH_ENDIAN_BIG)
+        return "there is no such level set or byte order";
+    return NULL;
+}
+
+static const char *fault_of_options(const triptych_brick_options *o)
+{
+    unsigned tile = o->tile_voxels;
+    if (tile && tile != 16 && tile != 32 && tile != 64 && tile != 128)
+        return "a tile has 16, 32, 64 or 128 voxels either way";
+    if (o->slab_sheets > 64)
+        return "a brick has 1 to 64 sheets";
+    if (o->code_bits < TRIPTYCH_CODE_BITS_AUTO || o->code_bits > TRIPTYCH_CODE_BITS_16)
+        return "codes have 8 or 16 bits";
+    if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_NONE)
+        return "there are no such normals";
+    if (o->levels_for < TRIPTYCH_LEVELS_FOR_AUTO || o->levels_for > TRIPTYCH_LEVELS_FOR_BOTH)
+        return "coarse levels are for post, pre or both";
+    if (o->no_halo &&
+        (o->levels_for == TRIPTYCH_LEVELS_FOR_POST || o->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
+        return "coarse levels for post need the halo";
+    for (size_t i = 0; i < o->range_count; i++)
+        if (!(o->ranges[i].lo <= o->ranges[i].hi))
+            return "the lower end of a range is above the upper";
+    return fault_of_volume(o);
+}
+
+/* Bricking's parameters; *ranges is for free(). */
+static int make_params(triptych *t, const char *volume, const triptych_brick_options *options,
+                       trip_value_range **ranges, trip_brick_params *out)
+{
+    const triptych_brick_options o = options ? *options : (triptych_brick_options){ 0 };
+    const char *fault = fault_of_options(&o);
+    int status = trip_context_check_idle(t, false);
+    *ranges = NULL;
+    if (!status && fault)
+        status = trip_fail(TRIP_USAGE, "brick", volume, "%s", fault);
+    if (!status && !(*ranges = calloc(o.range_count + 1, sizeof **ranges)))
+        status = trip_fail(TRIP_ERROR, "brick", volume, "out of memory");
+    for (size_t i = 0; i < o.range_count && !status; i++)
+        (*ranges)[i] = (trip_value_range){ o.ranges[i].lo, o.ranges[i].hi };
+    *out = brick_params(t, volume, &o, *ranges);
+    return status;
+}
+
+static triptych_brick_summary summary_of(const trip_brick_summary *s)
+{
+    triptych_brick_summary out = {
+        .value_min = s->value_min,
+        .value_max = s->value_max,
+        .voxels = s->voxels,
+        .kept = s->kept,
+        .halo = s->halo,
+        .not_finite = s->not_finite,
+        .code_bytes = s->code_bytes,
+        .normal_bytes = s->normal_bytes,
+        .kind = trip_tf_kind_name(s->kind),
+        .kind_title = trip_tf_kind_title(s->kind),
+        .input_bytes = s->input_bytes,
+        .bytes = s->bytes,
+        .halo_bytes = s->halo_bytes,
+        .level_bytes = s->level_bytes,
+        .levels = s->levels,
+        .temporary_bytes = s->temporary_bytes,
+        .resumed = s->resumed,
+        .memory_bytes = s->memory_bytes,
+        .peak_memory_bytes = s->peak_memory_bytes,
+    };
+    for (int a = 0; a < 3; a++) {
+        out.dims[a] = s->dims[a];
+        out.spacing[a] = s->spacing[a];
+    }
+    for (int i = 0; i < TRIPTYCH_STAGES; i++)
+        out.stages[i] = (triptych_brick_stage){ s->stages[i].seconds, s->stages[i].bytes_read,
+                                                s->stages[i].bytes_written };
+    snprintf(out.note, sizeof out.note, "%s", s->note);
+    return out;
+}
+
+int triptych_brick(triptych *t, const char *volume, const char *data_set,
+                   const triptych_brick_options *options, triptych_brick_summary *summary)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    trip_value_range *ranges;
+    trip_brick_params params;
+    trip_brick_summary made = { 0 };
+    int status = make_params(t, volume, options, &ranges, &params);
+    params.output = data_set;
+    if (!status)
+        status = trip_brick(&params, &made);
+    if (summary)
+        *summary = status ? (triptych_brick_summary){ 0 } : summary_of(&made);
+    free(ranges);
+    return trip_context_leave(before, status);
+}
+
+int triptych_estimate(triptych *t, const char *volume, const char *data_set,
+                      const triptych_brick_options *options, triptych_brick_estimate *out)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    trip_value_range *ranges;
+    trip_brick_params params;
+    trip_brick_estimate e = { 0 };
+    int status = make_params(t, volume, options, &ranges, &params);
+    params.output = data_set;
+    if (!status)
+        status = trip_brick_estimate_make(&params, &e);
+    *out = (triptych_brick_estimate){ 0 };
+    if (!status)
+        *out = (triptych_brick_estimate){ e.voxels,          e.kept,       e.halo,   e.bytes,
+                                          e.temporary_bytes, e.free_bytes, e.seconds };
+    free(ranges);
+    return trip_context_leave(before, status);
+}
+
+static void show_bytes(void *user, uint64_t done, uint64_t total)
+{
+    trip_context_show_stage(user, "look", done, total);
+}
+
+/* The options and the program's version: another one may make another data set of the same volume.
+ */
+static int describe_options(const trip_brick_params *params, char **text)
+{
+    char *options = NULL;
+    int status = trip_brick_options_text(params, &options);
+    if (status)
+        return status;
+    int length = asprintf(text, "%s" TRIP_VERSION "\n", options);
+    free(options);
+    if (length >= 0)
+        return 0;
+    *text = NULL;
+    return trip_fail(TRIP_ERROR, "brick", params->input, "out of memory");
+}
+
+static int identify(triptych *t, const trip_brick_params *params, uint64_t max_content_bytes,
+                    triptych_identity *out)
+{
+    trip_source source = { 0 };
+    trip_digest state = { "" }, content = { "" };
+    char *text = NULL;
+    int status = trip_source_find(&source, params->input, &params->volume);
+    if (!status)
+        status = describe_options(params, &text);
+    if (!status)
+        status = trip_source_digest_state(&source, text, &state);
+    out->stable = !status && trip_source_is_stable(&source); /* before the content is read */
+    if (!status && max_content_bytes > 0 && source.bytes <= max_content_bytes)
+        status =
+            trip_source_digest_content(&source, text, &content, t->show ? show_bytes : NULL, t);
+    out->bytes = source.bytes;
+    memcpy(out->state, state.text, sizeof out->state);
+    memcpy(out->content, content.text, sizeof out->content);
+    trip_source_free(&source);
+    free(text);
+    return status;
+}
+
+int triptych_identify(triptych *t, const char *volume, const triptych_brick_options *options,
+                      uint64_t max_content_bytes, triptych_identity *out)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    trip_value_range *ranges;
+    trip_brick_params params;
+    *out = (triptych_identity){ 0 };
+    int status = make_params(t, volume, options, &ranges, &params);
+    if (!status)
+        status = identify(t, &params, max_content_bytes, out);
+    free(ranges);
+    return trip_context_leave(before, status);
+}
+
+static int list_files(const char *volume, const triptych_brick_options *o,
+                      int (*found)(void *user, const char *path), void *user)
+{
+    const trip_volume_params params = volume_params(o);
+    const char *fault = fault_of_volume(o);
+    trip_source source = { 0 };
+    if (fault)
+        return trip_fail(TRIP_USAGE, "read", volume, "%s", fault);
+    int status = trip_source_find(&source, volume, &params);
+    for (size_t i = 0; i < source.count && status >= 0; i++)
+        status = found(user, source.files[i].path);
+    trip_source_free(&source);
+    return status < 0 ? status : 0;
+}
+
+int triptych_list_files(triptych *t, const char *volume, const triptych_brick_options *options,
+                        int (*found)(void *user, const char *path), void *user)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_brick_options defaults = { 0 };
+    return trip_context_leave(before,
+                              list_files(volume, options ? options : &defaults, found, user));
+}
+
+static int use_source(triptych *t, const char *path, const triptych_brick_options *o)
+{
+    const trip_volume_params params = volume_params(o);
+    const char *fault = fault_of_volume(o);
+    int status = trip_context_check_idle(t, true);
+    if (!status && fault)
+        status = trip_fail(TRIP_USAGE, "read", path, "%s", fault);
+    if (!status && t->resources.renderer != TRIPTYCH_RENDERER_INTEGRAL)
+        status = trip_fail(TRIP_USAGE, "render", path,
+                           "only the integral renderer draws from a volume's own values");
+    if (status)
+        return status;
+    trip_context_drop_renderer(t); /* the field of which would take as much again */
+    trip_field_destroy(t->source);
+    return trip_source_field_read(&t->source, t->session.data, path, &params, t->session.budget);
+}
+
+int triptych_set_source(triptych *t, const char *volume, const triptych_brick_options *options)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_brick_options defaults = { 0 };
+    return trip_context_leave(before, use_source(t, volume, options ? options : &defaults));
+}
+
+int triptych_is_raw_type(const char *name)
+{
+    return trip_scalar_from_name(name) >= 0;
+}

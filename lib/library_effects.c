@@ -1,0 +1,199 @@
+/* Which effects a frame has, and why; what light reaches, from frame to frame. */
+#include "library_context.h"
+#include "report.h"
+
+enum { CODES = 65536 };
+
+/* Whether most of what the function shows is opaque within a voxel. */
+static bool is_of_surfaces(const triptych *t)
+{
+    const trip_tf_entry *table = t->session.table;
+    const double voxel = t->camera.voxel_world;
+    int shown = 0, opaque = 0;
+    for (int code = 0; code < CODES; code++) {
+        shown += table[code].extinction > 0;
+        opaque += (double)table[code].extinction * voxel > 0.69314718055994531; /* half */
+    }
+    return 2 * opaque > shown;
+}
+
+/* What the kind of data and the function call for. */
+static int choose(triptych *t)
+{
+    const trip_tf_kind kind = trip_dataset_metadata_kind(t->session.text);
+    const bool surfaces = kind == TRIP_TF_LABELS && is_of_surfaces(t);
+    switch (kind) {
+    case TRIP_TF_FOG:
+        t->why_effects =
+            t->settings.headlight
+                ? "smoke, clouds or fog, lit from the eye: give the light a direction or place"
+                : "smoke, clouds or fog scatter the light";
+        return t->settings.headlight ? 0 : TRIPTYCH_SHADOWS;
+    case TRIP_TF_LABELS:
+        t->why_effects = surfaces ? "labels are drawn as surfaces"
+                                  : "labels that are seen through keep their colours";
+        return surfaces ? TRIPTYCH_OCCLUSION : 0;
+    case TRIP_TF_CT:
+    case TRIP_TF_MR:
+        t->why_effects = "a picture of measurements keeps the colours of its function";
+        return 0;
+    default:
+        t->why_effects = "values keep the colours of their function";
+        return 0;
+    }
+}
+
+static int check_effects(const triptych *t, int effects)
+{
+    if (!TRIP_HAS_EFFECTS && effects)
+        return trip_fail(TRIP_USAGE, "render", "effects", "this build has none");
+    if (effects & TRIPTYCH_EMISSION && !t->heat)
+        return trip_fail(TRIP_USAGE, "render", "emission",
+                         "there is no data set of heat that it could be of");
+    return 0;
+}
+
+int trip_context_choose_effects(triptych *t)
+{
+    trip_effects *e = &t->drawn_settings.effects;
+    int effects = t->effects & ~TRIPTYCH_EFFECTS_AUTO, status = 0;
+    t->why_effects = NULL;
+    if (t->effects & TRIPTYCH_EFFECTS_AUTO) {
+        status = session_read_text(&t->session);
+        effects |= status ? 0 : choose(t);
+        effects |= t->heat ? TRIPTYCH_EMISSION : 0;
+    }
+    if (t->settings.show == TRIP_SHOW_MERGE) /* nothing of the volume is */
+        effects = 0;
+    if (!status)
+        status = check_effects(t, effects);
+    e->shadows = effects & TRIPTYCH_SHADOWS;
+    e->occlusion = effects & TRIPTYCH_OCCLUSION;
+    e->emission = effects & TRIPTYCH_EMISSION;
+    e->cueing = effects & TRIPTYCH_CUEING ? t->settings.effects.cueing : 0;
+    return status;
+}
+
+void trip_context_drop_light(triptych *t)
+{
+    trip_light_map_destroy(t->light);
+    t->light = NULL;
+}
+
+int triptych_set_heat(triptych *t, const char *path)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    int status = trip_context_check_idle(t, true);
+    if (status)
+        return trip_context_leave(before, status);
+    trip_context_drop_heat(t);
+    return trip_context_leave(before,
+                              path ? trip_emission_create(&t->heat, path, t->session.budget) : 0);
+}
+
+void trip_context_drop_heat(triptych *t)
+{
+    trip_emission_destroy(t->heat);
+    t->heat = NULL;
+}
+
+/* The integral has each voxel's. */
+static int begin_heat(triptych *t)
+{
+    const trip_effects *e = &t->drawn_settings.effects;
+    const triptych_resources *r = &t->resources;
+    if (!e->emission) {
+        if (t->heat)
+            trip_emission_drop(t->heat);
+        return 0;
+    }
+    const trip_dataset *drawn = t->at_level ? t->at_level : t->session.data;
+    return trip_emission_begin(t->heat, &(trip_emission_params){
+                                            .index_to_world = &drawn->index_to_world,
+                                            .kelvin = { t->kelvin[0], t->kelvin[1] },
+                                            .cells = t->plan.gathers ? 0 : e->cells,
+                                            .engine = (trip_engine)r->engine,
+                                            .threads = trip_context_threads(r->threads),
+                                        });
+}
+
+static int begin_light(triptych *t)
+{
+    const triptych_resources *r = &t->resources;
+    if (!trip_effects_light(&t->drawn_settings.effects) || t->plan.gathers) {
+        trip_context_drop_light(t);
+        return 0;
+    }
+    int status = t->light ? 0 : trip_light_map_create(&t->light, t->session.budget);
+    const trip_light_source source = {
+        .data = t->at_level ? t->at_level : t->session.data,
+        .level = t->level,
+        .settings = &t->drawn_settings,
+        .clip = &t->plan.clip,
+        .table = t->session.table,
+        .engine = (trip_engine)r->engine,
+        .threads = trip_context_threads(r->threads),
+    };
+    return status ? status : trip_light_map_begin(t->light, &source);
+}
+
+int trip_context_begin_light(triptych *t)
+{
+    const int status = begin_heat(t);
+    return status ? status : begin_light(t);
+}
+
+static void explain(const triptych *t, const char *name, int effect, bool runs, FILE *out)
+{
+    const bool automatic = t->effects & TRIPTYCH_EFFECTS_AUTO;
+    const char *why = t->effects & effect ? "asked for" : "not asked for";
+    if (t->settings.show == TRIP_SHOW_MERGE && (automatic || t->effects & effect))
+        why = "the merge map has nothing of the volume";
+    /* Of fog it is shadows that there is something to say about, whether they run or not. */
+    else if (automatic && !(t->effects & effect) && effect == TRIPTYCH_EMISSION)
+        why = runs ? "a data set of heat is given" : "no data set of heat is given";
+    else if (automatic && !(t->effects & effect))
+        why = runs || effect == TRIPTYCH_SHADOWS ? t->why_effects
+                                                 : "the kind of data does not call for it";
+    fprintf(out, "%-11s %s: %s\n", name, runs ? "runs" : "does not run", why);
+}
+
+static void explain_lattice(const triptych *t, FILE *out)
+{
+    if (t->plan.gathers) {
+        fprintf(out, "light       by an integral from each place, %s\n",
+                t->drawn_settings.effects.occlusion ? "and as many as there are directions"
+                                                    : "towards the light");
+        return;
+    }
+    const trip_light_grid *grid = trip_light_map_gathered(t->light);
+    fprintf(out, "light       %d x %d x %d nodes, one in %g voxels: %s\n", grid->nodes[0],
+            grid->nodes[1], grid->nodes[2], grid->spacing,
+            trip_light_map_is_complete(t->light)
+                ? "kept from the frame before, nothing is read for it"
+                : "one more list is read for it");
+}
+
+static void explain_heat(const triptych *t, FILE *out)
+{
+    const trip_light_map *map = trip_emission_map(t->heat);
+    const trip_light_grid *grid = trip_light_map_gathered(map);
+    fprintf(out, "heat        %d x %d x %d nodes, one in %g voxels, %g to %g K: %s\n",
+            grid->nodes[0], grid->nodes[1], grid->nodes[2], grid->spacing, t->kelvin[0],
+            t->kelvin[1],
+            trip_light_map_is_complete(map) ? "kept from the frame before, nothing is read for it"
+                                            : "a list of its data set is read");
+}
+
+void trip_context_explain_effects(const triptych *t, FILE *out)
+{
+    const trip_effects *e = &t->drawn_settings.effects;
+    explain(t, "shadows", TRIPTYCH_SHADOWS, e->shadows, out);
+    explain(t, "occlusion", TRIPTYCH_OCCLUSION, e->occlusion, out);
+    explain(t, "emission", TRIPTYCH_EMISSION, e->emission, out);
+    explain(t, "cueing", TRIPTYCH_CUEING, e->cueing > 0, out);
+    if (trip_effects_light(e))
+        explain_lattice(t, out);
+    if (e->emission)
+        explain_heat(t, out);
+}

@@ -1,0 +1,280 @@
+#include "library_session.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "brick_command.h"
+#include "dataset_join.h"
+#include "report.h"
+
+static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
+
+enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MAX };
+
+/* Whether values which show were left out of some part, where the caller wants that in place of a
+ * warning. */
+static bool find_missing(const session *s, const trip_tf *tf, const session_look *look)
+{
+    double range[2];
+    bool missing = false;
+    for (unsigned i = 0; i < s->part_count && look->missing; i++)
+        missing = missing || trip_dataset_metadata_culled(s->texts[i], tf, range) >= 1;
+    if (look->missing)
+        *look->missing = missing;
+    return missing;
+}
+
+/* Else it stands for a volume, whose name the user knows it by. */
+static bool is_named_by_path(const session *s, unsigned part)
+{
+    const char *path = s->parts[part]->path;
+    return part || strncmp(s->input, path, strlen(path)) == 0;
+}
+
+static void warn_of_culled_values(const session *s, unsigned part, const trip_tf *tf,
+                                  const session_look *look)
+{
+    const char *input = part ? s->parts[part]->path : s->input;
+    double range[2], voxels = trip_dataset_metadata_culled(s->texts[part], tf, range);
+    if (voxels < 1)
+        return;
+    double span[2];
+    const bool named = look->window == 0 && !look->tf_text;
+    trip_tf_visible_span(tf, s->data->header.value_min, s->data->header.value_max, span);
+    char *command = brick_command(s->texts[part], input, is_named_by_path(s, part) ? NULL : input,
+                                  look->tf, named ? NULL : span);
+    trip_warn(input,
+              "the transfer function shows about %.0f voxels with values from %g to %g that were "
+              "left out when the data set was made; to have them: %s",
+              voxels, range[0], range[1], command ? command : "brick it again");
+    free(command);
+}
+
+/* An opacity o becomes 1 - (1 - o)^scale. */
+static void warn_of_lost_peak(const session *s, const trip_tf *tf)
+{
+    const trip_file_header *h = &s->data->header;
+    trip_tf_point peak;
+    if (trip_tf_lost_peak(tf, h->code_lo, h->code_hi, &peak))
+        trip_warn(s->input,
+                  "the transfer function has a peak at %.9g that is narrower than the %.3g between "
+                  "two codes of the data: it is not shown; make it wider",
+                  peak.value, (h->code_hi - h->code_lo) / 65535);
+}
+
+static void scale_extinction(trip_tf_entry *table, double scale)
+{
+    if (scale > 0 && scale != 1)
+        for (int code = 0; code < 65536; code++)
+            table[code].extinction = (float)(table[code].extinction * scale);
+}
+
+/* The function in data units, with its window. */
+static int load_function(const session *s, const session_look *look, trip_tf **tf)
+{
+    int status = look->tf_text ? trip_tf_parse(tf, s->input, look->tf_text, strlen(look->tf_text))
+                 : look->tf    ? trip_tf_load(tf, look->tf)
+                               : trip_dataset_metadata_tf(s->text, s->data, tf);
+    bool window = look->window > 0;
+    if (!status && !(window && trip_tf_is_normalised(*tf))) /* a window replaces the range */
+        status = trip_dataset_metadata_adapt(s->text, s->data, *tf);
+    return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
+}
+
+static int take_table(session *s)
+{
+    s->table = trip_budget_take(s->budget, table_bytes);
+    if (s->table)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", s->input,
+                     "the transfer function's table does not fit the memory given; raise --memory");
+}
+
+int session_read_text(session *s)
+{
+    int status = 0;
+    for (unsigned i = 0; i < s->part_count && !status; i++)
+        if (!s->texts[i])
+            status = trip_dataset_metadata_parse(&s->texts[i], s->parts[i]);
+    s->text = s->texts[0];
+    return status;
+}
+
+trip_classification *session_classified(const session *s, unsigned level)
+{
+    return &s->classified[level];
+}
+
+void session_keep_tables(session *s)
+{
+    enum { SMALL_PART = 8 };
+    if (trip_mean_tables_bytes(&s->mean_tables) > trip_budget_left_bytes(s->budget) / SMALL_PART)
+        trip_mean_tables_release(&s->mean_tables, s->budget);
+}
+
+int session_use_function(session *s, const session_look *look)
+{
+    const trip_file_header *h = &s->data->header;
+    trip_tf *tf = NULL;
+    int status = session_read_text(s);
+    for (int i = 0; i < LEVELS; i++)
+        trip_classification_forget_table(&s->classified[i]);
+    trip_mean_tables_release(&s->mean_tables, s->budget);
+    if (!status && !s->table)
+        status = take_table(s);
+    if (!status)
+        status = load_function(s, look, &tf);
+    if (!status && !find_missing(s, tf, look)) {
+        trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
+        for (unsigned i = 0; i < s->part_count; i++)
+            warn_of_culled_values(s, i, tf, look);
+        warn_of_lost_peak(s, tf);
+        double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+        trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
+        scale_extinction(s->table, look->opacity_scale);
+    }
+    trip_tf_destroy(tf);
+    return status;
+}
+
+/* Opens one more, which is not drawn yet. */
+static int open_part(session *s, const char *input)
+{
+    trip_dataset **parts = realloc(s->parts, (s->part_count + 1) * sizeof *parts);
+    s->parts = parts ? parts : s->parts;
+    trip_dataset_metadata **texts = realloc(s->texts, (s->part_count + 1) * sizeof *texts);
+    s->texts = texts ? texts : s->texts;
+    if (!parts || !texts)
+        return trip_fail(TRIP_ERROR, "open", input, "out of memory");
+    texts[s->part_count] = NULL;
+    int status = trip_dataset_open(&parts[s->part_count], input, s->budget);
+    s->part_count += status == 0;
+    return status;
+}
+
+int session_open_data(session *s, const char *input, uint64_t memory_bytes)
+{
+    *s = (session){ .input = input };
+    int status = trip_budget_create(&s->budget, memory_bytes);
+    s->classified = calloc(LEVELS, sizeof *s->classified);
+    if (!status && !s->classified)
+        status = trip_fail(TRIP_ERROR, "open", input, "out of memory");
+    if (!status)
+        status = open_part(s, input);
+    if (!status)
+        s->data = s->parts[0];
+    return status;
+}
+
+int session_add_data(session *s, const char *input)
+{
+    trip_dataset *joined;
+    int status = open_part(s, input);
+    if (status)
+        return status;
+    status = trip_dataset_join(&joined, s->parts, s->part_count, s->budget);
+    if (status) {
+        trip_dataset_close(s->parts[--s->part_count]);
+        return status;
+    }
+    trip_dataset_join_close(s->joined);
+    s->data = s->joined = joined;
+    memset(s->classified, 0, LEVELS * sizeof *s->classified);
+    trip_mean_tables_release(&s->mean_tables, s->budget);
+    return 0;
+}
+
+int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
+{
+    int status = session_open_data(s, input, memory_bytes);
+    return status ? status : session_use_function(s, look);
+}
+
+void session_close(session *s)
+{
+    if (s->table)
+        trip_budget_release(s->budget, s->table, table_bytes);
+    if (s->budget)
+        trip_mean_tables_release(&s->mean_tables, s->budget);
+    trip_dataset_join_close(s->joined);
+    for (unsigned i = 0; i < s->part_count; i++) {
+        trip_dataset_metadata_destroy(s->texts[i]);
+        trip_dataset_close(s->parts[i]);
+    }
+    free(s->parts);
+    free(s->texts);
+    free(s->classified);
+    if (s->budget)
+        trip_budget_destroy(s->budget);
+    *s = (session){ 0 };
+}
+
+/* Memory of the renderer's for the ring; NULL where it has none, or none that reads land in. */
+static void *const *take_slots(const session *s, const session_reader *wanted, unsigned count,
+                               size_t bytes)
+{
+    trip_renderer *r = wanted->renderer;
+    void *const *slots = r && r->ops->take_slots ? r->ops->take_slots(r, count, bytes) : NULL;
+    if (!slots || trip_reader_probe(s->data, wanted->engine, slots[0]))
+        return slots;
+    r->ops->drop_slots(r);
+    return NULL;
+}
+
+enum { SLOTS = 8, MAX_SLOTS = 16, MAX_SLOT_BYTES = 512 << 10 };
+
+/* Slots are handed out in order, so that one late read delays those behind it, and the less so the
+ * more reads are under way. But what is read ahead may turn out to be occluded. */
+static unsigned choose_slots(const session_reader *wanted, uint64_t ring_bytes, size_t plane_count)
+{
+    bool fit = ring_bytes / MAX_SLOTS / plane_count >= MAX_SLOT_BYTES;
+    return fit && !wanted->skip ? MAX_SLOTS : SLOTS;
+}
+
+int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
+{
+    uint64_t left = trip_budget_left_bytes(s->budget);
+    size_t page = (size_t)1 << s->data->header.page_log2;
+    size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
+    unsigned slots = choose_slots(wanted, left / 4, plane_count);
+    size_t slot = (size_t)(left / 4) / slots / page * page, max = MAX_SLOT_BYTES * plane_count;
+    slot = slot < page ? page : slot;
+    trip_reader_params params = {
+        .engine = wanted->engine,
+        .planes = wanted->planes,
+        .slots = slots,
+        .slot_bytes =
+            trip_reader_slot_bytes(s->data, wanted->planes, slot < max || page > max ? slot : max),
+        .threads = (unsigned)wanted->threads,
+        .skip = wanted->skip,
+        .skip_user = wanted->skip_user,
+        .cache_bytes = wanted->cache ? (size_t)(left / 2) : 0,
+    };
+    if (wanted->renderer)
+        params.runner = trip_renderer_runner(wanted->renderer);
+    params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
+    return trip_reader_create(out, s->data, &params, s->budget);
+}
+
+static size_t image_bytes(int width, int height)
+{
+    return (size_t)width * (size_t)height * 4 * sizeof(float);
+}
+
+int session_take_image(const session *s, int width, int height, float **rgba)
+{
+    *rgba = trip_budget_take(s->budget, image_bytes(width, height));
+    if (*rgba)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", s->input,
+                     "an image of %d x %d does not fit the memory given; raise --memory or make "
+                     "it smaller",
+                     width, height);
+}
+
+void session_release_image(const session *s, int width, int height, float *rgba)
+{
+    if (rgba)
+        trip_budget_release(s->budget, rgba, image_bytes(width, height));
+}

@@ -1,0 +1,271 @@
+#include "brick_metadata.h"
+
+#include <cjson/cJSON.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "anatomy.h"
+#include "orientation_base.h"
+#include "json.h"
+#include "report.h"
+#include "text.h"
+
+/* Numbers in their shortest exact form: cJSON's own differs between its versions. */
+static cJSON *number(double value)
+{
+    char text[32];
+    return cJSON_CreateRaw(trip_text_from_double(value, text));
+}
+
+static void add_number(cJSON *object, const char *name, double value)
+{
+    cJSON_AddItemToObject(object, name, number(value));
+}
+
+static void add_function(cJSON *root, const char *name, const trip_tf *tf)
+{
+    char *text = tf ? trip_tf_to_text(tf) : NULL;
+    if (text)
+        cJSON_AddStringToObject(root, name, text);
+    free(text);
+}
+
+static void add_envelope(cJSON *root, const trip_brick_metadata *t)
+{
+    cJSON *intervals = cJSON_AddArrayToObject(root, "envelope");
+    for (size_t i = 0; i < t->envelope->count; i++) {
+        cJSON *interval = cJSON_CreateArray();
+        cJSON_AddItemToArray(interval, number(t->envelope->intervals[i].lo));
+        cJSON_AddItemToArray(interval, number(t->envelope->intervals[i].hi));
+        cJSON_AddItemToArray(intervals, interval);
+    }
+}
+
+static void add_histogram(cJSON *root, const trip_histogram *h)
+{
+    cJSON *histogram = cJSON_AddObjectToObject(root, "histogram");
+    add_number(histogram, "value_min", h->value_min);
+    add_number(histogram, "value_max", h->value_max);
+    cJSON *counts = cJSON_AddArrayToObject(histogram, "counts");
+    for (size_t i = 0; i < sizeof h->counts / sizeof *h->counts; i++)
+        cJSON_AddItemToArray(counts, number((double)h->counts[i]));
+}
+
+/* For ranges alone: what they hold shows, more the higher the value, and nothing else does. */
+static int make_ramp(trip_tf **out, const trip_brick_metadata *t)
+{
+    enum { POINTS = 4 };
+    const trip_rgba dark = { 0.45, 0.25, 0.1, 0.02 }, light = { 1, 0.95, 0.85, 0.5 };
+    double lo = t->envelope->intervals[0].lo;
+    double hi = t->envelope->intervals[t->envelope->count - 1].hi;
+    lo = lo > t->histogram->value_min ? lo : t->histogram->value_min;
+    hi = hi < t->histogram->value_max ? hi : t->histogram->value_max;
+    hi = hi > lo ? hi : lo;
+    trip_rgba before = dark, after = light;
+    before.opacity = after.opacity = 0;
+    const trip_tf_point points[POINTS] = {
+        { lo, before }, { lo, dark }, { hi, light }, { nextafter(hi, INFINITY), after }
+    };
+    return trip_tf_from_points(out, points, POINTS, false, 0);
+}
+
+trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h)
+{
+    const trip_tf_origin origin = {
+        .sparse = info->sparse,
+        .integers = info->type < TRIP_F16 && info->slope == floor(info->slope) &&
+                    info->inter == floor(info->inter),
+        .modality = info->modality,
+        .patient = info->space[0] || !strcmp(info->format, "nifti"),
+    };
+    return trip_tf_recognise(&origin, h);
+}
+
+/* What is drawn when no function is given. */
+static int add_default_function(cJSON *root, const trip_brick_metadata *t)
+{
+    trip_tf *made = NULL;
+    const trip_brick_params *p = t->params;
+    bool given = p->function_count > 0 && !p->automatic;
+    bool ranges = p->range_count > 0 && t->envelope->count > 0 && !p->automatic;
+    int status = 0;
+    if (!given && ranges)
+        status = make_ramp(&made, t);
+    else if (!given)
+        status =
+            trip_tf_make_automatic(&made, trip_brick_kind(t->info, t->histogram), t->histogram);
+    if (status == 0)
+        add_function(root, "transfer_function", made ? made : t->functions[0]);
+    trip_tf_destroy(made);
+    return status;
+}
+
+static void add_functions(cJSON *root, const trip_brick_metadata *t)
+{
+    cJSON *functions = cJSON_AddArrayToObject(root, "functions");
+    for (size_t i = 0; i < t->params->function_count; i++) {
+        char *text = trip_tf_to_text(t->functions[i]);
+        if (text)
+            cJSON_AddItemToArray(functions, cJSON_CreateString(text));
+        free(text);
+    }
+}
+
+/* One option as the command line takes it, "--name=value". */
+__attribute__((format(printf, 2, 3))) static void add_option(cJSON *options, const char *form, ...)
+{
+    char *text;
+    va_list args;
+    va_start(args, form);
+    int length = vasprintf(&text, form, args);
+    va_end(args);
+    if (length < 0)
+        return;
+    cJSON_AddItemToArray(options, cJSON_CreateString(text));
+    free(text);
+}
+
+/* How the input is read. */
+static void add_volume_options(cJSON *options, const trip_volume_params *v)
+{
+    char number[3][32];
+    if (v->grid)
+        add_option(options, "--grid=%s", v->grid);
+    if (v->level_set)
+        add_option(options, "--level-set=%s",
+                   v->level_set == TRIP_LEVEL_SET_BAND ? "band" : "filled");
+    if (v->raw_dims[0])
+        add_option(options, "--size=%" PRId64 ",%" PRId64 ",%" PRId64, v->raw_dims[0],
+                   v->raw_dims[1], v->raw_dims[2]);
+    if (v->raw_type)
+        add_option(options, "--type=%s", v->raw_type);
+    if (v->raw_endian)
+        add_option(options, "--endian=%s", v->raw_endian == 2 ? "big" : "little");
+    if (v->raw_offset_bytes)
+        add_option(options, "--offset=%" PRIu64, v->raw_offset_bytes);
+    if (v->spacing[0] > 0)
+        add_option(options, "--spacing=%s,%s,%s", trip_text_from_double(v->spacing[0], number[0]),
+                   trip_text_from_double(v->spacing[1], number[1]),
+                   trip_text_from_double(v->spacing[2], number[2]));
+    if (v->axes)
+        add_option(options, "--axes=%s", v->axes);
+    if (v->coordinates)
+        add_option(options, "--coordinates=%s", v->coordinates);
+    if (v->allow_gaps)
+        add_option(options, "--allow-gaps");
+}
+
+static void add_region(cJSON *options, const trip_region *r)
+{
+    char sides[3][64];
+    if (trip_region_is_whole(r))
+        return;
+    for (int a = 0; a < 3; a++)
+        if (r->past[a])
+            snprintf(sides[a], sizeof sides[a], "%" PRId64 ":%" PRId64, r->first[a], r->past[a]);
+        else
+            snprintf(sides[a], sizeof sides[a], "%" PRId64 ":", r->first[a]);
+    add_option(options, "--region=%s,%s,%s", sides[0], sides[1], sides[2]);
+}
+
+/* What `brick` has to be given to make the data set again, but for what is kept. */
+static void add_source_options(cJSON *root, const trip_brick_params *p)
+{
+    cJSON *options = cJSON_AddArrayToObject(root, "source_options");
+    add_volume_options(options, &p->volume);
+    add_region(options, &p->region);
+    static const char *const code_bits[] = { NULL, "8", "16" };
+    if (p->code_bits)
+        add_option(options, "--code-bits=%s", code_bits[p->code_bits]);
+    static const char *const normals[] = { NULL, "compact", "full", "none" };
+    if (p->normals)
+        add_option(options, "--normals=%s", normals[p->normals]);
+    if (p->no_halo)
+        add_option(options, "--halo=0");
+    if (p->tile_voxels)
+        add_option(options, "--tile=%u", p->tile_voxels);
+    if (p->slab_sheets)
+        add_option(options, "--slab-sheets=%u", p->slab_sheets);
+    if (p->levels)
+        add_option(options, "--levels=%d", p->levels > 0 ? p->levels : 0);
+    static const char *const levels_for[] = { NULL, "post", "pre", "both" };
+    if (p->levels_for && p->levels >= 0)
+        add_option(options, "--levels-for=%s", levels_for[p->levels_for]);
+}
+
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash && slash[1] ? slash + 1 : path;
+}
+
+/* What drawing (render/dataset_metadata.c) makes of it, where that is not what it takes by default.
+ */
+static void print_guess(const trip_volume_info *info, trip_orientation u,
+                        char guess[TRIP_BRICK_NOTE_BYTES / 2])
+{
+    guess[0] = 0;
+    if (u.mirror == 2)
+        snprintf(
+            guess, TRIP_BRICK_NOTE_BYTES / 2,
+            "its file does not say what is up: being mirror-symmetric across z, its slices are "
+            "taken for views from the side, with up at -y and the front at -x; --up, --view "
+            "and --axes say otherwise");
+    else if (u.footing >= 0 && u.footing != TRIP_ORIENTATION_BASE_LOW_Z &&
+             !trip_anatomy_is_scan_from_above(&info->index_to_world))
+        snprintf(guess, TRIP_BRICK_NOTE_BYTES / 2,
+                 "its file does not say what is up: being level at %s alone, it is taken to stand "
+                 "there, with up at %s; --up, --view and --axes say otherwise",
+                 trip_orientation_base_name(u.footing), trip_orientation_base_name(u.footing ^ 1));
+}
+
+void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
+                              char note[TRIP_BRICK_NOTE_BYTES])
+{
+    char guess[TRIP_BRICK_NOTE_BYTES / 2];
+    print_guess(info, upright, guess);
+    snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s%s", info->note,
+             guess[0] && info->note[0] ? "; " : "", guess);
+}
+
+char *trip_brick_metadata_make(const trip_brick_metadata *t)
+{
+    static const char *const axes[] = { "x", "y", "z" };
+    char note[TRIP_BRICK_NOTE_BYTES];
+    trip_brick_metadata_note(t->info, t->upright, note);
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "source", base_name(t->params->input));
+    add_source_options(root, t->params);
+    cJSON_AddStringToObject(root, "format", t->info->format);
+    if (t->info->name[0])
+        cJSON_AddStringToObject(root, "grid", t->info->name);
+    if (note[0])
+        cJSON_AddStringToObject(root, "note", note);
+    if (t->info->space[0])
+        cJSON_AddStringToObject(root, "space", t->info->space);
+    if (t->info->oriented)
+        cJSON_AddTrueToObject(root, "oriented");
+    if (t->upright.mirror >= 0)
+        cJSON_AddStringToObject(root, "mirror", axes[t->upright.mirror]);
+    if (t->upright.footing >= 0)
+        cJSON_AddStringToObject(root, "footing", trip_orientation_base_name(t->upright.footing));
+    cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
+    cJSON_AddStringToObject(root, "function_kind",
+                            trip_tf_kind_name(trip_brick_kind(t->info, t->histogram)));
+    cJSON_AddBoolToObject(root, "keep_all", t->params->keep_all);
+    if (t->info->sparse)
+        add_number(root, "background", t->info->background);
+    add_envelope(root, t);
+    add_functions(root, t);
+    int status = add_default_function(root, t);
+    add_histogram(root, t->histogram);
+    char *text = status == 0 ? trip_json_print(root, false) : NULL;
+    cJSON_Delete(root);
+    if (status == 0 && !text)
+        trip_fail(TRIP_ERROR, "brick", t->params->output, "out of memory");
+    return text;
+}

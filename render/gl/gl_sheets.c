@@ -1,0 +1,558 @@
+#include "gl/gl_sheets.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "field.h"
+#include "gl/frame_block.h"
+#include "report.h"
+#include "sheet.h"
+
+/* Of a part of the work: pixels times ends, squares that are decoded, voxels that get gradients. */
+enum { PART_ENDS = 1 << 20, PART_SQUARES = 1 << 14, PART_VOXELS = 1 << 20 };
+
+/* ---- frames, layers, passes ---- */
+
+/* Sheets about an interval that what is seen in it depends on: by the kernel, and by gradients, at
+ * one sheet more. */
+static int sheets_about(const trip_settings *s)
+{
+    return trip_sheet_reach(s->kernel) - 1;
+}
+
+static unsigned effects_of(const trip_frame *frame)
+{
+    const trip_settings *s = frame->settings;
+    return (s->kernel != TRIP_KERNEL_LINEAR ? TRIP_GL_WIDE : 0) |
+           (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
+           (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
+           trip_gl_frame_placed(s) |
+           (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0) |
+           (frame->plan->not_closed ? 0 : TRIP_GL_CLOSED);
+}
+
+static void forget(trip_gl_sheets *s)
+{
+    s->pass = NULL;
+    s->count = s->front = 0;
+    s->batch = (trip_gl_sheet_batch){ 0 };
+    s->drawing = (trip_gl_sheet_drawing){ 0 };
+}
+
+int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
+{
+    s->frame = frame;
+    s->coordinates = &frame->data->coordinates;
+    s->effects = effects_of(frame);
+    forget(s);
+    if (!s->ends_block) {
+        glCreateBuffers(1, &s->pass_block);
+        glNamedBufferStorage(s->pass_block, sizeof(trip_gl_sheet_pass), NULL,
+                             GL_DYNAMIC_STORAGE_BIT);
+        glCreateBuffers(1, &s->ends_block);
+        glNamedBufferStorage(s->ends_block, TRIP_GL_ENDS_MAX * sizeof(trip_gl_sheet_end), NULL,
+                             GL_DYNAMIC_STORAGE_BIT);
+    }
+    return trip_gl_sheet_tf_set(&s->function, frame->table,
+                                frame->plan->not_closed ? NULL : &frame->plan->closed,
+                                frame->camera->voxel_world);
+}
+
+void trip_gl_sheets_release(trip_gl_sheets *s)
+{
+    trip_gl_sheet_textures_release(&s->textures);
+    trip_gl_sheet_tf_release(&s->function);
+    trip_gl_sheet_positions_release(&s->positions);
+    glDeleteBuffers(1, &s->pass_block);
+    glDeleteBuffers(1, &s->ends_block);
+    s->pass_block = s->ends_block = 0;
+}
+
+/* A rectangle of voxels of a list's u and v, inclusive. */
+typedef struct rectangle {
+    int64_t lo[2], hi[2];
+} rectangle;
+
+static void widen(rectangle *r, const trip_selection *selection, unsigned tile_log2)
+{
+    for (uint64_t i = 0; i < selection->list->brick_count; i++) {
+        const trip_file_brick *b = &selection->list->bricks[i];
+        if (!trip_selection_has(selection, i))
+            continue;
+        const int64_t corner[2] = { (int64_t)b->tile_u << tile_log2,
+                                    (int64_t)b->tile_v << tile_log2 };
+        const int64_t lo[2] = { corner[0] + b->u_min, corner[1] + b->v_min };
+        const int64_t hi[2] = { corner[0] + b->u_max, corner[1] + b->v_max };
+        for (int a = 0; a < 2; a++) {
+            r->lo[a] = lo[a] < r->lo[a] ? lo[a] : r->lo[a];
+            r->hi[a] = hi[a] > r->hi[a] ? hi[a] : r->hi[a];
+        }
+    }
+}
+
+/* Of all that the layer's passes read; one voxel where that is nothing. */
+static void find_extent(trip_gl_sheets *s)
+{
+    const trip_plan_layer *layer = &s->frame->plan->layers[s->axis];
+    rectangle r = { { INT64_MAX, INT64_MAX }, { INT64_MIN, INT64_MIN } };
+    for (int i = 0; i < layer->pass_count; i++)
+        for (unsigned k = 0; k < layer->passes[i].pass.selection_count; k++)
+            widen(&r, &layer->passes[i].pass.selections[k], s->frame->data->header.tile_log2);
+    for (int a = 0; a < 2; a++) {
+        s->first[a] = r.lo[a] <= r.hi[a] ? r.lo[a] : 0;
+        s->size[a] = r.lo[a] <= r.hi[a] ? r.hi[a] - r.lo[a] + 1 : 1;
+    }
+}
+
+int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis)
+{
+    s->axis = axis;
+    forget(s);
+    find_extent(s);
+    /* Those of an interval, those behind it, and one before it where that is kept. */
+    const unsigned min = 2 * (unsigned)sheets_about(s->frame->settings) + 1;
+    int status = trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], min,
+                                            s->frame->settings->shading);
+    if (!status && s->effects & TRIP_GL_UNEVEN)
+        status =
+            trip_gl_sheet_positions_set(&s->positions, s->coordinates, axis, s->first, s->size);
+    return status;
+}
+
+static void begin_pass(trip_gl_sheets *s, const trip_pass *pass)
+{
+    s->pass = pass;
+    s->way = pass->descending ? -1 : 1;
+    s->view = trip_gl_sheet_view_make(s->frame, s->axis, pass->descending, s->first, s->size,
+                                      s->function.unit);
+    s->eye = trip_coordinates_index(s->coordinates, s->axis, s->view.eye[0]);
+    glNamedBufferSubData(s->pass_block, 0, sizeof s->view.constants, &s->view.constants);
+}
+
+static int use_program(trip_gl_sheets *s, trip_gl_pass pass)
+{
+    GLuint program = 0;
+    trip_gl_variant variant = { pass, s->frame->settings->method, s->effects, 0 };
+    int status = trip_gl_variants_get(s->variants, variant, &program);
+    if (!status)
+        glUseProgram(program);
+    return status;
+}
+
+static GLuint groups_over(int length)
+{
+    return (GLuint)(length + TRIP_GL_SQUARE_GROUP - 1) / TRIP_GL_SQUARE_GROUP;
+}
+
+/* ---- from runs to sheets ---- */
+
+/* u and v in the tile of a square's corner, by its Morton number. */
+static void corner_of(uint32_t number, uint32_t at[2])
+{
+    at[0] = 8 * trip_morton_even(number);
+    at[1] = 8 * trip_morton_even(number >> 1);
+}
+
+/* The squares of a run, whose codes are at `codes` of the slot's; returns how many. */
+static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const trip_block *block,
+                             size_t codes, struct trip_gl_sheet_square *out)
+{
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX];
+    const uint32_t count = trip_block_squares(block, squares);
+    for (uint32_t n = 0; n < count; n++) {
+        const trip_square *of = &squares[n];
+        uint32_t at[2];
+        corner_of(of->number, at);
+        /* A square may begin before the sheet's first voxels: 16 bits go round. */
+        uint32_t u = (uint32_t)(run->u - s->first[0]) + at[0];
+        uint32_t v = (uint32_t)(run->v - s->first[1]) + at[1];
+        out[n] = (struct trip_gl_sheet_square){
+            .mask_low = (uint32_t)of->mask,
+            .mask_high = (uint32_t)(of->mask >> 32),
+            .codes = (uint32_t)(codes + (size_t)(of->codes - squares[0].codes)),
+            .min_width = of->min | of->width << 16,
+            .corner = (u & 0xffff) | v << 16
+        };
+    }
+    return count;
+}
+
+/* Squares and codes of all runs into a slot. */
+static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
+{
+    size_t squares = 0, bytes = sizeof(uint32_t); /* codes may have none, which cannot be bound */
+    for (size_t i = 0; i < batch->run_count; i++) {
+        const trip_block block = trip_block_of(batch, &batch->runs[i]);
+        squares += block.squares;
+        bytes += trip_block_codes_bytes(&block);
+    }
+    size_t codes = trip_gl_ring_after(0, squares * sizeof(struct trip_gl_sheet_square));
+    if (codes + bytes > trip_gl_context_limits(s->context)->storage_block_bytes)
+        return trip_fail(TRIP_ERROR, "gl", "batch",
+                         "%llu splats at a time are too many; read in smaller pieces",
+                         (unsigned long long)batch->splats);
+    trip_gl_slot *slot;
+    int status = trip_gl_ring_take(s->ring, codes + bytes, &slot);
+    if (status)
+        return status;
+    s->batch = (trip_gl_sheet_batch){ .slot = slot, .codes_offset = codes, .begun = true };
+    void *memory = slot->memory;
+    struct trip_gl_sheet_square *square = memory;
+    for (size_t i = 0, at = 0; i < batch->run_count; i++) {
+        const trip_block block = trip_block_of(batch, &batch->runs[i]);
+        square += fill_squares(s, &batch->runs[i], &block, at, square);
+        memcpy(slot->memory + codes + at, trip_block_codes(&block), trip_block_codes_bytes(&block));
+        at += trip_block_codes_bytes(&block);
+    }
+    return TRIP_OK;
+}
+
+static void begin_sheet(trip_gl_sheets *s, int64_t number)
+{
+    unsigned taken = 0;
+    for (int i = 0; i < s->count; i++)
+        taken |= 1u << s->held[i].layer;
+    int layer = __builtin_ctz(~taken);
+    s->held[s->count++] = (trip_gl_sheet){ .number = number, .layer = layer, .min = UINT16_MAX };
+    trip_gl_sheet_textures_clear(&s->textures, layer, (int)s->size[0], (int)s->size[1]);
+}
+
+/* The codes of a run's brick are among those of the sheet. */
+static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_run *run)
+{
+    const trip_file_brick *brick = &trip_batch_list(batch, run)->bricks[run->brick];
+    trip_gl_sheet *sheet = &s->held[s->count - 1];
+    sheet->min = brick->code_min < sheet->min ? brick->code_min : sheet->min;
+    sheet->max = brick->code_max > sheet->max ? brick->code_max : sheet->max;
+}
+
+static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
+{
+    const trip_gl_slot *slot = s->batch.slot;
+    const trip_block_form form = trip_block_form_of(&s->frame->data->header, TRIP_KIND_VOXELS);
+    int status = use_program(s, TRIP_GL_PASS_SHEET_DECODE);
+    if (status)
+        return status;
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SQUARES, slot->buffer, 0,
+                      (GLsizeiptr)s->batch.codes_offset);
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, TRIP_GL_VOXELS, slot->buffer,
+                      (GLintptr)s->batch.codes_offset,
+                      (GLsizeiptr)(slot->bytes - s->batch.codes_offset));
+    glBindImageTexture(TRIP_GL_IMAGE, s->textures.codes, 0, GL_FALSE, s->held[s->count - 1].layer,
+                       GL_WRITE_ONLY, GL_R32F);
+    glUniform2ui(TRIP_GL_SHEET, first, trip_block_step(&form));
+    glDispatchCompute(count, 1, 1);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
+    status = trip_gl_queue_end_part(s->queue);
+    s->batch.slot->part = s->queue->ended;
+    return status;
+}
+
+/* The batch's next runs of the last sheet, a part of them. */
+static int decode_runs(trip_gl_sheets *s, const trip_batch *batch)
+{
+    trip_gl_sheet_batch *b = &s->batch;
+    int64_t number = s->held[s->count - 1].number;
+    uint32_t count = 0;
+    for (; b->next_run < batch->run_count && count < PART_SQUARES; b->next_run++) {
+        const trip_run *run = &batch->runs[b->next_run];
+        if (run->sheet != number)
+            break;
+        count += trip_block_of(batch, run).squares;
+        widen_range(s, batch, run);
+    }
+    uint32_t first = b->next_square;
+    b->next_square += count;
+    return decode_squares(s, first, count);
+}
+
+/* ---- drawing sheets ---- */
+
+/* Where the eye is behind held[i], in sheets; below 0: before it. In parallel views rays begin
+ * elsewhere each. */
+static double eye_behind(const trip_gl_sheets *s, int i)
+{
+    if (s->frame->camera->ortho)
+        return 0;
+    return (s->eye - (double)s->held[i].number) * (double)s->way;
+}
+
+/* Whether something between held[i] and the next may show; false where there is no next. */
+static bool shows(const trip_gl_sheets *s, int i)
+{
+    const int about = sheets_about(s->frame->settings) - 1;
+    unsigned min = UINT16_MAX, max = 0;
+    double bounds[2];
+    if (i < 0 || i + 1 >= s->count || s->held[i].min > s->held[i].max ||
+        s->held[i + 1].min > s->held[i + 1].max || eye_behind(s, i) >= 1)
+        return false;
+    for (int k = i - about; k <= i + 1 + about; k++)
+        if (k >= 0 && k < s->count) {
+            min = s->held[k].min < min ? s->held[k].min : min;
+            max = s->held[k].max > max ? s->held[k].max : max;
+        }
+    trip_field_code_bounds(s->frame->settings->kernel, min, max, bounds);
+    return trip_gl_sheet_tf_shows(&s->function, (unsigned)fmax(0, floor(bounds[0])),
+                                  (unsigned)fmin(65535, ceil(bounds[1])));
+}
+
+/* How far the sheets below and above one are. */
+static void bind_positions(const trip_gl_sheets *s, int64_t sheet)
+{
+    const trip_coordinates *c = s->coordinates;
+    const double here = trip_coordinates_position(c, s->axis, (double)sheet);
+    glUniform2f(TRIP_GL_SHEET_APART,
+                (float)(here - trip_coordinates_position(c, s->axis, (double)(sheet - 1))),
+                (float)(trip_coordinates_position(c, s->axis, (double)(sheet + 1)) - here));
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_POSITIONS, s->positions.buffer);
+}
+
+static int make_gradients(trip_gl_sheets *s, int i)
+{
+    const int before = i > 0 ? s->held[i - 1].layer : -1;
+    const int after = i + 1 < s->count ? s->held[i + 1].layer : -1;
+    trip_gl_sheet *sheet = &s->held[i];
+    int status = use_program(s, TRIP_GL_PASS_SHEET_GRADIENT);
+    if (status)
+        return status;
+    glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
+    glBindImageTexture(TRIP_GL_IMAGE, s->textures.gradients, 0, GL_FALSE, sheet->layer,
+                       GL_WRITE_ONLY, GL_RGBA16F);
+    glUniform3i(TRIP_GL_SHEET, sheet->layer, s->way > 0 ? before : after,
+                s->way > 0 ? after : before);
+    if (s->effects & TRIP_GL_UNEVEN)
+        bind_positions(s, sheet->number);
+    const int width = (int)s->size[0], height = (int)s->size[1];
+    const int rows = PART_VOXELS / width < 1 ? 1 : PART_VOXELS / width;
+    for (int y = 0; y < height && !status; y += rows) {
+        glUniform3i(TRIP_GL_SHEET_SIZE, width, height, y);
+        glDispatchCompute(groups_over(width), groups_over(height - y < rows ? height - y : rows),
+                          1);
+        glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+        status = trip_gl_queue_end_part(s->queue);
+    }
+    sheet->has_gradients = true;
+    return status;
+}
+
+/* Of the sheets that what is to be drawn is interpolated from, the first that something shows about
+ * and that has no gradients: from the next group on, those before it are not at hand. -1: there is
+ * none. All held are complete. */
+static int without_gradients(const trip_gl_sheets *s)
+{
+    const int about = sheets_about(s->frame->settings);
+    for (int i = 0; i < s->count && i < s->drawing.to + about && s->textures.gradients; i++)
+        for (int k = i - about; k < i + about && !s->held[i].has_gradients; k++)
+            if (shows(s, k))
+                return i;
+    return -1;
+}
+
+/* The layer of held[i]; beyond the grid that of the last one there, and -1 where another sheet is
+ * not at hand: then it has no voxels. */
+static int layer_of(const trip_gl_sheets *s, int i)
+{
+    const int64_t number = s->held[0].number + i * s->way;
+    const int64_t sheets = (int64_t)s->frame->data->header.dims[s->axis];
+    if (i >= 0 && i < s->count)
+        return s->held[i].layer;
+    return number >= 0 && number < sheets ? -1 : s->held[i < 0 ? 0 : s->count - 1].layer;
+}
+
+/* Where along the list a part of the way from a sheet to the next is. */
+static double position_at(const trip_gl_sheets *s, const trip_gl_sheet *from, double part)
+{
+    return trip_coordinates_position(s->coordinates, s->axis,
+                                     (double)from->number + part * (double)s->way);
+}
+
+/* The ends of the slices from held[i] to the next; returns how many there are then. `first`: those
+ * of the interval before are not there, whose last end is the first of these but for kernels of 64
+ * voxels, which weigh others there. */
+static int add_ends(const trip_gl_sheets *s, int i, bool first, trip_gl_sheet_end *ends, int count)
+{
+    const trip_gl_sheet *from = &s->held[i];
+    const int samples_per_sheet = s->frame->settings->samples_per_sheet;
+    const int layers[4] = { layer_of(s, i - 1), layer_of(s, i), layer_of(s, i + 1),
+                            layer_of(s, i + 2) };
+    const double eye = fmax(0, eye_behind(s, i));
+    double last = position_at(s, from, eye);
+    if (first || s->frame->settings->kernel != TRIP_KERNEL_LINEAR)
+        ends[count++] = trip_gl_sheet_end_at(&s->view, last, 0, layers, eye);
+    for (int n = 1; n <= samples_per_sheet; n++) {
+        double part = (double)n / samples_per_sheet;
+        if (n <= eye * samples_per_sheet)
+            continue;
+        const double next = position_at(s, from, part);
+        ends[count++] = trip_gl_sheet_end_at(&s->view, next, next - last, layers, part);
+        last = next;
+    }
+    return count;
+}
+
+/* Takes as many of the intervals that are to be drawn as fit. */
+static void begin_group(trip_gl_sheets *s)
+{
+    trip_gl_sheet_end ends[TRIP_GL_ENDS_MAX];
+    trip_gl_sheet_drawing *d = &s->drawing;
+    const int max = s->frame->settings->samples_per_sheet + 1;
+    d->in_group = true;
+    d->band = d->row = d->ends = 0;
+    d->done = s->front;
+    bool first = true;
+    for (; d->done < d->to && d->ends + max <= TRIP_GL_ENDS_MAX; d->done++) {
+        const bool some = shows(s, d->done);
+        if (some)
+            d->ends = add_ends(s, d->done, first, ends, d->ends);
+        first = !some;
+    }
+    if (d->ends)
+        glNamedBufferSubData(s->ends_block, 0, (GLsizeiptr)((size_t)d->ends * sizeof *ends), ends);
+}
+
+static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
+{
+    const trip_gl_surface *layer = &band->layers[s->axis];
+    int status = use_program(s, TRIP_GL_PASS_SHEET_DRAW);
+    if (status)
+        return status;
+    trip_gl_constants_bind_layer(s->constants, s->axis, false);
+    glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_PASS, s->pass_block);
+    glBindBufferBase(GL_UNIFORM_BUFFER, TRIP_GL_SHEET_ENDS, s->ends_block);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_SUMS,
+                     s->effects & TRIP_GL_CLOSED ? s->function.closed : s->function.sums);
+    if (s->effects & TRIP_GL_UNEVEN)
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_POSITIONS, s->positions.buffer);
+    glBindTextureUnit(TRIP_GL_SHEET_CODES, s->textures.codes);
+    glBindTextureUnit(TRIP_GL_SHEET_GRADIENTS, s->textures.gradients);
+    if (s->effects & TRIP_GL_PLACED) {
+        trip_gl_lattices_bind(s->lattices);
+        trip_gl_lattices_bind_block(s->lattices, (unsigned)s->axis);
+    }
+    glBindImageTexture(TRIP_GL_IMAGE, layer->colour, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+    if (layer->depth)
+        glBindImageTexture(TRIP_GL_IMAGE_DEPTH, layer->depth, 0, GL_FALSE, 0, GL_READ_WRITE,
+                           GL_RGBA32F);
+    return TRIP_OK;
+}
+
+/* Some rows of the group. */
+static int draw_rows(trip_gl_sheets *s)
+{
+    trip_gl_sheet_drawing *d = &s->drawing;
+    const trip_gl_band *band = &s->target->bands[d->band];
+    int width = s->target->width, rows = PART_ENDS / d->ends / width;
+    int end = d->row + (rows < 1 ? 1 : rows);
+    end = end < band->rows ? end : band->rows;
+    int status = bind_drawing(s, band);
+    if (status)
+        return status;
+    glUniform4i(TRIP_GL_ROW, band->first_row, d->row, end, d->ends);
+    glDispatchCompute(groups_over(width), groups_over(end - d->row), 1);
+    glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
+                    GL_FRAMEBUFFER_BARRIER_BIT);
+    d->row = end < band->rows ? end : 0;
+    d->band += d->row == 0;
+    return trip_gl_queue_end_part(s->queue);
+}
+
+/* Lets go of what is drawn, but for what the kernel still reaches. */
+static void end_group(trip_gl_sheets *s)
+{
+    trip_gl_sheet_drawing *d = &s->drawing;
+    const int kept = s->frame->settings->kernel == TRIP_KERNEL_LINEAR ? 0 : 1;
+    const int drop = d->done > kept ? d->done - kept : 0;
+    s->count -= drop;
+    memmove(s->held, s->held + drop, (size_t)s->count * sizeof *s->held);
+    d->to -= drop;
+    s->front = d->done - drop;
+    d->in_group = false;
+    if (d->to <= s->front && d->all)
+        s->count = s->front = 0;
+    if (d->to <= s->front || s->count == 0)
+        d->to = 0;
+}
+
+/* A part of what is to be drawn. */
+static int draw_part(trip_gl_sheets *s)
+{
+    trip_gl_sheet_drawing *d = &s->drawing;
+    int status = TRIP_OK, bare = d->in_group ? -1 : without_gradients(s);
+    if (bare >= 0)
+        return make_gradients(s, bare);
+    if (!d->in_group)
+        begin_group(s);
+    if (d->ends)
+        status = draw_rows(s);
+    if (!status && (d->ends == 0 || d->band == s->target->band_count))
+        end_group(s);
+    return status;
+}
+
+/* Has the complete sheets drawn: up to the last one when `all`, after which none is held; else as
+ * far as none is missing behind them that they depend on. */
+static void begin_drawing(trip_gl_sheets *s, bool all)
+{
+    const int to = s->count - 1 - (all ? 0 : sheets_about(s->frame->settings));
+    s->drawing = (trip_gl_sheet_drawing){ .to = to > s->front ? to : 0, .all = all };
+    if (to <= s->front && all)
+        s->count = s->front = 0;
+}
+
+/* ---- batches ---- */
+
+/* The batch's next run is of no sheet at hand: a sheet for it, or what is to be drawn before. */
+static void make_position(trip_gl_sheets *s, const trip_batch *batch)
+{
+    int64_t number = batch->runs[s->batch.next_run].sheet;
+    bool new_pass = batch->pass != s->pass;
+    if (s->count > 0 && (new_pass || s->held[s->count - 1].number + s->way != number)) {
+        begin_drawing(s, true);
+        return;
+    }
+    if (s->count == s->textures.layers) {
+        begin_drawing(s, false);
+        return;
+    }
+    if (new_pass)
+        begin_pass(s, batch->pass);
+    begin_sheet(s, number);
+}
+
+static bool is_at_hand(const trip_gl_sheets *s, const trip_batch *batch)
+{
+    return s->count > 0 && batch->pass == s->pass &&
+           s->held[s->count - 1].number == batch->runs[s->batch.next_run].sheet;
+}
+
+int trip_gl_sheets_draw(trip_gl_sheets *s, const trip_batch *batch)
+{
+    int status = TRIP_OK;
+    if (s->drawing.to > 0)
+        status = draw_part(s);
+    else if (!s->batch.begun)
+        status = begin_batch(s, batch);
+    else if (!is_at_hand(s, batch))
+        make_position(s, batch);
+    else
+        status = decode_runs(s, batch);
+    if (status)
+        return status;
+    if (s->drawing.to > 0 || s->batch.next_run < batch->run_count)
+        return 1;
+    s->batch = (trip_gl_sheet_batch){ 0 };
+    return trip_gl_check(s->context, "sheets");
+}
+
+int trip_gl_sheets_end_layer(trip_gl_sheets *s)
+{
+    int status = TRIP_OK;
+    if (s->pass && s->drawing.to == 0)
+        begin_drawing(s, true);
+    if (s->drawing.to > 0)
+        status = draw_part(s);
+    if (!status && s->drawing.to > 0)
+        return 1;
+    forget(s);
+    return status ? status : trip_gl_check(s->context, "sheets");
+}

@@ -1,0 +1,502 @@
+#include "serve_session.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "encode.h"
+#include "json.h"
+#include "light.h"
+#include "report.h"
+#include "script.h"
+#include "text.h"
+#include "viewer.h"
+
+enum { WIDTH = 1024, HEIGHT = 768, MAX_SIDE = 4096, MIN_SIDE = 16, MAX_EVENTS = 1000 };
+
+struct trip_session {
+    pthread_mutex_t lock; /* for all that is a window's thread's: the viewer, and its frames */
+    trip_frames *frames;
+    trip_viewer viewer;
+    /* Taken by the drawing thread too, which may hold locks of its own: what is done with this one
+     * held takes no other. */
+    pthread_mutex_t news_lock;
+    pthread_cond_t news; /* something has come, or the end */
+    uint64_t came;       /* under news_lock: how often */
+    bool ended;          /* the same */
+    uint64_t seen;       /* of `came`, by the thread that ticks */
+    uint64_t told;       /* of the frames' messages, the last failure among them, by the same */
+    const char *given;   /* the function of the command line, or NULL */
+};
+
+static void wake(void *user)
+{
+    trip_session *s = user;
+    pthread_mutex_lock(&s->news_lock);
+    s->came++;
+    pthread_cond_broadcast(&s->news);
+    pthread_mutex_unlock(&s->news_lock);
+}
+
+static uint64_t news_so_far(trip_session *s, bool *ended)
+{
+    pthread_mutex_lock(&s->news_lock);
+    uint64_t came = s->came;
+    *ended = s->ended;
+    pthread_mutex_unlock(&s->news_lock);
+    return came;
+}
+
+/* Waits for more than `came`, until a time; false where that has passed. */
+static bool wait_for_news(trip_session *s, uint64_t came, const struct timespec *end)
+{
+    int late = 0;
+    pthread_mutex_lock(&s->news_lock);
+    while (s->came == came && !s->ended && !late)
+        late = pthread_cond_timedwait(&s->news, &s->news_lock, end);
+    pthread_mutex_unlock(&s->news_lock);
+    return !late;
+}
+
+static void make_locks(trip_session *s)
+{
+    pthread_condattr_t monotonic;
+    pthread_mutex_init(&s->lock, NULL);
+    pthread_mutex_init(&s->news_lock, NULL);
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&s->news, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+}
+
+static void show(trip_session *s, const trip_serve_params *p)
+{
+    trip_viewer *v = &s->viewer;
+    trip_viewer_init(v, s->frames);
+    v->settings = p->settings;
+    v->function = s->given = p->function;
+    v->heat = p->heat;
+    v->opacity_scale = 1;
+    v->fresh = true; /* what a window showed, with its panel, is another thing */
+    trip_viewer_resize(v, WIDTH, HEIGHT);
+    trip_viewer_set_panel(v, false);
+    trip_viewer_open(v, p->input);
+}
+
+trip_session *trip_session_start(const trip_serve_params *p)
+{
+    trip_session *s = calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    make_locks(s);
+    s->frames = trip_frames_start(&(trip_frames_params){ .memory_bytes = p->memory_bytes,
+                                                         .threads = p->threads,
+                                                         .renderer = p->renderer,
+                                                         .engine = p->engine,
+                                                         .frames_per_second = p->frames_per_second,
+                                                         .find = p->find,
+                                                         .release = p->release,
+                                                         .user = p->find_user,
+                                                         .wake = wake,
+                                                         .wake_user = s });
+    if (!s->frames) {
+        free(s);
+        return NULL;
+    }
+    show(s, p);
+    return s;
+}
+
+void trip_session_end(trip_session *s)
+{
+    pthread_mutex_lock(&s->news_lock);
+    s->ended = true;
+    pthread_cond_broadcast(&s->news);
+    pthread_mutex_unlock(&s->news_lock);
+}
+
+void trip_session_stop(trip_session *s)
+{
+    trip_frames_stop(s->frames);
+    trip_viewer_release(&s->viewer);
+    pthread_cond_destroy(&s->news);
+    pthread_mutex_destroy(&s->news_lock);
+    pthread_mutex_destroy(&s->lock);
+    free(s);
+}
+
+static struct timespec in_seconds(double seconds)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    double whole = floor(seconds);
+    t.tv_sec += (time_t)whole;
+    t.tv_nsec += (long)((seconds - whole) * 1e9);
+    t.tv_sec += t.tv_nsec / 1000000000;
+    t.tv_nsec %= 1000000000;
+    return t;
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void trip_session_tick(trip_session *s, double seconds)
+{
+    const struct timespec end = in_seconds(seconds);
+    bool ended;
+    double start = now();
+    wait_for_news(s, s->seen, &end);
+    s->seen = news_so_far(s, &ended);
+    pthread_mutex_lock(&s->lock);
+    trip_viewer_tick(&s->viewer, now() - start);
+    pthread_mutex_unlock(&s->lock);
+}
+
+/* Of those that a script can have: no key that ends or writes something, or makes room for the
+ * panel that a window has. */
+static bool is_allowed(const trip_event *e)
+{
+    bool other = e->kind == TRIP_EVENT_KEY && e->code < 128 && strchr("pqcmt", e->code);
+    bool size = e->kind == TRIP_EVENT_RESIZE &&
+                (e->x < MIN_SIDE || e->x > MAX_SIDE || e->y < MIN_SIDE || e->y > MAX_SIDE);
+    return e->kind <= TRIP_EVENT_RESIZE && e->kind != TRIP_EVENT_TEXT && !other && !size;
+}
+
+static void act(trip_session *s, const trip_script *script)
+{
+    trip_viewer *v = &s->viewer;
+    pthread_mutex_lock(&s->lock);
+    for (size_t i = 0; i < script->count; i++) {
+        const trip_event *e = &script->events[i];
+        if (e->kind == TRIP_EVENT_RESIZE)
+            trip_viewer_resize(v, (int)e->x, (int)e->y);
+        else
+            trip_viewer_event(v, e);
+    }
+    trip_viewer_tick(v, 0);
+    pthread_mutex_unlock(&s->lock);
+}
+
+static void drop_line(const char *line, void *user)
+{
+    (void)line, (void)user;
+}
+
+bool trip_session_do(trip_session *s, const char *text, size_t bytes)
+{
+    trip_script script;
+    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    bool good = trip_script_parse(&script, "events", text, bytes) == 0;
+    trip_scope_enter(before);
+    good = good && script.count <= MAX_EVENTS;
+    for (size_t i = 0; good && i < script.count; i++)
+        good = is_allowed(&script.events[i]);
+    if (good)
+        act(s, &script);
+    trip_script_free(&script);
+    return good;
+}
+
+/* The name that lasts as long as the program. */
+static const char *preset(const char *name)
+{
+    triptych_preset p;
+    for (unsigned i = 0; triptych_get_preset(i, &p); i++)
+        if (!strcmp(p.name, name))
+            return p.name;
+    return NULL;
+}
+
+bool trip_session_set_function(trip_session *s, const char *name)
+{
+    const char *known = s->given && !strcmp(name, s->given) ? s->given : preset(name);
+    if (*name && !known)
+        return false;
+    pthread_mutex_lock(&s->lock);
+    trip_viewer_set_function(&s->viewer, known);
+    trip_viewer_tick(&s->viewer, 0);
+    pthread_mutex_unlock(&s->lock);
+    return true;
+}
+
+static bool choose(const char *text, const char *const *names, int *out)
+{
+    for (int i = 0; names[i]; i++)
+        if (!strcmp(text, names[i])) {
+            *out = i;
+            return true;
+        }
+    return false;
+}
+
+static const char *const classes[] = { "pre", "post", "auto", NULL };
+static const char *const methods[] = { "merge", "clip", "axis", NULL };
+static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
+
+/* "head", or "ROUND,UP,DISTANCE" as of trip_light_control. */
+static bool set_light(trip_document *d, const char *value)
+{
+    char copy[64], *rest = copy;
+    double numbers[3];
+    if (!strcmp(value, "head")) {
+        d->settings.headlight = 1;
+        return true;
+    }
+    if (!d->opened || strlen(value) >= sizeof copy)
+        return false;
+    snprintf(copy, sizeof copy, "%s", value);
+    for (int i = 0; i < 3; i++) {
+        const char *number = strsep(&rest, ",");
+        if (!number || !trip_text_to_double(number, &numbers[i]))
+            return false;
+    }
+    const trip_light_control c = { numbers[0], numbers[1], numbers[2] };
+    if (rest || !(fabs(c.round) <= 360 && fabs(c.up) <= 90 && c.distance >= TRIP_LIGHT_NEAREST))
+        return false;
+    trip_light_control_set(&d->settings, &d->info, &c);
+    return true;
+}
+
+static bool set_number(double *out, const char *value, double lo, double hi)
+{
+    double number;
+    if (!trip_text_to_double(value, &number) || !(number >= lo && number <= hi))
+        return false;
+    *out = number;
+    return true;
+}
+
+/* What the page can set. */
+static bool set_setting(triptych_settings *s, const char *name, const char *value)
+{
+    static const char *const no_yes[] = { "0", "1", NULL };
+    int which = 0;
+    bool good = true;
+    if (!strcmp(name, "classify")) {
+        good = choose(value, classes, &which);
+        s->classify = good ? (triptych_classify)which : s->classify;
+    } else if (!strcmp(name, "method")) {
+        good = choose(value, methods, &which);
+        s->method = good ? (triptych_method)which : s->method;
+    } else if (!strcmp(name, "show")) {
+        good = choose(value, shows, &which);
+        s->show = good ? (triptych_show)which : s->show;
+    } else if (!strcmp(name, "shading")) {
+        good = choose(value, no_yes, &which);
+        s->shading = good ? which : s->shading;
+    } else if (!strcmp(name, "early_termination")) {
+        good = set_number(&s->early_termination, value, TRIPTYCH_EARLY_TERMINATION_AUTO, 0.1);
+        s->early_termination =
+            s->early_termination >= 0 ? s->early_termination : TRIPTYCH_EARLY_TERMINATION_AUTO;
+    } else {
+        good = !strcmp(name, "h") && set_number(&s->h, value, TRIPTYCH_H_AUTO, 0.999);
+        s->h = s->h >= 0 ? s->h : TRIPTYCH_H_AUTO;
+    }
+    return good;
+}
+
+static bool set_switch(trip_document *d, const trip_effect_switch *e, const char *value)
+{
+    static const char *const no_yes[] = { "0", "1", NULL };
+    int on = 0;
+    return choose(value, no_yes, &on) && trip_effect_turn(e, on, &d->settings, trip_viewer_heat(d));
+}
+
+/* One of light.h's. */
+static bool set_effect(trip_document *d, const char *name, const char *value)
+{
+    double number;
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++)
+        if (!strcmp(name, trip_effect_switches[i].name))
+            return set_switch(d, &trip_effect_switches[i], value);
+    for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++)
+        if (!strcmp(name, trip_effect_numbers[i].name))
+            return trip_text_to_double(value, &number) &&
+                   trip_effect_number_set(&trip_effect_numbers[i], number, &d->settings);
+    return false;
+}
+
+bool trip_session_set(trip_session *s, const char *name, const char *value)
+{
+    bool good = false;
+    pthread_mutex_lock(&s->lock);
+    trip_document *d = trip_viewer_document(&s->viewer);
+    if (d && !strcmp(name, "opacity"))
+        good = set_number(&d->opacity_scale, value, 1e-3, 1e3);
+    else if (d && !strcmp(name, "light"))
+        good = set_light(d, value);
+    else if (d)
+        good = set_setting(&d->settings, name, value) || set_effect(d, name, value);
+    s->viewer.changed |= good;
+    trip_viewer_tick(&s->viewer, 0);
+    pthread_mutex_unlock(&s->lock);
+    return good;
+}
+
+char *trip_session_presets(void)
+{
+    cJSON *root = cJSON_CreateArray();
+    triptych_preset p;
+    for (unsigned i = 0; triptych_get_preset(i, &p); i++)
+        cJSON_AddItemToArray(root, cJSON_CreateString(p.name));
+    char *text = root ? trip_json_print(root, false) : NULL;
+    cJSON_Delete(root);
+    return text;
+}
+
+/* A copy of its pixels, so that encoding does not hold up drawing. */
+typedef struct copy {
+    uint8_t *rgba;
+    int width, height;
+    uint64_t number;
+    bool whole;
+} copy;
+
+static void take(void *user, const trip_picture *p)
+{
+    copy *c = user;
+    size_t bytes = 4 * (size_t)p->width * (size_t)p->height;
+    *c = (copy){ malloc(bytes), p->width, p->height, p->number, p->whole };
+    if (c->rgba)
+        memcpy(c->rgba, p->rgba, bytes);
+}
+
+static bool await_copy(trip_session *s, uint64_t number, double seconds, copy *c)
+{
+    const struct timespec end = in_seconds(seconds);
+    bool there = false, more = true, ended = false;
+    while (!there && more && !ended) {
+        uint64_t came = news_so_far(s, &ended);
+        pthread_mutex_lock(&s->lock);
+        there = trip_frames_use_picture(s->frames, number, take, c);
+        pthread_mutex_unlock(&s->lock);
+        more = there || wait_for_news(s, came, &end);
+    }
+    return there;
+}
+
+bool trip_session_await(trip_session *s, uint64_t number, double seconds, trip_session_picture *out)
+{
+    copy c = { NULL };
+    *out = (trip_session_picture){ NULL };
+    if (!await_copy(s, number, seconds, &c) || !c.rgba)
+        return false;
+    if (c.whole)
+        trip_encode_png(c.rgba, c.width, c.height, &out->file, &out->bytes);
+    else
+        trip_encode_jpeg(c.rgba, c.width, c.height, &out->file, &out->bytes);
+    out->number = c.number;
+    out->whole = c.whole;
+    free(c.rgba);
+    return out->file != NULL;
+}
+
+/* As trip_session_set() takes them. */
+static void add_settings(cJSON *root, const triptych_settings *s)
+{
+    cJSON *settings = cJSON_AddObjectToObject(root, "settings");
+    cJSON_AddStringToObject(settings, "classify", classes[s->classify]);
+    cJSON_AddStringToObject(settings, "method", methods[s->method]);
+    cJSON_AddStringToObject(settings, "show", shows[s->show]);
+    cJSON_AddNumberToObject(settings, "shading", s->shading != 0);
+    cJSON_AddNumberToObject(settings, "h", s->h);
+    cJSON_AddNumberToObject(settings, "early_termination", s->early_termination);
+}
+
+static void add_numbers(cJSON *to, const trip_effect_switch *below, const triptych_settings *s)
+{
+    cJSON *numbers = cJSON_AddArrayToObject(to, "numbers");
+    for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
+        const trip_effect_number *n = &trip_effect_numbers[i];
+        if (!trip_effect_number_is_below(n, below, s))
+            continue;
+        cJSON *number = cJSON_CreateObject();
+        cJSON_AddStringToObject(number, "name", n->name);
+        cJSON_AddStringToObject(number, "label", n->label);
+        cJSON_AddStringToObject(number, "unit", n->unit);
+        cJSON_AddNumberToObject(number, "lo", n->lo);
+        cJSON_AddNumberToObject(number, "hi", n->hi);
+        cJSON_AddNumberToObject(number, "step", n->step);
+        cJSON_AddNumberToObject(number, "value", trip_effect_number_get(n, s));
+        cJSON_AddItemToArray(numbers, number);
+    }
+}
+
+/* What the page's controls of effects show. */
+static void add_switches(cJSON *root, const trip_document *d)
+{
+    const triptych_settings *s = &d->settings;
+    cJSON *switches = cJSON_AddArrayToObject(root, "switches");
+    for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++) {
+        const trip_effect_switch *e = &trip_effect_switches[i];
+        const char *lacks = trip_effect_lacks(e, s, trip_viewer_heat(d));
+        cJSON *to = cJSON_CreateObject();
+        cJSON_AddStringToObject(to, "name", e->name);
+        cJSON_AddStringToObject(to, "label", e->label);
+        cJSON_AddBoolToObject(to, "on", s->effects & e->bit && !lacks);
+        cJSON_AddStringToObject(to, "lacks", lacks ? lacks : "");
+        add_numbers(to, e, s);
+        cJSON_AddItemToArray(switches, to);
+    }
+}
+
+/* As trip_session_set() takes it, but for "head". */
+static void add_light(cJSON *root, const trip_document *d)
+{
+    const trip_light_control c = trip_light_control_of(&d->settings, &d->info);
+    cJSON *light = cJSON_AddObjectToObject(root, "light");
+    cJSON_AddBoolToObject(light, "head", d->settings.headlight);
+    cJSON_AddNumberToObject(light, "round", c.round);
+    cJSON_AddNumberToObject(light, "up", c.up);
+    cJSON_AddNumberToObject(light, "distance", c.distance);
+}
+
+bool trip_session_take_failure(trip_session *s, char *line, size_t bytes)
+{
+    const trip_frames_status status = trip_frames_get_status(s->frames);
+    const bool fresh = status.failed && status.messages != s->told;
+    if (fresh)
+        snprintf(line, bytes, "triptych: %s", status.message);
+    s->told = status.messages;
+    return fresh;
+}
+
+char *trip_session_status(trip_session *s)
+{
+    cJSON *root = cJSON_CreateObject();
+    pthread_mutex_lock(&s->lock);
+    trip_frames_status status = trip_frames_get_status(s->frames);
+    char *camera = trip_viewer_options(&s->viewer);
+    const trip_document *d = trip_viewer_document(&s->viewer);
+    const triptych_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
+    char effects[256];
+    trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
+    if (d && d->opened)
+        add_light(root, d);
+    if (d)
+        add_switches(root, d);
+    cJSON_AddStringToObject(root, "function", d && d->function ? d->function : "");
+    cJSON_AddNumberToObject(root, "opacity", d ? d->opacity_scale : 1);
+    pthread_mutex_unlock(&s->lock);
+    cJSON_AddBoolToObject(root, "exact", status.exact);
+    cJSON_AddBoolToObject(root, "failed", status.failed);
+    cJSON_AddStringToObject(root, "message", status.message);
+    cJSON_AddNumberToObject(root, "messages", (double)status.messages);
+    cJSON_AddStringToObject(root, "stage", status.stage);
+    cJSON_AddNumberToObject(root, "done", status.done);
+    cJSON_AddStringToObject(root, "camera", camera ? camera : "");
+    cJSON_AddStringToObject(root, "effects", effects);
+    add_settings(root, &settings);
+    char *text = root ? trip_json_print(root, false) : NULL;
+    cJSON_Delete(root);
+    free(camera);
+    return text;
+}

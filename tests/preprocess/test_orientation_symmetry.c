@@ -1,0 +1,161 @@
+/* Mirror symmetry: sums worked out by hand, and volumes that have it across a known axis. */
+#include "brick_files.h"
+
+#include <math.h>
+
+#include "orientation_symmetry.h"
+
+static double score(int i, int j, int k, const uint16_t *weights, int axis)
+{
+    trip_occupancy o = { { i, j, k }, { 0 } };
+    memcpy(o.weights, weights, (size_t)(i * j * k) * sizeof *weights);
+    return trip_orientation_symmetry_score(&o, axis);
+}
+
+static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
+{
+    (void)state;
+    /* 1 2 on itself: 1, 4 and 4, by the mirror's place; its squares come to 5. */
+    const uint16_t row[] = { 1, 2 };
+    for (int axis = 0; axis < 3; axis++) {
+        int n[3] = { 1, 1, 1 };
+        n[axis] = 2;
+        assert_float_equal(score(n[0], n[1], n[2], row, axis), 4.0 / 5, 1e-15);
+        assert_float_equal(score(n[0], n[1], n[2], row, (axis + 1) % 3), 1, 0);
+    }
+    /* Beside the middle: the mirror is where it fits best. */
+    const uint16_t aside[] = { 0, 0, 0, 7, 9, 7, 0 };
+    assert_float_equal(score(7, 1, 1, aside, 0), 1, 0);
+    /* Rows share a mirror: 3 and 1 0 3 0 of the second row, at the same place, 9 + 9 of 9 + 10. */
+    const uint16_t rows[] = { 0, 0, 3, 0, 1, 0, 3, 0 };
+    assert_float_equal(score(4, 2, 1, rows, 0), 18.0 / 19, 1e-15);
+    const uint16_t nothing[8] = { 0 };
+    assert_float_equal(score(2, 2, 2, nothing, 1), 0, 0);
+}
+
+static void the_greatest_weights_do_not_overflow(void **state)
+{
+    (void)state;
+    trip_occupancy full = { { TRIP_OCCUPANCY_EDGE, TRIP_OCCUPANCY_EDGE, TRIP_OCCUPANCY_EDGE },
+                            { 0 } };
+    memset(full.weights, 0xff, sizeof full.weights);
+    for (int axis = 0; axis < 3; axis++)
+        assert_float_equal(trip_orientation_symmetry_score(&full, axis), 1, 0);
+}
+
+static void one_axis_stands_out_or_there_is_none(void **state)
+{
+    (void)state;
+    static const struct {
+        double scores[3];
+        int axis;
+    } rows[] = {
+        { { 0.95, 0.8, 0.75 }, 0 },  { { 0.8, 0.95, 0.75 }, 1 },  { { 0.75, 0.8, 0.95 }, 2 },
+        { { 1, 1, 1 }, -1 },         { { 0.99, 0.95, 0.5 }, -1 }, /* two */
+        { { 0.5, 0.6, 0.85 }, -1 },                               /* weak */
+        { { 0.5, 0.86, 0.92 }, -1 },                              /* hardly more than another */
+        { { 0, 0, 0 }, -1 },         { { 1, 1, 0.3 }, -1 },
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        assert_int_equal(trip_orientation_symmetry_axis(rows[i].scores), rows[i].axis);
+}
+
+/* In parts of the edge, from -1 to 1: a wedge that is thin in front and at the top, rounded at its
+ * sides. The mirror image of a right triangle across a leg's direction covers at most 2/3 of it. */
+static bool is_in_wedge(double side, double front, double up)
+{
+    return side * side + 0.2 * up * up < 0.3 && front > -0.8 && up > -0.8 && front + up < 0.2;
+}
+
+enum { NX = 90, NY = 84, NZ = 76 };
+
+static uint8_t wedge[NX * NY * NZ];
+
+static void make_wedge(int axis, double aside, bool lopsided)
+{
+    const int dims[3] = { NX, NY, NZ };
+    for (int n = 0; n < NX * NY * NZ; n++) {
+        const int at[3] = { n % NX, n / NX % NY, n / NX / NY };
+        double p[3];
+        for (int a = 0; a < 3; a++)
+            p[a] = 2 * (at[a] + 0.5) / dims[a] - 1;
+        double side = p[axis] - aside;
+        bool ear = lopsided && side > 0.2 && side < 0.8 && p[(axis + 1) % 3] < 0.8;
+        wedge[n] = is_in_wedge(side, p[(axis + 1) % 3], p[(axis + 2) % 3]) || ear ? 200 : 10;
+    }
+}
+
+static void assert_mirror(trip_brick_params p, const char *expected)
+{
+    trip_brick_summary s;
+    char *text = test_brick_bytes(p, wedge, (const int[]){ NX, NY, NZ }, &s);
+    assert_true((s.note[0] != 0) == (strstr(text, "\"mirror\":\"z\"") != NULL));
+    assert_true(!s.note[0] || strstr(s.note, "mirror-symmetric across z"));
+    if (expected ? !strstr(text, expected) : strstr(text, "\"mirror\"") != NULL)
+        fail_msg("%s is not in: %.200s", expected ? expected : "no mirror", text);
+    free(text);
+}
+
+static void a_wedge_is_symmetric_across_its_own_axis(void **state)
+{
+    (void)state;
+    static const char *const expected[] = { "\"mirror\":\"x\"", "\"mirror\":\"y\"",
+                                            "\"mirror\":\"z\"" };
+    for (int axis = 0; axis < 3; axis++) {
+        make_wedge(axis, axis * 0.04, false);
+        assert_mirror((trip_brick_params){ 0 }, expected[axis]);
+    }
+    make_wedge(2, 0, true);
+    assert_mirror((trip_brick_params){ 0 }, NULL);
+}
+
+static void what_is_found_does_not_depend_on_how_it_is_bricked(void **state)
+{
+    (void)state;
+    const trip_brick_params ways[] = {
+        { .levels = -1 },
+        { .levels = 1 },
+        { .tile_voxels = 16, .slab_sheets = 3 },
+        { .no_halo = true, .threads = 1 },
+        { .threads = 1, .memory_bytes = 27 << 20 },
+    };
+    make_wedge(2, 0.05, false);
+    for (size_t i = 0; i < sizeof ways / sizeof *ways; i++)
+        assert_mirror(ways[i], "\"mirror\":\"z\"");
+}
+
+/* Where it is not even, the mirror image of voxels is not that of the object. */
+static void no_symmetry_is_found_across_uneven_spacing(void **state)
+{
+    (void)state;
+    char table[16 * NZ] = "", files[160];
+    for (int k = 0, used = 0; k < NZ; k++)
+        used += snprintf(table + used, sizeof table - (size_t)used, "%d\n", k * (k + 10));
+    test_write("z.txt", table, strlen(table));
+    snprintf(files, sizeof files, ",,%s", test_path("z.txt"));
+    make_wedge(2, 0, false);
+    assert_mirror((trip_brick_params){ .volume.coordinates = files }, NULL);
+}
+
+static void nothing_is_guessed_where_it_is_said_how_the_volume_lies(void **state)
+{
+    (void)state;
+    make_wedge(2, 0, false);
+    assert_mirror((trip_brick_params){ .volume.axes = "PIR" }, NULL);
+}
+
+#define TEST(f) cmocka_unit_test_setup_teardown(f, test_begin, test_end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(scores_are_the_greatest_overlap_with_the_mirror_image),
+        TEST(the_greatest_weights_do_not_overflow),
+        TEST(one_axis_stands_out_or_there_is_none),
+        TEST(a_wedge_is_symmetric_across_its_own_axis),
+        TEST(what_is_found_does_not_depend_on_how_it_is_bricked),
+        TEST(no_symmetry_is_found_across_uneven_spacing),
+        TEST(nothing_is_guessed_where_it_is_said_how_the_volume_lies),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
