@@ -86,7 +86,7 @@ static int measure_splat(double angle_degrees, double distance, deviation *out)
 
 static const bench_column splat_columns[] = {
     { "angle", "degrees", 0, 0 },        { "distance", "kernel radii", 0, 0 },
-    { "most", "most, % of peak", 2, 0 }, { "mean", "mean, %", 2, 0 },
+    { "max", "maximum, % of peak", 2, 0 }, { "mean", "mean, %", 2, 0 },
     { "sum", "sum, %", 2, 0 },
 };
 
@@ -105,7 +105,7 @@ static int measure_splats(bench_report *r)
             cJSON_AddNumberToObject(row, "angle", angles[i]);
             cJSON_AddNumberToObject(row, "distance", distances[k]);
             if (d.affine) {
-                cJSON_AddNumberToObject(row, "most", 100 * d.max);
+                cJSON_AddNumberToObject(row, "max", 100 * d.max);
                 cJSON_AddNumberToObject(row, "mean", 100 * d.mean);
                 cJSON_AddNumberToObject(row, "sum", 100 * d.sum);
             }
@@ -121,7 +121,7 @@ enum { FIELDS = sizeof fields_of_view / sizeof *fields_of_view };
 
 static const bench_column picture_columns[] = {
     { "fov", "degrees high", 0, 0 },          { "mean", "mean of 255", 3, 0 },
-    { "percentile_99", "99 %", 3, 0 },        { "most", "most", 2, 0 },
+    { "percentile_99", "99 %", 3, 0 },        { "max", "max", 2, 0 },
     { "exact_ms", "exact: median ms", 1, 0 }, { "ewa_ms", "ewa", 1, 0 },
     { "ratio", "ewa / exact", 3, 0 },
 };
@@ -180,7 +180,7 @@ static int measure_view(pair *p, double fov, cJSON *rows)
         cJSON_AddNumberToObject(row, "fov", fov);
         cJSON_AddNumberToObject(row, "mean", figures.mean);
         cJSON_AddNumberToObject(row, "percentile_99", figures.percentile_99);
-        cJSON_AddNumberToObject(row, "most", figures.max);
+        cJSON_AddNumberToObject(row, "max", figures.max);
         cJSON_AddNumberToObject(row, "exact_ms", exact);
         cJSON_AddNumberToObject(row, "ewa_ms", ewa);
         cJSON_AddNumberToObject(row, "ratio", ewa / exact);

@@ -68,7 +68,7 @@ static void add_part(cJSON *table, const char *name, const part *p)
     cJSON_AddNumberToObject(row, "fps", sum > 0 ? 1e3 * p->count / sum : 0);
     cJSON_AddNumberToObject(row, "ms", quantile(p->between, p->count, 0.5));
     cJSON_AddNumberToObject(row, "ms_99", quantile(p->between, p->count, 0.99));
-    cJSON_AddNumberToObject(row, "ms_most", quantile(p->between, p->count, 1));
+    cJSON_AddNumberToObject(row, "ms_max", quantile(p->between, p->count, 1));
     cJSON_AddNumberToObject(row, "age_ms", quantile(p->age, p->count, 0.5));
     cJSON_AddNumberToObject(row, "age_ms_99", quantile(p->age, p->count, 0.99));
     cJSON_AddNumberToObject(row, "stale", p->stale);
@@ -82,7 +82,7 @@ static const bench_column part_columns[] = {
     { "fps", "a second", 1, 0 },
     { "ms", "ms between", 1, 0 },
     { "ms_99", "99 %", 1, 0 },
-    { "ms_most", "most", 1, 0 },
+    { "ms_max", "max", 1, 0 },
     { "age_ms", "ms from input", 1, 0 },
     { "age_ms_99", "99 %", 1, 0 },
     { "stale", "of older input", 0, 0 },

@@ -241,7 +241,7 @@ static int dolly(measuring *m, const triptych_camera *from, double lod_px, float
 static const bench_column dolly_columns[] = {
     { "drawn", "drawn", 0, 0 },
     { "mean", "mean", 3, 0 },
-    { "most", "most", 3, 0 },
+    { "max", "max", 3, 0 },
     { "mean_of_finest", "of the finest's", 2, 0 },
     { "most_of_finest", "most of that", 2, 0 },
 };
@@ -258,7 +258,7 @@ static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const f
     }
     cJSON_AddStringToObject(row, "drawn", drawn);
     cJSON_AddNumberToObject(row, "mean", sum / DOLLY_STEPS);
-    cJSON_AddNumberToObject(row, "most", max);
+    cJSON_AddNumberToObject(row, "max", max);
     cJSON_AddNumberToObject(row, "mean_of_finest", sum / sum_of_finest);
     cJSON_AddNumberToObject(row, "most_of_finest", max_of_finest);
     cJSON_AddItemToArray(table, row);

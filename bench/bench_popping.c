@@ -23,7 +23,7 @@ static int draw_steps(const session *s, const bench_scene *scene, const trip_set
 
 static const bench_column columns[] = {
     { "settings", "settings", 0, 0 },  { "mean", "mean", 3, 0 },
-    { "percentile_99", "99 %", 3, 0 }, { "most", "most", 2, 0 },
+    { "percentile_99", "99 %", 3, 0 }, { "max", "max", 2, 0 },
     { "motion", "motion", 3, 0 },
 };
 
@@ -33,7 +33,7 @@ static void add_row(cJSON *table, const char *name, const bench_popping_row *f)
     cJSON_AddStringToObject(row, "settings", name);
     cJSON_AddNumberToObject(row, "mean", f->mean);
     cJSON_AddNumberToObject(row, "percentile_99", f->percentile_99);
-    cJSON_AddNumberToObject(row, "most", f->max);
+    cJSON_AddNumberToObject(row, "max", f->max);
     cJSON_AddNumberToObject(row, "motion", f->motion);
     cJSON_AddItemToArray(table, row);
 }

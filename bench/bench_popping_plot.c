@@ -37,7 +37,7 @@ static double motion_of(const bench_popping_row *r)
 }
 
 static const curve curves[] = {
-    { "most", "#b03020", max_of },
+    { "max", "#b03020", max_of },
     { "99 %", "#c08010", percentile_99_of },
     { "mean", "#2050b0", mean_of },
     { "motion", "#777", motion_of },

@@ -30,7 +30,7 @@ enum { VARIANTS = sizeof variants / sizeof variants[0] };
 
 static const bench_column columns[] = {
     { "form", "form", 0, 0 }, { "mean", "mean", 3, 0 }, { "percentile_99", "99 %", 2, 0 },
-    { "most", "most", 1, 0 }, { "ms", "ms", 0, 0 },
+    { "max", "max", 1, 0 }, { "ms", "ms", 0, 0 },
 };
 
 static int ascending(const void *a, const void *b)
@@ -52,7 +52,7 @@ static void compare(const float *a, const float *b, size_t pixels, float *apart,
     cJSON_AddNumberToObject(row, "mean", some ? 255 * sum / (double)count : 0);
     cJSON_AddNumberToObject(row, "percentile_99",
                             some ? 255 * (double)apart[(count - 1) * 99 / 100] : 0);
-    cJSON_AddNumberToObject(row, "most", some ? 255 * (double)apart[count - 1] : 0);
+    cJSON_AddNumberToObject(row, "max", some ? 255 * (double)apart[count - 1] : 0);
 }
 
 /* The first form's picture is kept in `usual`. */

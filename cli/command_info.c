@@ -210,8 +210,8 @@ static cJSON *to_json(const data_set *d, bool verified)
     cJSON_AddItemToObject(root, "dims", numbers(dims, 3));
     cJSON_AddItemToObject(root, "spacing", numbers(steps, 3));
     if (is_uneven(info)) {
-        cJSON_AddItemToObject(root, "spacing_least", numbers(info->spacing_min, 3));
-        cJSON_AddItemToObject(root, "spacing_most", numbers(info->spacing_max, 3));
+        cJSON_AddItemToObject(root, "spacing_min", numbers(info->spacing_min, 3));
+        cJSON_AddItemToObject(root, "spacing_max", numbers(info->spacing_max, 3));
     }
     add_world(root, info, d->source.root);
     cJSON_AddItemToObject(root, "value_min", number(info->value_min));

@@ -64,7 +64,7 @@ static void write_defines(FILE *out, const trip_gl_variant *variant)
     if (passes[variant->pass].in_double)
         fprintf(out, "#define TRIP_DOUBLE\n");
     fprintf(out, "#define METHOD %d\n#define LAYERS %u\n", (int)variant->method, variant->layers);
-    fprintf(out, "#define AFFINE_MOST %f\n#define AFFINE_REACH %f\n", TRIP_SPLAT_AFFINE,
+    fprintf(out, "#define AFFINE_MAX %f\n#define AFFINE_REACH %f\n", TRIP_SPLAT_AFFINE,
             TRIP_SPLAT_AFFINE_REACH);
     write_effects(out, variant->effects);
     if (variant->effects & TRIP_GL_WIDE)

@@ -324,8 +324,8 @@ static void forms_compares_what_the_papers_do_with_the_usual_picture(void **stat
     cJSON_ArrayForEach(row, rows)
     {
         bool first = row == cJSON_GetArrayItem(rows, 0);
-        assert_true(first ? number(row, "most") == 0 : number(row, "most") > 0);
-        assert_true(number(row, "percentile_99") <= number(row, "most"));
+        assert_true(first ? number(row, "max") == 0 : number(row, "max") > 0);
+        assert_true(number(row, "percentile_99") <= number(row, "max"));
     }
     cJSON_Delete(root);
 }
@@ -348,8 +348,8 @@ static void popping_is_of_axis_alone(void **state)
         assert_true(number(clip, "mean") < number(axis, "mean") / 6);
         cJSON_ArrayForEach(row, rows)
         {
-            assert_true(number(row, "mean") <= number(row, "most"));
-            assert_true(number(row, "percentile_99") <= number(row, "most"));
+            assert_true(number(row, "mean") <= number(row, "max"));
+            assert_true(number(row, "percentile_99") <= number(row, "max"));
             if (row != axis && row != clip)
                 assert_true(number(row, "percentile_99") < number(axis, "percentile_99") / 4);
         }
@@ -395,7 +395,7 @@ static void levels_of_a_plain_block_are_near_the_finest(void **state)
     }
     row = cJSON_GetArrayItem(rows_of(root, "dolly"), 1);
     assert_true(number(row, "mean_of_finest") > 0.8 && number(row, "mean_of_finest") < 1.25);
-    assert_true(number(row, "most") >= number(row, "mean"));
+    assert_true(number(row, "max") >= number(row, "mean"));
     cJSON_Delete(root);
     program_call(
         &r, "brick plain.raw --size 32,32,32 --type uint8 --keep-all --levels 0 -o without.trip "
@@ -418,7 +418,7 @@ static void flight_ends_with_the_picture_of_render_and_counts_each_picture_once(
     for (int i = 0; i < 5; i++) {
         const cJSON *row = cJSON_GetArrayItem(rows, i);
         assert_true(number(row, "ms") <= number(row, "ms_99"));
-        assert_true(number(row, "ms_99") <= number(row, "ms_most"));
+        assert_true(number(row, "ms_99") <= number(row, "ms_max"));
         assert_true(number(row, "stale") <= number(row, "pictures"));
         if (i < 4)
             pictures += number(row, "pictures");
@@ -481,7 +481,7 @@ static void ewa_compares_splats_and_pictures(void **state)
         if (number(row, "angle") > 0)
             continue;
         double expected = max_on_axis(number(row, "distance"));
-        assert_true(fabs(number(row, "most") - expected) < 0.01 * expected + 1e-4);
+        assert_true(fabs(number(row, "max") - expected) < 0.01 * expected + 1e-4);
         assert_true(number(row, "sum") <= 0 && -number(row, "sum") <= number(row, "mean") + 1e-9);
         checked++;
     }
@@ -491,10 +491,10 @@ static void ewa_compares_splats_and_pictures(void **state)
     cJSON_ArrayForEach(row, rows)
     {
         assert_close(number(row, "ratio"), number(row, "ewa_ms") / number(row, "exact_ms"));
-        assert_true(number(row, "mean") <= number(row, "most"));
+        assert_true(number(row, "mean") <= number(row, "max"));
     }
-    assert_true(number(cJSON_GetArrayItem(rows, 0), "most") <
-                number(cJSON_GetArrayItem(rows, cJSON_GetArraySize(rows) - 1), "most"));
+    assert_true(number(cJSON_GetArrayItem(rows, 0), "max") <
+                number(cJSON_GetArrayItem(rows, cJSON_GetArraySize(rows) - 1), "max"));
     cJSON_Delete(root);
 }
 
