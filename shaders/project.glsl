@@ -137,8 +137,8 @@ bool project_near(real3 c, real3 position, inout splat s)
 void shape_footprint(inout splat s, inout real2 half_size)
 {
     real3 x = own_gradient(to_x.xyz), y = own_gradient(to_y.xyz), ray = own_vector(ray_0.xyz);
-    real largest = max(dot(x, x), dot(y, y)), sigma2 = own_sigma2() * largest;
-    real3 gx = x * inversesqrt(largest), gy = y * inversesqrt(largest), area = cross(gx, gy);
+    real longest = max(dot(x, x), dot(y, y)), sigma2 = own_sigma2() * longest;
+    real3 gx = x * inversesqrt(longest), gy = y * inversesqrt(longest), area = cross(gx, gy);
     real low = kernel.z / sigma2, det_s = dot(area, area);
     real4 shape = real4(dot(gx, gx), dot(gx, gy), dot(gy, gy), det_s);
 #ifdef UNEVEN

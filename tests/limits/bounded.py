@@ -105,7 +105,7 @@ class Bounded:
         self.note(stage.line(0))
         for part in flown["tables"]["parts"]["rows"]:
             self.note("    {part:<10}{fps:6.1f} pictures a second; ms between: median {ms:.1f}, "
-                      "99 % {ms_99:.1f}, most {ms_most:.1f}; from input: median {age_ms:.1f}, "
+                      "99 % {ms_99:.1f}, most {ms_max:.1f}; from input: median {age_ms:.1f}, "
                       "99 % {age_ms_99:.1f}".format(**part))
         rest = flown["tables"]["rest"]["rows"][0]
         self.note("    first picture {first_ms:.0f} ms, whole picture {first_whole_ms:.0f}, whole "
