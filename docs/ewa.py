@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Draws docs/ewa.png, the cases of Zwicker et al. 2001 by plain splats, Swan's uniform scaling and EWA:
+"""Draws docs/ewa.png: the cases of Zwicker et al. 2001 with plain splats, Swan's uniform scaling
+and EWA.
 
 docs/ewa.py build/release/triptych docs/ewa.png
 
-A row a case: a checkerboard that recedes, a zebra of voxels twice and four times as long as wide, and a
-few voxels close up; a column a filter. All by the reference renderer.
+Each row is a case: a receding checkerboard, a zebra with voxels twice as long as wide, one with
+voxels four times as long, and a disc of few voxels close up. Each column is a filter. The reference
+renderer draws all pictures.
 """
 import os
 import struct
@@ -29,7 +31,8 @@ def disc(u, v):
     return (u - 0.5) ** 2 + (v - 0.5) ** 2 < 0.1
 
 
-# Pattern, voxels along x and y, how long one is along x, eye, point looked at, field of view.
+# Pattern, voxels along x and y, length of a voxel along x, eye, target point, field of view in
+# degrees.
 CASES = [
     (checkers, 512, 512, 1, (256, -40, 36), (256, 160, 0), 50),
     (zebra, 256, 512, 2, (256, -40, 36), (256, 160, 0), 50),
@@ -49,7 +52,8 @@ def write_volume(folder, pattern, nx, ny):
 
 
 def read_png(path):
-    """Rows of red, green and blue bytes, each pixel ENLARGED times; of 8 bits a channel, not interlaced."""
+    """Returns rows of RGB bytes, each pixel repeated ENLARGED times. Reads 8-bit PNG files without
+    interlace."""
     with open(path, "rb") as file:
         data = file.read()
     at, packed, width, height, kind = 8, b"", 0, 0, 0
@@ -89,7 +93,7 @@ def write_png(path, rows):
 
 
 def draw(triptych, folder, case):
-    """The pictures of a case, one a filter."""
+    """Returns the pictures of a case, one for each filter."""
     pattern, nx, ny, length, eye, look, fov = case
     volume, data = write_volume(folder, pattern, nx, ny), os.path.join(folder, "plane.trip")
     function, picture = os.path.join(folder, "plane.tf"), os.path.join(folder, "plane.png")

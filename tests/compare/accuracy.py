@@ -1,5 +1,5 @@
-"""How far each program's picture is from the emission-absorption integral through the source volume,
-`triptych render --renderer integral --field source`."""
+"""Measures the error of each program's pictures against the emission-absorption integral through
+the source volume, `triptych render --renderer integral --field source`."""
 import os
 import subprocess
 import tempfile
@@ -17,7 +17,8 @@ def _numbers(values):
 
 
 def integral(prepared, view, size, threads, path):
-    """Writes it, as the programs write theirs."""
+    """Writes the integral of a view to `path`, as a PNG with the alpha of the programs'
+    pictures."""
     command = [prepared.triptych, "render", prepared.volume, "-o", path, "--renderer", "integral",
                "--field", "source", "--tolerance", str(TOLERANCE), "--tf", prepared.function_path,
                "--threads", str(threads), "--size", "%dx%d" % (size, size),
@@ -34,13 +35,14 @@ def integral(prepared, view, size, threads, path):
 
 
 def load(path, name):
-    """Premultiplied."""
+    """Returns the picture of the program `name`, premultiplied."""
     image = pictures.load(path, is_opacity=name == "vdb_render")
     return pictures.premultiply(image) if name.startswith(("triptych-", "integral")) else image
 
 
 def measure(options, prepared, field, views, size, log):
-    """By program: figures of pictures.distance(), the mean over views; {} without an integral."""
+    """Returns the mean of pictures.distance() over the views for each program, or {} if the
+    integral cannot be drawn."""
     apart = {one.name: [] for one in field}
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "picture.png")
@@ -48,14 +50,14 @@ def measure(options, prepared, field, views, size, log):
             try:
                 integral(prepared, view, size, options.threads, path)
             except Unavailable as why:
-                log("%s: no integral: %s" % (prepared.scene.name, why))
+                log("%s: the integral failed: %s" % (prepared.scene.name, why))
                 return {}
             truth = load(path, "integral")
             for one in field:
                 try:
                     one.picture(view, size, path)
                 except Unavailable as why:
-                    log("%s: no picture: %s" % (one.name, why))
+                    log("%s: drawing failed: %s" % (one.name, why))
                     continue
                 picture = load(path, one.name)
                 apart[one.name].append(pictures.distance(picture, truth))
@@ -64,13 +66,14 @@ def measure(options, prepared, field, views, size, log):
 
 
 def table(result, size):
-    """Of one scene: time and error of each program."""
+    """Returns a table of time and error of each program for one scene."""
     lines = ["%s: %s, %d px" % (result["scene"], result["shows"], size), "",
-             "| program | median ms | error: median | mean | 99 % | most | of opacity: median | mean |",
+             "| program | median ms | error: median | mean | 99 % | maximum | of opacity: median "
+             "| mean |",
              "|---|--:|--:|--:|--:|--:|--:|--:|"]
     times = {row["program"]: row["ms"] for row in result["rows"] if row["size"] == size}
     for name, error in result["errors"].get(str(size), {}).items():
-        lit = ("median", "mean", "percentile_99", "most")
+        lit = ("median", "mean", "percentile_99", "max")
         cells = ["-" if name == "vdb_render" else "%.2f" % error[key] for key in lit]
         cells += ["%.2f" % error[key] for key in ("opacity_median", "opacity_mean")]
         lines.append("| %s | %s | %s |" % (

@@ -1,5 +1,5 @@
-"""builds: what data sets and frames of a volume cost by each of several builds of triptych, in turns,
-and whether their pictures have the same bits. Started by ./builds."""
+"""builds: compares several builds of triptych on one volume, in turns. It measures the cost of data
+sets and frames, or checks that the pictures have the same bits. Started by ./builds."""
 import argparse
 import hashlib
 import json
@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 
-# Sides, and views from inside and of a wide angle, as every build has them.
+# Views from the sides, from inside and with a wide angle, with options that every build has.
 VIEWS = (["--view=front"], ["--view=left"], ["--view=top"], ["--view=iso"],
          ["--view=iso", "--zoom=6"], ["--view=iso", "--fov=90"])
 
@@ -36,14 +36,14 @@ def load():
 
 
 class Build:
-    """A program, which may lack options that later ones have."""
+    """A build of the program, which may lack options of later builds."""
 
     def __init__(self, path):
         self.path = path
         self.help = {c: run(path, c, "--help") for c in ("brick", "render", "bench")}
 
     def given(self, command, *options):
-        """Those of the options that the command has."""
+        """Returns the options that the command has in this build."""
         return [o for o in options if o.split("=")[0] in self.help[command]]
 
     def brick(self, o, data, *options):
@@ -52,14 +52,15 @@ class Build:
         return json.loads(summary)
 
     def stream(self, o, data):
-        """Milliseconds of a frame from disk, of reading alone and of drawing from memory."""
+        """Returns milliseconds of a frame from disk, of reading alone and of drawing from
+        memory."""
         report = json.loads(run(self.path, "bench", "stream", data, "--renderer=cpu", "--json",
                                 "--memory=" + o.memory, "--size=" + o.size, "--repeat=1"))
         rows = report["tables"]["stages"]["rows"]
         return {row["key"]: row["ms"] for row in rows if "ms" in row}
 
     def pictures(self, o, data, folder):
-        """The SHA-256 of each view, as the pixels' bits in OpenEXR."""
+        """Returns the SHA-256 of the OpenEXR file of each view."""
         name = os.path.join(folder, "view.exr")
         hashes = []
         for view in VIEWS:
@@ -74,7 +75,7 @@ def costs(builds, o, folder):
     rows = [{"program": b.path, "brick": [], "frame": [], "read": [], "draw": []} for b in builds]
     for _ in range(o.repeat):
         for number, (build, row) in enumerate(zip(builds, rows)):
-            data = os.path.join(folder, "%d.trip" % number)  # forms that differ
+            data = os.path.join(folder, "%d.trip" % number)  # formats differ between builds
             made = build.brick(o, data)
             splats = made["bytes"] - made.get("halo_bytes", 0)
             row["bytes_a_splat"] = splats / made["kept"]
@@ -90,7 +91,7 @@ def costs(builds, o, folder):
 
 
 def pictures(builds, o, folder):
-    """By each build with the halo and, where it has a choice, without."""
+    """Returns the hashes of each build with a halo and, if the build has --halo, without one."""
     rows = []
     for number, build in enumerate(builds):
         halos = ["--halo=0", "--halo=1"] if "--halo" in build.help["brick"] else [None]
@@ -128,24 +129,28 @@ def print_pictures(rows):
         print("%-32s halo %-2s %s" % (row["program"][-32:], row["halo"] or "-",
                                       " ".join(h[:8] for h in row["views"])))
     same = all(row["views"] == rows[0]["views"] for row in rows)
-    print("the same bits" if same else "not the same bits")
+    print("all pictures have the same bits" if same else "the pictures differ")
 
 
 def parse():
     parser = argparse.ArgumentParser(
-        prog="builds", description="What data sets of a volume, without coarse levels, and frames of "
-        "them cost by each of several builds of triptych, in turns; or whether six pictures of the "
-        "volume have the same bits, by splats with normals at full width, with the halo and without.")
+        prog="builds", description="Compares several builds of triptych on one volume, in turns. "
+        "Prints the cost of data sets without coarse levels and of their frames. With --pictures, "
+        "checks that six pictures by splats have the same bits, with the halo and without, with "
+        "full normals.")
     parser.add_argument("--triptych", action="append", required=True,
-                        help="a build of the program; may be repeated, the first is compared with")
+                        help="a build of the program; repeat it to compare with the first one")
     parser.add_argument("volume")
-    parser.add_argument("--brick", default="", help="options of `triptych brick`, as one word")
-    parser.add_argument("--render", default="", help="options of `triptych render`, with --pictures")
-    parser.add_argument("--memory", default="128M", help="as in triptych (default: 128M)")
-    parser.add_argument("--size", default="1024x1024", help="pixels (default: 1024x1024)")
-    parser.add_argument("--repeat", type=int, default=3, help="turns (default: 3)")
-    parser.add_argument("--pictures", action="store_true", help="compare pictures, not costs")
-    parser.add_argument("--work", help="a folder for the data sets (default: a temporary one)")
+    parser.add_argument("--brick", default="", help="options of `triptych brick`, in one argument")
+    parser.add_argument("--render", default="",
+                        help="options of `triptych render`, in one argument; needs --pictures")
+    parser.add_argument("--memory", default="128M",
+                        help="memory for data, as in triptych (default: 128M)")
+    parser.add_argument("--size", default="1024x1024",
+                        help="picture size in pixels (default: 1024x1024)")
+    parser.add_argument("--repeat", type=int, default=3, help="number of turns (default: 3)")
+    parser.add_argument("--pictures", action="store_true", help="compare pictures instead of costs")
+    parser.add_argument("--work", help="folder for the data sets (default: a temporary folder)")
     parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
     options.brick, options.render = options.brick.split(), options.render.split()

@@ -1,5 +1,5 @@
-"""Whether all programs look from the same place the same way: an object that looks different from
-every side, drawn by each, must lie at the same pixels."""
+"""Checks that all programs show the same view: each draws an object without symmetry, which must
+cover the same pixels."""
 import os
 import tempfile
 from collections import namedtuple
@@ -13,15 +13,16 @@ from prepare import Prepared
 
 SIZE_PX = 512
 VOXEL = 0.25  # world units
-LIMIT_PX = 1.0  # of displacement; a mirrored or turned picture is off by far more
-OUTLINE_LIMIT_VOXELS = 1.5  # a splat reaches further out than interpolation does
+LIMIT_PX = 1.0  # maximum displacement; a mirrored or turned picture exceeds it widely
+OUTLINE_LIMIT_VOXELS = 1.5  # a splat reaches further than interpolation
 
 _Scene = namedtuple("Scene", "name function shading shows")
 
 
 def _object():
-    """Four balls placed without symmetry; uint8, [k, j, i]. They are of one size so that what a
-    renderer adds to every outline or takes from it leaves the middle of the silhouette in place."""
+    """Returns four balls placed without symmetry; uint8, [k, j, i]. All have one size, so a
+    renderer that draws every outline too wide or too narrow does not move the centre of the
+    silhouette."""
     k, j, i = np.ogrid[0:180.0, 0:260.0, 0:220.0]
     inside = np.zeros((180, 260, 220))
     for x, y, z in ((50, 60, 50), (170, 90, 60), (120, 200, 120), (60, 150, 135)):
@@ -50,14 +51,14 @@ def _opacity(one, view, folder):
 
 
 def _displacement(ours, theirs):
-    """Of the middle of the silhouette, and of its outline, in pixels."""
+    """Returns the displacement of the centre of the silhouette and of its outline, in pixels."""
     shift = pictures.centroid(theirs) - pictures.centroid(ours)
     apart = np.abs(pictures.edges(theirs) - pictures.edges(ours))
     return float(np.abs(shift).max()), float(apart.max())
 
 
 def _voxel_px(view):
-    """A voxel's size in the middle of the picture."""
+    """Returns the size of a voxel in the centre of the picture, in pixels."""
     distance = np.linalg.norm(np.array(view["eye"]) - np.array(view["look"]))
     return VOXEL * SIZE_PX / (2 * distance * np.tan(np.radians(view["fov_degrees"] / 2)))
 
@@ -72,8 +73,8 @@ def _compare(ours, other, views, folder):
 
 
 def cameras_agree(options, log):
-    """The largest displacement of each program against Triptych over three views; SystemExit when
-    one is too large."""
+    """Returns the largest displacement of each program from Triptych over three views. Raises
+    SystemExit if one is too large."""
     worst = {}
     with tempfile.TemporaryDirectory() as folder:
         prepared = Prepared(_Scene("alignment", "alignment", False, "balls"), _write(folder),
@@ -92,5 +93,7 @@ def cameras_agree(options, log):
                 (name, worst[name]["displaced_px"], worst[name]["outline_voxels"]))
             if (worst[name]["displaced_px"] > LIMIT_PX or
                     worst[name]["outline_voxels"] > OUTLINE_LIMIT_VOXELS):
-                raise SystemExit("compare: %s does not show the same view as Triptych" % name)
+                raise SystemExit("compare: %s does not show the same view as Triptych; "
+                                 "--no-alignment skips this check" %
+                                 name)
     return worst

@@ -1,4 +1,5 @@
-"""compare: scene by scene, prepare -> draw in turns -> table, pictures. Started by ./compare."""
+"""Compares Triptych with other volume renderers: for each scene, prepares the data, draws in turns,
+and writes a table and pictures. Started by ./compare."""
 import argparse
 import json
 import os
@@ -23,31 +24,32 @@ PICTURE_SIZE = 512
 
 NOTES = [
     "A frame is the wall time of one view from the volume in memory to the finished picture in "
-    "memory. No figure contains a disk, except vdb_render's.",
-    "triptych-cpu, triptych-gl: planning, drawing, merging, and for gl copying bricks to its own "
-    "memory and reading the picture back (triptych bench renderers).",
-    "vtk-cpu: Render() of a window that shows one volume by vtkFixedPointVolumeRayCastMapper, one "
-    "sample a voxel, one ray a pixel, no automatic coarsening; showing the finished picture by "
-    "OpenGL, the display time, is part of it.",
-    "vtk-gpu: the same by vtkOpenGLGPUVolumeRayCastMapper, on Mesa's software OpenGL where there is "
-    "no other; the picture stays in the window.",
-    "vdb_render: a whole process, with reading the grid and writing a PNG; \"own\" is what it says "
-    "its ray tracing took. It has no transfer function: its grid holds the extinction of every "
-    "voxel, so it shows the same opacity, in grey and unlit, without shadows (-shadowstep 1e9). It "
-    "stops a ray at 4 % transmittance, VTK's ray caster at 0.8 %, Triptych at 0.2 % (post) and "
-    "0.012 % (pre).",
-    "triptych-post-1, -2, -4: triptych-cpu with --classify post and so many slices; triptych-cpu and "
-    "triptych-gl draw --classify pre. vtk-cpu-half: vtk-cpu with a sample every half voxel. VTK's ray caster is given a view wider by a pixel, which it needs to show the same.",
-    "Errors: of 255, against the integral through the source volume (linear interpolation, tolerance "
-    "%g, 8 bits a channel), over red, green, blue (premultiplied) and opacity of the pixels where "
-    "either opacity is above 1/255, and of opacity alone, which no light changes; the mean of the views "
-    "measured. VTK lights by gradients of its own, and lights flat regions: its error in colour holds "
-    "that difference too." %
+    "memory. Only the figures of vdb_render include the disk.",
+    "triptych-cpu, triptych-gl: planning, drawing and merging. For gl, also copying bricks to its "
+    "own memory and reading the picture back (triptych bench renderers).",
+    "vtk-cpu: Render() of a window that shows one volume by vtkFixedPointVolumeRayCastMapper, "
+    "with one sample per voxel, one ray per pixel and no automatic coarsening. The time includes "
+    "showing the finished picture by OpenGL (the display time).",
+    "vtk-gpu: Render() of a window with vtkOpenGLGPUVolumeRayCastMapper, on Mesa's software "
+    "OpenGL if there is no other. The picture stays in the window.",
+    "vdb_render: a whole process that reads the grid and writes a PNG. Its own time is the one "
+    "that it reports for ray tracing. It has no transfer function, so its grid holds the "
+    "extinction of every voxel. It shows the same opacity, in grey and unlit, without shadows "
+    "(-shadowstep 1e9). It stops a ray at 4 % transmittance, VTK's ray caster at 0.8 %, Triptych "
+    "at 0.2 % (post) and 0.012 % (pre).",
+    "triptych-post-1, -2, -4: triptych-cpu with --classify post and 1, 2 or 4 samples per sheet. "
+    "triptych-cpu and triptych-gl use --classify pre. vtk-cpu-half: vtk-cpu with a sample every "
+    "half voxel. VTK's ray caster gets a view wider by a pixel, which it needs to show the same.",
+    "Errors: of 255, against the integral through the source volume (linear interpolation, "
+    "tolerance %g, 8 bits per channel), as the mean over the measured views. They cover the "
+    "pixels where either opacity is above 1/255, in red, green, blue (premultiplied) and opacity, "
+    "and in opacity alone. Light does not change opacity. VTK has its own gradients and lights "
+    "flat regions, so its error of colour includes that difference." %
     accuracy.TOLERANCE,
-    "vdb_render's function, and those of triptych-cpu and triptych-gl, are applied to voxels, VTK's and "
-    "those of triptych-post to interpolated values.",
+    "vdb_render, triptych-cpu and triptych-gl apply the transfer function to voxels, VTK and "
+    "triptych-post to interpolated values.",
     "Triptych leaves flat regions unlit; VTK lights them like all others.",
-    "Medians: of the rounds at each view, then over views.",
+    "Medians are over the rounds at each view, then over views.",
 ]
 
 
@@ -84,7 +86,7 @@ def machine(triptych):
 
 
 class Race:
-    """One scene at one size. times[name][view] holds the milliseconds of each round."""
+    """Times one scene at one size. times[name][view] holds the milliseconds of each round."""
 
     def __init__(self, options, size, field):
         self.options, self.size, self.field = options, size, field
@@ -98,7 +100,7 @@ class Race:
                     self._round(one)
 
     def _seconds(self, name):
-        """What the last round took."""
+        """Returns the seconds of the last round."""
         return sum(view[-1] for view in self.times[name] if view) / 1e3
 
     def _round(self, one):
@@ -108,7 +110,7 @@ class Race:
             else:
                 self._time_other(one)
         except Unavailable as why:
-            log("%s, %d px: left out: %s" % (one.name, self.size, why))
+            log("%s, %d px: skipped: %s" % (one.name, self.size, why))
             self.field.remove(one)
             del self.times[one.name]
 
@@ -134,7 +136,7 @@ class Race:
                 self.own.setdefault(index, []).append(took["own_ms"])
 
     def _step(self, took, warm):
-        """Slow ones draw every fourth view."""
+        """Returns the step between views: slow programs draw every fourth view."""
         return 4 if min(took["ms"], warm) > self.options.slow * 1e3 else 1
 
     def rows(self):
@@ -169,12 +171,12 @@ def make_field(options, prepared):
             field.append(contenders.make(name, prepared, options.threads))
         except Unavailable as why:
             left_out[name] = str(why)
-            log("%s: %s: left out: %s" % (prepared.scene.name, name, why))
+            log("%s: %s: skipped: %s" % (prepared.scene.name, name, why))
     return field, left_out
 
 
 def draw_pictures(options, prepared, field, view, path):
-    """Each program's picture of one view; returns what differs from the first one's."""
+    """Draws one view with each program. Returns the differences from the first picture."""
     names, images, result = [], [], []
     with tempfile.TemporaryDirectory() as folder:
         for one in field:
@@ -182,14 +184,14 @@ def draw_pictures(options, prepared, field, view, path):
             try:
                 one.picture(view, PICTURE_SIZE, own)
             except Unavailable as why:
-                log("%s: no picture: %s" % (one.name, why))
+                log("%s: drawing failed: %s" % (one.name, why))
                 continue
             image = pictures.load(own, is_opacity=one.name == "vdb_render")
             if one.name.startswith("triptych-"):
                 image = pictures.premultiply(image)
             names.append(one.name)
             images.append(image)
-    title = "%s: %s. The same view by %s; %d x %d px, %s." % (
+    title = "%s: %s. One view by %s; %d x %d px, %s." % (
         prepared.scene.name, prepared.scene.shows, ", ".join(names), PICTURE_SIZE, PICTURE_SIZE,
         "lit from the eye (vdb_render unlit)" if prepared.scene.shading else "unlit")
     pictures.side_by_side(path, title, names, images)
@@ -236,7 +238,8 @@ def run_scene(options, scene, volume):
 
 
 def table(results):
-    """The scenes as a Markdown table: milliseconds, and how many times Triptych's cpu frame."""
+    """Returns a Markdown table of the scenes: milliseconds, and the ratio to Triptych's cpu
+    frame."""
     lines = ["| scene | kind | voxels kept | px | %s | its own time |" % " | ".join(contenders.NAMES),
              "|---|---|--:|--:|" + "--:|" * (len(contenders.NAMES) + 1)]
     for result in results:
@@ -264,22 +267,22 @@ def _cell(row, is_base):
 
 
 def scene_text(result, whole):
-    """One scene's tables, with what they do not say."""
+    """Returns the tables of one scene, with the notes."""
     settings, out = whole["settings"], []
     for size in settings["sizes"]:
         out += [accuracy.table(result, size), ""]
-    out += ["%d views round the object, %d rounds, %d threads; errors of %d of the views. Load %.1f "
-            "before, %.1f after: times of programs in one table compare, those of tables do not." %
+    out += ["%d views around the object, %d rounds, %d threads; errors of %d of the views. Load "
+            "%.1f before, %.1f after. Times compare within a table, but not between tables." %
             (settings["views"], settings["rounds"], settings["threads"], settings["error_views"],
              result["load_before"], result["load_after"]), ""]
     out += ["- " + note for note in NOTES]
-    out += ["- without %s: %s." % item for item in result["left_out"].items()]
+    out += ["- skipped %s: %s." % item for item in result["left_out"].items()]
     return "\n".join(out) + "\n"
 
 
 def panels_of(result, size):
-    """For plots.svg(), of what was both timed and compared; vdb_render has opacity alone, and its
-    own time counts."""
+    """Returns the points for plots.svg(): the programs with a time and an error. vdb_render has an
+    error of opacity alone, and its own time counts."""
     errors, panels = result["errors"].get(str(size), {}), {"colour": [], "opacity": []}
     for row in result["rows"]:
         error = errors.get(row["program"])
@@ -293,7 +296,7 @@ def panels_of(result, size):
 
 
 def write_scene(options, result, whole):
-    """SCENE.md, and SCENE-SIZE.svg for each size."""
+    """Writes SCENE.md, and SCENE-SIZE.svg for each size."""
     with open(os.path.join(options.out, result["scene"] + ".md"), "w", encoding="utf-8") as file:
         file.write(scene_text(result, whole))
     for size in options.sizes:
@@ -309,7 +312,7 @@ def write_scene(options, result, whole):
 
 
 def report(whole):
-    out = ["Whole frames, median ms (times triptych-cpu's), %d views round the object, %d threads" %
+    out = ["Median ms per frame (ratio to triptych-cpu), %d views around the object, %d threads" %
            (whole["settings"]["views"], whole["settings"]["threads"]), "", table(whole["scenes"]), ""]
     for result in whole["scenes"]:
         if result["errors"]:
@@ -317,7 +320,7 @@ def report(whole):
                 out += [accuracy.table(result, size), ""]
     out += ["- " + note for note in NOTES]
     for result in whole["scenes"]:
-        out += ["- %s: without %s: %s." % (result["scene"], name, why)
+        out += ["- %s: skipped %s: %s." % (result["scene"], name, why)
                 for name, why in result["left_out"].items()]
     out += ["", "Machine", ""]
     out += ["- %s: %s" % item for item in whole["machine"].items()]
@@ -338,42 +341,46 @@ def parse_options():
             items = [kind(item) for item in text.split(",")]
             for item in items:
                 if allowed and item not in allowed:
-                    raise argparse.ArgumentTypeError("%s is none of %s" % (item, ", ".join(allowed)))
+                    raise argparse.ArgumentTypeError("invalid value %s; use %s" %
+                                                     (item, ", ".join(allowed)))
             return items
         return parse
 
-    parser.add_argument("--data", metavar="FOLDER", help="where volumes are, itself or below it, "
-                        "besides the included ones")
+    parser.add_argument("--data", metavar="FOLDER",
+                        help="folder with volumes, also in its subfolders; the included ones are "
+                        "always found")
     parser.add_argument("--out", default="compare-results", metavar="FOLDER",
-                        help="pictures and results.json (default: %(default)s); FOLDER/work keeps "
-                        "what the programs draw from")
+                        help="folder for pictures and results.json (default: %(default)s); "
+                        "FOLDER/work keeps the prepared volumes")
     parser.add_argument("--triptych", required=True, metavar="PROGRAM",
-                        help="default: built here, preset release")
+                        help="the program (default: built here, preset release)")
     parser.add_argument("--scene", "--scenes", dest="scenes", type=comma(str, names), metavar="NAME[,..]",
-                        help="default: all whose volume is there, of " + ", ".join(names))
+                        help="scenes (default: all with a volume): " + ", ".join(names))
     parser.add_argument("--programs", type=comma(str, contenders.NAMES), default=contenders.NAMES,
-                        metavar="NAME[,..]", help="of " + ", ".join(contenders.NAMES) +
-                        "; " + BASE + " always runs, it gives the views")
+                        metavar="NAME[,..]", help="programs to compare: " +
+                        ", ".join(contenders.NAMES) + "; " + BASE + " always runs")
     parser.add_argument("--size", "--sizes", dest="sizes", type=comma(int), default=[512, 1024], metavar="N[,..]",
-                        help="pixels along an edge (default: 512,1024)")
-    parser.add_argument("--views", type=int, default=20, help="round the object (default: 20)")
+                        help="edges of the pictures in pixels (default: 512,1024)")
+    parser.add_argument("--views", type=int, default=20,
+                        help="number of views around the object (default: 20)")
     parser.add_argument("--threads", type=int, default=min(4, len(os.sched_getaffinity(0))),
-                        help="of every program (default: %(default)s)")
-    parser.add_argument("--rounds", type=int, default=3, help="turns of every program at all views; "
-                        "0: only pictures (default: 3)")
-    parser.add_argument("--error-views", type=int, default=3, metavar="N", help="of the views, whose "
-                        "errors are measured, at every size (default: 3)")
+                        help="threads of each program (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=3, help="turns of every program at all "
+                        "views; 0 draws only pictures (default: 3)")
+    parser.add_argument("--error-views", type=int, default=3, metavar="N", help="number of views "
+                        "to measure errors of, at every size (default: 3)")
     parser.add_argument("--patience", type=float, default=60, metavar="SECONDS",
-                        help="who took longer for a round has no further one (default: 60)")
+                        help="a program that needs longer for a round gets no other (default: 60)")
     parser.add_argument("--slow", type=float, default=3, metavar="SECONDS",
-                        help="who takes longer for a frame draws every fourth view (default: 3)")
-    parser.add_argument("--no-alignment", action="store_true", help="leave out the check that all "
-                        "programs look the same way")
-    parser.add_argument("--tidy", action="store_true", help="remove what a scene was drawn from")
-    parser.add_argument("--json", action="store_true", help="print results.json, not tables")
+                        help="programs slower per frame draw every fourth view (default: 3)")
+    parser.add_argument("--no-alignment", action="store_true", help="skip the check that all "
+                        "programs show the same view")
+    parser.add_argument("--tidy", action="store_true",
+                        help="remove the prepared volumes of each scene")
+    parser.add_argument("--json", action="store_true", help="print results.json instead of tables")
     options = parser.parse_args()
     if options.views < 1 or options.rounds < 0 or options.threads < 1:
-        parser.error("views and threads are at least 1, rounds at least 0")
+        parser.error("--views and --threads must be at least 1, --rounds at least 0")
     options.programs = [BASE] + [name for name in options.programs if name != BASE]
     return options
 
@@ -387,7 +394,7 @@ def choose_scenes(options):
         if volume:
             yield scene, volume
         else:
-            log("%s: skipped: no %s in %s" % (scene.name, scene.file, " or ".join(folders)))
+            log("%s: skipped: %s is not in %s" % (scene.name, scene.file, " or ".join(folders)))
 
 
 def main():

@@ -1,5 +1,5 @@
-"""The programs compared, behind one face: `draw(view, size)` gives milliseconds, `picture(view,
-size, path)` writes what was timed. Triptych times views itself, `time_views`."""
+"""The compared programs with a common interface. `draw(view, size)` returns milliseconds, and
+`picture(view, size, path)` writes the picture. Triptych times views itself, with `time_views`."""
 import json
 import os
 import re
@@ -13,7 +13,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 class Unavailable(Exception):
-    """This program cannot draw this scene; says why."""
+    """Raised if a program cannot draw a scene; the message gives the reason."""
 
 
 def _run(command, **options):
@@ -26,7 +26,7 @@ def _run(command, **options):
 
 
 def _environment(threads):
-    """Mesa's software OpenGL takes its threads from here."""
+    """Returns the environment with the number of threads for Mesa's software OpenGL."""
     return dict(os.environ, LP_NUM_THREADS=str(threads))
 
 
@@ -35,7 +35,7 @@ def _numbers(values):
 
 
 class Triptych:
-    """`triptych bench renderers`: each frame in turn from the data set in memory."""
+    """Runs `triptych bench renderers`, which draws each frame from the data set in memory."""
 
     def __init__(self, prepared, renderer, threads, name=None, look=()):
         self.prepared, self.renderer, self.threads = prepared, renderer, threads
@@ -68,7 +68,7 @@ class Triptych:
 
 
 class Vtk:
-    """A process that keeps the volume and the window, vtk_worker.py."""
+    """Runs accuracy/vtk_worker.py, a process that keeps the volume and the window."""
 
     def __init__(self, prepared, mapper, threads, name=None, step=1):
         self.name = name or "vtk-" + mapper
@@ -111,19 +111,20 @@ class Vtk:
 
 
 class VdbRender:
-    """A process a picture; what it says of its own ray tracing is kept apart."""
+    """Runs vdb_render, one process per picture, and also stores the ray tracing time that it
+    reports."""
 
     def __init__(self, prepared, threads):
         self.name = "vdb_render"
         if not prepared.voxels_are_cubes():
-            raise Unavailable("draws only grids whose voxels are cubes")
+            raise Unavailable("it draws only grids with cubic voxels")
         self.grid, self.threads = prepared.grid(), threads
         self.scratch = os.path.join(prepared.work, "vdb_render.png")
         self.device = "CPU, %d threads" % threads
 
     def _command(self, view, size, path):
-        # Scattering alone, in white light without shadows: the picture is the opacity. A shadow
-        # ray that steps 10^9 voxels at a time takes no sample.
+        # With scattering alone, in white light without shadows, the picture equals the opacity. A
+        # shadow ray with steps of 10^9 voxels takes no sample.
         scatter = _numbers([1 / DENSITY_SCALE] * 3)
         return ["vdb_render", self.grid, path, "-translate", _numbers(view["eye"]), "-lookat",
                 _numbers(view["look"]), "-up", _numbers(view["up"]), "-fov",
@@ -145,7 +146,7 @@ class VdbRender:
         pass
 
 
-POST = "triptych-post-"  # and the slices
+POST = "triptych-post-"  # followed by the samples per sheet
 NAMES = ["triptych-cpu", POST + "1", POST + "2", POST + "4", "triptych-gl", "vtk-cpu",
          "vtk-cpu-half", "vtk-gpu", "vdb_render"]
 

@@ -1,13 +1,12 @@
 #!/usr/bin/python3
-"""Seconds from a file to its picture: `triptych render VOLUME -o x.png` for every kind of file, as a
-table. "first" bricks into an empty cache, "again" finds it there, each with the seconds of processors
-that the whole takes, which other work on the machine hardly changes; the middle one of ROUNDS runs,
-with the files in the page cache. One volume in each form, written beside the others, and what there
-is of others:
+"""Measures the seconds from a file to its picture: `triptych render VOLUME -o x.png`, as a table.
 
     tests/compare/first_picture.py build/release/triptych [VOLUME_XxYxZ_TYPE.raw] [FILE...]
 
-Without a volume it is the included tooth.
+The script writes the volume in every file format that it can write, and also measures the given
+files. Without a volume it uses the included tooth. "First" bricks into an empty cache, "again"
+finds the data set there. Each time comes with the processor seconds, which other work on the
+machine hardly changes. All times are medians of ROUNDS runs, with the files in the page cache.
 """
 import bz2
 import gzip
@@ -35,10 +34,11 @@ import program
 
 
 def read_volume(path):
-    """A raw file by its name, packed or not: the values as (z, y, x)."""
+    """Reads a raw file, compressed or not, with size and type from its name. Returns values as (z,
+    y, x)."""
     name = re.search(r"_(\d+)x(\d+)x(\d+)_(\w+)\.raw(\.gz|\.bz2)?$", path)
     if not name:
-        sys.exit(f"first_picture: {path} is not named like engine_256x256x128_uint8.raw")
+        sys.exit(f"first_picture: {path}: rename it like engine_256x256x128_uint8.raw")
     x, y, z = (int(n) for n in name.groups()[:3])
     opens = {None: open, ".gz": gzip.open, ".bz2": bz2.open}[name[5]]
     with opens(path, "rb") as f:
@@ -52,8 +52,8 @@ def tooth():
 
 
 def write_pages(path, values):
-    """Of a TIFF, a strip each: image width and length, bits, no compression, black is 0, and where
-    the strip is."""
+    """Writes a TIFF of several pages, one strip each. The tags are image width and length, bits, no
+    compression, black is 0, and the position of the strip."""
     depth, height, width = values.shape
     size, place = height * width * values.dtype.itemsize, 8
     with open(path, "wb") as f:
@@ -70,7 +70,8 @@ def write_pages(path, values):
 
 
 def write_netcdf(path, values):
-    """Of the classic form: three dimensions and a variable of floats, without attributes."""
+    """Writes netCDF in the classic format: three dimensions and a variable of floats, no
+    attributes."""
     name = lambda text: struct.pack(">I", len(text)) + text + b"\0" * (-len(text) % 4)
     sizes = zip((b"z", b"y", b"x"), values.shape)
     dims = b"".join(name(axis) + struct.pack(">I", size) for axis, size in sizes)
@@ -82,7 +83,8 @@ def write_netcdf(path, values):
 
 
 def write_detached(values, raw):
-    """Headers beside their data: a file, packed or not, a file a slice, and NIfTI's pair."""
+    """Writes headers with data in other files: one file, compressed or not, one per slice, or
+    .img."""
     z, y, x = values.shape
     header = (
         f"NRRD0004\ntype: {program.NRRD_TYPES[values.dtype.str[1:]]}\ndimension: 3\n"
@@ -102,7 +104,7 @@ def write_detached(values, raw):
 
 
 def write_forms(values):
-    """The same values in every form that can be written here."""
+    """Writes the values in every file format. Returns (label, path) of each."""
     z, y, x = values.shape
     kind = program.NRRD_TYPES[values.dtype.str[1:]]
     raw = f"raw_{x}x{y}x{z}_{kind}.raw"
@@ -120,9 +122,9 @@ def write_forms(values):
         ("raw, bzip2", raw + ".bz2"),
         ("NRRD", "attached.nrrd"),
         ("NRRD, gzip", "packed.nrrd"),
-        ("NRRD, a header beside its data", "beside.nhdr"),
-        ("NRRD, bzip2 beside it", "packed.nhdr"),
-        ("NRRD, a file a slice beside it", "slices.nhdr"),
+        ("NRRD, detached header", "beside.nhdr"),
+        ("NRRD, detached, bzip2", "packed.nhdr"),
+        ("NRRD, detached, one file per slice", "slices.nhdr"),
         ("NIfTI", "plain.nii"),
         ("NIfTI, gzip", "packed.nii.gz"),
         ("NIfTI, .hdr and .img", "pair.hdr"),
@@ -142,13 +144,13 @@ def write_forms(values):
     places = [(0, 0, k) for k in range(z)]
     frames = values.astype(numpy.uint16)
     program.write_dicom("frames.dcm", frames, 0, (1, 1, 1), places[0], frames=places)
-    pages = ("TIFF of pages", "pages.tif")
+    pages = ("TIFF with pages", "pages.tif")
     forms.append(("netCDF", "plain.nc"))
-    return forms + stacks + [pages, ("DICOM series", "dicom"), ("DICOM of frames", "frames.dcm")]
+    return forms + stacks + [pages, ("DICOM series", "dicom"), ("DICOM with frames", "frames.dcm")]
 
 
 def beside(path):
-    """Files that hold the values of a header."""
+    """Returns the files with the values of a header."""
     endings = {"beside.nhdr": ".raw", "packed.nhdr": ".raw.bz2", "pair.hdr": ".img"}
     if path == "slices.nhdr":
         return [n for n in os.listdir() if n.startswith("slice") and n.endswith(".raw")]
@@ -164,7 +166,7 @@ def size_of(path):
 
 
 def seconds(triptych, path):
-    """Of the clock, and of processors, those of triptych-images too."""
+    """Returns wall clock and processor seconds, including those of triptych-images."""
     begin, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     run = subprocess.run([triptych, "render", path, "-o", "x.png"], capture_output=True)
     if run.returncode:
@@ -183,7 +185,7 @@ def measure(triptych, path):
 
 
 def measure_data_set(triptych, path):
-    """Of one that was bricked before."""
+    """Measures a data set that was bricked before."""
     subprocess.run([triptych, "brick", path, "-o", "x.trip", "-q"], check=True)
     runs = [seconds(triptych, "x.trip") for _ in range(ROUNDS)]
     return [statistics.median(run[i] for run in runs) for i in (0, 1)]
@@ -203,13 +205,13 @@ def main():
         forms = write_forms(values) + [(os.path.basename(f), f) for f in [cloud] + files]
         z, y, x = values.shape
         print(f"{x} x {y} x {z}, {values.dtype}\n")
-        print("| file | MB | first, s | of processors | again, s | of processors |")
+        print("| file | MB | first, s | processor s | again, s | processor s |")
         print("|---|---:|---:|---:|---:|---:|")
         for name, path in forms:
             times = " | ".join(f"{t:.2f}" for t in measure(triptych, path))
             print(f"| {name} | {size_of(path) / 1e6:.1f} | {times} |", flush=True)
         again = " | ".join(f"{t:.2f}" for t in measure_data_set(triptych, forms[0][1]))
-        print(f"| data set of the first | {size_of('x.trip') / 1e6:.1f} | | | {again} |")
+        print(f"| data set of the first file | {size_of('x.trip') / 1e6:.1f} | | | {again} |")
     finally:
         shutil.rmtree(folder)
 

@@ -1,12 +1,12 @@
-"""Transfer functions in Triptych's `.tf` text (common/TRANSFER_FUNCTIONS.md), as the other programs
-need them."""
+"""Reads transfer functions in Triptych's `.tf` text (common/TRANSFER_FUNCTIONS.md) for the other
+programs."""
 import numpy as np
 
 OPACITY_MAX = 0.9999
 
 
 def read(path):
-    """Points (value, r, g, b, opacity) in data units, opacity per voxel."""
+    """Returns points (value, r, g, b, opacity) in data units, with opacity per voxel."""
     points = []
     with open(path, encoding="utf-8") as file:
         for line in file:
@@ -14,16 +14,17 @@ def read(path):
             if not words or words in (["unit", "voxel"], ["values", "data"]):
                 continue
             if len(words) != 5:
-                raise ValueError("%s: only opacity per voxel and values of the data here" % path)
+                raise ValueError("%s: expected 5 numbers per line, opacity per voxel and values of "
+                                 "the data" % path)
             points.append(tuple(float(word) for word in words))
     return points
 
 
 def extinction(points, values):
-    """-ln(1 - opacity) per voxel at each value, float32."""
+    """Returns -ln(1 - opacity) per voxel at each value, as float32."""
     at = [p[0] for p in points]
     tau = np.empty(values.shape, np.float32)
-    # Slice by slice: the largest volume has 10^9 voxels.
+    # One slice at a time saves memory: the largest volume has 10^9 voxels.
     for k in range(values.shape[0]):
         opacity = np.minimum(np.interp(values[k], at, [p[4] for p in points]), OPACITY_MAX)
         tau[k] = -np.log1p(-opacity)

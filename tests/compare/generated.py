@@ -1,4 +1,4 @@
-"""Volumes that are made, not found: written into the work folder where they are missing."""
+"""Makes volumes by formula and writes them to the work folder if they are missing."""
 import os
 
 import numpy as np
@@ -8,9 +8,9 @@ MARSCHNER_LOBB = "marschner-lobb_%dx%dx%d_uint8.nhdr" % (EDGE, EDGE, EDGE)
 
 
 def marschner_lobb(edge):
-    """Their test signal (Marschner & Lobb 1994, section 5), f_M = 6, alpha = 0.25, over [-1, 1]^3;
-    uint8, [k, j, i]. At 40^3 most of its frequencies are just below what a grid holds, at 256^3 far
-    below."""
+    """Returns the test signal of Marschner & Lobb (1994, section 5) with f_M = 6 and alpha = 0.25,
+    over [-1, 1]^3; uint8, [k, j, i]. At 40^3 most of its frequencies are just below the limit of
+    the grid, at 256^3 far below."""
     at = np.linspace(-1, 1, edge)
     radius = np.hypot(at[:, None], at[None, :])
     ring = 0.25 * (1 + np.cos(2 * np.pi * 6 * np.cos(np.pi * radius / 2)))
@@ -19,7 +19,8 @@ def marschner_lobb(edge):
 
 
 def make(name, folder):
-    """The volume of that name in the folder, or None where there is no such one."""
+    """Returns the path of the volume `name` in the folder, or None if `name` is not a generated
+    volume."""
     if name != MARSCHNER_LOBB:
         return None
     path = os.path.join(folder, name)

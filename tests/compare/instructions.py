@@ -1,5 +1,5 @@
-"""instructions: what a frame of the CPU renderer costs in instructions, stage by stage, by callgrind.
-Started by ./instructions."""
+"""instructions: counts the instructions of a frame of the CPU renderer, stage by stage, by
+callgrind. Started by ./instructions."""
 import argparse
 import json
 import os
@@ -9,12 +9,12 @@ import subprocess
 import sys
 import tempfile
 
-# Instruction sets that valgrind can run; it has no AVX-512.
+# The instruction sets that valgrind supports; it has no AVX-512.
 ISAS = ["neon", "plain"] if platform.machine() == "aarch64" else ["avx2", "plain"]
 
-# The functions whose cost, with all they call, is a stage's: those of the kernels' table
-# (render/cpu/kernels/kernels.h), of render/cpu/cull.h and of render/cpu/splat_buffer.h, which no
-# compiler can hide.
+# The cost of a stage is the cost of these functions with all their callees. They belong to the
+# table of kernels (render/cpu/kernels/kernels.h), render/cpu/cull.h and render/cpu/splat_buffer.h,
+# so no compiler can inline them.
 STAGES = {
     "hiding": ["trip_cpu_cull"],
     "projection": ["stage", "project"],
@@ -23,7 +23,7 @@ STAGES = {
     "merge": ["pane_merge", "pane_finish"],
 }
 
-# Of frames that classify after interpolation (render/cpu/sheets/).
+# The stages of frames with post-classification (render/cpu/sheets/).
 POST_STAGES = {
     "decoding": ["trip_cpu_store_decode"],
     "preparing": ["sheet_ranges", "sheet_cells"],
@@ -51,12 +51,13 @@ def run(command, **how):
 
 
 def function_costs(lines):
-    """Instructions of each function of a callgrind file with all that it calls; and of all."""
+    """Reads a callgrind file. Returns the instructions of each function with its callees, and the
+    total."""
     names, costs, own, called, total = {}, {}, None, False, 0
     for line in lines:
         name = NAME.match(line)
         if name:
-            # Names of functions and of those called are numbered together.
+            # Functions and callees share one numbering.
             if name.group(3):
                 names[name.group(2)] = name.group(3)
             if name.group(1) == "fn":
@@ -75,11 +76,13 @@ def function_costs(lines):
 
 
 def stage_costs(costs, total, of=None):
-    """By stage; a view may leave a function uncalled, but never all of a stage."""
+    """Returns the instructions of each stage. A view may skip some functions of a stage, but never
+    all."""
     of = of or STAGES
     for names in of.values():
         if not any(name in costs for name in names):
-            fail("no function %s in the program's profile; is it stripped?" % " or ".join(names))
+            fail("the profile has no function %s; use a program that is not stripped" %
+                 " or ".join(names))
     stages = {stage: sum(costs.get(name, 0) for name in names) for stage, names in of.items()}
     stages["rest"] = total - sum(stages.values())
     return stages
@@ -93,7 +96,7 @@ def view_options(view):
 
 
 class Frames:
-    """The views of `bench renderers` round a data set, and what they have in splats and pixels."""
+    """The views of `bench renderers` around a data set, with their splats and pixels."""
 
     def __init__(self, options):
         self.options = options
@@ -112,10 +115,10 @@ class Frames:
         self.splats = row["splats_drawn"] * len(self.views)
         self.pixels = self.splats * row.get("pixels_per_splat", 0)
         if not self.splats:
-            fail("%s: nothing to draw" % options.dataset)
+            fail("%s: the views draw no splats; check its transfer function" % options.dataset)
 
     def count(self, isa, folder):
-        """Instructions of each stage, all views together."""
+        """Returns the instructions of each stage, summed over the views."""
         sums = {}
         for view in self.views:
             for stage, n in self._count_view(isa, view, folder).items():
@@ -147,12 +150,13 @@ def print_table(frames, counts):
             print("%-8s %-11s %16d %12.1f %12.2f" % (isa, stage, n, n / frames.splats,
                                                      n / frames.pixels))
     if post:
-        print("\nVoxels are those kept, pixels those of the picture. The rest is reading, checking, "
-              "planning,\nthe function's integrals and writing the picture.")
+        print("\nVoxels are the kept voxels, pixels are the pixels of the picture. The rest is "
+              "reading, checking,\nplanning, the integrals of the transfer function and writing "
+              "the picture.")
         return
-    print("\nSplats and pixels are those of `triptych bench renderers`, occluded ones too. The rest is "
-          "reading,\nchecking, planning, leaving out what is occluded and writing the picture. valgrind has "
-          "no AVX-512, so\nthat is not counted.")
+    print("\n`triptych bench renderers` counts splats and pixels, including occluded ones. The "
+          "rest is reading,\nchecking, planning, culling and writing the picture. AVX-512 is not "
+          "counted, because valgrind\nlacks it.")
 
 
 def as_json(frames, counts):
@@ -163,14 +167,16 @@ def as_json(frames, counts):
 
 def parse():
     parser = argparse.ArgumentParser(
-        prog="instructions", description="Instructions per splat and per covered pixel of a frame "
-        "by one thread, for projection, binning, blend and merge, counted by callgrind.")
-    parser.add_argument("dataset", help="made by `triptych brick`")
-    parser.add_argument("--triptych", default="triptych", help="the program (default: built)")
-    parser.add_argument("--size", default="512x512", help="pixels (default: 512x512)")
-    parser.add_argument("--views", type=int, default=1, help="round the object (default: 1)")
+        prog="instructions", description="Counts by callgrind the instructions per splat and per "
+        "covered pixel of a frame by one thread, for each stage.")
+    parser.add_argument("dataset", help="data set made by `triptych brick`")
+    parser.add_argument("--triptych", default="triptych", help="the program (default: built here)")
+    parser.add_argument("--size", default="512x512",
+                        help="picture size in pixels (default: 512x512)")
+    parser.add_argument("--views", type=int, default=1,
+                        help="number of views around the object (default: 1)")
     parser.add_argument("--isa", choices=ISAS, action="append",
-                        help="instruction set; may be repeated (default: both)")
+                        help="instruction set; repeat it for several (default: both)")
     parser.add_argument("--classify", choices=["pre", "post"], default="pre",
                         help="as in `triptych render`; post counts per kept voxel and per pixel of "
                         "the picture (default: pre)")

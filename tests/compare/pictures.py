@@ -1,14 +1,15 @@
-"""The same view by every program, side by side: the picture, how it differs from the first one, its
-opacity, and how that differs."""
+"""Puts one view by every program side by side: picture, difference from the first program, opacity
+and difference of opacity."""
 import numpy as np
 from PIL import Image, ImageDraw
 
 LABEL_PX = 36
-GAIN = 3  # of differences
+GAIN = 3  # factor of displayed differences
 
 
 def load(path, is_opacity=False):
-    """Premultiplied r, g, b, a in [0, 1]; a grey picture over black that is its own opacity."""
+    """Returns r, g, b, a of a file in [0, 1]. With is_opacity, all four are the grey value of a
+    picture over black."""
     image = Image.open(path)
     if is_opacity:
         grey = np.asarray(image.convert("L")).astype(np.float32) / 255
@@ -26,14 +27,14 @@ def difference(a, b):
 
 def _figures(apart):
     if not apart.size:
-        return {"median": 0.0, "mean": 0.0, "percentile_99": 0.0, "most": 0.0}
+        return {"median": 0.0, "mean": 0.0, "percentile_99": 0.0, "max": 0.0}
     return {"median": float(np.median(apart)), "mean": float(apart.mean()),
-            "percentile_99": float(np.percentile(apart, 99)), "most": float(apart.max())}
+            "percentile_99": float(np.percentile(apart, 99)), "max": float(apart.max())}
 
 
 def distance(picture, truth):
-    """Of 255, over the pixels where either picture's opacity is above 1/255: of all channels, and of
-    opacity, which no light changes."""
+    """Returns figures of the difference, of 255, over the pixels where the opacity of either
+    picture is above 1/255: for all channels, and for opacity alone, which light does not change."""
     covered = np.maximum(picture[..., 3], truth[..., 3]) > 1 / 255
     apart = 255 * np.abs(picture - truth)[covered]
     opacity = _figures(apart[:, 3])
@@ -47,15 +48,16 @@ def _as_image(values):
 
 
 def _signed(values):
-    """Red where there is more than in the first picture, blue where there is less."""
+    """Returns colours: red where values exceed the first picture, blue where they are below it."""
     return np.stack([values * GAIN, np.abs(values) * 0, -values * GAIN], axis=2)
 
 
 def side_by_side(path, title, names, pictures):
-    """pictures: premultiplied RGBA arrays of one size, the first one the measure."""
+    """Writes a PNG. `pictures` are premultiplied RGBA arrays of one size, compared with the
+    first."""
     size = pictures[0].shape[0]
-    rows = ["picture", "difference of brightness x %d (red: more, blue: less)" % GAIN, "opacity",
-            "difference of opacity x %d" % GAIN]
+    rows = ["picture", "difference of brightness x %d (red: brighter, blue: darker)" % GAIN,
+            "opacity", "difference of opacity x %d" % GAIN]
     sheet = Image.new("RGB", (size * len(names), (size + LABEL_PX) * len(rows) + LABEL_PX))
     draw = ImageDraw.Draw(sheet)
     draw.text((8, 12), title, fill=(255, 255, 255))
@@ -74,8 +76,8 @@ def side_by_side(path, title, names, pictures):
 
 
 def edges(opacity):
-    """Leftmost, rightmost, top and bottom of where opacity passes one half, in pixels to a fraction:
-    from coverage profiles, so that jagged edges average out."""
+    """Returns the left, right, top and bottom edge of the area with opacity above one half, in
+    pixels."""
     solid = opacity > 0.5
     columns, rows = np.nonzero(solid.any(axis=0))[0], np.nonzero(solid.any(axis=1))[0]
     return np.array([columns[0], columns[-1] + 1, rows[0], rows[-1] + 1], float)

@@ -1,13 +1,13 @@
-"""Time and error of every program as SVG, a scene and size a file, with a panel for colour and one
-for opacity, which no light changes: to the left is faster, down is closer to the integral. All axes
-are logarithmic."""
+"""Plots time and error of every program as SVG, one file for each scene and size. One panel shows
+colour, the other opacity, which light does not change. Left is faster, and down is closer to the
+integral. All axes are logarithmic."""
 import math
 from xml.sax.saxutils import escape
 
 WIDTH, HEIGHT = 900, 520  # of a panel
 LEFT, RIGHT, TOP, BOTTOM = 70, 30, 56, 60
-LEAST_ERROR = 0.01  # of 255: less is drawn there
-LABEL_PX = 15  # between two labels, one above the other
+LEAST_ERROR = 0.01  # of 255; smaller errors are drawn at this value
+LABEL_PX = 15  # minimum vertical distance of two labels
 COLOURS = {"triptych": "#1769aa", "vtk": "#c2410c", "vdb_render": "#4d7c0f"}
 
 
@@ -16,14 +16,14 @@ def colour_of(name):
 
 
 def _decades(values):
-    """Edges of an axis: a little beyond the values."""
+    """Returns the edges of an axis as decimal logarithms, a little beyond the values."""
     low, high = math.log10(min(values)), math.log10(max(values))
     room = max(0.12, 0.08 * (high - low))
     return low - room, high + room
 
 
 def _ticks(edges):
-    """1, 2, 5, 10, ... within an axis, and no fewer than two."""
+    """Returns the values 1, 2, 5, 10, ... within an axis."""
     first, last = math.floor(edges[0]), math.ceil(edges[1])
     every = [(mantissa * 10.0 ** power) for power in range(first, last + 1)
              for mantissa in (1, 2, 5)]
@@ -55,14 +55,15 @@ def _axes(plot, what):
         _, y = plot.place(1, error)
         yield '<path d="M%d %.1fH%d"/>' % (LEFT, y, right)
         yield _text(LEFT - 8, y + 4, "%g" % error, 'text-anchor="end"')
-    yield _text((LEFT + right) / 2, HEIGHT - 16, "milliseconds a frame, median", 'text-anchor="middle"')
+    yield _text((LEFT + right) / 2, HEIGHT - 16, "milliseconds per frame, median",
+                'text-anchor="middle"')
     yield _text(0, 0, "mean error of %s, of 255" % what, 'text-anchor="middle" transform="translate(20 %d) '
                 'rotate(-90)"' % ((TOP + bottom) / 2))
 
 
 def _labels(points, plot):
-    """Where names are written: beside their points, each moved down to where no other one is, nor a
-    point of another."""
+    """Returns the position of each name: beside its point, moved down until it covers no other name
+    and no other point."""
     dots = {name: plot.place(ms, error) for name, ms, error in points}
     taken, places = [], {}
     for name, ms, error in sorted(points, key=lambda p: plot.place(p[1], p[2])[1]):
@@ -80,7 +81,7 @@ def _labels(points, plot):
 
 
 def _panel(points, what):
-    """`points`: (name, milliseconds, error)."""
+    """Returns SVG lines of a panel. `points` are (name, milliseconds, error)."""
     plot = Plot(points)
     axes = list(_axes(plot, what))
     lines = ['<g stroke="#ddd" fill="none">']
@@ -99,7 +100,8 @@ def _panel(points, what):
 
 
 def svg(title, panels):
-    """`panels`: by what the error is of, (name, milliseconds, mean error) of some programs."""
+    """Returns SVG text. `panels` maps "colour" or "opacity" to points (name, milliseconds, mean
+    error)."""
     height = HEIGHT * len(panels)
     lines = ['<svg xmlns="http://www.w3.org/2000/svg" width="%d" height="%d" viewBox="0 0 %d %d" '
              'font-family="sans-serif" font-size="12">' % (WIDTH, height, WIDTH, height),

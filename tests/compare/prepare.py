@@ -1,5 +1,5 @@
-"""What each program draws a scene from: a Triptych data set, an array for VTK, a grid for
-vdb_render. Made once in the work folder, again when the volume or the function is newer."""
+"""Makes the input of each program for a scene: a Triptych data set, an array for VTK, a grid for
+vdb_render. The work folder keeps them until the volume or the transfer function is newer."""
 import json
 import os
 import shutil
@@ -11,7 +11,7 @@ import functions
 import scenes
 import volumes
 
-# vdb_render leaves out densities below 0.005; ours are in 1/50 of an extinction of 1 per voxel.
+# vdb_render skips densities below 0.005. Our density 1 is 1/50 of an extinction of 1 per voxel.
 DENSITY_SCALE = 50
 LEAF_SLICES = 64
 
@@ -22,7 +22,7 @@ def _stale(path, sources):
 
 
 class Prepared:
-    """The files of one scene. `info` is what `triptych info --json` says of its data set."""
+    """The files of one scene. `info` is the output of `triptych info --json` for its data set."""
 
     def __init__(self, scene, volume, work, triptych):
         self.scene, self.volume, self.work = scene, volume, work
@@ -56,7 +56,7 @@ class Prepared:
         return bool(np.ptp(lengths) < 1e-4 * lengths.max())
 
     def grid(self):
-        """Extinction per voxel as density, so that vdb_render covers as much as the others."""
+        """Writes extinction per voxel as density, so vdb_render shows the opacity of the others."""
         path = self._path(".vdb")
         if _stale(path, [self.volume, self.function_path]):
             values = np.load(self.array(), mmap_mode="r")

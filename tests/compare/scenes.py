@@ -1,5 +1,5 @@
-"""What is compared: volumes by their usual file names, each with a transfer function in functions/
-or beside the included volumes."""
+"""The compared scenes: volumes by their usual file names, each with a transfer function in
+functions/ or datasets/."""
 import os
 from collections import namedtuple
 
@@ -8,7 +8,7 @@ import generated
 HERE = os.path.dirname(os.path.abspath(__file__))
 INCLUDED = os.path.join(HERE, "..", "..", "datasets")
 
-# kind: "sparse" (most of the box is empty, or opaque so that little of it is seen) or "dense".
+# kind: "sparse" (most of the box is empty or hidden by opaque parts) or "dense".
 Scene = namedtuple("Scene", "name file function shading kind shows")
 
 SCENES = [
@@ -41,8 +41,8 @@ def function_path(scene):
 
 
 def find(scene, folders, work):
-    """The scene's file, made in the folder `work` or in the first of `folders`, or below it, that has
-    one; else None."""
+    """Returns the path of the scene's volume, or None. A generated volume is made in the folder
+    `work`. Others are searched in `folders` and their subfolders, in order."""
     made = generated.make(scene.file, work)
     if made:
         return made

@@ -1,4 +1,4 @@
-"""builds.py: a program against itself."""
+"""Tests builds.py by comparing the program with itself."""
 import json
 import os
 import subprocess
@@ -11,7 +11,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 class BuildsTest(unittest.TestCase):
     def compare(self, *options):
-        """Of the program with itself, a ball of 400 or so voxels."""
+        """Compares the program with itself on a small body. Returns exit status and JSON."""
         program = os.environ["TRIP_PROGRAM"]
         with tempfile.TemporaryDirectory() as folder:
             volume = os.path.join(folder, "v.raw")
@@ -26,18 +26,18 @@ class BuildsTest(unittest.TestCase):
                 stdout=subprocess.PIPE, check=False)
         return done.returncode, json.loads(done.stdout)
 
-    def test_bytes_a_splat_are_those_of_the_lists_without_the_halo(self):
+    def test_bytes_per_splat_exclude_the_halo(self):
         status, rows = self.compare()
         self.assertEqual((status, len(rows)), (0, 2))
         for row in rows:
             self.assertEqual(row["kept"], 7 * 16 * 7)
             self.assertEqual(row["bytes_a_splat"], rows[0]["bytes_a_splat"])
-            # Three lists of a code, a mask's bits and a normal at least; then the index.
+            # Each of the three lists has at least a code and a normal of 3 bytes per splat.
             self.assertGreater(row["bytes_a_splat"], 3 * (1 + 3))
             for stage in "brick", "frame", "read", "draw":
                 self.assertGreater(row[stage], 0)
 
-    def test_every_picture_has_the_same_bits_with_a_halo_and_without(self):
+    def test_pictures_have_the_same_bits_with_and_without_halo(self):
         status, rows = self.compare("--pictures")
         self.assertEqual([row["halo"] for row in rows], ["0", "1", "0", "1"])
         self.assertEqual(status, 0)

@@ -1,4 +1,4 @@
-"""compare.py on one tiny scene by Triptych alone, its plots, and the volumes that it makes."""
+"""Tests compare.py on one tiny scene by Triptych alone, its plots, and the generated volumes."""
 import json
 import os
 import re
@@ -45,7 +45,7 @@ class CompareTest(unittest.TestCase):
             self.assertEqual(len(plot.findall(".//{*}circle")), 2 * len(errors))
             self.assertTrue(os.path.exists(os.path.join(out, "tooth.png")))
 
-    def test_plots_are_logarithmic_and_names_do_not_meet(self):
+    def test_plots_are_logarithmic_and_names_do_not_overlap(self):
         points = [("triptych-cpu", 10, 1), ("vtk-cpu", 100, 1), ("vtk-gpu", 1000, 0.1),
                   ("vtk-cpu-half", 101, 1.01)]
         plot = plots.Plot(points)
@@ -58,9 +58,10 @@ class CompareTest(unittest.TestCase):
         circles = xml.fromstring(plots.svg("<title>", {"colour": points})).findall(".//{*}circle")
         self.assertEqual(float(circles[0].get("cx")), round(x0, 1))
 
-    def test_the_signal_of_marschner_and_lobb(self):
+    def test_the_marschner_lobb_signal_has_its_known_values(self):
         values = generated.marschner_lobb(5)
-        # In the middle (1 + 0.25 2) / 2.5; the sine is 1 at the last z, -1 at the first.
+        # The value in the middle is (1 + 0.25 2) / 2.5. The sine is 1 at the last z and -1 at the
+        # first.
         self.assertEqual(values[2, 2, 2], round(255 * 0.6))
         self.assertEqual(values[4, 2, 2], round(255 * 0.2))
         self.assertEqual(values[0, 2, 2], 255)

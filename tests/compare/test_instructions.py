@@ -1,4 +1,4 @@
-"""instructions.py: what it makes of a callgrind file, and that it still finds its way in the program."""
+"""Tests how instructions.py reads a callgrind file and finds the functions of the program."""
 import json
 import os
 import shutil
@@ -11,7 +11,8 @@ import instructions
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
-# main (5 itself) calls sum twice (100 together); sum has 40 itself and calls leaf for 60.
+# main has 5 instructions of its own and calls sum twice, for 100. sum has 40 of its own and calls
+# leaf, for 60.
 PROFILE = """\
 events: Ir
 fn=(1) main
@@ -34,7 +35,7 @@ totals: 105
 
 
 class InstructionsTest(unittest.TestCase):
-    def test_a_function_costs_what_it_and_all_it_calls_cost(self):
+    def test_the_cost_of_a_function_includes_its_callees(self):
         costs, total = instructions.function_costs(PROFILE.splitlines())
         self.assertEqual(costs, {"main": 105, "sum": 100, "leaf": 60})
         self.assertEqual(total, 105)
@@ -75,7 +76,7 @@ class InstructionsTest(unittest.TestCase):
 
     @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
     @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
-    def test_every_stage_of_a_frame_that_classifies_after_interpolation_is_counted(self):
+    def test_every_stage_of_a_post_frame_is_counted(self):
         result = self.count("--classify=post")
         self.assertEqual(result["pixels"], 64 * 64)
         self.assertGreater(result["voxels"], 1000)

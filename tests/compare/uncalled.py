@@ -1,5 +1,5 @@
-"""uncalled: frames without effects, by the program and by one that is built without effects, counted in
-instructions by callgrind. Started by ./uncalled."""
+"""uncalled: counts by callgrind the instructions of frames without effects, for the program and for
+a build without effects. Started by ./uncalled."""
 import argparse
 import os
 import subprocess
@@ -8,7 +8,7 @@ import tempfile
 
 import instructions
 
-# The functions whose cost, with all that they call, is compared: what draws.
+# The drawing functions. Their cost is compared, with all their callees.
 DRAWING = {
     "post": ["sheet_pane"],
     "pre": ["stage", "project", "pane_blend"],
@@ -23,7 +23,7 @@ SCENES = {
 
 
 def count(program, data, isa, classify, look, size, folder):
-    """Of what draws, and of all from the program's start to its end."""
+    """Returns the instructions of drawing, and of the whole run."""
     profile = os.path.join(folder, "profile")
     instructions.run(["valgrind", "--tool=callgrind", "--callgrind-out-file=" + profile, program,
                       "render", data, "--output", os.path.join(folder, "frame.tif"),
@@ -35,7 +35,7 @@ def count(program, data, isa, classify, look, size, folder):
 
 
 def refuses(program, data, folder):
-    """Whether the build without effects is one."""
+    """Returns whether the program refuses effects, as a build without effects must."""
     done = subprocess.run([program, "render", data, "--output", os.path.join(folder, "a.tif"),
                            "--effects=occlusion"], capture_output=True, text=True, check=False)
     return done.returncode == 2 and done.stderr == "triptych: render: effects: this build has none\n"
@@ -43,15 +43,19 @@ def refuses(program, data, folder):
 
 def main():
     parser = argparse.ArgumentParser(
-        prog="uncalled", description="Instructions of frames without effects, by the program and by "
-        "one built without effects. Fails where drawing differs by more than --most.")
-    parser.add_argument("--builds", help="where both are (default: build/, where they are built)")
-    parser.add_argument("--size", default="128x128", help="pixels (default: 128x128)")
-    parser.add_argument("--voxels", default="64", help="of the volumes, a side (default: 64)")
+        prog="uncalled", description="Counts the instructions of frames without effects, for the "
+        "program and for a build without effects. Fails if drawing takes more, by more than "
+        "--most per cent.")
+    parser.add_argument("--builds",
+                        help="folder of both builds (default: build/, where they are built)")
+    parser.add_argument("--size", default="128x128",
+                        help="picture size in pixels (default: 128x128)")
+    parser.add_argument("--voxels", default="64",
+                        help="edge of the volumes in voxels (default: 64)")
     parser.add_argument("--isa", choices=instructions.ISAS, action="append",
-                        help="instruction set; may be repeated (default: all that valgrind runs)")
+                        help="instruction set; repeat it for several (default: all)")
     parser.add_argument("--most", type=float, default=0,
-                        help="of what draws, in per cent (default: 0)")
+                        help="allowed increase of drawing, in per cent (default: 0)")
     o = parser.parse_args()
     builds = [os.path.join(o.builds, name + "-effects") for name in ("with", "without")]
     programs = [os.path.join(build, "triptych") for build in builds]
@@ -64,7 +68,7 @@ def main():
             instructions.run([programs[0], "brick", source, "--quiet", "--output",
                               os.path.join(folder, field + ".trip")])
         if not refuses(programs[1], os.path.join(folder, "cloud.trip"), folder):
-            instructions.fail(programs[1] + " has effects")
+            instructions.fail(programs[1] + " has effects; build it with -DTRIP_WITHOUT_EFFECTS")
         print("%-6s %-9s %-27s %13s %13s %8s %8s" % ("set", "classify", "scene", "drawing",
                                                      "without", "more", "of all"))
         for isa in o.isa or instructions.ISAS:
@@ -78,7 +82,7 @@ def main():
                     print("%-6s %-9s %-27s %13d %13d %+7.2f%% %+7.2f%%" % (
                         isa, classify, scene, has, lacks, more, 100 * (all_ / rest - 1)), flush=True)
     if worst > o.most:
-        sys.exit("uncalled: effects that nobody called for take %.2f %% of what draws" % worst)
+        sys.exit("uncalled: unused effects add %.2f %% to the instructions of drawing" % worst)
 
 
 if __name__ == "__main__":

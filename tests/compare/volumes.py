@@ -1,6 +1,6 @@
-"""Volumes as NumPy arrays, for the programs that have no reader for a file: NRRD, NIfTI, .vol and
-OpenVDB, indexed [k, j, i]. Plain on purpose, and not Triptych's own readers. Where a voxel lies in
-the world is Triptych's to say (`triptych info`), so that all draw the same object."""
+"""Reads volumes as NumPy arrays, indexed [k, j, i], for programs without a reader: NRRD, NIfTI,
+.vol and OpenVDB. The readers are simple and independent of Triptych's own. The positions of voxels
+come from `triptych info`, so all programs draw the same object."""
 import bz2
 import gzip
 import os
@@ -71,7 +71,8 @@ def read_vol(path):
 
 
 def read_vdb(path, dims, first_world):
-    """The first scalar grid's box of `dims` voxels whose first one lies at `first_world`."""
+    """Returns the box of `dims` voxels of the first scalar grid, from the voxel at `first_world`
+    on."""
     import pyopenvdb as vdb
     grids = [g for g in vdb.readAllGridMetadata(path) if g.valueTypeName in ("float", "half")]
     grid = vdb.read(path, grids[0].name)
@@ -82,7 +83,8 @@ def read_vdb(path, dims, first_world):
 
 
 def read(path, info):
-    """The volume of a file whose data set `triptych info --json` describes, in native byte order."""
+    """Returns the volume of a file in native byte order. `info` is the output of `triptych info
+    --json` for its data set."""
     if path.endswith((".nhdr", ".nrrd")):
         values = read_nrrd(path)
     elif path.endswith((".nii", ".nii.gz")):
@@ -92,8 +94,8 @@ def read(path, info):
     elif path.endswith(".vdb"):
         values = read_vdb(path, info["dims"], [row[3] for row in info["index_to_world"]])
     else:
-        raise ValueError(path + ": no reader for it here")
+        raise ValueError(path + ": unknown type; use .nhdr, .nrrd, .nii, .nii.gz, .vol or .vdb")
     if list(values.shape[::-1]) != info["dims"]:
-        raise ValueError("%s: %s voxels here, %s in the data set" %
+        raise ValueError("%s: the file has %s voxels, its data set %s" %
                          (path, values.shape[::-1], info["dims"]))
     return values.astype(values.dtype.newbyteorder("="), copy=False)

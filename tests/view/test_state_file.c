@@ -168,8 +168,8 @@ static void what_is_no_state_is_refused_whole(void **state)
     (void)state;
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t1e9", "opacity_scale");
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t\"2\"", "opacity_scale");
-    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t2.5", "slices");
-    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t17", "slices");
+    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t2.5", "samples_per_sheet");
+    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t17", "samples_per_sheet");
     assert_refused("\"lod_px\":\t1.5", "\"lod_px\":\t-1", "lod_px");
     assert_refused("\"compositing\":\t1", "\"compositing\":\t2", "compositing");
     assert_refused("\"fov_degrees\":\t30", "\"fov_degrees\":\t230", "fov_degrees");
