@@ -1,14 +1,16 @@
-/* The pixels of a line whose centres (at + 0.5) lie within bounds. shaders/project.glsl and
- * cpu/kernels/project_tmpl.h do the same in their own numbers. */
+/* The pixels of a row or column with centres (at + 0.5) inside given bounds.
+ * shaders/project.glsl and cpu/kernels/project_tmpl.h compute the same in their own number
+ * types. Pure functions. */
 #ifndef TRIP_PIXELS_H
 #define TRIP_PIXELS_H
 
-/* Inclusive; none when first > last. */
+/* Inclusive; empty if first > last. */
 typedef struct trip_pixels {
     int first, last;
 } trip_pixels;
 
-/* Those with centres in [lo, hi], cut to a line of `size`; none where a bound is not a number. */
+/* Returns the pixels with centres in [lo, hi], limited to a line of `size` pixels. The result is
+ * empty if a bound is NaN. */
 static inline trip_pixels trip_pixels_within(double lo, double hi, int size)
 {
     trip_pixels p = { 0, size - 1 };

@@ -13,25 +13,24 @@
 
 static const char axis_names[3] = { 'x', 'y', 'z' };
 
-/* What a plan is made from. */
 typedef struct planning {
     trip_plan *plan;
     const trip_dataset *data;
     const trip_camera *camera;
     const trip_settings *settings;
     const trip_tf_entry *table;
-    trip_mean_tables *tables; /* the plan's own, or those of frames before */
+    trip_mean_tables *tables; /* the plan's own, or the caller's */
     trip_budget *budget;
-    trip_classification *classified; /* by frames before */
-    trip_brick_ranges *about;        /* post: of the lists along the axis at hand; else NULL */
-    trip_code_set shown;             /* by a table of a coarse level's: */
+    trip_classification *classified; /* results of earlier frames */
+    trip_brick_ranges *about;        /* post: ranges along the axis being planned; else NULL */
+    /* The codes with extinction in the table `shown_by`, which is a coarse level's. */
+    trip_code_set shown;
     const trip_tf_entry *shown_by;
 } planning;
 
-/* The sheets on one side of the eye, or all. */
+/* Sheets on one side of the eye, or all sheets. */
 typedef enum sides { ALL, BEYOND, BELOW } sides;
 
-/* Whether the classification draws records of the list's kind. */
 static bool is_of(const trip_settings *s, const trip_list *list)
 {
     const trip_kind_info *kind = trip_kind_of(list->kind);
@@ -47,9 +46,10 @@ static bool is_in_layer(const planning *p, const trip_list *list, int axis)
     return !trip_kind_of(list->kind)->coarse || trip_lod_concerns(&p->plan->lod, list);
 }
 
-/* Whether each ray takes part in the pass of its own way alone. Rays through values begin at the
- * eye whatever the passes are; weights of vertices are those of splats, not of rays; and sheets
- * parallel to the image have an order of their own. */
+/* Whether each ray takes part only in the pass of its own direction. It does not in three cases:
+ * - post: rays begin at the eye, whatever the passes are;
+ * - vertex_weights: the weights belong to splats, not to rays;
+ * - image-aligned sheets: they have an order of their own. */
 static bool is_by_ways(const planning *p)
 {
     const trip_settings *s = p->settings;
@@ -57,8 +57,8 @@ static bool is_by_ways(const planning *p)
            !p->camera->ortho && !s->vertex_weights && s->method != TRIP_METHOD_IMAGE;
 }
 
-/* Places of a list along its axis: of the eye, and how far on either side of it splats of the other
- * side show. */
+/* Position of the eye along a list's axis, and the distance that splats of one side reach over
+ * to the other side. */
 typedef struct eye_position {
     double at, over;
 } eye_position;
@@ -75,7 +75,7 @@ static eye_position position_of_eye(const planning *p, const trip_list *list)
     return eye;
 }
 
-/* First sheet that does not lie below a place, cut to [0, sheets]. */
+/* Returns the first sheet at or above a position, limited to [0, sheets]. */
 static int64_t first_sheet_beyond(const planning *p, const trip_list *list, double position)
 {
     double index = trip_coordinates_index(&p->data->coordinates, list->axis, position);
@@ -87,8 +87,8 @@ static int add_selection(const planning *p, trip_plan_pass *pass, const trip_lis
     trip_plan *plan = p->plan;
     int64_t sheets = list->dims[list->axis], first = 0, last = sheets - 1;
     const eye_position eye = position_of_eye(p, list);
-    /* Sheets beyond the eye's coordinate serve what is below it too, and the other way round, where
-     * it lies among them. */
+    /* Interpolation at one side of the eye also reads sheets of the other side, if the eye lies
+     * among the sheets. */
     int64_t over = p->about ? trip_sheet_reach(p->settings->kernel) : 0;
     if (side == BEYOND) {
         first = first_sheet_beyond(p, list, eye.at - eye.over);
@@ -134,9 +134,9 @@ static bool has_rays(const planning *p, int axis, trip_way way)
            trip_weight_is_somewhere(p->settings, p->camera, p->plan->axis_of_view, axis, way);
 }
 
-/* The sides of the eye, each from the eye outwards. A ray meets only the side it points to, and of
- * the other the splats that reach over the eye's coordinate. In a parallel view the eye is
- * infinitely far off. */
+/* Adds one pass for each side of the eye, from the eye outwards. A ray meets the sheets of the
+ * side it points to, and splats of the other side that reach over the eye's coordinate. In a
+ * parallel view the eye is infinitely far away, and one pass covers all sheets. */
 static int add_passes(const planning *p, int axis)
 {
     const trip_camera *c = p->camera;
@@ -154,14 +154,14 @@ static int add_passes(const planning *p, int axis)
     return status;
 }
 
-/* Those of a pass: they lie in the plan's array. */
+/* Returns the selections of a pass as part of the plan's own array, to write to them. */
 static trip_selection *selections_of(const trip_plan *plan, const trip_plan_pass *pass)
 {
     return plan->selections + (pass->pass.selections - plan->selections);
 }
 
-/* Of a list, or of one with its number at another level (dataset_level.h), in pass `i` of its
- * layer; NULL where it has none. */
+/* Returns the selection of a list in pass `i` of its layer, or NULL. The list may be the one
+ * with the same index at another level (dataset_level.h). */
 static trip_selection *selection_in(const trip_plan *plan, int axis, int i, const trip_list *list)
 {
     const trip_plan_pass *pass = &plan->layers[axis].passes[i];
@@ -172,16 +172,15 @@ static trip_selection *selection_in(const trip_plan *plan, int axis, int i, cons
     return NULL;
 }
 
-/* A list whose bricks are being selected. */
 typedef struct selecting {
     const planning *p;
     const trip_list *list;
     trip_plan_list *planned;
     trip_cull cull;
-    trip_selection *selections[2]; /* of the layer's passes; NULL: in none of its sheets */
+    trip_selection *selections[2]; /* by pass; NULL if the pass draws no sheet of the list */
 } selecting;
 
-/* How many passes draw a sheet: those about the eye may be of both. */
+/* Returns the number of passes that draw a sheet. Both passes may draw a sheet near the eye. */
 static unsigned passes_of(const selecting *of, int64_t sheet)
 {
     unsigned count = 0;
@@ -246,7 +245,7 @@ static void consider_brick(selecting *of, const trip_file_slab *slab, uint64_t i
     }
 }
 
-/* The codes that a list shows, whose table is the plan's or a coarse level's. */
+/* Returns the codes with extinction in `table`, which is the plan's or a coarse level's. */
 static const trip_code_set *shown_by(planning *p, const trip_tf_entry *table)
 {
     if (table == p->table)
@@ -283,7 +282,7 @@ static int select_bricks(planning *p, const trip_list *list)
     return 0;
 }
 
-/* Selections that read nothing are left out, and passes without any. */
+/* Drops selections that read nothing, and passes without selections. */
 static void drop_empty(trip_plan *plan, trip_plan_layer *layer, trip_budget *budget)
 {
     int kept = 0;
@@ -308,7 +307,7 @@ static void drop_empty(trip_plan *plan, trip_plan_layer *layer, trip_budget *bud
     layer->pass_count = kept;
 }
 
-/* Of each plane of the frame, in the list's index space. */
+/* Sets the clipping planes of a list in its own index space. */
 static void place_clip(const planning *p, const trip_list *list, trip_plan_list *planned)
 {
     const uint64_t dims[3] = { (uint64_t)list->dims[0], (uint64_t)list->dims[1],
@@ -317,7 +316,7 @@ static void place_clip(const planning *p, const trip_list *list, trip_plan_list 
     trip_clip_simplify(&planned->clip, dims);
 }
 
-/* The view in a list's own index space. */
+/* Sets the grid, clipping, table and view of a list that is drawn. */
 static int place_list(const planning *p, const trip_list *list)
 {
     trip_plan_list *planned = &p->plan->lists[list->index];
@@ -357,7 +356,7 @@ static int plan_layer(planning *p, int axis)
     return 0;
 }
 
-/* The layer of lists whose values are interpolated. */
+/* Plans a layer of interpolated values. */
 static int plan_sheets(planning *p, int axis)
 {
     trip_brick_ranges about;
@@ -380,7 +379,7 @@ static int take_lists(trip_plan *plan, unsigned count, trip_budget *budget)
                      "%u lists do not fit the memory given; raise --memory", count);
 }
 
-/* Sheets that are classified after interpolation are lit by differences of values. */
+/* `post` reads no normals: it lights by differences of values. */
 static unsigned planes_of(const trip_dataset *data, const trip_settings *settings)
 {
     bool wanted = settings->shading || settings->flatten > 1;
@@ -393,9 +392,10 @@ int trip_plan_check_cells(const trip_dataset *data, const char *instead)
 {
     for (int a = 0; a < 3; a++)
         if (data->header.dims[a] < 2)
-            return trip_fail(TRIP_ERROR, "render", data->path,
-                             "has one voxel along %c, and no cell to interpolate in; %s draws it",
-                             "ijk"[a], instead);
+            return trip_fail(
+                TRIP_ERROR, "render", data->path,
+                "is one voxel thick along %c and has no cells to interpolate in; use %s", "ijk"[a],
+                instead);
     return 0;
 }
 
@@ -405,14 +405,14 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
     if (!trip_coordinates_uneven(&data->coordinates))
         return 0;
     if (s->kernel != TRIP_KERNEL_LINEAR)
-        why = "it is interpolated linearly alone";
+        why = "only linear interpolation draws it";
     else if (s->footprint == TRIP_FOOTPRINT_FIXED || s->vertex_weights ||
              s->method == TRIP_METHOD_IMAGE)
-        why = "neither fixed sprites, weights of vertices nor image-aligned sheets draw it";
+        why = "fixed footprints, vertex weights and image-aligned sheets cannot draw it";
     return why ? trip_fail(TRIP_USAGE, "render", data->path, "has uneven spacing: %s", why) : 0;
 }
 
-/* Whether values need be looked up. */
+/* Decides whether classification has a closed form or looks up its integrals. */
 static void plan_classification(const planning *p)
 {
     trip_plan *plan = p->plan;
@@ -491,7 +491,7 @@ static bool is_gathered(const trip_list *list, unsigned kinds)
     return list->axis == 2 && list->level == 0 && kinds >> list->kind & 1;
 }
 
-/* All of the list is selected. */
+/* Selects all bricks of a list. */
 static int gather_list(const planning *p, trip_plan_pass *pass, const trip_list *list)
 {
     trip_plan *plan = p->plan;
@@ -526,8 +526,8 @@ static int gather_lists(const planning *p, unsigned kinds)
     return status;
 }
 
-/* Gradients of values are differences of values, so that the integral through them does not depend
- * on what normals were rounded to; splats have their own. */
+/* The integral through values takes gradients as differences of values. Rounded normals would
+ * change it. Splats are lit by their stored normals. */
 static unsigned planes_gathered(const trip_dataset *data, const trip_settings *s)
 {
     return s->field == TRIP_FIELD_SPLATS ? planes_of(data, s) : 1u << TRIP_PLANE_VOXELS;
@@ -568,19 +568,24 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
     *plan = (trip_plan){ 0 };
 }
 
-/* What of footprints is not as usual. */
+/* Prints the footprint settings that differ from the defaults. */
 static void explain_footprints(const trip_settings *s, FILE *out)
 {
     if (s->footprint == TRIP_FOOTPRINT_EWA)
-        fprintf(out, "kernel      ewa: footprints by the affine map at each splat's centre\n");
+        fprintf(out,
+                "kernel      ewa: footprints by the affine approximation at each splat's centre\n");
     if (s->footprint == TRIP_FOOTPRINT_FIXED)
-        fprintf(out, "kernel      fixed: every footprint %.4g pixels wide\n", s->sprite_px);
+        fprintf(out, "kernel      fixed: every footprint is %.4g pixels wide\n", s->sprite_px);
     if (s->low_pass == TRIP_LOW_PASS_NONE)
         fprintf(out, "low-pass    does not run: switched off\n");
     else if (s->low_pass == TRIP_LOW_PASS_UNIFORM)
-        fprintf(out, "low-pass    uniform: kernels are scaled until no axis is shorter\n");
+        fprintf(out, "low-pass    uniform: footprints are scaled until no axis is shorter than the "
+                     "filter's\n");
     if (s->flatten > 1)
-        fprintf(out, "flattening  runs, %g times along full gradients: normal planes are read\n",
+        fprintf(out,
+                "flattening  runs: kernels are up to %g times flatter along gradients; normal "
+                "planes are "
+                "read\n",
                 s->flatten);
 }
 
@@ -595,69 +600,80 @@ static void explain_kernel(const trip_dataset *data, const trip_settings *s, FIL
 {
     if (s->classify != TRIP_CLASSIFY_POST || s->kernel == TRIP_KERNEL_LINEAR)
         return;
-    fprintf(out, "kernel      %s: from 64 voxels%s\n", trip_kernel_name(s->kernel),
+    fprintf(out, "kernel      %s: interpolates between 64 voxels%s\n", trip_kernel_name(s->kernel),
             trip_plan_halo_is_short(data, s)
-                ? "; those that were left out count as the ones next to them"
+                ? "; missing voxels count as the nearest corner of the cell"
                 : "");
 }
 
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     if (plan->gathers) {
-        fprintf(out, "method      integral: ray by ray, through %s, each component within %g\n",
-                s->field == TRIP_FIELD_SPLATS ? "the sum of the splats" : "the values",
-                s->tolerance);
+        fprintf(
+            out,
+            "method      integral: each ray is integrated through %s, each component within %g\n",
+            s->field == TRIP_FIELD_SPLATS ? "the sum of the splats" : "the interpolated values",
+            s->tolerance);
         return;
     }
     if (s->classify == TRIP_CLASSIFY_PRE)
         fprintf(out, "classify    pre: voxels are classified, then splatted\n");
     else
-        fprintf(out, "classify    post: values are interpolated in %d slice%s a sheet\n",
-                s->samples_per_sheet, s->samples_per_sheet == 1 ? "" : "s");
+        fprintf(
+            out,
+            "classify    post: values are interpolated at %d sample%s per sheet, then classified\n",
+            s->samples_per_sheet, s->samples_per_sheet == 1 ? "" : "s");
     if (trip_settings_sum_sheets(s))
-        fprintf(out,
-                "compositing sheet: the splats of a sheet are summed, and composited as one\n");
+        fprintf(
+            out,
+            "compositing sheet: the splats of each sheet are added, then composited together\n");
     explain_footprints(s, out);
-    fprintf(out, "saturation  below %g of transmittance a pixel takes no more\n",
+    fprintf(out, "termination below %g of transmittance a pixel takes no more samples or splats\n",
             trip_settings_early_termination(s));
     switch (s->method) {
     case TRIP_METHOD_MERGE:
         fprintf(out,
-                "method      merge: layers of up to three lists, blended by w^2 with h = %g%s\n",
-                trip_settings_h(s), s->vertex_weights ? ", w from the corners of splats" : "");
+                "method      merge: the layers of up to three lists are blended by w^2, h = %g%s\n",
+                trip_settings_h(s),
+                s->vertex_weights ? ", w interpolated between the corners of splats" : "");
         break;
     case TRIP_METHOD_CLIP:
-        fprintf(out, "method      clip: every pixel from the list its ray is most aligned with\n");
+        fprintf(out, "method      clip: each pixel is drawn from the list that its ray is most "
+                     "aligned with\n");
         break;
     case TRIP_METHOD_IMAGE:
-        fprintf(out, "method      image: sheets parallel to the image plane, from list %c\n",
+        fprintf(out,
+                "method      image: the splats of list %c are cut into sheets parallel to the "
+                "image plane\n",
                 axis_names[plan->axis_of_view]);
         break;
     case TRIP_METHOD_AXIS:
-        fprintf(out, "method      axis: list %c alone, by the ray at the image centre\n",
-                axis_names[plan->axis_of_view]);
+        fprintf(
+            out,
+            "method      axis: list %c alone is drawn; the ray at the image centre selects it\n",
+            axis_names[plan->axis_of_view]);
         break;
     }
 }
 
-/* Of a voxel it is one entry of a table, whatever the function. */
+/* Prints how `post` classifies. `pre` needs no line: it reads one table entry per voxel. */
 static void explain_classification(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     static const char *const why[] = {
-        [TRIP_CLOSED_FORM_ENDS] = "neither the least nor the greatest of the values shows",
-        [TRIP_CLOSED_FORM_EXTINCTION] = "extinction is not linear in the value, nor nearly",
+        [TRIP_CLOSED_FORM_ENDS] = "neither the minimum nor the maximum value is visible",
+        [TRIP_CLOSED_FORM_EXTINCTION] = "extinction is not linear in the value, nor close to it",
         [TRIP_CLOSED_FORM_COLOUR] = "colours are not linear in the value",
-        [TRIP_CLOSED_FORM_EFFECTS] = "frames with effects do so",
+        [TRIP_CLOSED_FORM_EFFECTS] = "frames with effects always do so",
     };
     const double *k = plan->closed.k;
     if (plan->gathers || s->classify != TRIP_CLASSIFY_POST)
         return;
     if (plan->not_closed)
-        fprintf(out, "integrals   of the function are looked up: %s\n", why[plan->not_closed]);
+        fprintf(out, "integrals   are looked up: %s\n", why[plan->not_closed]);
     else
         fprintf(out,
                 "integrals   have a closed form: extinction is %s, colours are %s; cpu and gl "
-                "look nothing up\n",
+                "need no lookup\n",
                 k[1] != 0 || k[2] != 0 || k[3] != 0 ? "linear in the value, or nearly" : "constant",
                 plan->closed.coloured ? "linear" : "constant");
 }
@@ -668,12 +684,12 @@ static void explain_levels(const trip_plan *plan, const trip_settings *s, FILE *
         s->show == TRIP_SHOW_MERGE)
         return;
     char chosen[64] = "the finest";
-    const char *bound = s->max_bytes > 0 ? ", or what the bound on bytes calls for" : "";
+    const char *bound = s->max_bytes > 0 ? ", or coarser to keep the bound on bytes" : "";
     if (s->lod_px > 0)
-        snprintf(chosen, sizeof chosen, "the coarsest whose voxels are at most %g pixels wide",
+        snprintf(chosen, sizeof chosen, "the coarsest with voxels at most %g pixels wide",
                  s->lod_px);
     if (plan->lod.level)
-        fprintf(out, "levels      run: cubes of %d voxels a side, each at one of %u levels: %s%s\n",
+        fprintf(out, "levels      run: each cube of %d voxels a side has one of %u levels: %s%s\n",
                 1 << plan->lod.cube_log2, plan->lod.levels + 1, chosen, bound);
     else
         fprintf(out, "levels      do not run: the data set has none\n");
@@ -690,11 +706,12 @@ static void explain_limit(const trip_plan *plan, const trip_settings *s, FILE *o
     trip_format_bytes((uint64_t)l->bytes, bytes);
     if (l->px > 0)
         fprintf(out,
-                "bound       of %s of codes and normals in view: levels are chosen as if voxels "
-                "could be %.3g pixels wide, which leaves %s of %s\n",
+                "bound       %s of codes and normals in view: levels are chosen as if voxels "
+                "could be %.3g pixels wide, which leaves %s of %s in view\n",
                 max, l->px, bytes, full);
     else
-        fprintf(out, "bound       of %s of codes and normals in view: %s suffice\n", max, full);
+        fprintf(out, "bound       %s of codes and normals in view: the levels need only %s\n", max,
+                full);
 }
 
 static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *out)
@@ -702,7 +719,7 @@ static void explain_clip(const trip_plan *plan, const trip_settings *s, FILE *ou
     if (s->clip.count == 0 || s->show == TRIP_SHOW_MERGE)
         return;
     if (plan->clip.count == 0)
-        fprintf(out, "clipping    does not run: nothing of the grid lies outside\n");
+        fprintf(out, "clipping    does not run: the whole grid lies inside\n");
     else
         fprintf(out, "clipping    runs: %d plane%s the grid\n", plan->clip.count,
                 plan->clip.count > 1 ? "s cut" : " cuts");
@@ -723,7 +740,7 @@ static void explain_passes(const trip_plan *plan, const trip_list *list, FILE *o
         fprintf(out, "%ssheets %" PRId64 " to %" PRId64 " %s, %s%s", before, s->sheet_first,
                 s->sheet_last, s->descending ? "descending" : "ascending",
                 layer->passes[i].front_to_back ? "front to back" : "back to front",
-                layer->parted ? ", for rays that way" : "");
+                layer->parted ? ", for rays in that direction" : "");
         before = "; then ";
     }
     fprintf(out, "\n");
@@ -743,10 +760,10 @@ static const char *why_not_drawn(const trip_plan *plan, const trip_settings *s,
 {
     const bool post = s->classify == TRIP_CLASSIFY_POST;
     if (s->show == TRIP_SHOW_MERGE)
-        return ": the merge map has nothing of the volume";
+        return ": the merge map shows no part of the volume";
     if (plan->gathers)
-        return list->level > 0   ? ": the finest level alone is drawn"
-               : list->axis != 2 ? ": list z has the same"
+        return list->level > 0   ? ": only the finest level is drawn"
+               : list->axis != 2 ? ": list z holds the same voxels"
                                  : ": its records are not splatted";
     if (!is_of(s, list))
         return post ? ": it has no values to interpolate" : ": its records are not splatted";
@@ -754,19 +771,19 @@ static const char *why_not_drawn(const trip_plan *plan, const trip_settings *s,
                             : trip_kind_of(list->kind)->coarse &&
                                   !(plan->lod.level && list->level <= plan->lod.levels);
     if (other)
-        return post && trip_settings_has_levels(s) ? ": of another level than what is drawn"
-                                                   : ": the finest level alone is drawn";
+        return post && trip_settings_has_levels(s) ? ": the frame is drawn at another level"
+                                                   : ": only the finest level is drawn";
     return ": no ray of the view has weight in it";
 }
 
-/* Reasons that not every frame has. */
+/* Returns the reasons that apply to some frames only. */
 static const char *rarer_reasons(const trip_plan_list *planned, char text[96])
 {
     int length = 0;
     text[0] = 0;
     if (planned->by_level)
-        length = snprintf(text, 96, ", %" PRIu64 " where other levels are drawn",
-                          planned->bricks_of_other_levels);
+        length =
+            snprintf(text, 96, ", %" PRIu64 " of other levels", planned->bricks_of_other_levels);
     if (planned->clip.count > 0)
         snprintf(text + length, 96 - (size_t)length, ", %" PRIu64 " clipped",
                  planned->bricks_clipped);
@@ -861,14 +878,14 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
                             FILE *out)
 {
     const char *light = s->headlight     ? "from the eye"
-                        : s->point_light ? "from the place given"
-                                         : "from the direction given";
+                        : s->point_light ? "from the given position"
+                                         : "from the given direction";
     char bytes[32];
     const bool of_values = trip_plan_is_of_values(plan, s);
     if (s->show == TRIP_SHOW_MERGE)
-        fprintf(out, "shading     does not run: the merge map has nothing of the volume\n");
+        fprintf(out, "shading     does not run: the merge map shows no part of the volume\n");
     else if (of_values && s->shading)
-        fprintf(out, "shading     runs, lit %s, by differences of the values\n", light);
+        fprintf(out, "shading     runs, lit %s; gradients are differences of the values\n", light);
     else if (of_values)
         fprintf(out, "shading     does not run: switched off\n");
     else if (!s->shading && s->flatten > 1)

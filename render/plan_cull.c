@@ -5,16 +5,16 @@
 #include "sheet.h"
 #include "weight.h"
 
-/* Voxels along u or v that a ray of a list moves at most from one sheet to the next, where its
- * weight has no bound of its own that is lower: beyond, it is too little to show. */
+/* Maximum number of voxels that a ray moves along u or v from one sheet to the next, unless the
+ * list's weight sets a lower bound. Steeper rays have too little weight to be visible. */
 #define TRIP_CULL_STEEPEST 64.0
 
-/* Bounds of the voxel positions of a brick, from the eye. */
+/* Bounds of the voxel positions of a brick, relative to the eye. */
 typedef struct box {
     double lo[3], hi[3];
 } box;
 
-/* fmax() without the call: nothing here is not a number. */
+/* As fmax(), without the call. The arguments are never NaN. */
 static double larger(double a, double b)
 {
     return a > b ? a : b;
@@ -28,7 +28,8 @@ static trip_cull_plane side(const trip_camera *c, trip_vec3 to, double pixel, do
                               c->ortho ? sign * pixel / length : 0 };
 }
 
-/* Of sheets the cells about the eye have voxels behind it. */
+/* Returns the depth behind the eye up to which voxels count. In `post` the cells around the eye
+ * have voxels behind it. */
 static double behind_eye(const trip_camera *camera, const trip_settings *settings, bool sheets)
 {
     if (sheets)
@@ -38,7 +39,8 @@ static double behind_eye(const trip_camera *camera, const trip_settings *setting
     return behind * (1 + 1e-9);
 }
 
-/* Flat kernels seen edge-on are scaled up to any size (splat.h), by the reference alone. */
+/* Swan's scaling enlarges flat kernels seen edge-on without bound (splat.h). Only the reference
+ * renderer draws them. */
 static bool reaches_anywhere(const trip_settings *settings)
 {
     return settings->low_pass == TRIP_LOW_PASS_UNIFORM && settings->flatten > 1;
@@ -68,9 +70,10 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
         .radius2 = reaches_anywhere(settings) ? INFINITY
                    : fixed                    ? 0
                                               : room * radius * radius,
-        /* The low-pass in index space: the largest eigenvalue of S^-1 (splat.h) is at most
-         * z^2 (rx.rx + ry.ry) / sigma^2, z = 1 in parallel views. Of fixed footprints all there
-         * is. */
+        /* The low-pass filter in index space: the largest eigenvalue of S^-1 (splat.h) is at
+         * most
+         *     z^2 (rx.rx + ry.ry) / sigma^2,  z = 1 in parallel views.
+         * Fixed footprints have this term alone. */
         .low_pass2 = room * widest * widest * pixel2,
         .behind = data->coordinates.widest * behind_eye(camera, settings, about != NULL),
         .shown = shown,
@@ -78,7 +81,7 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
     };
 }
 
-/* By index axes, from the eye. */
+/* Returns the bounds of a brick by index axis, relative to the eye. */
 static box place_box(const trip_cull *cull, int axis, const trip_brick_box *b)
 {
     box r;
@@ -91,7 +94,7 @@ static box place_box(const trip_cull *cull, int axis, const trip_brick_box *b)
     return r;
 }
 
-/* Largest n . p over the box. */
+/* Returns the largest n . p over the box. */
 static double farthest_along(const box *b, trip_vec3 n)
 {
     double sum = 0;
@@ -108,8 +111,8 @@ static bool eye_within(const box *b, double margin)
     return true;
 }
 
-/* A splat that is not about the eye touches a pixel only when it lies within `radius` of a ray of
- * the image, in front of the eye. */
+/* Whether a box lies outside the view. A splat that does not contain the eye touches a pixel
+ * only if it lies within `radius` of a ray of the image, in front of the eye. */
 static bool outside(const trip_cull *cull, const box *b, double radius)
 {
     for (int i = 0; i < 4; i++)
@@ -118,12 +121,13 @@ static bool outside(const trip_cull *cull, const box *b, double radius)
     return false;
 }
 
-/* The points of the box, grown by the radius, are those that carry rays near its splats. */
+/* Whether a ray near the box may have weight. All rays that come near its splats pass through
+ * the box grown by the radius. */
 static bool may_weigh(const trip_cull *cull, const box *b, double radius, int axis)
 {
     double lo[3], hi[3];
     if (trip_settings_has_one_list(cull->settings) || cull->camera->ortho)
-        return true; /* decided for the list as a whole */
+        return true; /* decided for the whole list */
     for (int a = 0; a < 3; a++) {
         lo[a] = (b->lo[a] - radius) * cull->grid->scale[a];
         hi[a] = (b->hi[a] + radius) * cull->grid->scale[a];
@@ -132,7 +136,8 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
     return trip_weight_may_lie(cull->settings, cull->axis_of_view, &bounds, axis);
 }
 
-/* Cells between the brick's voxels and its neighbours' may show what neither of them does. */
+/* Whether no part of a brick is visible. Cells between the brick and its neighbours take values
+ * between both, so the neighbours' codes count too. */
 static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
                            const trip_file_slab *slab)
 {
@@ -144,8 +149,9 @@ static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
     return !trip_code_set_has_some(cull->shown, range.min, range.max);
 }
 
-/* Of sheets a value counts that is within reach of a slice that a ray inside the clip, or its
- * segment's other end, passes. */
+/* Returns how far outside the clipping planes a voxel may lie and still count. Interpolation
+ * reads voxels around a sample, and a segment inside the planes may end at a sample outside them.
+ */
 static double reach_over_clip(const trip_cull *cull)
 {
     const trip_settings *s = cull->settings;
@@ -162,15 +168,15 @@ static bool is_clipped(const trip_cull *cull, const box *b)
            trip_clip_misses(cull->clip, cull->camera->eye, b->lo, b->hi, reach_over_clip(cull));
 }
 
-/* The radius of splats that lie as deep as the farthest of the box. */
+/* Returns the radius of splats at a depth. */
 static double radius_in(const trip_cull *cull, double depth)
 {
     double low_pass2 = cull->low_pass2 * (cull->camera->ortho ? 1 : depth * depth);
     return sqrt(cull->radius2 + low_pass2) * (1 + 1e-9);
 }
 
-/* The least that a ray with weight goes along the axis for each step along that which it goes
- * farthest along. */
+/* Returns the minimum slope of a ray with weight: the distance along the list's axis over the
+ * distance along the ray's largest component. */
 static double min_slope(const trip_cull *cull, int axis)
 {
     const double *scale = cull->grid->scale;
@@ -178,17 +184,25 @@ static double min_slope(const trip_cull *cull, int axis)
     return h * fmin(scale[0], fmin(scale[1], scale[2])) / scale[axis];
 }
 
-/* With c from the eye and p the point of the ray that is nearest to c, at most R(z) away at the
- * depth z of c, a ray of the other way has p_a <= 0, and so c_a <= R; and p_a <= -slope |p|, |p|
- * the largest of its components, so that also c_a <= R - slope (|c| - R), with |c| at least z over
- * the sum of |forward|. The two are equal where R is as long as |c|. Below that the first holds,
- * beyond it the second, which is convex: largest there or at the farthest depth. Of splats about
- * the eye p may lie behind it by a radius too, which the 2 is for. */
+/* Derivation of the bound. Let c be the splat's centre relative to the eye, and z its depth. Let
+ * p be the point of the ray nearest to c, at most R(z) away. A ray of the other direction has
+ * p_a <= 0, so
+ *
+ *     c_a <= R.
+ *
+ * Its slope gives p_a <= -slope |p|, where |p| is the largest component. So also
+ *
+ *     c_a <= R - slope (|c| - R),
+ *
+ * where |c| is at least z over the sum of |forward|. Both bounds are equal where R = |c|. Nearer
+ * than that the first applies, farther away the second. The second is convex, so its maximum
+ * lies there or at the farthest depth. For splats around the eye p may also lie behind the eye
+ * by a radius, which gives the factor 2. */
 double trip_cull_reach_over_eye(const trip_cull *cull, int axis, const int64_t dims[3])
 {
     const trip_vec3 f = cull->camera->forward;
     const double depth = fabs(f.x) + fabs(f.y) + fabs(f.z), slope = min_slope(cull, axis);
-    const double turn2 = cull->low_pass2 * depth * depth; /* R grows by its root for each |c| */
+    const double turn2 = cull->low_pass2 * depth * depth; /* R grows by its square root per |c| */
     const double radius2 = 2 * cull->radius2;
     trip_brick_box all = { .lo = { 0, 0, 0 } };
     for (int i = 0; i < 3; i++)
@@ -228,8 +242,7 @@ trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_bric
     double low_pass2 = cull->camera->ortho ? cull->low_pass2 : cull->low_pass2 * front * front;
     double room = 1 + 1e-9; /* for rounding */
     double radius = sqrt(cull->radius2 + low_pass2) * room;
-    /* Of splats about the eye the nearest point of a ray may lie behind, and any ray may be near.
-     */
+    /* Any ray may be near a splat around the eye, and its nearest point may lie behind the eye. */
     if (!cull->camera->ortho && eye_within(&b, sqrt(2 * cull->radius2 + low_pass2) * room))
         return TRIP_CULL_KEEP;
     if (outside(cull, &b, radius))

@@ -11,13 +11,13 @@
 #include "errno_text.h"
 #include "report.h"
 
-/* zlib's own choice, 6, takes twice as long for files that are 7 % smaller. */
+/* zlib's default, 6, takes twice as long and makes files 7 % smaller. */
 enum { COMPRESSION = 4 };
 
 typedef struct sink {
     int fd;
-    int number;      /* errno of a write that failed; 0: none has */
-    char fault[128]; /* what libpng says otherwise */
+    int number;      /* errno of a failed write, or 0 */
+    char fault[128]; /* libpng's message, if writing did not fail */
 } sink;
 
 static void put_bytes(png_structp png, png_bytep bytes, size_t count)
@@ -34,7 +34,7 @@ static void put_bytes(png_structp png, png_bytep bytes, size_t count)
     }
 }
 
-/* Each write is of the file itself. */
+/* put_bytes() does not buffer. */
 static void flush_nothing(png_structp png)
 {
     (void)png;
@@ -53,8 +53,9 @@ static void ignore_warning(png_structp png, png_const_charp text)
     (void)text;
 }
 
-/* Unassociated alpha. Colour times 1 / alpha before it is rounded, so that thin places keep their
- * hue; without alpha it stays as it is, over black. */
+/* Converts a row to unassociated alpha. The colour is divided by alpha before rounding, so that
+ * thin parts keep their hue. Without an alpha channel the colour stays premultiplied, over
+ * black. */
 static void convert_row(const float *rgba, int width, int channels, unsigned top, png_bytep row)
 {
     for (int x = 0; x < width; x++, rgba += 4) {
@@ -75,7 +76,7 @@ typedef struct picture {
     const char *path;
     int width, height, channels, bits;
     const float *rgba;
-    png_bytep row; /* room for one */
+    png_bytep row; /* room for one row */
 } picture;
 
 static int write_rows(png_structp png, png_infop info, const picture *p)
@@ -105,7 +106,7 @@ static int fail(const sink *s, const char *path)
     return trip_fail(TRIP_ERROR, "write", path, "cannot encode: %s", s->fault);
 }
 
-/* libpng jumps back here from what fails. */
+/* libpng longjmps back here on errors. */
 static int write_picture(sink *s, const picture *p)
 {
     png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, s, keep_fault, ignore_warning);

@@ -1,12 +1,13 @@
-/* Pictures as PNG files, by libpng in this process: the helper of the other formats
- * (image_helper.h) takes longer to start than many a picture to be drawn. Any thread. */
+/* Writes PNG files with libpng in this process. The helper process for the other formats
+ * (image_helper.h) often takes longer to start than a picture takes to draw. Any thread may call
+ * it. */
 #ifndef TRIP_PNG_FILE_H
 #define TRIP_PNG_FILE_H
 
 #include "image_file.h"
 
-/* As trip_image_write(), for numbers and params that are known to be right, to a descriptor that is
- * open for writing, of an empty file; failures are reported about `path`. */
+/* Writes a picture as trip_image_write() does, to a descriptor of an empty file that is open for
+ * writing. The caller has checked the size and `params`. Failures are reported with `path`. */
 int trip_png_write(int fd, const char *path, int width, int height, const float *rgba,
                    const trip_image_params *params);
 

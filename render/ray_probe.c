@@ -7,14 +7,14 @@
 
 #define NOTHING UINT32_MAX
 
-/* Sheets first to first + count - 1, four voxels each: codes, or NOTHING. */
+/* Codes of four voxels in each of the sheets first to first + count - 1; NOTHING where none is. */
 typedef struct samples {
     const trip_ray_probe *probe;
-    double from, to; /* z: what of the ray is not cut away */
+    double from, to; /* the part of the ray inside the clipping planes; z */
     int axis;
     int64_t first, count;
     uint32_t *codes;
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of one run */
 } samples;
 
 static int longest_axis(trip_vec3 v)
@@ -28,7 +28,7 @@ static const trip_coordinates *positions(const samples *s)
     return &s->probe->data->coordinates;
 }
 
-/* Where the ray meets a sheet. */
+/* Returns z where the ray meets a sheet. */
 static double z_of(const samples *s, double sheet)
 {
     const trip_ray_probe *p = s->probe;
@@ -37,7 +37,7 @@ static double z_of(const samples *s, double sheet)
            trip_component(p->direction, s->axis);
 }
 
-/* There, a coordinate by the list's own: 0 is u, 1 is v. */
+/* Returns the ray's u (`which` is 0) or v (1) at a sheet, in voxels. */
 static double across(const samples *s, double sheet, int which)
 {
     const trip_ray_probe *p = s->probe;
@@ -47,7 +47,7 @@ static double across(const samples *s, double sheet, int which)
                                       z_of(s, sheet) * trip_component(p->direction, axis));
 }
 
-/* Narrows [from, to] to where o + z d lies in [lo, hi]. */
+/* Narrows [from, to] to the part where o + z d lies in [lo, hi]. */
 static void narrow(double o, double d, double lo, double hi, double *from, double *to)
 {
     if (d == 0) {
@@ -60,7 +60,7 @@ static void narrow(double o, double d, double lo, double hi, double *from, doubl
     *to = fmin(*to, fmax(a, b));
 }
 
-/* The sheets that the ray meets in the grid; none where it passes by. */
+/* Finds the sheets that the ray meets inside the grid. The count stays 0 if the ray misses it. */
 static void find_sheets(samples *s)
 {
     const trip_ray_probe *p = s->probe;
@@ -111,7 +111,7 @@ static bool select_bricks(const samples *s, trip_selection *selection)
     return some;
 }
 
-/* Keeps the voxels of a run that are next to the ray. */
+/* Keeps the voxels of a run next to the ray. */
 static void take_run(samples *s, const trip_batch *batch, const trip_run *run)
 {
     if (run->sheet < s->first || run->sheet >= s->first + s->count)
@@ -171,7 +171,7 @@ static int read_kind(samples *s, trip_kind kind)
     return status;
 }
 
-/* The code where the ray meets a sheet; false where there is none. */
+/* Computes the code where the ray meets a sheet. Returns false if the nearest voxel is missing. */
 static bool code_at(const samples *s, int64_t sheet, double *code)
 {
     const uint32_t *c = s->codes + 4 * (sheet - s->first);
@@ -193,13 +193,13 @@ static double extinction(const trip_tf_entry *table, double code)
     return (1 - t) * (double)table[lower].extinction + t * (double)table[upper].extinction;
 }
 
-/* A sheet's piece of the ray. */
+/* The piece of the ray that belongs to a sheet. */
 typedef struct piece {
     double from, to, code;
-    double depth; /* optical */
+    double depth; /* optical depth */
 } piece;
 
-/* The n-th piece from the eye; false where nothing shows. */
+/* Computes the n-th piece, counted from the eye. Returns false if the piece is not visible. */
 static bool piece_at(const samples *s, int64_t n, piece *out)
 {
     bool ascends = trip_component(s->probe->direction, s->axis) > 0;
@@ -245,7 +245,8 @@ int trip_ray_probe_find(const trip_ray_probe *probe, trip_ray_hit *out)
     size_t bytes = (size_t)s.count * 4 * sizeof *s.codes;
     s.codes = trip_budget_take(probe->budget, bytes);
     if (!s.codes)
-        return trip_fail(TRIP_ERROR, "render", "probe", "the ray does not fit the memory given");
+        return trip_fail(TRIP_ERROR, "render", "probe",
+                         "the ray does not fit the memory given; raise --memory");
     memset(s.codes, 0xff, bytes);
     int status = read_kind(&s, TRIP_KIND_VOXELS);
     if (!status)

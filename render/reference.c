@@ -1,6 +1,6 @@
-/* The definition of the picture: double precision, every splat of every batch against every pixel
- * of its bounds, as splat.h, weight.h and shade.h are written; of frames that classify after
- * interpolation the layers are reference_sheets.c's. Slow, and meant to be read. */
+/* The reference renderer defines the picture. In double precision it tests every splat of every
+ * batch against every pixel of its bounds, exactly as splat.h, weight.h and shade.h say.
+ * reference_sheets.c does so for the layers of `post`. It is slow, and written to be read. */
 #include "renderer.h"
 
 #include <limits.h>
@@ -18,47 +18,47 @@
 #include "debug_view.h"
 #include "weight.h"
 
-/* One pixel of splats: the layer being drawn, and the sum over the layers before it. */
+/* One pixel: the layer being drawn, and the sum over the layers before it. For splats only. */
 typedef struct pixel {
-    double layer[TRIP_CHANNELS_MAX]; /* over-composite; depths are distances here */
-    double sheet[TRIP_CHANNELS_MAX]; /* of the open sheet: sums of optical depth times the channels,
-                                        where splats are summed */
-    double weight;                   /* of the layer at this pixel */
-    trip_way way;                    /* of its ray along the layer's axis */
-    double stretch;    /* world units per index length of the list at hand, along the ray */
-    double ray_length; /* |J r(p)| of it */
-    double merged[TRIP_CHANNELS_MAX]; /* sum of w^2 layer over the layers that are done */
-    double merged_weight;             /* sum of w^2 likewise */
+    double layer[TRIP_CHANNELS_MAX]; /* composited with *over*; depths are distances here */
+    double sheet[TRIP_CHANNELS_MAX]; /* sums of optical depth times channel over the open sheet, if
+                                        splats are summed */
+    double weight;                   /* weight of the layer at this pixel */
+    trip_way way;                    /* direction of the pixel's ray along the layer's axis */
+    double stretch;    /* world units per index length of the current list, along the ray */
+    double ray_length; /* |J r(p)| of the current list */
+    double merged[TRIP_CHANNELS_MAX]; /* sum of w^2 layer over the finished layers */
+    double merged_weight;             /* sum of w^2 over the finished layers */
 } pixel;
 
 typedef struct reference {
     trip_renderer base;
     trip_budget *budget;
     const trip_frame *frame;
-    const trip_plan_list *list;    /* at hand; NULL: none since the layer began */
-    unsigned number;               /* of it, in the data set */
-    trip_splat_frame constants;    /* of it */
-    const trip_splat_frame *splat; /* of the splat at hand: the same, or `local` */
-    trip_splat_frame local;        /* where spacing is uneven */
-    unsigned channels;             /* of a layer */
+    const trip_plan_list *list;    /* current list; NULL before the first of a layer */
+    unsigned number;               /* its index in the data set */
+    trip_splat_frame constants;    /* of the current list */
+    const trip_splat_frame *splat; /* frame of the current splat: `constants` or `local` */
+    trip_splat_frame local;        /* used with uneven spacing */
+    unsigned channels;             /* per layer */
     double gradient_full;
-    double early_termination; /* trip_settings_early_termination() */
+    double early_termination;
     trip_effects_view effects;
-    trip_compact_normals compact; /* where normals have 3 bytes */
+    trip_compact_normals compact; /* for normals of 3 bytes */
     pixel *pixels;
     size_t pixels_bytes;
-    trip_reference_sheets *sheets; /* of frames that classify after interpolation; else NULL */
-    trip_image_sheets *slabs;      /* of frames that are composited by them; else NULL */
-    int axis;                      /* of the layer being drawn; -1 before the first */
-    trip_way way;                  /* of the rays that take part in the pass at hand */
-    bool sums;                     /* splats, sheet by sheet */
-    int64_t sheet;                 /* that is open, of the level of `list` */
-    trip_pixels rows;              /* that it may have touched */
-    bool front_to_back;            /* of the splats last drawn */
-    bool broken;                   /* some splat's numbers are not finite */
-    trip_list_stats *stats;        /* by the data set's lists: room for */
+    trip_reference_sheets *sheets; /* for `post`; else NULL */
+    trip_image_sheets *slabs;      /* for image-aligned sheets; else NULL */
+    int axis;                      /* of the current layer; -1 before the first */
+    trip_way way;                  /* direction of the rays that take part in the current pass */
+    bool sums;                     /* splats are summed sheet by sheet */
+    int64_t sheet;                 /* the open sheet, in the level of `list` */
+    trip_pixels rows;              /* rows that the open sheet may have changed */
+    bool front_to_back;            /* order of the last splats */
+    bool broken;                   /* a splat's numbers are not finite */
+    trip_list_stats *stats;        /* by list of the data set; room for stats_room */
     unsigned stats_room;
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of one run */
 } reference;
 
 static void destroy(trip_renderer *base)
@@ -78,7 +78,7 @@ static const char *device(const trip_renderer *base)
     return "CPU, double precision";
 }
 
-/* Ends with pixels for `count` of them. */
+/* Makes room for `count` pixels, reusing the memory if the size is the same. */
 static int take_pixels(reference *r, size_t count)
 {
     size_t bytes = count * sizeof(pixel);
@@ -96,7 +96,7 @@ static int take_pixels(reference *r, size_t count)
     return 0;
 }
 
-/* Ends with empty counts for so many lists. */
+/* Makes room for the counts of `lists` lists and clears them. */
 static int take_stats(reference *r, unsigned lists)
 {
     if (lists > r->stats_room) {
@@ -162,7 +162,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     return status ? status : clear_pixels(r);
 }
 
-/* Puts a fragment behind what is there (front to back) or over it. */
+/* Composites a fragment behind a layer (front to back) or over it. */
 static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
                       const double fragment[TRIP_CHANNELS_MAX], double alpha, bool front_to_back)
 {
@@ -178,7 +178,7 @@ static void composite(const reference *r, double layer[TRIP_CHANNELS_MAX],
         layer[c] = layer[c] * keep + fragment[c] * add;
 }
 
-/* The open sheet's sums at a pixel into the layer. */
+/* Composites the sums of the open sheet at a pixel into the layer. */
 static void composite_sheet(const reference *r, const double sheet[TRIP_CHANNELS_MAX],
                             double layer[TRIP_CHANNELS_MAX])
 {
@@ -204,7 +204,7 @@ static void end_sheet(reference *r)
     r->rows = no_rows;
 }
 
-/* Adds a layer to the merge, equation 3 of Hofsetz, Max & Bastos 2008. */
+/* Adds a layer to the merge (Hofsetz, Max & Bastos 2008, equation 3). */
 static void add_layer(const reference *r, const double layer[TRIP_CHANNELS_MAX], double weight,
                       double merged[TRIP_CHANNELS_MAX])
 {
@@ -245,7 +245,7 @@ static int begin_layer(trip_renderer *base, int axis)
             trip_vec3 ray = trip_camera_ray(camera, x + 0.5, y + 0.5);
             memset(p->layer, 0, sizeof p->layer);
             p->way = trip_ray_goes(ray, axis);
-            p->weight = 0; /* of vertices: until a splat is drawn there */
+            p->weight = 0; /* with vertex_weights: until a splat is drawn there */
             if (!r->frame->settings->vertex_weights)
                 p->weight =
                     trip_weight(r->frame->settings, r->frame->plan->axis_of_view, ray, axis);
@@ -255,7 +255,7 @@ static int begin_layer(trip_renderer *base, int axis)
     return status;
 }
 
-/* Takes up the list that the next splats are of. */
+/* Makes the list of the next splats the current one. */
 static int use_list(reference *r, const trip_list *of)
 {
     const trip_plan_list *list = &r->frame->plan->lists[of->index];
@@ -263,7 +263,7 @@ static int use_list(reference *r, const trip_list *of)
     if (list == r->list)
         return 0;
     if (!r->list || r->frame->data->lists[r->number].level != of->level)
-        end_sheet(r); /* lists of one level have sheets in common */
+        end_sheet(r); /* lists of one level share sheets */
     r->list = list;
     r->number = of->index;
     r->constants = trip_splat_frame_make(&list->camera, r->frame->settings);
@@ -278,7 +278,7 @@ static int use_list(reference *r, const trip_list *of)
     return status;
 }
 
-/* A splat's fragment of an optical depth: composited, or added to its sheet. */
+/* Composites a splat's fragment, or adds it to its sheet. */
 static void put_fragment(const reference *r, pixel *p, const double fragment[TRIP_CHANNELS_MAX],
                          double depth)
 {
@@ -288,9 +288,10 @@ static void put_fragment(const reference *r, pixel *p, const double fragment[TRI
         p->sheet[c] += depth * fragment[c];
 }
 
-/* The weights of the corners of a splat's bounds, left and right above, then below: below 0 where
- * the list has none. False where no corner has any. Not of near splats, whose bounds may span the
- * picture: linear from corner to corner, a weight is far from that of a ray between them. */
+/* Computes the weights at the corners of a splat's bounds: upper left, upper right, lower left,
+ * lower right. They are negative where the list has no weight. Returns false if no corner has
+ * weight. Near splats must not use it: their bounds may span the picture, where a linear weight is
+ * far from the weight of a ray. */
 static bool weigh_corners(const reference *r, const trip_splat *s, double weights[4])
 {
     bool some = false;
@@ -303,8 +304,8 @@ static bool weigh_corners(const reference *r, const trip_splat *s, double weight
     return some;
 }
 
-/* Linear over each of two triangles, which meet from the right above to the left below; as a depth
- * buffer holds it, not below 0. */
+/* Interpolates the weight linearly over each of two triangles, which share the edge from the upper
+ * right to the lower left corner. It is limited to 0 from below, as in a depth buffer. */
 static double weight_within(const trip_splat *s, const double w[4], double x, double y)
 {
     double u = (x - s->x0) / (s->x1 - s->x0), v = (y - s->y0) / (s->y1 - s->y0);
@@ -313,7 +314,7 @@ static double weight_within(const trip_splat *s, const double w[4], double x, do
     return fmax(0, w[3] + (1 - u) * (w[2] - w[3]) + (1 - v) * (w[1] - w[3]));
 }
 
-/* What a splat sets the weight of the layer to at a pixel. */
+/* Returns the weight of the layer that a splat sets at a pixel. */
 static double vertex_weight(const reference *r, const trip_splat *s, const double corners[4],
                             double x, double y)
 {
@@ -324,7 +325,7 @@ static double vertex_weight(const reference *r, const trip_splat *s, const doubl
                        trip_camera_ray(frame->camera, x, y), r->axis);
 }
 
-/* Of a pixel in the support. */
+/* Draws a pixel in the support of a splat. */
 static void draw_pixel(reference *r, const trip_splat *s, trip_vec3 voxel, int x, int y,
                        double fragment[TRIP_CHANNELS_MAX], double extinction)
 {
@@ -341,14 +342,14 @@ static void draw_pixel(reference *r, const trip_splat *s, trip_vec3 voxel, int x
         put_fragment(r, p, fragment, depth * trip_splat_front(r->splat, s, x + 0.5, y + 0.5));
 }
 
-/* Whether a pixel's ray takes part in the pass, and the layer has weight there. */
+/* Whether a pixel's ray takes part in the pass, and the layer may have weight there. */
 static bool takes_part(const reference *r, const pixel *p)
 {
     return (r->way == TRIP_WAY_ANY || r->way == p->way) &&
            (p->weight > 0 || r->frame->settings->vertex_weights);
 }
 
-/* True when some pixel centre is in the support of one that takes part. */
+/* Draws a splat. Returns true if its support contains the centre of a pixel that takes part. */
 static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
                            double fragment[TRIP_CHANNELS_MAX], double extinction)
 {
@@ -377,7 +378,7 @@ static bool draw_footprint(reference *r, const trip_splat *s, trip_vec3 voxel,
     return touched;
 }
 
-/* The world-space gradient of a voxel. */
+/* Unpacks the world-space gradient of a voxel. */
 static void unpack(const reference *r, uint32_t normal, double gradient[3])
 {
     const trip_file_header *header = &r->frame->data->header;
@@ -407,7 +408,7 @@ static void colour(const reference *r, trip_vec3 voxel, const trip_tf_entry *ent
                         shaded ? gradient : NULL, rgb);
 }
 
-/* By the rays in the grid of level 0. */
+/* Whether a ray with weight may pass through a splat, tested in the grid of level 0. */
 static bool may_reach(const reference *r, trip_vec3 voxel, double radius)
 {
     const trip_frame *frame = r->frame;
@@ -453,7 +454,8 @@ static void draw_splat(reference *r, trip_vec3 voxel, uint32_t record, const uin
     stats->splats_drawn += draw_footprint(r, &s, voxel, fragment, entry->extinction);
 }
 
-/* Index position of a record: sheet along the list's axis, u and v along the next two. */
+/* Returns the index position of a record: the sheet along the list's axis, u and v along the next
+ * two axes. */
 static trip_vec3 voxel_position(int axis, const trip_run *run, uint32_t record)
 {
     double p[3];
@@ -516,14 +518,14 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     return r->broken ? trip_splat_fail() : trip_frame_poll();
 }
 
-/* The merge's divisor: layers that were not drawn count too, as empty ones. */
+/* Returns the divisor of the merge. Layers that were not drawn count as empty ones. */
 static double weight_sum(const reference *r, int x, int y)
 {
     const trip_frame *frame = r->frame;
     if (frame->settings->vertex_weights) {
         const pixel *p = &row_of(r, y)[x];
         double all = p->merged_weight + p->weight * p->weight;
-        return all > 0 ? all : 1; /* nothing is there */
+        return all > 0 ? all : 1; /* no splat was drawn here */
     }
     trip_vec3 ray = trip_camera_ray(frame->camera, x + 0.5, y + 0.5);
     double sum = 0;
@@ -540,7 +542,7 @@ static float mean_depth(const double merged[TRIP_CHANNELS_MAX])
     return alpha > 0 ? (float)(merged[TRIP_CHANNEL_DEPTH] / alpha) : INFINITY;
 }
 
-/* Divided by the sum of the merge's weights, over the background. */
+/* Divides the merged layers by the sum of the weights, and puts them over the background. */
 static void finish_colour(const reference *r, const double merged[4], double sum, float rgba[4])
 {
     const double *background = r->frame->settings->background;
@@ -565,7 +567,7 @@ static void merge_sheets(const reference *r, int x, int y, double merged[TRIP_CH
     }
 }
 
-/* Of the splats drawn so far. */
+/* Merges the splats drawn so far at a pixel. */
 static void merge_splats(const reference *r, int x, int y, double merged[TRIP_CHANNELS_MAX])
 {
     const pixel *p = &row_of(r, y)[x];

@@ -15,8 +15,8 @@ struct trip_reference_sheets {
     trip_affine to_index;
     const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
-    double early_termination; /* trip_settings_early_termination() */
-    trip_field *field;        /* gradients are in index space, codes per index */
+    double early_termination;
+    trip_field *field; /* gradients are in index space, codes per index */
     bool has_gradients;
     trip_field_fill fill;
     trip_segments segments;
@@ -35,7 +35,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
                          "out of memory; raise --memory");
     s->budget = budget;
     s->frame = frame;
-    trip_affine_invert(&data->index_to_world, &s->to_index); /* it was checked on opening */
+    trip_affine_invert(&data->index_to_world, &s->to_index); /* invertible: checked on opening */
     s->coordinates = &data->coordinates;
     s->early_termination = trip_settings_early_termination(frame->settings);
     s->value_per_code = (h->code_hi - h->code_lo) / 65535;
@@ -69,7 +69,8 @@ int trip_reference_sheets_put(trip_reference_sheets *s, const trip_batch *batch,
     return trip_field_fill_run(&s->fill, batch, run);
 }
 
-/* Codes per index along an axis, or per unit of place; of a voxel that is there. */
+/* Returns the difference of codes along an axis at a present voxel, in codes per index. With uneven
+ * spacing it is in codes per unit of position. */
 static double difference(const trip_reference_sheets *s, const int64_t at[3], int axis)
 {
     const trip_field *field = s->field;
@@ -85,7 +86,7 @@ static double difference(const trip_reference_sheets *s, const int64_t at[3], in
                         : 0;
 }
 
-/* Differences of codes are exact in the field's single precision. */
+/* Sets the gradient of a voxel. The field's single precision holds differences of codes exactly. */
 static int set_gradient(const trip_reference_sheets *s, const int64_t at[3])
 {
     trip_field *field = s->field;
@@ -115,17 +116,17 @@ int trip_reference_sheets_prepare(trip_reference_sheets *s)
     return status;
 }
 
-/* A ray on its way through the cells between sheets. */
+/* A ray in the cells between sheets. */
 typedef struct passage {
     const trip_reference_sheets *s;
     int axis;
     trip_vec3 origin, direction;
     double world_per_t;
-    double from, to; /* t: what is not cut away */
+    double from, to; /* part of the ray inside the clipping planes, in t */
     double layer[TRIP_CHANNELS_MAX];
 } passage;
 
-/* Where the ray is at t, in a cell: its voxels, and their weights. */
+/* A sample: the voxels it is interpolated from, their weights, and the code. */
 typedef struct position {
     trip_field_cell cell;
     double weights[64];
@@ -137,7 +138,7 @@ static trip_vec3 point_at(const passage *p, double t)
     return trip_add(p->origin, trip_scale(p->direction, t));
 }
 
-/* The index of a point, whose coordinates are places. */
+/* Returns the index of a point given by its position. */
 static trip_vec3 index_at(const passage *p, trip_vec3 point)
 {
     const trip_coordinates *c = p->s->coordinates;
@@ -145,7 +146,7 @@ static trip_vec3 index_at(const passage *p, trip_vec3 point)
                    trip_coordinates_index(c, 2, point.z));
 }
 
-/* Of the cell's voxels, i fastest. */
+/* Sets the weights of the cell's voxels, i fastest. */
 static void set_weights(trip_kernel kernel, position *at, trip_vec3 point)
 {
     const int edge = at->cell.edge, first = edge == 2;
@@ -157,7 +158,8 @@ static void set_weights(trip_kernel kernel, position *at, trip_vec3 point)
                          w[2][first + n / (edge * edge)];
 }
 
-/* The corners of a cell; of a place at a sheet those there alone, twice. */
+/* Finds the corners of a cell. For a sample at a sheet it takes the four corners there twice.
+ * Returns false if one is missing. */
 static bool take_corners(const passage *p, const int64_t cell[3], double coordinate,
                          trip_field_cell *out)
 {
@@ -174,7 +176,7 @@ static bool take_corners(const passage *p, const int64_t cell[3], double coordin
     return true;
 }
 
-/* False where something is missing that it is interpolated from. */
+/* Interpolates the code of a sample. Returns false if a voxel is missing. */
 static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point, double coordinate,
                         position *at)
 {
@@ -189,7 +191,7 @@ static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point
     return true;
 }
 
-/* Where the ray is at a coordinate of the axis, in indices. */
+/* Returns t where the ray reaches a coordinate of the axis, in indices. */
 static double reached_at(const passage *p, double coordinate)
 {
     return (trip_coordinates_position(p->s->coordinates, p->axis, coordinate) -
@@ -197,8 +199,8 @@ static double reached_at(const passage *p, double coordinate)
            trip_component(p->direction, p->axis);
 }
 
-/* At a coordinate, at the sheet of `cells` or between it and the next, where the ray is at t. False
- * in empty cells and beyond the grid. */
+/* Computes the sample at a coordinate, where the ray is at t. The coordinate lies at the sheet
+ * `cells` or between it and the next. Returns false in empty cells and beyond the grid. */
 static bool find_position(const passage *p, double coordinate, double t, int64_t cells,
                           position *at)
 {
@@ -223,7 +225,7 @@ static trip_vec3 gradient_at(const position *at)
     return trip_v3(g[0], g[1], g[2]);
 }
 
-/* At the middle between two places. */
+/* Lights the colour of a segment at its middle. */
 static void light(const passage *p, const position ends[2], trip_vec3 middle, double rgb[3])
 {
     const trip_reference_sheets *s = p->s;
@@ -239,7 +241,7 @@ static void light(const passage *p, const position ends[2], trip_vec3 middle, do
     trip_effects_colour(&s->effects, &at, middle, (double[3]){ g.x, g.y, g.z }, rgb);
 }
 
-/* False once the pixel is saturated. */
+/* Composites a fragment. Returns false once the pixel takes no more. */
 static bool composite(const trip_reference_sheets *s, double layer[TRIP_CHANNELS_MAX],
                       const double fragment[TRIP_CHANNELS_MAX], double alpha)
 {
@@ -254,14 +256,14 @@ static bool composite(const trip_reference_sheets *s, double layer[TRIP_CHANNELS
     return false;
 }
 
-/* The code at t, running straight from one end of a segment to the other. */
+/* Returns the code at t, linear between the two ends of a segment. */
 static double code_at(const position ends[2], double t0, double t1, double t)
 {
     double a = ends[0].code, b = ends[1].code;
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
 }
 
-/* Between the slices at two coordinates. False once the pixel is saturated. */
+/* Adds the segment between two coordinates. Returns false once the pixel takes no more. */
 static bool add_segment(passage *p, double first, double last, int64_t cells)
 {
     position ends[2];
@@ -291,8 +293,8 @@ static bool add_segment(passage *p, double first, double last, int64_t cells)
                      -expm1(-segment.extinction * (to - from) * p->world_per_t));
 }
 
-/* Between the slices at coordinates n / slices that lie before the eye, and from the eye itself to
- * the first of them. */
+/* Adds all segments in front of the eye. They lie between coordinates n / samples_per_sheet, and
+ * between the eye itself and the first such coordinate. */
 static void add_segments(passage *p)
 {
     const double samples_per_sheet = p->s->frame->settings->samples_per_sheet;

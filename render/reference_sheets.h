@@ -1,7 +1,6 @@
-/* The reference renderer's pictures of frames that classify after interpolation: sheet.h in double
- * precision, pixel by pixel. What the passes bring is gathered in one field for all layers; what a
- * plan leaves out changes nothing in the layer that it is left out of, so it may as well be there
- * for another. Owned by the reference renderer. */
+/* Draws `post` frames for the reference renderer, which owns it: sheet.h in double precision, pixel
+ * by pixel. The voxels of all passes go into one field for all layers. A voxel that the plan leaves
+ * out of a layer cannot change that layer, so it may be present for another. One thread. */
 #ifndef TRIP_REFERENCE_SHEETS_H
 #define TRIP_REFERENCE_SHEETS_H
 
@@ -17,10 +16,11 @@ void trip_reference_sheets_destroy(trip_reference_sheets *s);
 int trip_reference_sheets_put(trip_reference_sheets *s, const trip_batch *batch,
                               const trip_run *run);
 
-/* Before the layers of what was put so far. */
+/* Prepares the voxels put so far. Call it before trip_reference_sheets_layer(). Fails (reported) if
+ * memory is exhausted or the frame is interrupted. */
 int trip_reference_sheets_prepare(trip_reference_sheets *s);
-/* The layer of `axis` at the centre of pixel (x, y), which has weight there; depths are distances.
- */
+/* Computes the layer of `axis` at the centre of pixel (x, y). The layer must have weight there.
+ * Depths are distances. */
 void trip_reference_sheets_layer(const trip_reference_sheets *s, int axis, int x, int y,
                                  double layer[TRIP_CHANNELS_MAX]);
 

@@ -1,7 +1,7 @@
-/* The interface behind which renderers stand: begin frame, for each layer of the plan begin layer
- * and draw its batches in order, picture, end frame. All calls come from one thread at a time.
- * Created once, used for many frames; the frame path does not allocate while sizes stay the same.
- */
+/* The interface that all renderers implement. A frame calls begin_frame, then for each layer of the
+ * plan begin_layer and draw for its batches in order, then picture and end_frame. Calls come from
+ * one thread at a time. A renderer is created once and draws many frames; drawing a frame does not
+ * allocate while sizes stay the same. */
 #ifndef TRIP_RENDERER_H
 #define TRIP_RENDERER_H
 
@@ -17,38 +17,38 @@ struct trip_field;
 struct trip_light_map;
 struct trip_emission;
 
-/* Of a list in one frame. Splats about the eye's coordinate, which are in the passes of both ways
- * (plan.h), count once for each. Where frames classify after interpolation nothing is projected: 0.
- */
+/* Counts of one list in one frame. Splats near the eye's coordinate that belong to both passes
+ * (plan.h) count once per pass. `post` projects no splats and counts 0. */
 typedef struct trip_list_stats {
-    uint64_t splats_read;      /* handed to the renderer */
-    uint64_t splats_projected; /* of those, not culled by w +- dw or behind the eye */
-    uint64_t splats_drawn;     /* of those, with a pixel centre of the image in their support where
-                                  the layer has weight (whatever their opacity) */
+    uint64_t splats_read;      /* passed to the renderer */
+    uint64_t splats_projected; /* read, and not culled by w +- dw or behind the eye */
+    /* Projected, and their support contains a pixel centre where the layer has weight, whatever
+     * their opacity. */
+    uint64_t splats_drawn;
     uint64_t bytes_read;
 } trip_list_stats;
 
-/* What a frame is drawn from; outlives the frame. */
+/* The inputs of a frame; they must outlive it. */
 typedef struct trip_frame {
     const trip_dataset *data;
     const trip_camera *camera;
     const trip_settings *settings;
     const trip_plan *plan;
-    const trip_tf_entry *table; /* 65536 entries */
-    /* For the integral renderer: integrate this instead of what batches hold; NULL: those. */
+    const trip_tf_entry *table;
+    /* For the integral renderer: the field to integrate. NULL selects the voxels of the batches. */
     const struct trip_field *field;
-    /* Of frames with shadows or occlusion, but for the integral renderer: begun; else NULL. */
+    /* Light for frames with shadows or occlusion, begun before the frame. NULL in other frames and
+     * for the integral renderer. */
     struct trip_light_map *light;
-    struct trip_emission *emission; /* of frames with that effect: begun; else NULL */
-    bool count;                     /* splats projected and drawn, too: counting costs time */
-    /* Called between batches with how many splats were drawn, of how many: "draw"; and by the
-     * integral renderer with how many pixels: "integrate". May be NULL. */
+    struct trip_emission *emission; /* begun, in frames with that effect; else NULL */
+    bool count;                     /* also count projected and drawn splats, which takes time */
+    /* Called between batches with the stage "draw" and the number of splats. The integral renderer
+     * calls it with "integrate" and the number of pixels. May be NULL. */
     void (*progress)(void *user, const char *stage, uint64_t done, uint64_t total);
     void *progress_user;
 } trip_frame;
 
-/* Between pieces of work that take a few milliseconds: fails (reported) once the frame is no longer
- * wanted. */
+/* Fails (reported) once the frame is no longer wanted. Renderers call it every few milliseconds. */
 static inline int trip_frame_poll(void)
 {
     if (!trip_interrupted())
@@ -58,85 +58,85 @@ static inline int trip_frame_poll(void)
 
 typedef struct trip_renderer trip_renderer;
 
-/* Most splats of a piece or part, but for a single run. */
+/* Maximum number of splats in a piece or part of a batch. A single run may exceed it. */
 #define TRIP_FRAME_PIECE 16384
 
-/* What a step has come to; below 0: failed or cancelled. */
+/* The result of a step. Negative results mean failed or cancelled. */
 enum {
     TRIP_FRAME_DONE = 0,
-    TRIP_FRAME_MORE = 1,  /* more is ready to be done */
-    TRIP_FRAME_WAITS = 2, /* nothing is ready: the disk or a graphics device is at work */
+    TRIP_FRAME_MORE = 1,  /* more work is ready */
+    TRIP_FRAME_WAITS = 2, /* no work is ready: the disk or a graphics device is busy */
 };
 
-/* Forms that the papers compare with, which not every renderer draws. */
+/* Forms of splatting from the papers that only some renderers draw. */
 enum {
-    TRIP_DRAWS_FIXED = 1,          /* footprints of a fixed size */
-    TRIP_DRAWS_VERTEX_WEIGHTS = 2, /* weights interpolated between vertices */
-    TRIP_DRAWS_IMAGE_SHEETS = 4,   /* sheets parallel to the image plane */
+    TRIP_DRAWS_FIXED = 1,
+    TRIP_DRAWS_VERTEX_WEIGHTS = 2, /* weights interpolated between a splat's corners */
+    TRIP_DRAWS_IMAGE_SHEETS = 4,
 };
 
 typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
-    bool classifies_post; /* draws frames whose settings say so (sheet.h) */
-    bool closed_forms;    /* looks nothing up where segments have one (closed_form.h) */
-    unsigned effects;     /* draws frames with effects: a bit per trip_classify */
+    bool classifies_post; /* draws frames with classify post (sheet.h) */
+    bool closed_forms;    /* needs no lookup if segments have a closed form (closed_form.h) */
+    unsigned effects;     /* draws frames with effects; a bit per trip_classify */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */
     void (*destroy)(trip_renderer *r);
     const char *(*device)(const trip_renderer *r);
     int (*begin_frame)(trip_renderer *r, const trip_frame *frame);
-    /* Loads a piece of what the renderer keeps of the data set from frame to frame, once what an
-     * earlier frame left under way has ended; called between begin_frame and begin_layer until
-     * TRIP_FRAME_DONE, and before anything is read. NULL: it keeps and leaves nothing. */
+    /* Loads a piece of the data that the renderer keeps from frame to frame, after the work of an
+     * earlier frame has ended. Called after begin_frame and before any read, until it returns
+     * TRIP_FRAME_DONE. NULL if the renderer keeps no such data. */
     int (*load)(trip_renderer *r);
-    /* Where a call has come to TRIP_FRAME_WAITS, or is_done() to 0: waits until it is to be called
-     * again, at most so long. NULL: neither happens. */
+    /* Waits for at most `timeout_ns`, after a call returned TRIP_FRAME_WAITS or is_done() returned
+     * 0, until that call is worth repeating. NULL if neither happens. */
     void (*await)(trip_renderer *r, uint64_t timeout_ns);
-    /* The layer of `axis` starts empty. Called again until TRIP_FRAME_DONE. */
+    /* Starts the layer of `axis` empty. Called again until TRIP_FRAME_DONE. */
     int (*begin_layer)(trip_renderer *r, int axis);
-    /* Splats of one batch, in draw order; front_to_back false: later ones go over earlier ones. */
+    /* Draws the splats of one batch in draw order. If front_to_back is false, later splats are
+     * drawn over earlier ones. */
     int (*draw)(trip_renderer *r, const trip_batch *batch, bool front_to_back);
-    /* Every batch of the frame was drawn, and every layer begun. Called again until
-     * TRIP_FRAME_DONE. NULL: nothing is left to do then. */
+    /* Called after all batches are drawn and all layers begun, again until TRIP_FRAME_DONE. NULL if
+     * no work is left by then. */
     int (*end_passes)(trip_renderer *r);
-    /* Whether draw() is given whole batches and draws them in parts: it is called again with the
-     * same batch until TRIP_FRAME_DONE. Else it is given pieces of batches. */
+    /* If true, draw() gets whole batches and is called with the same batch until TRIP_FRAME_DONE.
+     * If false, draw() gets pieces of batches. */
     bool in_parts;
-    /* Memory of the renderer's own for a reader's ring: `count` slots of `bytes`, aligned to 4096;
-     * batches that lie there are drawn in place. NULL where it has none to give. It stays the
-     * renderer's, which must outlive the reader. NULL: batches may lie anywhere, and are done with
-     * when draw() returns. */
+    /* Returns memory of the renderer for a reader's ring: `count` slots of `bytes`, aligned to
+     * 4096. It draws batches in these slots in place. The renderer keeps the ownership and must
+     * outlive the reader. Returns NULL if it has no such memory. The function is NULL if batches
+     * may lie anywhere; draw() is then done with a batch when it returns. */
     void *const *(*take_slots)(trip_renderer *r, unsigned count, size_t bytes);
-    /* Takes that memory back. */
+    /* Takes the memory of take_slots back. */
     void (*drop_slots)(trip_renderer *r);
-    /* 1: the batch is done with, and its slot may be read into; 0: not yet; negative: failed. NULL
-     * where take_slots is. */
+    /* Returns 1 if the batch is finished and its slot may be overwritten, 0 if not yet, or a
+     * negative failure. NULL if take_slots is NULL. */
     int (*is_done)(trip_renderer *r, const trip_batch *batch);
-    /* Merges what the layers hold so far, puts the background behind, and gives width * height * 4
-     * floats, premultiplied, row 0 at the top; with settings.depth also width * height distances as
-     * layer.h has them, otherwise `depth` is NULL. The frame goes on as if it had not been called;
-     * after its last batch it gives the picture. */
+    /* Merges the current layers over the background. Writes width * height * 4 floats:
+     * premultiplied, row 0 at the top. With settings.depth it also writes width * height distances
+     * (layer.h); otherwise `depth` is NULL. The frame is unchanged and may continue. After the last
+     * batch the result is the final picture. */
     int (*picture)(trip_renderer *r, float *rgba, float *depth);
-    /* The frame is over or given up. Waits a moment at most. When it returns, of what the frame is
-     * drawn from only the renderer's own memory may still be in use, for which load() waits. NULL:
-     * nothing is in use between the other calls. */
+    /* Ends a frame, complete or not. It waits for a moment at most. On return only the renderer's
+     * own memory may still be in use, and load() waits for that. NULL if nothing is in use between
+     * calls. */
     void (*end_frame)(trip_renderer *r);
-    /* trip_task_runner.run, of which `user` is the renderer: on its threads, between other calls.
-     * NULL: it has none. */
+    /* Implements trip_task_runner.run on the renderer's threads, between other calls. `renderer` is
+     * the runner's user pointer. NULL if the renderer has no threads. */
     void (*run_tasks)(void *renderer, void (*task)(void *context, unsigned number), void *context,
                       unsigned count);
-    /* Of a list in the frame, by its number in the data set, once the picture was taken
-     * (bytes_read is the caller's). */
+    /* Returns the counts of a list, by its index in the data set, after picture(). The caller
+     * counts bytes_read. */
     trip_list_stats (*stats)(const trip_renderer *r, unsigned list);
 } trip_renderer_ops;
 
-/* Every renderer's first member. */
+/* The first member of every renderer. */
 struct trip_renderer {
     const trip_renderer_ops *ops;
-    bool resident; /* since begin_frame: it has the frame's splats, and takes runs alone */
-    bool software; /* what stands for a graphics device is the processor */
+    bool resident; /* set by begin_frame: it holds the frame's splats and needs only the runs */
+    bool software; /* its graphics device is emulated by the processor */
 };
 
-/* The renderer's threads. */
 static inline trip_task_runner trip_renderer_runner(trip_renderer *r)
 {
     return (trip_task_runner){ r->ops->run_tasks, r };
@@ -145,7 +145,7 @@ static inline trip_task_runner trip_renderer_runner(trip_renderer *r)
 int trip_reference_create(trip_renderer **out, trip_budget *budget);
 int trip_gl_create(trip_renderer **out, trip_budget *budget);
 int trip_cpu_create(trip_renderer **out, trip_budget *budget, unsigned threads);
-/* Of frames whose plan is trip_plan_make_field()'s. */
+/* For frames with a plan made by trip_plan_make_field(). */
 int trip_integral_create(trip_renderer **out, trip_budget *budget, unsigned threads);
 
 #endif

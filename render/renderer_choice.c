@@ -10,9 +10,8 @@ static void drop(const char *line, void *user)
     (void)user;
 }
 
-/* A device that hardware GL is reached by: DRM's, NVIDIA's, and those of WSL, Mali and Adreno.
- * Without one GL could only draw on the processor, and loading it to find that out takes some 60 MB
- * and 0.1 s. */
+/* Whether the machine has a graphics device: DRM, NVIDIA, WSL, Mali or Adreno. Without one, GL
+ * could only draw on the processor, and loading GL to find that out takes about 60 MB and 0.1 s. */
 static bool has_graphics_device(void)
 {
     static const char *const patterns[] = { "/dev/dri/*", "/dev/nvidiactl", "/dev/dxg",
@@ -26,7 +25,7 @@ static bool has_graphics_device(void)
     return found;
 }
 
-/* Whatever draws fastest here; a renderer that this machine lacks is passed over in silence. */
+/* Creates the fastest renderer of this machine. Failures of GL are not reported. */
 static int create_best(trip_renderer **out, unsigned threads, trip_budget *budget)
 {
     if (!has_graphics_device())

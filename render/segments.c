@@ -4,7 +4,7 @@
 
 enum { CODES = TRIP_SEGMENT_CODES };
 
-/* Extinction and its products at a place between two codes. */
+/* Extinction and its products with the colour, between two codes. */
 typedef struct sample {
     double k, kq[3];
 } sample;
@@ -18,8 +18,8 @@ static sample sample_at(const trip_tf_entry *e, double t)
     return (sample){ k, { k * r, k * g, k * b } };
 }
 
-/* Adds what lies from t0 to t1 between code i and the next, as `length` of it. Simpson's rule is
- * exact for polynomials of degree two. */
+/* Adds the part [t0, t1] between code i and the next, scaled to `length`. Simpson's rule is exact
+ * for polynomials of degree two. */
 static void add_part(trip_segment_sums *sums, const trip_tf_entry *table, int i, double t0,
                      double t1, double length)
 {
@@ -54,7 +54,7 @@ void trip_segments_make(trip_segments *s, const trip_tf_entry *table)
     }
 }
 
-/* Adds codes [first, end), by nodes as large as fit. */
+/* Adds the codes [first, end) with the largest nodes that fit. */
 static void add_whole(trip_segment_sums *sums, const trip_segments *s, int first, int end,
                       double scale)
 {
@@ -74,14 +74,14 @@ static double clamp(double code)
     return fmin(CODES - 1, fmax(0, code));
 }
 
-/* The code that a place is behind; the last one has no next. */
+/* Returns the table entry at or below a code. For the last code it returns the one before. */
 static int code_before(double code)
 {
     int i = (int)code;
     return i < CODES - 2 ? i : CODES - 2;
 }
 
-/* Means over [a, b], a <= b. */
+/* Returns the means over [a, b], a <= b. */
 static trip_segment_sums means_over(const trip_segments *s, double a, double b)
 {
     trip_segment_sums sums = { 0 };

@@ -24,23 +24,24 @@ trip_settings trip_settings_default(void)
     };
 }
 
-/* What the forms of splats that the papers compare with exclude. */
+/* Fails for settings that the forms of splatting from the papers exclude. */
 static int check_forms(const trip_settings *s)
 {
     const bool image = s->method == TRIP_METHOD_IMAGE;
     if ((image || s->footprint == TRIP_FOOTPRINT_FIXED) && trip_settings_has_levels(s))
-        return trip_fail(TRIP_USAGE, "render", "levels",
-                         "sprites of a fixed size and image-aligned sheets are of the finest");
+        return trip_fail(
+            TRIP_USAGE, "render", "levels",
+            "fixed footprints and method image draw only the finest level; leave out the "
+            "bounds on pixels and bytes");
     if (image && (s->traversal != TRIP_TRAVERSAL_OUTWARD || trip_settings_sum_sheets(s)))
         return trip_fail(TRIP_USAGE, "render", "method",
-                         "image-aligned sheets have no traversal, and are sums already");
+                         "image requires traversal outward and compositing splat");
     if (s->vertex_weights && (s->method != TRIP_METHOD_MERGE || trip_settings_sum_sheets(s)))
         return trip_fail(TRIP_USAGE, "render", "weights",
-                         "those of vertices are of splats that are merged one by one");
+                         "vertex weights require method merge and compositing splat");
     if (s->classify == TRIP_CLASSIFY_POST && (image || s->vertex_weights))
         return trip_fail(TRIP_USAGE, "render", "method",
-                         "image-aligned sheets and weights of vertices are of splats; classify "
-                         "pre");
+                         "method image and vertex weights draw splats; use classify pre");
     return 0;
 }
 
@@ -54,29 +55,27 @@ int trip_settings_check(const trip_settings *s)
                          "rounded layers have no depth; leave the target at rgba32f");
     if (s->indexed && trip_settings_has_levels(s))
         return trip_fail(TRIP_USAGE, "render", "levels",
-                         "one array of vertices has the finest level alone; use three lists");
+                         "one vertex array holds only the finest level; use three lists");
     if (s->indexed && s->clip.count > 0)
         return trip_fail(TRIP_USAGE, "render", "clipping",
-                         "one array of vertices is drawn whole; use three lists");
+                         "one vertex array cannot be clipped; use three lists");
     if (s->effects.shadows && s->headlight)
         return trip_fail(TRIP_USAGE, "render", "shadows",
-                         "light from the eye casts none that is seen; give its direction");
+                         "light from the eye casts no visible shadows; give its direction");
     if (s->low_pass == TRIP_LOW_PASS_UNIFORM && s->footprint != TRIP_FOOTPRINT_EWA)
-        return trip_fail(TRIP_USAGE, "render", "low-pass",
-                         "uniform scaling is of the kernel ewa; give that too");
+        return trip_fail(TRIP_USAGE, "render", "low-pass", "uniform scaling requires kernel ewa");
     if (s->flatten > 1 && s->footprint != TRIP_FOOTPRINT_EWA)
-        return trip_fail(TRIP_USAGE, "render", "flatten",
-                         "flat kernels are of the kernel ewa; give that too");
+        return trip_fail(TRIP_USAGE, "render", "flatten", "flat kernels require kernel ewa");
     if (s->classify == TRIP_CLASSIFY_PRE)
         return 0;
     if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
         return trip_fail(TRIP_USAGE, "render", "kernel",
-                         "footprints and their low-pass are of splats; classify pre");
+                         "footprints and their low-pass filter apply to splats; use classify pre");
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)
         return trip_fail(TRIP_USAGE, "render", "traversal",
-                         "sheets that are classified after interpolation are composited outward");
+                         "classify post requires traversal outward");
     if (s->target != TRIP_TARGET_RGBA32F || s->indexed || s->triangles)
         return trip_fail(TRIP_USAGE, "render", "settings",
-                         "targets and forms of submission are of splats; classify pre");
+                         "targets and forms of submission apply to splats; use classify pre");
     return 0;
 }

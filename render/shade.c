@@ -4,8 +4,8 @@
 
 #include "report.h"
 
-/* World-space unit vector from a voxel to the eye: from their difference in index space, which is
- * exact however far the volume lies from the world's origin. */
+/* Returns the world-space unit vector from a voxel to the eye. Their difference is taken in index
+ * space, where it is exact however far the volume lies from the world's origin. */
 static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
 {
     if (c->ortho)
@@ -13,7 +13,7 @@ static trip_vec3 towards_eye(const trip_camera *c, trip_vec3 voxel)
     return trip_normalize(trip_affine_vector(&c->index_to_world, trip_sub(c->eye, voxel)));
 }
 
-/* From the first voxel to the light, world space. */
+/* Returns the vector from the first voxel to the light in world space. */
 static trip_vec3 from_first_voxel(const trip_settings *s, const trip_affine *m)
 {
     return trip_sub(s->light_position, trip_v3(m->m[0][3], m->m[1][3], m->m[2][3]));
@@ -22,7 +22,7 @@ static trip_vec3 from_first_voxel(const trip_settings *s, const trip_affine *m)
 trip_vec3 trip_light_position(const trip_settings *s, const trip_affine *index_to_world)
 {
     trip_affine to_index;
-    trip_affine_invert(index_to_world, &to_index); /* it was checked on opening */
+    trip_affine_invert(index_to_world, &to_index); /* invertible: checked on opening */
     return trip_affine_vector(&to_index, from_first_voxel(s, index_to_world));
 }
 
@@ -32,7 +32,7 @@ int trip_light_check(const trip_settings *s, const trip_affine *index_to_world)
     return far <= TRIP_LIGHT_FARTHEST_VOXELS
                ? 0
                : trip_fail(TRIP_USAGE, "render", "light",
-                           "its place is too far from the volume; give the direction to it");
+                           "its position is too far from the volume; give its direction instead");
 }
 
 static trip_vec3 towards_light(const trip_settings *s, const trip_affine *m, trip_vec3 voxel)
@@ -50,7 +50,7 @@ trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gr
     return (trip_light){ eye, light, trip_normalize(trip_add(light, eye)), gradient_full };
 }
 
-/* To the power TRIP_SHININESS. */
+/* Returns x to the power TRIP_SHININESS. */
 static double shininess_power(double x)
 {
     static_assert((int)TRIP_SHININESS == 24, "the power below");

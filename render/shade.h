@@ -1,15 +1,19 @@
-/* Light on a splat: Blinn-Phong from the stored world-space gradient, the same numbers in every
- * renderer. A surface faces down the gradient (values fall outwards); both sides are lit alike.
+/* Light on a splat: Blinn-Phong from the stored world-space gradient, with the same constants in
+ * every renderer. Pure functions.
+ *
+ * A surface faces down the gradient, since values fall outwards. Both sides are lit alike. With l
+ * the direction to the light, and half between l and the direction to the eye:
  *     strength = min(1, |gradient| / gradient_full)        flat regions are left unshaded
  *     diffuse  = |n . l|,  specular = facing |n . half|^TRIP_SHININESS
  *     facing   = min(1, max(0, TRIP_FACING (n . l) (n . eye)))
  *     colour'  = colour (1 + strength (AMBIENT + DIFFUSE diffuse - 1)) + strength SPECULAR specular
- * clamped to [0, 1]; l towards the light, half between l and the direction to the eye. Only the
- * side that the light falls on has a highlight, and it is seen when light and eye are on the same
- * side of the surface. Where the angle between them is 120 degrees or less, a highlight is as
- * bright at its middle as without `facing`, which lets it fade towards grazing light. With light
- * from the eye `facing` changes no colour by more than 2e-8: where it is not 1, |n . half| < 1/2.
- */
+ * Colours are clamped to [0, 1].
+ *
+ * The highlight lies on the side towards the light. It is visible only if light and eye are on the
+ * same side of the surface. `facing` lets the highlight fade towards grazing light. Up to an
+ * angle of 120 degrees between light and eye, `facing` leaves the brightness at the middle of the
+ * highlight unchanged. With light from the eye `facing` changes no colour by more than 2e-8: it is
+ * below 1 only where |n . half| < 1/2. */
 #ifndef TRIP_SHADE_H
 #define TRIP_SHADE_H
 
@@ -24,8 +28,8 @@
 #define TRIP_SHININESS 24.0
 #define TRIP_FACING 4.0
 
-/* |gradient| in value per world unit at which shading is full: the same at every level, the voxels
- * of which are `voxel_world` long. */
+/* Returns |gradient| in value per world unit at which shading is full. It is the same at every
+ * level. `voxel_world` is the voxel size of `level` in world units. */
 static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world,
                                               unsigned level)
 {
@@ -34,47 +38,48 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 
-/* So that squares of 65536 times it are floats: gradients that are steeper still are as well lit.
- */
+/* Limits x so that squares of 65536 times x fit a float. Steeper gradients are lit the same. */
 static inline double trip_shade_within_floats(double x)
 {
     return fmin(1e12, fmax(-1e12, x));
 }
 
-/* What is the same for all gradients at a point: unit vectors in world space, that to a light which
- * is at the very point zero. Along a ray from the eye it does not change, but for a light that is
- * at a place. */
+/* The part of lighting that is the same for all gradients at a point: unit vectors in world space.
+ * The light vector is zero at the position of a point light. Along a ray from the eye the vectors
+ * change only with a point light. */
 typedef struct trip_light {
-    trip_vec3 eye, light, half; /* towards them */
+    trip_vec3 eye, light, half; /* directions to the eye and the light, and half between */
     double gradient_full;
 } trip_light;
 
-/* Farther from the first voxel (in voxels) a light cannot be, as an eye cannot; one that is so far
- * is a direction. */
+/* Maximum distance of a point light from the first voxel, in voxels, as for the eye. A light
+ * farther away must be given as a direction. */
 #define TRIP_LIGHT_FARTHEST_VOXELS TRIP_CAMERA_FARTHEST_VOXELS
 
-/* Of a light that is at a place: where in index space. */
+/* Returns the position of a point light in index space. */
 trip_vec3 trip_light_position(const trip_settings *s, const trip_affine *index_to_world);
-/* Fails (usage) where that is too far. */
+/* Fails with TRIP_USAGE (reported) if a point light is too far away. */
 int trip_light_check(const trip_settings *s, const trip_affine *index_to_world);
 
-/* At a point in index space. */
+/* Returns the light at a point in index space. */
 trip_light trip_light_at(const trip_settings *s, const trip_camera *c, double gradient_full,
                          trip_vec3 voxel);
-/* How a surface with a world-space gradient is lit: the terms above, all 0 where it is flat. */
+/* The light on a surface with a world-space gradient, in the terms above. All are 0 on flat
+ * regions. */
 typedef struct trip_lit {
-    double strength, diffuse, specular; /* specular: with `facing` */
-    bool behind;                        /* light falls on the side of falling values */
+    double strength, diffuse, specular; /* specular includes `facing` */
+    bool behind;                        /* the light is on the side of falling values */
 } trip_lit;
 trip_lit trip_light_on(const trip_light *l, const double gradient[3]);
 
-/* Lights the colour `rgb` (not premultiplied) of what has a world-space gradient. Returns a number
- * that stays the same while the gradient, the colour or both change and what comes of them is a
- * smooth function: it has kinks where a surface turns from the light and at the bounds. */
+/* Lights the colour `rgb` (not premultiplied) of matter with a world-space gradient. Returns the
+ * form of the result: while the form stays the same, the lit colour is a smooth function of the
+ * gradient and the colour. The form changes where a surface turns from the light and at the
+ * clamping bounds. */
 unsigned trip_light_colour(const trip_light *l, const double gradient[3], double rgb[3]);
 
-/* Both: lights the colour `rgb` of the splat of a voxel (index space) with the given
- * world-space gradient. */
+/* Lights the colour `rgb` of a voxel's splat (index space) with a world-space gradient:
+ * trip_light_at(), then trip_light_colour(). */
 void trip_shade(const trip_settings *s, const trip_camera *c, double gradient_full, trip_vec3 voxel,
                 const double gradient[3], double rgb[3]);
 

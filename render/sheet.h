@@ -1,49 +1,64 @@
-/* What a sheet classified after interpolation is, in numbers. This page is the definition of `post`
- * that all renderers follow; reference_sheets.c evaluates it in double precision as written. After
- * Mueller, Moller & Crawfis 1999 (splatting without the blur), with the three lists and w^2.
+/* The definition of `post`, classification after interpolation, in formulas. All renderers follow
+ * it; reference_sheets.c evaluates it in double precision as written. It extends Mueller, Moller &
+ * Crawfis 1999 (splatting without the blur) by three lists and weights w^2.
  *
- * Field. Voxel (i, j, k) of level 0, kept or of the halo, has its code c and a gradient g (index
- * space, codes per index): along each axis the central difference where both neighbours are there,
- * the difference to the one that is there otherwise, 0 without neighbours. A cell is the cube
- * between eight voxels, and is empty unless all of them are there. Within it codes and gradients
- * are interpolated by settings.kernel (kernel.h) along each axis: linearly between its corners, or
- * from the 4 x 4 x 4 voxels around, as in field.h: beyond the grid its edge repeats, and another
- * voxel that is missing counts as the corner next to it. A halo of one voxel has all corners of
- * cells with a voxel that was kept; what it lacks of those around counts so.
+ * Field
+ * -----
+ * Each voxel (i, j, k) of level 0, kept or halo, has a code c and a gradient g (index space, codes
+ * per index). Along each axis the gradient is
+ * - the central difference if both neighbours are present,
+ * - the difference to one neighbour if only that one is present,
+ * - 0 without neighbours.
  *
- * Slices. Along the axis of a list slices lie at the coordinates n / S, S = settings.slices; in
- * perspective the eye's own coordinate is one more. A layer's ray is cut by them into segments, and
- * only the field at the slices is used: at one lies the sample (c, g) of each end of a segment. A
- * segment is in the cell layer between two sheets; it is empty where either end lies in an empty
- * cell of that layer, or beyond the grid. Linear samples at a sheet (n / S is whole) are
- * interpolated from the four voxels around them there, and need no others.
- * Rays begin at the eye, in parallel views at its plane: what begins behind that is left out.
+ * A cell is the cube between eight voxels. It is empty unless all eight are present. Within a cell
+ * settings.kernel (kernel.h) interpolates codes and gradients along each axis: linearly between the
+ * corners, or from the 4 x 4 x 4 voxels around as in field.h. Beyond the grid its edge repeats. Any
+ * other missing voxel counts as the corner next to it. A halo of one voxel holds all corners of the
+ * cells with a kept voxel, but not all voxels around them.
  *
- * A segment from code a to code b, L world units long, has with the extinction k and the colour q
- * of the transfer function (transfer_function.h), linear between codes (segments.h),
+ * Samples
+ * -------
+ * Along a list's axis the samples lie in planes at the coordinates n / S, S =
+ * settings.samples_per_sheet. In perspective the eye's own coordinate is one more. The planes cut a
+ * layer's ray into segments. Only the field at the planes is used: each end of a segment is a
+ * sample (c, g). A segment lies in the cell layer between two sheets. It is empty if one end lies
+ * in an empty cell of the layer, or beyond the grid. Linear samples at a sheet (n / S is whole)
+ * are interpolated from the four voxels around them there, and need no others. Rays begin at the
+ * eye, or at its plane in parallel views. Everything behind is left out.
+ *
+ * Segments
+ * --------
+ * A segment goes from code a to code b and is L world units long. k and q are the extinction and
+ * colour of the transfer function (transfer_function.h), linear between codes (segments.h). Then
  *     depth  = L mean of k over [a, b]
  *     alpha  = 1 - exp(-depth)
  *     colour = integral of k q over [a, b] / integral of k over [a, b]
- * and is lit at its middle, by the mean of the gradients of its ends (shade.h); its distance from
- * the eye is that of its middle, too. Values between the ends are taken to run straight from a to
- * b, which is the error of a slice; what lies in front within the segment does not hide what lies
- * behind in it, which is the error of an opaque segment's colour. Light where the mean of what is
- * seen of the segment lies, or colours attenuated within it, come closer to the integral with some
- * volumes and less close with others.
+ * A segment is lit at its middle, by the mean of the gradients of its ends (shade.h). Its distance
+ * from the eye is the distance of its middle. Two errors follow:
+ * - Values between the ends are assumed to change linearly from a to b. This error depends on S.
+ * - Matter in front does not hide matter behind in the same segment. This error affects the colour
+ *   of opaque segments.
  *
- * These are looked up in sums over the codes (segments.h), but by cpu and gl where extinction and
- * colours are linear in the value, or nearly: then they have a closed form, within 0.16/255 of a
+ * Two refinements are left out: light at the mean of the visible part, and colours attenuated
+ * within the segment. They come closer to the integral with some volumes and less close with
+ * others.
+ *
+ * The integrals are looked up in sums over the codes (segments.h). If extinction and colours are
+ * linear in the value, or nearly, cpu and gl use a closed form instead, within 0.16/255 of a
  * picture (closed_form.h).
  *
- * Segments are composited front to back, outward from the eye. A pixel whose transmittance falls
- * below trip_settings_early_termination() takes no more: its colour is divided by its opacity,
- * which is then 1, so that no component is off by more than that, of colours from 0 to 1. */
+ * Compositing
+ * -----------
+ * Segments are composited front to back, outward from the eye. A pixel takes no more segments once
+ * its transmittance falls below trip_settings_early_termination(). Its colour is then divided by
+ * its opacity, and the opacity becomes 1. With colours from 0 to 1 no component changes by more
+ * than that transmittance. */
 #ifndef TRIP_SHEET_H
 #define TRIP_SHEET_H
 
 #include "kernel.h"
 
-/* How far in indices, along each axis, a voxel changes what is drawn: cells about it are
+/* Returns how far a voxel changes the picture, in indices along each axis. Cells around it are
  * interpolated from it, and the gradients of its neighbours depend on it. */
 static inline int trip_sheet_reach(trip_kernel kernel)
 {
@@ -51,7 +66,7 @@ static inline int trip_sheet_reach(trip_kernel kernel)
 }
 enum { TRIP_SHEET_REACH_MAX = 3 };
 
-/* The distance in indices of the farthest ray that a voxel changes. */
+/* Returns the distance, in indices, of the farthest ray that a voxel changes. */
 static inline double trip_sheet_radius(trip_kernel kernel)
 {
     return trip_sheet_reach(kernel) * 1.7320508075688772;

@@ -2,7 +2,8 @@
 
 #include "weight.h"
 
-/* Over a sheet of list `axis`; 0 where the ray has no weight in it. */
+/* Returns the slope of a ray over a sheet of list `axis`, or 0 if the ray has no weight in the
+ * list. */
 static double slope_of(const trip_settings *s, int axis_of_view, trip_vec3 ray, int axis)
 {
     if (!(trip_weight(s, axis_of_view, ray, axis) > 0))
@@ -14,8 +15,8 @@ static double slope_of(const trip_settings *s, int axis_of_view, trip_vec3 ray, 
     return max;
 }
 
-/* Among rays through a grid of pixel positions, corners included; where slopes vary, they are
- * steepest at corners or where lists meet, and there they are far above what is straight. */
+/* Returns the maximum slope over a grid of pixel positions, corners included. The steepest rays lie
+ * at corners or where lists meet, and their slopes are far above TRIP_SHEET_SAMPLES_STRAIGHT. */
 static double steepest(const trip_camera *c, const trip_settings *s)
 {
     enum { ACROSS = 16 };
@@ -30,7 +31,7 @@ static double steepest(const trip_camera *c, const trip_settings *s)
     return max;
 }
 
-/* Index-space distance from the eye to the nearest point of the grid. */
+/* Returns the index-space distance from the eye to the nearest point of the grid. */
 static double distance_to(const trip_camera *c, const uint64_t dims[3])
 {
     double sum = 0;
@@ -42,7 +43,8 @@ static double distance_to(const trip_camera *c, const uint64_t dims[3])
     return sqrt(sum);
 }
 
-/* A pixel is as wide as directions of neighbouring rays are apart, at depth 1 in perspective. */
+/* Returns the width of a voxel in pixels. A pixel is as wide as the difference of neighbouring
+ * rays, at depth 1 in perspective. */
 static double voxel_px(const trip_camera *c, double distance)
 {
     double pixel = fmin(trip_length(c->rx), trip_length(c->ry));

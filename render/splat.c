@@ -64,8 +64,8 @@ trip_vec3 trip_splat_position(const trip_splat_frame *f, const trip_coordinates 
     return trip_vec3_over(trip_coordinates_point(coordinates, voxel), width);
 }
 
-/* Centre and ray2 for a depth; the ray through the centre and `c`, the vector whose cross products
- * with rx and ry are A and B. */
+/* Computes centre and ray2 of a splat at a depth. Returns the ray through the centre, and `c`, the
+ * vector with the cross products A and B with rx and ry. */
 static void position(const trip_splat_frame *f, trip_vec3 v, trip_splat *s, trip_vec3 *ray,
                      trip_vec3 *c)
 {
@@ -84,8 +84,8 @@ static void position(const trip_splat_frame *f, trip_vec3 v, trip_splat *s, trip
     }
 }
 
-/* S, S', amplitude and the radius: the rays of {q : g q^T S'^-1 q <= k^2} lie within
- * sigma k sqrt(largest eigenvalue of S^-1 S') of the centre, and S^-1 S' = I + low_pass2 S^-1. */
+/* Sets S', amplitude and radius. The rays of {q : g q^T S'^-1 q <= k^2} lie within sigma k
+ * sqrt(largest eigenvalue of S^-1 S') of the centre, and S^-1 S' = I + low_pass2 S^-1. */
 static void set_footprint(const trip_splat_frame *f, trip_vec3 ray, trip_vec3 c, trip_splat *s)
 {
     trip_vec3 a = trip_cross(c, f->camera.rx), b = trip_cross(c, f->camera.ry);
@@ -109,7 +109,7 @@ static void set_footprint(const trip_splat_frame *f, trip_vec3 ray, trip_vec3 c,
     s->radius = f->sigma * sqrt(f->cutoff2 * (1 + f->low_pass2 * largest));
 }
 
-/* False unless the support is an ellipse. */
+/* Sets the bounds of the support. Returns false if it is no ellipse. */
 static bool set_bounds(const trip_splat_frame *f, trip_vec3 ray, trip_splat *s)
 {
     double k2 = f->cutoff2;
@@ -141,7 +141,7 @@ static trip_covariance2 low_passed(const trip_splat_frame *f, const trip_covaria
                                                 : trip_covariance2_low_passed(s, f->low_pass2);
 }
 
-/* Conic, amplitude (without stretch), bounds and radius of a footprint of fixed size; z is 1 in
+/* Sets conic, amplitude (without stretch), bounds and radius of a fixed footprint. z is 1 in
  * parallel views. */
 static void set_fixed(const trip_splat_frame *f, double z, trip_splat *s)
 {
@@ -163,16 +163,17 @@ double trip_splat_fixed_radius_px(const trip_settings *settings)
                  settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_CUTOFF * TRIP_LOW_PASS_PX);
 }
 
-/* Of the angle between the axis of view and the ray through a point; 1 in parallel views. */
+/* Returns the cosine of the angle between the axis of view and the ray through a point; 1 in
+ * parallel views. */
 static double cosine_off_axis(const trip_camera *camera, trip_vec3 from_eye)
 {
     trip_vec3 way = trip_affine_vector(&camera->index_to_world, from_eye);
     return camera->ortho ? 1 : trip_dot(camera->world_forward, trip_normalize(way));
 }
 
-/* The projection is a scaling by |v'c - E| / |vc - E| of what lies across the ray, and makes that
- * longer by one over the cosine, the plane of the picture being slanted; the paper's has no such
- * factor. */
+/* The projection scales lengths across the ray by |v'c - E| / |vc - E|. The slanted plane of the
+ * picture makes them longer by one over the cosine. The paper has no such factor, so it is removed
+ * here. */
 double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *settings,
                             trip_vec3 middle)
 {
@@ -185,8 +186,8 @@ double trip_splat_sprite_px(const trip_camera *camera, const trip_settings *sett
     return 2 * TRIP_CUTOFF * sqrt(area * cosine_off_axis(camera, from_eye));
 }
 
-/* A splat in perspective of fixed size; false behind the eye, and where it is so near that its
- * place in the picture is no number. */
+/* Projects a fixed footprint in perspective. Returns false behind the eye, and so near the eye that
+ * the position in the picture is not finite. */
 static bool project_fixed(const trip_splat_frame *f, trip_vec3 v, trip_splat *s)
 {
     const double farthest_px = 1e9;
@@ -203,7 +204,7 @@ static bool project_fixed(const trip_splat_frame *f, trip_vec3 v, trip_splat *s)
     return true;
 }
 
-/* Whether the rays of the round kernel's support differ so little from r_c. */
+/* Whether the rays of the round kernel's support are close enough to r_c. */
 static bool is_affine(const trip_splat_frame *f, trip_vec3 ray, const trip_ray_space *j)
 {
     trip_covariance kernel = trip_covariance_round(f->sigma);
@@ -212,8 +213,8 @@ static bool is_affine(const trip_splat_frame *f, trip_vec3 ray, const trip_ray_s
     return TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE * trip_dot(ray, ray) >= apart2;
 }
 
-/* Of a flat kernel that Swan's scaling enlarges, which may be many times more than the round one:
- * S' is within the round kernel's S times as much, and no ray r of the view's plane has
+/* Returns the radius of a flat kernel after Swan's scaling, which may be many times the round
+ * kernel's. S' lies within the round kernel's S times the scale. No ray r of the view's plane has
  * |r_c| / |r| above |r_c| |forward|. */
 static double scaled_radius(const trip_splat_frame *f, const trip_covariance2 *exact,
                             const trip_covariance2 *wide, double ray2)
@@ -223,8 +224,8 @@ static double scaled_radius(const trip_splat_frame *f, const trip_covariance2 *e
     return f->sigma * sqrt(f->cutoff2 * scale * slant2);
 }
 
-/* Conic, amplitude and bounds by the affine map at the centre, which is known, and the radius where
- * it is not that of the round kernel. */
+/* Sets conic, amplitude and bounds by the affine approximation; the centre is already set. Sets the
+ * radius if it differs from the round kernel's. */
 static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
                        const trip_flattening *flat, trip_splat *s)
 {
@@ -246,7 +247,8 @@ static void set_affine(const trip_splat_frame *f, const trip_ray_space *j,
     s->y1 = s->y + half_y;
 }
 
-/* A splat in perspective by the affine map at its centre; false where that is not used. */
+/* Projects a splat in perspective by the affine approximation. Returns false if it does not apply.
+ */
 static bool project_affine(const trip_splat_frame *f, trip_vec3 v, const trip_flattening *flat,
                            trip_splat *s)
 {
@@ -255,13 +257,13 @@ static bool project_affine(const trip_splat_frame *f, trip_vec3 v, const trip_fl
     trip_ray_space j = trip_ray_space_at(&f->camera, v);
     if (!is_affine(f, ray, &j))
         return false;
-    set_footprint(f, ray, c, s); /* of which the radius is kept */
+    set_footprint(f, ray, c, s); /* only its radius is kept */
     s->radius *= TRIP_SPLAT_AFFINE_REACH;
     set_affine(f, &j, flat, s);
     return true;
 }
 
-/* Two unit vectors at right angles to v and to one another; any where v is zero. */
+/* Sets two unit vectors at right angles to v and to one another. Any two will do if v is zero. */
 static void set_across(trip_vec3 v, trip_vec3 e[2])
 {
     double x = fabs(v.x), y = fabs(v.y), z = fabs(v.z);
@@ -272,7 +274,7 @@ static void set_across(trip_vec3 v, trip_vec3 e[2])
     e[1] = trip_normalize(trip_cross(v, e[0]));
 }
 
-/* A linear form of a pixel position: e . (r0 + x rx + y ry) times `scale`. */
+/* Sets a linear form of a pixel position (x, y): e . (r0 + x rx + y ry) times `scale`. */
 static void set_form(double form[3], trip_vec3 e, trip_vec3 r0, trip_vec3 rx, trip_vec3 ry,
                      double scale)
 {
@@ -281,8 +283,8 @@ static void set_form(double form[3], trip_vec3 e, trip_vec3 r0, trip_vec3 rx, tr
     form[2] = scale * trip_dot(e, ry);
 }
 
-/* a, b, amplitude and radius, by the factor of W^-1 whose lower left entry is 0. `origin`, `x` and
- * `y` are what rho is taken of: its pixel's is origin + px x + py y. */
+/* Sets a, b, amplitude and radius from the factor of W^-1 with a zero in the lower left. rho of a
+ * pixel (px, py) is taken of origin + px x + py y. */
 static void set_across_forms(const trip_splat_frame *f, const trip_vec3 e[2], trip_vec3 origin,
                              trip_vec3 x, trip_vec3 y, double scale, double low_pass2,
                              trip_splat *s)
@@ -301,9 +303,9 @@ static void set_across_forms(const trip_splat_frame *f, const trip_vec3 e[2], tr
     s->radius = f->sigma * sqrt(f->cutoff2 * (mean + hypot(0.5 * (w00 - w11), w01)));
 }
 
-/* The least and greatest p of [0, size] with (X - p z)^2 <= reach^2 |to - p forward|^2, X = to . c:
- * those whose plane of rays, all pixels of a column or a row, passes within `reach` of c. False
- * when there are none. */
+/* Finds the minimum and maximum p of [0, size] with (X - p z)^2 <= reach^2 |to - p forward|^2, X =
+ * to . c. The rays of column or row p form a plane; it passes within `reach` of c. Returns false if
+ * no p does. */
 static bool bound_along(const trip_splat_frame *f, trip_vec3 to, trip_vec3 c, double z,
                         double reach, int size, double *lo, double *hi)
 {
@@ -312,7 +314,7 @@ static bool bound_along(const trip_splat_frame *f, trip_vec3 to, trip_vec3 c, do
     double q2 = z * z - r2 * trip_dot(forward, forward);
     double q1 = x * z - r2 * trip_dot(to, forward);
     double q0 = x * x - r2 * trip_dot(to, to);
-    /* q2 p^2 - 2 q1 p + q0 <= 0; q1^2 - q2 q0 without its cancellation. */
+    /* Solves q2 p^2 - 2 q1 p + q0 <= 0, with q1^2 - q2 q0 free of cancellation. */
     trip_vec3 across = trip_sub(trip_scale(to, z), trip_scale(forward, x));
     trip_vec3 normal = trip_cross(to, forward);
     double root = r2 * (trip_dot(across, across) - r2 * trip_dot(normal, normal));
@@ -337,7 +339,7 @@ double trip_splat_behind(const trip_splat_frame *f)
     return sqrt(2 * f->cutoff2) * f->sigma * trip_length(f->camera.forward);
 }
 
-/* A splat in perspective by the forms of near ones. */
+/* Sets a splat in perspective by the formulas of near splats. */
 static bool set_near(const trip_splat_frame *f, trip_vec3 c, trip_splat *s)
 {
     const trip_camera *camera = &f->camera;
@@ -354,7 +356,7 @@ static bool set_near(const trip_splat_frame *f, trip_vec3 c, trip_splat *s)
     return seen && !(s->z < -trip_splat_behind(f));
 }
 
-/* By how much s may differ over the support from that of its centre. */
+/* Returns the maximum difference of s over the support from its value at the centre. */
 static double slant(const trip_splat_frame *f, const trip_splat *s)
 {
     double scale = 1 / (trip_length(f->camera.r0) * f->sigma);
@@ -457,7 +459,7 @@ bool trip_splat_is_broken(const trip_splat *s)
 int trip_splat_fail(void)
 {
     return trip_fail(TRIP_ERROR, "render", "projection",
-                     "numbers are not finite; the view or the grid is out of any range");
+                     "a splat's numbers are not finite; the view or the grid is out of range");
 }
 
 static double form_at(const double form[3], double x, double y)
@@ -465,7 +467,7 @@ static double form_at(const double form[3], double x, double y)
     return form[0] + form[1] * x + form[2] * y;
 }
 
-/* s(p) of a near splat. */
+/* Returns s(p) of a near splat. */
 static double distance_along(const trip_splat_frame *f, const trip_splat *s, double x, double y)
 {
     double along = form_at(s->along, x, y);
@@ -480,7 +482,7 @@ double trip_splat_front(const trip_splat_frame *f, const trip_splat *s, double x
     return t >= end ? 1 : t <= -end ? 0 : 0.5 + 0.5 * f->front * erf(t);
 }
 
-/* m(p), wherever the eye is. */
+/* Returns m(p), without regard to the position of the eye. */
 static double radius2(const trip_splat_frame *f, const trip_splat *s, double x, double y)
 {
     double dx = x - s->x, dy = y - s->y;
@@ -503,7 +505,7 @@ double trip_splat_stretch(const trip_splat_frame *f, double x, double y)
            trip_length(trip_camera_ray(&f->camera, x, y));
 }
 
-/* The footprints of all voxels of a sheet at a place in a cell. */
+/* Returns the sum of the footprints of all voxels of a sheet at (u, v) in a cell. */
 static double sum_of_footprints(const trip_splat_frame *f, double kernel_radius, double u, double v)
 {
     int reach = (int)kernel_radius + 1;

@@ -3,40 +3,40 @@
 #include "brick_box.h"
 #include "report.h"
 
-enum { AXIS = 2 }; /* the list that is read; all hold the same voxels */
+enum { AXIS = 2 }; /* the list to read; all lists hold the same voxels */
 
 #define MIN_OPACITY (1.0 / 255.0)
 #define SHARE_OF_DEPTH (1.0 / 16.0)
 #define MIN_ALONE 0.1
 
-/* Of a wanted function in index space:
- * normal . p + offset + around |(across[0] . p + from[0], across[1] . p + from[1])| */
+/* A function to maximise, in index space:
+ *     normal . p + offset + around |(across[0] . p + from[0], across[1] . p + from[1])| */
 typedef struct form {
     trip_vec3 normal;
     double offset, around;
-    double per_voxel;            /* how fast it grows at most */
-    double slack;                /* more than rounding makes of a bound; 0 where bounds are exact */
-    double best;                 /* found so far, or known without looking; */
-    bool found;                  /* found */
-    trip_visible_position where; /* there */
-    double step;                 /* bounds are looked at in steps, the largest first */
-    double left;                 /* the farthest that bricks which were not read may reach, */
-    double from;                 /* and what those reach at least that are read next */
+    double per_voxel;            /* its maximum growth */
+    double slack;                /* covers rounding in a bound; 0 for exact bounds */
+    double best;                 /* result so far, or the caller's start value */
+    bool found;                  /* a voxel has this result */
+    trip_visible_position where; /* the voxel */
+    double step;                 /* bricks are read in steps, the farthest first */
+    double left;                 /* maximum bound of the unread bricks */
+    double from;                 /* minimum bound of the bricks to read next */
 } form;
 
 typedef struct trip_visible_search {
     trip_visible *visible;
-    const trip_list *list;     /* that is being read */
-    trip_selection open;       /* those of its bricks that were not read and may matter */
-    trip_selection *selection; /* those that are read next */
+    const trip_list *list;     /* the list being read */
+    trip_selection open;       /* its unread bricks that may change the result */
+    trip_selection *selection; /* its bricks to read next */
     trip_vec3 across[2];
     double from[2];
     int count;
     form forms[TRIP_REACHES_MAX];
-    trip_square squares[TRIP_BLOCK_SQUARES_MAX]; /* of a run */
+    trip_square squares[TRIP_BLOCK_SQUARES_MAX]; /* of one run */
 } search;
 
-/* The extinction, per world unit, from which on voxels count. */
+/* Returns the minimum extinction of a visible voxel, per world unit. */
 static double min_extinction(const trip_visible *v)
 {
     const trip_affine *m = &v->data->index_to_world;
@@ -54,8 +54,8 @@ void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone)
     trip_code_set_make(&v->codes, table, min_extinction(v));
 }
 
-/* Every operation rounds monotonically in x, y and z alone, so that the corners of a box bound the
- * rounded values too. */
+/* Computes a linear form. Every operation rounds monotonically in x, y and z alone, so the corners
+ * of a box also bound the rounded values. */
 static inline double linear(const form *f, double x, double y, double z)
 {
     return f->normal.x * x + (f->normal.y * y + (f->normal.z * z + f->offset));
@@ -71,7 +71,7 @@ static double value_at(const search *s, const form *f, double x, double y, doubl
     return value + f->around * sqrt(a * a + b * b);
 }
 
-/* A convex function is greatest at a corner. */
+/* Returns a bound over a box. A convex function is greatest at a corner. */
 static double bound(const search *s, const form *f, const trip_brick_box *b)
 {
     double max = -INFINITY;
@@ -84,14 +84,14 @@ static double bound(const search *s, const form *f, const trip_brick_box *b)
     return max + f->slack;
 }
 
-/* The longest image of a unit vector under the two rows. */
+/* Returns the maximum length of the image of a unit vector under the two rows. */
 static double longest(trip_vec3 a, trip_vec3 b)
 {
     double aa = trip_dot(a, a), bb = trip_dot(b, b), ab = trip_dot(a, b);
     return sqrt(0.5 * (aa + bb) + hypot(0.5 * (aa - bb), ab));
 }
 
-/* Two directions across the axis, unit lengths. */
+/* Sets two unit vectors across the axis. */
 static void set_across(search *s, const trip_reach_origin *origin)
 {
     const trip_affine *m = &s->visible->data->index_to_world;
@@ -118,8 +118,8 @@ static form make_form(const search *s, trip_vec3 normal, double offset, double a
     };
 }
 
-/* The bounds of an open brick; false, and it is open no more, when it reaches no farther than what
- * was found. */
+/* Computes the bounds of an open brick. Closes it and returns false if it reaches no farther than
+ * the result so far. */
 static bool bound_brick(search *s, uint64_t index, const trip_file_slab *slab, double *bounds)
 {
     const trip_brick_box position =
@@ -134,7 +134,7 @@ static bool bound_brick(search *s, uint64_t index, const trip_file_slab *slab, d
     return open;
 }
 
-/* Calls `each` for all bricks that are open. */
+/* Calls `each` for all open bricks. */
 static void each_open(search *s, void (*each)(search *s, uint64_t index, const double *bounds))
 {
     const trip_list *list = s->list;
@@ -163,7 +163,8 @@ static void select_brick(search *s, uint64_t index, const double *bounds)
     trip_selection_remove(&s->open, index);
 }
 
-/* Selects those that reach the farthest; false when none may reach farther than what was found. */
+/* Selects the open bricks that reach farthest. Returns false if none can exceed the result so far.
+ */
 static bool select_bricks(search *s, trip_selection *selection)
 {
     const double tile = (double)(1u << s->visible->data->header.tile_log2);
@@ -183,7 +184,7 @@ static bool select_bricks(search *s, trip_selection *selection)
     return some;
 }
 
-/* The forms that may be greater in the box than what was found, a bit each. */
+/* Returns the forms that may exceed their result in the box, a bit each. */
 static unsigned forms_beyond(const search *s, const trip_brick_box *position)
 {
     unsigned beyond = 0;
@@ -193,7 +194,7 @@ static unsigned forms_beyond(const search *s, const trip_brick_box *position)
     return beyond;
 }
 
-/* The voxels of a brick in a sheet lie there. */
+/* Returns the box of a brick's voxels in one sheet. */
 static trip_brick_box run_box(const trip_list *list, const trip_run *run)
 {
     const trip_file_brick *b = &list->bricks[run->brick];
@@ -237,7 +238,7 @@ static void look_at_square(search *s, const trip_run *run, const trip_square *sq
     }
 }
 
-/* Squares that reach no farther than what was found are left out: most of them are. */
+/* Examines a run. Most squares cannot exceed the result so far and are skipped. */
 static void look_at_run(search *s, const trip_batch *batch, const trip_run *run)
 {
     const trip_brick_box all = run_box(s->list, run);
@@ -288,8 +289,8 @@ static int open_bricks(search *s, const trip_list *list)
     return status;
 }
 
-/* The farthest first, at first those alone: most often what they hold reaches farther than most
- * others may. */
+/* Searches a list. It reads the bricks that reach farthest first, alone: their voxels usually
+ * exceed the bounds of most other bricks. */
 static int find_in_list(search *s, const trip_list *list)
 {
     const trip_visible *v = s->visible;
@@ -305,7 +306,7 @@ static int find_in_list(search *s, const trip_list *list)
         more = select_bricks(s, &selection);
         if (more)
             status = read_selected(s, &selection);
-        trip_reader_begin(v->reader, NULL); /* nothing is read of it any more */
+        trip_reader_begin(v->reader, NULL); /* ends the pass early */
         trip_selection_destroy(&selection, v->budget);
     }
     trip_selection_destroy(&s->open, v->budget);
@@ -328,7 +329,8 @@ static void keep_positions(const search *s)
             v->positions[v->position_count++ % TRIP_VISIBLE_POSITIONS] = s->forms[i].where;
 }
 
-/* What one list shows need not be looked for in the next where that reaches no farther. */
+/* Searches all lists, starting from earlier results. The result of one list limits the search in
+ * the next. */
 static int find(search *s)
 {
     const trip_list *list = NULL;
@@ -342,7 +344,8 @@ static int find(search *s)
     return status;
 }
 
-/* What was found; for what is visible with others else the bounds of all splats. */
+/* Returns the result. If no voxel is visible together with others, returns the bound of all splats.
+ */
 static double result(const search *s, const form *f)
 {
     const trip_visible *v = s->visible;
@@ -380,7 +383,7 @@ static search make_search(trip_visible *v, const trip_reach_origin *origin,
     return s;
 }
 
-/* The kernel reaches beyond a voxel. */
+/* Adds the reach of the kernel beyond a voxel. */
 static double with_kernel(const trip_visible *v, const form *f, double value)
 {
     return value + v->kernel_radius * f->per_voxel;
@@ -404,7 +407,7 @@ int trip_visible_raise(trip_visible *v, const trip_reach_origin *origin, const t
     for (int i = 0; i < count; i++) {
         form *f = &s.forms[i];
         f->best = values[i] - v->kernel_radius * f->per_voxel;
-        while (with_kernel(v, f, f->best) > values[i]) /* by rounding */
+        while (with_kernel(v, f, f->best) > values[i]) /* rounding */
             f->best = nextafter(f->best, -INFINITY);
     }
     int status = find(&s);

@@ -1,12 +1,12 @@
-/* How far the voxels that a transfer function shows reach in given directions: the greatest values
- * of convex functions over all of them, exactly, whatever the tiles. Bricks that cannot reach
- * farther than what was found are not read, nor sheets of them: mostly a small part of one list is.
- * One thread.
+/* Finds how far the visible voxels reach in given directions: the exact maxima of convex functions
+ * over them, independent of the tiles. It skips bricks and sheets that cannot reach farther than
+ * the result so far, and mostly reads a small part of one list. One thread.
  *
- * A voxel counts as visible together with others when a ray that met its like along a sixteenth of
- * the data set's diagonal would lose at least 1/255 of its light: fainter ones are seen where many
- * lie behind one another only, which they do not at the rim. It is visible alone when a ray through
- * it loses a tenth. */
+ * Two definitions of visible:
+ * - Visible together with others: a ray through equal voxels along a sixteenth of the data set's
+ *   diagonal loses at least 1/255 of its light. Fainter voxels are visible only where many lie
+ *   behind one another, and they do not at the rim.
+ * - Visible alone: a ray through the voxel loses a tenth of its light. */
 #ifndef TRIP_VISIBLE_H
 #define TRIP_VISIBLE_H
 
@@ -17,47 +17,49 @@
 
 enum { TRIP_VISIBLE_POSITIONS = 32 };
 
-/* Of a voxel. */
+/* Position and code of a voxel. */
 typedef struct trip_visible_position {
     double u, v, sheet;
     unsigned code;
 } trip_visible_position;
 
 typedef struct trip_visible {
-    /* Set by the caller, and outliving this. */
+    /* Set by the caller; must outlive the struct. */
     const trip_dataset *data;
-    trip_reader *reader; /* of voxels, no pass under way; it may skip by trip_visible_skip() */
+    trip_reader *reader; /* reads voxels, no pass running; may skip by trip_visible_skip() */
     trip_budget *budget;
-    double kernel_radius; /* voxels: how far beyond their voxel splats count as reaching */
+    double kernel_radius; /* voxels: how far splats reach beyond their voxel */
     double lo[3], hi[3];  /* bounds of all splats in index space */
 
-    bool alone;          /* which of them count: trip_visible_start() */
-    uint64_t splats;     /* looked at so far */
-    trip_code_set codes; /* whose voxels are visible */
-    /* Where earlier searches ended, the last ones: later ones begin with what reaches far there. */
+    bool alone;          /* count only voxels visible alone, see trip_visible_start() */
+    uint64_t splats;     /* examined so far */
+    trip_code_set codes; /* codes of the visible voxels */
+    /* Results of the last searches. Later searches start from them. */
     trip_visible_position positions[TRIP_VISIBLE_POSITIONS];
-    unsigned position_count;                  /* so far */
-    const struct trip_visible_search *search; /* under way; NULL: none */
+    unsigned position_count;                  /* all results so far */
+    const struct trip_visible_search *search; /* current search, or NULL */
 } trip_visible;
 
-/* After the caller's part is set. `table` as filled for the data set. Those visible alone count, or
- * all that are visible together with others. */
+/* Starts with a transfer function, after the caller's fields are set. `table` must be filled for
+ * the data set. `alone` counts voxels that are visible alone; otherwise all voxels count that are
+ * visible together with others. */
 void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone);
 
-/* For trip_reader_params.skip, `user` being the trip_visible: what reaches no farther than what was
- * found is left out. */
+/* Implements trip_reader_params.skip; `user` is the trip_visible. Skips runs that reach no farther
+ * than the result so far. */
 bool trip_visible_skip(void *user, const trip_selection *selection, const trip_run *run);
 
-/* Bounds of the visible voxels in index space, without kernels. */
+/* Computes the bounds of the visible voxels in index space, without kernels. */
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);
 
-/* For trip_camera_framing, `user` being the trip_visible. Where nothing is visible, the bounds of
- * all splats take its place; where nothing is alone, values are -INFINITY. */
+/* Implements trip_camera_framing; `user` is the trip_visible. If no voxel is visible, it uses the
+ * bounds of all splats. If `alone` is set and no voxel is visible alone, the values are -INFINITY.
+ */
 int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 
-/* Raises values to those of trip_visible_reach() where these are greater, of voxels that are
- * visible alone: what reaches no farther is not looked for. */
+/* Raises `values` to the values of trip_visible_reach() for voxels that are visible alone. It does
+ * not search below the given values. */
 int trip_visible_raise(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 

@@ -1,6 +1,6 @@
 #include "weight.h"
 
-/* fmax() and fmin() without the call: nothing here is not a number. */
+/* As fmax() and fmin(), without the call. The arguments are never NaN. */
 static double larger(double a, double b)
 {
     return a > b ? a : b;
@@ -111,7 +111,7 @@ typedef struct rectangle {
     int lo[2], hi[2];
 } rectangle;
 
-/* By halving. */
+/* Searches the rectangle by halving it. */
 static bool some_pixel_weighs(const trip_settings *s, const trip_camera *c, int axis_of_view,
                               int axis, trip_way way, const rectangle *r)
 {
@@ -146,8 +146,8 @@ bool trip_weight_is_somewhere(const trip_settings *s, const trip_camera *c, int 
     return some_pixel_weighs(s, c, axis_of_view, axis, way, c->ortho ? &one : &all);
 }
 
-/* The rays with weight and a given sign of r_a form a convex cone, so that the corner pixels speak
- * for all. */
+/* Tests the corner pixels alone. Rays with weight and a given sign of r_a form a convex cone, so
+ * the corners decide for all pixels. */
 bool trip_weight_is_everywhere(const trip_settings *s, const trip_camera *c, int axis_of_view,
                                int axis)
 {

@@ -7,8 +7,8 @@ enum { FOUR = 4, MAX = TRIP_POLYNOMIAL_DEGREE + 1 };
 /* Code and gradient as polynomials: [power][component]. */
 typedef double coefficients[MAX][FOUR];
 
-/* The weights of the `edge` voxels along an axis, at `start` + `rise` x of the way from one corner
- * of the cell to the other: [voxel][power]. */
+/* Sets the weights of the `edge` voxels along an axis as polynomials: [voxel][power]. The position
+ * in the cell is `start` + `rise` x, from 0 at one corner to 1 at the other. */
 static void linear_weights(double start, double rise, double w[][4])
 {
     w[0][0] = 1 - start;
@@ -19,7 +19,7 @@ static void linear_weights(double start, double rise, double w[][4])
 
 static void cubic_weights(double start, double rise, double w[][4])
 {
-    /* Catmull and Rom's, of powers of the way; twice of it. */
+    /* Twice the Catmull-Rom spline, by powers of the position. */
     static const double spline[4][4] = {
         { 0, -1, 2, -1 }, { 2, 0, -5, 3 }, { 0, 1, 4, -3 }, { 0, 0, -1, 1 }
     };
@@ -33,7 +33,7 @@ static void cubic_weights(double start, double rise, double w[][4])
     }
 }
 
-/* Adds `terms` coefficients of p times those of a weight. */
+/* Adds the product of `terms` coefficients of p and a weight. */
 static inline void add_product(coefficients sum, double (*p)[FOUR], int terms, const double *weight,
                                int weight_terms)
 {
@@ -43,7 +43,7 @@ static inline void add_product(coefficients sum, double (*p)[FOUR], int terms, c
                 sum[i + j][k] += p[i][k] * weight[j];
 }
 
-/* Weighs voxels along x, their sums along y, and those along z. */
+/* Weights voxels along x, the sums along y, and those sums along z. */
 static inline void weigh(const trip_field_voxel *const *voxels, int edge, double w[3][4][4],
                          coefficients out)
 {

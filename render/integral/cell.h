@@ -1,5 +1,5 @@
-/* A cell of a field along a ray: what is interpolated there from the voxels around, as polynomials.
- * Plain values. */
+/* The part of a ray in one cell of a field: code and gradient, interpolated from the voxels around,
+ * as polynomials along the ray. Plain values. */
 #ifndef TRIP_CELL_H
 #define TRIP_CELL_H
 
@@ -7,20 +7,21 @@
 #include "polynomial.h"
 #include "ray.h"
 
-/* From where the ray enters the cell, 0, to where it leaves it, 1. */
+/* The polynomials run from 0 where the ray enters the cell to 1 where it leaves it. */
 typedef struct trip_cell_line {
     double from, length; /* in t of the ray, length > 0 */
-    double inverse;      /* of the length */
+    double inverse;      /* 1 / length */
     trip_polynomial code;
-    double all[TRIP_POLYNOMIAL_DEGREE + 1][4]; /* the same, and the gradient's three components */
+    /* Code and the three components of the gradient: [power][component]. */
+    double all[TRIP_POLYNOMIAL_DEGREE + 1][4];
 } trip_cell_line;
 
-/* `coordinates`: of the grid, linear cells alone having uneven ones; NULL: voxels lie at integers.
- */
+/* Computes the polynomials of a cell. `coordinates` belong to the grid; only linear cells may have
+ * uneven ones. NULL places the voxels at integers. */
 trip_cell_line trip_cell_along(const trip_field_cell *cell, const trip_coordinates *coordinates,
                                const trip_ray *ray, double from, double to);
 
-/* At t: the code, and the gradient as of trip_field_voxel. */
+/* Writes the code and the gradient at t. The gradient has the units of trip_field_voxel. */
 static inline void trip_cell_line_at(const trip_cell_line *l, double t, double out[4])
 {
     double x = (t - l->from) * l->inverse;

@@ -14,7 +14,7 @@ static void get_components(const trip_tf_entry *e, double out[COMPONENTS])
     out[3] = e->extinction;
 }
 
-/* Lines from a point that stay close to all points so far: slopes between these bounds. */
+/* The lines from a point that stay close to all later points: bounds of their slopes. */
 typedef struct cone {
     double from[COMPONENTS], min[COMPONENTS], max[COMPONENTS];
 } cone;
@@ -42,7 +42,7 @@ static bool cone_holds(const cone *c, const trip_tf_entry *e, double steps)
     return true;
 }
 
-/* Times what the components may be off. */
+/* Maximum errors of the components. */
 typedef struct slack {
     double colour, extinction;
 } slack;

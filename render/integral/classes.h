@@ -1,5 +1,5 @@
-/* The transfer function between the codes of its table: linear from one entry to the next, colour
- * and extinction alike, and beyond the ends as at them. Read-only once made. */
+/* The transfer function between the codes of its table. Colour and extinction are linear from one
+ * entry to the next, and constant beyond the ends. Read-only once made; any thread may use it. */
 #ifndef TRIP_CLASSES_H
 #define TRIP_CLASSES_H
 
@@ -13,27 +13,28 @@ enum { TRIP_CLASS_CODES = 65536 };
 
 typedef struct trip_classes {
     const trip_tf_entry *table;
-    /* The first code from here on with extinction; TRIP_CLASS_CODES: none. */
+    /* The first code from here on with extinction, or TRIP_CLASS_CODES. */
     uint32_t next_visible[TRIP_CLASS_CODES];
-    /* Codes between which each component is close to a line: so finely a function has to be looked
-     * at for nothing of it to be missed. */
+    /* Codes that divide the table into ranges in which every component is close to a line. Samples
+     * at this spacing miss no feature of the transfer function. */
     uint16_t knots[TRIP_CLASS_CODES];
-    uint16_t knots_up_to[TRIP_CLASS_CODES]; /* how many are at most so much */
+    uint16_t knots_up_to[TRIP_CLASS_CODES]; /* number of knots up to each code */
     size_t knot_count;
 } trip_classes;
 
-/* `table` outlives it. Between knots the depth of a voxel's length is within KNOT_TOLERANCE times
- * `tolerance` of a line, or where it is more than 1 within so much of itself; colours, which count
- * by the opacity there, are as close at depths above 1, below so much less as the depth is. */
+/* Prepares `table`, which must outlive `c`. Let e be KNOT_TOLERANCE times `tolerance`, and depth
+ * the optical depth of one voxel length at a code. Between knots the depth lies within e max(1,
+ * depth) of a line. Colours count by the opacity and lie within e / min(1, depth) of a line. */
 void trip_classes_make(trip_classes *c, const trip_tf_entry *table, double voxel_world,
                        double tolerance);
 
-/* False only when no code from `least` to `most` has extinction. */
+/* Returns false only if no code from `min` to `max` has extinction. */
 bool trip_classes_visible(const trip_classes *c, double min, double max);
-/* The first knot above a code, and the first that is not below it: its place, or knot_count. */
+/* Return the index of the first knot above a code, and of the first knot at or above it. Both
+ * return knot_count if there is none. */
 size_t trip_classes_knot_above(const trip_classes *c, double code);
 size_t trip_classes_knot_from(const trip_classes *c, double code);
-/* Extinction per world unit, and colour. */
+/* Returns the extinction per world unit, and writes the colour. */
 double trip_classes_at(const trip_classes *c, double code, double rgb[3]);
 
 #endif

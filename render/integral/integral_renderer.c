@@ -1,6 +1,6 @@
-/* The renderer that computes what the others approximate. A frame's batches, all voxels of one list
- * with their halo, are put into a field, which stays for the frames to come; the picture is then
- * integrated ray by ray. */
+/* The integral renderer computes the picture that the other renderers approximate. A frame's
+ * batches hold all voxels of one list, and the halo. They fill a field, which is kept for later
+ * frames. The picture is then integrated ray by ray. */
 #include "renderer.h"
 
 #include <stdatomic.h>
@@ -19,20 +19,20 @@ typedef struct integral {
     trip_classes *classes;
     trip_splat_hits *hits; /* by thread */
 
-    /* Gathered from batches: of this data set, with the halo or without. */
+    /* The field of field_data, filled from batches, with or without the halo. */
     trip_field *field;
     const trip_dataset *field_data;
-    unsigned planes; /* that it was gathered from */
+    unsigned planes; /* that the field was filled from */
     bool has_halo, complete;
     uint64_t put;
 
     const trip_frame *frame;
     trip_integrand in;
-    uint64_t splats[TRIP_KINDS]; /* handed over, by the kind of their list */
-    float *rgba;                 /* of the picture being made */
-    int pane_px, panes_x;        /* which is shared out among threads in squares */
-    _Atomic bool failed;         /* set by any thread: the picture is given up */
-    _Atomic uint64_t done;       /* pixels, by any thread */
+    uint64_t splats[TRIP_KINDS]; /* records received, by the kind of their list */
+    float *rgba;                 /* of the current picture */
+    int pane_px, panes_x;        /* threads share the picture in squares of pane_px */
+    _Atomic bool failed;         /* set by any thread to give up the picture */
+    _Atomic uint64_t done;       /* pixels, added by any thread */
     trip_field_fill fill;
 } integral;
 
@@ -70,7 +70,8 @@ static bool is_of_splats(const integral *r)
     return r->frame->settings->field == TRIP_FIELD_SPLATS;
 }
 
-/* A field of splats has no halo, which would count as splats. */
+/* Begins a field unless the last one fits. A field of splats has no halo, which would count as
+ * splats. */
 static int begin_field(integral *r)
 {
     const trip_dataset *data = r->frame->data;
@@ -94,10 +95,11 @@ static int begin_field(integral *r)
 static int check_frame(const trip_frame *frame)
 {
     if (frame->settings->depth)
-        return trip_fail(TRIP_USAGE, "render", "depth", "the integral gives no distances");
+        return trip_fail(TRIP_USAGE, "render", "depth",
+                         "the integral renderer computes no depth; use another renderer");
     if (frame->settings->field == TRIP_FIELD_SPLATS && trip_effects_some(&frame->settings->effects))
         return trip_fail(TRIP_USAGE, "render", "effects",
-                         "the integral has them of values, not of splats");
+                         "the integral renderer applies effects to values only; use field values");
     if (frame->settings->field == TRIP_FIELD_VALUES)
         return trip_plan_check_cells(frame->data, "--field splats");
     return 0;
@@ -153,7 +155,7 @@ static int draw(trip_renderer *base, const trip_batch *batch, bool front_to_back
     return status;
 }
 
-/* Once all voxels are there. */
+/* Completes the field once all voxels are present. */
 static int complete_field(integral *r)
 {
     const trip_file_header *header = &r->frame->data->header;
@@ -177,7 +179,7 @@ static int integrate(integral *r, double x, double y, trip_splat_hits *hits, tri
     return 0;
 }
 
-/* The mean over a grid of positions in the pixel. */
+/* Computes the mean over a grid of positions in the pixel. */
 static int integrate_pixel(integral *r, int x, int y, trip_splat_hits *hits, double rgba[4])
 {
     const int samples = r->in.settings->samples;
@@ -214,7 +216,7 @@ static int smaller(int a, int b)
     return a < b ? a : b;
 }
 
-/* The first thread is the one that the frame is drawn by. */
+/* Reports progress from the first thread, which draws the frame. */
 static void show_progress(integral *r, uint64_t pixels, unsigned thread)
 {
     const trip_frame *frame = r->frame;
@@ -236,7 +238,8 @@ static void make_pane(void *context, unsigned pane, unsigned thread)
     show_progress(r, (uint64_t)(x1 - x0) * (uint64_t)(y1 - y0), thread);
 }
 
-/* Small, so that threads are busy to the end, but for the pool's bound of their number. */
+/* Divides the picture into panes. They are small, so that all threads stay busy to the end, but not
+ * more than the pool allows. */
 static unsigned divide_picture(integral *r)
 {
     enum { FIRST_PANE_PX = 8, MAX_PANES = 1 << 19 };
@@ -251,7 +254,7 @@ static unsigned divide_picture(integral *r)
     return (unsigned)panes;
 }
 
-/* Before all voxels are there the picture is its background. */
+/* Writes the picture. It shows the background alone until all voxels are present. */
 static int picture(trip_renderer *base, float *rgba, float *depth)
 {
     integral *r = (integral *)base;

@@ -9,13 +9,13 @@
 
 enum { FIRST_ROOM = 4096 };
 
-/* A ray on its way through the splats. */
+/* A ray through the splats. */
 typedef struct passage {
     const trip_integrand *in;
     const trip_ray *ray;
     trip_splat_hits *hits;
-    double sigma, radius, amplitude; /* index space; the amplitude is that of a density */
-    size_t first;                    /* hits before this one end before where the ray is */
+    double sigma, radius, amplitude; /* in index space; amplitude of the density */
+    size_t first;                    /* earlier hits end before the current position */
 } passage;
 
 void trip_splat_hits_free(trip_splat_hits *h)
@@ -42,8 +42,9 @@ static int make_room(trip_splat_hits *h)
     return 0;
 }
 
-/* Squared distance of a point from the ray's line, where a voxel of this width has edges of 1;
- * where on the line that is least, and the length of the ray's direction there. */
+/* Returns the squared distance of a point from the ray's line, in a space where a voxel of this
+ * width has edges of 1. Also computes t of the nearest point, and the length of the ray's direction
+ * there. */
 static double distance2(const trip_ray *ray, trip_vec3 point, trip_vec3 width, double *t,
                         double *length)
 {
@@ -172,7 +173,8 @@ static void sample(void *user, double t, trip_ray_sample *out)
         out->rgb[i] /= out->extinction;
 }
 
-/* Piece by piece, each as long as the least voxel; stretches without splats are passed over. */
+/* Integrates piece by piece. Pieces are as long as the smallest voxel, and gaps between splats are
+ * skipped. */
 static void add_pieces(passage *p, trip_ray_sum *sum)
 {
     const trip_splat_hit *hits = p->hits->hits;

@@ -1,13 +1,13 @@
 #include "cell.h"
 #include "integrand.h"
 
-/* A ray on its way through the values. */
+/* A ray through the values. */
 typedef struct passage {
     const trip_integrand *in;
     const trip_ray *ray;
-    trip_light light; /* the same all along the ray, but where the light is at a place */
+    trip_light light; /* the same along the whole ray, except for a point light */
     trip_effects_view effects;
-    trip_cell_line line; /* of the cell where it is */
+    trip_cell_line line; /* of the current cell */
     trip_ray_sum sum;
 } passage;
 
@@ -38,7 +38,7 @@ static void sample(void *user, double t, trip_ray_sample *out)
     }
 }
 
-/* A place in a cell: 0 to 1 of its line, and the code there. */
+/* A position in a cell, 0 to 1 along its line, and the code there. */
 typedef struct position {
     double x, code;
 } position;
@@ -53,7 +53,7 @@ static trip_ray_end end_at(passage *p, double x)
     return trip_ray_end_at(trip_cell_line_t(&p->line, x), sample, p);
 }
 
-/* Between two places from which to which the code only rises or only falls, knot by knot. */
+/* Adds the part between two positions, knot by knot. The code must rise or fall throughout. */
 static void add_between(passage *p, position first, position last)
 {
     const trip_classes *c = p->in->classes;
@@ -62,7 +62,7 @@ static void add_between(passage *p, position first, position last)
     if (!trip_classes_visible(c, lo, hi))
         return;
     size_t begin = trip_classes_knot_above(c, lo), end = trip_classes_knot_from(c, hi);
-    end = end < begin ? begin : end; /* flat, on a knot */
+    end = end < begin ? begin : end; /* constant code on a knot */
     trip_ray_end from = end_at(p, first.x);
     for (size_t n = begin; n < end + 1 && !trip_ray_sum_is_over(&p->sum); n++) {
         position next = last;
@@ -119,7 +119,7 @@ static bool visit_cube(void *user, const int64_t at[3], double from, double to)
     return trip_ray_walk(p->ray, &cells, from, to, visit_cell, p);
 }
 
-/* Transmittance along a ray. */
+/* Returns the transmittance along a ray. */
 static double through(const trip_integrand *in, const trip_ray *ray)
 {
     trip_integrand bare = *in;

@@ -3,8 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* Roots closer to one another than this part of the interval are taken for none: between them the
- * polynomial is flat. */
+/* Maximum number of halvings. Closer roots are ignored: between them the polynomial is flat. */
 enum { MAX_HALVINGS = 20 };
 
 static trip_polynomial derivative(const trip_polynomial *p)
@@ -15,7 +14,7 @@ static trip_polynomial derivative(const trip_polynomial *p)
     return d;
 }
 
-/* Newton's steps, and halves of what is left where one leads out of it. */
+/* Newton's method. A step out of the remaining interval is replaced by halving it. */
 double trip_polynomial_find(const trip_polynomial *p, double value, double from, double to)
 {
     const trip_polynomial slope = derivative(p);
@@ -38,8 +37,8 @@ double trip_polynomial_find(const trip_polynomial *p, double value, double from,
     return fmin(to, fmax(from, x));
 }
 
-/* By its coefficients over [0, 1] in Bernstein's basis, which change sign at least as often as it
- * does there. */
+/* Coefficients over [0, 1] in Bernstein's basis. They change sign at least as often as the
+ * polynomial does in [0, 1]. */
 typedef struct bernstein {
     int degree;
     double b[TRIP_POLYNOMIAL_DEGREE + 1];
@@ -48,7 +47,7 @@ typedef struct bernstein {
 static bernstein to_bernstein(const trip_polynomial *p)
 {
     bernstein out = { .degree = p->degree };
-    double over = 1; /* c[i] over binomial(degree, i), then sums of differences */
+    double over = 1; /* first c[i] / binomial(degree, i), then sums of differences */
     for (int i = 0; i <= p->degree; i++) {
         out.b[i] = p->c[i] / over;
         over = over * (p->degree - i) / (i + 1);
@@ -59,7 +58,7 @@ static bernstein to_bernstein(const trip_polynomial *p)
     return out;
 }
 
-/* `zero`: no more than rounding leaves of nothing. */
+/* Counts sign changes. Coefficients up to `zero` are rounding errors and count as 0. */
 static int sign_changes(const bernstein *p, double zero)
 {
     int changes = 0;
@@ -73,7 +72,7 @@ static int sign_changes(const bernstein *p, double zero)
     return changes;
 }
 
-/* By de Casteljau's construction. */
+/* Splits the interval in two by de Casteljau's construction. */
 static void halve(const bernstein *p, bernstein *first, bernstein *last)
 {
     *last = *p;
@@ -98,8 +97,8 @@ static void add_root(roots *r, double at)
         r->at[r->count++] = at;
 }
 
-/* A single change of sign is a single root; it is not looked for at the very ends, one of which may
- * be another. */
+/* Finds the roots in an interval. A single change of sign is a single root. The search leaves out
+ * the very ends, which may be another root. */
 static void find_roots(roots *r, const bernstein *p, double from, double to, int halvings)
 {
     int changes = sign_changes(p, r->zero);

@@ -1,8 +1,9 @@
-/* Polynomials over [0, 1], by the coefficients of their powers, the constant first. */
+/* Polynomials over [0, 1], by the coefficients of their powers, the constant first. Pure functions.
+ */
 #ifndef TRIP_POLYNOMIAL_H
 #define TRIP_POLYNOMIAL_H
 
-enum { TRIP_POLYNOMIAL_DEGREE = 9 }; /* at most */
+enum { TRIP_POLYNOMIAL_DEGREE = 9 }; /* maximum */
 
 typedef struct trip_polynomial {
     int degree;
@@ -17,11 +18,12 @@ static inline double trip_polynomial_at(const trip_polynomial *p, double x)
     return sum;
 }
 
-/* Where it turns from rising to falling or back, in (0, 1), ascending; returns how many. */
+/* Finds the points in (0, 1) where the polynomial turns from rising to falling or back, ascending.
+ * Returns their number. */
 int trip_polynomial_turns(const trip_polynomial *p, double turns[TRIP_POLYNOMIAL_DEGREE]);
 
-/* Where it is `value`, between two places between which it only rises or only falls, and at one of
- * which it is at most that, at the other at least. */
+/* Returns the point between `from` and `to` where the polynomial equals `value`. It must rise or
+ * fall throughout, and `value` must lie between its values at the two ends. */
 double trip_polynomial_find(const trip_polynomial *p, double value, double from, double to);
 
 #endif

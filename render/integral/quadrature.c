@@ -4,18 +4,18 @@
 
 #include <math.h>
 
-/* After so many halvings a piece is too short to matter. */
-/* Pieces that were halved so often are few where all is well. */
+/* After MAX_HALVINGS a piece is too short to matter. Pieces with POLLED_HALVINGS are rare, so only
+ * these check for interruption. */
 enum { MAX_HALVINGS = 40, POLLED_HALVINGS = 12 };
 
-/* How many times closer halves bring Simpson's rule to the integral of what is smooth. */
+/* Halving a piece brings Simpson's rule this much closer to the integral of a smooth function. */
 #define CLOSER 15.0
 
-/* What a piece does to light: what it adds in front, and how much it lets through. Of colour 1 it
- * adds its opacity, exactly; `white` is what the rule makes of that. */
+/* The light of a piece: the colour it adds, and the opacity. `white` is the result of the rule for
+ * colour 1, which would equal the opacity if the rule were exact. */
 typedef struct part {
     double rgb[3], white, depth;
-    double opacity; /* 1 - exp(-depth), to the last bits however small */
+    double opacity; /* 1 - exp(-depth), exact to the last bits for small depths too */
 } part;
 
 typedef struct piece {
@@ -24,8 +24,8 @@ typedef struct piece {
     part whole; /* by Simpson's rule */
 } piece;
 
-/* 1 - exp(-depth), 0 below 0: light that is let through, not made. Small depths, which most pieces
- * have, by the series, whose terms left out are below the last bit. */
+/* Returns 1 - exp(-depth), or 0 for negative depths, since a piece cannot add light. Most pieces
+ * have small depths. For them it sums the series; the omitted terms are below the last bit. */
 static double opacity_of(double depth)
 {
     if (depth > 1.0 / 16)
@@ -38,7 +38,8 @@ static double opacity_of(double depth)
     return depth * sum;
 }
 
-/* Depths at the middle and the end are those of the parabola through the three extinctions. */
+/* Sets a part by Simpson's rule. The depths at the middle and the end are integrals of the parabola
+ * through the three extinctions. */
 static void set_simpson(part *p, double length, const trip_ray_sample *a, const trip_ray_sample *m,
                         const trip_ray_sample *b)
 {
@@ -74,7 +75,7 @@ static double distance(const part *a, const part *b)
     return max + fabs(a->opacity - b->opacity);
 }
 
-/* What both come to where the integrand is smooth. */
+/* Returns the extrapolation of both results, for a smooth integrand. */
 static double correct(double whole, double finer)
 {
     return finer + (finer - whole) * (1 / CLOSER);
@@ -98,7 +99,7 @@ static void set_piece(piece *p, const trip_ray_end *from, const trip_ray_end *to
     set_simpson(&p->whole, to->t - from->t, &from->sample, &p->middle.sample, &to->sample);
 }
 
-/* The form of its samples, 0 where they differ. */
+/* Returns the form that all samples of a piece share, or 0. */
 static unsigned form_of(const piece *p)
 {
     unsigned form = p->middle.sample.form;
@@ -110,7 +111,8 @@ static bool is_smooth(const piece *first, const piece *last)
     return form_of(first) && form_of(first) == form_of(last);
 }
 
-/* `smooth`: whether the finer is known to be closer than the difference. */
+/* Whether the error is within the piece's share of the tolerance. `smooth` says that the finer
+ * result is closer than the difference. */
 static bool is_close(const trip_ray_sum *s, const piece *p, const part *finer, bool smooth)
 {
     double apart = distance(&p->whole, finer), white = fabs(finer->white - finer->opacity);
@@ -120,8 +122,8 @@ static bool is_close(const trip_ray_sum *s, const piece *p, const part *finer, b
     return !(s->transmittance * error > s->tolerance / 4 * (length_share + opacity_share));
 }
 
-/* The nearer half first, so that what is added is behind all before. Ends where the work is
- * interrupted or a number is none, which no halving makes closer. */
+/* Adds a piece, halving it as needed, the nearer half first. Ends early if the work is interrupted.
+ * A comparison with NaN counts as close, because halving cannot help there. */
 static void add(trip_ray_sum *s, const piece *p, int halvings, trip_ray_sampler sampler, void *user)
 {
     piece first, last;

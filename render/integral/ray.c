@@ -48,7 +48,7 @@ bool trip_ray_clip(const trip_ray *r, const trip_ray_boxes *b, double *from, dou
     return *from < *to;
 }
 
-/* The box that holds a point, or the nearest one. */
+/* Finds the cube that contains a point, or the nearest one. */
 static void find_box(const trip_ray_boxes *b, trip_vec3 p, int64_t at[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -61,10 +61,11 @@ static void find_box(const trip_ray_boxes *b, trip_vec3 p, int64_t at[3])
     }
 }
 
-/* The walk along an axis. */
+/* The walk along one axis. */
 typedef struct pace {
     double origin, inverse; /* of the ray */
-    int64_t step, to_face; /* from box to box; from a box's first corner to the face it leaves by */
+    /* To the next cube; from a cube's first corner to the face where the ray leaves. */
+    int64_t step, to_face;
 } pace;
 
 static pace make_pace(const trip_ray *r, int axis, int64_t edge)
@@ -76,7 +77,7 @@ static pace make_pace(const trip_ray *r, int axis, int64_t edge)
                    .to_face = d > 0 ? edge : 0 };
 }
 
-/* Where the ray leaves a box, at most `to`; the axis of that face, or -1. */
+/* Finds where the ray leaves a cube, at most `to`. Returns the axis of that face, or -1. */
 static int find_exit(const pace paces[3], const trip_ray_boxes *b, const int64_t at[3], double *to)
 {
     int axis = -1;
@@ -84,7 +85,7 @@ static int find_exit(const pace paces[3], const trip_ray_boxes *b, const int64_t
         int64_t face = at[a] + paces[a].to_face;
         double away = face_at(b, a, face < b->hi[a] ? face : b->hi[a]) - paces[a].origin;
         double t = away * paces[a].inverse;
-        if (t < *to) { /* not where it is not a number */
+        if (t < *to) { /* false for NaN */
             *to = t;
             axis = a;
         }

@@ -236,7 +236,7 @@ static int check_plan(triptych *t)
     for (at = text; (at = strstr(at, "\nlist ")); at++) {
         const unsigned of = at[7] > '0' && at[7] <= '9' ? (unsigned)(at[7] - '0') : 0;
         const char *end = strchr(at + 1, '\n');
-        const char *other = strstr(at, ": of another level than what is drawn\n");
+        const char *other = strstr(at, ": the frame is drawn at another level\n");
         const char *reads = strstr(at, " read: ");
         assert_int_equal(other && other < end, of != level);
         read += reads && reads < end;

@@ -109,7 +109,7 @@ static void expect_post_refused(const scene *s, int axis)
     assert_int_equal(trip_camera_make(&camera, &v.camera, &s->data->index_to_world), 0);
     test_catch_reports();
     assert_true(trip_plan_make(&plan, s->data, &camera, &v.settings, s->table, s->budget) < 0);
-    assert_one_report("has one voxel along");
+    assert_one_report("is one voxel thick along");
 }
 
 /* All voxels of opacity 0.3. Post has no cells there. */
