@@ -76,9 +76,9 @@ const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES] = {
 const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS] = {
     { TRIPTYCH_SHADOWS, "anisotropy", "Anisotropy", "", AT(anisotropy), false, -0.95, 0.95, 0.05 },
     { LATTICES, "light-cells", "Light cells", "", AT(light_cells), true, 8, 1024, 1 },
-    { TRIPTYCH_CUEING, "fading", "Fading", "", AT(cueing), false, 0.01, 1, 0.01 },
-    { TRIPTYCH_EMISSION, "coldest", "Coldest", "K", AT(kelvin[0]), false, 0, HOTTEST - 1, 1 },
-    { TRIPTYCH_EMISSION, "hottest", "Hottest", "K", AT(kelvin[1]), false, 1, HOTTEST, 1 },
+    { TRIPTYCH_CUEING, "fading", "Cueing strength", "", AT(cueing), false, 0.01, 1, 0.01 },
+    { TRIPTYCH_EMISSION, "coldest", "Minimum temperature", "K", AT(kelvin[0]), false, 0, HOTTEST - 1, 1 },
+    { TRIPTYCH_EMISSION, "hottest", "Maximum temperature", "K", AT(kelvin[1]), false, 1, HOTTEST, 1 },
 };
 
 const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_settings *s,

@@ -366,12 +366,12 @@ void draw_point(trip_panel *p, trip_document *d)
 
 void draw_presets(trip_panel *p, trip_viewer *v, trip_document *d)
 {
-    const char *now = d->edited ? "edited" : d->function ? d->function : "the data set's own";
+    const char *now = d->edited ? "edited" : d->function ? d->function : "Default of the data set";
     const bool open = ImGui::BeginCombo("Preset", now);
     mark_beside(p, "Preset", open);
     if (!open)
         return;
-    if (mark(p, "the data set's own", ImGui::Selectable("the data set's own")))
+    if (mark(p, "Default of the data set", ImGui::Selectable("Default of the data set")))
         trip_viewer_set_function(v, nullptr);
     triptych_preset preset;
     for (unsigned i = 0; triptych_get_preset(i, &preset); i++) {
@@ -411,9 +411,8 @@ void draw_left_out(trip_panel *p, trip_viewer *v, trip_document *d)
         std::snprintf(text, sizeof text, "bricking: %s %.0f %%", s.stage, 100 * s.done);
         ImGui::ProgressBar(static_cast<float>(s.done), ImVec2(-1, 0), text);
     } else if (v->status.left_out && v->status.document == d->number) {
-        ImGui::TextWrapped("This function shows values that were not kept when the data set was "
-                           "made.");
-        if (button(p, "Brick again with all values"))
+        ImGui::TextWrapped("The transfer function reveals voxels that bricking dropped.");
+        if (button(p, "Brick again with all voxels"))
             trip_viewer_brick_again(v);
     }
 }
@@ -444,8 +443,8 @@ bool draw_light_position(trip_panel *p, trip_document *d)
 {
     trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     const bool far = c.distance >= TRIP_LIGHT_FARTHEST;
-    bool changed = slide(p, "Light round", &c.round, -180, 180, "%.0f°");
-    changed |= slide(p, "Light up", &c.up, -89, 89, "%.0f°");
+    bool changed = slide(p, "Light azimuth", &c.round, -180, 180, "%.0f°");
+    changed |= slide(p, "Light elevation", &c.up, -89, 89, "%.0f°");
     changed |= slide(p, "Light distance", &c.distance, TRIP_LIGHT_NEAREST, TRIP_LIGHT_FARTHEST,
                      far ? "far away" : "%.2f", ImGuiSliderFlags_Logarithmic);
     if (changed)
@@ -487,7 +486,7 @@ bool draw_effects(trip_panel *p, trip_document *d)
     }
     trip_effects_say(&shown, heat, text, sizeof text);
     if (text[0])
-        ImGui::TextWrapped("On: %s", text);
+        ImGui::TextWrapped("Active: %s", text);
     return changed;
 }
 
@@ -498,7 +497,7 @@ bool draw_light(trip_panel *p, trip_document *d)
     if (d->info.normal_bytes || s->classify != TRIPTYCH_PRE)
         changed |= check(p, "Shading", &s->shading);
     else
-        ImGui::TextDisabled("No normals: splats cannot be shaded.");
+        ImGui::TextDisabled("The data set has no normals: splats cannot be shaded.");
     changed |= check(p, "Light from the eye", &s->headlight); /* which lights effects, too */
     if (!s->headlight)
         changed |= draw_light_position(p, d);
@@ -516,15 +515,15 @@ bool draw_light(trip_panel *p, trip_document *d)
 bool draw_quality(trip_panel *p, trip_document *d)
 {
     triptych_settings *s = &d->settings;
-    static const char *const classes[] = { "Before splatting", "After interpolation", "Auto" };
+    static const char *const classes[] = { "Pre (splats)", "Post (interpolation)", "Automatic" };
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
-    bool changed = choose(p, "Classify", &s->classify, classes, 3);
+    bool changed = choose(p, "Classification", &s->classify, classes, 3);
     if (s->classify != TRIPTYCH_PRE) {
-        changed |= mark_beside(p, "Slices",
-                               ImGui::SliderInt("Slices", &s->samples_per_sheet, 0, 16,
-                                                s->samples_per_sheet ? "%d" : "by the view"));
+        changed |= mark_beside(p, "Samples per sheet",
+                               ImGui::SliderInt("Samples per sheet", &s->samples_per_sheet, 0, 16,
+                                                s->samples_per_sheet ? "%d" : "automatic"));
     } else {
-        static const char *const sums[] = { "Splat by splat", "Sheet by sheet" };
+        static const char *const sums[] = { "Per splat", "Per sheet" };
         changed |= choose(p, "Compositing", &s->compositing, sums, 2);
         changed |= slide(p, "Kernel radius", &s->kernel_radius, 1.5, 6, "%.2f voxels");
     }
@@ -533,30 +532,30 @@ bool draw_quality(trip_panel *p, trip_document *d)
     if (s->method == TRIPTYCH_MERGE) {
         const double leftmost = -0.01;
         double h = s->h >= 0 ? s->h : leftmost;
-        changed |= slide(p, "h", &h, leftmost, 0.99, h < 0 ? "by the classification" : "%.2f");
+        changed |= slide(p, "Blend start (h)", &h, leftmost, 0.99, h < 0 ? "automatic" : "%.2f");
         s->h = h >= 0 ? h : TRIPTYCH_H_AUTO;
     }
     {
         const double leftmost = -0.001;
         double early_termination = s->early_termination >= 0 ? s->early_termination : leftmost;
-        changed |= slide(p, "Saturation", &early_termination, leftmost, 0.1,
-                         early_termination < 0 ? "by the classification" : "%.3f");
+        changed |= slide(p, "Early termination", &early_termination, leftmost, 0.1,
+                         early_termination < 0 ? "automatic" : "%.3f");
         s->early_termination =
             early_termination >= 0 ? early_termination : TRIPTYCH_EARLY_TERMINATION_AUTO;
     }
-    changed |= mark_beside(p, "Samples", ImGui::SliderInt("Samples", &s->samples, 1, 4));
+    changed |= mark_beside(p, "Antialiasing", ImGui::SliderInt("Antialiasing", &s->samples, 1, 4));
     return changed;
 }
 
 // The papers' views.
 bool draw_shown(trip_panel *p, trip_document *d)
 {
-    static const char *const shown[] = { "The function", "Lists", "Merge map", "Levels" };
-    static const char *const legends[] = { "", "along x red, y green, z blue",
-                                           "their weights: x red, y green, z blue",
-                                           "white the finest, then blue, green, yellow, ..." };
+    static const char *const shown[] = { "Off", "Lists", "Merge weights", "Levels of detail" };
+    static const char *const legends[] = { "", "list: X red, Y green, Z blue",
+                                           "weight: X red, Y green, Z blue",
+                                           "finest white, then blue, green, yellow, ..." };
     triptych_settings *s = &d->settings;
-    const bool changed = choose(p, "Colours by", &s->show, shown, 4);
+    const bool changed = choose(p, "Debug view", &s->show, shown, 4);
     if (s->show)
         ImGui::TextDisabled("%s", legends[s->show]);
     return changed;
@@ -564,9 +563,9 @@ bool draw_shown(trip_panel *p, trip_document *d)
 
 bool draw_clip_box(trip_panel *p, trip_document *d)
 {
-    static const char *const labels[3][2] = { { "i from", "i to" },
-                                              { "j from", "j to" },
-                                              { "k from", "k to" } };
+    static const char *const labels[3][2] = { { "i min", "i max" },
+                                              { "j min", "j max" },
+                                              { "k min", "k max" } };
     triptych_clip *c = &d->settings.clip;
     bool changed = check(p, "Clip box", &c->box);
     if (changed && c->box && !(c->box_lo[0] < c->box_hi[0]))
@@ -642,7 +641,7 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
     const double part = f.memory_bytes ? static_cast<double>(f.peak_memory_bytes) /
                                              static_cast<double>(f.memory_bytes)
                                        : 0;
-    std::snprintf(text, sizeof text, "at most %s of %s",
+    std::snprintf(text, sizeof text, "peak %s of %s",
                   bytes_text(static_cast<double>(f.peak_memory_bytes)).c_str(),
                   bytes_text(static_cast<double>(f.memory_bytes)).c_str());
     ImGui::ProgressBar(static_cast<float>(part), ImVec2(-70 * static_cast<float>(p->scale), 0),
@@ -660,7 +659,7 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
                 bytes_text(static_cast<double>(f.bytes_read)).c_str(),
                 bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
                 static_cast<double>(f.splats) * 1e-6);
-    ImGui::TextWrapped("moving %.0f ms at 1/%.1f, detail of %.1f px; whole %.0f ms", s.moving_ms,
+    ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f, level of detail %.1f px; full: %.0f ms", s.moving_ms,
                        s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
     ImGui::PlotLines("##times", times, count, 0, "ms", 0, FLT_MAX,
                      ImVec2(ImGui::GetContentRegionAvail().x, 40 * static_cast<float>(p->scale)));
@@ -745,11 +744,11 @@ void draw_probe(ImDrawList *list, trip_viewer *v, const trip_document *d)
     if (ImGui::GetIO().WantCaptureMouse) // the pointer is over the panel or a list
         return;
     if (!(h.opacity > 0)) {
-        ImGui::SetTooltip("nothing is seen here");
+        ImGui::SetTooltip("nothing is visible here");
         return;
     }
-    ImGui::SetTooltip("value %.6g\nat %.6g, %.6g, %.6g\nvoxel %.1f, %.1f, %.1f\n%.6g from the "
-                      "eye, begins at %.6g\nopacity of the ray %.3g",
+    ImGui::SetTooltip("value %.6g\nposition %.6g, %.6g, %.6g\nvoxel %.1f, %.1f, %.1f\ndistance from "
+                      "the eye %.6g, of the first visible point %.6g\nopacity along the ray %.3g",
                       h.value, h.position[0], h.position[1], h.position[2], h.index[0], h.index[1],
                       h.index[2], h.depth, h.depth_first, h.opacity);
 }
@@ -778,8 +777,7 @@ void draw_making(ImDrawList *list, trip_viewer *v, const trip_document *d, doubl
     char text[160];
     const trip_maker_status s = trip_maker_get_status(v->maker);
     std::snprintf(text, sizeof text,
-                  "a quick version of %lld x %lld x %lld voxels; the whole is being bricked: %s "
-                  "%.0f %%",
+                  "preview with %lld x %lld x %lld voxels; bricking the full volume: %s %.0f %%",
                   static_cast<long long>(d->info.dims[0]), static_cast<long long>(d->info.dims[1]),
                   static_cast<long long>(d->info.dims[2]), s.stage, 100 * s.done);
     const double middle[2] = { v->picture_width / 2.0, v->height - 24 * scale };
@@ -807,22 +805,22 @@ void draw_keys(trip_viewer *v)
         { "left drag", "orbit" },
         { "shift left drag, middle drag", "pan" },
         { "control left drag", "roll" },
-        { "wheel", "nearer, farther" },
+        { "wheel", "move closer or farther" },
         { "right drag", "look around" },
-        { "w a s d, arrows, page up and down", "fly; shift: faster" },
-        { "f", "fit the data into the picture" },
-        { "x y z", "along an axis; shift: from the other end" },
+        { "w a s d, arrows, page up and down", "fly; with shift, faster" },
+        { "f", "fit the visible data into the picture" },
+        { "x y z", "look along an axis; with shift, from the other end" },
         { "1 2 3 4 5 6", "front, back, left, right, top, bottom" },
         { "0, home", "the default view" },
-        { "o", "perspective or parallel" },
-        { "[ ]", "field of view" },
-        { "b", "box" },
+        { "o", "switch between perspective and parallel view" },
+        { "[ ]", "narrow or widen the field of view" },
+        { "b", "show or hide the box" },
         { "p", "write the picture" },
-        { "c", "copy the camera as options" },
-        { "m", "mark the view as key of a path" },
-        { "t", "panel" },
+        { "c", "copy the view and the settings as options" },
+        { "m", "add the view to the path as a key frame" },
+        { "t", "show or hide the panel" },
         { "tab", "next data set" },
-        { "F1, ?", "these keys" },
+        { "F1, ?", "show these keys" },
         { "q", "quit" },
         { "escape", "close this list, or quit" },
     };
@@ -878,7 +876,7 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         draw_view(p, v, d);
     if (!d->opened)
         return;
-    if (section(p, "Function"))
+    if (section(p, "Transfer function"))
         draw_function(p, v, d);
     if (section(p, "Light"))
         v->changed |= draw_light(p, d);
@@ -892,7 +890,7 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         v->changed |= draw_shown(p, d);
         draw_marks(p, v);
     }
-    if (section(p, "Gauges"))
+    if (section(p, "Statistics"))
         draw_gauges(p, v);
     if (section(p, "Plan", false))
         draw_plan(p, v);
@@ -983,7 +981,7 @@ int trip_panel_create(trip_panel **out, double scale)
     ImGui::DestroyContext(p->context);
     delete p;
     *out = nullptr;
-    return trip_fail(TRIP_ERROR, "view", "panel", "OpenGL does not take it");
+    return trip_fail(TRIP_ERROR, "view", "panel", "Dear ImGui cannot use this OpenGL context");
 }
 
 void trip_panel_destroy(trip_panel *p)

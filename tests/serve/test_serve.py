@@ -282,7 +282,7 @@ class Serve(program.ProgramTest):
 
     def test_what_is_automatic_is_called_so_as_on_the_command_line(self):
         _, _, page = self.ask("/")
-        self.assertIn(b'<option value="auto">auto</option>', page)
+        self.assertIn(b'<option value="auto">Automatic</option>', page)
 
     def test_only_this_machine_with_the_token_is_answered(self):
         for path in ("/", "/picture", "/status", "/presets", "/nothing"):

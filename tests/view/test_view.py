@@ -121,8 +121,8 @@ class View(program.ProgramTest):
     def test_heat_has_controls_and_is_of_its_data_set_alone(self):
         shutil.rmtree("state", ignore_errors=True)
         script = ("wait\npicture 0.exr\nclick 0.5 Emission\nwait\npicture 1.exr\n"
-                  "click 0.5 Emission\nclick 0.9 Hottest\nwait\npicture 2.exr\n"
-                  "click 0.1 Coldest\nwait\npicture 3.exr\n"
+                  "click 0.5 Emission\nclick 0.9 Maximum temperature\nwait\npicture 2.exr\n"
+                  "click 0.1 Minimum temperature\nwait\npicture 3.exr\n"
                   f"drop {os.path.abspath('ball.trip')}\nwait\npicture 4.exr\n")
         hot, cold, hotter, warmer, ball = self.pictures(script, range(5), *self.GLOWS, fresh=False)
         for a, b in (hot, cold), (cold, hotter), (hotter, warmer):
@@ -172,8 +172,8 @@ class View(program.ProgramTest):
 
     def test_effects_have_controls_that_draw_as_render_does(self):
         script = "wait\npicture 0.exr\nclick 0.1 Effects\n"
-        for i, control in enumerate(("Occlusion", "Depth cueing", "Fading", "Light from the eye",
-                                     "Light up", "Shadows", "Anisotropy", "Light cells"), 1):
+        for i, control in enumerate(("Occlusion", "Depth cueing", "Cueing strength", "Light from the eye",
+                                     "Light elevation", "Shadows", "Anisotropy", "Light cells"), 1):
             at = 0.01 if control == "Light cells" else 0.3  # the volume has few
             script += f"click {at} {control}\nwait\npicture {i}.exr\nstatus {i}.json\n"
         pictures = self.pictures(script, range(9), "noise.trip")
@@ -223,24 +223,24 @@ class View(program.ProgramTest):
                     "click 0.7 Field of view", "click 0.5 Fit", "click 0.5 Preset\nclick 0.5 hot-metal",
                     "click 0.3 Function editor", "click 0.5 Undo", "click 0.5 Redo",
                     "click 0.4 Opacity", "click 0.5 Shading", "click 0.5 Shading",
-                    "click 0.5 Light from the eye\nclick 0.2 Light round", "click 0.9 Light up",
+                    "click 0.5 Light from the eye\nclick 0.2 Light azimuth", "click 0.9 Light elevation",
                     "click 0.4 Light distance",
-                    "click 0.5 Classify\nclick 0.5 Before splatting",
-                    "click 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Sheet by sheet",
-                    "click 0.2 h",
+                    "click 0.5 Classification\nclick 0.5 Pre (splats)",
+                    "click 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Per sheet",
+                    "click 0.2 Blend start (h)",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
-                    "click 0.4 Samples", "click 0.5 Classify\nclick 0.5 After interpolation",
-                    "click 0.9 Slices", "click 0.5 Classify\nclick 0.5 Auto",
-                    "click 0.5 Classify\nclick 0.5 After interpolation",
+                    "click 0.4 Antialiasing", "click 0.5 Classification\nclick 0.5 Post (interpolation)",
+                    "click 0.9 Samples per sheet", "click 0.5 Classification\nclick 0.5 Automatic",
+                    "click 0.5 Classification\nclick 0.5 Post (interpolation)",
                     "click 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\n"
-                    "click 0.4 i from", "click 0.6 j to", "click 0.3 k from",
+                    "click 0.4 i min", "click 0.6 j max", "click 0.3 k min",
                     "click 0.5 Add plane", "click 0.6 Plane 1", "click 0.5 Flip 1",
                     "click 0.5 Add plane\nclick 0.6 Plane 2", "click 0.5 Remove 1",
                     "click 0.5 Clip box", "click 0.5 Clip the data", "click 0.5 Clipping",
-                    "click 0.5 Colours by\nclick 0.5 Lists",
-                    "click 0.5 Colours by\nclick 0.5 Merge map",
-                    "click 0.5 Colours by\nclick 0.5 Levels",
-                    "click 0.5 Colours by\nclick 0.5 The function", "click 0.5 Top"]
+                    "click 0.5 Debug view\nclick 0.5 Lists",
+                    "click 0.5 Debug view\nclick 0.5 Merge weights",
+                    "click 0.5 Debug view\nclick 0.5 Levels of detail",
+                    "click 0.5 Debug view\nclick 0.5 Off", "click 0.5 Top"]
         unchanged = ["click 0.5 Clipping"]
         script = "wait\nkey 3\nwait\npicture 0.exr\n" + "".join(
             f"{text}\nwait\npicture {i + 1}.exr\n" for i, text in enumerate(controls))
@@ -248,7 +248,7 @@ class View(program.ProgramTest):
 
     def test_what_is_cut_is_copied_kept_and_marked(self):
         self.view("wait\nclick 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\n"
-                  "click 0.4 i from\nclick 0.6 k to\nclick 0.5 Add plane\nclick 0.55 Plane 1\n"
+                  "click 0.4 i min\nclick 0.6 k max\nclick 0.5 Add plane\nclick 0.55 Plane 1\n"
                   "drag left 100 100 160 130 5\nwait\npicture cut.exr\nstatus status.json\n",
                   "noise.trip", fresh=False)
         camera = shlex.split(self.status()["camera"])
@@ -368,7 +368,7 @@ class View(program.ProgramTest):
 
     def test_values_that_were_not_kept_are_bricked_again(self):
         self.works("brick", "noise.nrrd", "-o", "part.trip", "--range=200:255")
-        self.view("wait\npicture before.exr\nclick 0.5 Brick again with all values\nwait\n"
+        self.view("wait\npicture before.exr\nclick 0.5 Brick again with all voxels\nwait\n"
                   "picture after.exr\nstatus status.json\n", "part.trip", "--tf=grey")
         camera = shlex.split(self.status()["camera"])
         self.works("render", "noise.trip", *camera, "--tf=grey", "--background=0,0,0", "-o",
@@ -379,7 +379,7 @@ class View(program.ProgramTest):
         # Its volume is no longer beside it.
         os.mkdir("elsewhere")
         shutil.copytree("part.trip", "elsewhere/part.trip")
-        self.view("wait\nclick 0.5 Brick again with all values\nwait\nscreenshot alone.exr\n"
+        self.view("wait\nclick 0.5 Brick again with all voxels\nwait\nscreenshot alone.exr\n"
                   "status status.json\n", "elsewhere/part.trip", "--tf=grey")
         self.assertTrue(self.status()["exact"], self.status())
 
