@@ -29,48 +29,52 @@ enum {
 };
 
 static const struct argp_option options[] = {
+    { "force", KEY_FORCE, NULL, 0, "Replaces an existing report", 0 },
     { "output", 'o', "REPORT/", 0,
-      "Folder to write: accuracy.json, accuracy.csv, index.html (default: NAME.accuracy)", 0 },
-    { "force", KEY_FORCE, NULL, 0, "Replace a report of that name", 0 },
-    { NULL, 0, NULL, 0, "What is measured:", 1 },
-    { "settings", KEY_SETTINGS, "PATTERN[,...]", 0,
-      "Only settings of such names, as of a shell: 'post*,pre,quality-*' (default: all)", 1 },
-    { "list", KEY_LIST, NULL, 0, "Print the names of the settings", 1 },
-    { "source", KEY_SOURCE, "VOLUME", 0,
-      "The volume that the data set was made of: the integral is of it, and what storing loses is "
-      "a step of its own",
-      1 },
+      "Names the folder of the report: accuracy.json, accuracy.csv and index.html (default: "
+      "NAME.accuracy)",
+      0 },
+    { "quiet", KEY_QUIET, NULL, 0, "Prints no progress", 0 },
+    { NULL, 0, NULL, 0, "Settings and data:", 1 },
     { "also", KEY_ALSO, "OTHER.trip", 0,
-      "A data set of the same volume kept otherwise (halo, bits, levels), drawn by the defaults; "
-      "up to 7",
-      1 },
+      "Adds a data set of the same volume with another halo, code bits or normals; up to 7", 1 },
     { "compare", KEY_COMPARE, "COMMAND", 0,
-      "Another program that draws the same views of the source, up to 4; none: nor VTK's ray "
-      "caster, "
-      "which is one where it is installed: see triptych-accuracy(1)",
+      "Measures another program in the same views, up to 4; requires --source; none leaves out the "
+      "ray caster of VTK",
+      1 },
+    { "list", KEY_LIST, NULL, 0, "Prints the names of all settings, and ends", 1 },
+    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 1),
+    { "settings", KEY_SETTINGS, "PATTERN[,...]", 0,
+      "Measures only settings with such names, with the wildcards of a shell: "
+      "'post*,pre,quality-*' (default: all)",
+      1 },
+    { "source", KEY_SOURCE, "VOLUME", 0,
+      "Compares with the integral through this volume, from which the data set was made, and "
+      "measures the error of storing",
       1 },
     TRIP_OPTION_TF(KEY_TF, 1),
-    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 1),
-    { NULL, 0, NULL, 0, "How:", 2 },
-    { "views", KEY_VIEWS, "N", 0,
-      "Views round the object, in turns perspective, parallel, from inside, wide (default: 4)", 2 },
-    { "size", KEY_SIZE, "WxH", 0, "Pixels, 32 to 4096 a side (default: 256x256)", 2 },
-    { "samples", KEY_SAMPLES, "N", 0,
-      "N x N rays a pixel in the integral (default: 1); settings of so many samples are compared "
-      "from 2 on",
-      2 },
-    { "repeat", KEY_REPEAT, "N", 0, "Timed frames of each view and setting (default: 3)", 2 },
-    { "tolerance", KEY_TOLERANCE, "E", 0, "Of the integral, 1e-8 to 0.01 (default: 1e-4)", 2 },
-    { "no-ladder", KEY_NO_LADDER, NULL, 0,
-      "Only what ran against the integral, without the steps between, which take most of the time",
-      2 },
+    { NULL, 0, NULL, 0, "Measurement:", 2 },
     { "budget", KEY_BUDGET, "SECONDS", 0,
-      "Nothing is begun after so long; what was left out is listed (default: no end)", 2 },
+      "Starts no setting after this time, and lists those left out (default: unlimited)", 2 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 2),
+    { "no-ladder", KEY_NO_LADDER, NULL, 0,
+      "Measures only total errors, without the steps that each error consists of; the steps take "
+      "most of the time",
+      2 },
+    { "pictures", KEY_PICTURES, NULL, 0, "Keeps every picture, as OpenEXR", 2 },
+    { "repeat", KEY_REPEAT, "N", 0,
+      "Sets the timed frames per view and setting, 1 to 1000 (default: 3)", 2 },
+    { "samples", KEY_SAMPLES, "N", 0,
+      "Draws the integral with N x N rays per pixel, 1 to 16 (default: 1)", 2 },
+    { "size", KEY_SIZE, "WxH", 0,
+      "Sets the picture size in pixels, 32 to 4096 a side (default: 256x256)", 2 },
     TRIP_OPTION_THREADS(KEY_THREADS, 2),
-    { "memory", KEY_MEMORY, "SIZE", 0,
-      "Memory for all data (default: a quarter of what may be used)", 2 },
-    { "pictures", KEY_PICTURES, NULL, 0, "Keep every picture too, as OpenEXR", 2 },
-    { "quiet", KEY_QUIET, NULL, 0, "No progress", 2 },
+    { "tolerance", KEY_TOLERANCE, "E", 0,
+      "Bounds the error of each component of the integral, 1e-8 to 0.01 (default: 1e-4)", 2 },
+    { "views", KEY_VIEWS, "N", 0,
+      "Sets the number of views around the object, 1 to 1000: perspective, parallel, from inside "
+      "and wide in turns (default: 4)",
+      2 },
     { 0 },
 };
 
@@ -206,9 +210,9 @@ int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
         .options = options,
         .parser = parse_key,
         .args_doc = "NAME.trip",
-        .doc = "Measures what each setting that trades accuracy for time costs and errs on a data "
-               "set, against the emission-absorption integral, and writes a report: JSON, CSV and "
-               "a page.",
+        .doc = "Measures the time and the error of every setting that trades accuracy for time, on "
+               "one data set. The error is the difference from the emission-absorption integral. "
+               "Writes a report: JSON, CSV and a page. `triptych render --error` reads it.",
     };
     *o = (accuracy_options){ .width = 256,
                              .height = 256,

@@ -119,7 +119,7 @@ static int measure(bench_options *o, bench_report *r)
 static void print_tables(void)
 {
     printf("`triptych bench TABLE NAME.trip` measures a data set; the tables:\n%s\n"
-           "In short, on the included tooth, what renderers takes:\n\n",
+           "A short run of the table renderers, on the included tooth:\n\n",
            BENCH_TABLES);
     fflush(stdout);
 }

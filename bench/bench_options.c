@@ -39,64 +39,71 @@ enum {
 #define OF_LEVELS (BIT(KEY_FIELD) | BIT(KEY_FINEST))
 
 static const struct argp_option options[] = {
-    TRIP_OPTION_TF(KEY_TF, 0),
-    { "size", KEY_SIZE, "WxH[,...]", 0,
-      "Pixels (default: 512x512; renderers 512x512,1024x1024; stream 1024x1024; popping, levels "
-      "256x256; variants 128x128; flight 800x600)",
-      0 },
+    { "json", KEY_JSON, NULL, 0, "Prints JSON", 0 },
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 0),
+    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 0),
     { "renderer", KEY_RENDERER, "NAME[,...]", 0,
-      "gl, cpu, reference or auto (default: auto; submit gl, variants reference; renderers all "
-      "there "
-      "are; popping, "
-      "levels cpu)",
-      0 },
-    { "threads", KEY_THREADS, "N[,...]", 0, "Threads that draw or read (default: one a processor)",
+      "Selects the renderers: gl, cpu, reference or auto (default: auto; renderers: all available; "
+      "popping, levels and ewa: cpu); submit is always gl, variants always reference",
       0 },
     { "repeat", KEY_REPEAT, "N", 0,
-      "Runs, in turns, to take the middle one of (default: 5; renderers 1)", 0 },
-    { "views", KEY_VIEWS, "N", 0,
-      "Views round the object (default: 20; levels 3); renderers and levels only", 0 },
-    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 0),
-    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 0 },
-    { "occluded", KEY_OCCLUDED, "skip|draw", 0,
-      "Whether bricks behind what is opaque are read (default: stream draw, renderers skip); skip "
-      "by cpu only",
+      "Sets the number of runs, 1 to 1000; a figure is their median (default: 5; renderers: 1)",
       0 },
-    { "engine", KEY_ENGINE, "NAME", 0, "auto, io_uring or pread (default: auto); stream, flight",
+    { "size", KEY_SIZE, "WxH[,...]", 0,
+      "Sets the picture sizes in pixels (default: 512x512; renderers: 512x512,1024x1024; stream: "
+      "1024x1024; popping and levels: 256x256; variants: 128x128; flight: 800x600)",
       0 },
-    TRIP_OPTION_MEMORY(KEY_MEMORY, 0),
-    { "no-counts", KEY_NO_COUNTS, NULL, 0,
-      "Only times: splats and pixels are not counted, which takes long; renderers only", 0 },
+    TRIP_OPTION_TF(KEY_TF, 0),
+    { "threads", KEY_THREADS, "N[,...]", 0,
+      "Sets the numbers of threads that draw and read, 1 to 256 (default: one per processor)", 0 },
+    { NULL, 0, NULL, 0, "Options of some tables:", 1 },
     { "classify", KEY_CLASSIFY, "pre|post", 0,
-      "As of `triptych render` (default: pre); renderers, stream, popping and levels only", 0 },
-    { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
-      "As of `triptych render`, pre (default: splat); renderers, stream, popping and levels only",
-      0 },
-    { "samples-per-sheet", KEY_SAMPLES_PER_SHEET, "N", 0,
-      "Slices of a sheet, post (default: by the view); renderers, stream, popping and levels only",
-      0 },
-    { "slices", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0 },
+      "Selects the classification, as in `triptych render` (default: pre); renderers, stream, "
+      "popping and levels only",
+      1 },
     { "early-termination", KEY_EARLY_TERMINATION, "T", 0,
-      "As of `triptych render` (default: pre 1/8192, post 1/512); renderers, stream, popping and "
-      "levels only",
-      0 },
-    { "saturation", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0 },
-    { "field", KEY_FIELD, "NAME", 0,
-      "What is sampled finer and finer: marschner-lobb, cloud, shells or filaments (default: "
-      "shells); levels without a data set only",
-      0 },
-    { "finest", KEY_FINEST, "N", 0,
-      "Up to so many voxels along each axis: 128, 256, 512 or 1024 (default: 512); levels "
-      "without a data set only",
-      0 },
+      "Sets the transmittance below which a pixel stops, 0 to 0.1 (default: post 1/512, pre "
+      "1/8192); renderers, stream, popping and levels only",
+      1 },
+    { "saturation", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 1 },
+    { "engine", KEY_ENGINE, "NAME", 0,
+      "Selects how files are read: io_uring, pread or auto (default: auto); stream and flight only",
+      1 },
+    { "no-counts", KEY_NO_COUNTS, NULL, 0,
+      "Measures only times, and does not count splats and pixels; renderers only", 1 },
+    { "occluded", KEY_OCCLUDED, "skip|draw", 0,
+      "Selects whether cpu reads bricks behind opaque ones (default: renderers skip, stream draw); "
+      "renderers and stream only",
+      1 },
     { "plot", KEY_PLOT, "FILE", 0,
-      "Draws its table into an .svg; popping, or levels without a data set", 0 },
-    { "seconds", KEY_SECONDS, "N", 0, "How long the eye moves (default: 12); flight only", 0 },
+      "Draws the table into an .svg file; popping, and levels without a data set, only", 1 },
+    { "samples-per-sheet", KEY_SAMPLES_PER_SHEET, "N", 0,
+      "Sets the samples per sheet of post, 1 to 16 (default: automatic); renderers, stream, "
+      "popping and levels only",
+      1 },
+    { "slices", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 1 },
+    { "views", KEY_VIEWS, "N", 0,
+      "Sets the number of views around the object, 1 to 1000 (default: 20; levels: 3); renderers "
+      "and levels only",
+      1 },
+    { NULL, 0, NULL, 0, "levels without a data set:", 2 },
+    { "field", KEY_FIELD, "NAME", 0,
+      "Selects the object: marschner-lobb, cloud, shells or filaments (default: shells)", 2 },
+    { "finest", KEY_FINEST, "N", 0,
+      "Sets the largest number of voxels along each axis: 128, 256, 512 or 1024 (default: 512)",
+      2 },
+    { NULL, 0, NULL, 0, "flight:", 3 },
     { "fps", KEY_FPS, "N", 0,
-      "Frames a second that moving views are drawn for, as of `triptych view` (default: 30); "
-      "flight only",
-      0 },
-    { "json", KEY_JSON, NULL, 0, "Print JSON", 0 },
+      "Sets the target frames per second, 1 to 1000, as in `triptych view` (default: 30)", 3 },
+    { "seconds", KEY_SECONDS, "N", 0,
+      "Sets how long the eye moves, 0.1 to 600 seconds (default: 12)", 3 },
+    { NULL, 0, NULL, 0, "Variants of the papers:", 4 },
+    { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
+      "Selects what pre composites, as in `triptych render` (default: splat); renderers, stream, "
+      "popping and levels only",
+      4 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0,
+      "Sets the radius of a splat, 0.1 to 100 (default: 2); not for flight", 4 },
     { 0 },
 };
 
@@ -416,8 +423,8 @@ static int check(parse *p)
     if (status)
         return status;
     const struct table *t = &tables[which];
-    for (int i = 0; options[i].name; i++)
-        if (p->given & t->refused & BIT(options[i].key))
+    for (size_t i = 0; i < sizeof options / sizeof *options; i++)
+        if (options[i].key && p->given & t->refused & BIT(options[i].key))
             return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
                              options[i].name);
     if (o->input && !strcmp(t->name, "levels") && p->given & (OF_LEVELS | BIT(KEY_PLOT)))
@@ -459,11 +466,10 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
         .options = options,
         .parser = parse_key,
         .args_doc = "[TABLE [NAME.trip]]",
-        .doc = "Measures drawing a data set made by `triptych brick` and prints a "
-               "table:\n" BENCH_TABLES
-               "\vWithout NAME.trip the included volume is measured, and without TABLE, in less "
-               "than a minute, the renderers cpu and gl. What is compared takes turns, so that a "
-               "machine busy for a while slows all of them.",
+        .doc = "Measures how fast this machine draws a data set, and prints a table:\n" BENCH_TABLES
+               "\vWithout NAME.trip, bench measures the included tooth. Without TABLE it measures "
+               "the renderers cpu and gl, in less than a minute. Compared settings take turns, so "
+               "that other load slows all of them.",
     };
     *o = (bench_options){ .field = "shells",
                           .finest = 512,

@@ -33,17 +33,17 @@ typedef struct bench_options {
     bench_progress *progress; /* no option: where it is shown how far the table is; may be NULL */
 } bench_options;
 
-/* The tables there are, a line each. */
+/* A line for each table. */
 #define BENCH_TABLES                                                                               \
-    "  orders     the list methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
-    "  submit     the forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                \
-    "  stream     reading and drawing against the disk's bandwidth\n"                              \
-    "  renderers  the renderers there are, over views round the object\n"                          \
-    "  popping    how much pixels jump where the axis of most weight changes\n"                    \
-    "  levels     how far coarse levels are from the finest; what an object sampled finer takes\n" \
-    "  flight     the viewer's drawing while the eye turns, approaches and flies through\n"        \
-    "  ewa        how far EWA's affine approximation is from the exact form, and its time\n"       \
-    "  variants   what the papers' fixed sprites, weights of vertices and others change\n"
+    "  renderers  speed of each renderer, in views around the object\n"                            \
+    "  stream     reading and drawing from disk, beside the speed of the disk\n"                   \
+    "  flight     frame times of the viewer in a flight through the object\n"                      \
+    "  levels     error of each coarse level; cost of finer and finer volumes\n"                   \
+    "  popping    jumps of pixels while the list of highest weight changes\n"                      \
+    "  ewa        error and time of the affine EWA footprints\n"                                   \
+    "  orders     ordering methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
+    "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                    \
+    "  variants   changes of the picture by the shortcuts of the papers\n"
 
 /* 0, or TRIP_USAGE once reported; --help prints and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);

@@ -11,12 +11,13 @@
       KEY_CLIP_BOX,                                                                                \
       "X,Y,Z,X,Y,Z",                                                                               \
       0,                                                                                           \
-      "Cut away what lies outside of the box from the first point to the second, in world units; " \
-      "of voxels:I,J,K,I,J,K in voxels",                                                           \
+      "Keeps only the inside of a box, from the first corner to the second, in world units; "      \
+      "voxels:I,J,K,I,J,K counts in voxels",                                                       \
       group },                                                                                     \
     {                                                                                              \
         "clip-plane", KEY_CLIP_PLANE, "A,B,C,D", 0,                                                \
-            "Cut away what has A x + B y + C z + D < 0, in world units; up to 6 times", group      \
+            "Keeps only the points with A x + B y + C z + D >= 0, in world units; up to 6 planes", \
+            group                                                                                  \
     }
 
 /* "X,Y,Z,X,Y,Z", or the same in voxels behind "voxels:". */

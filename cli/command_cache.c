@@ -22,7 +22,7 @@ typedef struct options {
 enum { KEY_JSON = 256 };
 
 static const struct argp_option option_table[] = {
-    { "json", KEY_JSON, NULL, 0, "Print the list as JSON", 0 },
+    { "json", KEY_JSON, NULL, 0, "Prints the list as JSON; list only", 0 },
     { 0 },
 };
 
@@ -191,7 +191,7 @@ int trip_command_cache(int argc, char **argv)
         .options = option_table,
         .parser = parse_option,
         .args_doc = "list|clear",
-        .doc = "Lists or removes the data sets that `triptych render` made of volumes.",
+        .doc = "Lists or removes the data sets that render, view and serve made of volumes.",
     };
     options o = { 0 };
     cache_folder c = { .fd = -1 };

@@ -22,8 +22,8 @@ typedef struct options {
 } options;
 
 static const struct argp_option option_table[] = {
-    { "verify", 'v', NULL, 0, "Read everything and check it", 0 },
-    { "json", 'j', NULL, 0, "Print JSON", 0 },
+    { "verify", 'v', NULL, 0, "Reads all bytes and checks them", 0 },
+    { "json", 'j', NULL, 0, "Prints JSON", 0 },
     { 0 },
 };
 
@@ -430,7 +430,7 @@ int trip_command_info(int argc, char **argv)
         .options = option_table,
         .parser = parse_option,
         .args_doc = "NAME.trip",
-        .doc = "Show what is in a data set: grid, values, sizes, where it came from.",
+        .doc = "Prints the contents of a data set: grid, values, sizes and source.",
     };
     options o = { 0 };
     data_set d = { 0 };

@@ -51,22 +51,34 @@ typedef struct serve_options {
 } serve_options;
 
 static const struct argp_option options[] = {
-    { "port", KEY_PORT, "N", 0, "Port to listen at, of 127.0.0.1 (default: one that is free)", 1 },
-    { "fps", KEY_FPS, "N", 0, "Frames a second while the view moves (default: 30)", 1 },
-    { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 1 },
-    TRIP_OPTIONS_QUALITY(1),
+    { NULL, 0, NULL, 0, "Server:", 1 },
+    { "fps", KEY_FPS, "N", 0,
+      "Sets the target frames per second of a moving view, 1 to 1000 (default: 30)", 1 },
+    { "port", KEY_PORT, "N", 0,
+      "Sets the port of 127.0.0.1, 0 to 65535; 0 selects a free port (default: 0)", 1 },
+    { NULL, 0, NULL, 0, "Look (the page changes it):", 2 },
+    { "tf", KEY_TF, "NAME|FILE", 0,
+      "Selects the transfer function, a preset or a file (default: the one in the data set)", 2 },
+    TRIP_OPTION_LIGHT(2),
+    TRIP_OPTIONS_EFFECTS(2),
+    TRIP_OPTIONS_EMISSION(2),
+    TRIP_OPTIONS_CLIP(2),
+    { NULL, 0, NULL, 0, "Accuracy and speed:", 3 },
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
-      "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 1 },
-    TRIP_OPTION_LIGHT(1),
-    TRIP_OPTIONS_EFFECTS(1),
-    TRIP_OPTIONS_EMISSION(1),
-    TRIP_OPTIONS_CLIP(1),
-    { "renderer", KEY_RENDERER, "NAME", 0, "gl, cpu or auto (default: auto)", 1 },
-    TRIP_OPTION_MEMORY(KEY_MEMORY, 1),
-    TRIP_OPTION_ENGINE(KEY_ENGINE, 1),
-    TRIP_OPTION_THREADS(KEY_THREADS, 1),
-    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 2 },
-    TRIP_OPTIONS_VOLUME(2),
+      "Selects when values become colours: pre (before splatting), post (after interpolation) or "
+      "auto (default: auto, as in `triptych render`); excludes --error",
+      3 },
+    TRIP_OPTIONS_QUALITY(3),
+    { NULL, 0, NULL, 0, "Renderer and resources:", 4 },
+    TRIP_OPTION_ENGINE(KEY_ENGINE, 4),
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 4),
+    { "renderer", KEY_RENDERER, "NAME", 0,
+      "Selects the renderer: gl, cpu or auto, which is gl on graphics hardware, else cpu (default: "
+      "auto)",
+      4 },
+    TRIP_OPTION_THREADS(KEY_THREADS, 4),
+    { NULL, 0, NULL, 0, "Volume (not for a data set, which has these fixed):", 5 },
+    TRIP_OPTIONS_VOLUME(5),
     { 0 },
 };
 
@@ -242,15 +254,12 @@ int trip_command_serve(int argc, char **argv)
         .options = options,
         .parser = parse_key,
         .args_doc = "VOLUME|NAME.trip",
-        .doc =
-            "Shows a volume, or a data set made of one by `triptych brick`, in a browser on this "
-            "machine, at the address that is printed, until "
-            "it is interrupted. A moving view is sent as JPEG, as large as its time allows; at "
-            "rest the picture that `triptych render` draws is sent as PNG. It listens to 127.0.0.1 "
-            "alone and answers addresses with its token alone; to look from another machine, "
-            "forward the port by ssh -L, to the same number there. A volume is bricked into a "
-            "cache first, which `triptych "
-            "cache` lists and clears.",
+        .doc = "Shows a volume or a data set in a browser, at the address that this command "
+               "prints, until it is interrupted. A moving view is sent as JPEG. At rest the page "
+               "gets the picture of `triptych render` as PNG. The server listens to 127.0.0.1 "
+               "only, and answers only requests with the token in the address. To look from "
+               "another machine, forward the port with ssh -L to the same number. A volume is "
+               "first bricked into a cache; `triptych cache` lists and clears the cache.",
     };
     serve_options o = {
         .params = { .settings = triptych_default_settings(),

@@ -31,16 +31,17 @@ typedef struct options {
 } options;
 
 static const struct argp_option option_table[] = {
-    { "tf", KEY_TF, "NAME|FILE", 0,
-      "For a data set or a volume: this function, made for it (default: the data set's own, the "
-      "volume's automatic one)",
-      0 },
-    { "range", KEY_RANGE, "LO:HI", 0, "The data's range, for a function that runs over it", 0 },
+    { "force", KEY_FORCE, NULL, 0, "Replaces OUT", 0 },
     { "format", KEY_FORMAT, "NAME", 0,
-      "tf, paraview, vp, vp.json (3D Slicer), slicer (presets in XML) or vtk (XML); default: by "
-      "OUT's name: .tf, .json, .vp, .vp.json, .xml (slicer)",
+      "Selects the format of OUT: tf, paraview, vp or vp.json (3D Slicer), slicer (presets in XML) "
+      "or vtk (XML) (default: by the name of OUT: .tf, .json, .vp, .vp.json, .xml for slicer)",
       0 },
-    { "force", KEY_FORCE, NULL, 0, "Replace OUT", 0 },
+    { "range", KEY_RANGE, "LO:HI", 0,
+      "Sets the range of the data, for a transfer function that runs over this range", 0 },
+    { "tf", KEY_TF, "NAME|FILE", 0,
+      "Selects the transfer function to adapt to the data set or volume IN (default: the one in "
+      "the data set, the automatic one of the volume)",
+      0 },
     { 0 },
 };
 
@@ -242,10 +243,9 @@ int trip_command_tf(int argc, char **argv)
         .options = option_table,
         .parser = parse_key,
         .args_doc = "list\nshow NAME|FILE|DATA.trip|VOLUME\nconvert IN OUT",
-        .doc =
-            "Lists the built-in transfer functions; shows one, or that of a data set or volume, as "
-            "`.tf` text; converts between the forms of other programs. IN is anything that can be "
-            "shown, OUT a file, or - for standard output.",
+        .doc = "Lists the built-in transfer functions; prints a transfer function, or the one of a "
+               "data set or volume, as `.tf` text; converts between the formats of other programs. "
+               "IN is anything that show takes. OUT is a file, or - for standard output.",
     };
     options o = { .format = -1 };
     int status = trip_options_parse(&argp, argc, argv, &o);

@@ -58,38 +58,55 @@ enum {
 
 static const struct argp_option options[] = {
     { NULL, 0, NULL, 0, "Window:", 1 },
-    { "size", KEY_SIZE, "WxH", 0, "Of the window (default: 1100x720)", 1 },
-    { "scale", KEY_SCALE, "X", 0, "Of texts and controls (default: the screen's)", 1 },
-    { "no-panel", KEY_NO_PANEL, NULL, 0, "Begin without the panel; t shows it", 1 },
     { "fps", KEY_FPS, "N", 0,
-      "Frames a second while the view moves, which are as small as that takes (default: 30)", 1 },
-    { "fresh", KEY_FRESH, NULL, 0,
-      "Begin as if the data were seen for the first time, and keep nothing of it", 1 },
-    { "script", KEY_SCRIPT, "FILE", 0, "Replay events, then end", 1 },
-    { NULL, 0, NULL, 0, "View and look, as of `triptych render`:", 2 },
-    { "view", KEY_VIEW, "SIDE", 0, "front, back, left, right, top, bottom or iso", 2 },
-    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 2 },
-    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at", 2 },
-    { "up", KEY_UP, "X,Y,Z", 0, "What is up", 2 },
-    { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (default: 30)", 2 },
-    { "ortho", KEY_ORTHO, "HEIGHT", 0, "Parallel view, so many world units high", 2 },
-    { "tf", KEY_TF, "NAME|FILE", 0, "Transfer function (default: kept in the data set)", 2 },
-    { "opacity-scale", KEY_OPACITY_SCALE, "X", 0, "Multiplies extinction", 2 },
-    TRIP_OPTIONS_QUALITY(2),
+      "Sets the target frames per second of a moving view, 1 to 1000 (default: 30)", 1 },
+    { "fresh", KEY_FRESH, NULL, 0, "Ignores the stored state of the data, and stores none", 1 },
+    { "no-panel", KEY_NO_PANEL, NULL, 0, "Starts without the panel; the key t shows it", 1 },
+    { "scale", KEY_SCALE, "X", 0,
+      "Sets the scale of texts and controls, 0.5 to 8 (default: the scale of the screen)", 1 },
+    { "script", KEY_SCRIPT, "FILE", 0, "Replays the events in a file, then ends", 1 },
+    { "size", KEY_SIZE, "WxH", 0, "Sets the size of the window in pixels (default: 1100x720)", 1 },
+    { NULL, 0, NULL, 0, "View:", 2 },
+    { "eye", KEY_EYE, "X,Y,Z", 0,
+      "Sets the position of the eye (default: so that the whole object is in view); excludes "
+      "--view",
+      2 },
+    { "fov", KEY_FOV, "DEGREES", 0,
+      "Sets the vertical angle of view, up to 179.999 (default: 30); excludes --ortho", 2 },
+    { "look", KEY_LOOK, "X,Y,Z", 0,
+      "Sets the point that the eye looks at (default: the middle of the visible object)", 2 },
+    { "ortho", KEY_ORTHO, "HEIGHT", 0, "Starts with a parallel view, HEIGHT world units high", 2 },
+    { "up", KEY_UP, "X,Y,Z", 0,
+      "Sets the direction that is up in the picture (default: as in `triptych render`)", 2 },
+    { "view", KEY_VIEW, "SIDE", 0,
+      "Selects the side that you see: front, back, left, right, top, bottom or iso (default: "
+      "front, a little from the left and from above)",
+      2 },
+    { NULL, 0, NULL, 0, "Look (the panel changes it):", 3 },
+    { "opacity-scale", KEY_OPACITY_SCALE, "X", 0,
+      "Multiplies the extinction: opacity o becomes 1-(1-o)^X (default: 1)", 3 },
+    { "tf", KEY_TF, "NAME|FILE", 0,
+      "Selects the transfer function, a preset or a file (default: the one in the data set)", 3 },
+    TRIP_OPTION_LIGHT(3),
+    TRIP_OPTIONS_EFFECTS(3),
+    TRIP_OPTIONS_EMISSION(3),
+    TRIP_OPTIONS_CLIP(3),
+    { NULL, 0, NULL, 0, "Accuracy and speed:", 4 },
     { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
-      "Before splatting, or after interpolation (default: auto, as of `triptych render`)", 2 },
-    TRIP_OPTION_LIGHT(2),
-    TRIP_OPTIONS_EFFECTS(2),
-    TRIP_OPTIONS_EMISSION(2),
-    TRIP_OPTIONS_CLIP(2),
-    { NULL, 0, NULL, 0, "Renderer:", 3 },
+      "Selects when values become colours: pre (before splatting), post (after interpolation) or "
+      "auto (default: auto, as in `triptych render`); excludes --error",
+      4 },
+    TRIP_OPTIONS_QUALITY(4),
+    { NULL, 0, NULL, 0, "Renderer and resources:", 5 },
+    TRIP_OPTION_ENGINE(KEY_ENGINE, 5),
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 5),
     { "renderer", KEY_RENDERER, "NAME", 0,
-      "gl, cpu or auto (default: auto: gl on graphics hardware, else cpu)", 3 },
-    TRIP_OPTION_MEMORY(KEY_MEMORY, 3),
-    TRIP_OPTION_ENGINE(KEY_ENGINE, 3),
-    TRIP_OPTION_THREADS(KEY_THREADS, 3),
-    { NULL, 0, NULL, 0, "Volumes (not data sets, of which it is part):", 4 },
-    TRIP_OPTIONS_VOLUME(4),
+      "Selects the renderer: gl, cpu or auto, which is gl on graphics hardware, else cpu (default: "
+      "auto)",
+      5 },
+    TRIP_OPTION_THREADS(KEY_THREADS, 5),
+    { NULL, 0, NULL, 0, "Volume (not for data sets, which have these fixed):", 6 },
+    TRIP_OPTIONS_VOLUME(6),
     { 0 },
 };
 
@@ -330,11 +347,11 @@ static int parse(view_options *o, int argc, char **argv)
         .options = options,
         .parser = parse_key,
         .args_doc = "[VOLUME|NAME.trip...]",
-        .doc = "Shows volumes, or data sets made of them by `triptych brick`, in a window: turned, "
-               "flown through and classified by hand. A moving view is drawn as large as its time "
-               "allows; at rest it becomes the picture that `triptych render` draws, bit for bit. "
-               "A volume is bricked into a cache first, which `triptych cache` lists and clears."
-               "\vF1 lists the keys. Files can be dropped on the window.",
+        .doc = "Shows volumes or data sets in a window, where you turn, cut, classify and fly "
+               "through them. A moving view is drawn with as little detail as keeps to --fps. At "
+               "rest the picture equals the picture of `triptych render`, bit for bit. A volume is "
+               "first bricked into a cache; `triptych cache` lists and clears the cache.\vF1 lists "
+               "the keys. Files can be dropped on the window.",
     };
     o->params.settings = triptych_default_settings();
     int status = trip_options_parse(&argp, argc, argv, o);

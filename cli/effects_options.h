@@ -12,8 +12,8 @@
 #define TRIP_OPTION_LIGHT(group)                                                                   \
     {                                                                                              \
         "light", KEY_LIGHT, "X,Y,Z|point:X,Y,Z|head", 0,                                           \
-            "Direction to the light, its place, or from the eye (default: head); what is not "     \
-            "shaded has it for --effects alone",                                                   \
+            "Sets the direction to the light, the position of the light, or a light at the eye "   \
+            "(default: head)",                                                                     \
             group                                                                                  \
     }
 #define TRIP_OPTIONS_EFFECTS(group)                                                                \
@@ -21,27 +21,28 @@
       KEY_EFFECTS,                                                                                 \
       "auto|none|LIST",                                                                            \
       0,                                                                                           \
-      "shadows (with scattering in fog, and a --light), occlusion (of light from everywhere), "    \
-      "emission (of heat), cueing (of depth), joined by commas; auto: those that the kind of "     \
-      "data calls for, which "                                                                     \
-      "for measurements are none (default: none)",                                                 \
+      "Switches effects on: shadows (require a --light other than head), occlusion, emission "     \
+      "(requires --emission) and cueing, joined by commas; auto chooses by the kind of data "      \
+      "(default: none)",                                                                           \
       group },                                                                                     \
         { "anisotropy",                                                                            \
           KEY_ANISOTROPY,                                                                          \
           "G",                                                                                     \
           0,                                                                                       \
-          "How fog scatters light: -0.95 backwards to 0.95 forwards (default: 0, alike)",          \
+          "Sets how fog scatters light: -0.95 (backwards) to 0.95 (forwards) (default: 0, "        \
+          "equally); requires --effects shadows or auto",                                          \
           group },                                                                                 \
         { "cueing",                                                                                \
           KEY_CUEING,                                                                              \
           "SHARE",                                                                                 \
           0,                                                                                       \
-          "Of the background in what is farthest, above 0 to 1 (default: 0.6)",                    \
+          "Sets the share of the background in the colour of the farthest parts, above 0 to 1 "    \
+          "(default: 0.6); requires --effects cueing or auto",                                     \
           group },                                                                                 \
     {                                                                                              \
         "light-cells", KEY_LIGHT_CELLS, "N", 0,                                                    \
-            "Cells of the lattice of shadows, occlusion and emission along the longest side, 8 "   \
-            "to 1024 (default: 128)",                                                              \
+            "Sets the number of lattice cells for shadows, occlusion and emission along the "      \
+            "longest side, 8 to 1024 (default: 128)",                                              \
             group                                                                                  \
     }
 
@@ -51,12 +52,12 @@
       KEY_EMISSION,                                                                                \
       "HEAT.trip",                                                                                 \
       0,                                                                                           \
-      "A data set of heat, as brick makes of another grid of the same file, by which what is "     \
-      "drawn glows; for --effects emission and auto",                                              \
+      "Reads heat from a second data set, for --effects emission or auto: hot matter glows",       \
       group },                                                                                     \
     {                                                                                              \
         "temperature", KEY_TEMPERATURE, "LO:HI", 0,                                                \
-            "Kelvin where heat is 0 and where it is greatest (default: 0:2500); --emission only",  \
+            "Sets the temperatures in kelvin of heat 0 and of the greatest heat, 0 to 100000 "     \
+            "(default: 0:2500); requires --emission",                                              \
             group                                                                                  \
     }
 

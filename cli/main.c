@@ -14,16 +14,17 @@ static const struct command {
     const char *name, *summary;
     int (*run)(int argc, char **argv);
 } commands[] = {
-    { "brick", "turn a volume into a data set that is drawn from disk", trip_command_brick },
-    { "info", "show what is in a data set, and check it", trip_command_info },
-    { "render", "draw a volume or data set into image files", trip_command_render },
-    { "view", "show volumes and data sets in a window", trip_command_view },
-    { "serve", "show a data set in a browser on this machine", trip_command_serve },
-    { "cache", "list or clear the data sets that render, view and serve made of volumes",
+    { "brick", "converts a volume into a data set that is drawn from disk", trip_command_brick },
+    { "info", "prints the contents of a data set, and checks it", trip_command_info },
+    { "render", "draws a volume or data set into image files", trip_command_render },
+    { "view", "shows volumes and data sets in a window", trip_command_view },
+    { "serve", "shows a volume or data set in a browser", trip_command_serve },
+    { "cache", "lists or clears the data sets that render, view and serve made of volumes",
       trip_command_cache },
-    { "bench", "measure drawing and reading, as tables", trip_command_bench },
-    { "accuracy", "measure what each setting errs and costs, as a report", trip_command_accuracy },
-    { "tf", "list, show and convert transfer functions", trip_command_tf },
+    { "bench", "measures speed, as tables", trip_command_bench },
+    { "accuracy", "measures the error and time of each setting, as a report",
+      trip_command_accuracy },
+    { "tf", "lists, prints and converts transfer functions", trip_command_tf },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 
@@ -38,8 +39,8 @@ static void print_help(void)
            "Draws volumes too large for memory.\n\n");
     for (int i = 0; i < COMMANDS; i++)
         printf("  %-8s %s\n", commands[i].name, commands[i].summary);
-    printf("\n`triptych COMMAND --help` shows a command's options; each has a man page,\n"
-           "triptych-COMMAND(1). `triptych --version` shows the version.\n");
+    printf("\n`triptych COMMAND --help` lists the options of a command. The man page\n"
+           "triptych-COMMAND(1) explains them. `triptych --version` prints the version.\n");
 }
 
 /* Where a standard stream is closed, its number must not go to a data file, which messages would

@@ -18,7 +18,7 @@ static char error_prefix[64], help_name[64];
 enum { KEY_HELP = 1000 };
 
 static const struct argp_option common_options[] = {
-    { "help", KEY_HELP, NULL, 0, "Show this help", -1 },
+    { "help", KEY_HELP, NULL, 0, "Prints this help", -1 },
     { 0 },
 };
 

@@ -31,63 +31,78 @@ int trip_option_choice(const char *option, const char *text, const char *const *
  * library's values; `names` says how many of them the command takes. */
 #define TRIP_OPTION_MEMORY(key, group)                                                             \
     {                                                                                              \
-        "memory", key, "SIZE", 0, "Memory for data (default: a quarter of what may be used)",      \
+        "memory", key, "SIZE", 0,                                                                  \
+            "Limits the memory for data, for example 256M or 2G (default: a quarter of the "       \
+            "memory that the process may use)",                                                    \
             group                                                                                  \
     }
 #define TRIP_OPTION_ENGINE(key, group)                                                             \
     {                                                                                              \
-        "engine", key, "NAME", 0, "auto, io_uring, pread or null (default: auto)", group           \
+        "engine", key, "NAME", 0,                                                                  \
+            "Selects how files are read: io_uring, pread, null (from memory) or auto (default: "   \
+            "auto)",                                                                               \
+            group                                                                                  \
     }
 #define TRIP_OPTION_THREADS(key, group)                                                            \
     {                                                                                              \
-        "threads", key, "N", 0, "Threads that draw or read (default: one a processor)", group      \
+        "threads", key, "N", 0,                                                                    \
+            "Sets the number of threads that draw and read, 1 to 256 (default: one per "           \
+            "processor)",                                                                          \
+            group                                                                                  \
     }
-/* Of `bench` and `accuracy`, which measure. */
+/* Rows of `bench` and `accuracy`. */
 #define TRIP_OPTION_TF(key, group)                                                                 \
     {                                                                                              \
         "tf", key, "NAME|FILE", 0,                                                                 \
-            "Transfer function, a preset's name or a file (default: kept in the data set)", group  \
+            "Selects the transfer function, a preset or a file (default: the one in the data "     \
+            "set)",                                                                                \
+            group                                                                                  \
     }
 #define TRIP_OPTION_NO_SHADING(key, group)                                                         \
     {                                                                                              \
-        "no-shading", key, NULL, 0, "Colours as they are; normals are not read", group             \
+        "no-shading", key, NULL, 0,                                                                \
+            "Draws the plain colours of the transfer function, and reads no normals", group        \
     }
-/* How volumes are read that are drawn without a data set; the keys are KEY_GRID, KEY_LEVEL_SET,
- * KEY_SPACING, KEY_COORDINATES, KEY_AXES and KEY_ALLOW_GAPS. */
+/* Rows for commands that read a volume. The keys are KEY_GRID, KEY_LEVEL_SET, KEY_SPACING,
+ * KEY_COORDINATES, KEY_AXES and KEY_ALLOW_GAPS. */
 #define TRIP_OPTIONS_VOLUME(group)                                                                 \
     { "grid",                                                                                      \
       KEY_GRID,                                                                                    \
       "NAME",                                                                                      \
       0,                                                                                           \
-      "OpenVDB grid (default: density, else the first fog, else the first one of scalars)",        \
+      "Selects a grid of an OpenVDB file or a variable of a netCDF file (default: density, else "  \
+      "the first fog volume or grid of scalars; the netCDF variable with the most numbers)",       \
       group },                                                                                     \
         { "level-set",                                                                             \
           KEY_LEVEL_SET,                                                                           \
           "HOW",                                                                                   \
           0,                                                                                       \
-          "What to make of an OpenVDB level set: filled or band (default: filled)",                \
+          "Selects how an OpenVDB level set becomes a density: filled or band (default: filled)",  \
           group },                                                                                 \
         { "spacing",                                                                               \
           KEY_SPACING,                                                                             \
           "X,Y,Z",                                                                                 \
           0,                                                                                       \
-          "Distance of voxels along each axis (default: the file's, else 1)",                      \
+          "Sets the distance of neighbouring voxels along each axis (default: the distance in "    \
+          "the file, else 1)",                                                                     \
           group },                                                                                 \
         { "coordinates",                                                                           \
           KEY_COORDINATES,                                                                         \
           "X.txt,Y.txt,Z.txt",                                                                     \
           0,                                                                                       \
-          "Where voxels lie along each axis, by files of numbers; empty: evenly",                  \
+          "Reads the position of each voxel along each axis from files of numbers; an axis "       \
+          "without a file is even",                                                                \
           group },                                                                                 \
         { "axes",                                                                                  \
           KEY_AXES,                                                                                \
           "PIR",                                                                                   \
           0,                                                                                       \
-          "Where in the patient x, y and z point to, where the file does not say: posterior, "     \
-          "inferior, right",                                                                       \
+          "Gives the orientation of a patient if the file does not: where x, y and z point to, "   \
+          "here posterior, inferior and right",                                                    \
           group },                                                                                 \
     {                                                                                              \
-        "allow-gaps", KEY_ALLOW_GAPS, NULL, 0, "Go on where slices of a stack are missing", group  \
+        "allow-gaps", KEY_ALLOW_GAPS, NULL, 0,                                                     \
+            "Accepts a stack with missing slices, as if the neighbours of a gap touched", group    \
     }
 int trip_option_memory(const char *text, uint64_t *out);
 int trip_option_threads(const char *text, int *out);

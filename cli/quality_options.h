@@ -27,19 +27,19 @@ typedef struct quality_options {
       KEY_QUALITY,                                                                                 \
       "NAME",                                                                                      \
       0,                                                                                           \
-      "draft, normal, high or exact: settings that come closer to the integral and take longer, "  \
-      "of which triptych-accuracy(1) has the figures (default: normal)",                           \
+      "Selects how close the picture comes to the exact integral: draft, normal, high or exact; "  \
+      "closer takes longer (default: normal)",                                                     \
       group },                                                                                     \
         { "error",                                                                                 \
           KEY_ERROR,                                                                               \
           "E",                                                                                     \
           0,                                                                                       \
-          "The fastest settings that `triptych accuracy` measured to stay below E of 255 at the "  \
-          "99th percentile of pixels on this data",                                                \
+          "Selects the fastest settings that keep 99 % of the pixels within E of 255, as "         \
+          "`triptych accuracy` measured for this data; excludes --quality",                        \
           group },                                                                                 \
     {                                                                                              \
         "report", KEY_REPORT, "REPORT/", 0,                                                        \
-            "The report that --error takes (default: NAME.accuracy beside the data)", group        \
+            "Names the report that --error reads (default: NAME.accuracy beside the data)", group  \
     }
 
 int quality_option_quality(const char *text, quality_options *q);

@@ -90,173 +90,189 @@ enum {
 };
 
 static const struct argp_option options[] = {
-    { "output", 'o', "FILE", 0,
-      "Image to write: .png, .exr, .tif or .jpg; of --orbit and --path also a video: .mp4, .mov, "
-      ".mkv or .webm, by ffmpeg",
-      0 },
-    { NULL, 0, NULL, 0, "View:", 1 },
-    { "size", KEY_SIZE, "WxH", 0, "Pixels (default: 1024x1024)", 1 },
-    { "view", KEY_VIEW, "SIDE", 0,
-      "front, back, left, right, top, bottom or iso (default: front, a little from the left and "
-      "above). Left and right are the object's own: a patient's left, or, as of a person facing "
-      "you, what is on your right in front",
-      1 },
-    { "azimuth", KEY_AZIMUTH, "DEGREES", 0, "From there go round the object, to your right", 1 },
-    { "elevation", KEY_ELEVATION, "DEGREES", 0, "and up", 1 },
-    { "roll", KEY_ROLL, "DEGREES", 0, "Turn the picture clockwise", 1 },
-    { "zoom", KEY_ZOOM, "FACTOR", 0, "Magnify, as another lens would (default: 1)", 1 },
-    { "up", KEY_UP, "X,Y,Z", 0,
-      "What is up; the sides follow it (default: 0,0,1; OpenVDB 0,1,0; where the file says "
-      "nothing, "
-      "0,-1,0 for what is mirror-symmetric across z, 0,0,-1 for thick slices, else away from the "
-      "one level side)",
-      1 },
-    { "eye", KEY_EYE, "X,Y,Z", 0, "Where to look from (default: so that all is in view)", 1 },
-    { "look", KEY_LOOK, "X,Y,Z", 0, "What to look at (default: the middle of what is visible)", 1 },
-    { "fov", KEY_FOV, "DEGREES", 0, "Vertical angle of view (default: 30)", 1 },
-    { "ortho", KEY_ORTHO, "HEIGHT|fit", 0,
-      "Parallel view, HEIGHT world units high, or so that all is in view", 1 },
-    { "orbit", KEY_ORBIT, "N", 0, "N images once round: FILE-000.png, ...; or a video", 1 },
-    { "path", KEY_PATH, "FILE.json", 0,
-      "Images along a path of the camera, as triptych-render(1) describes it: FILE-000.png, ...; "
-      "or "
-      "a video",
-      1 },
-    { "fps", KEY_FPS, "N", 0,
-      "Images a second of a video; a path takes as long with more of them (default: the path's, "
-      "else 30)",
-      1 },
-    { NULL, 0, NULL, 0, "Look:", 2 },
-    { "tf", KEY_TF, "NAME|FILE", 0,
-      "Transfer function (default: kept in the data set): auto, ct, mr, fog, labels or simulation, "
-      "made from the histogram; ct-bone, ct-soft, ct-lung, ct-skin in Hounsfield units; grey, "
-      "bone, hot-metal, viridis, vessels, xray over the data's range; or a file that `triptych tf` "
-      "reads",
-      2 },
-    { "opacity-scale", KEY_OPACITY_SCALE, "X", 0,
-      "Multiplies extinction: an opacity o becomes 1-(1-o)^X", 2 },
-    { "window", KEY_WINDOW, "W", 0,
-      "With --level: stretch the function over the values from L-W/2 to L+W/2", 2 },
-    { "level", KEY_LEVEL, "L", 0, "The middle of --window", 2 },
-    TRIP_OPTION_LIGHT(2),
-    TRIP_OPTIONS_EFFECTS(2),
-    TRIP_OPTIONS_EMISSION(2),
-    { "no-shading", KEY_NO_SHADING, NULL, 0, "Colours as they are; normals are not read", 2 },
+    { NULL, 0, NULL, 0, "Picture:", 1 },
     { "background", KEY_BACKGROUND, "R,G,B[,A]|none", 0,
-      "Behind the volume, 0 to 1 (default: 0,0,0; none for .exr)", 2 },
-    TRIP_OPTIONS_CLIP(2),
-    { "show", KEY_SHOW, "WHAT", 0,
-      "What colours stand for: picture (the function), lists (along x red, y green, z blue), merge "
-      "(their weights at each pixel, nothing of the volume) or levels (of detail) (default: "
-      "picture)",
+      "Sets the colour behind the volume; components are 0 to 1 (default: 0,0,0; for .exr none)",
+      1 },
+    { "output", 'o', "FILE", 0,
+      "Writes this file: .png, .jpg, .tif or .exr; with --orbit or --path also a video, .mp4, "
+      ".mov, .mkv or .webm, which needs ffmpeg",
+      1 },
+    { "size", KEY_SIZE, "WxH", 0,
+      "Sets the picture size in pixels, 1 to 99999 a side (default: 1024x1024)", 1 },
+    { NULL, 0, NULL, 0, "View:", 2 },
+    { "azimuth", KEY_AZIMUTH, "DEGREES", 0,
+      "Turns the eye around the object, to your right (default: 0)", 2 },
+    { "elevation", KEY_ELEVATION, "DEGREES", 0, "Raises the eye around the object (default: 0)",
       2 },
-    { NULL, 0, NULL, 0, "Method:", 3 },
-    TRIP_OPTIONS_QUALITY(3),
-    { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
-      "pre: voxels are classified and drawn as splats, as the papers do; post: values are "
-      "interpolated in sheets and classified at each pixel, close to the integral; auto: post, but "
-      "pre with what only splats have (--kernel-radius, --kernel exact, ewa or fixed, "
-      "--low-pass, --flatten, --compositing, --method image, --weights, --target, --submit, "
-      "--traversal ascending, --count) and for data without cells to interpolate in (default: "
-      "auto)",
-      3 },
-    { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
-      "splat: each splat goes over those behind it, as in the papers; sheet: the splats of a sheet "
-      "are summed and go over those behind together, so that a mirrored volume gives the mirrored "
-      "picture (default: splat); pre only",
-      3 },
-    { "samples-per-sheet", KEY_SAMPLES_PER_SHEET, "N|auto", 0,
-      "Slices of a sheet, 1 to 16 (default: auto, by the view); post only", 3 },
-    { "slices", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 3 },
-    { "lod", KEY_LOD, "PX", 0,
-      "Draw coarse levels where their voxels are at most so many pixels wide (default: 0, the "
-      "finest alone)",
-      3 },
-    { "max-bytes", KEY_MAX_BYTES, "SIZE", 0,
-      "Draw levels so coarse that no more than this, as 64M, of codes and normals is in view, what "
-      "is widest in the picture finest",
-      3 },
-    { "max-ms", KEY_MAX_MS, "MS", 0,
-      "The same for about so long a frame, by what others took: the picture then depends on the "
-      "machine",
-      3 },
-    { "method", KEY_METHOD, "NAME", 0,
-      "merge, clip, axis or image (sheets parallel to the image plane; by reference only) "
-      "(default: "
-      "merge)",
-      3 },
-    { "h", KEY_H, "H", 0,
-      "Where lists begin to blend, 0 to below 1 (default: pre 0.85, post 0.99); merge only", 3 },
-    { "early-termination", KEY_EARLY_TERMINATION, "T", 0,
-      "Transmittance below which a pixel takes nothing of what lies behind, 0 (never) to 0.1, and "
-      "the most that it is off by (default: pre 1/8192, post 1/512)",
-      3 },
-    { "saturation", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 3 },
-    { "weights", KEY_WEIGHTS, "pixel|vertex", 0,
-      "What merge blends by: the weights of each pixel, or of the corners of splats, interpolated "
-      "over them (by reference only) (default: pixel); pre only",
-      3 },
-    { "normalise", KEY_NORMALISE, NULL, 0,
-      "Divide colours by the opacity that has accumulated: what is covered at all is opaque", 3 },
-    { "traversal", KEY_TRAVERSAL, "NAME", 0, "outward or ascending (default: outward)", 3 },
-    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0, "Reach of a splat (default: 2)", 3 },
-    { "low-pass", KEY_LOW_PASS, "NAME", 0,
-      "What keeps splats from falling between pixels: ewa (a convolution), uniform (Swan's "
-      "scaling; "
-      "--renderer reference and --kernel ewa only) or none (default: ewa); pre only",
-      3 },
-    { "flatten", KEY_FLATTEN, "S", 0,
-      "Flatten kernels along the gradient by 1 to 100, for surfaces (default: 1, round); --kernel "
-      "ewa only",
-      3 },
-    { NULL, 0, NULL, 0, "Renderer:", 4 },
-    { "renderer", KEY_RENDERER, "NAME", 0,
-      "gl, cpu, reference, integral or auto (default: auto: gl on graphics hardware, else cpu)",
-      4 },
-    { "target", KEY_TARGET, "NAME", 0,
-      "Layers of rgba32f, rgba16f or rgba8 (default: rgba32f); gl and cpu only", 4 },
-    { "submit", KEY_SUBMIT, "FORM", 0,
-      "replicated or indexed lists, sprites or triangles (default: replicated,sprites); gl only",
-      4 },
-    { "occluded", KEY_OCCLUDED, "skip|draw", 0,
-      "Whether bricks behind what is opaque are read (default: skip); the picture is the same; "
-      "cpu only",
-      4 },
-    TRIP_OPTION_MEMORY(KEY_MEMORY, 4),
-    TRIP_OPTION_ENGINE(KEY_ENGINE, 4),
-    TRIP_OPTION_THREADS(KEY_THREADS, 4),
+    { "eye", KEY_EYE, "X,Y,Z", 0,
+      "Sets the position of the eye (default: so that the whole object is in view); excludes "
+      "--view, --azimuth and --elevation",
+      2 },
+    { "fov", KEY_FOV, "DEGREES", 0,
+      "Sets the vertical angle of view, up to 179.999 (default: 30); excludes --ortho", 2 },
+    { "look", KEY_LOOK, "X,Y,Z", 0,
+      "Sets the point that the eye looks at (default: the middle of the visible object)", 2 },
+    { "ortho", KEY_ORTHO, "HEIGHT|fit", 0,
+      "Draws a parallel view, HEIGHT world units high; fit shows the whole object and excludes "
+      "--eye",
+      2 },
+    { "roll", KEY_ROLL, "DEGREES", 0, "Turns the picture clockwise (default: 0)", 2 },
+    { "up", KEY_UP, "X,Y,Z", 0,
+      "Sets the direction that is up in the picture (default: by the orientation in the file, else "
+      "0,0,1, for OpenVDB 0,1,0, or a guess that a note names)",
+      2 },
+    { "view", KEY_VIEW, "SIDE", 0,
+      "Selects the side that you see: front, back, left, right, top, bottom or iso; left is the "
+      "own left of the object (default: front, a little from the left and from above)",
+      2 },
+    { "zoom", KEY_ZOOM, "FACTOR", 0, "Magnifies the picture, as a longer lens does (default: 1)",
+      2 },
+    { NULL, 0, NULL, 0, "Turntables and camera paths:", 3 },
+    { "fps", KEY_FPS, "N", 0,
+      "Sets the frames per second of a video, 0.001 to 1000 (default: from the path, else 30)", 3 },
     { "in-flight", KEY_IN_FLIGHT, "N", 0,
-      "Images drawn at once, which divide the memory, 1 to 16 (default: 2; 1 with --stats, "
-      "--explain); --orbit and --path only",
+      "Draws N pictures at once, 1 to 16; they share the memory (default: 2; with --stats or "
+      "--explain 1)",
+      3 },
+    { "orbit", KEY_ORBIT, "N", 0,
+      "Draws N pictures once around the object: FILE-000.png and so on, or a video", 3 },
+    { "path", KEY_PATH, "FILE.json", 0,
+      "Draws pictures along a camera path, which triptych-render(1) describes: FILE-000.png and so "
+      "on, or a video; excludes --orbit and the options of the view",
+      3 },
+    { NULL, 0, NULL, 0, "Look:", 4 },
+    { "level", KEY_LEVEL, "L", 0, "Sets the middle of the values that --window covers", 4 },
+    { "opacity-scale", KEY_OPACITY_SCALE, "X", 0,
+      "Multiplies the extinction: opacity o becomes 1-(1-o)^X (default: 1)", 4 },
+    { "tf", KEY_TF, "NAME|FILE", 0,
+      "Selects the transfer function (default: the one in the data set). From the histogram: auto, "
+      "ct, mr, fog, labels, simulation. In Hounsfield units: ct-bone, ct-soft, ct-lung, ct-skin. "
+      "Over the range of the data: grey, bone, hot-metal, viridis, vessels, xray. Other names are "
+      "files",
       4 },
-    { "field", KEY_FIELD, "NAME", 0,
-      "What is integrated: stored values, those of the source volume, or splats (default: stored); "
-      "integral only",
+    { "window", KEY_WINDOW, "W", 0,
+      "Stretches the transfer function over the values from L-W/2 to L+W/2; requires --level L",
       4 },
+    { NULL, 0, NULL, 0, "Light and effects:", 5 },
+    TRIP_OPTION_LIGHT(5),
+    TRIP_OPTIONS_EFFECTS(5),
+    TRIP_OPTIONS_EMISSION(5),
+    TRIP_OPTION_NO_SHADING(KEY_NO_SHADING, 5),
+    { NULL, 0, NULL, 0, "Clipping:", 6 },
+    TRIP_OPTIONS_CLIP(6),
+    { NULL, 0, NULL, 0, "Accuracy and speed:", 7 },
+    { "classify", KEY_CLASSIFY, "pre|post|auto", 0,
+      "Selects when values become colours. post interpolates values and classifies them at each "
+      "pixel, close to the integral. pre classifies voxels and draws them as splats, as the papers "
+      "do. auto is post, except with options that only splats have (default: auto)",
+      7 },
+    { "early-termination", KEY_EARLY_TERMINATION, "T", 0,
+      "Stops a pixel once its transmittance is below T, 0 (never) to 0.1; no component is off by "
+      "more than T (default: post 1/512, pre 1/8192)",
+      7 },
+    { "saturation", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 7 },
     { "kernel", KEY_KERNEL, "NAME", 0,
-      "Footprints of splats, exact, ewa (by the affine map at the centre) or fixed (all as large "
-      "as "
-      "one in the middle; by reference and gl) (default: exact); "
-      "interpolation of values, linear (the default), cubic (Catmull and Rom's, from 64 voxels) or "
-      "gaussian (which smooths; not by integral)",
-      4 },
-    { "tolerance", KEY_TOLERANCE, "E", 0,
-      "Error of a pixel's components, 1e-12 to 0.1 (default: 1e-4); integral only", 4 },
-    { "samples", KEY_SAMPLES, "N", 0, "N x N rays a pixel, for antialiasing (default: 1)", 4 },
-    { NULL, 0, NULL, 0, "Results:", 5 },
-    { "depth", KEY_DEPTH, "FILE", 0,
-      "Mean distance from the eye to what is seen at each pixel, in world units, infinite where "
-      "nothing is: .exr (channel Z) or .tif; not by integral",
-      5 },
-    { "stats", KEY_STATS, "FILE", 0, "Counts and times as JSON; - is standard output", 5 },
-    { "explain", KEY_EXPLAIN, NULL, 0, "Print the plan, and what it cost", 5 },
+      "Selects the interpolation of post and integral: linear, cubic or gaussian (post only) "
+      "(default: linear); or the footprints of pre: exact, ewa or fixed (default: exact)",
+      7 },
+    { "lod", KEY_LOD, "PX", 0,
+      "Draws distant parts by coarse levels with voxels at most PX pixels wide, 0 to 1000 "
+      "(default: 0, only the finest level)",
+      7 },
+    { "max-bytes", KEY_MAX_BYTES, "SIZE", 0,
+      "Draws coarser levels, so that at most SIZE of codes and normals is in view, for example 64M",
+      7 },
+    { "max-ms", KEY_MAX_MS, "MS", 0,
+      "Draws coarser levels, so that a frame takes about MS milliseconds; the picture then depends "
+      "on the machine",
+      7 },
+    TRIP_OPTIONS_QUALITY(7),
+    { "samples", KEY_SAMPLES, "N", 0,
+      "Draws N x N rays per pixel, for antialiasing, 1 to 64 (default: 1)", 7 },
+    { "samples-per-sheet", KEY_SAMPLES_PER_SHEET, "N|auto", 0,
+      "Sets the samples per sheet of post, 1 to 16; more come closer to the integral (default: "
+      "automatic, 1 to 6)",
+      7 },
+    { "slices", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 7 },
+    { NULL, 0, NULL, 0, "Renderer and resources:", 8 },
+    TRIP_OPTION_ENGINE(KEY_ENGINE, 8),
+    TRIP_OPTION_MEMORY(KEY_MEMORY, 8),
+    { "renderer", KEY_RENDERER, "NAME", 0,
+      "Selects the renderer: gl, cpu, reference (slow), integral (exact, slower) or auto, which is "
+      "gl on graphics hardware, else cpu (default: auto)",
+      8 },
+    TRIP_OPTION_THREADS(KEY_THREADS, 8),
+    { NULL, 0, NULL, 0, "Results and diagnostics:", 9 },
     { "count", KEY_COUNT, NULL, 0,
-      "With --stats or --explain: draw everything once more, untimed, occluded bricks too, and "
-      "count "
-      "the splats",
-      5 },
-    { NULL, 0, NULL, 0, "Volume (not for a data set, which has it fixed):", 6 },
-    TRIP_OPTIONS_VOLUME(6),
+      "Draws every frame once more, untimed, and counts its splats exactly; requires --stats or "
+      "--explain",
+      9 },
+    { "depth", KEY_DEPTH, "FILE", 0,
+      "Writes the mean distance from the eye to the visible object at each pixel, in world units: "
+      ".exr or .tif; requires --samples 1; not with integral",
+      9 },
+    { "explain", KEY_EXPLAIN, NULL, 0,
+      "Prints the view as options, the plan of the frame and its cost", 9 },
+    { "occluded", KEY_OCCLUDED, "skip|draw", 0,
+      "Selects whether cpu reads bricks behind opaque ones (default: skip); the picture is the "
+      "same",
+      9 },
+    { "show", KEY_SHOW, "NAME", 0,
+      "Selects the meaning of the colours: picture, lists (x red, y green, z blue), merge (weights "
+      "of the lists) or levels (of detail) (default: picture)",
+      9 },
+    { "stats", KEY_STATS, "FILE", 0, "Writes counts and times as JSON; - is standard output", 9 },
+    { NULL, 0, NULL, 0, "Volume (not for a data set, which has these fixed):", 10 },
+    TRIP_OPTIONS_VOLUME(10),
+    { NULL, 0, NULL, 0, "Integral (--renderer integral):", 11 },
+    { "field", KEY_FIELD, "NAME", 0,
+      "Selects what is integrated: stored values, the values of the source (requires a volume, not "
+      "a data set) or splats (default: stored)",
+      11 },
+    { "tolerance", KEY_TOLERANCE, "E", 0,
+      "Bounds the error of each component of a pixel, 1e-12 to 0.1 (default: 1e-4)", 11 },
+    { NULL, 0, NULL, 0, "Variants of the papers:", 12 },
+    { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
+      "Selects what is composited: each splat in list order, or the sum of the splats of a sheet "
+      "(default: splat); pre only",
+      12 },
+    { "flatten", KEY_FLATTEN, "S", 0,
+      "Flattens kernels along the gradient, up to S times, 1 to 100 (default: 1, round); requires "
+      "--kernel ewa; not with --count",
+      12 },
+    { "h", KEY_H, "H", 0,
+      "Sets where the lists of merge begin to blend, 0 to below 1 (default: post 0.99, pre 0.85)",
+      12 },
+    { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0,
+      "Sets the radius of a splat, 0.1 to 100 (default: 2); pre, and integral with --field splats",
+      12 },
+    { "low-pass", KEY_LOW_PASS, "NAME", 0,
+      "Selects the filter for splats smaller than a pixel: ewa, uniform (requires --renderer "
+      "reference --kernel ewa) or none (default: ewa); pre only",
+      12 },
+    { "method", KEY_METHOD, "NAME", 0,
+      "Selects how lists become a picture: merge, clip, axis, or image, which implies --renderer "
+      "reference and pre (default: merge)",
+      12 },
+    { "normalise", KEY_NORMALISE, NULL, 0,
+      "Divides colours by the accumulated opacity: every covered pixel becomes opaque", 12 },
+    { "submit", KEY_SUBMIT, "FORM", 0,
+      "Selects how gl receives splats: replicated or indexed, sprites or triangles, or one of each "
+      "(default: replicated,sprites); pre and gl only",
+      12 },
+    { "target", KEY_TARGET, "NAME", 0,
+      "Selects the pixel format of layers: rgba32f, rgba16f or rgba8 (default: rgba32f); pre with "
+      "gl or cpu only",
+      12 },
+    { "traversal", KEY_TRAVERSAL, "NAME", 0,
+      "Selects the order of sheets: outward from the eye, or ascending as in the file (pre only) "
+      "(default: outward)",
+      12 },
+    { "weights", KEY_WEIGHTS, "pixel|vertex", 0,
+      "Selects the weights of merge: of the ray of each pixel, or interpolated from the corners of "
+      "splats, which implies --renderer reference (default: pixel); pre only",
+      12 },
     { 0 },
 };
 
@@ -1037,11 +1053,11 @@ int render_options_parse(render_options *o, int argc, char **argv)
         .options = options,
         .parser = parse_key,
         .args_doc = "VOLUME|NAME.trip [NAME.trip...]",
-        .doc = "Draws a volume, or a data set made of one by `triptych brick`, into an image file. "
-               "A volume is bricked into a cache first, which `triptych cache` lists and clears; "
-               "the next picture of it is drawn at once. Several data sets, of regions of one "
-               "volume, are drawn in one picture.\vPoints and lengths are in the data's world "
-               "units.",
+        .doc =
+            "Draws a volume, or a data set made by `triptych brick`, into an image file. A volume "
+            "is first bricked into a cache, so that its next picture starts at once; `triptych "
+            "cache` lists and clears the cache. Several data sets are drawn in one picture if they "
+            "are regions of one volume.\vPoints and lengths are in the world units of the data.",
     };
     const render_options defaults = { .width = 1024,
                                       .height = 1024,

@@ -255,11 +255,15 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option options[] = {
-    { "output", 'o', "FILE", 0, "What to write: .nrrd, .raw or .vdb (sparse)", 0 },
-    { "size", 's', "N|NXxNYxNZ", 0, "Voxels (default 256)", 0 },
-    { "type", 't', "TYPE", 0, "uint8 (default), uint16 or float; .vdb is always float", 0 },
-    { "detail", 'd', "X", 0, "Fineness of the structure (default: longest side / 256)", 0 },
-    { "threads", 'j', "N", 0, "Threads (default: all processors)", 0 },
+    { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
+    { "size", 's', "N|NXxNYxNZ", 0, "Sets the number of voxels along each axis (default: 256)", 0 },
+    { "type", 't', "TYPE", 0,
+      "Sets the type of a voxel: uint8, uint16 or float (default: uint8); .vdb is always float",
+      0 },
+    { "detail", 'd', "X", 0,
+      "Sets the fineness of the structure (default: longest side / 256, at least 1)", 0 },
+    { "threads", 'j', "N", 0, "Sets the number of threads, 1 to 64 (default: one per processor)",
+      0 },
     { 0 },
 };
 
@@ -272,8 +276,8 @@ int main(int argc, char **argv)
         options,
         parse_option,
         "FIELD",
-        "Writes a volume with known values. FIELD is one of: marschner-lobb (dense), "
-        "cloud (about half empty), shells, filaments (almost empty).",
+        "Writes a volume of a function in closed form. FIELD is marschner-lobb (dense), cloud "
+        "(about half empty), shells or filaments (almost empty).",
         NULL,
         NULL,
         NULL
