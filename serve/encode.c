@@ -32,7 +32,7 @@ static void compress(struct jpeg_compress_struct *c, const uint8_t *rgba, int wi
     while (c->next_scanline < c->image_height) {
         union {
             const uint8_t *from;
-            JSAMPROW row; /* which is read only */
+            JSAMPROW row; /* libjpeg only reads it */
         } line = { rgba + (size_t)c->next_scanline * 4 * (size_t)width };
         jpeg_write_scanlines(c, &line.row, 1);
     }

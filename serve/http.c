@@ -1,4 +1,4 @@
-/* The server: which requests are answered, and from whom. */
+/* The HTTP server: authenticates and answers requests. */
 #include <arpa/inet.h>
 #include <microhttpd.h>
 #include <stdio.h>
@@ -26,7 +26,7 @@ typedef struct server {
     char token[2 * TOKEN_BYTES + 1];
 } server;
 
-/* What comes with a request, as it comes. */
+/* The body of a request as it arrives. */
 typedef struct body {
     char *text;
     size_t bytes;
@@ -38,7 +38,7 @@ static void add_header(struct MHD_Response *r, const char *name, const char *val
     MHD_add_response_header(r, name, value);
 }
 
-/* Frees `data`, which was allocated, once it is sent. */
+/* Answers with `data`, and frees it after sending. */
 static enum MHD_Result answer(struct MHD_Connection *c, unsigned status, const char *type,
                               void *data, size_t bytes, const trip_session_picture *picture)
 {
@@ -77,7 +77,7 @@ static enum MHD_Result refuse(struct MHD_Connection *c, unsigned status, const c
     return answer_text(c, status, "text/plain; charset=utf-8", why);
 }
 
-/* In a time that says nothing of where they differ. */
+/* Compares in constant time, so that timing reveals nothing about the token. */
 static bool same_token(const char *a, const char *b)
 {
     unsigned differences = 0;
@@ -88,7 +88,7 @@ static bool same_token(const char *a, const char *b)
     return differences == 0;
 }
 
-/* A page of elsewhere, under a name that leads here, has another host. */
+/* Refuses other hosts: another site's name may resolve to this address (DNS rebinding). */
 static bool is_own_host(const server *s, struct MHD_Connection *c)
 {
     char own[2][32];

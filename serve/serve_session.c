@@ -19,18 +19,18 @@
 enum { WIDTH = 1024, HEIGHT = 768, MAX_SIDE = 4096, MIN_SIDE = 16, MAX_EVENTS = 1000 };
 
 struct trip_session {
-    pthread_mutex_t lock; /* for all that is a window's thread's: the viewer, and its frames */
+    pthread_mutex_t lock; /* guards the viewer and its frames */
     trip_frames *frames;
     trip_viewer viewer;
-    /* Taken by the drawing thread too, which may hold locks of its own: what is done with this one
-     * held takes no other. */
+    /* The drawing thread takes this lock too, and may hold its own locks. No other lock is taken
+     * while this one is held. */
     pthread_mutex_t news_lock;
-    pthread_cond_t news; /* something has come, or the end */
-    uint64_t came;       /* under news_lock: how often */
-    bool ended;          /* the same */
-    uint64_t seen;       /* of `came`, by the thread that ticks */
-    uint64_t told;       /* of the frames' messages, the last failure among them, by the same */
-    const char *given;   /* the function of the command line, or NULL */
+    pthread_cond_t news; /* signals news or the end */
+    uint64_t came;       /* counts news; under news_lock */
+    bool ended;          /* under news_lock */
+    uint64_t seen;       /* last `came` handled by the ticking thread */
+    uint64_t told;       /* messages handled by the ticking thread */
+    const char *given;   /* the command line's transfer function, or NULL */
 };
 
 static void wake(void *user)
@@ -51,7 +51,7 @@ static uint64_t news_so_far(trip_session *s, bool *ended)
     return came;
 }
 
-/* Waits for more than `came`, until a time; false where that has passed. */
+/* Waits until news exceed `came`. Returns false at the deadline. */
 static bool wait_for_news(trip_session *s, uint64_t came, const struct timespec *end)
 {
     int late = 0;
@@ -81,7 +81,7 @@ static void show(trip_session *s, const trip_serve_params *p)
     v->function = s->given = p->function;
     v->heat = p->heat;
     v->opacity_scale = 1;
-    v->fresh = true; /* what a window showed, with its panel, is another thing */
+    v->fresh = true; /* ignore the window's saved states */
     trip_viewer_resize(v, WIDTH, HEIGHT);
     trip_viewer_set_panel(v, false);
     trip_viewer_open(v, p->input);
@@ -160,8 +160,8 @@ void trip_session_tick(trip_session *s, double seconds)
     pthread_mutex_unlock(&s->lock);
 }
 
-/* Of those that a script can have: no key that ends or writes something, or makes room for the
- * panel that a window has. */
+/* Accepts script events, except keys that end the viewer, write files or toggle the window's panel.
+ */
 static bool is_allowed(const trip_event *e)
 {
     bool other = e->kind == TRIP_EVENT_KEY && e->code < 128 && strchr("pqcmt", e->code);
@@ -205,7 +205,7 @@ bool trip_session_do(trip_session *s, const char *text, size_t bytes)
     return good;
 }
 
-/* The name that lasts as long as the program. */
+/* Returns the same name with static lifetime. */
 static const char *preset(const char *name)
 {
     triptych_preset p;
@@ -241,7 +241,7 @@ static const char *const classes[] = { "pre", "post", "auto", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", NULL };
 static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
 
-/* "head", or "ROUND,UP,DISTANCE" as of trip_light_control. */
+/* Parses "head" or "AZIMUTH,ELEVATION,DISTANCE" of trip_light_control. */
 static bool set_light(trip_document *d, const char *value)
 {
     char copy[64], *rest = copy;
@@ -274,7 +274,7 @@ static bool set_number(double *out, const char *value, double lo, double hi)
     return true;
 }
 
-/* What the page can set. */
+/* Sets one of the page's settings. */
 static bool set_setting(triptych_settings *s, const char *name, const char *value)
 {
     static const char *const no_yes[] = { "0", "1", NULL };
@@ -310,7 +310,7 @@ static bool set_switch(trip_document *d, const trip_effect_switch *e, const char
     return choose(value, no_yes, &on) && trip_effect_turn(e, on, &d->settings, trip_viewer_heat(d));
 }
 
-/* One of light.h's. */
+/* Sets an effect or a number of light.h. */
 static bool set_effect(trip_document *d, const char *name, const char *value)
 {
     double number;
@@ -352,7 +352,7 @@ char *trip_session_presets(void)
     return text;
 }
 
-/* A copy of its pixels, so that encoding does not hold up drawing. */
+/* Copies the pixels, so that encoding does not delay drawing. */
 typedef struct copy {
     uint8_t *rgba;
     int width, height;
@@ -399,7 +399,7 @@ bool trip_session_await(trip_session *s, uint64_t number, double seconds, trip_s
     return out->file != NULL;
 }
 
-/* As trip_session_set() takes them. */
+/* Writes the settings as trip_session_set() takes them. */
 static void add_settings(cJSON *root, const triptych_settings *s)
 {
     cJSON *settings = cJSON_AddObjectToObject(root, "settings");
@@ -430,7 +430,7 @@ static void add_numbers(cJSON *to, const trip_effect_switch *below, const tripty
     }
 }
 
-/* What the page's controls of effects show. */
+/* Writes the state of the page's effect controls. */
 static void add_switches(cJSON *root, const trip_document *d)
 {
     const triptych_settings *s = &d->settings;
@@ -448,7 +448,7 @@ static void add_switches(cJSON *root, const trip_document *d)
     }
 }
 
-/* As trip_session_set() takes it, but for "head". */
+/* Writes the light as trip_session_set() takes it, with "head" as a flag of its own. */
 static void add_light(cJSON *root, const trip_document *d)
 {
     const trip_light_control c = trip_light_control_of(&d->settings, &d->info);

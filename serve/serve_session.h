@@ -1,4 +1,4 @@
-/* What is shown, for any number of threads: events change it, pictures are waited for. */
+/* The state of the served viewer. Any thread may send events and wait for pictures. */
 #ifndef TRIP_SERVE_SESSION_H
 #define TRIP_SERVE_SESSION_H
 
@@ -8,46 +8,47 @@
 
 typedef struct trip_session trip_session;
 
-/* NULL without memory or threads. */
+/* Returns NULL if memory or threads are exhausted. */
 trip_session *trip_session_start(const trip_serve_params *params);
-/* No thread may be in the others any more. */
+/* Requires that no other thread uses the session. */
 void trip_session_stop(trip_session *s);
-/* Threads that wait are let go, and none waits from now on. */
+/* Wakes all waiting threads, and makes later waits return at once. */
 void trip_session_end(trip_session *s);
 
-/* What goes on by itself, until about so long has passed or something has come. */
+/* Advances the viewer, then waits for news or for about the timeout. */
 void trip_session_tick(trip_session *s, double seconds);
 
-/* Events as lines of a script of the viewer (script.h): of the pointer, keys, and sizes. False
- * where some are none of these, or none at all; nothing happens then. */
+/* Handles pointer, key and resize events, as lines of a viewer script (script.h). Returns false,
+ * and does nothing, if any line is invalid or of another kind. */
 bool trip_session_do(trip_session *s, const char *text, size_t bytes);
-/* A built-in function, or that of the command line; false where there is none of the name. "": the
- * data set's own. */
+/* Sets a built-in transfer function or the command line's; "" selects the data set's default.
+ * Returns false for unknown names. */
 bool trip_session_set_function(trip_session *s, const char *name);
 
-/* A setting by its name, as the page has them: classify, method, h, shading, light (head, or
- * "ROUND,UP,DISTANCE" of trip_light_control), opacity, show, and those of effects by their names in
- * light.h. False where there is no such name or value; nothing happens
- * then. */
+/* Sets a setting by its name on the page: classify, method, h, shading, light (head, or
+ * "AZIMUTH,ELEVATION,DISTANCE" of trip_light_control), opacity, show, or an effect's name in
+ * light.h. Returns false, and changes nothing, for an unknown name or an invalid value. */
 bool trip_session_set(trip_session *s, const char *name, const char *value);
-/* The built-in functions' names as JSON, for free(); NULL without memory. */
+/* Returns the names of the built-in transfer functions as JSON, for free(), or NULL if memory is
+ * exhausted. */
 char *trip_session_presets(void);
 
-/* A picture as a file, for free(). */
+/* A picture as an encoded file, for free(). */
 typedef struct trip_session_picture {
     unsigned char *file;
     size_t bytes;
     uint64_t number;
-    bool whole; /* PNG, the picture of `triptych render`; else JPEG */
+    bool whole; /* the full picture of `triptych render`, as PNG; otherwise a JPEG */
 } trip_session_picture;
-/* Waits for a picture other than `number`, at most so long; false: there is none. */
+/* Waits for a picture other than `number`. Returns false at the timeout. */
 bool trip_session_await(trip_session *s, uint64_t number, double seconds,
                         trip_session_picture *out);
 
-/* What failed since the last call, as a line without its end; false: nothing did. */
+/* Takes the failure since the last call, as a line without its newline. Returns false if there is
+ * none. */
 bool trip_session_take_failure(trip_session *s, char *line, size_t bytes);
 
-/* What goes on, as JSON, for free(); NULL without memory. */
+/* Returns the status as JSON, for free(), or NULL if memory is exhausted. */
 char *trip_session_status(trip_session *s);
 
 #endif

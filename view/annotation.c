@@ -5,7 +5,8 @@
 #include <string.h>
 
 #define NEAREST                                                                                    \
-    1e-6 /* of the distance to the point looked at: where edges end in front of the eye */
+    1e-6 /* share of the distance to the point looked at: edges are cut there, in front of the eye \
+          */
 #define TICKS_APART_PX 50
 #define TICK_PX 6
 #define LABEL_PX 20
@@ -35,7 +36,7 @@ static void difference(const double a[3], const double b[3], double out[3])
         out[i] = a[i] - b[i];
 }
 
-/* Whether the face across `axis`, at its upper end or lower end, is turned to the eye. */
+/* Returns whether the upper or lower face across `axis` is turned to the eye. */
 static bool faces_eye(const trip_annotation_box *box, const trip_navigation *n, int axis, int upper)
 {
     const double(*c)[3] = box->corners;
@@ -54,7 +55,7 @@ static bool faces_eye(const trip_annotation_box *box, const trip_navigation *n, 
     return outward ? dot(normal, to_eye) > 0 : dot(normal, to_eye) < 0;
 }
 
-/* Projects the part of an edge in front of the eye; false where there is none. */
+/* Projects the part of an edge in front of the eye. Returns false if there is none. */
 static bool project(const trip_navigation *n, int width, int height, const double a[3],
                     const double b[3], double from[2], double to[2])
 {
@@ -72,7 +73,7 @@ static bool project(const trip_navigation *n, int width, int height, const doubl
     return true;
 }
 
-/* The lower corner of edge k of an axis. */
+/* Returns the lower corner of edge k of an axis. */
 static int corner_of(int axis, int k)
 {
     return (k & 1) << (axis + 1) % 3 | (k >> 1) << (axis + 2) % 3;
@@ -106,14 +107,14 @@ double trip_annotation_round(double min)
     return steps[i] * power;
 }
 
-/* The greatest of them that is not above `most`. */
+/* Returns the largest round number that is at most `max`. */
 static double round_down(double max)
 {
     double power = pow(10, floor(log10(max * (1 + 1e-12)))), lead = max * (1 + 1e-12) / power;
     return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
 }
 
-/* Digits behind the point that a multiple of the step has. */
+/* Returns the number of decimals that multiples of the step need. */
 static int digits_of(double step)
 {
     double digits = -floor(log10(step) + 1e-9);
@@ -146,7 +147,7 @@ trip_annotation_bar trip_annotation_scale_bar(const trip_navigation *n, int heig
     return bar;
 }
 
-/* The edge to put a scale on: of the outline, the one whose middle is lowest. -1: none. */
+/* Returns the edge for a scale, the outline edge with the lowest centre, or -1. */
 static int choose_edge(const trip_annotation_edge *edges, int axis)
 {
     int found = -1;
@@ -161,7 +162,7 @@ static int choose_edge(const trip_annotation_edge *edges, int axis)
     return found;
 }
 
-/* The world axis that lies along the box's, or -1. */
+/* Returns the world axis parallel to an axis of the box, or -1. */
 static int world_axis(const double along[3])
 {
     double length = sqrt(dot(along, along));
@@ -171,14 +172,14 @@ static int world_axis(const double along[3])
     return -1;
 }
 
-/* A scale on an edge that runs from `start` along `along` in the world. */
+/* A scale on an edge from `start` in direction `along`, world space. */
 typedef struct scale {
     const trip_navigation *n;
     int width, height;
     const double *start;
     double along[3];
     double first, last; /* numbers at both ends */
-    double out[2];      /* px, unit length: away from the box's middle */
+    double out[2];      /* unit length in pixels, away from the centre of the box */
 } scale;
 
 static void place_label(const double at[2], const double out[2], double px, double label[2])

@@ -43,7 +43,7 @@ static double fps(const trip_camera_path *p)
     return p->frames_per_second > 0 ? p->frames_per_second : DEFAULT_FPS;
 }
 
-/* A loop takes two keys. */
+/* A loop requires two keys. */
 static double loop(const trip_camera_path *p)
 {
     return p->count > 1 ? p->loop_seconds : 0;
@@ -59,7 +59,7 @@ int trip_camera_path_frames(const trip_camera_path *p)
     double steps = round(duration(p) * fps(p));
     if (p->count < 2)
         return (int)p->count;
-    const int last = loop(p) > 0 ? 0 : 1; /* the first frame is not seen twice */
+    const int last = loop(p) > 0 ? 0 : 1; /* the first frame is not repeated */
     return steps < 1                         ? 1 + last
            : steps < TRIP_CAMERA_PATH_FRAMES ? (int)steps + last
                                              : TRIP_CAMERA_PATH_FRAMES;
@@ -73,7 +73,7 @@ double trip_camera_path_seconds(const trip_camera_path *p, int frame)
     return p->keys[0].seconds + duration(p) * frame / steps;
 }
 
-/* The last key that is not after the time; the first where all are. */
+/* Returns the last key at or before the time, or the first key. */
 static size_t key_before(const trip_camera_path *p, double seconds)
 {
     size_t lo = 0, hi = p->count;
@@ -89,15 +89,14 @@ static size_t key_before(const trip_camera_path *p, double seconds)
 
 /* ---- splines ---- */
 
-/* A time between two keys: share `s` of the way, of `step` seconds; the steps before and after,
- * 0 where there is no further key. */
+/* A time between two keys: share `s` of an interval of `step` seconds. `before` and `after` are the
+ * neighbouring intervals, 0 at the ends of the path. */
 typedef struct position {
     double s, step, before, after;
 } position;
 
-/* The derivative at a key, over the step that counts: Catmull and Rom's, of unequal steps the one
- * of the parabola through three keys. At an end, so that two keys make a straight line, the
- * difference. */
+/* Returns the derivative at a key per interval (Catmull-Rom). Unequal intervals use the parabola
+ * through three keys. The ends use the difference, so that two keys make a straight line. */
 static double tangent(double back, double back_step, double ahead, double step)
 {
     if (back_step == 0)
@@ -105,13 +104,13 @@ static double tangent(double back, double back_step, double ahead, double step)
     return (back / back_step * step + ahead / step * back_step) / (back_step + step) * step;
 }
 
-/* Hermite's cubic from 0 to `change`, with these derivatives at its ends. */
+/* Evaluates the Hermite cubic from 0 to `change` with these derivatives at its ends. */
 static double hermite(double change, double start, double end, double s)
 {
     return ((start + end - 2 * change) * s + (3 * change - 2 * start - end)) * s * s + start * s;
 }
 
-/* Between v[1] and v[2]. */
+/* Interpolates between v[1] and v[2]. */
 static double spline(const double v[4], const position *at)
 {
     double change = v[2] - v[1];
@@ -137,10 +136,10 @@ static rotation rotation_of(const trip_navigation *n)
                        trip_v3(-a.forward[0], -a.forward[1], -a.forward[2]) };
 }
 
-/* The rotation that takes a to b, as an axis times an angle up to pi. */
+/* Returns the rotation from a to b, as an axis times an angle of at most pi. */
 static trip_vec3 turn_between(const rotation *a, const rotation *b)
 {
-    /* By the quaternion of b a^T, whose largest component is computed first. */
+    /* Uses the quaternion of b a^T, and computes its largest component first. */
     const double *p[3] = { &a->x.x, &a->y.x, &a->z.x }, *q[3] = { &b->x.x, &b->y.x, &b->z.x };
     double m[3][3] = { { 0 } }, w[4], v[4];
     for (int i = 0; i < 3; i++)
@@ -182,7 +181,7 @@ static trip_vec3 turned(trip_vec3 v, trip_vec3 turn)
 
 /* ---- the view ---- */
 
-/* The point looked at, and logarithms of the distance and of the picture's height. */
+/* The point looked at, and the logarithms of the distance and of the picture's height. */
 enum { LOOK, DISTANCE = 3, LENS, NUMBERS };
 
 static void numbers_of(const trip_navigation *n, double out[NUMBERS])
@@ -192,7 +191,8 @@ static void numbers_of(const trip_navigation *n, double out[NUMBERS])
     out[LENS] = log(n->ortho_height > 0 ? n->ortho_height : tan(n->fov_degrees / 2 * DEGREE));
 }
 
-/* The rotation between keys i and i + 1 of the four, spline-wise as the numbers are. */
+/* Interpolates the rotation between keys i and i + 1 of four with the same spline as the numbers.
+ */
 static trip_vec3 spline_turn(const rotation r[4], const position *at)
 {
     trip_vec3 turns[3], out;
@@ -224,8 +224,8 @@ static trip_navigation navigation_from(const double numbers[NUMBERS], const rota
     return n;
 }
 
-/* A key by its number, beyond the ends too: of a loop those of the rounds before and after, else
- * the first and the last. */
+/* Returns a key by its number, also beyond the ends: a loop wraps around, and other paths repeat
+ * the first and last key. */
 typedef struct numbered_key {
     size_t at;
     double seconds;
@@ -277,7 +277,7 @@ trip_navigation trip_camera_path_view(const trip_camera_path *p, double seconds)
     return navigation_from(now, &turned_to, &keys[k].camera);
 }
 
-/* The next key and the share of the way to it; the same key where there is none. */
+/* Returns the next key and the share of the interval to it, or the same key at the end. */
 static size_t next_key(const trip_camera_path *p, size_t k, double seconds, double *t)
 {
     const numbered_key from = key_numbered(p, (long)k), to = key_numbered(p, (long)k + 1);
@@ -288,7 +288,7 @@ static size_t next_key(const trip_camera_path *p, size_t k, double seconds, doub
     return to.at;
 }
 
-/* The key whose function holds at a key; -1: the default. */
+/* Returns the key that sets the transfer function in force at a key, or -1 for the default. */
 static int function_at(const trip_camera_path *p, size_t key)
 {
     int k = (int)key;
@@ -306,7 +306,7 @@ trip_path_mix trip_camera_path_mix(const trip_camera_path *p, double seconds)
     return mix;
 }
 
-/* What is cut away at a key; NULL where none up to it says so. */
+/* Returns the clipping in force at a key, or NULL if no key up to it sets any. */
 static const triptych_clip *clip_at(const trip_camera_path *p, size_t key)
 {
     for (const trip_path_key *k = p->keys + key; k >= p->keys; k--)

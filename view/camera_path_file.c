@@ -1,4 +1,4 @@
-/* Paths of the camera as JSON, and its files. */
+/* Reads and writes camera paths as JSON. */
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>
@@ -96,7 +96,7 @@ static const cJSON *item_of(const cJSON *object, const char *key)
     return cJSON_GetObjectItemCaseSensitive(object, key);
 }
 
-/* Parts that nobody knows are likely misspelt; in which part of the path says `where`. */
+/* Refuses unknown members, which are likely misspelt. `where` names the part of the path. */
 static int check_members(const cJSON *object, const char *const *known, const char *name,
                          const char *where)
 {
@@ -128,7 +128,7 @@ static int check_key_members(const cJSON *key, const char *name, size_t number)
     return status ? status : check_members(item_of(key, "clip"), of_clip, name, where);
 }
 
-/* What is wrong with a key's view, or NULL. */
+/* Returns the fault of a key's view, or NULL. */
 static const char *read_camera(trip_navigation *n, const cJSON *key)
 {
     const cJSON *fov = item_of(key, "fov"), *ortho = item_of(key, "ortho");
@@ -208,7 +208,7 @@ static const char *read_key(trip_camera_path *p, const cJSON *key)
     if (fault)
         return fault;
     fault = read_function(k, key);
-    p->count++; /* its texts are the path's from here on */
+    p->count++; /* the path now owns the key's texts */
     return fault;
 }
 
@@ -259,7 +259,7 @@ static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
     return status;
 }
 
-/* That the text is one value of JSON, and nothing more. */
+/* Checks that the text is exactly one JSON value. */
 static int check_text(const trip_json *json, const char *name, const char *text)
 {
     const char *end = json->end + (json->root ? strspn(json->end, " \t\r\n") : 0);

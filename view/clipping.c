@@ -18,7 +18,7 @@ void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info)
 
 void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position)
 {
-    const double min = 0.01; /* that is left of it */
+    const double min = 0.01; /* minimum size of the box, voxels */
     if (face)
         c->box_hi[axis] = fmax(position, c->box_lo[axis] + min);
     else
@@ -64,7 +64,7 @@ static double length_of(const double plane[4])
     return hypot(hypot(plane[0], plane[1]), plane[2]);
 }
 
-/* What the plane's function is in the middle of the data, without its constant. */
+/* Evaluates the plane's linear function, without its constant, at the centre of the data. */
 static double at_middle(const double plane[4], const triptych_info *info)
 {
     double sum = 0;
@@ -124,7 +124,7 @@ triptych_clip trip_clipping_mix(const triptych_clip *a, const triptych_clip *b, 
     for (int i = 0; i < a->planes; i++)
         for (int k = 0; k < 4; k++)
             mix.plane[i][k] += t * (b->plane[i][k] - a->plane[i][k]);
-    return trip_clipping_is_sound(&mix) ? mix : *a; /* opposite planes have none between them */
+    return trip_clipping_is_sound(&mix) ? mix : *a; /* opposite planes have no mean */
 }
 
 static void put_numbers(FILE *out, const double *numbers, int count)

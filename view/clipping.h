@@ -1,5 +1,5 @@
-/* How the viewer cuts a data set: what the panel's controls do to a box of voxels and to planes.
- * Plain values. */
+/* Clipping in the viewer: the panel's controls change a box of voxels and planes. Pure functions on
+ * plain values. */
 #ifndef TRIP_VIEW_CLIPPING_H
 #define TRIP_VIEW_CLIPPING_H
 
@@ -11,30 +11,31 @@ extern "C" {
 
 enum { TRIP_CLIPPING_PLANES = 6 };
 
-/* The whole of what was kept, half a voxel around it included, in voxels. */
+/* Sets the box to all kept voxels, in voxel indices, including half a voxel around them. */
 void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info);
-/* Moves a face of the box, which stays a box: face 0 or 1 of an axis, 0 the lower. */
+/* Moves face 0 (lower) or 1 (upper) of an axis. The faces never cross. */
 void trip_clipping_set_face(triptych_clip *c, int axis, int face, double position);
 
-/* A plane through the point looked at, that faces the eye: what lies before it is cut away. False
- * where there is no room for one. */
+/* Adds a plane through the point looked at, facing the eye. It cuts away the side of the eye.
+ * Returns false if there are TRIP_CLIPPING_PLANES already. */
 bool trip_clipping_add_plane(triptych_clip *c, const trip_navigation *n);
 void trip_clipping_flip_plane(triptych_clip *c, int plane);
 void trip_clipping_remove_plane(triptych_clip *c, int plane);
-/* How far the plane lies from the middle of the data towards what it keeps, over half of the data's
- * diagonal: from -1 to 1 it may cut something. */
+/* Returns the distance of the plane from the centre of the data towards the side that it keeps, in
+ * half diagonals. Only planes from -1 to 1 can cut the data. */
 double trip_clipping_depth(const triptych_clip *c, int plane, const triptych_info *info);
 void trip_clipping_set_depth(triptych_clip *c, int plane, const triptych_info *info, double depth);
 
-/* A box of voxels where the same data has voxels of another size. */
+/* Converts a box of voxels between two data sets of one volume with different voxel sizes. */
 void trip_clipping_rescale(triptych_clip *c, const triptych_info *from, const triptych_info *to);
-/* Whether a library would take it. */
+/* Returns whether the library accepts the clipping. */
 bool trip_clipping_is_sound(const triptych_clip *c);
-/* Between two that have the same kinds of parts, 0 is a and 1 is b; of others `a` below 1. */
+/* Interpolates from `a` (t = 0) to `b` (t = 1) if both have the same parts; otherwise returns `a`
+ * for t < 1. */
 triptych_clip trip_clipping_mix(const triptych_clip *a, const triptych_clip *b, double t);
 
-/* As options of `triptych render`, each with a space before it, to the last bit, for free(); ""
- * where nothing is cut; NULL without memory. */
+/* Returns the clipping as options of `triptych render`, each after a space, exact to the last bit,
+ * for free(). Returns "" without clipping, and NULL if memory is exhausted. */
 char *trip_clipping_text(const triptych_clip *c);
 
 #ifdef __cplusplus

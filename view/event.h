@@ -1,5 +1,5 @@
-/* What comes to the window: from people by GLFW, or from a script, whose parser is script.h.
- * Positions are in pixels of the window's contents, from its upper left corner. */
+/* Input events of the window, from GLFW or from a script (script.h). Positions are in pixels from
+ * the upper left corner of the window's contents. */
 #ifndef TRIP_VIEW_EVENT_H
 #define TRIP_VIEW_EVENT_H
 
@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-/* Keys with a character are that, in lower case; the others: */
+/* A key with a character has the code of the character in lower case. These are the others. */
 enum {
     TRIP_KEY_ESCAPE = 256,
     TRIP_KEY_ENTER,
@@ -31,28 +31,29 @@ enum {
 
 enum { TRIP_BUTTON_LEFT, TRIP_BUTTON_RIGHT, TRIP_BUTTON_MIDDLE, TRIP_BUTTONS };
 
-enum { TRIP_SHIFT = 1, TRIP_CONTROL = 2, TRIP_ALT = 4 }; /* held with it */
+enum { TRIP_SHIFT = 1, TRIP_CONTROL = 2, TRIP_ALT = 4 }; /* modifier keys, as bits */
 
 typedef enum trip_event_kind {
-    /* As people make them: */
-    TRIP_EVENT_MOVE,    /* to x, y */
+    /* from people or scripts: */
+    TRIP_EVENT_MOVE,    /* pointer to x, y */
     TRIP_EVENT_BUTTON,  /* code, down or not */
-    TRIP_EVENT_WHEEL,   /* y steps, away from the user */
+    TRIP_EVENT_WHEEL,   /* y steps away from the user */
     TRIP_EVENT_KEY,     /* code, down or not */
-    TRIP_EVENT_TEXT,    /* code: a character typed */
-    TRIP_EVENT_RESIZE,  /* x, y: the window's contents; scripts: is resized */
-    TRIP_EVENT_DROP,    /* text: a file dropped on it */
-    TRIP_EVENT_ICONIFY, /* down: minimised; else shown again */
+    TRIP_EVENT_TEXT,    /* code is the typed character */
+    TRIP_EVENT_RESIZE,  /* to x by y pixels of contents */
+    TRIP_EVENT_DROP,    /* text is the path of the dropped file */
+    TRIP_EVENT_ICONIFY, /* minimised if `down`, else restored */
     TRIP_EVENT_CLOSE,
-    /* Of scripts alone: */
-    TRIP_EVENT_WAIT,       /* until the picture is whole, or drawing has failed */
+    /* from scripts only: */
+    TRIP_EVENT_WAIT,       /* until the picture is complete or drawing has failed */
     TRIP_EVENT_SLEEP,      /* x milliseconds */
-    TRIP_EVENT_SCREENSHOT, /* text: a file for what the window shows */
-    TRIP_EVENT_PICTURE,    /* text: a file for the whole picture, as `triptych render` writes it */
-    TRIP_EVENT_RANDOM,     /* count events of the kinds above wait, by `seed` */
-    TRIP_EVENT_STATUS,     /* text: a file for what the gauges say, as JSON */
-    TRIP_EVENT_CLICK, /* text: the label of a control of the panel; x: how far along it, 0 to 1;
-                         done as by hand, with the left button */
+    TRIP_EVENT_SCREENSHOT, /* text is the file for a picture of the window */
+    TRIP_EVENT_PICTURE, /* text is the file for the complete picture, equal to `triptych render`'s
+                         */
+    TRIP_EVENT_RANDOM,  /* `count` random events of the kinds that people make, from `seed` */
+    TRIP_EVENT_STATUS,  /* text is the file for the statistics, as JSON */
+    TRIP_EVENT_CLICK,   /* clicks a control of the panel with the left button: text is its label, x
+                           the position along it, 0 to 1 */
 } trip_event_kind;
 
 typedef struct trip_event {
@@ -62,7 +63,7 @@ typedef struct trip_event {
     unsigned modifiers;
     bool down;
     uint64_t count, seed;
-    char *text; /* the event's own, for free(); NULL */
+    char *text; /* owned by the event, for free(); may be NULL */
 } trip_event;
 
 #ifdef __cplusplus

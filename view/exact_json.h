@@ -1,4 +1,4 @@
-/* Numbers in JSON that read back as they were, to the last bit. Pure functions. */
+/* JSON numbers that read back exactly, bit for bit. Pure functions. */
 #ifndef TRIP_VIEW_EXACT_JSON_H
 #define TRIP_VIEW_EXACT_JSON_H
 
@@ -6,13 +6,13 @@
 
 struct cJSON;
 
-/* NULL without memory; what cJSON_AddItemToObject() and the like then leave out. */
+/* Return NULL if memory is exhausted. cJSON_AddItemToObject() ignores a NULL item. */
 struct cJSON *trip_exact_number(double value);
 struct cJSON *trip_exact_numbers(const double *values, int count);
 
-/* False where the item, which may be NULL, is not a number between these. */
+/* Reads a number. Returns false if `item` is NULL, no number, or outside lo to hi. */
 bool trip_exact_read(const struct cJSON *item, double lo, double hi, double *out);
-/* The same for an array of so many. */
+/* Reads an array of exactly `count` numbers, each from lo to hi. Returns false otherwise. */
 bool trip_exact_read_numbers(const struct cJSON *item, int count, double lo, double hi,
                              double *out);
 

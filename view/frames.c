@@ -88,7 +88,7 @@ void trip_frames_want(trip_frames *f, const trip_wanted *wanted)
     trip_wanted copy;
     if (!trip_wanted_copy(&copy, wanted)) {
         trip_wanted_release(&copy);
-        return; /* the view stays as it is */
+        return; /* keep the old view */
     }
     pthread_mutex_lock(&f->lock);
     const bool ends = f->ends_early || f->wanted.document != copy.document;

@@ -1,10 +1,9 @@
-/* The thread that draws. It alone uses the library's context, of the one data set that is shown;
- * the window's thread leaves the view to draw, takes the picture that is there, and waits for
- * neither. What is wanted last counts: a frame under way is finished only where it is quick, so
- * that motion is seen, and given up otherwise. A frame of a view that just came is as small and
- * coarse as it has to be for its time; then the whole picture follows, which is that of `triptych
- * render`, bit for bit. Functions are for one thread, the window's, but for those of
- * trip_frames_params. */
+/* The drawing thread. Only this thread uses the library's context, which holds the data set in the
+ * window. The window's thread posts the wanted view and takes the latest picture; it never waits.
+ * The latest view replaces earlier ones. A frame in progress is finished if it is quick, and
+ * abandoned otherwise. For a new view it first draws a frame as small and coarse as the frame time
+ * needs. The full picture follows, with the same bits as `triptych render`'s. The window's thread
+ * calls these functions; the callbacks of trip_frames_params run on the drawing thread. */
 #ifndef TRIP_VIEW_FRAMES_H
 #define TRIP_VIEW_FRAMES_H
 
@@ -21,130 +20,131 @@ extern "C" {
 typedef struct trip_frames trip_frames;
 
 typedef struct trip_frames_params {
-    uint64_t memory_bytes; /* as triptych_resources; 0: the default */
+    uint64_t memory_bytes; /* as in triptych_resources; 0 means the default */
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
-    double frames_per_second; /* while the view moves; 0: 30 */
-    /* By the drawing thread: something has come. */
+    double frames_per_second; /* while the view moves; 0 means 30 */
+    /* Called by the drawing thread when there is something new to show. */
     void (*wake)(void *user);
     void *wake_user;
-    /* The same: the data set to open for what the user named, which stays where it is until
-     * release(); one with all values, which was made before, where keep_all. *small says whether it
-     * is of samples alone, in the place of a large one that is yet to be made. NULL: names are data
-     * sets. A failure is reported in the context or the thread's
-     * scope. */
+    /* Called by the drawing thread. Sets *path to the data set for the user's `input`; it stays in
+     * place until release(). With keep_all it must hold all values and exist already. *small is set
+     * if the data set is only a preview from samples. NULL means that inputs are data sets.
+     * Failures are reported in the context or the thread's scope. */
     int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                 const char **path);
     void (*release)(void *user);
     void *user;
 } trip_frames_params;
 
-/* NULL without memory or threads. */
+/* Starts the thread. Returns NULL if memory or threads are exhausted. */
 trip_frames *trip_frames_start(const trip_frames_params *params);
-/* Gives up what is under way, which takes milliseconds. */
+/* Abandons the frame in progress and ends the thread, within milliseconds. */
 void trip_frames_stop(trip_frames *f);
 
-/* What is to be seen. Texts are copied. */
+/* The wanted view of a data set. Texts are copied. */
 typedef struct trip_wanted {
-    unsigned document; /* another number: another data set, or the same opened anew */
+    unsigned document; /* a new number opens the data set (again) */
     const char *input;
-    bool keep_all;    /* one that has all values: as find() */
-    const char *heat; /* the data set of its heat; NULL: it has none */
-    /* Where to look from; without it the view is found by `start`, whose pointers stay valid. */
+    bool keep_all;    /* as for find() */
+    const char *heat; /* data set with the heat for emission; may be NULL */
+    /* The view. If has_navigation is false, the library finds it from `start`. */
     bool has_navigation;
     trip_navigation navigation;
-    const triptych_view *start; /* NULL: the default */
+    const triptych_view *start; /* NULL means the default; its pointers stay valid */
     int width, height;          /* of the picture, px */
-    const char *function;       /* preset or file; NULL: the data set's own */
-    const char *text;           /* of a function, in its place */
+    const char *function;       /* preset or file; NULL means the data set's default */
+    const char *text;           /* a transfer function as text, in place of `function` */
     double opacity_scale;
     triptych_settings settings;
 } trip_wanted;
 
-/* From now on this is wanted. */
+/* Replaces the wanted view. */
 void trip_frames_want(trip_frames *f, const trip_wanted *wanted);
 
-/* What is known of a data set once it is open; later, where a view that had to be found looks from,
- * and the text of another function. */
+/* News of a data set: its description once it is open, and later each view that the library found
+ * and each new transfer function as text. */
 typedef struct trip_opened {
     unsigned document;
-    bool first;         /* it has just been opened; else only navigation and function are set */
-    bool small;         /* as find() says */
-    bool cold;          /* the data set of its heat cannot be had: it is shown without */
-    triptych_info info; /* without notes */
+    bool first;         /* just opened; otherwise only navigation and function are set */
+    bool small;         /* as find() set it */
+    bool cold;          /* the heat data set failed to open; drawn without emission */
+    triptych_info info; /* notes is NULL */
     triptych_histogram histogram;
-    char *function; /* its text; NULL where it is as it was, or has none in data units */
+    char *function; /* as text in data units; NULL if unchanged or without such a text */
     trip_navigation navigation;
-    char *source; /* the path that was opened */
+    char *source; /* path of the open data set */
 } trip_opened;
 
-/* True when a data set was opened or a view found since; free with trip_opened_free(). */
+/* Takes the news since the last call. Returns false if there are none. Free with
+ * trip_opened_free(). */
 bool trip_frames_take_opened(trip_frames *f, trip_opened *out);
 void trip_opened_free(trip_opened *o);
 
 typedef struct trip_frames_status {
-    unsigned document;          /* that this is about */
-    bool open;                  /* there is a data set */
-    bool exact;                 /* the picture is the one that is wanted, whole */
-    bool failed;                /* for the reason `message` */
-    bool left_out;              /* the function shows values that were not kept */
-    bool unsaved;               /* the last file of trip_frames_save() could not be written */
-    bool rests;                 /* nothing more comes: the picture is exact, or has failed */
-    char message[512];          /* of the last failure or warning; "" */
-    uint64_t messages;          /* how many there were */
-    char stage[16];             /* what goes on: "draw", "read", "merge", ...; "": nothing */
-    double done;                /* of that, 0 to 1 */
-    double scale;               /* of the last frame of a moving view */
-    double lod_px;              /* voxels that were so wide in it were drawn by coarse levels */
-    double moving_ms;           /* it took */
-    double whole_ms;            /* the last whole picture took */
-    uint64_t frames;            /* whole or not, since the start */
-    uint64_t moving;            /* of those, of a moving view */
-    triptych_frame_stats stats; /* of the last whole picture; its texts are copied below */
+    unsigned document;          /* the data set that this describes */
+    bool open;                  /* a data set is open */
+    bool exact;                 /* the picture is complete and of the wanted view */
+    bool failed;                /* `message` gives the reason */
+    bool left_out;              /* the transfer function reveals voxels that bricking dropped */
+    bool unsaved;               /* the last trip_frames_save() failed */
+    bool rests;                 /* idle: the picture is exact, or drawing failed */
+    char message[512];          /* the last failure or warning, or "" */
+    uint64_t messages;          /* failures and warnings so far */
+    char stage[16];             /* "draw", "read", "merge", ...; "" if idle */
+    double done;                /* share of the stage, 0 to 1 */
+    double scale;               /* resolution of the last moving frame, up to 1 */
+    double lod_px;              /* its level of detail, as triptych_settings.lod_px */
+    double moving_ms;           /* its time */
+    double whole_ms;            /* time of the last full picture */
+    uint64_t frames;            /* drawn since the start */
+    uint64_t moving;            /* moving frames since the start */
+    triptych_frame_stats stats; /* of the last full picture; texts are copied below */
     char renderer[64], device[128], engine[64], ring[128];
 } trip_frames_status;
 
 trip_frames_status trip_frames_get_status(trip_frames *f);
 
-/* How long the last frames of moving views took, in ms, the latest last: so many, up to `most`. */
+/* Copies the times of the last moving frames, at most `max`, in ms, the latest last. Returns the
+ * count. */
 enum { TRIP_FRAMES_TIMES = 4096 };
 int trip_frames_get_times(trip_frames *f, int max, float *ms);
-/* The plan of the last whole picture, in words, for free(); NULL: there is none. */
+/* Returns the plan of the last full picture as text, for free(), or NULL if there is none. */
 char *trip_frames_explain(trip_frames *f);
 
-/* The last picture, 8 bits a channel, red first, opaque. */
+/* A picture: red, green, blue, alpha 255, 8 bits per channel. */
 typedef struct trip_picture {
     const uint8_t *rgba;
-    int width, height;           /* of its pixels */
-    int full_width, full_height; /* of the picture that was wanted */
-    trip_navigation navigation;  /* seen from there */
+    int width, height;           /* of `rgba`, px */
+    int full_width, full_height; /* of the full picture, px */
+    trip_navigation navigation;  /* the view drawn */
     unsigned document;
-    bool whole;      /* as large as wanted, and complete */
-    uint64_t number; /* grows with each one */
+    bool whole;      /* full size and complete */
+    uint64_t number; /* ascends with each picture */
 } trip_picture;
 
-/* Calls `use` with the picture if it is another one than `number` and can be had at once; then
- * true.
- */
+/* Calls `use` with the latest picture and returns true, if its number differs from `number` and the
+ * drawing thread is not writing it. */
 bool trip_frames_use_picture(trip_frames *f, uint64_t number,
                              void (*use)(void *user, const trip_picture *p), void *user);
 
-/* Writes the whole picture of what is wanted once it is there, as `triptych render` does; the
- * status's message then names it. */
+/* Writes the full picture of the wanted view when it is complete, as `triptych render` does. The
+ * status's message then names the file. */
 void trip_frames_save(trip_frames *f, const char *path);
-/* Whether one is yet to be written. */
+/* Returns whether a picture is still to be written. */
 bool trip_frames_saving(trip_frames *f);
 
-/* What is seen at a place of the picture, in its pixels, once the whole picture is there; until
- * then the last answer. */
+/* The answer of the last probe. */
 typedef struct trip_probed {
-    bool valid; /* something was looked at, */
+    bool valid; /* a probe was answered */
     double x, y;
-    trip_navigation navigation; /* seen from there */
+    trip_navigation navigation; /* the view probed */
     triptych_hit hit;
 } trip_probed;
 
+/* Asks for the visible value at a position in pixels. The answer comes once the full picture is
+ * complete. */
 void trip_frames_probe(trip_frames *f, double x, double y);
 trip_probed trip_frames_get_probed(trip_frames *f);
 

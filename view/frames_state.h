@@ -1,5 +1,5 @@
-/* What the files of frames.h share: the mailbox, under its lock, and what the drawing thread alone
- * uses. */
+/* The state of trip_frames, shared by frames.c and frames_thread.c: the mailbox under its lock, and
+ * the drawing thread's own members. */
 #ifndef TRIP_VIEW_FRAMES_STATE_H
 #define TRIP_VIEW_FRAMES_STATE_H
 
@@ -10,63 +10,63 @@
 #include "scope.h"
 
 struct trip_frames {
-    trip_frames_params params; /* constant */
+    trip_frames_params params; /* read-only */
     pthread_t thread;
     trip_scope scope; /* the thread's */
-    triptych *t;      /* the thread's, but for triptych_cancel() */
+    triptych *t;      /* the thread's; others only call triptych_cancel() */
 
     pthread_mutex_t lock;
     pthread_cond_t come;
     /* Under lock: */
     trip_wanted wanted;
-    uint64_t wanted_count; /* how often something was wanted */
+    uint64_t wanted_count; /* counts changes of `wanted` */
     bool quit;
-    bool ends_early; /* what goes on is given up for what comes */
-    char *save;      /* a file to write the whole picture to; NULL: none */
+    bool ends_early; /* new wishes abandon the frame in progress */
+    char *save;      /* file to write the full picture to; may be NULL */
     trip_frames_status status;
-    float times[TRIP_FRAMES_TIMES]; /* round */
+    float times[TRIP_FRAMES_TIMES]; /* ring buffer */
     trip_opened opened;
     bool has_opened;
     char *plan;
-    bool looks; /* at a place: */
+    bool looks; /* a probe is wanted, at `position` */
     double position[2];
     trip_probed probed;
 
-    /* The window looks at it only where it gets this lock at once; the drawing thread holds it only
-     * while it copies a picture. */
+    /* The window's thread only tries this lock. The drawing thread holds it only while it copies a
+     * picture. */
     pthread_mutex_t picture_lock;
     trip_picture picture;
 
-    /* The drawing thread's own. */
-    trip_wanted now; /* what it works on */
-    uint64_t taken;  /* wanted_count when that was wanted; of what was worked on last: */
-    uint64_t served;
-    bool small;                 /* as find() says */
-    bool cold;                  /* its heat cannot be had */
-    bool open, announced, warm; /* a data set; to the window; a frame of it was drawn */
-    bool frugal;                /* no pages are kept between frames of it */
-    bool plain;                 /* and moving views have no coarse levels */
-    bool by_values;             /* it has those of values alone: moving views are drawn by these */
+    /* Private to the drawing thread: */
+    trip_wanted now;            /* the wish it works on */
+    uint64_t taken;             /* wanted_count of `now` */
+    uint64_t served;            /* wanted_count of the previous wish */
+    bool small;                 /* as find() set it */
+    bool cold;                  /* the heat data set failed to open */
+    bool open, announced, warm; /* a data set is open; the window knows; a frame was drawn */
+    bool frugal;                /* keeps no pages between frames */
+    bool plain;                 /* moving views have no coarse levels */
+    bool by_values;             /* has coarse levels for post only: moving views use post */
     unsigned document;
-    const char *source;  /* that was found for what is named; NULL: nothing is held */
-    char *function;      /* that the context has, as a key */
-    bool other_function; /* than the window's thread was given the text of */
+    const char *source;  /* path from find(); NULL if nothing is held */
+    char *function;      /* key of the context's transfer function */
+    bool other_function; /* the window does not have its text yet */
     bool has_settings;
-    triptych_settings settings; /* that the context has */
-    float *rgba;                /* of this size: */
+    triptych_settings settings; /* of the context */
+    float *rgba;                /* width * height pixels */
     int width, height;
-    uint8_t *shown;             /* the picture's pixels */
-    trip_pace pace, whole_pace; /* of frames of moving views; of whole pictures */
-    bool whole;                 /* rgba is the whole picture of what is wanted */
-    double shown_ms;            /* when a picture was last shown */
+    uint8_t *shown;             /* pixels of `picture` */
+    trip_pace pace, whole_pace; /* of moving frames; of full pictures */
+    bool whole;                 /* rgba is the full picture of the wanted view */
+    double shown_ms;            /* time of the last shown picture */
 };
 
-/* Before the drawing thread starts: what may be given up from then on. */
+/* Prepares the state that other threads may cancel. Call it before the drawing thread starts. */
 void trip_frames_prepare(trip_frames *f);
-/* The drawing thread; `user` is the trip_frames. */
+/* Entry of the drawing thread; `user` is the trip_frames. */
 void *trip_frames_run(void *user);
 
-/* Copies texts; release it. False without memory. */
+/* Copies a wish with its texts. Returns false if memory is exhausted. Release the copy. */
 bool trip_wanted_copy(trip_wanted *to, const trip_wanted *from);
 void trip_wanted_release(trip_wanted *w);
 

@@ -21,17 +21,17 @@ static void wake(trip_frames *f)
     f->params.wake(f->params.wake_user);
 }
 
-/* Of moving views, in pixels of their frames: voxels no wider are drawn by coarse levels. */
+/* Level of detail of moving frames: the maximum width of a coarse level's voxels, in frame pixels.
+ */
 #define MOVING_LOD_PX 1.0
 #define MOVING_SLICES 1
-/* Of the time that such a frame has, what it is to take in the mean, since some take longer. It
- * keeps to that by detail alone: where it would take so many times as long as it has, what is near
- * becomes coarse too. */
+/* Moving frames aim at this share of their time on average, because some take longer. They only
+ * reduce detail. If a frame would exceed its time by this factor, near parts become coarse too. */
 #define MOVING_SHARE 0.85
 #define MOVING_MAX 1.5
 #define DEFAULT_FPS 30.0
 
-/* ---- what there is to say ---- */
+/* ---- messages ---- */
 
 static const char prefix[] = "triptych: ";
 
@@ -50,7 +50,7 @@ static void say(trip_frames *f, const char *line, bool failed)
     wake(f);
 }
 
-/* Of the context: its failures come with the status of the call that failed. */
+/* Takes the context's warnings and notes. Failures come with the status of the call. */
 static void take_line(void *user, const char *line)
 {
     const char *text = without_prefix(line);
@@ -97,7 +97,7 @@ static bool has_newer(trip_frames *f)
     return newer;
 }
 
-/* Whether a wish that came is about another data set, or the end. */
+/* Returns whether a new wish names another data set or ends the thread. */
 static bool has_other(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
@@ -106,7 +106,7 @@ static bool has_other(trip_frames *f)
     return other;
 }
 
-/* From here on a new wish ends the work that goes on, or does not. */
+/* Sets whether a new wish cancels the work in progress. */
 static void set_ends_early(trip_frames *f, bool ends)
 {
     pthread_mutex_lock(&f->lock);
@@ -114,11 +114,11 @@ static void set_ends_early(trip_frames *f, bool ends)
     pthread_mutex_unlock(&f->lock);
 }
 
-/* Waits for a wish, or for a file to write of what is there; false at the end. */
+/* Waits for a wish, or for a picture to save. Returns false at the end of the thread. */
 static bool take_wanted(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
-    f->status.stage[0] = 0; /* nothing goes on */
+    f->status.stage[0] = 0; /* idle */
     while (!f->quit && f->wanted_count == f->taken && !f->save && !(f->looks && f->whole)) {
         f->status.rests = true;
         pthread_cond_wait(&f->come, &f->lock);
@@ -153,7 +153,7 @@ static void close_data(trip_frames *f)
 {
     drop_picture(f);
     triptych_end(f->t);
-    triptych_close(f->t); /* the pictures, too */
+    triptych_close(f->t); /* also releases the pictures */
     if (f->source && f->params.release)
         f->params.release(f->params.user);
     f->source = NULL;
@@ -166,7 +166,7 @@ static void close_data(trip_frames *f)
     pthread_mutex_unlock(&f->lock);
 }
 
-/* Without it the data set is shown as it is, and why is said. */
+/* If the heat data set fails to open, the data set is drawn without it, with a message. */
 static int open_heat(trip_frames *f)
 {
     char line[512];
@@ -239,7 +239,7 @@ static int use_function(trip_frames *f)
                                           .left_out = &left_out };
     int status = triptych_set_transfer_function(f->t, &wanted);
     wanted.left_out = NULL;
-    if (!status && left_out) /* with a warning that names the command */
+    if (!status && left_out) /* the warning names the command to brick again */
         status = triptych_set_transfer_function(f->t, &wanted);
     pthread_mutex_lock(&f->lock);
     f->status.left_out = !status && left_out;
@@ -252,14 +252,14 @@ static int use_function(trip_frames *f)
     return status;
 }
 
-/* Those that are wanted, with levels at least so coarse. Not where memory is short: pictures of
- * several levels take more of it. */
+/* Returns the wanted settings with levels at least as coarse as lod_px. Short memory keeps the
+ * finest level: pictures of several levels take more. */
 static triptych_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
     triptych_settings s = f->now.settings;
     if (f->plain)
         return s;
-    /* Post, unless something is set that splats alone have. */
+    /* Use post, unless a setting requires splats. */
     if (f->by_values && s.classify == TRIPTYCH_PRE)
         s.classify = TRIPTYCH_CLASSIFY_AUTO;
     s.lod_px = fmax(s.lod_px, lod_px);
@@ -277,7 +277,7 @@ static int use_settings(trip_frames *f, const triptych_settings *wanted)
     return status;
 }
 
-/* The view that it was opened with, found by the library. */
+/* Takes the view that the library found when the data set was opened. */
 static int find_navigation(trip_frames *f, trip_navigation *out)
 {
     const trip_wanted *w = &f->now;
@@ -297,7 +297,7 @@ static int find_navigation(trip_frames *f, trip_navigation *out)
     return status;
 }
 
-/* The function in data units, for an editor; not every one can be had so. */
+/* Converts the transfer function to data units for the editor. Some cannot be converted. */
 static char *text_of_function(trip_frames *f)
 {
     char *text = NULL;
@@ -317,7 +317,7 @@ static int describe(trip_frames *f, trip_opened *o)
     return status;
 }
 
-/* Joins what was not taken yet. */
+/* Merges news with news that the window has not taken yet. */
 static void post(trip_frames *f, trip_opened *o)
 {
     trip_opened *to = &f->opened;
@@ -413,16 +413,16 @@ static void show(trip_frames *f, int width, int height, bool whole)
 
 typedef struct frame {
     int width, height;
-    bool whole; /* of the size and detail that are wanted */
+    bool whole; /* full size and detail */
     triptych_settings settings;
-    double detail; /* the part of the picture's width and height that there are voxels for */
-    bool first;    /* there is no picture of this view: parts of it are shown, and it is finished */
+    double detail; /* share of the width and height that has voxels of its own */
+    bool first;    /* first picture of this view: shown in parts, and always finished */
     double begun_ms;
 } frame;
 
 enum { STEP_NS = 10000000, PART_MS = 150, MAX_MS = 1000 };
 
-/* Frames that show that the view moves are given up only where they take long. */
+/* Moving frames are abandoned only if they take long. */
 static bool gives_up(trip_frames *f, const frame *d)
 {
     return has_newer(f) && (!d->first || now_ms() - d->begun_ms > MAX_MS || has_other(f));
@@ -472,7 +472,7 @@ static double wanted_pixels(const trip_frames *f)
     return (double)f->now.width * f->now.height;
 }
 
-/* A moving frame counts as of so many pixels as it has detail for. */
+/* A moving frame is recorded with its number of pixels of detail. */
 static void note_pace(trip_frames *f, const frame *d, double ms)
 {
     if (d->whole)
@@ -546,8 +546,8 @@ static int draw(trip_frames *f, double scale, double detail, const triptych_sett
     return 0;
 }
 
-/* A frame of a moving view, coarse and small to keep to the time. What it has less detail for is
- * shared out: both its pixels and the voxels in it are wider. */
+/* Draws a moving frame, small and coarse enough for its time. Reduced detail is split evenly
+ * between wider pixels and wider voxels. */
 static int draw_moving(trip_frames *f, double target_ms)
 {
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
@@ -559,8 +559,8 @@ static int draw_moving(trip_frames *f, double target_ms)
     return draw(f, scale, detail, &settings, true);
 }
 
-/* One of the picture's size, before the whole one, which takes about so long: for it, a part of
- * that. */
+/* Draws a full-size, coarse frame before the full picture. Its time is a share of the full
+ * picture's expected time. */
 static int draw_coarse(trip_frames *f, double whole_ms)
 {
     enum { PART = 5 };
@@ -568,8 +568,8 @@ static int draw_coarse(trip_frames *f, double whole_ms)
     return draw(f, 1, 1, &settings, false);
 }
 
-/* A picture at once, then the whole one; between them one of its size but coarser where that is
- * long in coming. */
+/* Draws a picture at once, then the full one. If the full one takes long, draws a coarse one of
+ * full size between them. */
 static int draw_wanted(trip_frames *f)
 {
     enum { LONG_MS = 1500 };
@@ -613,8 +613,8 @@ static int serve_once(trip_frames *f)
     return status ? status : draw_wanted(f);
 }
 
-/* Where the memory does not suffice for pictures and for pages kept between them, none are kept;
- * and where it does not for those of several levels, moving views have none. */
+/* If memory is too short for pictures and cached pages, no pages are cached. If it is too short for
+ * several levels, moving views have no coarse levels. */
 static int serve_wanted(trip_frames *f)
 {
     for (;;) {
@@ -627,7 +627,7 @@ static int serve_wanted(trip_frames *f)
     }
 }
 
-/* Writes the picture that is there, as `triptych render` would. */
+/* Writes the current picture, as `triptych render` does. */
 static int write_picture(trip_frames *f, const char *path)
 {
     char line[512];
@@ -638,7 +638,7 @@ static int write_picture(trip_frames *f, const char *path)
     return status;
 }
 
-/* A file that is to be written, when the picture is whole or will not be. */
+/* Handles a picture to save, once the picture is complete or has failed. */
 static int save(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
@@ -660,7 +660,7 @@ static int save(trip_frames *f)
     return status;
 }
 
-/* What failed is shown, and tried again when something else is wanted: data sets come back. */
+/* Shows a failure. The next wish tries again, because a data set can come back. */
 static void fail(trip_frames *f, int status)
 {
     char line[512];
@@ -671,7 +671,7 @@ static void fail(trip_frames *f, int status)
         close_data(f);
 }
 
-/* At a place that the pointer is at. */
+/* Answers the probe at the pointer's position. */
 static void look(trip_frames *f)
 {
     pthread_mutex_lock(&f->lock);
@@ -689,7 +689,7 @@ static void look(trip_frames *f)
     wake(f);
 }
 
-/* Without a new wish there is a file to write of what is there. */
+/* No new wish: save the current picture. */
 static void serve(trip_frames *f)
 {
     const bool fresh = f->served != f->taken;

@@ -74,7 +74,7 @@ static void add_document(cJSON *root, trip_viewer *v)
     free(camera);
 }
 
-/* Any file, as a device or a pipe too. */
+/* `path` may be any file, also a device or a pipe. */
 static int write_text(const char *path, const char *text)
 {
     FILE *f = fopen(path, "w");

@@ -1,4 +1,4 @@
-/* What the viewer measures of itself, and that as JSON. The window's thread only. */
+/* Statistics of the viewer, and their JSON file. Only the window's thread uses them. */
 #ifndef TRIP_VIEW_GAUGES_H
 #define TRIP_VIEW_GAUGES_H
 
@@ -10,18 +10,19 @@ extern "C" {
 
 enum { TRIP_GAUGES_ANSWERS = 4096 };
 
-/* Zeroed at first. */
+/* Zero-initialise it. */
 typedef struct trip_gauges {
-    float answers[TRIP_GAUGES_ANSWERS]; /* round: ms from input to a picture of the window */
-    uint64_t answered;                  /* how many there were */
+    float answers[TRIP_GAUGES_ANSWERS]; /* ring buffer: ms from an input to the picture that shows
+                                           it */
+    uint64_t answered;                  /* answers so far */
 } trip_gauges;
 
 void trip_gauges_note_answer(trip_gauges *g, double ms);
 
-/* The value that so large a part of them does not exceed, 0 to 1; reorders them. 0 of none. */
+/* Returns the quantile `part` (0 to 1) of the values, or 0 if there are none. Reorders them. */
 double trip_gauges_quantile(float *values, int count, double part);
 
-/* 0, or a reported failure. */
+/* Writes the statistics as JSON. Returns 0, or a reported failure. */
 int trip_gauges_write(const trip_gauges *g, trip_viewer *v, const char *path);
 
 #ifdef __cplusplus

@@ -77,8 +77,10 @@ const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS] = {
     { TRIPTYCH_SHADOWS, "anisotropy", "Anisotropy", "", AT(anisotropy), false, -0.95, 0.95, 0.05 },
     { LATTICES, "light-cells", "Light cells", "", AT(light_cells), true, 8, 1024, 1 },
     { TRIPTYCH_CUEING, "fading", "Cueing strength", "", AT(cueing), false, 0.01, 1, 0.01 },
-    { TRIPTYCH_EMISSION, "coldest", "Minimum temperature", "K", AT(kelvin[0]), false, 0, HOTTEST - 1, 1 },
-    { TRIPTYCH_EMISSION, "hottest", "Maximum temperature", "K", AT(kelvin[1]), false, 1, HOTTEST, 1 },
+    { TRIPTYCH_EMISSION, "coldest", "Minimum temperature", "K", AT(kelvin[0]), false, 0,
+      HOTTEST - 1, 1 },
+    { TRIPTYCH_EMISSION, "hottest", "Maximum temperature", "K", AT(kelvin[1]), false, 1, HOTTEST,
+      1 },
 };
 
 const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_settings *s,
@@ -135,7 +137,7 @@ static bool may_glow(const triptych_settings *s, const char *heat)
     return heat && s->effects & (TRIPTYCH_EMISSION | TRIPTYCH_EFFECTS_AUTO);
 }
 
-/* Where it is not the usual one, and some of the effects that it is of may run. */
+/* Returns whether the number differs from its default and one of its effects can run. */
 static void put_number(FILE *out, const char *option, double number, double defaults, int some)
 {
     char text[32];

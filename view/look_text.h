@@ -1,5 +1,5 @@
-/* How a data set is coloured and drawn, but for light and effects (light.h), as options of
- * `triptych render` that give the same picture again. Any thread. */
+/* Writes settings as options of `triptych render` that reproduce the picture; light.h does it for
+ * light and effects. Any thread may call these functions. */
 #ifndef TRIP_VIEW_LOOK_TEXT_H
 #define TRIP_VIEW_LOOK_TEXT_H
 
@@ -9,9 +9,9 @@
 extern "C" {
 #endif
 
-/* What differs from the default: a space and an option each, numbers to the last bit, a function's
- * name or path as one word of a shell. `function` is NULL for the data set's own. For free(); NULL
- * without memory. */
+/* Returns the options that differ from the default, each after a space, for free(). Numbers are
+ * exact to the last bit. The transfer function's name is quoted for a shell; NULL means the data
+ * set's default. Returns NULL if memory is exhausted. */
 char *trip_look_text(const triptych_settings *s, const char *function, double opacity_scale);
 
 #ifdef __cplusplus

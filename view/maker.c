@@ -9,18 +9,18 @@
 #include "scope.h"
 
 struct trip_maker {
-    trip_maker_params params; /* constant */
+    trip_maker_params params; /* read-only */
     pthread_t thread;
-    bool started;     /* the thread is to be joined; the window's thread's */
+    bool started;     /* the thread must be joined; window's thread only */
     trip_scope scope; /* the thread's */
-    triptych *t;      /* the thread's, but for triptych_cancel() */
-    char *input;      /* these are set before the thread begins */
+    triptych *t;      /* the thread's; others only call triptych_cancel() */
+    char *input;      /* set before the thread starts */
     bool keep_all;
 
     pthread_mutex_t lock;
     /* Under lock: */
     trip_maker_status status;
-    bool ended; /* and not taken */
+    bool ended; /* and not yet taken */
     trip_made made;
 };
 
@@ -36,7 +36,7 @@ static void show_progress(void *user, const char *stage, uint64_t done, uint64_t
 
 static void take_line(void *user, const char *line)
 {
-    (void)user, (void)line; /* of what it makes; drawing says the same */
+    (void)user, (void)line; /* drawing reports the same messages */
 }
 
 static void take_report(const char *line, void *user)

@@ -18,9 +18,9 @@ static void put(double out[3], trip_vec3 v)
     out[2] = v.z;
 }
 
-/* What a change works on, written back by apply() if it is a view. */
+/* Working copy of a change. apply() writes it back if it is a valid view. */
 typedef struct pose {
-    trip_vec3 eye, look, right, up, forward; /* the last three of unit length */
+    trip_vec3 eye, look, right, up, forward; /* the last three have unit length */
     double distance;
 } pose;
 
@@ -40,7 +40,8 @@ static bool is_finite(trip_vec3 v)
     return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
 }
 
-/* Eyes nearer to the point looked at than this part of their coordinates have no exact gaze. */
+/* Minimum distance of the eye from the point looked at, relative to their coordinates: below it the
+ * view direction is inexact. */
 #define NEAREST 1e-9
 
 static void apply(trip_navigation *n, trip_vec3 eye, trip_vec3 look, trip_vec3 up)
@@ -59,7 +60,7 @@ static double tangent(const trip_navigation *n)
     return tan(n->fov_degrees / 2 * DEGREE);
 }
 
-/* About an axis of unit length. */
+/* Rotates about an axis of unit length. */
 static trip_vec3 turned(trip_vec3 v, trip_vec3 axis, double degrees)
 {
     trip_vec3 along = trip_scale(axis, trip_dot(axis, v)), across = trip_sub(v, along);
@@ -210,7 +211,7 @@ void trip_navigation_roll(trip_navigation *n, double degrees)
     apply(n, p.eye, p.look, turned(p.up, p.forward, -degrees));
 }
 
-/* The eye moves so that the point looked at is seen from `distance`. */
+/* Moves the eye to `distance` from the point looked at. */
 static void set_distance(trip_navigation *n, double distance)
 {
     pose p = pose_of(n);
@@ -248,9 +249,8 @@ void trip_navigation_look_from(trip_navigation *n, const double direction[3])
     apply(n, trip_add(p.look, trip_scale(from, p.distance)), p.look, up);
 }
 
-/* How far the eight corners reach to both sides of an axis of the camera's, each moved back by
- * `tangent` times its place along the gaze: both sides of a frustum through the result's middle
- * hold the box. */
+/* Computes the extent of the eight corners along an axis of the camera. Each corner is first moved
+ * by `tangent` times its depth. A frustum centred on the result then contains the box. */
 static void reach(const trip_vec3 corners[8], trip_vec3 axis, trip_vec3 forward, double slope,
                   double sides[2])
 {

@@ -1,6 +1,6 @@
-/* Where the viewer looks from, and how its controls change that: plain values in world space, with
- * the geometry of render/camera.h. A change whose result would be no view (the eye in the point
- * looked at, numbers without end) leaves everything as it is. Pure functions. */
+/* The viewer's camera and its controls: plain values in world space, with the geometry of
+ * render/camera.h. A change that would make the view invalid is ignored: the eye at the point
+ * looked at, or a number that is not finite. Pure functions. */
 #ifndef TRIP_VIEW_NAVIGATION_H
 #define TRIP_VIEW_NAVIGATION_H
 
@@ -13,16 +13,15 @@ extern "C" {
 #endif
 
 typedef struct trip_navigation {
-    double eye[3], look[3], up[3]; /* up: of the picture; not along the gaze */
-    double upright[3];             /* unit length: what orbits go about */
+    double eye[3], look[3], up[3]; /* up: of the picture; not along the view direction */
+    double upright[3];             /* unit length: the axis of orbits */
     double fov_degrees;            /* vertical; kept in parallel views */
     double ortho_height;           /* > 0: parallel, so many world units high */
 } trip_navigation;
 
-/* The view that a context has; `upright` is the direction orbits go about, NULL: the camera's up.
- */
+/* Converts the view of a context. `upright` is the axis of orbits; NULL selects the camera's up. */
 trip_navigation trip_navigation_from_camera(const triptych_camera *camera, const double *upright);
-/* For triptych_set_view(); points into *n. */
+/* Returns the view for triptych_set_view(). It points into *n. */
 triptych_view trip_navigation_view(const trip_navigation *n, int width, int height);
 
 /* The camera's axes, unit length. */
@@ -31,49 +30,48 @@ typedef struct trip_navigation_axes {
 } trip_navigation_axes;
 trip_navigation_axes trip_navigation_get_axes(const trip_navigation *n);
 
-/* From the eye to the point looked at. */
+/* Returns the distance from the eye to the point looked at. */
 double trip_navigation_distance(const trip_navigation *n);
-/* World units a pixel covers at a distance along the gaze. */
+/* Returns the world units that a pixel covers at distance `depth` along the view direction. */
 double trip_navigation_pixel(const trip_navigation *n, int height, double depth);
 
-/* The pixel position of a point (centres lie at + 0.5, y down); returns its distance along the
- * gaze. In perspective a point is in front where that is above 0, and otherwise has no place. */
+/* Projects a point to pixels (centres at + 0.5, y down). Returns its distance along the view
+ * direction. In perspective the pixel is valid only if that distance is above 0. */
 double trip_navigation_project(const trip_navigation *n, int width, int height,
                                const double point[3], double pixel[2]);
-/* The ray of a pixel position: where it begins (parallel: in the plane of the eye), and its
- * direction of unit length. */
+/* Computes the ray of a pixel position: its origin, in the plane of the eye for parallel views, and
+ * its direction of unit length. */
 void trip_navigation_ray(const trip_navigation *n, int width, int height, const double pixel[2],
                          double origin[3], double direction[3]);
-/* The point of that ray at a distance along the gaze. */
+/* Computes the point on a pixel's ray at distance `depth` along the view direction. */
 void trip_navigation_point(const trip_navigation *n, int width, int height, const double pixel[2],
                            double depth, double point[3]);
 
-/* The eye goes round the point looked at, which stays where it is: counterclockwise seen from
- * above, as triptych_turn(), and up over the top. Seen upside down, the azimuth is reversed, so
- * that a drag moves what is near in its direction. */
+/* Turns the eye around the fixed point looked at: counterclockwise seen from above, like
+ * triptych_turn(), and up across the top. If the view is upside down, the azimuth is reversed, so
+ * that near parts follow a drag. */
 void trip_navigation_orbit(trip_navigation *n, double azimuth_degrees, double elevation_degrees);
-/* The point at this distance along the gaze moves by so many pixels, x to the right, y down. */
+/* Moves the camera so that points at distance `depth` move by (dx, dy) pixels, right and down. */
 void trip_navigation_pan(trip_navigation *n, double dx_px, double dy_px, int height, double depth);
-/* Distances from `point` are multiplied by `factor`: below 1 the point comes nearer and stays at
- * its pixel. Parallel views become so much lower. */
+/* Multiplies the distances from `point` by `factor`. Below 1, the camera approaches the point,
+ * which stays at its pixel. In parallel views the height of the view is multiplied. */
 void trip_navigation_dolly(trip_navigation *n, double factor, const double point[3]);
-/* Moves eye and point looked at, by world units. */
+/* Moves the eye and the point looked at, in world units. */
 void trip_navigation_fly(trip_navigation *n, double forward, double right, double up);
-/* Looks elsewhere from where the eye is: to the right, up. */
+/* Turns the view direction about the fixed eye, to the right and up. */
 void trip_navigation_turn(trip_navigation *n, double right_degrees, double up_degrees);
-/* The picture turns clockwise. */
+/* Turns the picture clockwise. */
 void trip_navigation_roll(trip_navigation *n, double degrees);
 
-/* Another angle of view, from a distance at which the point looked at keeps its size. */
+/* Sets the vertical field of view, and moves the eye so that the point looked at keeps its size. */
 void trip_navigation_set_fov(trip_navigation *n, double degrees);
-/* Between parallel and perspective; the point looked at keeps its size. */
+/* Switches between parallel and perspective. The point looked at keeps its size. */
 void trip_navigation_set_parallel(trip_navigation *n, bool parallel);
-/* From this direction to the same point at the same distance, upright; along the upright axis with
- * the world's y, or z where that is upright, up. */
+/* Looks from this direction at the same point and distance, upright. If the direction is along the
+ * upright axis, up is world y, or z if y is the upright axis. */
 void trip_navigation_look_from(trip_navigation *n, const double direction[3]);
-/* All of a box in the picture, in the middle, as near as `fill` (0 to 1) of its width or height
- * allows, in the same direction. The point looked at becomes the box's middle, moved onto the gaze.
- */
+/* Frames a box in the same direction: centred, with `fill` (0 to 1) of the picture's width or
+ * height. The point looked at becomes the centre of the box, projected onto the view direction. */
 void trip_navigation_fit(trip_navigation *n, const double lo[3], const double hi[3], int width,
                          int height, double fill);
 

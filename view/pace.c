@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* What a frame's sums keep when the next is noted. */
+/* Decay of the sums with each recorded frame. */
 static const double kept = 0.7;
 
 #define MAX_GROWTH 3.0
@@ -18,9 +18,9 @@ void trip_pace_note(trip_pace *p, double pixels, double ms)
     p->ms_ms = p->ms_ms * kept + ms * ms;
 }
 
-/* The line of least squares through the frames: ms = fixed + slope * megapixels, neither below 0,
- * as steep as it may be where frames scatter about it: by its standard error more. From frames of
- * one size the two do not follow: all is then taken to be of pixels. */
+/* Fits ms = fixed + slope * megapixels to the frames by least squares, with neither below 0. Adds
+ * the standard error to the slope, for scattered frames. If all frames have one size, the whole
+ * time counts as slope. */
 static void fit(const trip_pace *p, double *fixed, double *slope)
 {
     const double mean_px = p->px / p->weight, mean_ms = p->ms / p->weight;

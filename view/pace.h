@@ -1,6 +1,6 @@
-/* How much detail frames may have while the view moves, from how long the last ones took: a frame
- * costs something whatever its detail, and something for each pixel that it has detail for, of
- * which there may be fewer than it has pixels. Plain values, one thread. */
+/* Chooses the resolution of moving frames from the times of the last ones. The model: a frame costs
+ * a constant and an amount for each pixel of detail. A frame can have fewer pixels of detail than
+ * pixels. Plain values, for one thread. */
 #ifndef TRIP_VIEW_PACE_H
 #define TRIP_VIEW_PACE_H
 
@@ -8,23 +8,24 @@
 extern "C" {
 #endif
 
-/* Zeroed at first: nothing is known. Sums over the frames noted, of which older ones count less. */
+/* Zero-initialise it. Weighted sums over past frames; older frames have smaller weights. */
 typedef struct trip_pace {
     double weight, px, px_px, ms, px_ms, ms_ms;
 } trip_pace;
 
-/* A frame of so many pixels took so long. */
+/* Records the time of a frame. */
 void trip_pace_note(trip_pace *p, double pixels, double ms);
-/* What a frame of so many pixels would take; 0 where nothing is known. */
+/* Returns the expected time of a frame with `pixels` pixels, or 0 without records. */
 double trip_pace_expect_ms(const trip_pace *p, double pixels);
 
-/* Less shows nothing. */
+/* The smallest resolution that is still useful, as a share of width and height. */
 #define TRIP_PACE_MIN 0.03125
 
-/* The part of the width and height of a picture of so many pixels with which a frame keeps to
- * `target_ms`, TRIP_PACE_MIN to 1; a half where nothing is known. Where what every frame costs
- * leaves too little, pixels get a quarter of that cost: fewer would gain nothing. A frame has at
- * most three times the pixels of those noted, in the mean: beyond them the cost is not known. */
+/* Returns the share of width and height, TRIP_PACE_MIN to 1, with which a frame should take
+ * `target_ms`. `pixels` is the size of the full picture. Returns 0.5 without records. If the
+ * constant cost alone exceeds the target, pixels get a quarter of it: fewer would gain little. The
+ * result has at most three times the mean number of recorded pixels, because the cost of more is
+ * unknown. */
 double trip_pace_scale(const trip_pace *p, double pixels, double target_ms);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* The panel by Dear ImGui, in the order in which it stands on the screen. */
+/* The panel by Dear ImGui. The functions follow the order of the controls on the screen. */
 #include "panel.h"
 
 #include <backends/imgui_impl_opengl3.h>
@@ -34,19 +34,19 @@ const int TIMES = 120;
 struct trip_panel {
     ImGuiContext *context;
     double scale;
-    std::map<std::string, Box> boxes; /* of the controls of the last frame */
-    std::string sought;               /* to be moved into sight */
-    int point;                        /* of the function that is chosen; -1: none */
+    std::map<std::string, Box> boxes; /* boxes of the last frame's controls, by label */
+    std::string sought;               /* label of a control to scroll into view */
+    int point;                        /* selected point of the transfer function, or -1 */
     bool dragging;
-    char path[512]; /* of a function */
+    char path[512]; /* of a transfer function */
 };
 
 namespace
 {
 
-// ---- small things ----
+// ---- helpers ----
 
-// The control that was just made can be found by its label.
+// Records the box of the last control under its label.
 bool mark(trip_panel *p, const char *label, bool result)
 {
     const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
@@ -57,7 +57,7 @@ bool mark(trip_panel *p, const char *label, bool result)
     return result;
 }
 
-// The same of a control with its label beside it.
+// Records a control with its label beside it.
 bool mark_beside(trip_panel *p, const char *label, bool result)
 {
     mark(p, label, result);
@@ -92,7 +92,7 @@ bool slide(trip_panel *p, const char *label, double *value, double lo, double hi
         p, label, ImGui::SliderScalar(label, ImGuiDataType_Double, value, &lo, &hi, format, all));
 }
 
-// Of a few names.
+// A choice from a few names.
 template <typename Choice>
 bool choose(trip_panel *p, const char *label, Choice *value, const char *const *names, int count)
 {
@@ -183,7 +183,7 @@ void draw_view(trip_panel *p, trip_viewer *v, trip_document *d)
 
 // ---- the transfer function ----
 
-// Opacities of fog are small: the axis is of their cube roots.
+// The opacity axis is a cube root, because opacities of fog are small.
 double height_of(double opacity)
 {
     return std::cbrt(opacity);
@@ -398,7 +398,7 @@ void draw_function_file(trip_panel *p, trip_viewer *v, trip_document *d)
     }
 }
 
-// Where the function shows values that were not kept.
+// Offers to brick again if the transfer function reveals dropped voxels.
 void draw_left_out(trip_panel *p, trip_viewer *v, trip_document *d)
 {
     if (!v->maker)
@@ -498,7 +498,7 @@ bool draw_light(trip_panel *p, trip_document *d)
         changed |= check(p, "Shading", &s->shading);
     else
         ImGui::TextDisabled("The data set has no normals: splats cannot be shaded.");
-    changed |= check(p, "Light from the eye", &s->headlight); /* which lights effects, too */
+    changed |= check(p, "Light from the eye", &s->headlight); /* also lights effects */
     if (!s->headlight)
         changed |= draw_light_position(p, d);
     float rgb[3];
@@ -547,7 +547,7 @@ bool draw_quality(trip_panel *p, trip_document *d)
     return changed;
 }
 
-// The papers' views.
+// The debug views of the papers.
 bool draw_shown(trip_panel *p, trip_document *d)
 {
     static const char *const shown[] = { "Off", "Lists", "Merge weights", "Levels of detail" };
@@ -629,7 +629,7 @@ void draw_marks(trip_panel *p, trip_viewer *v)
     check(p, "Probe", &v->probe);
 }
 
-// ---- gauges ----
+// ---- statistics ----
 
 void draw_gauges(trip_panel *p, trip_viewer *v)
 {
@@ -659,8 +659,8 @@ void draw_gauges(trip_panel *p, trip_viewer *v)
                 bytes_text(static_cast<double>(f.bytes_read)).c_str(),
                 bytes_text(f.ms > 0 ? static_cast<double>(f.bytes_read) / f.ms * 1e3 : 0).c_str(),
                 static_cast<double>(f.splats) * 1e-6);
-    ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f, level of detail %.1f px; full: %.0f ms", s.moving_ms,
-                       s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
+    ImGui::TextWrapped("moving: %.0f ms, resolution 1/%.1f, level of detail %.1f px; full: %.0f ms",
+                       s.moving_ms, s.scale > 0 ? 1 / s.scale : 1.0, s.lod_px, s.whole_ms);
     ImGui::PlotLines("##times", times, count, 0, "ms", 0, FLT_MAX,
                      ImVec2(ImGui::GetContentRegionAvail().x, 40 * static_cast<float>(p->scale)));
     ImGui::TextWrapped("%s, %s; %s", s.renderer, s.device, s.engine);
@@ -675,7 +675,7 @@ void draw_plan(trip_panel *, trip_viewer *v)
     std::free(plan);
 }
 
-// ---- over the picture ----
+// ---- overlays of the picture ----
 
 ImVec2 at(const double pixel[2])
 {
@@ -741,19 +741,20 @@ void draw_probe(ImDrawList *list, trip_viewer *v, const trip_document *d)
     const triptych_hit &h = probed.hit;
     const ImVec2 position(static_cast<float>(probed.x), static_cast<float>(probed.y));
     list->AddCircle(position, 5, IM_COL32_WHITE);
-    if (ImGui::GetIO().WantCaptureMouse) // the pointer is over the panel or a list
+    if (ImGui::GetIO().WantCaptureMouse) // the pointer is over the panel or a combo box
         return;
     if (!(h.opacity > 0)) {
         ImGui::SetTooltip("nothing is visible here");
         return;
     }
-    ImGui::SetTooltip("value %.6g\nposition %.6g, %.6g, %.6g\nvoxel %.1f, %.1f, %.1f\ndistance from "
-                      "the eye %.6g, of the first visible point %.6g\nopacity along the ray %.3g",
-                      h.value, h.position[0], h.position[1], h.position[2], h.index[0], h.index[1],
-                      h.index[2], h.depth, h.depth_first, h.opacity);
+    ImGui::SetTooltip(
+        "value %.6g\nposition %.6g, %.6g, %.6g\nvoxel %.1f, %.1f, %.1f\ndistance from "
+        "the eye %.6g, of the first visible point %.6g\nopacity along the ray %.3g",
+        h.value, h.position[0], h.position[1], h.position[2], h.index[0], h.index[1], h.index[2],
+        h.depth, h.depth_first, h.opacity);
 }
 
-// What goes on, along the lower edge of the picture.
+// Progress, along the lower edge of the picture.
 void draw_progress(ImDrawList *list, trip_viewer *v, double scale)
 {
     const trip_frames_status &s = v->status;
@@ -771,7 +772,7 @@ void draw_progress(ImDrawList *list, trip_viewer *v, double scale)
     }
 }
 
-// While samples stand for the whole.
+// A note while a preview from samples is shown.
 void draw_making(ImDrawList *list, trip_viewer *v, const trip_document *d, double scale)
 {
     char text[160];
@@ -868,7 +869,7 @@ void draw_over(trip_panel *p, trip_viewer *v)
         draw_keys(v);
 }
 
-// ---- all of it ----
+// ---- the whole panel ----
 
 void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
 {

@@ -1,6 +1,6 @@
-/* What lies over and beside the picture: the panel of controls, marks for orientation, messages and
- * the list of keys, by Dear ImGui, which draws by OpenGL. On the window's thread, with its GL
- * context current. */
+/* The panel of controls, the overlays of the picture, messages and the list of keys, drawn by Dear
+ * ImGui and OpenGL. Only the window's thread may call these functions, with its GL context current.
+ */
 #ifndef TRIP_VIEW_PANEL_H
 #define TRIP_VIEW_PANEL_H
 
@@ -12,21 +12,21 @@ extern "C" {
 
 typedef struct trip_panel trip_panel;
 
-/* Texts and controls are `scale` times as large. 0, or a reported failure. */
+/* Multiplies the size of texts and controls by `scale`. Returns 0, or a reported failure. */
 int trip_panel_create(trip_panel **out, double scale);
 void trip_panel_destroy(trip_panel *p);
 
-/* Pointer, buttons, wheel, keys and text. */
+/* Passes on pointer, button, wheel, key and text events. */
 void trip_panel_event(trip_panel *p, const trip_event *e);
-/* Whether such input is the panel's, and not for the picture. */
+/* Return whether the panel, not the picture, takes pointer or key events. */
 bool trip_panel_has_pointer(const trip_panel *p);
 bool trip_panel_has_keys(const trip_panel *p);
 
-/* A frame of it, over what the window shows; `seconds` after the last one. */
+/* Draws the panel over the window's contents, `seconds` after the last frame. */
 void trip_panel_draw(trip_panel *p, trip_viewer *v, double seconds);
 
-/* Where the control of this label lies: left, top, right, bottom. False where there is none; one
- * that is out of sight is moved into it by the next frames. */
+/* Sets `box` to the left, top, right and bottom of the control with this label. Returns false if
+ * there is none. The next frames scroll a hidden control into view. */
 bool trip_panel_find(trip_panel *p, const char *label, double box[4]);
 
 #ifdef __cplusplus

@@ -2,7 +2,7 @@
 
 #include "report.h"
 
-/* A generator of 64 bits (splitmix64). */
+/* splitmix64, a random generator of 64 bits. */
 static uint64_t draw(uint64_t *state)
 {
     uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
@@ -16,7 +16,7 @@ static int below(uint64_t *state, int n)
     return (int)(draw(state) % (uint64_t)n);
 }
 
-/* All but those that end the viewer or write files. */
+/* All keys but the ones that end the viewer or write files. */
 static int random_key(uint64_t *state)
 {
     static const int keys[] = { 'w', 'a', 's', 'd', 'f',          'x',           'y',
@@ -60,7 +60,7 @@ trip_event trip_player_random(uint64_t *state, int width, int height)
     return (trip_event){ .kind = TRIP_EVENT_ICONIFY, .down = below(state, 2) };
 }
 
-/* The window is shown again at the end, with nothing held. */
+/* At the end, restores the window and releases all keys and buttons. */
 static int play_random(trip_player *p, const trip_player_window *w, const trip_event *e)
 {
     if (p->phase == 0) {
@@ -87,7 +87,7 @@ static bool is_late(const trip_player *p, double seconds, double max)
     return seconds - p->since > max;
 }
 
-/* Whether a control is in sight and where it was a picture ago: it may be on its way there. */
+/* Returns whether a control is in sight and has not moved since the last picture. */
 static bool lies_still(trip_player *p, const trip_player_window *w, const trip_event *e)
 {
     double box[4];
@@ -100,7 +100,7 @@ static bool lies_still(trip_player *p, const trip_player_window *w, const trip_e
     return still;
 }
 
-/* Pressed and released in pictures of their own. */
+/* Presses and releases in separate pictures. */
 static int play_click(trip_player *p, const trip_player_window *w, const trip_event *e,
                       double seconds)
 {

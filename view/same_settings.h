@@ -1,5 +1,5 @@
-/* Whether two settings of a frame are the same, member by member: what lies between members does
- * not count, nor do planes of a clip beyond those there are. Pure. */
+/* Compares two settings member by member. Ignores padding and unused clipping planes. Pure
+ * function. */
 #ifndef TRIP_VIEW_SAME_SETTINGS_H
 #define TRIP_VIEW_SAME_SETTINGS_H
 

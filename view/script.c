@@ -24,9 +24,9 @@ typedef struct parser {
     long line;
     trip_script *script;
     size_t room;
-    char *words[MAX_WORDS]; /* of the line, the command first */
+    char *words[MAX_WORDS]; /* of the line; the first is the command */
     int count;
-    unsigned modifiers; /* of its last words */
+    unsigned modifiers; /* from the line's last words */
 } parser;
 
 #define fail_at(p, ...) trip_fail_line("script", (p)->name, (p)->line, __VA_ARGS__)
@@ -55,7 +55,7 @@ static int add(parser *p, trip_event event)
 
 /* Values of words */
 
-/* Positions, sizes and times lie within this. */
+/* Limit of positions, sizes and times. */
 #define MAX_NUMBER 1e6
 
 static int number(const parser *p, int word, double *out)
@@ -88,7 +88,7 @@ static int button(const parser *p, int *code)
                       : fail_at(p, "`%.40s` is not a button: left, right or middle", p->words[1]);
 }
 
-/* In the order of TRIP_KEY_ESCAPE and what follows it. */
+/* Names of the keys from TRIP_KEY_ESCAPE on. */
 static const char *const key_names[] = { "escape", "enter",   "tab",       "backspace", "delete",
                                          "left",   "right",   "up",        "down",      "home",
                                          "end",    "page-up", "page-down", "f1",        NULL };
@@ -241,11 +241,11 @@ static int parse_click(parser *p)
     return e.text ? add(p, e) : fail_at(p, "out of memory");
 }
 
-enum { REST = -1 }; /* in place of a count: the rest of the line */
+enum { REST = -1 }; /* the argument is the rest of the line */
 
 static const struct command {
     const char *name;
-    int words; /* after the name and without modifiers */
+    int words; /* arguments without modifiers */
     bool modifiers;
     int (*parse)(parser *p);
 } commands[] = {
@@ -281,7 +281,7 @@ static const struct command *find_command(const char *name)
     return NULL;
 }
 
-/* Takes "+shift" and the like off the end of the words. */
+/* Removes modifiers such as "+shift" from the end of the words. */
 static int take_modifiers(parser *p)
 {
     static const char *const names[] = { "+shift", "+control", "+alt", NULL };
@@ -307,7 +307,7 @@ static int cut_words(parser *p, char *rest)
     return 0;
 }
 
-/* `line` is without its end; it is cut into words in place. */
+/* Parses a line without its newline; cuts it into words in place. */
 static int parse_line(parser *p, char *line)
 {
     line += strspn(line, " \t");

@@ -22,14 +22,14 @@
 
 enum { MAX_BYTES = 16 << 20, VERSION = 1 };
 
-/* What numbers a state has, where they lie in it, and between what. */
+/* The numbers of a state: name, offset, type and range. */
 typedef enum kind { NUMBERS, WHOLE, YES_OR_NO } kind;
 
 typedef struct entry {
     const char *key;
     size_t at;
     kind kind;
-    int count; /* of NUMBERS: an array where it is above 1 */
+    int count; /* of NUMBERS; above 1 means an array */
     double lo, hi;
 } entry;
 
@@ -106,8 +106,8 @@ static void add_entries(cJSON *object, const trip_view_state *s, const entry *en
         cJSON_AddItemToObject(object, entries[i].key, value_of(s, &entries[i]));
 }
 
-/* The function's text, as comments may have it of bytes that are no UTF-8: each is a question mark,
- * so that lines, whose length is bounded, are no longer when they are read again. */
+/* Returns the transfer function's text with invalid UTF-8 bytes replaced by question marks, one
+ * each. So no line exceeds the limit when the file is read again. */
 static void add_function_text(cJSON *root, const char *text)
 {
     char *valid = strdup(text);
@@ -166,7 +166,7 @@ static bool read_entry(trip_view_state *s, const cJSON *item, const entry *e)
     return cJSON_IsBool(item);
 }
 
-/* What is missing stays as it is, unless all are needed. */
+/* Missing numbers keep their value, unless all are required. */
 static int read_entries(trip_view_state *s, const cJSON *object, const entry *entries, size_t count,
                         bool all, const char *path)
 {
@@ -199,7 +199,7 @@ static int read_camera(trip_view_state *s, const cJSON *camera, const char *path
     return trip_fail(TRIP_ERROR, "read", path, "its camera is none");
 }
 
-/* A string for free(), or NULL without one. */
+/* Returns a copy of a string for free(), or NULL if there is none. */
 static int read_string(const cJSON *root, const char *key, char **out, const char *path)
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, key);
@@ -247,7 +247,8 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     return status;
 }
 
-/* Whether it is a state, of this version, and of this data set; negative where it is none. */
+/* Returns whether the state has this version and data set, or a reported failure if it is no state.
+ */
 static int check_root(const cJSON *root, const char *data, const char *path)
 {
     const cJSON *version = cJSON_GetObjectItemCaseSensitive(root, "triptych_view");
@@ -285,7 +286,7 @@ void trip_view_state_release(trip_view_state *s)
 
 /* ---- files ---- */
 
-/* Where the data set is, whatever name led to it; for free(). */
+/* Returns the data set's canonical path, for free(). */
 static char *real_path(const char *data)
 {
     char *real = realpath(data, NULL);
@@ -300,7 +301,7 @@ static int fail_of_memory(const char *data)
 int trip_state_file_path(char **path, const char *data)
 {
     const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
-    bool own = state && state[0] == '/'; /* others are to be ignored, as its specification has it */
+    bool own = state && state[0] == '/'; /* the XDG specification says to ignore relative paths */
     char *real = real_path(data);
     *path = NULL;
     if (!real)
@@ -319,7 +320,7 @@ int trip_state_file_path(char **path, const char *data)
     return 0;
 }
 
-/* The folders that the file is in, which need not be there on a new account. */
+/* Creates the file's folders, which a new account lacks. */
 static int make_folders(char *path)
 {
     for (char *slash = strchr(path + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
@@ -351,7 +352,7 @@ int trip_state_file_save(const trip_view_state *s, const char *data)
     return status;
 }
 
-/* Its text, for free(); 0 where there is no file, else 1 or a reported failure. */
+/* Reads the text, for free(). Returns 1, 0 if there is no file, or a reported failure. */
 static int read_file(const char *path, char **text)
 {
     int fd = trip_input_open(path);

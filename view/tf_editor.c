@@ -10,11 +10,11 @@
 
 enum { MAX_POINTS = 65536 };
 
-/* Steps lie in a ring: those before `at` can be undone, those behind it redone. */
+/* A ring of steps: undo uses the steps before `at`, redo the steps after it. */
 struct trip_tf_editor {
     trip_tf *steps[TRIP_TF_EDITOR_STEPS + 1];
-    size_t first, at, last; /* counted from the start; modulo the ring's length their places */
-    bool open, begun;       /* between begin and end; that has a step already */
+    size_t first, at, last; /* step numbers; modulo the ring's length, the slots */
+    bool open, begun;       /* between begin and end; the first change made a step */
     uint64_t revision;
 };
 
@@ -52,7 +52,7 @@ static void forget(trip_tf_editor *e, size_t step)
     *position(e, step) = NULL;
 }
 
-/* Takes over `tf` as the function from now on. */
+/* Replaces the transfer function by `tf` and takes ownership. */
 static void take(trip_tf_editor *e, trip_tf *tf)
 {
     while (e->last > e->at)
@@ -141,7 +141,7 @@ void trip_tf_editor_end(trip_tf_editor *e)
     e->open = e->begun = false;
 }
 
-/* A copy of the points with room for `more`, for free(); NULL without memory. */
+/* Copies the points with room for `more`, for free(). Returns NULL if memory is exhausted. */
 static trip_tf_point *copy_points(const trip_tf_editor *e, size_t more, size_t *count)
 {
     const trip_tf_point *points = trip_tf_editor_points(e, count);
@@ -151,7 +151,7 @@ static trip_tf_point *copy_points(const trip_tf_editor *e, size_t more, size_t *
     return copy;
 }
 
-/* The points become the function; frees them. */
+/* Makes the points the transfer function, and frees them. */
 static void use_points(trip_tf_editor *e, trip_tf_point *points, size_t count)
 {
     trip_tf *tf = NULL;

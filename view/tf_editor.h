@@ -1,5 +1,6 @@
-/* A transfer function while it is edited: its points in data units, and what undoes each change.
- * The curve between them is that of common/transfer_function.h. One thread. */
+/* A transfer function being edited: its points in data units, and the steps to undo.
+ * common/transfer_function.h defines the curve between the points. One thread at a time may use an
+ * editor. */
 #ifndef TRIP_VIEW_FUNCTION_EDITOR_H
 #define TRIP_VIEW_FUNCTION_EDITOR_H
 
@@ -15,45 +16,44 @@ extern "C" {
 
 typedef struct trip_tf_editor trip_tf_editor;
 
-enum { TRIP_TF_EDITOR_STEPS = 256 }; /* that can be undone */
+enum { TRIP_TF_EDITOR_STEPS = 256 }; /* maximum number of steps to undo */
 
-/* With one transparent point at 0. NULL without memory. */
+/* Creates an editor with one transparent point at value 0. Returns NULL if memory is exhausted. */
 trip_tf_editor *trip_tf_editor_create(void);
 void trip_tf_editor_destroy(trip_tf_editor *e);
 
-/* Takes a function as `.tf` text in data units, as triptych_convert() gives it of any preset, file
- * or data set; `name` is for messages. A reported failure changes nothing. */
+/* Loads a transfer function from `.tf` text in data units, as triptych_convert() writes it. `name`
+ * appears in messages. A reported failure changes nothing. */
 int trip_tf_editor_set_text(trip_tf_editor *e, const char *name, const char *text);
-/* The function as that text, for triptych_transfer_function.text; for free(). NULL without memory.
- */
+/* Returns the transfer function as `.tf` text, for free(), or NULL if memory is exhausted. */
 char *trip_tf_editor_text(const trip_tf_editor *e);
-/* Writes that text to a file, in place of one that is there. 0, or a reported failure. */
+/* Writes that text to a file and replaces an existing one. Returns 0, or a reported failure. */
 int trip_tf_editor_save(const trip_tf_editor *e, const char *path);
 
-/* By ascending value; until the next change. */
+/* Returns the points by ascending value, valid until the next change. */
 const trip_tf_point *trip_tf_editor_points(const trip_tf_editor *e, size_t *count);
 trip_rgba trip_tf_editor_evaluate(const trip_tf_editor *e, double value);
-/* Grows with every change, undone ones too. */
+/* Returns a number that ascends with every change, including undo and redo. */
 uint64_t trip_tf_editor_revision(const trip_tf_editor *e);
 
-/* The point nearest to (value, opacity) with distances in units of the two reaches, if that is at
- * most 1; else -1. */
+/* Returns the point nearest to (value, opacity), or -1 if its distance exceeds 1. Distances are in
+ * units of the two reaches. */
 int trip_tf_editor_find(const trip_tf_editor *e, double value, double opacity, double value_reach,
                         double opacity_reach);
 
-/* Each of these is one step to undo, but for those between begin and end, which are one together.
- * Opacities and colours are clamped to 0 to 1. */
+/* Each change below is one step to undo. All changes between begin and end are one step together.
+ * Opacities and colours are clamped to 0..1. */
 void trip_tf_editor_begin(trip_tf_editor *e);
 void trip_tf_editor_end(trip_tf_editor *e);
-/* A point there, of the colour that the function has at the value; returns its number, -1 where the
- * value is not finite or there are 65536. */
+/* Adds a point with the transfer function's colour at `value`. Returns its number, or -1 if the
+ * value is not finite or there are 65536 points. */
 int trip_tf_editor_add(trip_tf_editor *e, double value, double opacity);
-/* Not beyond the neighbouring points. */
+/* Moves a point, at most up to its neighbours. */
 void trip_tf_editor_move(trip_tf_editor *e, int point, double value, double opacity);
 void trip_tf_editor_set_colour(trip_tf_editor *e, int point, double r, double g, double b);
-/* Never the last one. */
+/* Removes a point, except the only one. */
 void trip_tf_editor_remove(trip_tf_editor *e, int point);
-/* All values become centre + (value - from) * factor, factor > 0: shifted and stretched. */
+/* Maps all values to centre + (value - from) * factor, with factor > 0. */
 void trip_tf_editor_stretch(trip_tf_editor *e, double from, double factor, double centre);
 
 bool trip_tf_editor_can_undo(const trip_tf_editor *e);

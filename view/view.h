@@ -1,4 +1,5 @@
-/* The viewer: a window that shows data sets until the user closes it. Main thread only. */
+/* The viewer: shows data sets in a window until the user closes it. Only the main thread may call
+ * it. */
 #ifndef TRIP_VIEW_VIEW_H
 #define TRIP_VIEW_VIEW_H
 
@@ -10,38 +11,38 @@ extern "C" {
 
 /* Zero means the default. */
 typedef struct trip_view_params {
-    const char *const *inputs; /* data sets, or what `find` makes one of */
+    const char *const *inputs; /* data sets, or inputs of `find` */
     int count;
-    int width, height; /* of the window, in its own units; 1100 x 720 */
-    double scale;      /* of texts and controls; the screen's */
+    int width, height; /* of the window, in screen coordinates; default 1100 x 720 */
+    double scale;      /* of texts and controls; default from the screen */
     double frames_per_second;
-    uint64_t memory_bytes; /* these as triptych_resources */
+    uint64_t memory_bytes; /* as in triptych_resources, like the next three */
     unsigned threads;
     triptych_renderer renderer;
     triptych_engine engine;
-    triptych_view start; /* where documents are seen from; what it points to stays valid */
+    triptych_view start; /* first view of each data set; its pointers stay valid */
     const char *function;
-    const char *heat; /* the data set of the heat of the inputs; NULL: none */
+    const char *heat; /* heat data set of the inputs; may be NULL */
     double opacity_scale;
     triptych_settings settings;
-    bool start_given, settings_given; /* else what was kept of the data set goes before */
+    bool start_given, settings_given; /* override the saved state of a data set */
     bool no_panel;
-    bool fresh;         /* nothing is kept of how data sets were looked at */
-    const char *script; /* a file of events, after which it ends */
+    bool fresh;         /* neither restores nor saves states */
+    const char *script; /* file of events; the viewer ends after the last */
     void *user;
-    /* As frames.h and maker.h have them. */
+    /* As in frames.h and maker.h. */
     int (*find)(void *user, triptych *t, const char *input, bool keep_all, bool *small,
                 const char **path);
     int (*make)(void *user, triptych *t, const char *input,
-                bool keep_all); /* NULL: nothing is made */
+                bool keep_all); /* NULL disables background bricking */
     void (*release)(void *user);
-    /* Of each file that the script writes, before anything is shown: 0, or a reported failure.
-     * NULL: any may be written. */
+    /* Checks each file that the script writes, before the window opens. Returns 0, or a reported
+     * failure. NULL allows any file. */
     int (*check_output)(void *user, const char *path);
     void *check_user;
 } trip_view_params;
 
-/* Until the window is closed: 0, or a reported failure. */
+/* Runs until the window is closed. Returns 0, or a reported failure. */
 int trip_view_run(const trip_view_params *params);
 
 #ifdef __cplusplus

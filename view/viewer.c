@@ -39,7 +39,7 @@ static void free_document(trip_document *d)
     free(d);
 }
 
-/* By the whole path, however it was named. */
+/* Compares canonical paths. */
 static char *path_of(const trip_document *d)
 {
     return realpath(d->input, NULL);
@@ -51,7 +51,7 @@ static void keep(const trip_viewer *v, const trip_document *d)
     if (!path)
         return;
     char *text = d->edited ? trip_tf_editor_text(d->editor) : NULL;
-    char *heat = d->heat ? realpath(d->heat, NULL) : NULL; /* it may be away for a while */
+    char *heat = d->heat ? realpath(d->heat, NULL) : NULL; /* the file may be missing for a while */
     triptych_settings settings = d->settings;
     if (!d->heat)
         settings.effects &= ~TRIPTYCH_EMISSION;
@@ -73,7 +73,7 @@ static void keep(const trip_viewer *v, const trip_document *d)
     free(path);
 }
 
-/* What the command line says of the view goes before what was kept. */
+/* The command line's view overrides the saved state. */
 static void take_state(trip_viewer *v, trip_document *d, trip_view_state *s)
 {
     if (!v->start_given && s->has_navigation) {
@@ -194,7 +194,7 @@ void trip_viewer_close(trip_viewer *v)
     trip_viewer_show(v, v->shown);
 }
 
-/* ---- what is wanted ---- */
+/* ---- the wish ---- */
 
 const char *trip_viewer_heat(const trip_document *d)
 {
@@ -206,14 +206,14 @@ triptych_settings trip_viewer_settings(const trip_document *d)
     triptych_settings s = d->settings;
     if (!d->clips)
         s.clip = (triptych_clip){ 0 };
-    if (s.headlight) /* which casts no shadows that are seen */
+    if (s.headlight) /* its shadows are invisible */
         s.effects &= ~TRIPTYCH_SHADOWS;
     if (!trip_viewer_heat(d))
         s.effects &= ~TRIPTYCH_EMISSION;
     return s;
 }
 
-/* The drawing thread has the text of the editor's function only where it was edited. */
+/* Posts the editor's text only if the transfer function was edited. */
 static void want(trip_viewer *v)
 {
     trip_document *d = trip_viewer_document(v);
@@ -315,7 +315,7 @@ void trip_viewer_set_panel(trip_viewer *v, bool shown)
 
 /* ---- input ---- */
 
-/* Whether something can be done to the view. */
+/* Returns whether there is a view to change. */
 static trip_document *navigable(trip_viewer *v)
 {
     trip_document *d = trip_viewer_document(v);
@@ -327,7 +327,7 @@ static double depth_of(const trip_document *d)
     return trip_navigation_distance(&d->navigation);
 }
 
-/* Half a turn is a drag across the shorter side of the picture. */
+/* A drag across the shorter side of the picture is half a turn. */
 static void drag(trip_viewer *v, trip_document *d, double dx, double dy)
 {
     trip_navigation *n = &d->navigation;
@@ -358,7 +358,7 @@ static void move(trip_viewer *v, double x, double y)
         drag(v, d, dx, dy);
 }
 
-/* Towards what is under the pointer. */
+/* Moves towards the point under the pointer. */
 static void wheel(trip_viewer *v, double steps)
 {
     trip_document *d = navigable(v);
@@ -419,7 +419,7 @@ void trip_viewer_fit(trip_viewer *v)
     v->changed |= d != NULL;
 }
 
-/* The name of a data set without folders and ending. */
+/* Returns the data set's file name without folder and extension. */
 static void name_of(const char *input, char name[256])
 {
     char path[4096];
@@ -434,7 +434,7 @@ static void name_of(const char *input, char name[256])
         *dot = 0;
 }
 
-/* NAME, a number and the ending, of a file that is not there yet. */
+/* Returns NAME, a number and the extension, for a file that does not exist yet. */
 static void new_name(const trip_document *d, const char *ending, char path[300])
 {
     char name[256];
@@ -457,7 +457,7 @@ void trip_viewer_take_picture(trip_viewer *v)
     trip_viewer_say(v, "the picture is written when it is whole");
 }
 
-/* Keys are so far apart; the file can be edited. */
+/* Interval between keys; people can edit the file. */
 #define SECONDS_BETWEEN_KEYS 2
 
 static int add_key(trip_document *d)
@@ -514,7 +514,7 @@ void trip_viewer_brick_again(trip_viewer *v)
         trip_viewer_say(v, "another data set is being bricked: try again when it is done");
 }
 
-/* The whole of what is shown by samples. */
+/* Starts bricking the full volume of a preview. */
 static void make_whole(trip_viewer *v)
 {
     const trip_document *d = trip_viewer_document(v);
@@ -522,7 +522,7 @@ static void make_whole(trip_viewer *v)
         trip_maker_start(v->maker, d->number, d->input, false);
 }
 
-/* What was bricked is opened in the place of what is shown. */
+/* Opens a newly bricked data set in place of the current one. */
 static void take_made(trip_viewer *v)
 {
     trip_made made;
@@ -532,7 +532,7 @@ static void take_made(trip_viewer *v)
     for (int i = 0; i < v->count; i++)
         d = v->documents[i]->number == made.document ? v->documents[i] : d;
     if (d && !made.made) {
-        d->small = false; /* it stays as it is */
+        d->small = false; /* keep the preview */
         trip_viewer_say(v, made.message);
     }
     if (!d || !made.made)
@@ -595,7 +595,7 @@ static void show_next(trip_viewer *v)
         trip_viewer_show(v, (v->shown + 1) % v->count);
 }
 
-/* Keys of digits and letters that choose where to look from. */
+/* Keys for the views from the sides and along the axes. */
 static bool press_view(trip_viewer *v, int key)
 {
     if (key >= '1' && key <= '6')
@@ -676,7 +676,7 @@ void trip_viewer_let_go(trip_viewer *v)
     memset(v->held, 0, sizeof v->held);
 }
 
-/* A transfer function is for the data set that is shown. */
+/* A dropped transfer function applies to the current data set. */
 static void drop(trip_viewer *v, const char *path)
 {
     const char *dot = strrchr(path, '.');
@@ -719,7 +719,7 @@ void trip_viewer_event(trip_viewer *v, const trip_event *e)
 
 /* ---- time ---- */
 
-/* By the distance looked at in a second and a half; four times as fast with shift. */
+/* Flies the distance to the point looked at in 1.5 s; with shift, four times as fast. */
 static bool fly(trip_viewer *v, double seconds)
 {
     trip_document *d = navigable(v);
@@ -737,7 +737,7 @@ static bool fly(trip_viewer *v, double seconds)
     return true;
 }
 
-/* Once for each place of the pointer and each view that has come to rest. */
+/* Probes once for each pointer position and each idle view. */
 static void probe(trip_viewer *v)
 {
     const trip_document *d = navigable(v);
@@ -773,7 +773,7 @@ bool trip_viewer_tick(trip_viewer *v, double seconds)
     return flies || vanishes;
 }
 
-/* ---- where a picture lies ---- */
+/* ---- position of a picture ---- */
 
 bool trip_viewer_is_current(const trip_viewer *v, const trip_picture *p)
 {
@@ -783,7 +783,7 @@ bool trip_viewer_is_current(const trip_viewer *v, const trip_picture *p)
            !memcmp(&p->navigation, &d->navigation, sizeof d->navigation);
 }
 
-/* Of the picture's own corner, where it fills its part of the window. */
+/* Corner of the picture if it fills its part of the window. */
 static void plain_corner(const trip_viewer *v, int i, float corner[4])
 {
     corner[0] = (float)(i & 1 ? 2.0 * v->picture_width / v->width - 1 : -1);

@@ -16,9 +16,9 @@
 
 enum { WIDTH = 1100, HEIGHT = 720 };
 
-/* While nothing goes on by itself the window sleeps; signals are looked for in between. */
+/* Interval at which an idle window wakes up to check for signals. */
 static const double sleep_seconds = 0.1, script_seconds = 0.002;
-/* Dear ImGui lays out what input changed within so many pictures. */
+/* Number of pictures that Dear ImGui needs to lay out a change. */
 enum { PICTURES_AFTER_INPUT = 4 };
 
 typedef struct window {
@@ -26,20 +26,20 @@ typedef struct window {
     GLFWwindow *glfw;
     trip_viewer viewer;
     trip_frames *frames;
-    trip_maker *maker; /* NULL: nothing is made */
+    trip_maker *maker; /* NULL disables background bricking */
     trip_panel *panel;
     trip_blit *blit;
     atomic_bool woken;
-    int to_draw;        /* pictures of the window yet to be drawn */
+    int to_draw;        /* pictures of the window still to draw */
     bool hidden;        /* minimised */
-    trip_picture shown; /* in the texture; its pixels are not there any more */
-    double last;        /* seconds: when time last passed for the viewer */
-    double input_at;    /* when input came that no picture of the window follows yet; 0: none */
+    trip_picture shown; /* in the texture; its pixels are gone */
+    double last;        /* time of the viewer's last tick, seconds */
+    double input_at;    /* time of the oldest input without a picture yet; 0 if none */
     trip_gauges gauges;
     trip_player player;
     bool plays;
-    char *shot;  /* a file for what is drawn next; NULL: none */
-    triptych *t; /* writes that */
+    char *shot;  /* file for the next picture of the window; may be NULL */
+    triptych *t; /* writes `shot` */
     char title[512];
 } window;
 
@@ -73,7 +73,7 @@ static bool is_held(const trip_viewer *v)
     return held;
 }
 
-/* Whether it is for the panel: what begins there, until it ends, and keys while text is written. */
+/* Returns whether the panel takes an event: a drag that began there, or keys during text input. */
 static bool is_for_panel(const window *w, const trip_event *e)
 {
     const bool drags = is_held(&w->viewer);
@@ -81,7 +81,7 @@ static bool is_for_panel(const window *w, const trip_event *e)
            (e->kind == TRIP_EVENT_KEY && trip_panel_has_keys(w->panel));
 }
 
-/* Releases, and where the pointer is, are for both. */
+/* Both the panel and the picture get releases and pointer moves. */
 static void send(window *w, const trip_event *e)
 {
     trip_viewer *v = &w->viewer;
@@ -104,7 +104,7 @@ static unsigned modifiers_of(int mods)
            (mods & GLFW_MOD_ALT ? TRIP_ALT : 0);
 }
 
-/* Pixels for a unit of the window's positions. */
+/* Returns the pixels per unit of window coordinates. */
 static double pixels_a_unit(const window *w)
 {
     int units, unit_height;
@@ -135,8 +135,7 @@ static void on_wheel(GLFWwindow *glfw, double x, double y)
     send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_WHEEL, .y = y });
 }
 
-/* Letters and digits by what is printed on the key, so that they are where the user's keyboard has
- * them. */
+/* Maps letters and digits by the user's keyboard layout. */
 static int key_of(int key, int scancode)
 {
     static const int keys[][2] = {
@@ -235,7 +234,7 @@ static void listen(window *w)
     glfwSetWindowRefreshCallback(g, on_refresh);
 }
 
-/* ---- what scripts do ---- */
+/* ---- scripts ---- */
 
 static void play_event(void *user, const trip_event *e)
 {
@@ -252,7 +251,7 @@ static void play_event(void *user, const trip_event *e)
     send(w, e);
 }
 
-/* Whole, and in the texture. */
+/* Returns whether the complete picture is in the texture. */
 static bool play_rests(void *user)
 {
     window *w = user;
@@ -361,7 +360,7 @@ static void draw_picture(window *w)
     trip_blit_draw(w->blit, corners, exact);
 }
 
-/* What no picture covers looks as if nothing were there. */
+/* Fills the area that no picture covers with the background. */
 static void clear(const window *w)
 {
     const trip_viewer *v = &w->viewer;
@@ -377,7 +376,7 @@ static int draw(window *w, double seconds)
 {
     const trip_viewer *v = &w->viewer;
     if (w->hidden || v->width < 1 || v->height < 1) {
-        w->input_at = 0; /* nobody sees an answer */
+        w->input_at = 0; /* no picture answers the input */
         return 0;
     }
     clear(w);
@@ -478,7 +477,7 @@ static void open_documents(window *w)
     v->panel = !p->no_panel;
     for (int i = 0; i < p->count; i++)
         trip_viewer_open(v, p->inputs[i]);
-    v->heat = NULL; /* that of no others */
+    v->heat = NULL; /* only the given inputs have it */
     if (v->count > 1)
         trip_viewer_show(v, 0);
     glfwGetFramebufferSize(w->glfw, &width, &height);
@@ -495,7 +494,7 @@ static void show_title(window *w)
     memcpy(w->title, title, sizeof title);
 }
 
-/* Takes what came, and shows it where there is something new to show. */
+/* Handles input and news, and draws if there is something new. */
 static int pass(window *w)
 {
     int status = play(w);

@@ -1,4 +1,4 @@
-// In: a place in the picture, 0 to 1. Out: its colour, opaque.
+// In: a position in the picture, 0 to 1. Out: the colour there, opaque.
 #version 150
 
 uniform sampler2D picture;

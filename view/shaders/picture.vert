@@ -1,5 +1,5 @@
-// In: a corner of the quad by its number, 0 to 3, its place in clip coordinates.
-// Out: that place, and where it is in the picture, whose first row is at the top.
+// In: the number of a corner of the quad, 0 to 3, and its position in clip coordinates.
+// Out: the position in clip coordinates, and in the picture, 0 to 1 from the top left.
 #version 150
 
 uniform vec4 corners[4];
