@@ -217,7 +217,7 @@ static int make_token(server *s)
 {
     unsigned char bytes[TOKEN_BYTES];
     if (getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
-        return trip_fail_errno("serve", "token", "no random numbers");
+        return trip_fail_errno("serve", "token", "cannot read random numbers");
     for (int i = 0; i < TOKEN_BYTES; i++)
         snprintf(s->token + 2 * i, 3, "%02x", bytes[i]);
     return 0;
@@ -240,7 +240,7 @@ static int listen_here(server *s, int port)
     snprintf(text, sizeof text, "127.0.0.1:%d", port);
     return s->port ? 0
                    : trip_fail(TRIP_ERROR, "serve", text,
-                               "cannot be listened at; --port takes another, 0 a free one");
+                               "cannot listen on this port; choose another with --port, or 0 for a free one");
 }
 
 static void say_address(const server *s, const trip_serve_params *params)

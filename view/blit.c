@@ -50,7 +50,7 @@ static int make_program(trip_blit *b)
     glLinkProgram(b->program);
     glGetProgramiv(b->program, GL_LINK_STATUS, &good);
     b->corners = glGetUniformLocation(b->program, "corners");
-    return good ? 0 : trip_fail(TRIP_ERROR, "view", "picture.vert", "cannot be linked");
+    return good ? 0 : trip_fail(TRIP_ERROR, "view", "picture.vert", "the shaders do not link");
 }
 
 int trip_blit_create(trip_blit **out)

@@ -25,7 +25,8 @@ int trip_camera_path_add(trip_camera_path *p, double seconds, const trip_navigat
 {
     bool later = !p->count || seconds > p->keys[p->count - 1].seconds;
     if (!later || p->count == TRIP_CAMERA_PATH_KEYS)
-        return trip_fail(TRIP_USAGE, "path", "key", later ? "there are too many" : "is not later");
+        return trip_fail(TRIP_USAGE, "path", "key",
+                         later ? "too many keys" : "must be later than the key before");
     trip_path_key *keys = realloc(p->keys, (p->count + 1) * sizeof *keys);
     p->keys = keys ? keys : p->keys;
     char *copy = text && keys ? strdup(text) : NULL;

@@ -107,10 +107,10 @@ static int check_members(const cJSON *object, const char *const *known, const ch
         while (known[which] && strcmp(known[which], member->string))
             which++;
         if (!known[which])
-            return trip_fail(TRIP_ERROR, "path", name, "%sthere is no \"%s\"", where,
+            return trip_fail(TRIP_ERROR, "path", name, "%sunknown member \"%s\"", where,
                              member->string);
         if (item_of(object, member->string) != member)
-            return trip_fail(TRIP_ERROR, "path", name, "%sthere are two \"%s\"", where,
+            return trip_fail(TRIP_ERROR, "path", name, "%sduplicate member \"%s\"", where,
                              member->string);
     }
     return 0;
@@ -135,14 +135,14 @@ static const char *read_camera(trip_navigation *n, const cJSON *key)
     if (!trip_exact_read_numbers(item_of(key, "eye"), 3, -FAR, FAR, n->eye) ||
         !trip_exact_read_numbers(item_of(key, "look"), 3, -FAR, FAR, n->look) ||
         !trip_exact_read_numbers(item_of(key, "up"), 3, -FAR, FAR, n->up))
-        return "\"eye\", \"look\" and \"up\" are three numbers each";
+        return "\"eye\", \"look\" and \"up\" must be three numbers each";
     if (!fov == !ortho)
-        return "has either \"fov\" or \"ortho\"";
+        return "must have either \"fov\" or \"ortho\"";
     if (fov &&
         !trip_exact_read(fov, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES, &n->fov_degrees))
-        return "\"fov\" is not an angle from 1e-6 to 179.999 degrees";
+        return "\"fov\" must be from 1e-6 to 179.999 degrees";
     if (ortho && !trip_exact_read(ortho, 1 / MAX_HEIGHT, MAX_HEIGHT, &n->ortho_height))
-        return "\"ortho\" is not a height above 0";
+        return "\"ortho\" must be a height above 0";
     trip_navigation_axes axes = trip_navigation_get_axes(n);
     double length = hypot(hypot(axes.up[0], axes.up[1]), axes.up[2]);
     return fabs(length - 1) < 1e-6 ? NULL
@@ -154,7 +154,7 @@ static const char *read_function(trip_path_key *k, const cJSON *key)
     const cJSON *function = item_of(key, "function"), *text = item_of(key, "function_text");
     if ((function && !cJSON_IsString(function)) || (text && !cJSON_IsString(text)) ||
         (function && text))
-        return "\"function\" and \"function_text\" are texts, and exclude one another";
+        return "\"function\" and \"function_text\" must be texts, and exclude one another";
     k->function = function ? strdup(function->valuestring) : NULL;
     k->text = text ? strdup(text->valuestring) : NULL;
     return (function && !k->function) || (text && !k->text) ? "out of memory" : NULL;
@@ -169,11 +169,11 @@ static const char *read_clip(trip_path_key *k, const cJSON *key)
     k->has_clip = clip != NULL;
     if ((clip && !cJSON_IsObject(clip)) || (voxels && !cJSON_IsBool(voxels)) ||
         (planes && (!cJSON_IsArray(planes) || cJSON_GetArraySize(planes) > TRIP_CLIPPING_PLANES)))
-        return "\"clip\" has a \"box\", whether it is of \"voxels\", and up to 6 \"planes\"";
+        return "\"clip\" may have a \"box\", a boolean \"voxels\" and up to 6 \"planes\"";
     c->box = box != NULL;
     c->box_of_voxels = cJSON_IsTrue(voxels);
     if (box && !trip_exact_read_numbers(box, 6, -FAR, FAR, corners))
-        return "the \"box\" of \"clip\" is six numbers";
+        return "the \"box\" of \"clip\" must be six numbers";
     for (int a = 0; a < 3 && box; a++) {
         c->box_lo[a] = corners[a];
         c->box_hi[a] = corners[3 + a];
@@ -181,7 +181,7 @@ static const char *read_clip(trip_path_key *k, const cJSON *key)
     cJSON_ArrayForEach(plane, planes)
     {
         if (!trip_exact_read_numbers(plane, 4, -FAR, FAR, c->plane[c->planes++]))
-            return "a plane of \"clip\" is four numbers";
+            return "a plane of \"clip\" must be four numbers";
     }
     return trip_clipping_is_sound(c) ? NULL
                                      : "its \"clip\" leaves no box, or has a plane without "
@@ -196,14 +196,14 @@ static const char *read_key(trip_camera_path *p, const cJSON *key)
     if (!cJSON_IsObject(key))
         return "is not an object";
     if (!trip_exact_read(item_of(key, "seconds"), -MAX_SECONDS, MAX_SECONDS, &k->seconds))
-        return "\"seconds\" is not a time";
+        return "\"seconds\" must be a time";
     if (before && !(k->seconds > before->seconds))
-        return "is not later than the key before";
+        return "must be later than the key before";
     const char *fault = read_camera(&k->camera, key);
     if (fault)
         return fault;
     if (before && (before->camera.ortho_height > 0) != (k->camera.ortho_height > 0))
-        return "keys are all parallel (\"ortho\") or all in perspective (\"fov\")";
+        return "all keys must be parallel (\"ortho\") or all perspective (\"fov\")";
     fault = read_clip(k, key);
     if (fault)
         return fault;
@@ -216,7 +216,7 @@ static int read_keys(trip_camera_path *p, const cJSON *keys, const char *name)
 {
     int count = cJSON_IsArray(keys) ? cJSON_GetArraySize(keys) : 0;
     if (count < 1 || count > TRIP_CAMERA_PATH_KEYS)
-        return trip_fail(TRIP_ERROR, "path", name, "has not 1 to %d \"keys\"",
+        return trip_fail(TRIP_ERROR, "path", name, "must have 1 to %d \"keys\"",
                          TRIP_CAMERA_PATH_KEYS);
     p->keys = calloc((size_t)count, sizeof *p->keys);
     if (!p->keys)
@@ -239,22 +239,24 @@ static int read_root(trip_camera_path *p, const cJSON *root, const char *name)
     const cJSON *fps = item_of(root, "frames_per_second"), *loop = item_of(root, "loop");
     double version;
     if (!cJSON_IsObject(root) || !trip_exact_read(item_of(root, "triptych_path"), 0, FAR, &version))
-        return trip_fail(TRIP_ERROR, "path", name, "is not a path: there is no \"triptych_path\"");
+        return trip_fail(TRIP_ERROR, "path", name,
+                         "is not a camera path: \"triptych_path\" is missing");
     if (version != VERSION)
-        return trip_fail(TRIP_ERROR, "path", name, "is of version %g; %d can be read", version,
-                         VERSION);
+        return trip_fail(TRIP_ERROR, "path", name, "has version %g; this program reads version %d",
+                         version, VERSION);
     if (fps && !trip_exact_read(fps, 1e-3, MAX_FPS, &p->frames_per_second))
-        return trip_fail(TRIP_ERROR, "path", name, "\"frames_per_second\" is not from 0.001 to %d",
+        return trip_fail(TRIP_ERROR, "path", name, "\"frames_per_second\" must be from 0.001 to %d",
                          MAX_FPS);
     if (loop && !trip_exact_read(loop, 1e-3, MAX_SECONDS, &p->loop_seconds))
-        return trip_fail(TRIP_ERROR, "path", name, "\"loop\" is not a time above 0");
+        return trip_fail(TRIP_ERROR, "path", name, "\"loop\" must be a time above 0");
     static const char *const known[] = { "triptych_path", "frames_per_second", "loop", "keys",
                                          NULL };
     int status = read_keys(p, item_of(root, "keys"), name);
     if (!status)
         status = check_members(root, known, name, "");
     if (!status && trip_camera_path_frames(p) == TRIP_CAMERA_PATH_FRAMES)
-        return trip_fail(TRIP_ERROR, "path", name, "is %d frames long, or longer",
+        return trip_fail(TRIP_ERROR, "path", name,
+                         "has %d frames or more; shorten it or lower \"frames_per_second\"",
                          TRIP_CAMERA_PATH_FRAMES);
     return status;
 }
@@ -267,10 +269,8 @@ static int check_text(const trip_json *json, const char *name, const char *text)
     for (const char *c = text; c < end; c++)
         line += *c == '\n';
     if (!json->root)
-        return trip_fail_line("path", name, line,
-                              *end ? "is not JSON from here on"
-                                   : "the text ends before what it began");
-    return *end ? trip_fail_line("path", name, line, "there is more behind the path's end") : 0;
+        return trip_fail_line("path", name, line, *end ? "invalid JSON" : "incomplete JSON");
+    return *end ? trip_fail_line("path", name, line, "text after the end of the path") : 0;
 }
 
 int trip_camera_path_parse(trip_camera_path *p, const char *name, const char *text)

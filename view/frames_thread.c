@@ -646,8 +646,9 @@ static int save(trip_frames *f)
     pthread_mutex_unlock(&f->lock);
     if (!path)
         return 0;
-    int status = f->whole ? write_picture(f, path)
-                          : trip_fail(TRIP_ERROR, "view", path, "there is no picture to write");
+    int status = f->whole
+                     ? write_picture(f, path)
+                     : trip_fail(TRIP_ERROR, "view", path, "no picture to save: drawing failed");
     pthread_mutex_lock(&f->lock);
     f->status.unsaved = status != 0;
     if (f->save && !strcmp(f->save, path)) {

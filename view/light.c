@@ -87,8 +87,8 @@ const char *trip_effect_lacks(const trip_effect_switch *effect, const triptych_s
                               const char *heat)
 {
     if (effect->bit == TRIPTYCH_SHADOWS && s->headlight)
-        return "the light is from the eye";
-    return effect->bit == TRIPTYCH_EMISSION && !heat ? "no data set of heat (--emission)" : NULL;
+        return "the light is the headlight";
+    return effect->bit == TRIPTYCH_EMISSION && !heat ? "no heat data set (--emission)" : NULL;
 }
 
 bool trip_effect_turn(const trip_effect_switch *effect, bool on, triptych_settings *s,

@@ -393,7 +393,7 @@ void draw_function_file(trip_panel *p, trip_viewer *v, trip_document *d)
     ImGui::SameLine();
     if (button(p, "Save") && p->path[0]) {
         const bool wrote = trip_tf_editor_save(d->editor, p->path) == 0;
-        std::snprintf(line, sizeof line, wrote ? "wrote %s" : "%s cannot be written", p->path);
+        std::snprintf(line, sizeof line, wrote ? "wrote %s" : "cannot write %s", p->path);
         trip_viewer_say(v, line);
     }
 }

@@ -105,9 +105,9 @@ static int play_click(trip_player *p, const trip_player_window *w, const trip_ev
                       double seconds)
 {
     if (p->phase == 0 && !lies_still(p, w, e))
-        return is_late(p, seconds, 10)
-                   ? trip_fail(TRIP_ERROR, "script", e->text, "the panel has no such control")
-                   : 1;
+        return is_late(p, seconds, 10) ? trip_fail(TRIP_ERROR, "script", e->text,
+                                                   "the panel has no control with this label")
+                                       : 1;
     if (p->phase == 0)
         w->send(w->user,
                 &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = p->position[0], .y = p->position[1] });

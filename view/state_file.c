@@ -173,7 +173,7 @@ static int read_entries(trip_view_state *s, const cJSON *object, const entry *en
     for (size_t i = 0; i < count; i++) {
         const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, entries[i].key);
         if ((item || all) && !(item && read_entry(s, item, &entries[i])))
-            return trip_fail(TRIP_ERROR, "read", path, "\"%s\" is not what a view has there",
+            return trip_fail(TRIP_ERROR, "read", path, "\"%s\" is missing or has an invalid value",
                              entries[i].key);
     }
     return 0;
@@ -196,7 +196,7 @@ static int read_camera(trip_view_state *s, const cJSON *camera, const char *path
     s->has_navigation = true;
     if (fabs(length_of(n->upright) - 1) < 1e-6 && fabs(length_of(axes.up) - 1) < 1e-6)
         return 0;
-    return trip_fail(TRIP_ERROR, "read", path, "its camera is none");
+    return trip_fail(TRIP_ERROR, "read", path, "the camera is invalid");
 }
 
 /* Returns a copy of a string for free(), or NULL if there is none. */
@@ -207,7 +207,7 @@ static int read_string(const cJSON *root, const char *key, char **out, const cha
     if (!item)
         return 0;
     if (!cJSON_IsString(item))
-        return trip_fail(TRIP_ERROR, "read", path, "\"%s\" is not a text", key);
+        return trip_fail(TRIP_ERROR, "read", path, "\"%s\" must be a text", key);
     *out = strdup(item->valuestring);
     return *out ? 0 : trip_fail(TRIP_ERROR, "read", path, "out of memory");
 }
@@ -239,11 +239,11 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     const triptych_settings *t = &s->settings;
     if (!status && (t->shading || t->effects) && !t->headlight && !t->point_light &&
         !(length_of(t->light) > 0))
-        status = trip_fail(TRIP_ERROR, "read", path, "its light has no direction");
+        status = trip_fail(TRIP_ERROR, "read", path, "the light has no direction");
     if (!status && !(t->kelvin[0] < t->kelvin[1]))
-        status = trip_fail(TRIP_ERROR, "read", path, "its temperatures are none");
+        status = trip_fail(TRIP_ERROR, "read", path, "the temperatures are invalid");
     if (!status && !trip_clipping_is_sound(&t->clip))
-        status = trip_fail(TRIP_ERROR, "read", path, "its clipping box or planes are none");
+        status = trip_fail(TRIP_ERROR, "read", path, "the clipping box or planes are invalid");
     return status;
 }
 
@@ -254,7 +254,7 @@ static int check_root(const cJSON *root, const char *data, const char *path)
     const cJSON *version = cJSON_GetObjectItemCaseSensitive(root, "triptych_view");
     const char *of = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(root, "data"));
     if (!cJSON_IsObject(root) || !cJSON_IsNumber(version) || !of)
-        return trip_fail(TRIP_ERROR, "read", path, "is not what the viewer keeps of a data set");
+        return trip_fail(TRIP_ERROR, "read", path, "is not a state file of the viewer");
     return version->valuedouble == VERSION && !strcmp(of, data);
 }
 
@@ -310,8 +310,8 @@ int trip_state_file_path(char **path, const char *data)
     free(real);
     if (!own && !(home && home[0] == '/'))
         return trip_fail(TRIP_ERROR, "view", "HOME",
-                         "is not set, so there is no folder for what the viewer keeps: set "
-                         "XDG_STATE_HOME to one");
+                         "is not set: set XDG_STATE_HOME to a folder for the state of "
+                         "the viewer");
     if (asprintf(path, "%s%s/triptych/%016llx.json", own ? state : home, own ? "" : "/.local/state",
                  hash) < 0) {
         *path = NULL;
@@ -370,7 +370,7 @@ static int read_file(const char *path, char **text)
         return 1;
     }
     free(bytes);
-    return trip_fail(TRIP_ERROR, "read", path, "is not a file of at most %d MiB that can be read",
+    return trip_fail(TRIP_ERROR, "read", path, "cannot be read, or exceeds %d MiB",
                      MAX_BYTES >> 20);
 }
 

@@ -76,7 +76,7 @@ int trip_tf_editor_set_text(trip_tf_editor *e, const char *name, const char *tex
     if (!status && trip_tf_is_normalised(tf)) {
         trip_tf_destroy(tf);
         return trip_fail(TRIP_ERROR, "transfer function", name,
-                         "is over the data's range, not in data units");
+                         "runs over the range of the data, not over data units");
     }
     if (!status)
         take(e, tf);

@@ -169,7 +169,7 @@ void trip_viewer_open(trip_viewer *v, const char *input)
     while (which < v->count && strcmp(v->documents[which]->input, input))
         which++;
     if (which == TRIP_DOCUMENTS) {
-        trip_viewer_say(v, "no more data sets can be open at once: close one");
+        trip_viewer_say(v, "too many open data sets: close one");
         return;
     }
     if (which == v->count) {
@@ -454,7 +454,7 @@ void trip_viewer_take_picture(trip_viewer *v)
         return;
     new_name(d, ".png", path);
     trip_frames_save(v->frames, path);
-    trip_viewer_say(v, "the picture is written when it is whole");
+    trip_viewer_say(v, "the picture is saved as soon as it is complete");
 }
 
 /* Interval between keys; people can edit the file. */
@@ -494,11 +494,11 @@ void trip_viewer_mark(trip_viewer *v)
         return;
     const trip_navigation *first = d->path.count ? &d->path.keys[0].camera : &d->navigation;
     if ((first->ortho_height > 0) != (d->navigation.ortho_height > 0)) {
-        trip_viewer_say(v, "the keys of a path are all parallel or all in perspective");
+        trip_viewer_say(v, "all keys of a path must be parallel or all perspective");
         return;
     }
     if (add_key(d) || save_path(d)) {
-        trip_viewer_say(v, "the path cannot be written");
+        trip_viewer_say(v, "cannot write the path");
         return;
     }
     snprintf(text, sizeof text, "key %zu of %s", d->path.count, d->path_file);
@@ -511,7 +511,7 @@ void trip_viewer_brick_again(trip_viewer *v)
     if (!d || !v->maker)
         return;
     if (!trip_maker_start(v->maker, d->number, d->input, true))
-        trip_viewer_say(v, "another data set is being bricked: try again when it is done");
+        trip_viewer_say(v, "another data set is being bricked: try again later");
 }
 
 /* Starts bricking the full volume of a preview. */
@@ -571,9 +571,9 @@ void trip_viewer_copy_options(trip_viewer *v)
     if (text && v->copy)
         v->copy(v->user, text);
     if (text)
-        trip_viewer_say(v, d->edited ? "copied, as options of triptych render, but for the "
-                                       "function, which is to be saved and given with --tf"
-                                     : "copied, as options of triptych render");
+        trip_viewer_say(v, d->edited ? "copied as options of triptych render; save the edited "
+                                       "transfer function and give it with --tf"
+                                     : "copied as options of triptych render");
     free(text);
 }
 

@@ -179,13 +179,13 @@ class Paths(program.ProgramTest):
     def test_bad_paths_are_refused_by_name(self):
         good = key(0, 0)
         for path, says in (
-            ("{", "path.json: line 1: the text ends"),
-            ([good | {"zoom": 3}], 'key 1: there is no "zoom"'),
-            ('{"triptych_path": 9, "keys": []}', "is of version 9"),
-            ([good, good], "key 2: is not later"),
+            ("{", "path.json: line 1: incomplete JSON"),
+            ([good | {"zoom": 3}], 'key 1: unknown member "zoom"'),
+            ('{"triptych_path": 9, "keys": []}', "has version 9"),
+            ([good, good], "key 2: must be later"),
             ([good | {"fov": "wide"}], 'key 1: "fov"'),
             ([good | {"eye": good["look"]}], "key 1: is no view"),
-            ([good, key(1e5, 0)], "frames long"),
+            ([good, key(1e5, 0)], "frames or more"),
             ([good | {"function": "no-such.tf"}], "no-such.tf"),
             ([good | {"function_text": "0 0 0 0 7\n"}], "line 1"),
             ([good | {"function_text": "values normalised\n0 0 0 0 0\n"}], "data units"),

@@ -224,7 +224,7 @@ class Serve(program.ProgramTest):
             self.assertAlmostEqual(now["light"][name], degrees, 9)
         self.ask("/set", "POST", name="light", value="head")
         lacking = {e["name"]: e["lacks"] for e in self.status()["switches"] if e["lacks"]}
-        self.assertEqual(lacking, {"shadows": "the light is from the eye"})
+        self.assertEqual(lacking, {"shadows": "the light is the headlight"})
 
     def test_heat_glows_as_render_draws_it(self):
         for renderer in "cpu", *program.GL:
@@ -253,9 +253,9 @@ class Serve(program.ProgramTest):
         with open("r.png", "rb") as f:
             numpy.testing.assert_array_equal(read_png(data)[..., :3], read_png(f.read())[..., :3])
         self.assertEqual(self.ask("/function", "POST", name="grey")[0], 204)
-        while "left out" not in self.status()["message"]:
+        while "dropped" not in self.status()["message"]:
             time.sleep(0.02)
-        self.assertIn("to have them: triptych brick --tf grey v.nhdr", self.status()["message"])
+        self.assertIn("to keep them: triptych brick --tf grey v.nhdr", self.status()["message"])
 
     def test_nothing_new_is_waited_for(self):
         self.do("resize 40 30")
@@ -373,7 +373,7 @@ class Serve(program.ProgramTest):
                 status = self.status()
             self.assertEqual(status["failed"], report == "other", status)
             if status["failed"]:
-                self.assertIn("the report is of another data set", status["message"])
+                self.assertIn("the report measured another data set", status["message"])
 
     def test_what_cannot_be_served_is_said(self):
         self.fails(1, "serve", "no.trip")
@@ -386,7 +386,7 @@ class Serve(program.ProgramTest):
         self.fails(2, "serve", "v.trip", "--effects", "emission", says="--emission HEAT.trip")
         self.fails(2, "serve", "v.trip", "--emission", "heat.trip", says="--effects emission")
         self.fails(1, "serve", "v.trip", "--effects", "auto", "--emission", "no.trip", says="no.trip")
-        self.fails(1, "serve", "v.trip", "--port", self.port, says="--port takes another")
+        self.fails(1, "serve", "v.trip", "--port", self.port, says="--port, or 0 for a free")
 
 
 if __name__ == "__main__":

@@ -151,7 +151,7 @@ static void what_lacks_its_light_or_heat_is_not_turned_on(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
-    assert_non_null(strstr(trip_effect_lacks(switch_of(TRIPTYCH_SHADOWS), &s, "h"), "the eye"));
+    assert_non_null(strstr(trip_effect_lacks(switch_of(TRIPTYCH_SHADOWS), &s, "h"), "headlight"));
     assert_false(trip_effect_turn(switch_of(TRIPTYCH_SHADOWS), true, &s, "h"));
     assert_non_null(
         strstr(trip_effect_lacks(switch_of(TRIPTYCH_EMISSION), &s, NULL), "--emission"));

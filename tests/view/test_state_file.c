@@ -176,19 +176,19 @@ static void what_is_no_state_is_refused_whole(void **state)
     assert_refused("\"fov_degrees\":\t30", "\"fow\":\t30", "fov_degrees");
     assert_refused("5e+20", "1e999", "eye");
     assert_refused("5e+20", "5, 3", "eye");
-    assert_refused("[0.1, 0.7, 0]", "[0, 0, 0]", "its camera is none");
-    assert_refused("[0, 1, 0]", "[0, 0.5, 0]", "its camera is none");
+    assert_refused("[0.1, 0.7, 0]", "[0, 0, 0]", "the camera is invalid");
+    assert_refused("[0, 1, 0]", "[0, 0.5, 0]", "the camera is invalid");
     assert_refused("\"heat\":\t\"/data/heat of it.trip\"", "\"heat\":\t7", "heat");
     assert_refused("\"effects\":\t20", "\"effects\":\t32", "effects");
-    assert_refused("33.3", "3333.3", "its temperatures are none");
+    assert_refused("33.3", "3333.3", "the temperatures are invalid");
     assert_refused("\"panel\":\ttrue", "\"panel\":\t1", "panel");
     assert_refused("1 1 1 1 0.5", "1 1 1 1 7.5", "opacity");
-    assert_refused("-0.142", "x", "is not what the viewer keeps");
-    assert_refused("\"triptych_view\":\t1", "\"triptych_view\":\t\"1\"", "is not what the viewer");
+    assert_refused("-0.142", "x", "is not a state file");
+    assert_refused("\"triptych_view\":\t1", "\"triptych_view\":\t\"1\"", "is not a state file");
     trip_view_state s = defaults();
     test_catch_reports();
     assert_int_equal(trip_view_state_parse(&s, "/d", "[[[", "state.json"), TRIP_ERROR);
-    assert_one_report("is not what the viewer keeps");
+    assert_one_report("is not a state file");
 }
 
 static void other_versions_and_data_sets_are_no_state(void **state)
@@ -217,7 +217,7 @@ static void a_folder_in_its_place_is_reported(void **state)
     assert_int_equal(mkdir(path, 0700), 0);
     test_catch_reports();
     assert_int_equal(trip_state_file_load(&s, "/data/folder.trip"), TRIP_ERROR);
-    assert_one_report("is not a file");
+    assert_one_report("cannot be read, or");
     rmdir(path);
     free(path);
 }

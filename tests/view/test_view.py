@@ -353,7 +353,7 @@ class View(program.ProgramTest):
             self.assertTrue(self.status(report + ".json")["exact"])  # the report is not for it
             self.assertEqual(status["failed"], report == "other", status)
             if status["failed"]:
-                self.assertIn("the report is of another data set", status["message"])
+                self.assertIn("the report measured another data set", status["message"])
 
     def test_a_large_volume_is_shown_by_samples_until_it_is_bricked(self):
         program.write_nrrd("large.nrrd", program.ball((204, 204, 204), radius=0.5))
@@ -437,9 +437,9 @@ class View(program.ProgramTest):
         for status, options, says in (
             (2, ["noise.trip", glows[0]], "--emission HEAT.trip"),
             (2, ["noise.trip", glows[1]], "--effects emission"),
-            (2, glows, "of one data set"),
-            (2, ["noise.trip", "ball.trip", *glows], "of one data set"),
-            (2, ["noise.trip", "--temperature=0:3000"], "--emission only"),
+            (2, glows, "to one data set"),
+            (2, ["noise.trip", "ball.trip", *glows], "to one data set"),
+            (2, ["noise.trip", "--temperature=0:3000"], "requires --emission"),
             (2, ["noise.trip", *glows, "--temperature=9:3"], "the smaller first"),
             (1, ["noise.trip", glows[0], "--emission=no.trip"], "no.trip"),
         ):

@@ -1,4 +1,5 @@
-// In: a position in the picture, 0 to 1. Out: the colour there, opaque.
+// Draws the picture in the window.
+// In: a position in the picture, from 0 to 1. Out: its colour, opaque. It mirrors no C function.
 #version 150
 
 uniform sampler2D picture;

@@ -1,5 +1,7 @@
-// In: the number of a corner of the quad, 0 to 3, and its position in clip coordinates.
-// Out: the position in clip coordinates, and in the picture, 0 to 1 from the top left.
+// Places the picture in the window.
+// In: gl_VertexID from 0 to 3, and the corners of the quad in clip coordinates. Out: the position
+// in clip coordinates, and the position in the picture, from 0 to 1 from the top left. It mirrors
+// no C function.
 #version 150
 
 uniform vec4 corners[4];
