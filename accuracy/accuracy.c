@@ -1,4 +1,4 @@
-/* options -> folder -> pictures of all settings -> figures -> report. */
+/* Stages: options -> folder -> pictures of all settings -> errors and times -> report. */
 #include "accuracy.h"
 
 #include <math.h>
@@ -22,14 +22,15 @@ static int print_settings(void)
         accuracy_write_options(stdout, &all[i]);
         printf("\n");
     }
-    printf("%-20s VTK's ray caster where it is installed, with --source\n", "vtk");
+    printf("%-20s the ray caster of VTK, if it is installed; requires --source\n", "vtk");
     for (int i = 0; i < ACCURACY_POPPINGS; i++)
-        printf("%-20s --classify %s, turned, by each method and h\n", accuracy_poppings[i].name,
+        printf("%-20s --classify %s, popping of each method and h in a turning view\n",
+               accuracy_poppings[i].name,
                accuracy_poppings[i].classify == TRIPTYCH_POST ? "post" : "pre");
     return 0;
 }
 
-/* The command line again, for free(). */
+/* Joins the command line; the caller frees it. */
 static char *join(int argc, char **argv)
 {
     char *text = NULL;

@@ -82,14 +82,15 @@ static int parse_size(const char *text, accuracy_options *o)
 {
     int status = trip_option_size("--size", text, &o->width, &o->height);
     if (!status && (o->width < 32 || o->width > 4096 || o->height < 32 || o->height > 4096))
-        return trip_option_fail("--size", "sides have 32 to 4096 pixels");
+        return trip_option_fail("--size", "takes 32 to 4096 pixels a side");
     return status;
 }
 
 static int add_data(const char *path, accuracy_options *o)
 {
     if (o->data_count == ACCURACY_DATA_MAX)
-        return trip_option_fail("--also", "7 other data sets at most");
+        return trip_option_fail("--also",
+                                "given too often; at most 7 other data sets are possible");
     o->data[o->data_count++] = path;
     return 0;
 }
@@ -134,7 +135,8 @@ static int parse_word(int key, char *arg, accuracy_options *o)
         if (strcmp(arg, "none") == 0)
             return o->no_programs = true, 0;
         if (o->program_count == ACCURACY_COMPARED_PROGRAMS_MAX)
-            return trip_option_fail("--compare", "4 other programs at most");
+            return trip_option_fail("--compare",
+                                    "given too often; at most 4 programs are possible");
         o->program[o->program_count++] = arg;
         return 0;
     case KEY_TF:
@@ -162,7 +164,7 @@ static int parse_word(int key, char *arg, accuracy_options *o)
     }
 }
 
-/* While parsing. */
+/* State of parsing. */
 typedef struct parse {
     accuracy_options *o;
     const char *also[ACCURACY_DATA_MAX];
@@ -176,10 +178,10 @@ static int check(parse *p)
         return 0;
     if (!o->data_count)
         return trip_option_fail("NAME.trip",
-                                "none given: `triptych accuracy NAME.trip -o REPORT/`");
+                                "no data set given; use `triptych accuracy NAME.trip -o REPORT/`");
     int status = 0;
     if (o->no_programs && o->program_count)
-        return trip_option_fail("--compare", "a program or none");
+        return trip_option_fail("--compare", "none excludes other programs");
     for (int i = 0; i < p->also_count && !status; i++)
         status = add_data(p->also[i], o);
     return status;
@@ -190,13 +192,14 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     parse *p = state->input;
     if (key == ARGP_KEY_ARG)
         return p->o->data_count
-                   ? trip_option_fail(arg, "one data set at a time; --also adds others")
+                   ? trip_option_fail(arg, "only one data set is possible; --also adds others")
                    : add_data(arg, p->o);
     if (key == ARGP_KEY_END)
         return check(p);
     if (key == KEY_ALSO) {
         if (p->also_count == ACCURACY_DATA_MAX - 1)
-            return trip_option_fail("--also", "7 other data sets at most");
+            return trip_option_fail("--also",
+                                    "given too often; at most 7 other data sets are possible");
         p->also[p->also_count++] = arg;
         return 0;
     }

@@ -1,4 +1,5 @@
-/* The command line of `triptych accuracy`, checked, defaults filled in. */
+/* Parses and checks the command line of `triptych accuracy`, and fills in the defaults. Main thread
+ * only. */
 #ifndef TRIP_ACCURACY_OPTIONS_H
 #define TRIP_ACCURACY_OPTIONS_H
 
@@ -8,24 +9,25 @@
 enum { ACCURACY_DATA_MAX = 8, ACCURACY_COMPARED_PROGRAMS_MAX = 4 };
 
 typedef struct accuracy_options {
-    const char *data[ACCURACY_DATA_MAX]; /* the first is swept, the others kept otherwise */
+    const char *data[ACCURACY_DATA_MAX]; /* [0]: the data set with all settings; the others are
+                                            stored differently */
     int data_count;
     const char *
         program[ACCURACY_COMPARED_PROGRAMS_MAX]; /* commands of programs that draw the same views */
     int program_count;
-    bool no_programs; /* nor VTK, which stands there of itself where it is installed */
+    bool no_programs; /* leaves out VTK, which is measured by default if it is installed */
     const char *output;
-    const char *source;   /* the volume that the data were made of; NULL: not known */
-    const char *tf;       /* NULL: the function kept in the data set */
-    const char *settings; /* patterns joined by commas; NULL: all */
+    const char *source;   /* volume that the data set was made of, or NULL */
+    const char *tf;       /* NULL selects the transfer function in the data set */
+    const char *settings; /* patterns joined by commas; NULL selects all */
     int width, height, views, repeat, samples;
     double tolerance, budget_seconds;
     bool shading, ladder, force, quiet, list, pictures;
-    unsigned threads; /* 0: one a processor */
+    unsigned threads; /* 0 selects one per processor */
     uint64_t memory_bytes;
 } accuracy_options;
 
-/* 0, or TRIP_USAGE once reported; --help prints and exits. */
+/* Returns 0, or TRIP_USAGE after reporting an error. --help prints the help and exits. */
 int accuracy_options_parse(accuracy_options *o, int argc, char **argv);
 
 #endif

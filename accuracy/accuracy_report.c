@@ -15,7 +15,7 @@ static bool is_measured(const accuracy_report *r, int i)
     return r->m->rows[i].state == ACCURACY_MEASURED;
 }
 
-/* And no program beside. */
+/* Excludes rows of other programs. */
 static bool is_setting(const accuracy_report *r, int i)
 {
     return is_measured(r, i) && !r->m->rows[i].program;
@@ -27,7 +27,8 @@ static double error_of(const accuracy_report *r, int i, bool mean)
     return mean ? f->mean : f->percentile_99;
 }
 
-/* Those that none is better than in one and as good as in the other. */
+/* Finds the Pareto front: the settings that no other setting beats in time or error without being
+ * worse in the other. */
 static void find_front(const accuracy_report *r, bool mean, bool *front)
 {
     for (int i = 0; i < r->m->row_count; i++) {
@@ -130,12 +131,12 @@ static void print_why(FILE *f, const char *name, accuracy_state state, const cha
 {
     if (state != ACCURACY_MEASURED)
         fprintf(f, "left out: %s: %s\n", name,
-                state == ACCURACY_LEFT_OUT ? why : "the seconds of --budget were over");
+                state == ACCURACY_LEFT_OUT ? why : "--budget was used up");
 }
 
 void accuracy_report_print(FILE *f, const accuracy_report *r)
 {
-    fprintf(f, "\n| settings | median ms | error, of 255: mean | 99 %% | most | PSNR, dB | SSIM | "
+    fprintf(f, "\n| settings | median ms | error of 255: mean | 99 %% | max | PSNR, dB | SSIM | "
                "FLIP |\n|---|--:|--:|--:|--:|--:|--:|--:|\n");
     for (int i = 0; i < r->m->row_count; i++) {
         const accuracy_error_figures *e = &r->figures[i][ACCURACY_TOTAL];
@@ -145,12 +146,13 @@ void accuracy_report_print(FILE *f, const accuracy_report *r)
                     row->setting.name, r->front[i] ? " *" : "", r->ms[i], e->mean, e->percentile_99,
                     e->max, e->psnr, row->ssim / row->views, row->flip / row->views);
     }
-    fprintf(f, "\n* on the front: no other is as fast and as close at the 99th percentile.\n");
+    fprintf(f,
+            "\n* on the front: no other setting is as fast and as close at the 99th percentile.\n");
     for (int i = 0; i < r->m->row_count; i++)
         print_why(f, r->m->rows[i].setting.name, r->m->rows[i].state, r->m->rows[i].why);
     for (int i = 0; i < r->m->popping_count; i++)
         print_why(f, r->m->popping[i].name, r->m->popping[i].state, r->m->popping[i].why);
     if (r->m->view_count < r->m->options->views)
-        fprintf(f, "left out: views %d to %d: the seconds of --budget were over\n",
-                r->m->view_count + 1, r->m->options->views);
+        fprintf(f, "left out: views %d to %d: --budget was used up\n", r->m->view_count + 1,
+                r->m->options->views);
 }

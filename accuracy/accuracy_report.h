@@ -1,5 +1,5 @@
-/* The report of what was measured: a folder with accuracy.json, accuracy.csv and index.html, which
- * gets its name only when it is whole. One thread. */
+/* The report of a measurement: a folder with accuracy.json, accuracy.csv and index.html. The folder
+ * gets its name only when it is complete. One thread. */
 #ifndef TRIP_ACCURACY_REPORT_H
 #define TRIP_ACCURACY_REPORT_H
 
@@ -9,45 +9,46 @@
 #include "measure.h"
 
 typedef struct accuracy_folder {
-    const char *path; /* the caller's */
+    const char *path; /* owned by the caller */
     char temporary[PATH_MAX];
 } accuracy_folder;
 
-/* Makes the folder under another name. Refuses, before any work, what is there already; with
- * `force` only what is no report. */
+/* Creates the folder under a temporary name. Fails before any work if `path` exists. With `force`
+ * it fails only if the existing folder is not a report. */
 int accuracy_folder_begin(accuracy_folder *f, const char *path, bool force);
-/* Gives it its name, in place of an older report. */
+/* Renames the folder to its name, and replaces an older report. */
 int accuracy_folder_finish(accuracy_folder *f);
-/* Removes it, unless it is finished. */
+/* Removes the folder, unless it is finished. */
 void accuracy_folder_abandon(accuracy_folder *f);
 
-/* What the parts of a report have in common. */
+/* Data that all parts of a report share. */
 typedef struct accuracy_report {
     const accuracy_measured *m;
-    const char *command; /* that made it */
+    const char *command; /* command line of the measurement */
     double load_before, load_after;
-    accuracy_error_figures (*figures)[ACCURACY_STEPS]; /* of each row */
-    double *ms;                                        /* the median of each row */
-    bool *front, *front_of_mean;                       /* no other setting is as fast and closer */
+    accuracy_error_figures (*figures)[ACCURACY_STEPS]; /* of each row and step */
+    double *ms;                                        /* median time of each row */
+    bool *front, *front_of_mean; /* whether a row is on the Pareto front by the 99th percentile, and
+                                    by the mean */
 } accuracy_report;
 
 int accuracy_report_make(accuracy_report *r, const accuracy_measured *m, const char *command);
 void accuracy_report_free(accuracy_report *r);
 int accuracy_report_write(const accuracy_report *r, const char *folder);
 
-/* "total", "storage", ... */
+/* Names of the steps: "total", "storage", ... */
 extern const char *const accuracy_step_names[ACCURACY_STEPS];
 
-/* The parts, each as text for free(); NULL without memory. */
+/* Return the parts as text; the caller frees it. NULL if memory is exhausted. */
 char *accuracy_report_json(const accuracy_report *r);
 char *accuracy_report_csv(const accuracy_report *r);
 char *accuracy_report_html(const accuracy_report *r);
-/* Time and error as SVG, written to `f`; by the mean, else by the 99th percentile. */
+/* Writes a plot of time and error as SVG, by the mean error or by the 99th percentile. */
 void accuracy_report_plot(FILE *f, const accuracy_report *r, bool mean);
-/* A short table for people. */
+/* Prints a short table for people. */
 void accuracy_report_print(FILE *f, const accuracy_report *r);
 
-/* The options of `triptych render` for a view and for a row, as a shell takes them. */
+/* Write the options of `triptych render` for a view and for a setting, as shell words. */
 void accuracy_write_view(FILE *f, const accuracy_view *view);
 void accuracy_write_options(FILE *f, const accuracy_setting *s);
 

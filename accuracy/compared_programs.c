@@ -29,7 +29,7 @@ static int spawn(accuracy_program *b, const char *command, char why[256])
     char *copy = strdup(command), *const arguments[] = { shell, run, copy, NULL };
     if (!copy || socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends)) {
         free(copy);
-        return fail(why, "cannot start it");
+        return fail(why, "cannot start the program");
     }
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
@@ -66,7 +66,7 @@ static int send_text(const accuracy_program *b, const char *text, char why[256])
     return 0;
 }
 
-/* Takes over `what`. */
+/* Sends a line of JSON and frees `stage`. */
 static int send_json(const accuracy_program *b, cJSON *stage, char why[256])
 {
     char *text = cJSON_PrintUnformatted(stage);
@@ -78,7 +78,7 @@ static int send_json(const accuracy_program *b, cJSON *stage, char why[256])
     return status;
 }
 
-/* The next line, an object for cJSON_Delete(). */
+/* Reads the next line as a JSON object; the caller frees it. */
 static int receive(accuracy_program *b, cJSON **out, char why[256])
 {
     *out = NULL;
@@ -89,7 +89,7 @@ static int receive(accuracy_program *b, cJSON **out, char why[256])
         return 0;
     cJSON_Delete(*out);
     *out = NULL;
-    return fail(why, "the program's answer is no line of JSON");
+    return fail(why, "the program's answer is not a line of JSON");
 }
 
 static void keep_text(const cJSON *object, const char *name,
@@ -135,7 +135,7 @@ static int introduce(accuracy_program *b, const accuracy_options *o, triptych *t
     keep_text(about, "name", b->name);
     keep_text(about, "version", b->about);
     if (!status && !b->name[0])
-        status = fail(why, "the program does not say its name");
+        status = fail(why, "the program's answer has no \"name\"");
     cJSON_Delete(about);
     return status;
 }
@@ -145,7 +145,7 @@ int accuracy_program_start(accuracy_program *b, const accuracy_options *o, tript
 {
     *b = (accuracy_program){ .socket = -1, .command = b->command };
     if (!o->source)
-        return fail(why, "--source is the volume that it draws, and was not given");
+        return fail(why, "requires --source, the volume to draw");
     int status = spawn(b, b->command, why);
     return status ? status : introduce(b, o, t, why);
 }
@@ -177,7 +177,7 @@ static int draw(accuracy_program *b, const accuracy_view *view, const char *pict
         status = receive(b, &answer, why);
     const cJSON *time = cJSON_GetObjectItemCaseSensitive(answer, "ms");
     if (!status && !(cJSON_IsNumber(time) && time->valuedouble >= 0))
-        status = fail(why, "the program does not say how long it took");
+        status = fail(why, "the program's answer has no \"ms\"");
     if (!status)
         *ms = time->valuedouble;
     if (!status && picture)
@@ -203,7 +203,7 @@ static int read_picture(const char *path, size_t values, float *rgba, char why[2
         fclose(f);
     free(bytes);
     unlink(path);
-    return whole ? 0 : fail(why, "the program's picture does not have the size wanted");
+    return whole ? 0 : fail(why, "the program's picture has the wrong size");
 }
 
 int accuracy_program_picture(accuracy_program *b, const accuracy_view *view, const char *folder,
@@ -211,7 +211,7 @@ int accuracy_program_picture(accuracy_program *b, const accuracy_view *view, con
 {
     char whole[PATH_MAX], path[PATH_MAX + 16];
     if (!realpath(folder, whole))
-        return fail(why, "its picture has no place");
+        return fail(why, "the folder for its picture does not exist");
     snprintf(path, sizeof path, "%s/program.raw", whole);
     int status = draw(b, view, path, ms, why);
     const size_t pixels = (size_t)view->camera.width * (size_t)view->camera.height;

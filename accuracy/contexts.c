@@ -11,8 +11,7 @@ int accuracy_contexts_create(accuracy_contexts *c, const accuracy_options *o)
 {
     *c = (accuracy_contexts){ .options = o };
     uint64_t all = o->memory_bytes ? o->memory_bytes : trip_memory_available_bytes() / 4;
-    /* cpu, gl, reference, integral; for the others of the data sets but gl; the source's; pictures.
-     */
+    /* Shares: four renderers for each data set, the integral of the source, and the pictures. */
     c->share_bytes = all / (2 + 4 * (uint64_t)o->data_count);
     return trip_budget_create(&c->budget, c->share_bytes);
 }
@@ -26,7 +25,7 @@ void accuracy_contexts_close(accuracy_contexts *c)
     *c = (accuracy_contexts){ 0 };
 }
 
-/* What a context says of a failure, without "triptych: render: ". */
+/* Keeps the context's error message, without its "triptych: STAGE: " prefix. */
 static int keep_why(accuracy_contexts *c, int data, int renderer, triptych *t, int status)
 {
     const char *why = triptych_error(t);

@@ -27,7 +27,7 @@ void accuracy_error_add(accuracy_error *e, const float *picture, const float *tr
     accuracy_error_add_apart(e, e, picture, truth, pixels);
 }
 
-/* The least error that so many channels do not exceed. */
+/* Returns the smallest error that a share of the channels does not exceed. */
 static double percentile(const accuracy_error *e, double share)
 {
     uint64_t below = 0;

@@ -56,8 +56,8 @@ static bool is_same(const char *a, const char *b)
     return a && b ? !strcmp(a, b) : a == b;
 }
 
-/* False where it is not of the data set that the report is of, has options that are not known, or
- * lacks its figures. */
+/* Returns false if the row is for another data set, has an unknown option, or lacks its error or
+ * time. */
 static bool read_row(const cJSON *row, const char *data_set, accuracy_found *out)
 {
     const cJSON *options = cJSON_GetObjectItemCaseSensitive(row, "options"), *option;
@@ -85,12 +85,12 @@ static void warn_of_differences(const cJSON *root, const char *path, const accur
 {
     const char *function = text_of(root, "transfer_function");
     if (!is_same(function, w->function))
-        trip_warn(path, "was measured with %s%s, not with %s%s: errors and times differ",
+        trip_warn(path, "was measured with %s%s, not with %s%s; errors and times differ",
                   function ? "--tf " : "the data set's own transfer function",
                   function ? function : "", w->function ? "--tf " : "the data set's own",
                   w->function ? w->function : "");
     if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(root, "shading")) != !!s->shading)
-        trip_warn(path, "was measured %s: errors and times differ",
+        trip_warn(path, "was measured %s; errors and times differ",
                   s->shading ? "without light" : "with light");
 }
 
@@ -98,18 +98,17 @@ int accuracy_check_data(const char *measured, const char *drawn, const char *pat
 {
     return !strcmp(measured, drawn)
                ? 0
-               : trip_fail(
-                     TRIP_ERROR, "--error", path,
-                     "the report is of another data set, or of before this one was bricked anew: "
-                     "`triptych accuracy` measures it");
+               : trip_fail(TRIP_ERROR, "--error", path,
+                           "the report measured another data set, or an earlier version of this "
+                           "one; run `triptych accuracy` again");
 }
 
-/* Reports of before they had a checksum may be of anything. */
+/* Older reports have no checksum, and may have measured any data set. */
 static int check_data(const cJSON *root, const char *path, const accuracy_wanted *w)
 {
     const char *checksum = text_of(root, "checksum");
     if (w->checksum && !checksum)
-        trip_warn(path, "does not say which data set it was made of; measure it anew");
+        trip_warn(path, "does not name its data set; run `triptych accuracy` again");
     return w->checksum && checksum ? accuracy_check_data(checksum, w->checksum, path) : 0;
 }
 
@@ -143,10 +142,10 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
     }
     if (isinf(closest.error))
         return trip_fail(TRIP_ERROR, "--error", path,
-                         "has no settings of the renderer that is to draw");
+                         "has no settings for this renderer; choose another --renderer");
     if (isinf(best.ms))
         return trip_fail(TRIP_ERROR, "--error", path,
-                         "nothing stays below %g; %s comes closest, with %.2f", w->error,
+                         "no setting has an error below %g; %s has the smallest, %.2f", w->error,
                          closest.setting.name, closest.error);
     warn_of_differences(root, path, w, &defaults);
     *out = best;
@@ -162,8 +161,8 @@ int accuracy_fastest_in(const char *text, const char *path, const accuracy_wante
     trip_json json = { 0 };
     int status = trip_json_parse(&json, text, path, NULL);
     if (!status && number_of(json.root, "triptych_accuracy") != VERSION)
-        status =
-            trip_fail(TRIP_ERROR, "--error", path, "is no accuracy.json of `triptych accuracy`");
+        status = trip_fail(TRIP_ERROR, "--error", path,
+                           "is not an accuracy.json of `triptych accuracy`");
     if (!status)
         status = check_data(json.root, path, wanted);
     if (!status)
@@ -178,8 +177,9 @@ static int read_text(const char *path, char *text)
     ssize_t bytes = fd >= 0 ? trip_input_read(fd, text, MAX_BYTES + 1) : -1;
     int status =
         bytes < 0
-            ? trip_fail_errno("--error", path, "`triptych accuracy` makes this report; cannot open")
-        : bytes > MAX_BYTES ? trip_fail(TRIP_ERROR, "--error", path, "is longer than a report is")
+            ? trip_fail_errno("--error", path, "cannot open; `triptych accuracy` makes this report")
+        : bytes > MAX_BYTES ? trip_fail(TRIP_ERROR, "--error", path,
+                                        "is too large for a report; at most 16 MiB are possible")
                             : 0;
     if (fd >= 0)
         close(fd);

@@ -1,5 +1,5 @@
-/* From a report of `triptych accuracy`: the fastest settings that were measured to stay below an
- * error. One thread. */
+/* Finds, in a report of `triptych accuracy`, the fastest settings with a measured error below a
+ * bound. One thread. */
 #ifndef TRIP_ACCURACY_FASTEST_H
 #define TRIP_ACCURACY_FASTEST_H
 
@@ -9,40 +9,42 @@
 #include "setting.h"
 #include "triptych_brick.h"
 
-/* triptych_info.checksum as reports have it. */
+/* Bytes of triptych_info.checksum as text, with its terminating zero. */
 enum { ACCURACY_CHECKSUM_BYTES = 17 };
 void accuracy_checksum_text(uint64_t checksum, char text[ACCURACY_CHECKSUM_BYTES]);
 
 typedef struct accuracy_wanted {
-    double error;         /* of 255: the 99th percentile of the view where that is largest */
-    unsigned renderers;   /* of which: bits 1 << TRIPTYCH_RENDERER_...; 0: any */
-    const char *function; /* that is drawn with, as of --tf; NULL: the data set's own */
-    const char *checksum; /* of the data set, accuracy_checksum_text(); NULL: not known */
+    double error;         /* bound for the 99th percentile in the worst view, of 255 */
+    unsigned renderers;   /* allowed renderers as bits 1 << TRIPTYCH_RENDERER_...; 0 allows all */
+    const char *function; /* argument of --tf; NULL means the transfer function in the data set */
+    const char *checksum; /* of the data set, by accuracy_checksum_text(); NULL if unknown */
 } accuracy_wanted;
 
 typedef struct accuracy_found {
     accuracy_setting setting;
     double error, ms;
-    char checksum[ACCURACY_CHECKSUM_BYTES]; /* of the report's data set; "": it names none */
-    bool says_levels;                       /* whether the report says which that */
-    triptych_levels_for levels_for;         /* was bricked with */
+    char
+        checksum[ACCURACY_CHECKSUM_BYTES]; /* of the measured data set; "" if the report has none */
+    bool says_levels;                      /* whether the report gives levels_for */
+    triptych_levels_for levels_for;        /* --levels-for of the measured data set */
 } accuracy_found;
 
-/* `path` is a report's folder or its accuracy.json. out->setting.settings has what the report says
- * nothing of (light, background, ...) before and after. Fails where the report is none or of
- * another data set, or nothing in it stays below the error; warns where it is of another function
- * or light. */
+/* Reads a report, given as its folder or its accuracy.json. The caller sets
+ * out->setting.settings to the settings that a report does not vary, such as light and
+ * background; these settings are kept. Fails if the report is invalid or measured another data
+ * set, or if no setting has an error below the bound. Warns if the transfer function or the
+ * light differs. */
 int accuracy_fastest(const char *path, const accuracy_wanted *wanted, accuracy_found *out);
-/* The same of the text of an accuracy.json; `path` is for messages. */
+/* Reads the text of an accuracy.json; `path` is for messages. Otherwise like accuracy_fastest(). */
 int accuracy_fastest_in(const char *text, const char *path, const accuracy_wanted *wanted,
                         accuracy_found *out);
 
-/* Fails where the checksums of the data set measured and of the one drawn differ; `path` is for the
+/* Fails if the checksums of the measured and the drawn data set differ. `path` is for the
  * message. */
 int accuracy_check_data(const char *measured, const char *drawn, const char *path);
 
-/* Where the report of a data set or volume lies: NAME.accuracy beside NAME.trip, NAME.nrrd, ...;
- * for free(), NULL without memory. */
+/* Returns the default path of a report: NAME.accuracy beside NAME.trip, NAME.nrrd, and so on. The
+ * caller frees it. NULL if memory is exhausted. */
 char *accuracy_report_path(const char *data);
 
 #endif

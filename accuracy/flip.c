@@ -8,7 +8,7 @@ enum { CHANNELS = 3, KERNEL_MAX = 64 };
 
 static const double ppd = ACCURACY_FLIP_PIXELS_PER_DEGREE, pi = 3.14159265358979323846;
 
-/* Linear RGB of sRGB's primaries to XYZ; the white point is what (1, 1, 1) goes to. */
+/* Converts linear RGB with the primaries of sRGB to XYZ. (1, 1, 1) maps to the white point. */
 static const double to_xyz[3][3] = { { 0.4124564, 0.3575761, 0.1804375 },
                                      { 0.2126729, 0.7151522, 0.0721750 },
                                      { 0.0193339, 0.1191920, 0.9503041 } };
@@ -16,7 +16,7 @@ static const double from_xyz[3][3] = { { 3.2404542, -1.5371385, -0.4985314 },
                                        { -0.9692660, 1.8760108, 0.0415560 },
                                        { 0.0556434, -0.2040259, 1.0572252 } };
 
-/* One picture: YCxCz, what filtering makes of it, and room for a filter's first direction. */
+/* One picture: YCxCz channels, filtered channels, and features. */
 typedef struct picture {
     float *channel[CHANNELS], *seen[CHANNELS], *edges, *points;
 } picture;
@@ -28,7 +28,7 @@ typedef struct work {
     float *rows;
 } work;
 
-/* Weights of -reach to +reach. */
+/* Weights from -reach to +reach. */
 typedef struct kernel {
     int reach;
     double weights[2 * KERNEL_MAX + 1];
@@ -50,7 +50,7 @@ static void multiply(const double m[3][3], const double v[3], double out[3])
         out[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
 }
 
-/* X, Y and Z of linear RGB, each relative to the white point's. */
+/* Computes X, Y and Z of linear RGB, each relative to the white point. */
 static void relative_xyz(const double rgb[3], double out[3])
 {
     multiply(to_xyz, rgb, out);
@@ -58,7 +58,7 @@ static void relative_xyz(const double rgb[3], double out[3])
         out[i] /= to_xyz[i][0] + to_xyz[i][1] + to_xyz[i][2];
 }
 
-/* Linearised L*a*b*, in which contrast is filtered (section 4.1.1). */
+/* Converts to linearised L*a*b*, the space of contrast filtering (section 4.1.1). */
 static void rgb_to_ycxcz(const double rgb[3], double out[3])
 {
     double r[3];
@@ -82,7 +82,7 @@ static double cube_root_or_line(double t)
     return t > delta * delta * delta ? cbrt(t) : t / (3 * delta * delta) + 4.0 / 29;
 }
 
-/* L*a*b* with the Hunt effect: chromaticness as of the lightness (equation 3). */
+/* Converts to L*a*b* with the Hunt effect, which scales chromaticness by lightness (equation 3). */
 static void rgb_to_hunt_lab(const double rgb[3], double out[3])
 {
     double r[3], f[3];
@@ -94,7 +94,7 @@ static void rgb_to_hunt_lab(const double rgb[3], double out[3])
     out[2] = 0.01 * out[0] * 200 * (f[1] - f[2]);
 }
 
-/* The distance of colours far apart (equation 4). */
+/* Returns the HyAB distance, for colours far apart (equation 4). */
 static double hyab(const double a[3], const double b[3])
 {
     return fabs(a[0] - b[0]) + hypot(a[1] - b[1], a[2] - b[2]);
@@ -105,7 +105,8 @@ static int clamp_to(int i, int count)
     return i < 0 ? 0 : i >= count ? count - 1 : i;
 }
 
-/* out (+)= share * the picture under one kernel along x and one along y. */
+/* Filters with one kernel along x and one along y, times `share`. Adds to `out` if `add` is true,
+ * else overwrites it. */
 static void filter(const work *w, const float *in, const kernel *x, const kernel *y, double share,
                    bool add, float *out)
 {
@@ -130,7 +131,7 @@ static void filter(const work *w, const float *in, const kernel *x, const kernel
         }
 }
 
-/* The contrast sensitivity of a channel as two Gaussians (equation 1 and table 1). */
+/* Contrast sensitivity of a channel as a sum of two Gaussians (equation 1 and table 1). */
 typedef struct sensitivity {
     double a[2], b[2];
 } sensitivity;
@@ -139,7 +140,8 @@ static const sensitivity sensitivities[CHANNELS] = { { { 1, 0 }, { 0.0047, 1e-5 
                                                      { { 1, 0 }, { 0.0053, 1e-5 } },
                                                      { { 34.1, 13.5 }, { 0.04, 0.025 } } };
 
-/* As wide for all as the widest needs; returns the weights' sum, which becomes 1. */
+/* Makes a normalised Gaussian with the reach of the widest one. Returns the sum of the weights
+ * before normalisation. */
 static double make_gaussian(kernel *k, double b)
 {
     double sum = 0;
@@ -167,8 +169,8 @@ static void filter_contrast(const work *w, picture *p)
     }
 }
 
-/* A Gaussian and its first or second derivative, whose positive and whose negative weights sum to 1
- * each (section 4.2). */
+/* Makes a Gaussian and its first or second derivative. The positive and the negative weights of the
+ * derivative each sum to 1 (section 4.2). */
 static void make_feature(kernel *along, kernel *across, bool points)
 {
     const double sigma = 0.5 * 0.082 * ppd;
@@ -188,8 +190,8 @@ static void make_feature(kernel *along, kernel *across, bool points)
     }
 }
 
-/* The length of the gradient that one kernel pair gives along x and along y; `spare` is of a
- * picture. */
+/* Computes the length of the feature vector, from edges or points along x and y. `spare` is
+ * overwritten. */
 static void find_features(const work *w, const float *light, bool points, float *spare, float *out)
 {
     kernel along, across;
@@ -200,7 +202,7 @@ static void find_features(const work *w, const float *light, bool points, float 
         out[i] = hypotf(out[i], spare[i]);
 }
 
-/* Colours to YCxCz; the luminance is left in seen[0], from 0 to 1. */
+/* Converts colours to YCxCz, and leaves the luminance, 0 to 1, in seen[0]. */
 static void convert(const work *w, const float *rgba, picture *p)
 {
     for (size_t i = 0; i < w->pixels; i++) {
@@ -233,7 +235,7 @@ static void colour_seen(const picture *p, size_t i, double lab[3])
     rgb_to_hunt_lab(rgb, lab);
 }
 
-/* The distance of green and blue, the largest that colours have. */
+/* Returns the distance between green and blue, the maximum for colours. */
 static double max_apart(void)
 {
     double green[3], blue[3];
@@ -242,7 +244,8 @@ static double max_apart(void)
     return pow(hyab(green, blue), 0.7);
 }
 
-/* Colours: small errors get most of the range (equation 5). */
+/* Maps colour distances to 0 to 1. Small distances get the larger part of this range (equation
+ * 5). */
 static double colour_error(double apart, double max)
 {
     const double pc = 0.4, pt = 0.95;
@@ -250,7 +253,7 @@ static double colour_error(double apart, double max)
     return e < knee ? pt * e / knee : pt + (e - knee) / (max - knee) * (1 - pt);
 }
 
-/* Equations 6 and 7. */
+/* Returns the FLIP error of a pixel (equations 6 and 7). */
 static double error_at(const work *w, size_t i, double max)
 {
     const picture *a = &w->pictures[0], *b = &w->pictures[1];
@@ -285,7 +288,7 @@ int accuracy_flip(const float *a, const float *b, int width, int height, trip_bu
     float *memory = trip_budget_take(budget, bytes);
     if (!memory)
         return trip_fail(TRIP_ERROR, "accuracy", "FLIP",
-                         "%zu bytes do not fit the memory given; raise --memory", bytes);
+                         "needs %zu bytes, which do not fit the memory; raise --memory", bytes);
     lay_out(&w, memory);
     look_at(&w, a, &w.pictures[0]);
     look_at(&w, b, &w.pictures[1]);

@@ -24,10 +24,10 @@ enum { THUMBNAIL_PX = 128 };
 /* Pictures of a view. */
 typedef enum which {
     TRUTH,
-    STORED,    /* the integral of a data set's values */
-    FIELD,     /* that of its splats */
-    FINE,      /* the reference at the finest level */
-    REFERENCE, /* at the levels drawn */
+    STORED,    /* integral of the values in a data set */
+    FIELD,     /* integral of the drawn field: splats, or values by another kernel */
+    FINE,      /* reference at the finest level */
+    REFERENCE, /* reference at the drawn levels */
     RAN,
     PICTURES
 } which;
@@ -41,11 +41,12 @@ typedef struct sweep {
     float *pictures[PICTURES];
     size_t picture_bytes;
     double begin;
-    /* What the pictures are of: */
+    /* Data set and settings of the pictures STORED, FIELD and REFERENCE; -1 if there is no
+     * picture. */
     int stored_data, field_data, reference_data;
-    triptych_settings field; /* that are drawn: what of them the integral depends on */
+    triptych_settings field; /* only the settings that change the integral */
     triptych_settings reference;
-    accuracy_error view; /* scratch */
+    accuracy_error view; /* scratch memory */
 } sweep;
 
 static double now_seconds(void)
@@ -77,7 +78,7 @@ static size_t pixels_of(const sweep *s)
     return (size_t)s->o->width * (size_t)s->o->height;
 }
 
-/* ---- which rows there are ---- */
+/* ---- rows ---- */
 
 static bool is_wanted(const char *patterns, const char *name)
 {
@@ -103,7 +104,7 @@ static int add_row(accuracy_measured *m, int data, const accuracy_setting *setti
     return row->ms ? 0 : trip_fail(TRIP_ERROR, "accuracy", setting->name, "out of memory");
 }
 
-/* The other data sets, by post and by pre. */
+/* Adds rows for the other data sets, by post and by pre. */
 static int add_others(accuracy_measured *m, const triptych_settings *defaults)
 {
     int status = 0;
@@ -133,7 +134,8 @@ static int add_program(accuracy_measured *m, const char *name, const char *comma
     return status;
 }
 
-/* Other programs, each of which starts with the first view: those given, else VTK's ray caster. */
+/* Adds the other programs: the given ones, else VTK's ray caster. Each starts with the first
+ * view. */
 static int add_programs(accuracy_measured *m)
 {
     const accuracy_options *o = m->options;
@@ -170,7 +172,7 @@ static int add_rows(accuracy_measured *m, const triptych_settings *defaults)
             m->popping[m->popping_count++] = accuracy_poppings[i];
     if (!status && !m->row_count && !m->popping_count)
         return trip_fail(TRIP_USAGE, "usage", "--settings",
-                         "\"%s\" names none; `triptych accuracy --list` prints the names",
+                         "\"%s\" matches no setting; `triptych accuracy --list` prints the names",
                          m->options->settings);
     return status;
 }
@@ -184,14 +186,14 @@ __attribute__((format(printf, 2, 3))) static void leave_out(accuracy_row *row, c
     row->state = ACCURACY_LEFT_OUT;
 }
 
-/* Whether there are coarse levels to draw a setting by. */
+/* Returns whether the data set has coarse levels for a setting. */
 static bool has_levels(triptych *t, const triptych_settings *settings)
 {
     unsigned levels;
     return triptych_count_levels(t, settings->classify, &levels) == 0 && levels > 0;
 }
 
-/* What the data set was bricked with, by its notes. */
+/* Reads the --levels-for of the data set from its notes. */
 static void note_levels(accuracy_measured *m, const char *notes)
 {
     static const char option[] = "--levels-for=";
@@ -209,7 +211,7 @@ static void note_levels(accuracy_measured *m, const char *notes)
     trip_json_free(&json);
 }
 
-/* What says nothing here. */
+/* Marks the rows that would measure nothing here, and keeps the reason. */
 static int leave_out_idle(sweep *s)
 {
     triptych *t;
@@ -227,20 +229,21 @@ static int leave_out_idle(sweep *s)
         const int64_t *n = info.dims;
         if (row->is_vtk && (double)n[0] * (double)n[1] * (double)n[2] * ACCURACY_VTK_VOXEL_BYTES >
                                0.25 * (double)trip_memory_available_bytes())
-            leave_out(row,
-                      "VTK would hold the whole volume in memory; --compare draws it all the same");
+            leave_out(row, "VTK would hold the whole volume in memory; give --compare to measure "
+                           "it nevertheless");
         if (row->program)
             continue;
         if (row->setting.settings.lod_px > 0 && !has_levels(t, &row->setting.settings))
-            leave_out(row, "the data set has no coarse levels for it");
+            leave_out(row, "the data set has no coarse levels for this setting");
         else if (row->setting.settings.samples > s->o->samples)
-            leave_out(row, "the integral has %d x %d rays a pixel: --samples %d compares them",
+            leave_out(row,
+                      "the integral has %d x %d rays per pixel; --samples %d compares this setting",
                       s->o->samples, s->o->samples, row->setting.settings.samples);
     }
     return 0;
 }
 
-/* ---- pictures of the ladder ---- */
+/* ---- pictures of the steps ---- */
 
 static int draw_integral(sweep *s, int data, int renderer, triptych_settings settings, float *rgba)
 {
@@ -252,11 +255,11 @@ static int draw_integral(sweep *s, int data, int renderer, triptych_settings set
     return status == TRIP_ERROR
                ? trip_fail(TRIP_ERROR, "accuracy",
                            renderer == ACCURACY_SOURCE ? s->o->source : s->o->data[data],
-                           "no integral: %s", s->contexts.why[data][renderer])
+                           "the integral failed: %s", s->contexts.why[data][renderer])
                : status;
 }
 
-/* That of values, as they are interpolated by default. */
+/* Returns the settings for the integral of values with the default interpolation. */
 static triptych_settings default_field(const sweep *s)
 {
     triptych_settings settings = s->defaults;
@@ -273,7 +276,8 @@ static int need_stored(sweep *s, int data)
                          s->pictures[STORED]);
 }
 
-/* Of what a row draws: the sum of its splats, or values by its kernel. */
+/* Draws the integral of the field that a row draws: the sum of its splats, or values by its
+ * kernel. */
 static int need_field(sweep *s, const accuracy_row *row, bool splats)
 {
     const triptych_settings *drawn = &row->setting.settings;
@@ -293,7 +297,8 @@ static int need_field(sweep *s, const accuracy_row *row, bool splats)
     return draw_integral(s, row->data, TRIPTYCH_RENDERER_INTEGRAL, field, s->pictures[FIELD]);
 }
 
-/* The reference of a row's settings, and at the finest level if that is another. */
+/* Draws the reference with a row's settings, and at the finest level if the row draws coarse
+ * ones. */
 static int need_reference(sweep *s, const accuracy_row *row)
 {
     triptych_settings settings = row->setting.settings;
@@ -321,7 +326,7 @@ static void compare(sweep *s, accuracy_row *row, accuracy_step step, which a, wh
     accuracy_error_add(&row->error[step], s->pictures[a], s->pictures[b], pixels_of(s));
 }
 
-/* Whether what ran is classified before it is splatted. */
+/* Returns whether the frame was drawn by pre-classification. */
 static bool is_pre(const triptych_frame_stats *stats)
 {
     return stats->classify == TRIPTYCH_PRE;
@@ -338,7 +343,8 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
         compare(s, row, ACCURACY_PRECISION, RAN, STORED);
         return 0;
     }
-    /* The integral has no Gaussian values: what that kernel smooths counts as the method's. */
+    /* The integral has no Gaussian interpolation. The smoothing by that kernel counts as a
+     * method error. */
     const bool pre = is_pre(stats), cubic = row->setting.settings.kernel == TRIPTYCH_CUBIC;
     which drawn = pre || cubic ? FIELD : STORED;
     if (drawn == FIELD)
@@ -347,7 +353,7 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
         return status;
     compare(s, row, ACCURACY_MODEL, drawn, STORED);
     status = need_reference(s, row);
-    if (status) /* it does not have everything that others have */
+    if (status) /* the reference renderer lacks some settings */
         return status == TRIP_ERROR ? 0 : status;
     compare(s, row, ACCURACY_METHOD, FINE, drawn);
     if (row->setting.settings.lod_px > 0)
@@ -356,7 +362,7 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
     return 0;
 }
 
-/* ---- a row ---- */
+/* ---- measuring a row ---- */
 
 static int keep_exr(sweep *s, triptych *t, which picture, int view, const char *name)
 {
@@ -395,7 +401,7 @@ static int compare_with_truth(sweep *s, accuracy_row *row)
     return 0;
 }
 
-/* Counted apart, so that it takes nothing of what is timed. */
+/* Counts splats in a frame of its own, so that counting changes no timing. */
 static int count_splats(sweep *s, accuracy_row *row, float *rgba)
 {
     triptych_settings settings = row->setting.settings;
@@ -438,7 +444,7 @@ static int draw_program(sweep *s, accuracy_row *row, int view)
     return status;
 }
 
-/* Another program, as measure_row() does settings. */
+/* Measures another program in a view, like measure_row() for settings. */
 static int measure_program(sweep *s, accuracy_row *row, int view)
 {
     triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
@@ -465,7 +471,7 @@ static int measure_program(sweep *s, accuracy_row *row, int view)
     return status;
 }
 
-/* Untimed first, which also warms what a frame needs. */
+/* Measures a setting in a view. The first frame is not timed; it also fills the caches. */
 static int measure_row(sweep *s, accuracy_row *row, int view)
 {
     int renderer = (int)row->setting.renderer;
@@ -499,7 +505,8 @@ static int measure_row(sweep *s, accuracy_row *row, int view)
 
 /* ---- views ---- */
 
-/* The integral that all is held to: of the source where it is known. */
+/* Draws the reference for all errors: the integral of the source if it is given, else of the data
+ * set. */
 static int find_truth(sweep *s, int view)
 {
     int status;
@@ -519,7 +526,8 @@ static int find_truth(sweep *s, int view)
     return keep_exr(s, t, TRUTH, view, "truth");
 }
 
-/* In the first view rows are begun until the seconds are over; later ones are begun whole. */
+/* In the first view, a row starts only while the time budget lasts. Later views measure all rows
+ * that the first view measured. */
 static int measure_view(sweep *s, int view)
 {
     accuracy_measured *m = s->m;
@@ -529,7 +537,8 @@ static int measure_view(sweep *s, int view)
     if (!status)
         status = accuracy_contexts_look(&s->contexts, &m->views[view]);
     if (status)
-        return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "no view: %s", triptych_error(t));
+        return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "cannot set a view: %s",
+                         triptych_error(t));
     status = find_truth(s, view);
     for (int i = 0; i < m->row_count && !status; i++)
         if (m->rows[i].state == (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED) &&
@@ -541,7 +550,7 @@ static int measure_view(sweep *s, int view)
     return status;
 }
 
-/* A view is begun where as long as one took before is left. */
+/* Starts a view only if the budget allows the mean time of the views before it. */
 static bool has_time_for(const sweep *s, int view)
 {
     double spent = now_seconds() - s->begin;
@@ -553,10 +562,10 @@ static int take_pictures(sweep *s)
     s->picture_bytes = 4 * pixels_of(s) * sizeof(float);
     for (int i = 0; i < PICTURES; i++)
         if (!(s->pictures[i] = trip_budget_take(s->contexts.budget, s->picture_bytes)))
-            return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0],
-                             "pictures of %d x %d do not fit the memory given; raise --memory or "
-                             "make them smaller",
-                             s->o->width, s->o->height);
+            return trip_fail(
+                TRIP_ERROR, "accuracy", s->o->data[0],
+                "pictures of %d x %d pixels do not fit the memory; raise --memory or reduce --size",
+                s->o->width, s->o->height);
     return 0;
 }
 

@@ -1,6 +1,7 @@
-/* Draws every setting from every view, times it, and holds it to the steps of the ladder: the
- * integral of the source volume, that of the values stored, that of the splats where these are
- * drawn, the reference in double precision, and what ran. One thread. */
+/* Draws every setting from every view, measures its time, and splits its error into steps. Each
+ * step compares two consecutive pictures of this list: the integral of the source volume, the
+ * integral of the stored values, the integral of the drawn field, the reference in double
+ * precision, and the picture. One thread. */
 #ifndef TRIP_ACCURACY_MEASURE_H
 #define TRIP_ACCURACY_MEASURE_H
 
@@ -18,53 +19,55 @@ enum {
 };
 
 typedef enum accuracy_step {
-    ACCURACY_TOTAL,   /* what ran to the integral that is true */
-    ACCURACY_STORAGE, /* integral of the values stored to that of the source */
-    ACCURACY_MODEL,   /* integral of what is drawn, splats or values, to that of the values */
-    ACCURACY_METHOD,  /* the reference at the finest level to that: order, sheets, slices, lists */
-    ACCURACY_LEVEL,   /* the reference at the levels drawn to that */
-    ACCURACY_PRECISION, /* what ran to the reference */
+    ACCURACY_TOTAL,   /* picture against the integral of the source, or of the data set without
+                         --source */
+    ACCURACY_STORAGE, /* integral of the stored values against the integral of the source */
+    ACCURACY_MODEL,   /* integral of the drawn field (splats or values) against the integral of the
+                         stored values */
+    ACCURACY_METHOD,  /* reference at the finest level against the integral of the drawn field */
+    ACCURACY_LEVEL,   /* reference at the drawn levels against the reference at the finest level */
+    ACCURACY_PRECISION, /* picture against the reference */
     ACCURACY_STEPS
 } accuracy_step;
 
 typedef struct accuracy_row {
     accuracy_setting setting;
-    int data;                  /* of accuracy_options.data */
-    accuracy_program *program; /* another program, whose name is the setting's; NULL: a setting */
-    bool is_vtk;               /* without being given */
+    int data;                  /* index into accuracy_options.data */
+    accuracy_program *program; /* another program, which provides the name; NULL for a setting */
+    bool is_vtk;               /* VTK was added without --compare */
     accuracy_state state;
-    char why[256]; /* it was left out */
+    char why[256]; /* reason if the row was left out */
     accuracy_error error[ACCURACY_STEPS];
     bool has[ACCURACY_STEPS];
-    double worst_percentile_99; /* of a view, in total */
-    double ssim, flip;          /* sums over views */
+    double worst_percentile_99; /* total error in the worst view */
+    double ssim, flip;          /* sums over the views */
     int views, frames;
     double *ms;                 /* of each frame */
-    double splats, bytes_read;  /* sums over views: read, a frame */
-    double splats_drawn;        /* of the first view, counted; below 0: not */
-    char *picture, *difference; /* of the first view */
+    double splats, bytes_read;  /* read per frame; sums over the views */
+    double splats_drawn;        /* counted in the first view; negative if not counted */
+    char *picture, *difference; /* of the first view, as data URLs */
 } accuracy_row;
 
 typedef struct accuracy_measured {
     const accuracy_options *options;
-    char vtk[ACCURACY_COMMAND_BYTES]; /* the command of VTK's ray caster; "": there is none */
-    const char *folder;               /* that is being written */
+    char vtk[ACCURACY_COMMAND_BYTES]; /* command of VTK's ray caster, or "" */
+    const char *folder;               /* folder of the report, which is being written */
     accuracy_row *rows;
     int row_count;
     accuracy_popping popping[ACCURACY_POPPINGS];
-    int popping_count; /* wanted */
+    int popping_count; /* number of popping tables to measure */
     accuracy_view *views;
-    int view_count; /* done */
-    char *truth;    /* picture of the first view */
+    int view_count; /* number of measured views */
+    char *truth;    /* data URL of the integral in the first view */
     double seconds;
-    uint64_t checksum;  /* of the first data set, triptych_info */
-    char levels_for[8]; /* what it was bricked with, as of `triptych brick --levels-for` */
+    uint64_t checksum;  /* of the first data set, from triptych_info */
+    char levels_for[8]; /* --levels-for of the first data set */
 } accuracy_measured;
 
 int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder);
 void accuracy_measured_free(accuracy_measured *m);
 
-/* The middle one (of two, the faster) of `count` times, which are sorted. */
+/* Sorts `count` times and returns the median, or the lower of two middle times. */
 double accuracy_median(double *ms, int count);
 
 #endif

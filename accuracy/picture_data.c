@@ -14,7 +14,7 @@ static void put_u32(uint8_t *at, size_t value)
         at[i] = (uint8_t)(value >> (24 - 8 * i));
 }
 
-/* A chunk of PNG whose data stand already behind its 8 bytes; returns what follows it. */
+/* Completes a PNG chunk with its data already at `at` + 8. Returns the position after the chunk. */
 static uint8_t *close_chunk(uint8_t *at, const char *name, size_t bytes)
 {
     put_u32(at, bytes);
@@ -23,7 +23,8 @@ static uint8_t *close_chunk(uint8_t *at, const char *name, size_t bytes)
     return at + bytes + CHUNK_BYTES;
 }
 
-/* Rows of a filter byte (0: none) and 3 bytes a pixel, as a PNG file; NULL without memory. */
+/* Encodes rows as a PNG file. A row has a filter byte (0 disables filtering) and 3 bytes per pixel.
+ * Returns NULL if memory is exhausted. */
 static uint8_t *encode_png(const uint8_t *rows, int width, int height, size_t *bytes)
 {
     static const uint8_t magic[8] = { 0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n' };
@@ -69,7 +70,7 @@ static char *encode_base64(const uint8_t *file, size_t bytes)
     return text;
 }
 
-/* What is to be shown of two pictures, of which b may be NULL. */
+/* Picture a, or the difference of a and b unless b is NULL. */
 typedef struct source {
     const float *a, *b;
     int width, height, step; /* step x step pixels become one */
@@ -80,7 +81,7 @@ static uint8_t byte_of(double x)
     return (uint8_t)lround(255 * fmin(1, fmax(0, x)));
 }
 
-/* The mean of the pixels that become one. */
+/* Computes the mean colour of the step x step pixels that become one. */
 static void mean_colour(const source *s, int x, int y, uint8_t rgb[3])
 {
     double sum[3] = { 0 };

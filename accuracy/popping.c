@@ -12,7 +12,8 @@ const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS] = {
 
 /* ---- the turn ---- */
 
-/* Pictures of the whole object, from as far as a view of all of it from each side takes. */
+/* A camera that turns around the object, at a distance where the whole object is visible from every
+ * side. */
 typedef struct orbit {
     accuracy_view view;
     triptych_info info;
@@ -36,7 +37,7 @@ static int find_turn(triptych *t, const accuracy_options *o, orbit *out)
     return status;
 }
 
-/* A direction of index space in the world. */
+/* Transforms a direction of index space to world space. */
 static void to_world(const triptych_info *info, const double index[3], double world[3])
 {
     for (int i = 0; i < 3; i++)
@@ -44,7 +45,7 @@ static void to_world(const triptych_info *info, const double index[3], double wo
                    info->index_to_world[i][2] * index[2];
 }
 
-/* From so many degrees of index space from X towards Y, and a little above. */
+/* Sets the eye at an angle in index space, from X towards Y, slightly above. */
 static void turn_to(orbit *turn, double degrees)
 {
     const double angle = degrees * 3.14159265358979323846 / 180;
@@ -58,7 +59,7 @@ static void turn_to(orbit *turn, double degrees)
         c->eye[i] = c->look[i] + way[i] * turn->distance / length;
 }
 
-/* ---- its pictures ---- */
+/* ---- pictures of the turn ---- */
 
 static int draw_steps(accuracy_contexts *contexts, triptych *t, const triptych_settings *settings,
                       orbit *turn, float *rgba, bench_popping_changes *changes)
@@ -77,7 +78,8 @@ static int draw_steps(accuracy_contexts *contexts, triptych *t, const triptych_s
     return status;
 }
 
-/* Where a frame fails its message is why there are no figures. */
+/* Measures all settings. If a frame fails, its message becomes the reason for leaving out the
+ * table. */
 static int measure_settings(accuracy_popping *p, accuracy_contexts *contexts, triptych *t,
                             const triptych_settings *defaults, bench_progress *progress,
                             orbit *turn, float *rgba, bench_popping_changes *changes)
@@ -109,11 +111,12 @@ int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
     bench_popping_changes changes;
     orbit turn;
     if (find_turn(t, o, &turn))
-        return trip_fail(TRIP_ERROR, "accuracy", o->data[0], "no view: %s", triptych_error(t));
+        return trip_fail(TRIP_ERROR, "accuracy", o->data[0], "cannot set a view: %s",
+                         triptych_error(t));
     const size_t pixels = (size_t)o->width * (size_t)o->height;
     if (!bench_popping_begin(&changes, contexts->budget, pixels)) {
         snprintf(p->why, sizeof p->why,
-                 "%zu bytes of changes do not fit the memory given: raise --memory",
+                 "the changes need %zu bytes, which do not fit the memory; raise --memory",
                  bench_popping_bytes(pixels));
         p->state = ACCURACY_LEFT_OUT;
         return 0;

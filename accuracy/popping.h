@@ -1,5 +1,6 @@
-/* How much pixels jump while the camera turns through the change of the dominant axis, by each
- * method and h, with values and with splats: bench_popping.h has the figures. One thread. */
+/* Measures popping: the jump of pixels while the camera turns through the change of the dominant
+ * axis. It is measured for each method and h, with post and with pre. bench_popping.h defines the
+ * figures. One thread. */
 #ifndef TRIP_ACCURACY_POPPING_H
 #define TRIP_ACCURACY_POPPING_H
 
@@ -8,22 +9,22 @@
 #include "contexts.h"
 #include "setting.h"
 
-/* Merged by each h, clip and axis; not `image`, which the cpu renderer has not. */
+/* merge with each h, clip and axis; the cpu renderer lacks the method image */
 enum { ACCURACY_POPPINGS = 2, ACCURACY_POPPING_ROWS = BENCH_POPPING_SETTINGS - 1 };
 
 typedef struct accuracy_popping {
-    const char *name; /* as of a setting */
+    const char *name; /* name of the setting in --settings */
     triptych_classify classify;
     accuracy_state state;
-    char why[256]; /* it was left out */
+    char why[256]; /* reason if it was left out */
     bench_popping_row rows[ACCURACY_POPPING_ROWS];
 } accuracy_popping;
 
-/* By post and by pre, nothing measured yet. */
+/* One entry for post and one for pre, without measurements. */
 extern const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS];
 
-/* Of the first data set by the cpu renderer, whose context is open and whose view is lost; `usual`
- * has what the settings have in common. `rgba`: room for a picture. */
+/* Measures popping on the first data set by the cpu renderer. Its context is open, and its view
+ * changes. `defaults` has the settings that all share. `rgba` has room for one picture. */
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
                              const triptych_settings *defaults, bench_progress *progress,
                              float *rgba);

@@ -1,4 +1,4 @@
-/* accuracy.csv: a line for each setting that was measured, as of RFC 4180. */
+/* accuracy.csv: a line for each measured setting, in the format of RFC 4180. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -15,7 +15,7 @@ static void write_text(FILE *f, const char *text)
     fputc('"', f);
 }
 
-/* Nothing where there is no number. */
+/* Writes an empty field for infinite or missing numbers. */
 static void write_number(FILE *f, double value)
 {
     if (isfinite(value))

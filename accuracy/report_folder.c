@@ -13,7 +13,7 @@
 #include "remove_files.h"
 #include "report.h"
 
-/* Names of files that a report has. */
+/* Returns whether a report has files with this name. */
 static bool is_ours(const char *name)
 {
     const char *extension = strrchr(name, '.');
@@ -21,7 +21,7 @@ static bool is_ours(const char *name)
            !strcmp(name, "index.html") || (extension && !strcmp(extension, ".exr"));
 }
 
-/* Whether a folder holds a report, or nothing. */
+/* Returns whether a folder is empty or contains only a report. */
 static bool is_report(const char *path)
 {
     DIR *folder = opendir(path);
@@ -61,9 +61,9 @@ int accuracy_folder_begin(accuracy_folder *f, const char *path, bool force)
         return trip_fail(TRIP_USAGE, "accuracy", path, "the name is too long");
     }
     bool there = lstat(path, &st) == 0;
-    const char *fault = there && !force ? "is there already; --force replaces a report"
+    const char *fault = there && !force ? "exists already; --force replaces a report"
                         : there && !is_report(path)
-                            ? "is not a report of this program, so that --force does not replace it"
+                            ? "is not a report of this program; --force replaces only reports"
                             : NULL;
     if (fault || !mkdtemp(f->temporary)) {
         int status = fault ? trip_fail(TRIP_ERROR, "accuracy", path, "%s", fault)

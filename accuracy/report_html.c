@@ -1,4 +1,4 @@
-/* index.html: one page that holds all it shows. */
+/* index.html: a self-contained page with all tables, plots and pictures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,35 +61,34 @@ static void write_head(FILE *f, const accuracy_report *r)
     const accuracy_options *o = r->m->options;
     fputs("<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8>\n<title>Accuracy: ", f);
     write_escaped(f, o->data[0]);
-    fprintf(f, "</title>\n<style>\n%s</style></head><body>\n<h1>What accuracy costs: ", style);
+    fprintf(f, "</title>\n<style>\n%s</style></head><body>\n<h1>Accuracy and time: ", style);
     write_escaped(f, o->data[0]);
     fprintf(f,
-            "</h1>\n<p>Pictures of %d x %d pixels from %d view%s, held to the "
+            "</h1>\n<p>Pictures of %d x %d pixels from %d view%s, compared with the "
             "emission&ndash;absorption integral ",
             o->width, o->height, r->m->view_count, r->m->view_count == 1 ? "" : "s");
     if (o->source) {
         fputs("through the source volume ", f);
         write_escaped(f, o->source);
     } else
-        fputs("through the values that the data set stores (what storing loses is in no figure)",
-              f);
+        fputs("through the values in the data set (no figure includes the error of storing)", f);
     fprintf(f,
-            ", one ray for each of %d x %d places of a pixel, to a tolerance of %g. Errors are of "
-            "255, of red, green, blue (premultiplied) and alpha over the pixels that the object "
-            "covers. Load of the machine: %.1f before, %.1f after.</p>\n",
+            ". The integral has %d x %d rays per pixel and a tolerance of %g. Errors are "
+            "differences of red, green, blue (premultiplied) and alpha, of 255, over the pixels "
+            "that the object covers. Load of the machine: %.1f before, %.1f after.</p>\n",
             o->samples, o->samples, o->tolerance, r->load_before, r->load_after);
 }
 
 static void write_plots(FILE *f, const accuracy_report *r)
 {
     fprintf(f,
-            "<h2>Time and error</h2>\n<p><span class='key post' style='background:#1f6fc4'></span>"
-            "post<span class=key style='background:#e07b1a'></span>pre"
-            "<span class=key style='background:#2a9d4e'></span>gl"
-            "<span class=key style='background:#888'></span>reference, integral"
-            "<span class=key style='background:#c21f3a'></span>quality"
-            "%s. "
-            "The line is the front: no setting is both faster and closer.</p>\n",
+            "<h2>Time and error</h2>\n<p><span class='key post' "
+            "style='background:#1f6fc4'></span>post<span class=key "
+            "style='background:#e07b1a'></span>pre<span class=key "
+            "style='background:#2a9d4e'></span>gl<span class=key "
+            "style='background:#888'></span>reference, integral<span class=key "
+            "style='background:#c21f3a'></span>quality%s. The line is the front: no other setting "
+            "is both faster and closer to the integral.</p>\n",
             r->m->options->program_count || r->m->vtk[0]
                 ? "<span class=key style='background:#7b3fa0;border-radius:0'></span>"
                   "another program, with its own light"
@@ -131,24 +130,25 @@ static void write_row(FILE *f, const accuracy_report *r, int i)
 
 static void write_table(FILE *f, const accuracy_report *r)
 {
-    fputs("<h2>Settings</h2>\n<div class=wide><table><tr><th>settings<th>ms<th>million splats"
-          "<th>MB read<th>most<th>mean<th>median<th>99 %<th>PSNR<th>SSIM<th>FLIP<th>storage"
-          "<th>model<th>method<th>level<th>precision\n",
+    fputs("<h2>Settings</h2>\n<div class=wide><table><tr><th>settings<th>ms<th>million "
+          "splats<th>MB read<th>max<th>mean<th>median<th>99 "
+          "%<th>PSNR<th>SSIM<th>FLIP<th>storage<th>model<th>method<th>level<th>precision\n",
           f);
     for (int i = 0; i < r->m->row_count; i++)
         if (r->m->rows[i].state == ACCURACY_MEASURED)
             write_row(f, r, i);
-    fputs("</table></div>\n<p>Bold: on the front of the 99th percentile. The last columns are the "
-          "steps of the ladder, as mean / 99th percentile: <b>storage</b>, the integral of the "
-          "values stored to that of the source; <b>model</b>, the integral of what is drawn (the "
-          "sum of splats with pre, values with post) to that of the values stored; <b>method</b>, "
-          "the reference in double precision to that: order, sheets, slices, lists, merging; "
-          "<b>level</b>, the reference at the levels drawn to that at the finest; "
-          "<b>precision</b>, what ran to the reference. Steps do not add up where they make up for "
-          "one another. Times are whole frames from the file on, the median of all views; splats "
-          "(with post: voxels) and bytes are what a frame read. SSIM is that of Wang et al. (2004) "
-          "and FLIP that of Andersson et al. (2020) at 67 pixels a degree, of whole pictures over "
-          "black.</p>\n",
+    fputs("</table></div>\n<p>Bold settings are on the front of the 99th percentile. The last "
+          "columns split the error into steps, as mean / 99th percentile. <b>storage</b> compares "
+          "the integral of the stored values with the integral of the source. <b>model</b> "
+          "compares the integral of the drawn field (the sum of splats with pre, values with post) "
+          "with the integral of the stored values. <b>method</b> compares the reference in double "
+          "precision with the integral of the drawn field: order, sheets, samples, lists and "
+          "merging. <b>level</b> compares the reference at the drawn levels with the reference at "
+          "the finest level. <b>precision</b> compares the picture with the reference. The steps "
+          "do not add up where errors cancel each other. Times are medians of whole frames, "
+          "including reading, over all views. Splats (voxels with post) and bytes are read per "
+          "frame. SSIM (Wang et al. 2004) and FLIP (Andersson et al. 2020, at 67 pixels per "
+          "degree) are over whole pictures on black.</p>\n",
           f);
 }
 
@@ -162,11 +162,12 @@ static void write_popping(FILE *f, const accuracy_report *r)
         if (!any)
             fprintf(
                 f,
-                "<h2>Popping</h2>\n<p>The eye goes round the object in %d steps of %g degrees, "
-                "through where X and Y are equally near to the ray at the picture's centre. How "
-                "much more a pixel changes in a step than in its median step, over the pixels "
-                "that change at all, in the step where it is most; <b>motion</b> is the mean of "
-                "that median. One list a frame (axis) jumps there; merged lists should not.</p>\n",
+                "<h2>Popping</h2>\n<p>The eye turns around the object in %d steps of %g degrees, "
+                "through the direction with X and Y equally close to the central ray. The median "
+                "change of a pixel over all steps is its <b>motion</b>. A jump is the change of a "
+                "pixel in one step minus its motion. The figures are of 255, over the pixels that "
+                "change, in the step with the largest jumps. A single list per frame (axis) jumps "
+                "at the change of the axis; merged lists should not.</p>\n",
                 BENCH_POPPING_STEPS, bench_popping_degrees(1) - bench_popping_degrees(0));
         any = true;
         fputs("<figure>\n", f);
@@ -188,12 +189,11 @@ static void write_figure(FILE *f, const char *name, const char *picture, const c
 
 static void write_pictures(FILE *f, const accuracy_report *r)
 {
-    fprintf(
-        f,
-        "<h2>Pictures of the first view</h2>\n<p>Beside each how far it is from the integral, "
-        "the most of a pixel's channels: black is none, white %g of 255 and more; figures are of "
-        "all views.</p>\n",
-        ACCURACY_DIFFERENCE_MAX);
+    fprintf(f,
+            "<h2>Pictures of the first view</h2>\n<p>Beside each picture is its difference from "
+            "the integral, the maximum over the channels of a pixel: black is 0, and white is %g "
+            "of 255 or more. The figures are over all views.</p>\n",
+            ACCURACY_DIFFERENCE_MAX);
     if (r->m->truth)
         fprintf(f, "<figure><img alt='' src=\"%s\"><figcaption>integral</figcaption></figure>\n",
                 r->m->truth);
@@ -209,7 +209,7 @@ static void write_why(FILE *f, const char *name, accuracy_state state, const cha
     if (state == ACCURACY_MEASURED)
         return;
     fprintf(f, "<li>%s: ", name);
-    write_escaped(f, state == ACCURACY_LEFT_OUT ? why : "the seconds given were over");
+    write_escaped(f, state == ACCURACY_LEFT_OUT ? why : "--budget was used up");
     fputs("\n", f);
 }
 
@@ -224,7 +224,7 @@ static void write_left_out(FILE *f, const accuracy_report *r)
         return;
     fputs("<h2>Left out</h2>\n<ul>\n", f);
     if (r->m->view_count < r->m->options->views)
-        fprintf(f, "<li>views %d to %d: the seconds given were over\n", r->m->view_count + 1,
+        fprintf(f, "<li>views %d to %d: --budget was used up\n", r->m->view_count + 1,
                 r->m->options->views);
     for (int i = 0; i < r->m->row_count; i++)
         write_why(f, r->m->rows[i].setting.name, r->m->rows[i].state, r->m->rows[i].why);
@@ -233,7 +233,7 @@ static void write_left_out(FILE *f, const accuracy_report *r)
     fputs("</ul>\n", f);
 }
 
-/* What a shell takes, through the escapes of HTML. */
+/* Writes the shell commands that repeat the measurement, with the characters of HTML escaped. */
 static void write_commands(FILE *f, const accuracy_report *r)
 {
     const accuracy_options *o = r->m->options;
@@ -265,7 +265,7 @@ static void write_commands(FILE *f, const accuracy_report *r)
         fputc('\n', memory);
     }
     fclose(memory);
-    fputs("<h2>To repeat</h2>\n<pre>", f);
+    fputs("<h2>Commands</h2>\n<pre>", f);
     for (const char *line = text; line && *line; line++)
         if (*line == '\n')
             fputc('\n', f);

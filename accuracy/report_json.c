@@ -12,7 +12,7 @@ static void add_number(cJSON *to, const char *name, double value)
     if (isfinite(value))
         cJSON_AddNumberToObject(to, name, value);
     else
-        cJSON_AddNullToObject(to, name); /* PSNR of equal pictures */
+        cJSON_AddNullToObject(to, name); /* the PSNR of equal pictures is infinite */
 }
 
 static cJSON *add_figures(cJSON *to, const char *name, const accuracy_error_figures *f)
@@ -92,7 +92,7 @@ static void add_left_out(cJSON *list, const char *name, accuracy_state state, co
     cJSON *o = cJSON_CreateObject();
     cJSON_AddItemToArray(list, o);
     cJSON_AddStringToObject(o, "name", name);
-    cJSON_AddStringToObject(o, "why", state == ACCURACY_LEFT_OUT ? why : "the seconds were over");
+    cJSON_AddStringToObject(o, "why", state == ACCURACY_LEFT_OUT ? why : "--budget was used up");
 }
 
 static void add_popping(cJSON *to, const accuracy_popping *p)

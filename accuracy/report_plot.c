@@ -1,5 +1,4 @@
-/* Time and error, both logarithmic, with the front as a line through the settings that are on it.
- */
+/* A plot of time and error, both logarithmic. A line connects the settings on the front. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +7,7 @@
 
 enum { WIDTH = 860, HEIGHT = 480, LEFT = 64, RIGHT = 20, TOP = 16, BOTTOM = 48, LABELS_MAX = 256 };
 
-static const double min_error = 0.01; /* what is less is drawn there */
+static const double min_error = 0.01; /* smaller errors are drawn at this one */
 
 typedef struct box {
     double x0, y0, x1, y1;
@@ -65,7 +64,7 @@ static double position_y(const plot *p, double error)
     return HEIGHT - BOTTOM - (log10(error) - p->y0) / (p->y1 - p->y0) * (HEIGHT - TOP - BOTTOM);
 }
 
-/* 1, 2 and 5 of each decade between the edges. */
+/* Draws lines at 1, 2 and 5 times each power of ten between the edges. */
 static void draw_ticks(const plot *p)
 {
     static const double steps[] = { 1, 2, 5 };
@@ -85,13 +84,13 @@ static void draw_ticks(const plot *p)
                         LEFT, y, WIDTH - RIGHT, LEFT - 6, y + 4, value);
         }
     fprintf(p->f,
-            "<text x='%d' y='%d' text-anchor='middle'>median ms a frame</text>\n"
-            "<text transform='translate(16 %d) rotate(-90)' text-anchor='middle'>%s</text>\n",
+            "<text x='%d' y='%d' text-anchor='middle'>median ms per frame</text>\n<text "
+            "transform='translate(16 %d) rotate(-90)' text-anchor='middle'>%s</text>\n",
             (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, (TOP + HEIGHT - BOTTOM) / 2,
-            p->mean ? "mean error, of 255" : "error, 99th percentile, of 255");
+            p->mean ? "mean error of 255" : "error of 255, 99th percentile");
 }
 
-/* Its colour, which stands for the family of settings. */
+/* Returns the family of a setting, which selects its colour. */
 static const char *family(const char *name)
 {
     static const struct {
@@ -120,7 +119,7 @@ static void take(plot *p, box b)
         p->taken[p->taken_count++] = b;
 }
 
-/* A line of it, which names keep away from. */
+/* Keeps names away from a segment of the front's line. */
 static void take_line(plot *p, double x0, double y0, double x1, double y1)
 {
     take(p, (box){ fmin(x0, x1) - 1, fmin(y0, y1) - 1, fmax(x0, x1) + 1, fmax(y0, y1) + 1 });
@@ -153,7 +152,7 @@ static void draw_front(plot *p)
     fputs("'/>\n", p->f);
 }
 
-/* From a mark to its name, where that is not beside it. */
+/* Draws a line from a mark to its name, unless the name is beside the mark. */
 static void draw_leader(const plot *p, double x, double y, box b)
 {
     double to_x = fmin(fmax(x, b.x0), b.x1), to_y = y < b.y0 ? b.y0 : b.y1;
@@ -161,8 +160,8 @@ static void draw_leader(const plot *p, double x, double y, box b)
         fprintf(p->f, "<path class=leader d='M%.1f %.1f L%.1f %.1f'/>\n", x, y, to_x, to_y);
 }
 
-/* A name as near to its mark as there is room; where there is none, it is left to the mark's title.
- */
+/* Writes a name as near to its mark as there is room. Without room, only the mark's title has the
+ * name. */
 static void write_label(plot *p, double x, double y, const char *name)
 {
     const double width = 6.4 * (double)strlen(name), height = 12;
@@ -210,7 +209,8 @@ static void draw_rows(plot *p)
     }
 }
 
-/* Those that matter first, so that they find room. */
+/* Writes the names on the front first, so that they get room, then the qualities, then the
+ * others. */
 static void write_labels(plot *p)
 {
     const bool *front = p->mean ? p->r->front_of_mean : p->r->front;

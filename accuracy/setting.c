@@ -31,7 +31,8 @@ static void add_qualities(sweep *w, const triptych_settings *defaults)
     }
 }
 
-/* Post with each number of slices, the papers' parameter h, the other methods. */
+/* Adds post with each number of samples per sheet, the parameter h of the papers, and the other
+ * methods. */
 static void add_post(sweep *w)
 {
     static const int samples_per_sheet[] = { 1, 2, 3, 4, 6, 8, 16 };
@@ -88,7 +89,7 @@ static void add_targets(sweep *w)
     }
 }
 
-/* Less than the defaults, which are between, and more. */
+/* Adds early termination below and above the defaults. */
 static void add_saturations(sweep *w)
 {
     static const double saturations[] = { 0, 1.0 / 128, 1.0 / 32 };
@@ -100,7 +101,7 @@ static void add_saturations(sweep *w)
     }
 }
 
-/* Footprints of splats, their low-pass and radii; kernels of values. */
+/* Adds the footprints of splats, their low-pass filters and radii, and the kernels of values. */
 static void add_kernels(sweep *w)
 {
     static const double radii[] = { 1.5, 2.5, 3 };

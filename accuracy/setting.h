@@ -1,5 +1,5 @@
-/* What is swept: each setting that trades accuracy for time, as a name, a renderer and the settings
- * of triptych.h, and the options of `triptych render` that draw the same. Pure functions. */
+/* The settings that trade accuracy for time. Each has a name, a renderer, the settings of
+ * triptych.h, and the options of `triptych render` that draw the same picture. Pure functions. */
 #ifndef TRIP_ACCURACY_SETTING_H
 #define TRIP_ACCURACY_SETTING_H
 
@@ -15,29 +15,30 @@ typedef struct accuracy_setting {
     triptych_settings settings;
 } accuracy_setting;
 
-/* What became of one that was wanted. */
+/* State of a setting that was selected. */
 typedef enum accuracy_state {
-    ACCURACY_NOT_REACHED, /* the seconds were over */
+    ACCURACY_NOT_REACHED, /* --budget was used up before */
     ACCURACY_MEASURED,
     ACCURACY_LEFT_OUT,
 } accuracy_state;
 
-/* All of them, those first that matter most; `usual` has what they have in common (shading,
- * background). Returns how many. */
+/* Lists all settings, the most important first. `defaults` has the settings that all share, such as
+ * shading and background. Returns their number. */
 int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
                       const triptych_settings *defaults);
 
-/* Whether a picture of the reference is the same for both. */
+/* Returns whether the reference renderer draws the same picture for both settings. */
 bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b);
 
 typedef struct accuracy_option {
-    const char *name; /* "classify", without dashes */
+    const char *name; /* without dashes, such as "classify" */
     char value[32];
 } accuracy_option;
 
-/* The options of `triptych render`; returns how many. */
+/* Converts a setting to options of `triptych render`. Returns their number. */
 int accuracy_setting_options(const accuracy_setting *s, accuracy_option out[ACCURACY_OPTIONS_MAX]);
-/* Sets what one of them says, "classify" "post"; false: there is no such option or value. */
+/* Sets an option from its name and value, such as "classify" and "post". Returns false if either is
+ * unknown. */
 bool accuracy_setting_read_option(accuracy_setting *s, const char *name, const char *value);
 
 #endif

@@ -1,4 +1,4 @@
-/* A setting as options of `triptych render`, and back. */
+/* Converts settings to options of `triptych render`, and back. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -61,7 +61,7 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
             put(out, &count, "samples_per_sheet", "%d", s->samples_per_sheet);
     }
     if (one->renderer == TRIPTYCH_RENDERER_REFERENCE && s->classify == TRIPTYCH_PRE)
-        count--; /* has no target */
+        count--; /* removes the target, which this renderer lacks */
     put(out, &count, "method", "%s", methods[s->method]);
     if (s->method == TRIPTYCH_MERGE && s->h >= 0)
         put(out, &count, "h", "%g", s->h);

@@ -6,7 +6,7 @@
 
 enum { REACH = 5, WINDOW = 2 * REACH + 1 };
 
-/* Of a window, its Gaussian-weighted sums. */
+/* Gaussian-weighted sums over a window. */
 typedef struct moments {
     double a, b, aa, bb, ab;
 } moments;
@@ -26,7 +26,7 @@ static double luminance(const float *rgba)
     return 0.299 * (double)rgba[0] + 0.587 * (double)rgba[1] + 0.114 * (double)rgba[2];
 }
 
-/* Column sums along x of every row, which are then added along y. */
+/* Sums a row of a window along x. add_column() sums the rows along y. */
 static moments add_row(const float *a, const float *b, const double weights[WINDOW])
 {
     moments m = { 0 };
@@ -74,7 +74,7 @@ int accuracy_ssim(const float *a, const float *b, int width, int height, trip_bu
     moments *rows = trip_budget_take(budget, bytes);
     if (!rows)
         return trip_fail(TRIP_ERROR, "accuracy", "SSIM",
-                         "%zu bytes do not fit the memory given; raise --memory", bytes);
+                         "needs %zu bytes, which do not fit the memory; raise --memory", bytes);
     make_weights(weights);
     for (int y = 0; y < height; y++)
         for (int x = 0; x < columns; x++) {

@@ -1,4 +1,5 @@
-/* The views of a report: in turns perspective, parallel, from inside and wide, round the object. */
+/* The views of a report around the object, in turns perspective, parallel, from inside and wide.
+ * One thread. */
 #ifndef TRIP_ACCURACY_VIEWS_H
 #define TRIP_ACCURACY_VIEWS_H
 
@@ -9,10 +10,10 @@ typedef struct accuracy_view {
     triptych_camera camera;
 } accuracy_view;
 
-/* View `index` of `count` of what a context has open; sets the context's own view. */
+/* Computes view `index` of `count` around the open data set. Changes the view of the context. */
 int accuracy_view_find(triptych *t, int width, int height, int index, int count,
                        accuracy_view *out);
-/* What a context is to draw from. */
+/* Sets the view of a context. */
 int accuracy_view_use(triptych *t, const accuracy_view *view);
 
 #endif

@@ -21,7 +21,7 @@ bool accuracy_vtk_command(const char *source, char *command, size_t bytes)
     bool is_read = false;
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
         is_read |= ends_with(source, ends[i]);
-    /* A name that sh would take apart does not come into the command. */
+    /* Refuses a path that the quotes in the command would not protect. */
     if (!is_read ||
         !trip_companion_find(worker, TRIP_WORKER_FROM_BIN, TRIP_WORKER_OF_SOURCE, R_OK) ||
         strchr(worker, '\'') ||

@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
 """Draws one volume by one of VTK's mappers, for tests/compare and `triptych accuracy --compare`.
-Options: --step VOXELS, --mapper cpu|gpu, in place of what the first line says. JSON lines on
-standard input say what is drawn:
+
+The program reads JSON lines from standard input and answers each by a JSON line on standard output.
+The first line describes the volume:
   {"volume": FILE, "dims": [i, j, k], "index_to_world": 3 x 4, "tf": TEXT, "shading": bool,
    "threads": N, "mapper": "cpu" | "gpu", "step": voxels}
-then any number of
+FILE is a .npy, a NRRD or a NIfTI file. TEXT is a transfer function as printed by `triptych tf show`.
+"function" may replace "tf" with a list of points [value, r, g, b, opacity per voxel].
+The options --step VOXELS and --mapper cpu|gpu override this line. The answer is
+  {"name", "version", "device"}.
+Each further line describes a view:
   {"eye": .., "look": .., "up": .., "fov_degrees" or "ortho_height": .., "size": N or [W, H],
    "picture": FILE or null}
-and each is answered by a line: {"name", "version", "device"}, then {"ms", "display_ms"}, and {}
-once the picture is written: .png, or .raw, whose bytes are rows of RGBA, the top row first.
-FILE is a .npy, a NRRD or a NIfTI; TEXT a transfer function as of `triptych tf show`, or "function"
-its points, [[value, r, g, b, opacity a voxel], ...]."""
+The answer is {"ms", "display_ms"}, followed by {} when the picture is written. The picture is a .png
+file, or a .raw file with rows of RGBA bytes from top to bottom."""
 import argparse
 import json
 import math
@@ -19,7 +22,7 @@ import sys
 import time
 
 import numpy as np
-import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, the windows and mappers behind the names below
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, registers the windows and mappers
 import vtkmodules.vtkRenderingVolumeOpenGL2
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkVersion
@@ -36,24 +39,24 @@ AMBIENT, DIFFUSE, SPECULAR, SHININESS = 0.3, 0.7, 0.2, 24
 
 
 def read_by_vtk(path, dims):
-    """By VTK's own reader; where the voxels are is known already."""
+    """Returns the values. The job has the positions of the voxels."""
     lower = path.lower()
     if lower.endswith((".nrrd", ".nhdr")):
         reader = vtkNrrdReader()
     elif lower.endswith((".nii", ".nii.gz")):
         reader = vtkNIFTIImageReader()
     else:
-        raise SystemExit("VTK is given NRRD and NIfTI here, not " + path)
+        raise SystemExit("VTK reads only NRRD and NIfTI files here, not " + path)
     reader.SetFileName(path)
     reader.Update()
     scalars = reader.GetOutput().GetPointData().GetScalars()
     if scalars is None or list(reader.GetOutput().GetDimensions()) != list(dims):
-        raise SystemExit("VTK does not read " + path)
+        raise SystemExit("VTK cannot read " + path)
     return vtk_to_numpy(scalars).reshape(dims[::-1])
 
 
 def make_image(job):
-    """The volume with its spacing, and the rest of its placement as a matrix."""
+    """Returns the volume with its spacing, its position and rotation as a matrix, and its voxel size."""
     if job["volume"].endswith(".npy"):
         values = np.load(job["volume"], mmap_mode=None)
     else:
@@ -70,11 +73,11 @@ def make_image(job):
             matrix.SetElement(row, column, affine[row, column] / spacing[column])
         matrix.SetElement(row, 3, affine[row, 3])
     voxel = float(np.prod(spacing) ** (1 / 3))
-    return image, matrix, voxel, values  # VTK does not own the values
+    return image, matrix, voxel, values  # the caller keeps the values, because VTK does not own them
 
 
 def read_function(text, voxel):
-    """Points of a `.tf` text in data units, with opacity per voxel."""
+    """Returns the points of a `.tf` text in data units, with opacity per voxel."""
     points, unit = [], voxel
     for line in text.splitlines():
         words = line.split("#")[0].split()
@@ -107,7 +110,7 @@ def make_property(job, voxel):
 
 
 def make_mapper(job, voxel):
-    """One sample every `step` voxels and one ray a pixel, whatever the time it takes."""
+    """Makes a mapper with a sample every `step` voxels and one ray per pixel, however long it takes."""
     distance = job["step"] * voxel
     if job["mapper"] == "cpu":
         mapper = vtkFixedPointVolumeRayCastMapper()
@@ -124,7 +127,8 @@ def make_mapper(job, voxel):
 
 
 def make_headlight():
-    """VTK's own has no ambient part, without which its ray caster draws darker than its GPU mapper."""
+    """Makes a headlight with an ambient part. VTK's default headlight has none, and its ray caster
+    then draws darker than its GPU mapper."""
     light = vtkLight()
     light.SetLightTypeToHeadlight()
     light.SetAmbientColor(1, 1, 1)
@@ -156,15 +160,15 @@ class Stage:
         self.display = job["mapper"] == "cpu"
 
     def device(self):
-        self.window.Render()  # before it, there is no context
+        self.window.Render()  # creates the context
         facts = dict(line.split(":", 1) for line in self.window.ReportCapabilities().splitlines()
                      if ":" in line and line.startswith("OpenGL"))
         return "%s, OpenGL %s" % (facts["OpenGL renderer string"].strip(),
                                   facts["OpenGL version string"].strip())
 
     def angle(self, view):
-        """The ray caster's picture is larger by a pixel than that of the view: the first and the
-        last of N rays along an edge are as far apart as N pixels are wide. The angle makes up for it."""
+        """Returns the angle of view that compensates for the ray caster. It spreads N rays along an
+        edge over the width of N pixels, so that its picture would be larger by a pixel."""
         slope = math.tan(math.radians(view["fov_degrees"]) / 2) * self.growth(view)
         return math.degrees(2 * math.atan(slope))
 
@@ -195,7 +199,7 @@ class Stage:
         drawn = time.perf_counter()
         result = {"ms": (drawn - start) * 1e3, "display_ms": 0}
         if self.display:
-            # Once more, alone: what of the frame was showing the finished picture by OpenGL.
+            # Displays the finished picture by OpenGL again, to time this part of the frame alone.
             self.mapper.DisplayRenderedImage(self.renderer, self.volume)
             self.window.WaitForCompletion()
             result["display_ms"] = (time.perf_counter() - drawn) * 1e3
@@ -221,7 +225,7 @@ class Stage:
 
 
 def main():
-    # VTK writes its warnings to standard output's file too; answers keep the original one.
+    # VTK prints warnings to standard output. They go to stderr, and only answers to stdout.
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
 

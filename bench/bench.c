@@ -1,5 +1,5 @@
-/* Uses the parts beneath the library, which it times one by one (reading alone, drawing alone,
- * several renderers over one copy of the data in memory) where the library joins them to frames. */
+/* Measures the modules beneath the library one by one: reading alone, drawing alone, and several
+ * renderers over one copy of the data in memory. The library only draws whole frames. */
 #include "bench.h"
 
 #include <stdio.h>
@@ -13,8 +13,8 @@
 static const struct {
     const char *name;
     int (*run)(const session *s, const bench_options *o, bench_report *r);
-    bool makes_volumes; /* where no data set is named */
-    bool opens;         /* the data set by itself */
+    bool makes_volumes; /* makes its own volumes if no data set is named */
+    bool opens;         /* opens the data set itself */
 } tables[] = {
     { "orders", bench_orders, false, false },     { "submit", bench_submit, false, false },
     { "stream", bench_stream, false, false },     { "renderers", bench_renderers, false, false },
@@ -23,7 +23,8 @@ static const struct {
     { "variants", bench_variants, false, false },
 };
 
-/* Splats by their normals, values by their differences. */
+/* Returns whether the frames are shaded: pre by the stored normals, post by differences of
+ * values. */
 static bool is_lit(const session *s, const trip_settings *settings)
 {
     bool post = settings->classify == TRIP_CLASSIFY_POST;
@@ -40,7 +41,8 @@ static void describe(const session *s, const bench_options *o, bool included, be
     cJSON_AddStringToObject(settings, "data_set", included ? "tooth, included" : o->input);
     cJSON_AddStringToObject(settings, "grid", text);
     cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
-    cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
+    cJSON_AddStringToObject(settings, "transfer_function",
+                            o->tf ? o->tf : "stored in the data set");
     snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
     if (o->size_count == 1)
         cJSON_AddStringToObject(settings, "size", text);
@@ -50,7 +52,7 @@ static void describe(const session *s, const bench_options *o, bool included, be
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }
 
-/* "triptych bench orders ...", cut where it is too long. */
+/* Joins the command line, cut if it is too long. */
 static void join(int argc, char **argv, char *text, size_t bytes)
 {
     size_t used = (size_t)snprintf(text, bytes, "triptych");
@@ -58,7 +60,7 @@ static void join(int argc, char **argv, char *text, size_t bytes)
         used += (size_t)snprintf(text + used, bytes - used, " %s", argv[i]);
 }
 
-/* Of the options; they are checked. */
+/* Returns the index of the table, a valid name after parsing. */
 static size_t table_of(const bench_options *o)
 {
     size_t i = 0;
@@ -67,7 +69,7 @@ static size_t table_of(const bench_options *o)
     return i;
 }
 
-/* Where no data set is named, of the included volume, which is made for it. */
+/* Measures the named data set, or makes a data set of the included volume. */
 static int measure_data(bench_options *o, size_t table, bench_report *r)
 {
     session s = { 0 };
@@ -89,7 +91,7 @@ static int measure_data(bench_options *o, size_t table, bench_report *r)
     return status;
 }
 
-/* That a plot can be written at the end, and replaces nothing that is read. */
+/* Checks before any work that the plot can be written and would replace no input. */
 static int check_plot(const bench_options *o)
 {
     read_files r = { 0 };
@@ -118,8 +120,8 @@ static int measure(bench_options *o, bench_report *r)
 
 static void print_tables(void)
 {
-    printf("`triptych bench TABLE NAME.trip` measures a data set; the tables:\n%s\n"
-           "A short run of the table renderers, on the included tooth:\n\n",
+    printf("`triptych bench TABLE NAME.trip` measures a data set. The tables are:\n%s\n"
+           "A short run of the table renderers follows, on the included tooth:\n\n",
            BENCH_TABLES);
     fflush(stdout);
 }

@@ -3,7 +3,7 @@
 #ifndef TRIP_BENCH_H
 #define TRIP_BENCH_H
 
-/* argv[0] is "bench". Returns 0, or a reported failure. */
+/* argv[0] is "bench". Returns 0 or a reported failure. */
 int trip_bench(int argc, char **argv);
 
 #endif

@@ -6,7 +6,7 @@
 #include "bench_frame.h"
 #include "report.h"
 
-/* Reports what a call of the library came to. */
+/* Reports the error of the context if a call failed. */
 static int check(const bench_context *c, int status)
 {
     if (status)

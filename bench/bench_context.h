@@ -1,5 +1,5 @@
-/* Pictures drawn by the library, as `triptych render` draws them: what tables about a frame's
- * choices measure. What was read is kept in memory. One thread. */
+/* Draws pictures by the library, as `triptych render` does, for tables about the decisions of a
+ * frame. Data stays in memory after its first read. One thread. */
 #ifndef TRIP_BENCH_CONTEXT_H
 #define TRIP_BENCH_CONTEXT_H
 
@@ -9,27 +9,28 @@
 
 typedef struct bench_context {
     triptych *t;
-    triptych_settings settings; /* those of the options, without background */
-    bench_progress *progress;   /* a step of it is each picture */
+    triptych_settings settings; /* from the options, without background */
+    bench_progress *progress;   /* each picture is a step */
 } bench_context;
 
-/* The one renderer of the options. */
+/* Returns the first renderer of the options. */
 triptych_renderer bench_context_renderer(const bench_options *o);
 
-/* Failures are reported. Close it also after one. */
+/* Opens a data set and reports failures. The caller closes the context even after a failure. */
 int bench_context_open(bench_context *c, const char *path, const bench_options *o);
 void bench_context_close(bench_context *c);
 
-/* `eye`, `look` and `up` from *camera, the rest of the view as given. */
+/* Sets the view of *camera. */
 int bench_context_look(bench_context *c, const triptych_camera *camera);
 
-/* Draws the view at levels chosen by `lod_px`, with samples * samples rays a pixel, into `rgba`
- * (width * height * 4). *ms: planning, drawing and merging; may be NULL. */
+/* Draws the view into `rgba` (width * height * 4 floats). `lod_px` selects the levels, and each
+ * pixel has samples * samples rays. The time of planning, drawing and merging is stored in *ms,
+ * which may be NULL. */
 int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba, double *ms);
 
-/* How wide voxels of level 0 are along the grid's longest step, in world space. */
+/* Returns the largest voxel spacing of level 0 along a grid axis, in world units. */
 int bench_context_voxel(bench_context *c, double *width);
-/* So many coarse levels are drawn, of splats or of values. */
+/* Returns the number of coarse levels for the classification of the settings. */
 int bench_context_levels(bench_context *c, unsigned *levels);
 
 #endif

@@ -41,7 +41,7 @@ static int read_plane(const session *s, unsigned list, int plane, plain_disk *d,
     return plain_disk_read(d, path, memory);
 }
 
-/* The budget's memory is in large pages. */
+/* Memory from the budget has large pages. */
 static void *take_memory(const session *s, size_t bytes, bool large_pages)
 {
     if (large_pages) {
@@ -67,7 +67,7 @@ static void release_memory(const session *s, void *memory, size_t bytes, bool la
     trip_budget_discharge(s->budget, bytes);
 }
 
-/* Every file, one behind the other. */
+/* Reads all files, one after the other. */
 static int read_files(const session *s, const bench_files *files, plain_disk *d, void *memory)
 {
     int status = 0;
@@ -85,9 +85,10 @@ int bench_files_read(const session *s, const bench_files *files, bench_plain how
     bool large_pages = how != BENCH_PLAIN_SMALL;
     void *memory = take_memory(s, PLAIN_DISK_MEMORY_BYTES, large_pages);
     if (!memory)
-        return trip_fail(TRIP_ERROR, "bench", s->input,
-                         "%zu bytes to read into do not fit the memory given; raise --memory",
-                         PLAIN_DISK_MEMORY_BYTES);
+        return trip_fail(
+            TRIP_ERROR, "bench", s->input,
+            "needs %zu bytes to read into, which do not fit the memory; raise --memory",
+            PLAIN_DISK_MEMORY_BYTES);
     int status = read_files(s, files, &d, memory);
     *out = (bench_disk_read){ d.seconds * 1e3, d.bytes, d.direct };
     release_memory(s, memory, PLAIN_DISK_MEMORY_BYTES, large_pages);
@@ -109,7 +110,7 @@ static int stream_passes(trip_reader *reader, const trip_pass passes[AXES])
     return status;
 }
 
-/* All of the files' lists along an axis, from `selections` on. */
+/* Selects all lists of an axis with files, starting at `selections`. */
 static int select_axis(const session *s, const bench_files *files, int axis,
                        trip_selection *selections, trip_pass *pass)
 {

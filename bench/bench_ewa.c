@@ -1,6 +1,6 @@
-/* bench ewa: what the local affine approximation of EWA volume splatting is off by, splat by splat
- * against the exact form, by the angle from the axis of view and the distance from the eye; and
- * what it changes in whole pictures and in the time that they take. */
+/* bench ewa: measures the error of the local affine approximation of EWA volume splatting. It
+ * compares single splats with the exact form, by the angle from the axis of view and the distance
+ * from the eye. It also measures the change of whole pictures and of their times. */
 #include "bench_tables.h"
 
 #include <math.h>
@@ -16,15 +16,15 @@
 /* ---- one splat ---- */
 
 static const double angles[] = { 0, 10, 20, 30, 45, 60 };
-static const double distances[] = { 3, 4, 6, 10, 20, 50, 100 }; /* kernel radii */
+static const double distances[] = { 3, 4, 6, 10, 20, 50, 100 }; /* in kernel radii */
 enum {
     ANGLES = sizeof angles / sizeof *angles,
     DISTANCES = sizeof distances / sizeof *distances,
-    SAMPLES = 400, /* places along and across a support */
+    SAMPLES = 400, /* sample positions along each side of a support */
 };
 
-/* Of optical depth over the image plane: the largest difference as a share of the peak, the mean
- * one as a share of the mean, and by how much the sum is off. */
+/* Differences of optical depth over the image plane. max is the maximum as a share of the peak,
+ * mean is the mean as a share of the mean depth, and sum is the relative error of the sum. */
 typedef struct deviation {
     double max, mean, sum;
     bool affine;
@@ -56,8 +56,8 @@ static deviation compare_splats(const trip_splat_frame *exact, const trip_splat 
     return (deviation){ max / peak, apart / truth, sum / truth - 1, true };
 }
 
-/* A splat of cubes so many kernel radii from the eye, at an angle from the axis of view, without
- * low-pass. */
+/* Compares a splat of cubic voxels at a distance in kernel radii and at an angle from the axis of
+ * view, without low-pass filter. */
 static int measure_splat(double angle_degrees, double distance, deviation *out)
 {
     const trip_affine cubes = trip_affine_identity();
@@ -85,16 +85,18 @@ static int measure_splat(double angle_degrees, double distance, deviation *out)
 }
 
 static const bench_column splat_columns[] = {
-    { "angle", "degrees", 0, 0 },        { "distance", "kernel radii", 0, 0 },
-    { "max", "maximum, % of peak", 2, 0 }, { "mean", "mean, %", 2, 0 },
+    { "angle", "degrees", 0, 0 },
+    { "distance", "kernel radii", 0, 0 },
+    { "max", "maximum, % of peak", 2, 0 },
+    { "mean", "mean, %", 2, 0 },
     { "sum", "sum, %", 2, 0 },
 };
 
 static int measure_splats(bench_report *r)
 {
-    cJSON *rows =
-        bench_report_table(r, "splats", "Optical depth of an affine splat, against the exact one",
-                           splat_columns, sizeof splat_columns / sizeof *splat_columns);
+    cJSON *rows = bench_report_table(
+        r, "splats", "Optical depth of an affine splat, compared with the exact form",
+        splat_columns, sizeof splat_columns / sizeof *splat_columns);
     for (int i = 0; i < ANGLES; i++)
         for (int k = 0; k < DISTANCES; k++) {
             deviation d;
@@ -120,13 +122,13 @@ static const double fields_of_view[] = { 10, 30, 60, 90, 120 };
 enum { FIELDS = sizeof fields_of_view / sizeof *fields_of_view };
 
 static const bench_column picture_columns[] = {
-    { "fov", "degrees high", 0, 0 },          { "mean", "mean of 255", 3, 0 },
-    { "percentile_99", "99 %", 3, 0 },        { "max", "max", 2, 0 },
-    { "exact_ms", "exact: median ms", 1, 0 }, { "ewa_ms", "ewa", 1, 0 },
+    { "fov", "field of view, degrees", 0, 0 }, { "mean", "mean of 255", 3, 0 },
+    { "percentile_99", "99 %", 3, 0 },         { "max", "max", 2, 0 },
+    { "exact_ms", "exact: median ms", 1, 0 },  { "ewa_ms", "ewa", 1, 0 },
     { "ratio", "ewa / exact", 3, 0 },
 };
 
-/* The same view by the exact form and by EWA, which take turns. */
+/* One view, drawn alternately by the exact form and by EWA. */
 typedef struct pair {
     const bench_options *options;
     bench_context context;
@@ -204,7 +206,8 @@ static int measure_pictures(pair *p, bench_report *r)
         return status;
     }
     cJSON *rows = bench_report_table(
-        r, "pictures", "Whole pictures by EWA, against the exact form: the object as large in each",
+        r, "pictures",
+        "Whole pictures by EWA, compared with the exact form; the object has the same size in each",
         picture_columns, sizeof picture_columns / sizeof *picture_columns);
     for (int i = 0; i < FIELDS && !status; i++)
         status = measure_view(p, fields_of_view[i], rows);
@@ -213,15 +216,15 @@ static int measure_pictures(pair *p, bench_report *r)
 
 static void add_limits(bench_report *r)
 {
-    bench_report_limit(r, "- : nearer than the affine map is used, where --kernel ewa draws the "
-                          "exact form.");
     bench_report_limit(r,
-                       "A splat's figures are of cubes without low-pass, %d x %d places of its "
-                       "support; the most and the mean are of differences, the sum is what the "
-                       "splat holds too much.",
-                       SAMPLES, SAMPLES);
-    bench_report_limit(r,
-                       "Pictures are over channels of covered pixels; the two forms take turns.");
+                       "-: too near for the affine map; --kernel ewa draws the exact form there.");
+    bench_report_limit(
+        r,
+        "Splats are of cubic voxels without low-pass filter, with %d x %d sample positions in the "
+        "support. Maximum and mean are of the differences; sum is the excess of the splat's total.",
+        SAMPLES, SAMPLES);
+    bench_report_limit(r, "Picture errors are over the channels of covered pixels. The two forms "
+                          "are drawn alternately.");
 }
 
 int bench_ewa(const session *s, const bench_options *o, bench_report *r)

@@ -11,17 +11,17 @@
 
 enum { MAX = BENCH_FINER_MAX, TRUTH_SAMPLES = 4, ENTRIES = 2 };
 
-/* One volume; it is drawn by two contexts, so that each keeps what it reads. */
+/* One volume, drawn by two contexts, so that each keeps the data that it reads. */
 typedef struct volume {
     bench_sample sample;
-    bench_context contexts[ENTRIES]; /* the finest level; coarse ones */
-    double *ms[ENTRIES];             /* of each run over all views */
+    bench_context contexts[ENTRIES]; /* [0] for the finest level, [1] for coarse levels */
+    double *ms[ENTRIES];             /* sums of each run over all views */
     accuracy_error colour[ENTRIES], alpha[ENTRIES];
 } volume;
 
 typedef struct measuring {
     const bench_options *options;
-    volume *volumes; /* each twice as fine as the one before */
+    volume *volumes; /* each has twice the resolution of the one before */
     int count;
     double lod_px;
     size_t pixels;
@@ -43,7 +43,7 @@ static int open_volume(measuring *m, int i)
     return status;
 }
 
-/* One of the views round the first volume, which all share. */
+/* Computes a view around the first volume; all volumes share the views. */
 static int find_view(measuring *m, int view, triptych_camera *camera)
 {
     const bench_options *o = m->options;
@@ -60,8 +60,8 @@ static int find_view(measuring *m, int view, triptych_camera *camera)
     return status;
 }
 
-/* The width of the first volume's voxels where they are nearest to the eye: by that, all are drawn
- * about as coarse as it is. */
+/* Computes the maximum width in pixels of the first volume's voxels. With this --lod all volumes
+ * are drawn about as coarsely as the first one. */
 static int find_lod(measuring *m)
 {
     triptych_camera camera;
@@ -87,7 +87,7 @@ static int draw(measuring *m, volume *v, int e, const triptych_camera *camera, i
                   : bench_context_draw(&v->contexts[e], e ? m->lod_px : 0, samples, rgba, ms);
 }
 
-/* The truth of a view is the finest volume's; then all are drawn once untimed. */
+/* Draws the reference from the finest volume, then draws all volumes once, untimed. */
 static int measure_errors(measuring *m, const triptych_camera *camera)
 {
     int status = draw(m, &m->volumes[m->count - 1], 0, camera, TRUTH_SAMPLES, m->truth, NULL);
@@ -101,7 +101,7 @@ static int measure_errors(measuring *m, const triptych_camera *camera)
     return status;
 }
 
-/* All volumes in turns, run after run. */
+/* Times all volumes alternately, run by run. */
 static int measure_times(measuring *m, const triptych_camera *camera)
 {
     int status = 0;
@@ -155,21 +155,22 @@ static bench_finer_row row_of(const measuring *m, int i)
 }
 
 static const bench_column columns[] = {
-    { "voxels", "voxels a side", 0, 0 },
+    { "voxels", "voxels per side", 0, 0 },
     { "fine_ms", "finest: ms", 1, 0 },
-    { "fine_growth", "of the one before", 2, 0 },
+    { "fine_growth", "x previous", 2, 0 },
     { "fine_colour", "colour", 2, 0 },
     { "fine_alpha", "alpha", 2, 0 },
-    { "ms", "by levels: ms", 1, 0 },
-    { "growth", "of the one before", 2, 0 },
+    { "ms", "levels: ms", 1, 0 },
+    { "growth", "x previous", 2, 0 },
     { "colour", "colour", 2, 0 },
     { "alpha", "alpha", 2, 0 },
 };
 
 static void add_rows(bench_report *r, const bench_finer_row *rows, int count)
 {
-    cJSON *table = bench_report_table(r, "finer", "Frames of one object sampled finer", columns,
-                                      sizeof columns / sizeof columns[0]);
+    cJSON *table =
+        bench_report_table(r, "finer", "Frames of one object, sampled more and more finely",
+                           columns, sizeof columns / sizeof columns[0]);
     for (int i = 0; i < count; i++) {
         cJSON *row = cJSON_CreateObject();
         cJSON_AddNumberToObject(row, "voxels", rows[i].voxels);
@@ -208,21 +209,21 @@ static int report(const measuring *m, bench_report *r)
         rows[i] = row_of(m, i);
     add_rows(r, rows, m->count);
     describe(m->options, r);
+    bench_report_limit(
+        r,
+        "Coarse levels are selected by --lod %.3g. This is the maximum width in pixels of a voxel "
+        "of the first volume, so that all volumes are drawn about as coarsely as the first.",
+        m->lod_px);
     bench_report_limit(r,
-                       "Coarse levels are those of --lod %.3g, the most that voxels of the first "
-                       "volume are wide in pixels, so that all volumes are drawn about as coarse "
-                       "as that one.",
-                       m->lod_px);
-    bench_report_limit(r,
-                       "Errors are means of 255 over the pixels that the object covers, colour "
-                       "premultiplied, from the last volume drawn at its finest level with %d x %d "
-                       "pixels in place of each. Times are means over %d views round the object, "
-                       "from memory, the middle of %d runs in turns.",
+                       "Errors are means of 255 over the pixels that the object covers, with "
+                       "premultiplied colour. The reference is the last volume at its finest "
+                       "level, with %d x %d rays per pixel. Times are means over %d views around "
+                       "the object, read from memory, and medians of %d runs, taken alternately.",
                        TRUTH_SAMPLES, TRUTH_SAMPLES, m->options->views, m->options->repeat);
     if (m->options->settings.shading)
-        bench_report_limit(r, "Shading is full at a gradient that is given by the voxels, so that "
-                              "volumes sampled finer are shaded otherwise: --no-shading leaves "
-                              "that out of the errors of colour.");
+        bench_report_limit(
+            r, "The gradient for full shading depends on the voxel size, so that finer volumes are "
+               "shaded differently. --no-shading removes this part of the errors of colour.");
     return m->options->plot ? bench_finer_plot(m->options->plot, rows, m->count) : 0;
 }
 

@@ -8,13 +8,13 @@
 #include "new_file.h"
 #include "report.h"
 
-/* The picture, and the plot in it. */
+/* Pixels: the picture, and the margins of the plot. */
 enum { WIDTH = 560, HEIGHT = 360, LEFT = 70, RIGHT = 130, TOP = 40, BOTTOM = 50 };
 
 typedef struct plot {
     const bench_finer_row *rows;
     int count;
-    int lo, hi; /* ms: powers of two; both axes are logarithmic */
+    int lo, hi; /* powers of two of ms; both axes are logarithmic */
     FILE *file;
 } plot;
 
@@ -52,7 +52,7 @@ static void draw_axes(const plot *p)
     for (int i = 0; i < p->count; i++)
         text(p, x_of(p, i), HEIGHT - BOTTOM + 20, "middle", "#333", "%d\302\263",
              p->rows[i].voxels);
-    text(p, LEFT, TOP - 16, "end", "#333", "ms a frame");
+    text(p, LEFT, TOP - 16, "end", "#333", "ms per frame");
     text(p, 0.5 * (LEFT + WIDTH - RIGHT), HEIGHT - 8, "middle", "#333", "voxels");
 }
 

@@ -1,6 +1,6 @@
-/* bench flight: what the viewer's drawing thread does while the eye turns about a data set, comes
- * nearer and goes through it, as a table of the times between its pictures; and whether the picture
- * at rest is the one that the library draws. */
+/* bench flight: measures the viewer's drawing thread while the eye turns around a data set,
+ * approaches it and flies through it. The table gives the times between pictures. Checks that the
+ * picture at rest equals the library's picture. */
 #include "bench_tables.h"
 
 #include <math.h>
@@ -26,20 +26,20 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Of sorted numbers: the least that so large a part of them does not exceed. */
+/* Returns the smallest of the sorted numbers that is not less than a given part of them. */
 static double quantile(const double *sorted, int count, double part)
 {
     const int i = (int)ceil(part * count) - 1;
     return count ? sorted[i < 0 ? 0 : i] : 0;
 }
 
-/* What a part of the flight came to. */
+/* The pictures of a part of the flight. */
 typedef struct part {
-    double *between, *age, *scale; /* of its pictures */
+    double *between, *age, *scale; /* of each picture */
     int count, stale;
 } part;
 
-/* Of pictures of steps `first` to before `past`. */
+/* Collects the pictures of input steps `first` to before `past`. */
 static void gather(const flyer *f, int first, int past, part *p)
 {
     for (int i = 1; i < f->picture_count; i++) {
@@ -79,13 +79,13 @@ static void add_part(cJSON *table, const char *name, const part *p)
 static const bench_column part_columns[] = {
     { "part", "part", 0, 0 },
     { "pictures", "pictures", 0, 0 },
-    { "fps", "a second", 1, 0 },
+    { "fps", "pictures/s", 1, 0 },
     { "ms", "ms between", 1, 0 },
     { "ms_99", "99 %", 1, 0 },
     { "ms_max", "max", 1, 0 },
     { "age_ms", "ms from input", 1, 0 },
     { "age_ms_99", "99 %", 1, 0 },
-    { "stale", "of older input", 0, 0 },
+    { "stale", "outdated", 0, 0 },
     { "scale", "scale", 2, 0 },
 };
 
@@ -147,7 +147,7 @@ static int draw_alone(const flying *m, triptych *t, int *differ)
     return status;
 }
 
-/* Channels of the picture at rest that are not those of the picture the library draws. */
+/* Counts the channels that differ between the picture at rest and the library's picture. */
 static int compare_rest(const flying *m, int *differ)
 {
     triptych *t = NULL;
@@ -162,16 +162,16 @@ static int compare_rest(const flying *m, int *differ)
 }
 
 static const bench_column rest_columns[] = {
-    { "first_ms", "ms to first picture", 0, 0 },  { "first_whole_ms", "to whole picture", 0, 0 },
-    { "rest_ms", "to whole after flight", 0, 0 }, { "differ", "channels not render's", 0, 0 },
-    { "peak_bytes", "memory taken MB", 1, 1e6 },  { "limit_bytes", "promised MB", 1, 1e6 },
+    { "first_ms", "ms to first picture", 0, 0 }, { "first_whole_ms", "to complete picture", 0, 0 },
+    { "rest_ms", "after flight", 0, 0 },         { "differ", "differing channels", 0, 0 },
+    { "peak_bytes", "peak memory MB", 1, 1e6 },  { "limit_bytes", "limit MB", 1, 1e6 },
     { "resident_bytes", "resident MB", 1, 1e6 },
 };
 
 static int add_rest(const flying *m)
 {
-    cJSON *table = bench_report_table(m->report, "rest", "Before and after", rest_columns,
-                                      sizeof rest_columns / sizeof rest_columns[0]);
+    cJSON *table = bench_report_table(m->report, "rest", "Before and after the flight",
+                                      rest_columns, sizeof rest_columns / sizeof rest_columns[0]);
     cJSON *row = cJSON_CreateObject();
     const double resident = (double)trip_memory_peak_rss_bytes();
     int differ;
@@ -198,7 +198,8 @@ static void describe(const flying *m)
              (long long)info->dims[1], (long long)info->dims[2]);
     cJSON_AddStringToObject(settings, "grid", text);
     cJSON_AddNumberToObject(settings, "stored_bytes", (double)info->bytes);
-    cJSON_AddStringToObject(settings, "transfer_function", o->tf ? o->tf : "of the data set");
+    cJSON_AddStringToObject(settings, "transfer_function",
+                            o->tf ? o->tf : "stored in the data set");
     snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
     cJSON_AddStringToObject(settings, "size", text);
     cJSON_AddStringToObject(settings, "renderer", m->status.renderer);
@@ -208,14 +209,15 @@ static void describe(const flying *m)
 
 static void add_limits(const flying *m)
 {
+    bench_report_limit(
+        m->report,
+        "Input comes in %d steps, %d per second, independent of drawing. ms from input: from a "
+        "step to its picture. outdated: pictures that are more than one step older than the newest "
+        "input at the time of the previous picture. scale: median of drawn width / full width.",
+        m->flyer.steps, FLYER_STEPS_PER_SECOND);
     bench_report_limit(m->report,
-                       "%d steps of input, %d a second, come whatever is drawn. Ms from input: "
-                       "from a step to the picture of it. Of older input: pictures of a step more "
-                       "than one before the latest there was when the picture before had come. "
-                       "Scale: the median part of the width and height wanted.",
-                       m->flyer.steps, FLYER_STEPS_PER_SECOND);
-    bench_report_limit(m->report, "Resident includes the program and its libraries; the data set "
-                                  "may be in the page cache: empty that for times from the disk.");
+                       "Resident memory includes the program and its libraries. The data set may "
+                       "be in the page cache; empty the cache to include the disk.");
 }
 
 static int fly(flying *m)

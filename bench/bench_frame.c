@@ -53,7 +53,8 @@ int bench_reader_create(const session *s, trip_reader **out, const bench_options
                                                   .skip_user = occluder });
 }
 
-/* That of a splat in the middle of the volume, which the views of tables look at. */
+/* Returns the sprite size of a splat in the middle of the volume, which the views of the tables
+ * look at. */
 static double sprite_px(const trip_dataset *data, const trip_camera *camera,
                         const trip_settings *settings)
 {
@@ -146,7 +147,7 @@ const bench_cost *bench_runs_sorted(bench_runs *r, int frame)
     return costs;
 }
 
-/* The largest part of a frame, and its share: "drawing 93 %". */
+/* Names the largest part of a frame and its share, for example "drawing 93 %". */
 static void bound(const bench_cost *c, char text[48])
 {
     const struct {
@@ -179,7 +180,7 @@ void bench_runs_describe(bench_runs *r, int frame, cJSON *row)
     cJSON_AddStringToObject(row, "bound_by", text);
 }
 
-/* Keeps the last line that would have gone to stderr, but for that of an interruption, which ends
+/* Keeps the last reported line instead of printing it. An interruption is printed, because it ends
  * the program and is reported once. */
 static void keep_line(const char *line, void *user)
 {

@@ -1,6 +1,6 @@
-/* bench levels: how far each coarse level is from the finest one where its voxels are a pixel wide,
- * and how much pictures flicker while the eye moves away through all of them. Without a data set:
- * what frames take of one object that is sampled finer and finer (bench_finer.c). */
+/* bench levels: measures the error of each coarse level with voxels one pixel wide. It also
+ * measures the flicker of pictures while the eye moves away through the levels. Without a data
+ * set it measures one object that is sampled more and more finely (bench_finer.c). */
 #include "bench_tables.h"
 
 #include <math.h>
@@ -12,41 +12,42 @@
 #include "report.h"
 
 enum {
-    /* Pixels of the truth along a side of a picture's, at least. */
+    /* Minimum number of reference pixels along each side of a pixel. */
     MIN_SAMPLES = 4,
-    /* Of that, pixels along a side, at most: levels whose truth would be larger are left out. */
+    /* Maximum reference pixels along a side. Levels with a larger reference are left out. */
     MAX_TRUTH_PX = 4096,
     DOLLY_STEPS = 128,
     DOLLY_PX = 192,
     TOO_LARGE = 1,
 };
 
-/* The eye moves from where voxels of level 0 are so wide to where they are so many times less. */
+/* The eye starts where voxels of level 0 are dolly_px wide, and ends dolly_times times as far
+ * away. */
 static const double dolly_px = 0.8, dolly_times = 2;
 
 typedef struct measuring {
     const bench_options *options;
     bench_context context;
-    double voxel; /* width, world space */
+    double voxel; /* width in world units */
     unsigned levels;
     bench_report *report;
 } measuring;
 
 /* ---- levels ---- */
 
-/* settings.lod_px at which a level is drawn whose voxels are a pixel wide. */
+/* settings.lod_px that selects the level with voxels one pixel wide. */
 static const double level_px = 1.0001;
 
-/* The pictures of a level. */
+/* The errors of a level, summed over views. */
 typedef struct entry {
-    accuracy_error colour, alpha;           /* with a ray a pixel */
-    accuracy_error own_colour, own_alpha;   /* with as many as the truth */
-    accuracy_error fine_colour, fine_alpha; /* the finest level at that size, with a ray a pixel */
-    double ms, fine_ms;                     /* over the views */
+    accuracy_error colour, alpha;           /* with one ray per pixel */
+    accuracy_error own_colour, own_alpha;   /* with as many rays as the reference */
+    accuracy_error fine_colour, fine_alpha; /* finest level at this size, with one ray per pixel */
+    double ms, fine_ms;                     /* sums over the views */
     int width;
 } entry;
 
-/* The parallel view that shows all, with voxels of a level one pixel wide. */
+/* Sets a parallel view of the whole object, with voxels of a level one pixel wide. */
 static int look_at(measuring *m, int view, unsigned level, triptych_camera *camera)
 {
     const double pixel = ldexp(m->voxel, (int)level);
@@ -99,7 +100,7 @@ static int draw_and_compare(measuring *m, unsigned level, entry *e, float *truth
     return 0;
 }
 
-/* TOO_LARGE where the truth would be. */
+/* Returns TOO_LARGE if the reference would be too large. */
 static int measure_view(measuring *m, int view, unsigned level, entry *e)
 {
     triptych_camera camera;
@@ -130,7 +131,7 @@ static const bench_column level_columns[] = {
     { "alpha_mean", "alpha: mean", 2, 0 },
     { "alpha_99", "99 %", 1, 0 },
     { "ms", "ms", 1, 0 },
-    { "own_colour_mean", "rays as the truth: colour", 2, 0 },
+    { "own_colour_mean", "reference rays: colour", 2, 0 },
     { "own_alpha_mean", "alpha", 2, 0 },
     { "fine_colour_mean", "finest: colour", 2, 0 },
     { "fine_alpha_mean", "alpha", 2, 0 },
@@ -159,9 +160,9 @@ static void add_level(const measuring *m, cJSON *table, unsigned level, const en
 
 static int measure_levels(measuring *m)
 {
-    cJSON *table =
-        bench_report_table(m->report, "levels", "Each level, its voxels a pixel wide: error of 255",
-                           level_columns, sizeof level_columns / sizeof level_columns[0]);
+    cJSON *table = bench_report_table(
+        m->report, "levels", "Each level with voxels one pixel wide: error of 255", level_columns,
+        sizeof level_columns / sizeof level_columns[0]);
     int status = 0;
     entry *e = malloc(sizeof *e);
     if (!e)
@@ -179,7 +180,7 @@ static int measure_levels(measuring *m)
 
 /* ---- dolly ---- */
 
-/* Mean changes from picture to picture, of 255, by step. */
+/* Mean changes between consecutive pictures, of 255. */
 typedef struct flicker {
     double changes[DOLLY_STEPS];
 } flicker;
@@ -192,7 +193,7 @@ static double change(const float *a, const float *b, size_t pixels)
     return 255 * sum / (4 * (double)pixels);
 }
 
-/* The eye of a step: at a distance that grows by the same factor from step to step. */
+/* Sets the view of a step. The distance grows by the same factor in each step. */
 static int look_from(measuring *m, const triptych_camera *from, int step)
 {
     triptych_camera camera = *from;
@@ -202,7 +203,7 @@ static int look_from(measuring *m, const triptych_camera *from, int step)
     return bench_context_look(&m->context, &camera);
 }
 
-/* So near that voxels are dolly_px wide in the middle. */
+/* Computes the distance with voxels dolly_px wide in the middle of the picture. */
 static int find_start(measuring *m, triptych_camera *from)
 {
     const triptych_view whole = { .width = DOLLY_PX, .height = DOLLY_PX, .fov_degrees = 30 };
@@ -242,8 +243,8 @@ static const bench_column dolly_columns[] = {
     { "drawn", "drawn", 0, 0 },
     { "mean", "mean", 3, 0 },
     { "max", "max", 3, 0 },
-    { "mean_of_finest", "of the finest's", 2, 0 },
-    { "most_of_finest", "most of that", 2, 0 },
+    { "mean_of_finest", "x finest", 2, 0 },
+    { "most_of_finest", "maximum", 2, 0 },
 };
 
 static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const flicker *finest)
@@ -267,7 +268,7 @@ static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const f
 static int measure_dolly(measuring *m)
 {
     cJSON *table =
-        bench_report_table(m->report, "dolly", "Change from picture to picture, of 255",
+        bench_report_table(m->report, "dolly", "Change between consecutive pictures, of 255",
                            dolly_columns, sizeof dolly_columns / sizeof dolly_columns[0]);
     triptych_camera from;
     flicker finest, coarse;
@@ -292,16 +293,16 @@ static void add_limits(const measuring *m)
 {
     bench_report_limit(
         m->report,
-        "The truth of a level is the finest level drawn with at least %d x %d, and "
-        "at least as many pixels as voxels, in place of each, and averaged. From "
-        "the level on whose truth would be wider than %d pixels there is none. Views: %d round "
-        "the object, parallel. Colour is premultiplied; means and 99 %% are over "
-        "the pixels that the object covers.",
+        "The reference of a level is the finest level with at least %d x %d rays per pixel, and at "
+        "least one per voxel, averaged. Levels with a reference wider than %d pixels are left out. "
+        "The %d views around the object are parallel. Colour is premultiplied; means and 99 %% are "
+        "over the pixels that the object covers. reference rays: the level drawn with as many rays "
+        "as the reference.",
         MIN_SAMPLES, MIN_SAMPLES, MAX_TRUTH_PX, m->options->views);
     bench_report_limit(m->report,
-                       "The eye moves away from the object's middle in %d steps, from where voxels "
-                       "of the finest level are %g pixels wide to where they are %g; "
-                       "the last figure is of the step in which it is most.",
+                       "The eye moves away from the middle of the object in %d steps. Voxels of "
+                       "the finest level are %g pixels wide at first and %g at last. x finest is "
+                       "the ratio of the means; maximum is the largest ratio in one step.",
                        DOLLY_STEPS, dolly_px, dolly_px / dolly_times);
 }
 

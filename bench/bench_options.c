@@ -109,10 +109,10 @@ static const struct argp_option options[] = {
 
 static const struct table {
     const char *name;
-    unsigned refused; /* options that have no meaning here */
-    bool lists;       /* takes several sizes, renderers and thread counts */
+    unsigned refused; /* options that this table refuses */
+    bool lists;       /* accepts several sizes, renderers and thread counts */
     int repeat;
-    int views; /* 0: 20 */
+    int views; /* 0 selects 20 */
     bool draw_occluded;
     int sizes[2][2], size_count;
     trip_renderer_kind renderers[3];
@@ -217,13 +217,13 @@ static const struct table {
     },
 };
 
-/* While parsing: what was given, for the check against the table. */
+/* State of parsing: the options that were given, for the check against the table. */
 typedef struct parse {
     bench_options *o;
     unsigned given;
 } parse;
 
-/* Calls `one` with each of the texts that commas join. */
+/* Calls `one` with each item of a list joined by commas. */
 static int parse_list(const char *option, const char *text, bench_options *o, int *count,
                       int (*one)(const char *, bench_options *, int))
 {
@@ -234,7 +234,8 @@ static int parse_list(const char *option, const char *text, bench_options *o, in
         const char *comma = strchr(rest, ',');
         size_t length = comma ? (size_t)(comma - rest) : strlen(rest);
         if (*count == BENCH_LIST_MAX || length >= sizeof item)
-            return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is too long a list", text);
+            return trip_fail(TRIP_USAGE, "usage", option,
+                             "\"%s\" has too many items, or an item that is too long", text);
         memcpy(item, rest, length);
         item[length] = 0;
         status = one(item, o, (*count)++);
@@ -381,9 +382,8 @@ static void fill_defaults(bench_options *o, const struct table *t)
         o->thread_count = 1;
 }
 
-/* Bricks are left out where the processor's renderer finds them occluded; by the others, nothing
- * is.
- */
+/* Only cpu can skip occluded bricks. Selects it if --renderer is auto, and fails if no renderer
+ * can. */
 static int check_occluded(bench_options *o, const struct table *t)
 {
     int able = 0;
@@ -392,10 +392,10 @@ static int check_occluded(bench_options *o, const struct table *t)
             o->renderers[i] = TRIP_RENDERER_CPU;
         able += o->renderers[i] == TRIP_RENDERER_CPU || o->renderers[i] == TRIP_RENDERER_AUTO;
     }
-    return able ? 0 : trip_option_fail("--occluded", "skip applies to --renderer cpu only");
+    return able ? 0 : trip_option_fail("--occluded", "skip requires --renderer cpu");
 }
 
-/* What is run where nothing is named: what is not given is chosen to take little time. */
+/* Without a table, selects a short run of the table renderers. */
 static void be_short(parse *p)
 {
     bench_options *o = p->o;
@@ -428,8 +428,7 @@ static int check(parse *p)
             return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
                              options[i].name);
     if (o->input && !strcmp(t->name, "levels") && p->given & (OF_LEVELS | BIT(KEY_PLOT)))
-        return trip_option_fail("--field, --finest, --plot",
-                                "of this table are for what is sampled without a data set");
+        return trip_option_fail("--field, --finest, --plot", "apply only without a data set");
     if (!(p->given & BIT(KEY_OCCLUDED)))
         o->draw_occluded = t->draw_occluded;
     fill_defaults(o, t);
@@ -448,7 +447,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     }
     if (key == ARGP_KEY_ARG) {
         if (p->o->input)
-            return trip_option_fail(arg, "one data set at a time");
+            return trip_option_fail(arg, "only one data set is possible at a time");
         p->o->input = arg;
         return 0;
     }

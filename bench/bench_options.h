@@ -1,4 +1,5 @@
-/* The command line of `triptych bench`, checked, the table's defaults filled in. */
+/* Parses and checks the command line of `triptych bench`, and fills in the defaults of the table.
+ * Main thread only. */
 #ifndef TRIP_BENCH_OPTIONS_H
 #define TRIP_BENCH_OPTIONS_H
 
@@ -10,30 +11,30 @@
 enum { BENCH_LIST_MAX = 16 };
 
 typedef struct bench_options {
-    const char *table; /* always one of bench_tables[] */
-    const char *input; /* NULL: the included volume */
-    bool in_short;     /* no table was named: one that takes less than a minute */
-    const char *tf;    /* file or preset; NULL: the function kept in the data set */
+    const char *table; /* a name of tables[] in bench.c */
+    const char *input; /* NULL selects the included volume */
+    bool in_short;     /* no table was named; run a table in less than a minute */
+    const char *tf;    /* file or preset; NULL selects the transfer function in the data set */
     int sizes[BENCH_LIST_MAX][2], size_count;
     trip_renderer_kind renderers[BENCH_LIST_MAX];
     int renderer_count;
-    int threads[BENCH_LIST_MAX], thread_count; /* 0: one a processor */
+    int threads[BENCH_LIST_MAX], thread_count; /* 0 selects one per processor */
     int repeat, views;
-    const char *field;        /* what is sampled finer and finer, a name of trip_fields */
-    int finest;               /* up to so many voxels along each axis */
-    const char *plot;         /* an SVG of it is written here; NULL: none */
-    double seconds;           /* that a flight takes */
-    double frames_per_second; /* of it, wanted */
+    const char *field;        /* object for levels without a data set, a name of trip_fields */
+    int finest;               /* maximum voxels along each axis */
+    const char *plot;         /* path of an SVG file for the table, or NULL */
+    double seconds;           /* length of a flight */
+    double frames_per_second; /* target of a flight */
     trip_settings settings;
     trip_engine engine;
-    uint64_t memory_bytes; /* 0: the default */
-    bool draw_occluded;    /* bricks behind what is opaque */
-    bool no_counts;        /* times only */
+    uint64_t memory_bytes; /* 0 selects the default */
+    bool draw_occluded;    /* whether bricks behind opaque ones are drawn */
+    bool no_counts;        /* measures only times */
     bool json;
-    bench_progress *progress; /* no option: where it is shown how far the table is; may be NULL */
+    bench_progress *progress; /* shows the progress of the table; not an option; may be NULL */
 } bench_options;
 
-/* A line for each table. */
+/* One line for each table. */
 #define BENCH_TABLES                                                                               \
     "  renderers  speed of each renderer, in views around the object\n"                            \
     "  stream     reading and drawing from disk, beside the speed of the disk\n"                   \
@@ -45,7 +46,7 @@ typedef struct bench_options {
     "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                    \
     "  variants   changes of the picture by the shortcuts of the papers\n"
 
-/* 0, or TRIP_USAGE once reported; --help prints and exits. */
+/* Returns 0, or TRIP_USAGE after reporting an error. --help prints the help and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);
 
 #endif

@@ -1,5 +1,5 @@
-/* bench orders: what the ways to order splats by three lists draw and cost, beside Tables 1 and 2
- * of Hofsetz & Max 2005. */
+/* bench orders: compares the methods of ordering splats by three lists, in splats and time, with
+ * Tables 1 and 2 of Hofsetz & Max 2005. */
 #include "bench_tables.h"
 
 #include "bench_view.h"
@@ -16,11 +16,12 @@ static const struct {
     { "merge, h = 0.95", TRIP_METHOD_MERGE, 0.95 },
     { "clip", TRIP_METHOD_CLIP, 0 },
     { "axis", TRIP_METHOD_AXIS, 0 },
-    { "image", TRIP_METHOD_IMAGE, 0 }, /* by renderers that have it */
+    { "image", TRIP_METHOD_IMAGE, 0 }, /* only for renderers that implement it */
 };
 
-/* The Foot in Hofsetz & Max 2005, by view and method: splats, and frames per second with a list of
- * its own per axis ("optimized"), which is how a data set is stored here. */
+/* Results for the Foot in Hofsetz & Max 2005, by view and method. The columns are splats, and
+ * frames per second with a separate list for each axis ("optimized"). Data sets here have
+ * separate lists too. */
 #define PAPER_VALID_VOXELS 897229.0
 static const struct {
     double splats, fps;
@@ -55,7 +56,7 @@ static const bench_column columns[] = {
     { "multiple", "x kept", 3, 0 },
     { "ms", "median ms", 1, 0 },
     { "speed", "speed", 3, 0 },
-    { "bound_by", "bound by", 0, 0 },
+    { "bound_by", "largest part", 0, 0 },
     { "paper_multiple", "2005: x kept", 3, 0 },
     { "paper_speed", "2005: speed", 3, 0 },
 };
@@ -85,13 +86,13 @@ static void add_row(cJSON *rows, bench_runs *runs, const bench_cost counted[METH
     cJSON_AddNumberToObject(row, "paper_speed", paper[view][method].fps / paper[view][AXIS].fps);
 }
 
-/* Image-aligned sheets are the last of the methods. */
+/* The method image is the last one. Only some renderers implement it. */
 static int methods_of(const trip_renderer *renderer)
 {
     return renderer->ops->forms & TRIP_DRAWS_IMAGE_SHEETS ? METHODS : METHODS - 1;
 }
 
-/* Each method once with exact counts, which also warms up, then the timed runs. */
+/* Draws each method once with exact counts, which also warms up, then takes the timed runs. */
 static int measure_view(const bench_frame *base, const bench_options *o, bench_report *r, int view)
 {
     bench_frame frames[METHODS];
@@ -120,28 +121,27 @@ static int measure_view(const bench_frame *base, const bench_options *o, bench_r
 
 static void add_limits(bench_report *r)
 {
-    bench_report_limit(r, "The data set is in memory (null engine), where it was checked when it "
-                          "was loaded: no figure contains the disk. A frame is planning, drawing "
-                          "from memory and merging.");
-    bench_report_limit(r, "Drawn: the footprint touches a pixel centre where its list has weight, "
-                          "whatever its opacity there; counted in a frame apart from the timed "
-                          "ones. Kept: voxels in each list of the data set. Bricks that the "
-                          "transfer function makes invisible are left out, so a function narrower "
-                          "than the data set's own lowers all multiples.");
-    bench_report_limit(r, "Image: sheets parallel to the image plane (Mueller & Crawfis 1998), "
-                          "which each splat is cut into; by the reference alone.");
-    bench_report_limit(r, "Speed: against axis in the same view; the median is the middle run of "
-                          "runs that take turns.");
-    bench_report_limit(r, "Bound by: the largest part of the middle run, as the calling thread saw "
-                          "it; work that a GPU or other threads do later shows where it waits for "
-                          "them.");
-    bench_report_limit(r, "The parallel view gives one list all the weight. A perspective view "
-                          "parallel to X-Y would draw three lists at h = 0, though not at the "
-                          "other h of a narrow view.");
+    bench_report_limit(
+        r, "The data set is in memory (null engine) and was verified when it was loaded, so that "
+           "no figure includes the disk. A frame is planning, drawing from memory and merging.");
     bench_report_limit(r,
-                       "2005: Hofsetz & Max, the Foot (183 x 255 x 125, %.0f voxels kept) at "
-                       "512 x 512 on a GeForce 6600 GT, lists of their own per axis; another "
-                       "object, view and kernel, so the pattern compares and not the figures.",
+                       "splats drawn: splats with a pixel centre in the footprint where their list "
+                       "has weight, counted in an untimed frame. x kept: splats drawn / voxels "
+                       "kept per list. Bricks that are transparent under the transfer function are "
+                       "left out, so that a narrower transfer function lowers all ratios.");
+    bench_report_limit(r, "image: sheets parallel to the image plane (Mueller & Crawfis 1998); "
+                          "each splat is divided among them. Only the reference implements it.");
+    bench_report_limit(r, "speed: time of axis / time, in the same view. Times are medians of runs "
+                          "that are taken alternately.");
+    bench_report_limit(r, "largest part: of the median run, as the calling thread sees it. Work of "
+                          "a GPU or other threads counts where the calling thread waits for it.");
+    bench_report_limit(
+        r, "The parallel view gives one list all the weight. A perspective view parallel to X-Y "
+           "would draw three lists at h = 0, but not at the other h of a narrow view.");
+    bench_report_limit(r,
+                       "2005: Hofsetz & Max, the Foot (183 x 255 x 125, %.0f voxels kept) at 512 x "
+                       "512 on a GeForce 6600 GT, with a separate list for each axis. Object, view "
+                       "and kernel differ, so compare the pattern and not the figures.",
                        PAPER_VALID_VOXELS);
 }
 

@@ -1,5 +1,5 @@
-/* bench popping: how much pixels jump while the camera turns through the change of the axis that
- * rays are most aligned with. */
+/* bench popping: measures the jump of pixels while the camera turns through the change of the
+ * dominant axis. */
 #include "bench_tables.h"
 
 #include "bench_popping.h"
@@ -67,19 +67,19 @@ static int measure(const session *s, const bench_scene *scene, const bench_optio
 
 static void add_limits(const bench_options *o, bench_report *r)
 {
-    bench_report_limit(r,
-                       "The eye goes round the object in %d steps of %g degrees of index space, "
-                       "through where X and Y are equally near to the ray at the image's centre; "
-                       "classified %s.",
-                       BENCH_POPPING_STEPS, bench_popping_degrees(1) - bench_popping_degrees(0),
-                       o->settings.classify == TRIP_CLASSIFY_POST          ? "post"
-                       : o->settings.compositing == TRIP_COMPOSITING_SHEET ? "pre, by sheets"
-                                                                           : "pre, by splats");
-    bench_report_limit(r, "Of a pixel's change from one step to the next, red, green, blue "
-                          "(premultiplied) or alpha, whichever is most, the median over the steps "
-                          "is taken as the motion's. Figures are over the pixels that change at "
-                          "all, each of the step where it is most; with clip what jumps are the "
-                          "pixels that the line between two lists passes.");
+    bench_report_limit(
+        r,
+        "The eye turns around the object in %d steps of %g degrees of index space, through the "
+        "direction with X and Y equally close to the central ray; classified %s.",
+        BENCH_POPPING_STEPS, bench_popping_degrees(1) - bench_popping_degrees(0),
+        o->settings.classify == TRIP_CLASSIFY_POST          ? "post"
+        : o->settings.compositing == TRIP_COMPOSITING_SHEET ? "pre, by sheets"
+                                                            : "pre, by splats");
+    bench_report_limit(
+        r, "A pixel's change is the maximum over red, green, blue (premultiplied) and alpha. Its "
+           "motion is the median change over the steps. mean, 99 %% and max are of changes minus "
+           "motion, over the pixels that change, in the step with the largest; motion is a mean. "
+           "With clip, pixels jump where the line between two lists passes.");
 }
 
 int bench_popping(const session *s, const bench_options *o, bench_report *r)
@@ -91,8 +91,8 @@ int bench_popping(const session *s, const bench_options *o, bench_report *r)
     const size_t pixels = (size_t)scene.size[0] * (size_t)scene.size[1];
     if (!status && !bench_popping_begin(&p, s->budget, pixels))
         status = trip_fail(TRIP_ERROR, "bench", "popping",
-                           "%zu bytes of changes do not fit the memory given; raise --memory or "
-                           "measure smaller pictures",
+                           "needs %zu bytes for changes, which do not fit the memory; raise "
+                           "--memory or reduce --size",
                            bench_popping_bytes(pixels));
     if (!status)
         status = measure(s, &scene, o, &p, r);

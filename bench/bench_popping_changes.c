@@ -1,5 +1,4 @@
-/* What jumps while the camera turns: each pixel's changes from picture to picture, less what the
- * motion changes. */
+/* Collects the changes of each pixel between consecutive pictures, and subtracts its motion. */
 #include "bench_popping.h"
 
 #include <math.h>
@@ -49,7 +48,7 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Of the component that changes most. */
+/* Returns the maximum change over the components. */
 static float change_of(const float a[4], const float b[4])
 {
     float max = 0;
@@ -65,8 +64,8 @@ void bench_popping_add(bench_popping_changes *p, int step, const float *rgba)
     memcpy(p->before, rgba, 4 * p->pixels * sizeof *p->before);
 }
 
-/* Leaves the changes beyond the motion of those pixels that change, which come first; returns how
- * many they are. */
+/* Subtracts the motion from the changes, and moves the pixels that change to the front. Returns
+ * their number; *mean is the mean motion. */
 static size_t take_motion(bench_popping_changes *p, double *mean)
 {
     size_t kept = 0;

@@ -1,4 +1,4 @@
-/* What jumps over h, as a picture: h from 0 towards 1, then the methods that have none. */
+/* Plots the jumps over h from 0 towards 1, then for the methods without h. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 
 enum { WIDTH = 620, HEIGHT = 380, LEFT = 70, RIGHT = 130, TOP = 44, BOTTOM = 56 };
 
-static const double min = 0.01; /* of 255; what is less is drawn there */
+static const double min = 0.01; /* of 255; smaller changes are drawn here */
 
 typedef struct curve {
     const char *name, *colour;
@@ -48,7 +48,7 @@ enum { CURVES = sizeof curves / sizeof *curves };
 typedef struct plot {
     const bench_popping_row *rows;
     int count;
-    int lo, hi; /* of 255: powers of ten */
+    int lo, hi; /* powers of ten, of 255 */
     FILE *file;
 } plot;
 
@@ -84,10 +84,10 @@ static void draw_axes(const plot *p)
         text(p, x_of(p, i), HEIGHT - BOTTOM + 20, "middle", "#333", p->rows[i].label);
     text(p, 8, TOP - 20, "start", "#333", "change of a pixel beyond the motion, of 255");
     text(p, 0.5 * (LEFT + WIDTH - RIGHT), HEIGHT - 10, "middle", "#333",
-         "merge by h, and the other methods");
+         "merge by h, then the other methods");
 }
 
-/* A line through those with an h, and marks. */
+/* Draws a line through the rows with an h, and a mark for every row. */
 static void draw_curve(const plot *p, const curve *c)
 {
     fprintf(p->file, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"2\" points=\"",
@@ -101,7 +101,7 @@ static void draw_curve(const plot *p, const curve *c)
                 y_of(p, c->of(&p->rows[i])), c->colour);
 }
 
-/* Names beside the last marks, one below the other where these are near. */
+/* Writes the names beside the last marks, one below the other if the marks are close. */
 static void draw_names(const plot *p)
 {
     double last = -INFINITY;

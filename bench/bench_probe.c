@@ -36,7 +36,7 @@ static int begin_layer(trip_renderer *r, int axis)
     return 0;
 }
 
-/* Pixels of the image whose centre lies in the support where the list has weight. */
+/* Counts the pixels with a centre in the support of a splat, where its list has weight. */
 static uint64_t covered(const bench_probe *p, const trip_splat_frame *f, const trip_splat *s)
 {
     const trip_camera *camera = p->frame->camera;

@@ -12,14 +12,14 @@ enum { INTERVAL_MS = 250, LINES_INTERVAL_MS = 2000 };
 
 struct bench_progress {
     const char *name;
-    bool lines; /* one below the other, where there is no terminal */
+    bool lines; /* prints line below line, because stderr is not a terminal */
     struct timespec begin;
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t stop;
-    /* Under the lock. */
+    /* Guarded by lock. */
     bool stopped;
-    int begun, expected; /* steps */
+    int begun, expected; /* numbers of steps */
     char stage[48];
 };
 
@@ -30,7 +30,7 @@ static unsigned seconds_since(const struct timespec *begin)
     return (unsigned)(now.tv_sec - begin->tv_sec - (now.tv_nsec < begin->tv_nsec));
 }
 
-/* What is printed next stands in the line's place. */
+/* Prints the line. The next output overwrites it. */
 static void print_line(const bench_progress *p)
 {
     unsigned s = seconds_since(&p->begin);
@@ -65,7 +65,7 @@ static void *show(void *argument)
     return NULL;
 }
 
-/* Signals go to the main thread, as without this one. */
+/* Starts the thread with all signals blocked, so that the main thread gets them. */
 static bool start_thread(bench_progress *p)
 {
     sigset_t all, before;

@@ -1,5 +1,5 @@
-/* bench renderers: frames and splats per second of the renderers there are, over views round the
- * object. */
+/* bench renderers: measures frames and splats per second of the available renderers, in views
+ * around the object. */
 #include "bench_tables.h"
 
 #include <stdio.h>
@@ -25,14 +25,14 @@ static const bench_column columns[] = {
     { "mpixels_per_s", "Mpixels/s", 1, 0 },
 };
 
-/* A renderer and its number of threads; 0: one a processor. */
+/* A renderer and its number of threads; 0 means one per processor. */
 typedef struct contender {
     trip_renderer *renderer;
     int threads;
-    bench_cost *costs; /* of the size being drawn: [view * repeat + run] */
+    bench_cost *costs; /* of the current size, [view * repeat + run] */
 } contender;
 
-/* What is to be drawn in a view, the same for all renderers. */
+/* Splats and pixels to draw in a view, the same for all renderers. */
 typedef struct load {
     double splats, pixels;
 } load;
@@ -43,8 +43,8 @@ typedef struct race {
     trip_reader *reader;
     contender contenders[MAX_CONTENDERS];
     int count;
-    trip_renderer *occluder; /* of the frame being drawn */
-    load *loads;             /* of the size being drawn: [view] */
+    trip_renderer *occluder; /* renderer of the current frame */
+    load *loads;             /* of the current size, [view] */
     trip_camera_params *views;
 } race;
 
@@ -61,7 +61,7 @@ static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_re
     own->threads = kind == TRIP_RENDERER_CPU ? threads : 0;
     int status = bench_renderer_create(c->session, &own->renderer, kind, threads, false, why);
     if (status || !own->renderer) {
-        bench_report_limit(r, "Left out: %s: %s", names[kind], why);
+        bench_report_limit(r, "left out: %s: %s", names[kind], why);
         return status;
     }
     cJSON *machine = bench_report_machine(r);
@@ -75,7 +75,7 @@ static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_re
     return 0;
 }
 
-/* Each renderer once, those with threads of their own once per number of threads. */
+/* Adds each renderer once, and cpu once for each number of threads. */
 static int add_contenders(race *c, bench_report *r)
 {
     const bench_options *o = c->options;
@@ -85,17 +85,18 @@ static int add_contenders(race *c, bench_report *r)
             if (k == 0 || o->renderers[i] == TRIP_RENDERER_CPU)
                 status = add_contender(c, o->renderers[i], o->threads[k], r);
     if (!status && c->count == 0)
-        return trip_fail(TRIP_ERROR, "bench", "renderers", "none of them runs on this machine");
+        return trip_fail(TRIP_ERROR, "bench", "renderers",
+                         "none of the selected renderers runs on this machine");
     return status;
 }
 
-/* Of post there are no splats to be counted. */
+/* post has no splats to count. */
 static bool counts(const race *c)
 {
     return !c->options->no_counts && c->options->settings.classify == TRIP_CLASSIFY_PRE;
 }
 
-/* Splats by the first contender's exact count, pixels by a sample of the footprints. */
+/* Counts splats exactly by the first contender, and pixels by a sample of the footprints. */
 static int measure_load(bench_frame frame, load *out)
 {
     bench_cost cost;
@@ -109,9 +110,9 @@ static int measure_load(bench_frame frame, load *out)
     return status;
 }
 
-/* A contender's turn begins with a frame that is not timed: shaders are compiled and buffers grown
- * in its first one, and threads that slept through the others' turns have yet to be distributed
- * over the processors. */
+/* Each contender's turn begins with an untimed frame. The first frame compiles shaders and enlarges
+ * buffers, and threads that slept during other turns have to be distributed over the processors
+ * again. */
 static int draw_view(race *c, bench_frame frame, int view)
 {
     int repeat = c->options->repeat, status = 0;
@@ -150,7 +151,8 @@ static void add_vector(cJSON *object, const char *name, trip_vec3 v)
     cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray(numbers, 3));
 }
 
-/* Each view and the time of each of its runs, so that others can be timed at the same views. */
+/* Adds every view and the time of every run, so that other programs can be timed in the same
+ * views. */
 static void add_views(const race *c, const contender *own, cJSON *row)
 {
     int repeat = c->options->repeat;
@@ -213,7 +215,7 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
 static int run(race *c, bench_report *r)
 {
     const bench_options *o = c->options;
-    cJSON *rows = bench_report_table(r, "renderers", "Renderers over views round the object",
+    cJSON *rows = bench_report_table(r, "renderers", "Renderers, in views around the object",
                                      columns, sizeof columns / sizeof columns[0]);
     double *values = calloc((size_t)(o->views * o->repeat), sizeof *values);
     c->loads = calloc((size_t)o->views, sizeof *c->loads);
@@ -239,24 +241,23 @@ static bool leaves_out_occluded(const race *c)
 
 static void add_limits(const race *c, bench_report *r)
 {
-    bench_report_limit(r, "The data set is in memory (null engine), where it was checked when it "
-                          "was loaded: no figure contains the disk. A frame is planning, drawing "
-                          "from memory and merging, and ends with the picture in the program's "
-                          "memory.");
+    bench_report_limit(
+        r, "The data set is in memory (null engine) and was verified when it was loaded, so that "
+           "no figure includes the disk. A frame is planning, drawing from memory and merging; it "
+           "ends with the picture in the memory of the program.");
     if (counts(c)) {
         bench_report_limit(r,
                            "Msplats/s: splats with a pixel centre in their footprint where their "
-                           "list has weight, all views together, over the time of all views. Those "
-                           "behind saturated pixels count too, though a renderer may skip them.");
-        bench_report_limit(r, "Pixels: pixel centres in those footprints, from every %dth splat.",
+                           "list has weight, summed over all views / time of all views. Splats "
+                           "behind opaque ones count too, although a renderer may skip them.");
+        bench_report_limit(r,
+                           "Mpixels/s: pixel centres in these footprints, from every %dth splat.",
                            SAMPLE_EVERY);
     }
     if (leaves_out_occluded(c))
-        bench_report_limit(r, "cpu leaves out bricks behind what is opaque; the picture is the "
-                              "same.");
-    bench_report_limit(
-        r, "Times are over views; at each view renderers take turns, the first frame of each "
-           "turn untimed.");
+        bench_report_limit(r, "cpu skips bricks behind opaque ones; the picture is the same.");
+    bench_report_limit(r, "Times are over all views. In each view the renderers take turns, and "
+                          "the first frame of each turn is untimed.");
 }
 
 int bench_renderers(const session *s, const bench_options *o, bench_report *r)
@@ -269,9 +270,9 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
     cJSON_AddNumberToObject(bench_report_settings(r), "views", o->views);
     int status = add_contenders(c, r);
     add_limits(c, r);
-    int frames = c->count * (1 + o->repeat) + (o->no_counts ? 0 : 2); /* of a view */
+    int frames = c->count * (1 + o->repeat) + (o->no_counts ? 0 : 2); /* per view */
     bench_progress_expect(o->progress, 1 + frames * o->views * o->size_count);
-    bench_progress_step(o->progress, "data set to memory");
+    bench_progress_step(o->progress, "loading the data set");
     if (!status)
         status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, occluder_of(c));
     if (!status)

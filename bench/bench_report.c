@@ -16,7 +16,7 @@
 enum { MAX_TABLES = 8, CELL_BYTES = 96 };
 
 typedef struct table {
-    cJSON *object; /* in the root */
+    cJSON *object; /* the table in the root */
     const bench_column *columns;
     int column_count;
 } table;
@@ -49,7 +49,7 @@ static void cpu_model(char *text, size_t bytes, const struct utsname *system)
         fclose(f);
 }
 
-/* Processors that this process may run on. */
+/* Returns the number of processors that this process may use. */
 static int cores(void)
 {
     cpu_set_t set;
@@ -148,7 +148,7 @@ static int column_width(const cJSON *rows, const bench_column *c)
     return width;
 }
 
-/* Words to the left, numbers to the right. */
+/* Columns of numbers are aligned to the right, words to the left. */
 static int is_number(const cJSON *rows, const bench_column *c)
 {
     const cJSON *row;

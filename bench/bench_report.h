@@ -1,12 +1,12 @@
-/* What a benchmark found: tables of rows, and the limits to read them by. Everything is kept as
- * JSON; for people, columns of it are printed as aligned Markdown tables. One thread. */
+/* Results of a benchmark: tables of rows, and the limits of the figures. All results are JSON;
+ * people get columns of them as aligned Markdown tables. One thread. */
 #ifndef TRIP_BENCH_REPORT_H
 #define TRIP_BENCH_REPORT_H
 
 #include <cjson/cJSON.h>
 
-/* A number is shown divided by `unit` (0: as it is) with `decimals`; what is missing or null as
- * "-". */
+/* A number is divided by `unit` (0 means 1) and printed with `decimals`. Missing values and null
+ * print as "-". */
 typedef struct bench_column {
     const char *key, *heading;
     int decimals;
@@ -18,21 +18,19 @@ typedef struct bench_report bench_report;
 /* Adds the CPU, its cores, memory and kernel. */
 void bench_describe_machine(cJSON *machine);
 
-/* `command`: the command line, which the report repeats. */
+/* `command` is the command line, which the report repeats. */
 int bench_report_create(bench_report **out, const char *name, const char *command);
 void bench_report_destroy(bench_report *r);
 
-/* What was measured how: texts, numbers and truths, printed one a line; names that end in _bytes as
- * sizes.
- */
+/* Returns the object for the settings of the measurement: strings, numbers and booleans, printed
+ * one per line. Names that end in _bytes print as sizes. */
 cJSON *bench_report_settings(bench_report *r);
-/* The CPU, its cores, memory and kernel; more may be added. */
+/* Returns the object for the machine, which has the CPU, its cores, memory and kernel. */
 cJSON *bench_report_machine(bench_report *r);
-/* A new table "key"; returns its rows, an array to add objects to. `columns` outlives the report.
- */
+/* Adds a table and returns the array for its row objects. `columns` must outlive the report. */
 cJSON *bench_report_table(bench_report *r, const char *key, const char *title,
                           const bench_column *columns, int column_count);
-/* A sentence on what bounds the figures or what they leave out. */
+/* Adds a sentence about a limit of the figures, at most 1023 bytes. */
 __attribute__((format(printf, 2, 3))) void bench_report_limit(bench_report *r, const char *sentence,
                                                               ...);
 

@@ -20,9 +20,9 @@ static int make_folder(bench_sample *s)
     const char *parent = getenv("TMPDIR");
     char name[sizeof s->folder];
     if (!parent || !*parent)
-        parent = "/var/tmp"; /* on a disk, where /tmp may be in memory */
+        parent = "/var/tmp"; /* /var/tmp is on a disk; /tmp may be in memory */
     if (snprintf(name, sizeof name, "%s/triptych-bench-XXXXXX", parent) >= (int)sizeof name)
-        return trip_fail(TRIP_ERROR, "bench", parent, "the name of TMPDIR is too long");
+        return trip_fail(TRIP_ERROR, "bench", parent, "the path in TMPDIR is too long");
     if (!mkdtemp(name))
         return trip_fail_errno("bench", name, "cannot create");
     snprintf(s->folder, sizeof s->folder, "%s", name);
@@ -36,9 +36,9 @@ int bench_sample_make(bench_sample *s)
     *s = (bench_sample){ 0 };
     if (!trip_companion_find(path, TRIP_DATASETS_FROM_BIN "/" VOLUME,
                              TRIP_DATASETS_OF_SOURCE "/" VOLUME, R_OK))
-        return trip_fail(TRIP_ERROR, "bench", VOLUME,
-                         "the included volume is not there; name a data set: `triptych bench "
-                         "TABLE NAME.trip`");
+        return trip_fail(
+            TRIP_ERROR, "bench", VOLUME,
+            "the included volume is missing; name a data set, `triptych bench TABLE NAME.trip`");
     int status = make_folder(s);
     if (status)
         return status;
@@ -46,7 +46,7 @@ int bench_sample_make(bench_sample *s)
     return trip_brick(&(trip_brick_params){ .input = path, .output = s->data }, &summary);
 }
 
-/* How far the field reaches in world space, and what is seen of it. */
+/* The width of the field in world units, and its default transfer function. */
 static const double field_width = 255;
 static const char field_function[] = "values data\nunit 1\n"
                                      "0   0.10 0.15 0.50  0\n"

@@ -1,17 +1,18 @@
-/* The included volume, or one with known values, as a data set in a temporary folder, for a
- * benchmark that names none. */
+/* Makes a data set in a temporary folder for a benchmark without a named one. It contains the
+ * included volume or a field with known values. Main thread only. */
 #ifndef TRIP_BENCH_SAMPLE_H
 #define TRIP_BENCH_SAMPLE_H
 
 typedef struct bench_sample {
-    char folder[256], data[272]; /* "": not made */
+    char folder[256], data[272]; /* "" if the folder was not made */
 } bench_sample;
 
-/* Bricks the volume with its defaults. Remove it also after a failure. */
+/* Bricks the included volume with default options. The caller removes the folder even after a
+ * failure. */
 int bench_sample_make(bench_sample *s);
-/* The same of a field (fields.h) sampled at n * n * n places, 8 bits each, that reach over the same
- * world space whatever n. `tf`: the function kept, a file or preset; NULL: one whose opacity per
- * world unit is the same whatever n. */
+/* Bricks a field (fields.h) with n * n * n samples of 8 bits, which cover the same world space for
+ * every n. `tf` is the transfer function, a file or preset. NULL selects one with the same opacity
+ * per world unit for every n. */
 int bench_sample_make_field(bench_sample *s, const char *field, int n, const char *tf);
 void bench_sample_remove(const bench_sample *s);
 

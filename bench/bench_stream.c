@@ -1,5 +1,5 @@
-/* bench stream: reading and drawing from disk against what the disk gives a plain reader, and how
- * well the two overlap. */
+/* bench stream: compares reading and drawing from disk with the bandwidth of the disk, and measures
+ * their overlap. */
 #include "bench_tables.h"
 
 #include <math.h>
@@ -12,13 +12,11 @@
 
 enum { PLAIN, BLIND, SMALL, STREAMED, READ, DRAW, FRAME, STAGES };
 
-static const char *const names[STAGES] = { "plain read",
-                                           "the same, not looked at",
-                                           "into small pages, not looked at",
-                                           "lists streamed",
-                                           "read alone",
-                                           "draw alone",
-                                           "frame" };
+static const char *const names[STAGES] = {
+    "plain read",     "plain read, blind", "plain read, blind, small pages",
+    "lists streamed", "read alone",        "draw alone",
+    "frame"
+};
 static const char *const keys[STAGES] = { "plain", "plain_blind", "plain_small", "streamed",
                                           "read",  "draw",        "frame" };
 
@@ -31,20 +29,20 @@ static const bench_column stage_columns[] = {
     { "ms_max", "slowest", 3, second_ms },
     { "bytes_read", "GB read", 3, gigabyte },
     { "gb_per_s", "GB/s", 3, 0 },
-    { "of_plain", "of plain read", 3, 0 },
-    { "of_blind", "of it not looked at", 3, 0 },
+    { "of_plain", "x plain read", 3, 0 },
+    { "of_blind", "x blind", 3, 0 },
 };
 
 static const bench_column summary_columns[] = {
     { "dataset_bytes", "data set GB", 3, gigabyte },
-    { "memory_limit_bytes", "memory MB", 1, 1e6 },
-    { "memory_peak_bytes", "taken MB", 1, 1e6 },
+    { "memory_limit_bytes", "memory limit MB", 1, 1e6 },
+    { "memory_peak_bytes", "peak MB", 1, 1e6 },
     { "peak_rss_bytes", "resident MB", 1, 1e6 },
     { "seconds_per_frame", "s/frame", 3, 0 },
     { "gb_per_s", "GB/s", 3, 0 },
     { "disk_gb_per_s", "disk GB/s", 3, 0 },
-    { "frame_of_disk", "of disk", 3, 0 },
-    { "streamed_of_disk", "lists streamed of disk", 3, 0 },
+    { "frame_of_disk", "x disk", 3, 0 },
+    { "streamed_of_disk", "lists streamed x disk", 3, 0 },
     { "frame_of_bound", "frame / max(read, draw)", 3, 0 },
 };
 
@@ -52,16 +50,17 @@ typedef struct sample {
     double ms, bytes;
 } sample;
 
-/* Everything that the stages need. */
+/* State of the measurement. */
 typedef struct stream {
     const session *session;
     const bench_options *options;
-    trip_budget *whole; /* holds the data set for drawing without the disk; not under the promise */
-    bench_frame frame;  /* from disk */
-    bench_frame in_memory; /* no renderer: does not fit */
-    bench_frame unread;    /* read and not drawn */
+    trip_budget
+        *whole; /* holds the data set for drawing without the disk, outside the memory limit */
+    bench_frame frame;     /* from disk */
+    bench_frame in_memory; /* renderer is NULL if the data set does not fit */
+    bench_frame unread;    /* reads, and does not draw */
     bench_probe probe;
-    trip_renderer *occluder; /* of the frame being drawn */
+    trip_renderer *occluder; /* renderer of the current frame */
     bench_files files;
     bool direct;
     uint64_t peak_rss_bytes, peak_bytes;
@@ -128,8 +127,8 @@ static int find_files(stream *t)
     return 0;
 }
 
-/* What draws from disk, under the promise; ends with one frame drawn, and the peaks noted before
- * anything else takes memory. */
+/* Creates the renderer and the reader within the memory limit, and draws one frame. Notes the peaks
+ * before anything else takes memory. */
 static int open_frame(stream *t)
 {
     const session *s = t->session;
@@ -158,7 +157,7 @@ static int open_frame(stream *t)
     return status;
 }
 
-/* The data set in memory, from a budget of its own; left out where it does not fit. */
+/* Loads the data set into memory with a budget of its own. Leaves it out if it does not fit. */
 static int open_in_memory(stream *t, bench_report *r)
 {
     char why[256] = "";
@@ -175,7 +174,7 @@ static int open_in_memory(stream *t, bench_report *r)
     bench_keep_report(NULL);
     if (!status || trip_interrupted())
         return status;
-    bench_report_limit(r, "Drawing alone is left out: %s", why);
+    bench_report_limit(r, "draw alone is left out: %s", why);
     t->in_memory.renderer = NULL;
     return 0;
 }
@@ -186,7 +185,7 @@ static int by_time(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The middle run. */
+/* Returns the median run. */
 static sample middle(const stream *t, int stage)
 {
     sample *runs = &t->samples[stage * t->options->repeat];
@@ -201,7 +200,7 @@ static double gb_per_s(sample s)
 
 static void add_stages(const stream *t, bench_report *r)
 {
-    cJSON *rows = bench_report_table(r, "stages", "One frame's parts alone and together",
+    cJSON *rows = bench_report_table(r, "stages", "The parts of a frame, alone and together",
                                      stage_columns, sizeof stage_columns / sizeof stage_columns[0]);
     for (int stage = 0; stage < STAGES; stage++) {
         sample own = middle(t, stage), plain = middle(t, PLAIN), blind = middle(t, BLIND);
@@ -226,8 +225,9 @@ static void add_stages(const stream *t, bench_report *r)
 
 static void add_summary(const stream *t, bench_report *r)
 {
-    cJSON *rows = bench_report_table(r, "summary", "The frame against its bounds", summary_columns,
-                                     sizeof summary_columns / sizeof summary_columns[0]);
+    cJSON *rows =
+        bench_report_table(r, "summary", "The frame, compared with its limits", summary_columns,
+                           sizeof summary_columns / sizeof summary_columns[0]);
     cJSON *row = cJSON_CreateObject();
     sample plain = middle(t, PLAIN), read = middle(t, READ), draw = middle(t, DRAW);
     sample streamed = middle(t, STREAMED), frame = middle(t, FRAME);
@@ -259,31 +259,28 @@ static void describe(const stream *t, bench_report *r)
                             t->direct ? "8 threads, transfers of 1 MiB, O_DIRECT"
                                       : "8 threads, transfers of 1 MiB, through the page cache "
                                         "(O_DIRECT refused), dropped before each run");
-    bench_report_limit(r, "Plain read: the plane files of the lists that the view needs, each from "
-                          "end to end, into the same kind of memory as the ring's (pages of 2 MiB "
-                          "where the system has them), and a byte of every cache line is loaded, "
-                          "as whoever checks or draws what comes must. All fractions of disk are "
-                          "of this read. The machine under a virtual disk may hold the files in "
-                          "its own memory, for every stage alike.");
-    bench_report_limit(r, "Not looked at: nothing is loaded, and the processor never sees what was "
-                          "read. Into small pages: besides, into memory as the system gives it to "
-                          "any program, which costs a virtual disk more.");
-    bench_report_limit(r, "Lists streamed: the same bytes as the plain read, nothing left out, "
-                          "through the frame's ring: checked and handed out in draw order, not "
-                          "drawn.");
-    bench_report_limit(r, "Read alone: the frame's own plan, ring and checksums, with a renderer "
-                          "that takes batches and does nothing. Bricks that the plan leaves out "
-                          "are not read, so that its bytes are fewer, with holes in between.");
-    bench_report_limit(r, "Draw alone: the same frame with the data set in memory (null engine), "
-                          "besides the promise; gl copies it to memory of its own, the others draw "
-                          "it where it lies.");
+    bench_report_limit(
+        r, "plain read: the plane files of the lists that the view needs, each as a whole, into "
+           "pages like the ring's (2 MiB if the system has them). A byte of every cache line is "
+           "loaded, as checking and drawing do. All ratios to the disk use this read. The host of "
+           "a virtual disk may cache the files, equally for every stage.");
+    bench_report_limit(r, "blind: no byte is loaded. small pages: memory of the default page size, "
+                          "which costs more on a virtual disk.");
+    bench_report_limit(r, "lists streamed: the bytes of the plain read, through the frame's ring, "
+                          "verified and handed out in draw order, not drawn.");
+    bench_report_limit(
+        r, "read alone: the frame's plan, ring and checksums, with a renderer that does nothing. "
+           "The plan leaves out bricks, so that it reads fewer bytes, with gaps between them.");
+    bench_report_limit(
+        r, "draw alone: the same frame with the data set in memory (null engine), outside the "
+           "memory limit. gl copies the data to its own memory; cpu and reference do not.");
     if (t->frame.occluder)
-        bench_report_limit(r, "The frame leaves out bricks behind what is opaque, which reading "
-                              "alone cannot.");
-    bench_report_limit(r, "Memory: what was promised, what of it was taken and what was resident "
-                          "at most, code and libraries included, after one frame from disk.");
-    bench_report_limit(r, "Oblique perspective view that needs all three lists; stages take turns, "
-                          "and a figure is the middle run.");
+        bench_report_limit(
+            r, "The frame skips bricks behind opaque ones; read alone cannot skip them.");
+    bench_report_limit(r, "memory: the limit, the peak use, and the resident memory after one "
+                          "frame from disk, with code and libraries.");
+    bench_report_limit(r, "The view is oblique, in perspective, and needs all three lists. Stages "
+                          "run alternately, and figures are of median runs.");
 }
 
 static int measure(stream *t)
@@ -318,7 +315,7 @@ int bench_stream(const session *s, const bench_options *o, bench_report *r)
     bench_progress_expect(o->progress, 2 + STAGES * o->repeat);
     bench_progress_step(o->progress, "first frame");
     int status = open_frame(&t);
-    bench_progress_step(o->progress, "data set to memory");
+    bench_progress_step(o->progress, "loading the data set");
     if (!status)
         status = open_in_memory(&t, r);
     if (!status)

@@ -1,4 +1,5 @@
-/* bench submit: the forms of submission to OpenGL, beside Table 3 of Hofsetz, Max & Bastos 2008. */
+/* bench submit: compares the forms of submission to OpenGL with Table 3 of Hofsetz, Max & Bastos
+ * 2008. */
 #include "bench_tables.h"
 
 #include <string.h>
@@ -8,8 +9,8 @@
 
 enum { FORMS = 10, PAPER_SETS = 4 };
 
-/* Frames per second in Hofsetz, Max & Bastos 2008, Table 3; 0: did not fit. Their "align" is one
- * list, "pbuff" three lists merged. */
+/* Frames per second in Hofsetz, Max & Bastos 2008, Table 3; 0 means that the form did not fit.
+ * "align" in the paper is one list, and "pbuff" is three merged lists. */
 static const struct {
     bool indexed, triangles, fixed;
     trip_method method;
@@ -97,7 +98,8 @@ static void add_row(cJSON *rows, bench_runs *runs, const bench_frame *frame,
     cJSON_AddItemToArray(rows, row);
 }
 
-/* One counted frame, which also loads and compiles. A form that does not fit is left out. */
+/* Draws one counted frame, which also loads data and compiles shaders. Leaves out a form that does
+ * not fit. */
 static int warm_up(bench_frame *f, bench_cost *counted, bench_report *r, int form)
 {
     char why[256] = "";
@@ -106,7 +108,7 @@ static int warm_up(bench_frame *f, bench_cost *counted, bench_report *r, int for
     bench_keep_report(NULL);
     if (!status || form == 0 || trip_interrupted())
         return status;
-    bench_report_limit(r, "Left out: %s %s, %s: %s", forms[form].lists, forms[form].primitives,
+    bench_report_limit(r, "left out: %s %s, %s: %s", forms[form].lists, forms[form].primitives,
                        forms[form].orders, why);
     f->renderer = NULL;
     return 0;
@@ -133,8 +135,8 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
     if (!status) {
         cJSON *rows = bench_report_table(
             r, "submit",
-            "Oblique view, all three lists (2008, Table 3): speed against the first row", columns,
-            sizeof columns / sizeof columns[0]);
+            "Oblique view, all three lists (2008, Table 3); speed is relative to the first row",
+            columns, sizeof columns / sizeof columns[0]);
         for (int i = 0; i < FORMS; i++)
             add_row(rows, &runs, &frames[i], &counted[i], i);
     }
@@ -144,17 +146,18 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
 
 static void add_limits(bench_report *r)
 {
-    bench_report_limit(r, "Replicated lists go from memory to the GPU in every frame, indexed ones "
-                          "stay in its memory: here they are not the papers' two ways to fill "
-                          "vertex buffers, which both stayed there.");
-    bench_report_limit(r, "The papers' sprites are all of one size, as fixed sprites are; sprites "
-                          "as large as each splat are ours.");
-    bench_report_limit(r, "On a software GL all forms are bound by the processor's rasterising.");
-    bench_report_limit(r, "merge is with h = 0.85; the median is the middle run of runs that take "
-                          "turns.");
-    bench_report_limit(r, "2008: Hofsetz, Max & Bastos at 512 x 512 on a GeForce 7900 GT, whose "
-                          "Engine figures look bound by the display's 60 Hz; - where a form did "
-                          "not fit. Other objects, views and kernels.");
+    bench_report_limit(
+        r,
+        "replicated lists go from memory to the GPU in every frame; indexed lists stay in GPU "
+        "memory. The papers compare two ways to fill vertex buffers, which both stay on the GPU.");
+    bench_report_limit(r, "All sprites of the papers have the same size, like fixed sprites. "
+                          "Sprites with the size of each splat are an addition here.");
+    bench_report_limit(r, "With software OpenGL, rasterising on the processor limits all forms.");
+    bench_report_limit(r,
+                       "merge has h = 0.85. Times are medians of runs that are taken alternately.");
+    bench_report_limit(r, "2008: Hofsetz, Max & Bastos at 512 x 512 on a GeForce 7900 GT; the "
+                          "Engine seems limited by a display with 60 Hz. - means that the form did "
+                          "not fit. Objects, views and kernels differ.");
 }
 
 int bench_submit(const session *s, const bench_options *o, bench_report *r)

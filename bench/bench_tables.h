@@ -1,4 +1,5 @@
-/* The tables of `triptych bench`, a file each: bench_NAME.c. Each measures and fills the report. */
+/* The tables of `triptych bench`. bench_NAME.c measures the table NAME and adds it to the report.
+ * Main thread only. */
 #ifndef TRIP_BENCH_TABLES_H
 #define TRIP_BENCH_TABLES_H
 
@@ -8,9 +9,9 @@ int bench_orders(const session *s, const bench_options *o, bench_report *r);
 int bench_submit(const session *s, const bench_options *o, bench_report *r);
 int bench_stream(const session *s, const bench_options *o, bench_report *r);
 int bench_popping(const session *s, const bench_options *o, bench_report *r);
-/* Without a session: of volumes that it makes. */
+/* With s NULL, measures volumes that it makes. */
 int bench_levels(const session *s, const bench_options *o, bench_report *r);
-/* Without a session: it opens the data set as the viewer does. */
+/* Ignores s, and opens the data set as the viewer does. */
 int bench_flight(const session *s, const bench_options *o, bench_report *r);
 int bench_ewa(const session *s, const bench_options *o, bench_report *r);
 int bench_variants(const session *s, const bench_options *o, bench_report *r);

@@ -1,5 +1,5 @@
-/* bench variants: what the papers' shortcuts, and the method they are an answer to, change in the
- * picture, by the reference. */
+/* bench variants: measures the change of the picture by the shortcuts of the papers, and by
+ * image-aligned sheets, with the reference renderer. */
 #include "bench_tables.h"
 
 #include <math.h>
@@ -19,7 +19,7 @@ static const struct form {
 } variants[] = {
     { "merge, h = 0.85", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_EXACT, false, false },
     { "fixed sprites", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_FIXED, false, false },
-    { "weights of vertices", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_EXACT, true, false },
+    { "vertex weights", TRIP_METHOD_MERGE, 0.85, TRIP_FOOTPRINT_EXACT, true, false },
     { "clip", TRIP_METHOD_CLIP, 0, TRIP_FOOTPRINT_EXACT, false, false },
     { "axis", TRIP_METHOD_AXIS, 0, TRIP_FOOTPRINT_EXACT, false, false },
     { "image-aligned sheets", TRIP_METHOD_IMAGE, 0, TRIP_FOOTPRINT_EXACT, false, false },
@@ -30,7 +30,7 @@ enum { VARIANTS = sizeof variants / sizeof variants[0] };
 
 static const bench_column columns[] = {
     { "form", "form", 0, 0 }, { "mean", "mean", 3, 0 }, { "percentile_99", "99 %", 2, 0 },
-    { "max", "max", 1, 0 }, { "ms", "ms", 0, 0 },
+    { "max", "max", 1, 0 },   { "ms", "ms", 0, 0 },
 };
 
 static int ascending(const void *a, const void *b)
@@ -39,7 +39,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Over the components of those pixels that either covers; `apart` has room for all. */
+/* Compares the components of the pixels that either picture covers. `apart` is scratch memory for a
+ * picture. */
 static void compare(const float *a, const float *b, size_t pixels, float *apart, cJSON *row)
 {
     size_t count = 0;
@@ -55,15 +56,15 @@ static void compare(const float *a, const float *b, size_t pixels, float *apart,
     cJSON_AddNumberToObject(row, "max", some ? 255 * (double)apart[count - 1] : 0);
 }
 
-/* The first form's picture is kept in `usual`. */
+/* `defaults` keeps the picture of the first form. */
 static int measure(bench_frame *frame, const bench_options *o, float *defaults, float *apart,
                    bench_report *r)
 {
     static const double none[4] = { 0 };
     const size_t pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1];
     cJSON *rows = bench_report_table(
-        r, "variants", "Oblique view: changes of the picture against the first row's, of 255",
-        columns, sizeof columns / sizeof columns[0]);
+        r, "variants", "Oblique view: change of the picture against the first row, of 255", columns,
+        sizeof columns / sizeof columns[0]);
     int status = 0;
     frame->view = bench_view_oblique(frame->session, o->sizes[0]);
     memset(frame->settings.background, 0, sizeof frame->settings.background);
@@ -91,13 +92,13 @@ static int measure(bench_frame *frame, const bench_options *o, float *defaults, 
 
 static void add_limits(bench_report *r)
 {
-    bench_report_limit(r, "By the reference, in double precision: times are of one frame each and "
-                          "say little. Components of the pixels that either picture covers, "
-                          "premultiplied, without background.");
-    bench_report_limit(r, "Fixed sprites: Hofsetz, Max & Bastos 2008, section 5.2, who call the "
-                          "difference negligible. Weights of vertices: section 4.2. Colour over "
-                          "opacity: Hofsetz & Max 2005, section 5, step 3. Image-aligned sheets: "
-                          "Mueller & Crawfis 1998.");
+    bench_report_limit(r, "The reference draws in double precision, and times are of a single "
+                          "frame. Errors are over the components of the pixels that either picture "
+                          "covers, premultiplied, without background.");
+    bench_report_limit(
+        r, "fixed sprites: Hofsetz, Max & Bastos 2008, section 5.2, where the difference is called "
+           "negligible. vertex weights: section 4.2. colour over opacity: Hofsetz & Max 2005, "
+           "section 5, step 3. image-aligned sheets: Mueller & Crawfis 1998.");
 }
 
 int bench_variants(const session *s, const bench_options *o, bench_report *r)
@@ -112,8 +113,9 @@ int bench_variants(const session *s, const bench_options *o, bench_report *r)
         defaults = trip_budget_take(s->budget, bytes);
         apart = trip_budget_take(s->budget, bytes);
         if (!defaults || !apart)
-            status = trip_fail(TRIP_ERROR, "bench", "variants",
-                               "two pictures more do not fit the memory given; raise --memory");
+            status = trip_fail(
+                TRIP_ERROR, "bench", "variants",
+                "two more pictures do not fit the memory; raise --memory or reduce --size");
     }
     if (!status) {
         add_limits(r);

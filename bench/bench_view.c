@@ -2,7 +2,7 @@
 
 static const double fov_degrees = 30, fill = 0.95, degree = 3.14159265358979323846 / 180;
 
-/* The box of all splats, kernels included, in world space, and a view's basis. */
+/* The bounding box of all splats with their kernels in world space, and the axes of a view. */
 typedef struct framing {
     trip_vec3 corners[8], middle;
     trip_vec3 right, up, view_direction; /* unit length */
@@ -20,7 +20,7 @@ static void frame_box(framing *f, const session *s)
     f->middle = trip_scale(trip_add(f->corners[0], f->corners[7]), 0.5);
 }
 
-/* Directions of the index space, taken to the world. */
+/* Makes a view from directions in index space. */
 static framing make_framing(const session *s, trip_vec3 view_direction, trip_vec3 up)
 {
     framing f;
@@ -43,7 +43,7 @@ static trip_camera_params params(const framing *f, const int size[2], double dis
     };
 }
 
-/* How far off a perspective view of the middle has the whole box in the picture. */
+/* Returns the distance from the middle at which a perspective view shows the whole box. */
 static double distance_needed(const framing *f, const int size[2])
 {
     double slope_y = fill * tan(fov_degrees * degree / 2), distance = 0;
@@ -95,7 +95,7 @@ trip_camera_params bench_view_lateral(const session *s, const int size[2])
     return view;
 }
 
-/* The box seen as `render` would see it by default, turned by an angle about up. */
+/* Makes the default view of `render`, turned around the up direction. */
 static framing make_turned(const session *s, double azimuth_degrees)
 {
     framing f;

@@ -1,24 +1,23 @@
-/* The views that benchmarks draw. */
+/* The views of the benchmarks. Pure functions. */
 #ifndef TRIP_BENCH_VIEW_H
 #define TRIP_BENCH_VIEW_H
 
 #include "library_session.h"
 
-/* Perspective, along the diagonal of the index space, where the regions of all three lists meet in
- * the image's centre; all splats in the picture. */
+/* Returns a perspective view along the diagonal of index space. The regions of all three lists meet
+ * at the centre of the picture, which shows all splats. */
 trip_camera_params bench_view_oblique(const session *s, const int size[2]);
 
-/* Parallel, along Z of the index space: the image plane lies parallel to X-Y and one list has all
- * the weight. */
+/* Returns a parallel view along Z of index space. The image plane is parallel to X-Y, and one list
+ * has all the weight. */
 trip_camera_params bench_view_lateral(const session *s, const int size[2]);
 
-/* Perspective, from so many degrees of index space from X towards Y and a little above, at a
- * distance that does not depend on them; all splats in the picture but where they are far from 45.
- */
+/* Returns a perspective view from an angle in index space, from X towards Y, slightly above. The
+ * distance is the same for all angles. The picture shows all splats at angles near 45 degrees. */
 trip_camera_params bench_view_between(const session *s, const int size[2], double degrees);
 
-/* View `index` of `count` once round the object, from where `render` looks by default; perspective,
- * all splats in each picture. */
+/* Returns perspective view `index` of `count` around the object, starting at the default view of
+ * `render`. All views have the same distance and show all splats. */
 trip_camera_params bench_view_round(const session *s, const int size[2], int index, int count);
 
 #endif

@@ -14,7 +14,7 @@ static double now_ms(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-/* By the drawing thread. */
+/* Called by the drawing thread. */
 static void wake(void *user)
 {
     flyer *f = user;
@@ -24,7 +24,7 @@ static void wake(void *user)
     pthread_mutex_unlock(&f->lock);
 }
 
-/* Until something came, or that time. */
+/* Sleeps until wake() is called or until that time. */
 static void sleep_until(flyer *f, double ms)
 {
     const struct timespec t = { .tv_sec = (time_t)(ms / 1e3),
@@ -36,9 +36,9 @@ static void sleep_until(flyer *f, double ms)
     pthread_mutex_unlock(&f->lock);
 }
 
-/* ---- the way ---- */
+/* ---- the path ---- */
 
-/* The eye goes on by a step of part `part`, of `steps` in each. */
+/* Moves the eye by one step of a part with `steps` steps. */
 static void move(trip_navigation *n, const double *middle, double size, int part, int steps)
 {
     const double share = 1.0 / steps;
@@ -105,7 +105,7 @@ static bool has_room(flyer *f)
     return true;
 }
 
-/* The last step that had come by then. */
+/* Returns the newest step that had come at that time. */
 static int latest_at(const flyer *f, double ms)
 {
     int i = f->step_count - 1;
@@ -114,7 +114,7 @@ static int latest_at(const flyer *f, double ms)
     return i;
 }
 
-/* Keeps the last picture that is whole. */
+/* Keeps a copy of the picture if it is complete. */
 static void look(void *user, const trip_picture *p)
 {
     flyer *f = user;
@@ -133,7 +133,7 @@ static void note_picture(void *user, const trip_picture *p)
     flyer *f = user;
     const double ms = now_ms();
     const int step = step_of(f, &p->navigation);
-    look(f, p); /* that of the last step may come here */
+    look(f, p); /* also keeps the picture of the last step */
     if (step < 0 || !has_room(f))
         return;
     const flyer_picture *before = f->picture_count ? &f->pictures[f->picture_count - 1] : NULL;
@@ -148,7 +148,8 @@ static void note_picture(void *user, const trip_picture *p)
 
 /* ---- the flight ---- */
 
-/* Until the picture is whole; *first_ms becomes how long the first took, *whole_ms the whole. */
+/* Waits until the picture is complete. *first_ms is the time to the first picture, *whole_ms to the
+ * complete one. */
 static int await_rest(flyer *f, double *first_ms, double *whole_ms)
 {
     const double begun = now_ms();
@@ -169,7 +170,7 @@ static int await_rest(flyer *f, double *first_ms, double *whole_ms)
     }
     trip_frames_use_picture(f->frames, f->number, look, f);
     *whole_ms = now_ms() - begun;
-    return f->last ? 0 : trip_fail(TRIP_ERROR, "bench", "flight", "no picture could be kept");
+    return f->last ? 0 : trip_fail(TRIP_ERROR, "bench", "flight", "out of memory for a picture");
 }
 
 static void want_step(flyer *f)
@@ -180,7 +181,7 @@ static void want_step(flyer *f)
     trip_frames_want(f->frames, &f->wanted);
 }
 
-/* A step comes when it is time for it, whatever the drawing thread does. */
+/* Steps come at fixed times, independent of the drawing thread. */
 static int move_all(flyer *f)
 {
     f->begun_ms = now_ms();
@@ -209,7 +210,9 @@ static int start(flyer *f, const trip_frames_params *params)
     with.wake = wake;
     with.wake_user = f;
     f->frames = trip_frames_start(&with);
-    return f->frames ? 0 : trip_fail(TRIP_ERROR, "bench", "flight", "out of memory or threads");
+    return f->frames ? 0
+                     : trip_fail(TRIP_ERROR, "bench", "flight",
+                                 "cannot start the drawing thread; out of memory or threads");
 }
 
 int flyer_fly(flyer *f, const trip_frames_params *params, const trip_wanted *wanted, double seconds)

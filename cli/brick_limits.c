@@ -8,7 +8,7 @@
 
 #include "report.h"
 
-/* Of a larger data set only so much is written for the limit. */
+/* The write measurement stops at this size; the time for more bytes is extrapolated. */
 static const uint64_t max_written_bytes = (uint64_t)4 << 30;
 
 static const char *const stage_names[TRIPTYCH_STAGES] = { "scan", "read", "merge", "levels",
@@ -22,8 +22,9 @@ double brick_seconds(const triptych_brick_summary *s)
     return seconds;
 }
 
-/* A folder, a pattern or a header beside its data is not what holds the values; compressed values
- * are smaller than what they become, but hardly by this much. */
+/* Returns whether `path` itself contains the voxel values. Folders, patterns and headers with a
+ * separate data file do not. A compressed file may be smaller than its values, but not a thousand
+ * times. */
 static bool holds_values(const char *path, const triptych_brick_summary *s)
 {
     struct stat st;
@@ -59,7 +60,8 @@ int brick_limits_measure(brick_limits *l, const char *volume, const char *data_s
     return status;
 }
 
-/* Time as a multiple of the limits' sum; 0 where one is not known. */
+/* Returns the time of bricking divided by the time of both plain transfers, or 0 without a plain
+ * read. */
 static double ratio(const brick_limits *l, const triptych_brick_summary *s)
 {
     double limit = l->read.seconds + l->write.seconds;
@@ -85,9 +87,9 @@ void brick_limits_print(const brick_limits *l, const triptych_brick_summary *s)
     print_row(l->write.direct ? "plain write" : "cached write", l->write.seconds, 0,
               l->write.bytes);
     if (ratio(l, s) > 0)
-        printf("%.2f times plain read and plain write\n", ratio(l, s));
+        printf("%.2f times the plain read plus the plain write\n", ratio(l, s));
     else
-        printf("no plain read: the input is not one file that holds the values\n");
+        printf("no plain read: the input is not a single file with the values\n");
 }
 
 static cJSON *row(const char *name, double seconds, uint64_t read, uint64_t written)

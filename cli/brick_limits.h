@@ -1,5 +1,5 @@
-/* The stages of `triptych brick` beside what bounds them: a plain direct read of the input and a
- * plain write of as many bytes as the data set has, on the same disks, right after the run. */
+/* Compares the stages of `triptych brick` to a plain direct read of the input and a plain write of
+ * the data set's size. Both run on the same disks directly after bricking. Main thread only. */
 #ifndef TRIP_CLI_BRICK_LIMITS_H
 #define TRIP_CLI_BRICK_LIMITS_H
 
@@ -9,8 +9,9 @@
 #include "triptych_brick.h"
 
 typedef struct brick_limits {
-    plain_disk read;  /* no bytes where the input is not one file that holds the values */
-    plain_disk write; /* of the data set's bytes, or, of a large one, a part: seconds for all */
+    plain_disk read; /* bytes is 0 if the input is not a single file with the values */
+    plain_disk
+        write; /* large data sets are written in part; seconds is extrapolated to all bytes */
 } brick_limits;
 
 double brick_seconds(const triptych_brick_summary *s);

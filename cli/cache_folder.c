@@ -18,7 +18,7 @@
 enum { KEY_LENGTH = sizeof(cache_key) - 1, NAME_BYTES = 64 };
 static const uint64_t min_limit = UINT64_C(4) << 30;
 
-/* What a process that is no longer there may have left, besides its lock. */
+/* Suffixes of files that a killed process may leave, besides its lock. */
 static const char *const leftovers[] = { ".trip.partial", ".trip.spill", ".trip.replaced",
                                          ".gone" };
 enum { LEFTOVERS = sizeof leftovers / sizeof leftovers[0] };
@@ -29,7 +29,8 @@ static const char *file_name(const cache_key *key, const char *suffix, char name
     return name;
 }
 
-/* KEY and what follows it; NULL for any other name. */
+/* Stores the 32 digits of a name in *key and returns the rest, or NULL if the name is no cache
+ * entry. */
 static const char *parse_name(const char *name, cache_key *key)
 {
     if (strspn(name, "0123456789abcdef") != KEY_LENGTH)
@@ -39,21 +40,19 @@ static const char *parse_name(const char *name, cache_key *key)
     return name + KEY_LENGTH;
 }
 
-/* The folder */
-
 static int find_path(char **path)
 {
     const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
     int length = -1;
-    if (cache && cache[0] == '/') /* others are to be ignored, as its specification has it */
+    if (cache && cache[0] == '/') /* the XDG specification ignores relative paths */
         length = asprintf(path, "%s/triptych", cache);
     else if (home && home[0] == '/')
         length = asprintf(path, "%s/.cache/triptych", home);
     else {
         *path = NULL;
         return trip_fail(TRIP_ERROR, "cache", "HOME",
-                         "is not set, so there is no folder for the cache: set XDG_CACHE_HOME to "
-                         "one, or use `triptych brick`");
+                         "is not set, so the cache has no folder; set XDG_CACHE_HOME to a folder, "
+                         "or use `triptych brick`");
     }
     if (length >= 0)
         return 0;
@@ -63,13 +62,13 @@ static int find_path(char **path)
 
 static int fail_to_write(const char *path, const char *stage)
 {
-    return trip_fail(TRIP_ERROR, "cache", path,
-                     "cannot be %s: %s; set XDG_CACHE_HOME to a folder that can be written, or use "
-                     "`triptych brick`",
-                     stage, strerror(errno));
+    return trip_fail(
+        TRIP_ERROR, "cache", path,
+        "cannot be %s: %s; set XDG_CACHE_HOME to a writable folder, or use `triptych brick`", stage,
+        strerror(errno));
 }
 
-/* With the folder it is in, which need not be there on a new account. */
+/* Creates the folder and, if necessary, its parent: a new account may lack ~/.cache. */
 static int make_folder(char *path)
 {
     char *slash = strrchr(path, '/');
@@ -81,18 +80,19 @@ static int make_folder(char *path)
     return mkdir(path, 0700) < 0 && errno != EEXIST ? fail_to_write(path, "made") : 0;
 }
 
-/* Who else could write there could exchange what is drawn. */
+/* Refuses a folder that another user can write, because that user could replace the data. */
 static int check_folder(const cache_folder *c)
 {
     struct stat st;
     if (fstat(c->fd, &st) < 0)
-        return trip_fail_errno("cache", c->path, "cannot look at");
+        return trip_fail_errno("cache", c->path, "cannot get the status");
     if (st.st_uid != geteuid())
         return trip_fail(TRIP_ERROR, "cache", c->path,
                          "belongs to another user; set XDG_CACHE_HOME to a folder of your own");
     if (st.st_mode & (S_IWGRP | S_IWOTH))
-        return trip_fail(TRIP_ERROR, "cache", c->path,
-                         "can be written by other users: `chmod 700` makes it yours alone");
+        return trip_fail(
+            TRIP_ERROR, "cache", c->path,
+            "is writable by other users; restrict it with `chmod 700`, or set XDG_CACHE_HOME");
     return 0;
 }
 
@@ -124,7 +124,7 @@ int cache_folder_open(cache_folder *c, bool make)
         return 0;
     if (c->fd < 0 && (errno == ELOOP || errno == ENOTDIR))
         return trip_fail(TRIP_ERROR, "cache", c->path,
-                         "is a link or a file, not a folder: remove it, or set XDG_CACHE_HOME");
+                         "is a link or a file; remove it, or set XDG_CACHE_HOME to a folder");
     if (c->fd < 0)
         return trip_fail_errno("cache", c->path, "cannot open");
     status = check_folder(c);
@@ -148,15 +148,13 @@ char *cache_folder_path(const cache_folder *c, const cache_key *key)
     return NULL;
 }
 
-/* Data sets in use */
-
 static int open_folder(const cache_folder *c, const char *name)
 {
     return openat(c->fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 }
 
-/* Between opening a data set's folder and locking it nobody may remove it, and the other way round:
- * both happen under a lock on the cache's folder. */
+/* A shared lock on the cache's folder keeps cache_folder_remove() out between opening a data set's
+ * folder and locking it. */
 int cache_folder_hold(const cache_folder *c, const cache_key *key)
 {
     char name[NAME_BYTES];
@@ -170,7 +168,8 @@ int cache_folder_hold(const cache_folder *c, const cache_key *key)
     return fd;
 }
 
-/* Removes a folder of ours with the files in it; a folder inside stays, and so does this one. */
+/* Removes a data set's folder and its files. Subfolders are never entered; they and their parent
+ * remain. */
 static bool remove_folder(const cache_folder *c, const char *name)
 {
     int fd = open_folder(c, name);
@@ -203,8 +202,6 @@ bool cache_folder_remove(const cache_folder *c, const cache_key *key)
     return removed;
 }
 
-/* What is remembered */
-
 bool cache_folder_recall(const cache_folder *c, const cache_key *state, cache_key *key)
 {
     char name[NAME_BYTES], target[NAME_BYTES];
@@ -216,7 +213,7 @@ bool cache_folder_recall(const cache_folder *c, const cache_key *state, cache_ke
     return rest && !*rest;
 }
 
-/* In one step, so that another process sees the old one or the new one. */
+/* The rename is atomic: another process sees either the old link or the new one. */
 void cache_folder_remember(const cache_folder *c, const cache_key *state, const cache_key *key)
 {
     char name[NAME_BYTES], made[NAME_BYTES];
@@ -227,8 +224,6 @@ void cache_folder_remember(const cache_folder *c, const cache_key *state, const 
         unlinkat(c->fd, made, 0);
 }
 
-/* Locks */
-
 static bool is_named(const cache_folder *c, int fd, const char *name)
 {
     struct stat a, b;
@@ -236,7 +231,7 @@ static bool is_named(const cache_folder *c, int fd, const char *name)
            a.st_dev == b.st_dev && a.st_ino == b.st_ino;
 }
 
-/* -1: another process holds it, or it cannot be opened, as errno says. */
+/* Returns -1 if another process holds the lock (errno is EWOULDBLOCK) or if opening failed. */
 static int try_lock(const cache_folder *c, const cache_key *key)
 {
     char name[NAME_BYTES];
@@ -252,7 +247,7 @@ static int try_lock(const cache_folder *c, const cache_key *key)
         }
         if (is_named(c, fd, name))
             return fd;
-        close(fd); /* its holder removed it when its work was done */
+        close(fd); /* the holder finished and removed the file after it was opened here */
     }
 }
 
@@ -278,8 +273,6 @@ void cache_folder_unlock(const cache_folder *c, const cache_key *key, int fd)
     unlinkat(c->fd, file_name(key, ".lock", name), 0);
     close(fd);
 }
-
-/* What there is */
 
 static uint64_t folder_bytes(int fd)
 {
@@ -319,7 +312,7 @@ static int by_use(const void *a, const void *b)
                                     : strcmp(x->key.text, y->key.text);
 }
 
-/* Calls visit() with the key and the rest of every name that may be ours. */
+/* Calls visit() with the key and the suffix of every name that may be a cache entry. */
 static int visit_names(const cache_folder *c,
                        int (*visit)(const cache_folder *c, const char *name, const cache_key *key,
                                     const char *rest, void *user),
@@ -375,7 +368,7 @@ int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count)
     return status;
 }
 
-/* What nobody is at work on: leftovers of killed processes, links to what is gone. */
+/* Removes the leftovers of killed processes and links to data sets that no longer exist. */
 static int clean_name(const cache_folder *c, const char *name, const cache_key *key,
                       const char *rest, void *user)
 {

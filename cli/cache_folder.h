@@ -1,12 +1,14 @@
-/* The folder that `render` keeps data sets of volumes in: $XDG_CACHE_HOME/triptych, else
- * $HOME/.cache/triptych. The folder is the index; KEY is 32 hexadecimal digits:
+/* The cache: the folder in which `render`, `view` and `serve` keep data sets of volumes. It is
+ * $XDG_CACHE_HOME/triptych, else $HOME/.cache/triptych. Its file names are the index. KEY is 32
+ * hexadecimal digits:
  *
- *   KEY.trip                     a data set; its time of change is when it was last used
- *   KEY.link                     a symbolic link, to KEY: what a file in a known state has become
- *   KEY.lock, KEY.trip.partial, KEY.trip.spill, KEY.gone   while one is made or removed
+ *   KEY.trip    a data set; its modification time is the time of its last use
+ *   KEY.link    a symbolic link from the state of a volume's files to the key of their data set
+ *   KEY.lock, KEY.trip.partial, KEY.trip.spill, KEY.gone    while one is made or removed
  *
- * Only the user may write there, nothing outside of it is ever followed or removed, and any number
- * of processes may use it at once. One thread. */
+ * Only the user may write in the folder. No operation follows a link, or removes anything outside
+ * the folder. Any number of processes may use it at once. Each cache_folder belongs to one thread.
+ */
 #ifndef TRIP_CLI_CACHE_FOLDER_H
 #define TRIP_CLI_CACHE_FOLDER_H
 
@@ -14,14 +16,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* 32 hexadecimal digits. */
+/* 32 hexadecimal digits and a terminating zero. */
 typedef struct cache_key {
     char text[33];
 } cache_key;
 
 typedef struct cache_folder {
     char *path;
-    int fd;               /* -1: there is none */
+    int fd;               /* -1 if the folder does not exist */
     uint64_t limit_bytes; /* for all data sets together */
 } cache_folder;
 
@@ -31,34 +33,36 @@ typedef struct cache_entry {
     int64_t used_ns; /* since 1970 */
 } cache_entry;
 
-/* Makes the folder if `make`; else fd is -1 where there is none. TRIPTYCH_CACHE_SIZE sets the
- * limit; without it, it is a tenth of the disk, at least 4 GiB. Close it also after a failure. */
+/* Opens the folder, and creates it if `make` is true. Otherwise a missing folder is no failure, and
+ * fd is -1. TRIPTYCH_CACHE_SIZE sets the limit; its default is a tenth of the disk, at least 4 GiB.
+ * The caller closes the object even after a failure. */
 int cache_folder_open(cache_folder *c, bool make);
 void cache_folder_close(cache_folder *c);
 
-/* Path of a data set, for free(); NULL once reported that memory is out. */
+/* Returns the path of a data set; the caller frees it. Returns NULL after reporting that memory is
+ * exhausted. */
 char *cache_folder_path(const cache_folder *c, const cache_key *key);
 
-/* Opens a data set's folder, so that it stays while the descriptor is open, and notes that it was
- * used. -1: there is none. */
+/* Opens a data set's folder and updates its time of last use. The data set cannot be removed until
+ * the caller closes the descriptor. Returns -1 if it does not exist. */
 int cache_folder_hold(const cache_folder *c, const cache_key *key);
 
-/* The key that was remembered for a state. */
+/* Finds the key that was remembered for a state; false if there is none. */
 bool cache_folder_recall(const cache_folder *c, const cache_key *state, cache_key *key);
 void cache_folder_remember(const cache_folder *c, const cache_key *state, const cache_key *key);
 
-/* Waits until no other process makes this data set; `waiting` is called now and then. The
- * descriptor goes to cache_folder_unlock(); negative: a reported failure. */
+/* Waits until no other process makes this data set, and calls `waiting` every 50 ms meanwhile. The
+ * caller passes the descriptor to cache_folder_unlock(). A negative value is a reported failure. */
 int cache_folder_lock(const cache_folder *c, const cache_key *key, void (*waiting)(void *user),
                       void *user);
 void cache_folder_unlock(const cache_folder *c, const cache_key *key, int fd);
 
-/* All data sets, the least recently used first; for free(). */
+/* Lists all data sets, the least recently used first; the caller frees *out. */
 int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count);
-/* False where it is in use, or cannot be removed. */
+/* Returns false if the data set is in use or cannot be removed. */
 bool cache_folder_remove(const cache_folder *c, const cache_key *key);
-/* Removes what was used least recently until all takes at most `bytes`, and what killed processes
- * left. Data sets in use stay. */
+/* Removes the least recently used data sets until all take at most `bytes`, then the leftovers of
+ * killed processes. Data sets in use stay. */
 int cache_folder_shrink(const cache_folder *c, uint64_t bytes);
 
 #endif

@@ -13,16 +13,17 @@
 
 #define INDEX_NAME "index.trip"
 
-/* Files are read for their content up to this, which takes about a second. */
+/* Files up to this size in total are identified by their content. Reading them takes about a
+ * second. */
 static const uint64_t max_content_bytes = UINT64_C(1) << 30;
 
-/* While a volume is looked for and bricked. */
+/* State of a search for a volume's data set, and of bricking it. */
 typedef struct search {
     cached_volume *v;
     triptych *t;
     const char *volume;
     triptych_brick_options options;
-    triptych_identity identity; /* of the files as they were when the key was found */
+    triptych_identity identity; /* of the files when the key was found */
 } search;
 
 static double now_seconds(void)
@@ -52,7 +53,7 @@ bool cached_volume_wanted(const char *input)
     return !named && !has_index(input);
 }
 
-/* Shows on a terminal that another process makes it. */
+/* Shows on a terminal that another process is bricking the same volume. */
 static void on_wait(void *user)
 {
     trip_progress *p = user;
@@ -64,8 +65,8 @@ static int identify(search *s, uint64_t max_bytes)
     return triptych_identify(s->t, s->volume, &s->options, max_bytes, &s->identity);
 }
 
-/* Large files are distinguished by their times alone, which must then differ after every later
- * change. A clock that is wrong is not waited for. */
+/* Large files are identified by their modification times. Waits until these are old enough that any
+ * later change gives a different time, at most 3 seconds in case the clock is wrong. */
 static int wait_until_stable(search *s)
 {
     int status = 0;
@@ -85,7 +86,7 @@ static cache_key key_of(const char text[33])
     return key;
 }
 
-/* By what the files hold, or, of large ones, by their state. */
+/* Derives the key from the content of the files, or from their state if they are large. */
 static int find_content_key(search *s, cache_key *key)
 {
     bool read = s->identity.bytes <= max_content_bytes;
@@ -110,7 +111,7 @@ static int find_key(search *s)
     return status;
 }
 
-/* Whether the files are still those that the key is of. */
+/* Checks that the files have not changed since their key was found. */
 static int check_unchanged(search *s)
 {
     const triptych_identity before = s->identity;
@@ -120,12 +121,13 @@ static int check_unchanged(search *s)
     if (same && !before.stable)
         status = find_content_key(s, &key);
     if (status == 0 && (!same || strcmp(key.text, s->v->key.text)))
-        return trip_fail(TRIP_ERROR, "read", s->volume,
-                         "changed while it was read: draw it again when it is complete");
+        return trip_fail(
+            TRIP_ERROR, "read", s->volume,
+            "changed while it was read; run the command again when the file is complete");
     return status;
 }
 
-/* Where the memory given does not suffice, the failure comes from drawing. */
+/* Returns true also if the index does not fit the memory: drawing reports that failure. */
 static bool opens(const search *s)
 {
     struct stat st;
@@ -143,7 +145,7 @@ static bool opens(const search *s)
     return opened;
 }
 
-/* True when there is a data set that can be opened; a damaged one is removed. */
+/* Takes the data set from the cache if it exists and can be opened. Removes a damaged one. */
 static bool take(search *s)
 {
     cached_volume *v = s->v;
@@ -152,7 +154,7 @@ static bool take(search *s)
         return false;
     if (opens(s))
         return true;
-    trip_warn(s->volume, "its data set in the cache is damaged and is made anew");
+    trip_warn(s->volume, "its data set in the cache is damaged and will be made again");
     close(v->hold);
     v->hold = -1;
     cache_folder_remove(&v->folder, &v->key);
@@ -173,7 +175,7 @@ static int brick(search *s)
     return cache_folder_shrink(&v->folder, v->folder.limit_bytes);
 }
 
-/* Only one process bricks it; the others find it when they get the lock. */
+/* Bricks the volume under a lock. Other processes that wait for the lock then find the data set. */
 static int make(search *s)
 {
     cached_volume *v = s->v;
@@ -187,7 +189,7 @@ static int make(search *s)
     return status;
 }
 
-/* 1: it is there. */
+/* Returns 1 if the cache holds the data set, else 0. */
 static int find(search *s)
 {
     cached_volume *v = s->v;
@@ -248,7 +250,7 @@ void cached_volume_check(cached_volume *v, triptych *t, const char *volume)
         close(v->hold);
         v->hold = -1;
         cache_folder_remove(&v->folder, &v->key);
-        trip_warn(volume, "its data set in the cache is damaged and is removed: the same command "
-                          "makes it anew");
+        trip_warn(volume, "its data set in the cache was damaged and has been removed; the same "
+                          "command makes it again");
     }
 }

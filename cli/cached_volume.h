@@ -1,37 +1,38 @@
-/* A volume's data set in the cache: found there, or bricked into it first. What it is kept under is
- * the content of the volume's files and the options; so a changed file is another data set, and a
- * copy the same. The files' content is read once and remembered for as long as their times do not
- * change. Files of more than 1 GiB together are distinguished by place, size and times alone. */
+/* Finds a volume's data set in the cache, or bricks the volume into it. The key is a hash of the
+ * files' content and the options. A changed file therefore has another data set, and a copy has the
+ * same one. The content is read once and remembered until the files' times change. Files of more
+ * than 1 GiB in total are identified by path, size and times instead. Main thread only. */
 #ifndef TRIP_CLI_CACHED_VOLUME_H
 #define TRIP_CLI_CACHED_VOLUME_H
 
 #include "cache_folder.h"
 #include "library.h"
 
-/* Zeroed at first. */
+/* Zeroed before its first use. */
 typedef struct cached_volume {
     char *path; /* of the data set */
     cache_key key;
     cache_folder folder;
-    int hold;       /* keeps the data set from being removed */
-    double seconds; /* that bricking took; 0 where it was there */
+    int hold;       /* a descriptor that protects the data set from removal */
+    double seconds; /* time of bricking; 0 if the data set was in the cache */
 } cached_volume;
 
-/* Whether the input of a command that draws is to be bricked: it is no folder with a data set in
- * it, and not named NAME.trip. */
+/* Returns whether a command has to brick its input first: the input is not named NAME.trip, and is
+ * not a folder with a data set. */
 bool cached_volume_wanted(const char *input);
 
-/* The data set that bricking `volume` with the options makes. The context has none open before and
- * after. Close it also after a failure. */
+/* Finds or makes the data set of `volume` for the options. The context has no data set open before
+ * the call or after it. The caller closes *v even after a failure. */
 int cached_volume_open(cached_volume *v, triptych *t, const char *volume,
                        const triptych_brick_options *options);
-/* The same where it is there already: 1; else 0. */
+/* Returns 1 if the cache already holds the data set, 0 if not, or a negative code after a
+ * failure. */
 int cached_volume_find(cached_volume *v, triptych *t, const char *volume,
                        const triptych_brick_options *options);
 void cached_volume_close(cached_volume *v);
 
-/* After drawing failed: removes the data set where it is damaged. Closes what the context has open.
- */
+/* Checks the data set after drawing failed, and removes it if it is damaged. Closes the context's
+ * data set. */
 void cached_volume_check(cached_volume *v, triptych *t, const char *volume);
 
 #endif

@@ -1,11 +1,11 @@
-/* Options that say what is cut away, of `render`, `view` and `serve`. Each reports a bad value,
- * naming the option, and returns TRIP_USAGE. Main thread only. */
+/* Clipping options of `render`, `view` and `serve`. Each function reports a bad value, naming the
+ * option, and returns TRIP_USAGE. Main thread only. */
 #ifndef TRIP_CLI_CLIP_OPTIONS_H
 #define TRIP_CLI_CLIP_OPTIONS_H
 
 #include "triptych.h"
 
-/* The keys are KEY_CLIP_BOX and KEY_CLIP_PLANE. */
+/* Requires the keys KEY_CLIP_BOX and KEY_CLIP_PLANE. */
 #define TRIP_OPTIONS_CLIP(group)                                                                   \
     { "clip-box",                                                                                  \
       KEY_CLIP_BOX,                                                                                \
@@ -20,9 +20,9 @@
             group                                                                                  \
     }
 
-/* "X,Y,Z,X,Y,Z", or the same in voxels behind "voxels:". */
+/* Parses "X,Y,Z,X,Y,Z" in world units, or "voxels:I,J,K,I,J,K". */
 int trip_option_clip_box(const char *text, triptych_clip *clip);
-/* "A,B,C,D"; one plane more each time. */
+/* Parses "A,B,C,D" and appends the plane. */
 int trip_option_clip_plane(const char *text, triptych_clip *clip);
 
 #endif

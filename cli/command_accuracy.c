@@ -1,4 +1,4 @@
-/* triptych accuracy: measured in accuracy/. */
+/* triptych accuracy: accuracy/ implements it. */
 #include "accuracy.h"
 
 #include "commands.h"

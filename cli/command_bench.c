@@ -1,4 +1,4 @@
-/* triptych bench: measured in bench/. */
+/* triptych bench: bench/ implements it. */
 #include "bench.h"
 
 #include "commands.h"

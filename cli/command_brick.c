@@ -1,4 +1,4 @@
-/* triptych brick: turns a volume into a data set, once. */
+/* triptych brick: converts a volume into a data set. */
 #include "commands.h"
 
 #include <cjson/cJSON.h>
@@ -149,7 +149,7 @@ static const struct argp_option option_table[] = {
     { 0 },
 };
 
-/* "256,256,128" or "256x256x128". */
+/* Parses "256,256,128" or "256x256x128". */
 static int parse_size(const char *text, int64_t dims[3])
 {
     char commas[128];
@@ -161,7 +161,8 @@ static int parse_size(const char *text, int64_t dims[3])
     int status = trip_option_numbers("--size", commas, 3, 3, numbers, &count);
     for (int a = 0; a < 3 && status == 0; a++) {
         if (!(numbers[a] >= 1) || numbers[a] > INT32_MAX || numbers[a] != floor(numbers[a]))
-            return trip_option_fail("--size", "takes three whole numbers, each 1 or more");
+            return trip_option_fail("--size",
+                                    "takes three whole numbers, each 1 or more, as X,Y,Z");
         dims[a] = (int64_t)numbers[a];
     }
     return status;
@@ -172,19 +173,19 @@ static int parse_offset(const char *text, uint64_t *bytes)
     double number;
     if (!trip_text_to_double(text, &number) || number != floor(number) || number < 0 ||
         number > 0x1p62)
-        return trip_option_fail("--offset", "takes a number of bytes");
+        return trip_option_fail("--offset", "takes a whole number of bytes, 0 or more");
     *bytes = (uint64_t)number;
     return 0;
 }
 
-/* "LO:HI"; an empty side is open. */
+/* Parses "LO:HI"; an empty side is open. */
 static int parse_range(options *o, const char *text)
 {
     triptych_range *r = &o->ranges[o->brick.range_count];
     const char *colon = strchr(text, ':');
     char lo[64] = "";
     if (o->brick.range_count == MAX_RANGES)
-        return trip_option_fail("--range", "is given too often");
+        return trip_option_fail("--range", "given too often; at most 64 ranges are possible");
     if (!colon || colon - text >= (int)sizeof lo)
         return trip_option_fail("--range", "takes two values with a colon between them, LO:HI");
     memcpy(lo, text, (size_t)(colon - text));
@@ -196,7 +197,7 @@ static int parse_range(options *o, const char *text)
     return 0;
 }
 
-/* A voxel's index; "" leaves it as it is. */
+/* Parses the index of a voxel; an empty text keeps the value of *index. */
 static bool parse_index(const char *text, int64_t *index)
 {
     double number;
@@ -208,7 +209,7 @@ static bool parse_index(const char *text, int64_t *index)
     return good;
 }
 
-/* "I0:I1" at the start of a text, which goes on behind it. */
+/* Parses "I0:I1" and moves *text past it. */
 static bool parse_side(const char **text, int64_t *first, int64_t *past)
 {
     char side[64];
@@ -226,7 +227,7 @@ static bool parse_side(const char **text, int64_t *first, int64_t *past)
            (!colon[1] || *first < *past);
 }
 
-/* "I0:I1,J0:J1,K0:K1"; an empty side is open. */
+/* Parses "I0:I1,J0:J1,K0:K1"; an empty side is open. */
 static int parse_region(const char *text, triptych_brick_options *o)
 {
     bool good = true;
@@ -237,14 +238,16 @@ static int parse_region(const char *text, triptych_brick_options *o)
         text += good && a < 2;
     }
     return good ? 0
-                : trip_option_fail("--region", "takes voxels as I0:I1,J0:J1,K0:K1, each from the "
-                                               "first to before the second; empty sides are open");
+                : trip_option_fail("--region",
+                                   "takes voxel ranges I0:I1,J0:J1,K0:K1, each from the first "
+                                   "voxel to before the second; empty sides are open");
 }
 
 static int add_function(options *o, const char *path)
 {
     if (o->brick.function_count == MAX_FUNCTIONS)
-        return trip_option_fail("--tf", "is given too often");
+        return trip_option_fail("--tf",
+                                "given too often; at most 64 transfer functions are possible");
     o->functions[o->brick.function_count++] = path;
     return 0;
 }
@@ -264,7 +267,7 @@ static int parse_code_bits(const char *text, triptych_code_bits *bits)
     static const char *const names[] = { "auto", "8", "16", NULL };
     int choice = 0;
     int status = trip_option_choice("--code-bits", text, names, &choice);
-    *bits = (triptych_code_bits)choice; /* in their order */
+    *bits = (triptych_code_bits)choice; /* names[] has the order of the enum */
     return status;
 }
 
@@ -273,7 +276,7 @@ static int parse_normals(const char *text, triptych_normals *normals)
     static const char *const names[] = { "auto", "compact", "full", "none", NULL };
     int choice = 0;
     int status = trip_option_choice("--normals", text, names, &choice);
-    *normals = (triptych_normals)choice; /* in their order */
+    *normals = (triptych_normals)choice; /* names[] has the order of the enum */
     return status;
 }
 
@@ -334,7 +337,8 @@ static error_t parse_input_option(int key, char *argument, triptych_brick_option
         v->raw_type = argument;
         return triptych_is_raw_type(argument)
                    ? 0
-                   : trip_option_fail("--type", "no such type; for example uint8, int16 or float");
+                   : trip_option_fail("--type",
+                                      "unknown type; use for example uint8, int16 or float");
     case KEY_SPACING:
         return trip_option_spacing(argument, v->spacing);
     case KEY_AXES:
@@ -398,17 +402,18 @@ static error_t check_options(const options *o)
 {
     const triptych_brick_options *p = &o->brick;
     if (!o->volume)
-        return trip_option_fail("INPUT", "no volume given: `triptych brick VOLUME -o NAME.trip`");
+        return trip_option_fail("INPUT",
+                                "no volume given; use `triptych brick VOLUME -o NAME.trip`");
     if (p->keep_all && p->range_count)
-        return trip_option_fail("--range", "says nothing beside --keep-all");
+        return trip_option_fail("--range", "does not apply with --keep-all");
     if (o->dry_run && p->resume)
-        return trip_option_fail("--resume", "says nothing beside --dry-run");
+        return trip_option_fail("--resume", "does not apply with --dry-run");
     if (p->levels < 0 && p->levels_for)
-        return trip_option_fail("--levels-for", "says nothing beside --levels 0");
+        return trip_option_fail("--levels-for", "does not apply with --levels 0");
     if (o->limits && (o->quiet || o->dry_run))
-        return trip_option_fail("--limits", "prints nothing beside --quiet or --dry-run");
+        return trip_option_fail("--limits", "does not apply with --quiet or --dry-run");
     if (o->quiet && o->json)
-        return trip_option_fail("--json", "prints nothing beside --quiet");
+        return trip_option_fail("--json", "does not apply with --quiet");
     return 0;
 }
 
@@ -444,7 +449,7 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     }
 }
 
-/* INPUT's own name with .trip for what is after its first dot, in this folder. */
+/* The default output is the input's name up to its first dot, with .trip, in the current folder. */
 static int choose_output(options *o)
 {
     const char *input = o->volume;
@@ -461,7 +466,8 @@ static int choose_output(options *o)
         stem++;
     if (stem == 0 || asprintf(&o->default_output, "%.*s.trip", (int)stem, input + begin) < 0) {
         o->default_output = NULL;
-        return trip_option_fail("--output", "is needed: the input's name gives none");
+        return trip_option_fail("--output",
+                                "cannot be derived from the name of the input; use -o NAME.trip");
     }
     o->output = o->default_output;
     return 0;
@@ -544,7 +550,7 @@ static void print_text(const options *o, const triptych_brick_summary *s)
     printf("%-9s %s\n", "taken for", s->kind_title);
     printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
     if (s->halo)
-        printf("%-9s %llu neighbours of those, %s\n", "halo", (unsigned long long)s->halo,
+        printf("%-9s %llu neighbours of kept voxels, %s\n", "halo", (unsigned long long)s->halo,
                trip_format_bytes(s->halo_bytes, bytes));
     if (s->levels)
         printf("%-9s %u coarse, %s\n", "levels", s->levels,
@@ -562,7 +568,7 @@ static void print_text(const options *o, const triptych_brick_summary *s)
            s->stages[TRIPTYCH_STAGE_READ].seconds, s->stages[TRIPTYCH_STAGE_MERGE].seconds,
            s->stages[TRIPTYCH_STAGE_LEVELS].seconds, s->stages[TRIPTYCH_STAGE_FINISH].seconds,
            (double)s->input_bytes / 1e6 / (seconds > 0 ? seconds : 1));
-    printf("%-9s %s resident at most, %s promised for data\n", "memory",
+    printf("%-9s %s resident at peak, %s limit for data\n", "memory",
            trip_format_bytes(trip_memory_peak_rss_bytes(), peak),
            trip_format_bytes(s->memory_bytes, promise));
 }
@@ -585,9 +591,9 @@ static void print_estimate(const options *o, const triptych_brick_estimate *e)
 {
     char bytes[32], temporary[32], there[32];
     print_name("data set", o->output);
-    printf("%-9s about %.3g of %.3g voxels, and %.3g neighbours\n", "keeps", (double)e->kept,
+    printf("%-9s about %.3g of %.3g voxels, and %.3g halo voxels\n", "keeps", (double)e->kept,
            (double)e->voxels, (double)e->halo);
-    printf("%-9s about %s, %s of temporary data; %s are free\n", "takes",
+    printf("%-9s about %s, and %s of temporary data; %s are free\n", "takes",
            trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),
            trip_format_bytes(e->free_bytes, there));
     printf("%-9s about %.3g s\n", "time", e->seconds);

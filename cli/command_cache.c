@@ -1,4 +1,4 @@
-/* triptych cache: the data sets that `render` made of volumes, listed and removed. */
+/* triptych cache: lists or removes the data sets in the cache. */
 #include "commands.h"
 
 #include <cjson/cJSON.h>
@@ -29,7 +29,8 @@ static const struct argp_option option_table[] = {
 static error_t check_options(const options *o)
 {
     if (!o->list && !o->clear)
-        return trip_option_fail("ACTION", "none given: `triptych cache list` or `... clear`");
+        return trip_option_fail(
+            "ACTION", "no action given; use `triptych cache list` or `triptych cache clear`");
     if (o->clear && o->json)
         return trip_option_fail("--json", "applies to list only");
     return 0;
@@ -44,10 +45,12 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (o->list || o->clear)
-            return trip_option_fail(argument, "one action at a time");
+            return trip_option_fail(argument, "only one action is possible at a time");
         o->list = !strcmp(argument, "list");
         o->clear = !strcmp(argument, "clear");
-        return o->list || o->clear ? 0 : trip_option_fail(argument, "is neither list nor clear");
+        return o->list || o->clear
+                   ? 0
+                   : trip_option_fail(argument, "unknown action; use list or clear");
     case ARGP_KEY_END:
         return check_options(o);
     default:
@@ -55,8 +58,8 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     }
 }
 
-/* The volume's name, as the data set has it; for free(), NULL where it cannot be opened: the next
- * use makes it anew, so that nobody has to be told why. */
+/* Returns the volume's name from the notes of its data set; the caller frees it. Returns NULL
+ * without a message if the data set cannot be opened, because its next use makes it again. */
 static char *source_name(const char *path)
 {
     triptych *t = NULL;
@@ -173,13 +176,14 @@ static int clear(const cache_folder *c)
         status = cache_folder_list(c, &after, &has);
     count_entries(before, had, &had_bytes);
     count_entries(after, has, &has_bytes);
-    has = has < had ? has : had; /* others may be at work */
+    has = has < had ? has : had; /* another process may have added data sets */
     has_bytes = has_bytes < had_bytes ? has_bytes : had_bytes;
     if (status == 0)
         printf("removed %zu data set%s, %s\n", had - has, had - has == 1 ? "" : "s",
                trip_format_bytes(had_bytes - has_bytes, text));
     if (status == 0 && has > 0)
-        status = trip_fail(TRIP_ERROR, "cache", c->path, "%zu in use or not removable stay", has);
+        status = trip_fail(TRIP_ERROR, "cache", c->path,
+                           "%zu data sets remain: they are in use, or cannot be removed", has);
     free(before);
     free(after);
     return status;

@@ -1,4 +1,4 @@
-/* triptych info: what is in a data set, for people or as JSON, and whether it is sound. */
+/* triptych info: prints the contents of a data set, as text or JSON, and verifies it. */
 #include "commands.h"
 
 #include <cjson/cJSON.h>
@@ -39,41 +39,42 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (o->path)
-            return trip_option_fail(argument, "one data set at a time");
+            return trip_option_fail(argument, "only one data set is possible at a time");
         o->path = argument;
         return 0;
     case ARGP_KEY_END:
-        return o->path
-                   ? 0
-                   : trip_option_fail("NAME.trip", "no data set given: `triptych info NAME.trip`");
+        return o->path ? 0
+                       : trip_option_fail("NAME.trip",
+                                          "no data set given; use `triptych info NAME.trip`");
     default:
         return ARGP_ERR_UNKNOWN;
     }
 }
 
-/* A data set as it is shown. */
+/* The data set to print. */
 typedef struct data_set {
     const char *path;
     triptych *t;
     triptych_info info;
-    triptych_list *lists; /* info.lists of them */
-    trip_json source;     /* the notes, where they are JSON */
+    triptych_list *lists; /* array of info.lists elements */
+    trip_json source;     /* the notes, if they are JSON */
 } data_set;
 
-/* Along axis `axis` of a grid, in world space. */
+/* Returns the step along axis `axis` of a grid in world space. */
 static trip_vec3 direction(const double m[3][4], int axis)
 {
     return trip_v3(m[0][axis], m[1][axis], m[2][axis]);
 }
 
-/* The anatomical convention of world space; NULL where the data set gives none. */
+/* Returns the anatomical convention of world space, or NULL if the data set gives none. */
 static const char *space_of(const cJSON *text)
 {
     const char *space = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "space"));
     return trip_anatomy_known(space) ? space : NULL;
 }
 
-/* The box of world space about the whole grid, from edge to edge. */
+/* Computes the axis-aligned box in world space that contains the whole grid, including the outer
+ * halves of its border voxels. */
 static void grid_bounds(const triptych_info *info, double bounds[2][3])
 {
     trip_affine map;
@@ -97,7 +98,8 @@ static void kept_bounds(const triptych_info *info, double bounds[2][3])
     memcpy(bounds[1], info->hi, sizeof info->hi);
 }
 
-/* Every byte count below is exact in a double: files are far smaller than 2^53 bytes. */
+/* Numbers are doubles. Byte counts are exact in them, because files are far smaller than 2^53
+ * bytes. */
 static cJSON *number(double value)
 {
     char text[32];
@@ -160,7 +162,8 @@ static void add_bounds(cJSON *root, const char *name, double bounds[2][3])
     cJSON_AddItemToArray(corners, numbers(bounds[1], 3));
 }
 
-/* Where the volume lies: its map, its bounds and, of a patient, the ends that its axes point to. */
+/* Adds the index-to-world map and the bounds. For a patient, adds the anatomical directions of the
+ * axes. */
 static void add_world(cJSON *root, const triptych_info *info, const cJSON *text)
 {
     const char *space = space_of(text);
@@ -298,7 +301,7 @@ static void print_world(const triptych_info *info)
     print_bounds("kept in", bounds);
 }
 
-/* Where x, y and z of the world, and i, j and k of the grid point in the patient. */
+/* Prints the anatomical directions of x, y, z in the world and of i, j, k in the grid. */
 static void print_anatomy(const triptych_info *info, const char *space)
 {
     char words[TRIP_ANATOMY_WORDS];
@@ -309,7 +312,7 @@ static void print_anatomy(const triptych_info *info, const char *space)
                trip_anatomy_words(space, direction(info->index_to_world, a), words));
 }
 
-/* The top-level texts and numbers of the notes that brick left. */
+/* Prints the top-level strings of the notes that `triptych brick` stored. */
 static void print_notes(const cJSON *root)
 {
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
@@ -333,7 +336,7 @@ static void print_sizes(const data_set *d)
     printf("%-12s %s, %.4g per kept voxel", "size", trip_format_bytes(info->bytes, bytes),
            ((double)info->bytes - around) / kept);
     if (info->halo)
-        printf(" and %s of halo, %.4g with it", trip_format_bytes(halo_bytes(d), halo),
+        printf(" and %s of halo, %.4g with the halo", trip_format_bytes(halo_bytes(d), halo),
                (double)info->bytes / kept);
     printf("; index %s (%.2g %%)\n", trip_format_bytes(info->index_bytes, index),
            100.0 * (double)info->index_bytes / (double)info->bytes);
@@ -343,14 +346,14 @@ static void print_sizes(const data_set *d)
     putchar('\n');
 }
 
-/* Length of a step along an axis of a list's grid, in those of the data set's. */
+/* Returns the step along an axis of a list's grid, divided by the step of the data set's grid. */
 static double ratio(const triptych_info *info, const triptych_list *list, int axis)
 {
     return trip_length(direction(list->index_to_world, axis)) /
            trip_length(direction(info->index_to_world, axis));
 }
 
-/* A list; its grid where that is not the data set's. */
+/* Prints a list, and its grid if it belongs to a coarse level. */
 static void print_list(const triptych_info *info, const triptych_list *list)
 {
     char bytes[32], name[32], text[3][32];
@@ -383,7 +386,7 @@ static void print_text(const data_set *d)
     printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
            100.0 * (double)info->kept / voxels);
     if (info->halo)
-        printf("%-12s %llu neighbours of those, likewise\n", "halo",
+        printf("%-12s %llu neighbours of kept voxels, in each of three lists\n", "halo",
                (unsigned long long)info->halo);
     print_sizes(d);
     printf("%-12s tiles of %u x %u voxels over %u sheets\n", "bricks", info->tile_voxels,
@@ -420,7 +423,7 @@ static int show(const options *o, data_set *d, trip_budget *budget)
     else if (status == TRIP_OK)
         print_text(d);
     if (status == TRIP_OK && o->verify && !o->json)
-        printf("%-12s every page and record is as it was written\n", "verified");
+        printf("%-12s every page and record is intact\n", "verified");
     return status;
 }
 

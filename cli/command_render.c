@@ -18,27 +18,28 @@
 #include "sequence.h"
 #include "video.h"
 
-/* The context, whose helper for pictures ends with the program. */
+/* The context lives until the program ends, because its helper process for images does. */
 static triptych *context;
 
-/* Everything that lives as long as the command. */
+/* State of the command. */
 typedef struct drawing {
     render_options o;
     piped_tf function;
-    cached_volume volume; /* where the input is one */
+    cached_volume volume; /* if the input is a volume */
     triptych *t;
-    float *rgba, *depth; /* depth: NULL without --depth */
+    float *rgba, *depth; /* depth is NULL without --depth */
     sequence sequence;
-    bool by_cameras; /* frames are set by the sequence, not by turning the view that was found */
-    video *video;    /* NULL: pictures are written */
+    bool by_cameras; /* the sequence sets each frame's camera; else the first view is turned */
+    video *video;    /* NULL if frames go into image files */
     render_stats *stats;
     trip_progress progress;
-    int empty; /* pictures that show nothing */
+    int empty; /* number of pictures without any visible voxel */
 } drawing;
 
-/* What is kept of a volume: what is shown by default, and what functions show besides, so that
- * nothing is missing; everything where a window moves them, so that the next window finds it in the
- * cache. Without a sequence: what is shown by default alone. */
+/* Returns the options for bricking a volume. Bricking always keeps the voxels that the automatic
+ * transfer function shows. With a sequence, it also keeps the voxels that the sequence's transfer
+ * functions show. If a window moves the transfer function, it keeps every voxel, so that the next
+ * window finds its voxels in the cache. */
 static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
 {
     enum { THREAD_LIMIT = 256 };
@@ -83,8 +84,9 @@ static int open_data(drawing *d, const char *path)
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
-/* 1: opens what the cache has of a volume for drawing it by default, if that holds all that the
- * function shows; 0: it does not, or there are several. */
+/* Opens the data set that the cache holds for the default transfer function. Returns 1 if that data
+ * set also holds every voxel that the given transfer function shows, else 0. Returns 0 too if the
+ * sequence has transfer functions of its own. */
 static int open_default(drawing *d)
 {
     triptych_transfer_function look = d->o.function;
@@ -118,7 +120,7 @@ static int open_from_cache(drawing *d)
     return status ? status : triptych_set_transfer_function(d->t, &d->o.function);
 }
 
-/* What was chosen of the volume is said whether it was bricked now or before. */
+/* Prints the note of bricking also if the data set came from the cache. */
 static int open_volume(drawing *d)
 {
     int status = open_from_cache(d);
@@ -185,12 +187,11 @@ static void close_drawing(drawing *d)
     sequence_release(&d->sequence);
     if (d->t) {
         triptych_end(d->t);
-        triptych_close(d->t); /* the pictures too */
+        triptych_close(d->t); /* frees rgba and depth too */
     }
     cached_volume_close(&d->volume);
 }
 
-/* A view of the orbit or the path. */
 static int set_frame(drawing *d, int index)
 {
     if (d->by_cameras)
@@ -198,7 +199,7 @@ static int set_frame(drawing *d, int index)
     return triptych_turn(d->t, d->o.orbit ? 360.0 * index / d->o.orbit : 0);
 }
 
-/* Draws the frame that is begun. */
+/* Draws the frame after triptych_begin(). */
 static int draw_frame(drawing *d)
 {
     enum { LOOK_NS = 20000000 };
@@ -213,7 +214,7 @@ static int draw_frame(drawing *d)
     return status;
 }
 
-/* The plan before the frame is drawn, what it cost afterwards. */
+/* Prints the plan before the frame is drawn, and the cost afterwards. */
 static int draw_planned(drawing *d, int index)
 {
     int status = set_frame(d, index);
@@ -229,7 +230,7 @@ static int draw_planned(drawing *d, int index)
     return status;
 }
 
-/* The picture and its distances, if the frame goes into files of its own. */
+/* Writes the picture and its distances, unless the frame goes into a video. */
 static int write_image(void *user, triptych *t, int index, const float *rgba, const float *depth)
 {
     const drawing *d = user;
@@ -244,7 +245,7 @@ static int write_image(void *user, triptych *t, int index, const float *rgba, co
     return status;
 }
 
-/* Whether all that is to be seen is what lies behind the volume. */
+/* Returns whether the picture shows only the background. */
 static bool is_empty(const render_options *o, const float *rgba)
 {
     const double *ground = o->settings.background;
@@ -258,17 +259,14 @@ static bool is_empty(const render_options *o, const float *rgba)
 static void warn_of_empty(const drawing *d)
 {
     const int frames = d->sequence.frames;
-    char which[64] = "the picture shows";
+    char which[64] = "the picture is empty";
     if (frames > 1)
-        snprintf(which, sizeof which, "%d of %d pictures show", d->empty, frames);
+        snprintf(which, sizeof which, "%d of %d pictures are empty", d->empty, frames);
     if (d->empty)
-        trip_warn(d->o.output,
-                  "%s nothing but the background: the view, what is cut away and the function "
-                  "decide what is to be seen",
-                  which);
+        trip_warn(d->o.output, "%s: check the view, the clipping and the transfer function", which);
 }
 
-/* What follows in the order of the frames. */
+/* Adds the picture to the video and prints its summary; called in the order of the frames. */
 static int finish_image(void *user, triptych *t, int index, const float *rgba)
 {
     drawing *d = user;
@@ -292,8 +290,8 @@ static int draw_image(drawing *d, int index)
     return status ? status : finish_image(d, d->t, index, d->rgba);
 }
 
-/* How many frames are drawn at once: one where each is to be timed, or where a second
- * would take what the first needs. */
+/* Returns how many frames are drawn at once. It is 1 if each frame is timed, or if one frame alone
+ * uses all processors or reads the source. */
 static int contexts_of(const drawing *d)
 {
     enum { USUAL = 2 };
@@ -305,7 +303,7 @@ static int contexts_of(const drawing *d)
     return o->in_flight ? o->in_flight : slow ? 1 : USUAL;
 }
 
-/* With all of the memory again, after frames in flight. */
+/* Opens the data again with all of the memory, after frames in flight. */
 static int reopen(drawing *d)
 {
     int status = open_data(d, data_path(d));
@@ -314,7 +312,7 @@ static int reopen(drawing *d)
     return status ? status : take_pictures(d);
 }
 
-/* From frame *first on, which is counted up. */
+/* Draws frames in flight from frame *first on, and sets *first to the first frame that is left. */
 static int draw_in_flight(drawing *d, int *first)
 {
     const flight f = { .o = &d->o,
@@ -375,8 +373,8 @@ static int count_image(drawing *d, int index)
     return status;
 }
 
-/* Counting comes after all pictures are there, with a reader of its own, so that it changes nothing
- * that was timed. */
+/* Counts after all pictures are written, with a separate reader, so that counting changes no
+ * timing. */
 static int count_images(drawing *d, int images)
 {
     triptych_settings counted = d->o.settings;
@@ -387,7 +385,7 @@ static int count_images(drawing *d, int images)
     return status;
 }
 
-/* That the program can write pictures of these kinds. */
+/* Checks that the program can write these kinds of image files. */
 static int check_kinds(drawing *d)
 {
     const render_options *o = &d->o;

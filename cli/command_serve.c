@@ -1,4 +1,4 @@
-/* triptych serve: a data set -> a server for a browser on this machine. */
+/* triptych serve: starts a server that shows a data set in a browser on this machine. */
 #include <stdio.h>
 #include <string.h>
 
@@ -105,7 +105,6 @@ static int parse_renderer(int key, char *arg, trip_serve_params *p)
     }
 }
 
-/* Light and effects. */
 static int parse_effects(int key, char *arg, trip_serve_params *p)
 {
     switch (key) {
@@ -189,7 +188,7 @@ static int parse_volume(int key, char *arg, serve_options *o)
 static int check(const serve_options *o)
 {
     if (!o->params.input)
-        return trip_option_fail("VOLUME", "none given: `triptych serve VOLUME`");
+        return trip_option_fail("VOLUME", "no volume given; use `triptych serve VOLUME`");
     int status = trip_option_check_volume(&o->volume.options, o->params.input);
     return status ? status : quality_options_check(&o->quality);
 }
@@ -218,7 +217,7 @@ static int choose_settings(serve_options *o)
     int status = quality_options_use(&o->quality, &drawn, &p->settings, &p->renderer, false);
     if (o->classify_given)
         p->settings.classify = o->classify;
-    /* By which moving views are then drawn. */
+    /* A moving view is drawn from coarse levels by this classification. */
     const bool coarse_splats = p->settings.classify == TRIPTYCH_PRE;
     o->volume.options.levels_for = quality_options_levels(&o->quality, coarse_splats);
     o->volume.measured_volume = drawn.input;
@@ -226,7 +225,7 @@ static int choose_settings(serve_options *o)
     return status;
 }
 
-/* An input or a function that cannot be taken is found here, before anybody looks. */
+/* Reports an unusable input or transfer function before the server starts. */
 static int check_input(const serve_options *o)
 {
     const trip_serve_params *p = &o->params;

@@ -1,5 +1,5 @@
-/* triptych tf: lists the built-in transfer functions, shows any function as `.tf` text, and
- * converts between the forms of other programs. */
+/* triptych tf: lists the built-in transfer functions, prints a transfer function as `.tf` text, and
+ * converts between the formats of other programs. */
 #include "commands.h"
 
 #include <math.h>
@@ -21,13 +21,13 @@ enum { KEY_TF = 256, KEY_RANGE, KEY_FORMAT, KEY_FORCE };
 typedef enum action { LIST, SHOW, CONVERT } action;
 
 typedef struct options {
-    const char *words[3]; /* the action, IN, OUT */
+    const char *words[3]; /* the action, IN and OUT */
     int count;
     action action;
     const char *tf;
     double lo, hi;
     bool range, force;
-    int format; /* -1: by the output's name */
+    int format; /* index into formats[]; -1 selects by the name of OUT */
 } options;
 
 static const struct argp_option option_table[] = {
@@ -53,21 +53,23 @@ static int check(options *o)
     static const int words[] = { 1, 2, 3 };
     int which = 0;
     if (o->count == 0)
-        return trip_option_fail("tf", "list, show or convert? `triptych tf --help`");
+        return trip_option_fail("tf", "no action given; use list, show or convert");
     int status = trip_option_choice("tf", o->words[0], actions, &which);
     o->action = (action)which;
     if (status)
         return status;
     if (o->count < words[which])
-        return trip_option_fail(o->words[0], which == CONVERT ? "takes IN and OUT"
-                                                              : "takes a function, a data set or "
-                                                                "a volume");
+        return trip_option_fail(
+            o->words[0], which == CONVERT ? "takes two arguments, IN and OUT"
+                                          : "takes a transfer function, a data set or a volume");
     if (o->count > words[which])
-        return trip_option_fail(o->words[words[which]], "one thing at a time");
+        return trip_option_fail(o->words[words[which]],
+                                "unexpected argument; see `triptych tf --help`");
     if (o->action == LIST && (o->tf || o->range || o->format >= 0 || o->force))
         return trip_option_fail("list", "takes no options");
     if (o->action == SHOW && (o->format > 0 || o->force))
-        return trip_option_fail("show", "prints `.tf`; `convert` writes other forms");
+        return trip_option_fail(
+            "show", "prints `.tf` text only; use `triptych tf convert` for --format and --force");
     return 0;
 }
 
@@ -88,7 +90,7 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (o->count == 3)
-            return trip_option_fail(arg, "one thing at a time");
+            return trip_option_fail(arg, "unexpected argument; see `triptych tf --help`");
         o->words[o->count++] = arg;
         return 0;
     case ARGP_KEY_END:
@@ -129,7 +131,8 @@ static bool is_preset(const char *name)
     return false;
 }
 
-/* What no volume is called, nor a pattern of slices. */
+/* Returns whether a name means a transfer function. No volume and no pattern of slices has such a
+ * name. */
 static bool is_function(const char *name)
 {
     static const char *const ends[] = { ".tf", ".json", ".vp", ".xml" };
@@ -141,7 +144,7 @@ static bool is_function(const char *name)
            (stat(name, &st) != 0 && !strpbrk(name, "%*?["));
 }
 
-/* IN is a preset or a function's file, a data set, or a volume. */
+/* Converts IN, which is a preset, a file with a transfer function, a data set or a volume. */
 static int convert_in(triptych *t, const options *o, triptych_form form, char **text)
 {
     const char *in = o->words[1];
@@ -152,7 +155,7 @@ static int convert_in(triptych *t, const options *o, triptych_form form, char **
     } else if (!is_function(in)) {
         c.volume = in;
     } else if (o->tf) {
-        return trip_option_fail("--tf", "is for a data set or a volume");
+        return trip_option_fail("--tf", "applies to a data set or a volume only");
     } else {
         c.function = in;
         c.lo = o->lo;
@@ -161,8 +164,8 @@ static int convert_in(triptych *t, const options *o, triptych_form form, char **
     return status ? status : triptych_convert(t, &c, text);
 }
 
-/* Of a data set or a volume, beside whose slices it may lie; a function's own file may be what it
- * is converted into. */
+/* Refuses to overwrite files of a data set or a volume. OUT may lie beside the slices of a volume.
+ * A transfer function's file may be its own OUT. */
 static int check_replaced(triptych *t, const char *in, const char *out)
 {
     read_files r = { 0 };
@@ -206,9 +209,9 @@ static int choose_form(const options *o, triptych_form *form)
             *form = ends[i].form;
             return 0;
         }
-    return trip_option_fail(o->words[2],
-                            "is called neither .tf, .json, .vp.json, .vp nor .xml; say "
-                            "which by --format");
+    return trip_option_fail(
+        o->words[2],
+        "unknown ending; use .tf, .json, .vp.json, .vp or .xml, or select the format by --format");
 }
 
 static int write_file(const options *o, const char *text)
@@ -216,7 +219,7 @@ static int write_file(const options *o, const char *text)
     const char *path = o->words[2];
     struct stat st;
     if (lstat(path, &st) == 0 && !o->force)
-        return trip_fail(TRIP_ERROR, "tf", path, "is there already; --force replaces it");
+        return trip_fail(TRIP_ERROR, "tf", path, "exists already; --force replaces it");
     return trip_new_file_of_text("write", path, text);
 }
 

@@ -1,4 +1,4 @@
-/* triptych view: data sets and volumes -> a window. */
+/* triptych view: shows data sets and volumes in a window. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -118,7 +118,7 @@ typedef struct view_options {
     quality_options quality;
     bool classify_given;
     triptych_classify classify;
-    read_files read; /* what a script may not write */
+    read_files read; /* files that a script must not overwrite */
     viewed_volume volume;
 } view_options;
 
@@ -167,7 +167,6 @@ static int parse_view(int key, char *arg, view_options *o)
     }
 }
 
-/* Light and effects. */
 static int parse_effects(int key, char *arg, view_options *o)
 {
     triptych_settings *s = &o->params.settings;
@@ -271,7 +270,8 @@ static int parse_volume(int key, char *arg, view_options *o)
     }
 }
 
-/* How volumes are read is for some input, or for what is opened later. */
+/* Options for reading volumes require an input that is a volume, or no input: the user may then
+ * open a volume later. */
 static int check_volume(const view_options *o)
 {
     bool volumes = o->params.count == 0;
@@ -286,12 +286,11 @@ static int check(const view_options *o)
     if (v->fov_degrees > 0 && v->ortho_height > 0)
         return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
     if (v->eye && v->side)
-        return trip_option_fail("--eye", "says where to look from, and so does --view: give one or "
-                                         "the other");
+        return trip_option_fail("--eye", "excludes --view; give one of them");
     if (o->quality.error > 0 && o->params.count != 1)
-        return trip_option_fail("--error", "is of one data set: name it");
+        return trip_option_fail("--error", "applies to one data set; name it");
     if (o->params.heat && o->params.count != 1)
-        return trip_option_fail("--emission", "is of one data set: name it");
+        return trip_option_fail("--emission", "applies to one data set; name it");
     int status = check_volume(o);
     return status ? status : quality_options_check(&o->quality);
 }
@@ -303,7 +302,7 @@ static int choose_settings(view_options *o)
     int status = quality_options_use(&o->quality, &drawn, &p->settings, &p->renderer, false);
     if (o->classify_given)
         p->settings.classify = o->classify;
-    /* By which moving views are then drawn. */
+    /* A moving view is drawn from coarse levels by this classification. */
     const bool coarse_splats = p->settings.classify == TRIPTYCH_PRE;
     o->volume.options.levels_for = quality_options_levels(&o->quality, coarse_splats);
     p->settings_given |= o->classify_given || quality_options_given(&o->quality);
@@ -375,7 +374,7 @@ static int check_output(void *user, const char *path)
     return read_files_check(user, path);
 }
 
-/* An input or a function that cannot be taken is found here, before there is a window. */
+/* Reports an unusable input or transfer function before the window opens. */
 static int check_inputs(view_options *o)
 {
     triptych *t = NULL;

@@ -45,7 +45,7 @@ int trip_option_effects(const char *text, triptych_settings *s)
         rest = comma ? comma + 1 : NULL;
     }
     if (none && count > 1)
-        return trip_option_fail("--effects", "none goes with nothing else");
+        return trip_option_fail("--effects", "none cannot be joined with other effects");
     s->effects = effects;
     return 0;
 }
@@ -59,7 +59,7 @@ int trip_option_cueing(const char *text, triptych_settings *s)
 {
     int status = trip_option_number("--cueing", text, 0, 1, &s->cueing);
     if (!status && !(s->cueing > 0))
-        return trip_option_fail("--cueing", "is above 0");
+        return trip_option_fail("--cueing", "takes a share above 0, at most 1");
     return status;
 }
 
@@ -73,7 +73,8 @@ int trip_option_temperature(const char *text, triptych_settings *s)
     double *k = s->kelvin;
     int status = trip_option_range("--temperature", text, &k[0], &k[1]);
     if (!status && !(k[0] >= 0 && k[0] < k[1] && k[1] <= 100000))
-        return trip_option_fail("--temperature", "lies between 0 and 100000 K, the smaller first");
+        return trip_option_fail(
+            "--temperature", "takes temperatures from 0 to 100000 K, the smaller first, as LO:HI");
     return status;
 }
 
@@ -82,23 +83,22 @@ int trip_option_check_effects(const triptych_settings *s, const char *heat)
     const triptych_settings defaults = triptych_default_settings();
     const int some = s->effects | (s->effects & TRIPTYCH_EFFECTS_AUTO ? ~0 : 0);
     if (s->anisotropy != defaults.anisotropy && !(some & TRIPTYCH_SHADOWS))
-        return trip_option_fail("--anisotropy", "applies to --effects shadows");
+        return trip_option_fail("--anisotropy", "requires --effects shadows or auto");
     if (s->cueing != defaults.cueing && !(some & TRIPTYCH_CUEING))
-        return trip_option_fail("--cueing", "applies to --effects cueing");
+        return trip_option_fail("--cueing", "requires --effects cueing or auto");
     if (s->light_cells != defaults.light_cells &&
         !(some & (TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_EMISSION)))
         return trip_option_fail("--light-cells",
-                                "applies to --effects shadows, occlusion and emission");
+                                "requires --effects shadows, occlusion, emission or auto");
     if (s->effects & TRIPTYCH_EMISSION && !heat)
-        return trip_option_fail("--effects", "emission is of heat, which lies in a data set of its "
-                                             "own: --emission HEAT.trip");
+        return trip_option_fail("--effects",
+                                "emission requires a data set of heat, --emission HEAT.trip");
     if (heat && !(some & TRIPTYCH_EMISSION))
-        return trip_option_fail("--emission", "applies to --effects emission and auto");
+        return trip_option_fail("--emission", "requires --effects emission or auto");
     if (!heat && (s->kelvin[0] != defaults.kelvin[0] || s->kelvin[1] != defaults.kelvin[1]))
-        return trip_option_fail("--temperature", "applies to --emission only");
+        return trip_option_fail("--temperature", "requires --emission");
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
-        return trip_option_fail("--effects", "shadows are of a light that is not at the eye; give "
-                                             "its direction, --light X,Y,Z, or place, --light "
-                                             "point:X,Y,Z");
+        return trip_option_fail("--effects", "shadows require a light that is not at the eye; give "
+                                             "--light X,Y,Z or --light point:X,Y,Z");
     return 0;
 }

@@ -1,5 +1,5 @@
-/* Options of light and effects, as triptych_settings has them, alike in the commands that draw.
- * Each function reports a bad value, and returns TRIP_USAGE. */
+/* Options for light and effects, as in triptych_settings, shared by the commands that draw. Each
+ * function reports a bad value, naming the option, and returns TRIP_USAGE. Main thread only. */
 #ifndef TRIP_EFFECTS_OPTIONS_H
 #define TRIP_EFFECTS_OPTIONS_H
 
@@ -7,8 +7,8 @@
 
 #include "triptych.h"
 
-/* Rows of a command's table; the keys are KEY_EFFECTS, KEY_ANISOTROPY, KEY_CUEING and
- * KEY_LIGHT_CELLS, and KEY_LIGHT where a command has that. */
+/* Rows of a command's option table. They require the keys KEY_LIGHT, KEY_EFFECTS, KEY_ANISOTROPY,
+ * KEY_CUEING and KEY_LIGHT_CELLS. */
 #define TRIP_OPTION_LIGHT(group)                                                                   \
     {                                                                                              \
         "light", KEY_LIGHT, "X,Y,Z|point:X,Y,Z|head", 0,                                           \
@@ -46,7 +46,7 @@
             group                                                                                  \
     }
 
-/* Keys: KEY_EMISSION and KEY_TEMPERATURE. */
+/* Requires the keys KEY_EMISSION and KEY_TEMPERATURE. */
 #define TRIP_OPTIONS_EMISSION(group)                                                               \
     { "emission",                                                                                  \
       KEY_EMISSION,                                                                                \
@@ -67,8 +67,7 @@ int trip_option_anisotropy(const char *text, triptych_settings *s);
 int trip_option_cueing(const char *text, triptych_settings *s);
 int trip_option_light_cells(const char *text, triptych_settings *s);
 int trip_option_temperature(const char *text, triptych_settings *s);
-/* What does not go together, once all is parsed, with the data set of heat that is given, or NULL.
- */
+/* Checks combinations after all options are parsed. `heat` is the data set of heat, or NULL. */
 int trip_option_check_effects(const triptych_settings *s, const char *heat);
 
 #endif

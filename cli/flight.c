@@ -13,16 +13,17 @@ enum { MAX_CONTEXTS = 16, REPORT_BYTES = 4096 };
 
 typedef struct flying {
     const flight *f;
-    const volatile sig_atomic_t *signalled; /* of who called */
+    const volatile sig_atomic_t *signalled; /* the flag of the calling thread */
     pthread_mutex_t lock;
-    pthread_cond_t turn; /* `then` has changed, or `status` */
-    /* Under lock: the frames to draw and to go on with next; the first failure, and its line. */
+    pthread_cond_t turn; /* signals a change of `then` or `status` */
+    /* Guarded by lock: the next frame to draw, the next frame for then(), the first failure, and
+     * its message. */
     int next, then, status;
-    bool final; /* it is of what comes after a frame, and not to be tried again */
+    bool final; /* the failure is from then(), so the frame must not be drawn again */
     char line[REPORT_BYTES];
 } flying;
 
-/* A thread with its context. */
+/* A thread and its context. */
 typedef struct pilot {
     flying *all;
     pthread_t thread;
@@ -94,7 +95,7 @@ static void pass_warning(void *user, const char *line)
         trip_report_line(line);
 }
 
-/* What the first is warned of, all are. */
+/* Only the first frame's context prints warnings; the other frames have the same ones. */
 static int draw_frame(pilot *p, int frame)
 {
     const flight *f = p->all->f;
@@ -105,7 +106,7 @@ static int draw_frame(pilot *p, int frame)
     return status ? status : f->write(f->user, p->t, frame, p->rgba, p->depth);
 }
 
-/* The next frame to draw; -1: there is none. */
+/* Returns the next frame to draw, or -1 if there is none. */
 static int take_frame(flying *all)
 {
     pthread_mutex_lock(&all->lock);
@@ -115,7 +116,7 @@ static int take_frame(flying *all)
     return frame;
 }
 
-/* What comes after a frame, in its turn; not where one before it has failed. */
+/* Calls then() for a frame after all earlier frames, unless an earlier frame failed. */
 static int go_on(pilot *p, int frame)
 {
     flying *all = p->all;

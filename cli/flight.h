@@ -1,6 +1,6 @@
-/* Several frames of a sequence at once, each drawn by a context and thread of its own, so that the
- * disk and the processors have something to do while one of them is waited for, or its picture is
- * written. The contexts divide the memory; pictures are the same, bit for bit, as one by one. */
+/* Draws several frames of a sequence at once, each by a thread with a context of its own. The disk
+ * and the processors then stay busy while a frame waits or its picture is written. The contexts
+ * share the memory equally. Pictures are bit-identical to pictures drawn one by one. */
 #ifndef TRIP_CLI_FLIGHT_H
 #define TRIP_CLI_FLIGHT_H
 
@@ -9,18 +9,20 @@
 typedef struct flight {
     const render_options *o;
     const sequence *sequence;
-    const char *data; /* the data set */
+    const char *data; /* path of the data set */
     int contexts;
-    /* Writes a frame's picture (and its distances, NULL without --depth), in any order, by any
-     * thread; what comes after it, in the order of frames, one at a time. Both return 0 or a
-     * failure, which the context reports or trip_fail() has. */
+    /* write() writes a frame's picture and distances (NULL without --depth). Any thread calls it,
+     * in any order. then() runs once for each frame, in the order of the frames, never twice at
+     * once. Both return 0 or a failure that they have reported through the context or
+     * trip_fail(). */
     int (*write)(void *user, triptych *t, int frame, const float *rgba, const float *depth);
     int (*then)(void *user, triptych *t, int frame, const float *rgba);
     void *user;
 } flight;
 
-/* Draws all frames; *done becomes how many of the first ones are complete. 0; 1 where the others
- * may still be drawn one by one, with all of the memory; or a reported failure. */
+/* Draws all frames, and sets *done to the number of complete frames from the first on. Returns 0, a
+ * reported failure, or 1 if the caller may still draw the other frames one by one with all of the
+ * memory. */
 int flight_draw(const flight *f, int *done);
 
 #endif

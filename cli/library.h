@@ -1,5 +1,5 @@
-/* How the commands use libtriptych: messages go where the program's own do, progress to a line on
- * the terminal. Also what the notes of a data set say. Main thread only. */
+/* Wraps libtriptych for the commands. Messages go to the program's own log, and progress to a line
+ * on the terminal. Main thread only. */
 #ifndef TRIP_CLI_LIBRARY_H
 #define TRIP_CLI_LIBRARY_H
 
@@ -7,18 +7,20 @@
 #include "triptych.h"
 #include "triptych_brick.h"
 
-/* `progress`, which may be NULL, outlives the context. 0, or a reported failure. */
+/* Creates a context. `progress` may be NULL and must outlive the context. Returns 0 or a reported
+ * failure. */
 int library_create(triptych **out, trip_progress *progress);
 
-/* Data sets that are drawn with the one that is open, and that of its heat, NULL: none. */
+/* Adds data sets to the one that is open, and the data set of heat unless `heat` is NULL. */
 int library_add(triptych *t, const char *const *paths, int count, const char *heat);
-/* Fails where `heat` is no data set of heat, NULL: it is none. Closes what is open. */
+/* Fails if `heat` is neither NULL nor a usable data set of heat. Closes the open data set. */
 int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
-/* The function without its warnings; failures are reported. */
+/* Sets the transfer function without printing warnings. Reports failures. */
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);
 
-/* A text among the notes of the data set that is open, for free(); NULL where there is none. */
+/* Returns a string from the notes of the open data set; the caller frees it. Returns NULL if there
+ * is none. */
 char *library_note(triptych *t, const char *key);
 
 #endif

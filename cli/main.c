@@ -1,4 +1,4 @@
-/* triptych COMMAND ...: picks the command; everything else is the command's. */
+/* triptych COMMAND ...: selects the command and runs it. */
 #include "commands.h"
 #include "interrupt.h"
 
@@ -43,8 +43,8 @@ static void print_help(void)
            "triptych-COMMAND(1) explains them. `triptych --version` prints the version.\n");
 }
 
-/* Where a standard stream is closed, its number must not go to a data file, which messages would
- * then be written into. Read-only, so that writing still fails. */
+/* Opens closed standard streams. Otherwise a data file could get the number of a standard stream,
+ * and messages would overwrite its data. The streams are read-only, so that writing still fails. */
 static void hold_standard_streams(void)
 {
     for (int fd = 0; fd <= 2; fd++)
@@ -52,7 +52,7 @@ static void hold_standard_streams(void)
             (void)!open("/dev/null", O_RDONLY);
 }
 
-/* Writes everything out, so that a full disk behind stdout is a failure and not silence. */
+/* Flushes stdout, so that a full disk behind it is reported as a failure. */
 static int finish(int exit_status)
 {
     if (fflush(stdout) != 0 || ferror(stdout))
@@ -60,7 +60,7 @@ static int finish(int exit_status)
     return exit_status;
 }
 
-/* Each data set that is drawn takes a file for each of its lists. */
+/* Raises the limit on open files: every drawn data set has one open file for each list. */
 static void allow_open_files(void)
 {
     struct rlimit limit;
@@ -76,7 +76,8 @@ int main(int argc, char **argv)
     allow_open_files();
     if (argc < 2)
         return trip_exit_status(
-            trip_fail(TRIP_USAGE, "usage", "command", "none given; `triptych --help` lists them"));
+            trip_fail(TRIP_USAGE, "usage", "command",
+                      "no command given; `triptych --help` lists the commands"));
     const char *name = argv[1];
     if (!strcmp(name, "--help") || !strcmp(name, "help") || !strcmp(name, "-h")) {
         print_help();
@@ -91,11 +92,10 @@ int main(int argc, char **argv)
         if (!strcmp(name, commands[i].name))
             return finish(commands[i].run(argc - 1, argv + 1));
     if (access(name, F_OK) == 0)
-        return trip_exit_status(
-            trip_fail(TRIP_USAGE, "usage", name,
-                      "is no command: `triptych render %s -o PICTURE.png` draws "
-                      "it, `triptych view %s` shows it",
-                      name, name));
-    return trip_exit_status(
-        trip_fail(TRIP_USAGE, "usage", name, "no such command; `triptych --help` lists them"));
+        return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
+                                          "is no command; `triptych render %s -o PICTURE.png` "
+                                          "draws it, `triptych view %s` shows it",
+                                          name, name));
+    return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
+                                      "unknown command; `triptych --help` lists the commands"));
 }

@@ -11,8 +11,9 @@
 #include "report.h"
 #include "text.h"
 
-/* getopt prints its own line, "ARGV0: unrecognized option ...": with this argv[0] that line has our
- * form, and with no err_stream argp adds nothing to it. --help shows the command's own name. */
+/* getopt prints its own line, "ARGV0: unrecognized option ...". This argv[0] gives the line the
+ * project's form, and without err_stream argp adds nothing to it. --help prints the command's own
+ * name. */
 static char error_prefix[64], help_name[64];
 
 enum { KEY_HELP = 1000 };
@@ -39,8 +40,8 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     }
 }
 
-/* The first that begins like an option's name but has other bytes in it than ASCII's visible ones,
- * which getopt would send to the terminal as they are; NULL without such. */
+/* Returns the first argument that starts like an option but contains bytes other than visible
+ * ASCII, or NULL. getopt would send these bytes to the terminal unchanged. */
 static const char *find_hidden_name(int argc, char **argv)
 {
     for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
@@ -64,7 +65,7 @@ int trip_options_parse(const struct argp *argp, int argc, char **argv, void *inp
                                 .children = children };
     const char *hidden = find_hidden_name(argc, argv);
     if (hidden)
-        return trip_option_fail(hidden, "no such option");
+        return trip_option_fail(hidden, "unknown option");
     snprintf(help_name, sizeof help_name, "triptych %s", argv[0]);
     snprintf(error_prefix, sizeof error_prefix, "triptych: usage: %s", argv[0]);
     argv[0] = error_prefix;
@@ -129,10 +130,10 @@ int trip_option_numbers(const char *option, const char *text, int min, int max, 
     if (!rest && *count >= min)
         return 0;
     if (min == max)
-        return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not %d numbers joined by commas",
-                         text, max);
-    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not %d to %d numbers joined by commas",
-                     text, min, max);
+        return trip_fail(TRIP_USAGE, "usage", option,
+                         "\"%s\" is not a list of %d numbers joined by commas", text, max);
+    return trip_fail(TRIP_USAGE, "usage", option,
+                     "\"%s\" is not a list of %d to %d numbers joined by commas", text, min, max);
 }
 
 int trip_option_bytes(const char *option, const char *text, uint64_t *out)
@@ -164,10 +165,11 @@ int trip_option_choice(const char *option, const char *text, const char *const *
         size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", names[i]);
     }
-    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is none of %s", text, list);
+    return trip_fail(TRIP_USAGE, "usage", option, "invalid value \"%s\"; use one of %s", text,
+                     list);
 }
 
-/* Of the first `count` names. */
+/* Like trip_option_choice(), with only the first `count` names. */
 static int choose_of_first(const char *option, const char *text, const char *const *names,
                            int count, int *out)
 {

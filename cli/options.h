@@ -1,34 +1,34 @@
-/* Command lines by argp, with errors in the project's form: one line, exit status 2. Also the kinds
- * of values that options take. Each trip_option_* reports a bad value, naming the option, and
- * returns TRIP_USAGE, which an argp parser forwards. Main thread only. */
+/* Command lines by argp, and the kinds of values that options take. Errors have one line and exit
+ * status 2. Each trip_option_* function reports a bad value, naming the option, and returns
+ * TRIP_USAGE, which an argp parser forwards. Main thread only. */
 #ifndef TRIP_OPTIONS_H
 #define TRIP_OPTIONS_H
 
 #include <argp.h>
 #include <stdint.h>
 
-/* Parses argv (argv[0] is the command's name) with `input` for the parser; --help prints and exits.
- * Returns 0, or TRIP_USAGE once reported. */
+/* Parses argv, which starts with the name of the command, and passes `input` to the parser. --help
+ * prints the help and exits. Returns 0, or TRIP_USAGE after reporting an error. */
 int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input);
 
 int trip_option_number(const char *option, const char *text, double lo, double hi, double *out);
 int trip_option_integer(const char *option, const char *text, int lo, int hi, int *out);
-/* Comma-separated numbers: at least `least`, at most `most`; *count is how many there were. */
+/* Parses `min` to `max` numbers joined by commas, and sets *count to their number. */
 int trip_option_numbers(const char *option, const char *text, int min, int max, double *out,
                         int *count);
-/* "LO:HI", the smaller first. */
+/* Parses "LO:HI"; LO must be less than HI. */
 int trip_option_range(const char *option, const char *text, double *lo, double *hi);
-/* Sizes with binary suffixes: "256M". */
+/* Parses a size with a binary suffix, for example "256M". */
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
-/* A picture of 1 to 99999 pixels a side: "1024x768". */
+/* Parses a picture size, 1 to 99999 pixels a side, for example "1024x768". */
 int trip_option_size(const char *option, const char *text, int *width, int *height);
-/* Names of triptych_levels_for, NULL behind them. */
+/* Names of triptych_levels_for, terminated by NULL. */
 extern const char *const trip_levels_for_names[];
-/* The position of `text` in a NULL-terminated list of names. */
+/* Finds the index of `text` in a NULL-terminated list of names. */
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out);
 
-/* What several commands take, with the rows of their tables. The names come in the order of the
- * library's values; `names` says how many of them the command takes. */
+/* Options that several commands share, with the rows for their tables. The names are in the order
+ * of the library's values. `names` is the number of names that the command accepts. */
 #define TRIP_OPTION_MEMORY(key, group)                                                             \
     {                                                                                              \
         "memory", key, "SIZE", 0,                                                                  \
@@ -50,7 +50,7 @@ int trip_option_choice(const char *option, const char *text, const char *const *
             "processor)",                                                                          \
             group                                                                                  \
     }
-/* Rows of `bench` and `accuracy`. */
+/* Rows for `bench` and `accuracy`. */
 #define TRIP_OPTION_TF(key, group)                                                                 \
     {                                                                                              \
         "tf", key, "NAME|FILE", 0,                                                                 \
@@ -63,7 +63,7 @@ int trip_option_choice(const char *option, const char *text, const char *const *
         "no-shading", key, NULL, 0,                                                                \
             "Draws the plain colours of the transfer function, and reads no normals", group        \
     }
-/* Rows for commands that read a volume. The keys are KEY_GRID, KEY_LEVEL_SET, KEY_SPACING,
+/* Rows for commands that read a volume. They require the keys KEY_GRID, KEY_LEVEL_SET, KEY_SPACING,
  * KEY_COORDINATES, KEY_AXES and KEY_ALLOW_GAPS. */
 #define TRIP_OPTIONS_VOLUME(group)                                                                 \
     { "grid",                                                                                      \
@@ -106,17 +106,17 @@ int trip_option_choice(const char *option, const char *text, const char *const *
     }
 int trip_option_memory(const char *text, uint64_t *out);
 int trip_option_threads(const char *text, int *out);
-int trip_option_repeat(const char *text, int *out);              /* timed runs, 1 to 1000 */
-int trip_option_views(const char *text, int *out);               /* round the object, 1 to 1000 */
+int trip_option_repeat(const char *text, int *out); /* timed runs, 1 to 1000 */
+int trip_option_views(const char *text, int *out);  /* views around the object, 1 to 1000 */
 int trip_option_engine(const char *text, int names, int *out);   /* auto, io_uring, pread, null */
 int trip_option_renderer(const char *text, int names, int *out); /* auto, gl, cpu, reference, ... */
 int trip_option_classify(const char *text, int names, int *out); /* pre, post, auto */
 
-/* `why` completes "OPTION: ...". */
+/* Reports "OPTION: WHY" and returns TRIP_USAGE. */
 int trip_option_fail(const char *option, const char *why);
-/* Why not, of a second volume: most often a shell has put the names of slices for a pattern. */
+/* Message for a second volume, mostly caused by a shell that expanded a pattern of slices. */
 #define TRIP_ONE_VOLUME                                                                            \
-    "one volume at a time; slices are given by their folder, or a pattern in quotes, like "        \
-    "\"*.tif\""
+    "only one volume is possible at a time; give slices by their folder, or by a pattern in "      \
+    "quotes, like \"*.tif\""
 
 #endif

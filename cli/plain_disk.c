@@ -10,18 +10,18 @@
 
 #include "report.h"
 
-/* One file at a time, its transfers shared out among threads. */
+/* The transfers of one file, shared by the threads. */
 typedef struct job {
     int fd;
     bool write, look;
     uint64_t transfers;
     atomic_uint_fast64_t next;
     atomic_uint_fast64_t bytes;
-    atomic_int error;  /* errno of the first fault */
-    trip_scope *scope; /* of the caller */
+    atomic_int error;  /* errno of the first failure */
+    trip_scope *scope; /* scope of the caller */
     unsigned char *memory;
-    atomic_uint taken; /* parts of the memory */
-    atomic_uint seen;  /* what was looked at, so that the compiler does not leave it out */
+    atomic_uint taken; /* number of memory parts in use, one for each thread */
+    atomic_uint seen;  /* sum of the bytes looked at, so that the compiler keeps the loads */
 } job;
 
 static double now_seconds(void)
@@ -72,7 +72,7 @@ static void *move_transfers(void *argument)
     return NULL;
 }
 
-/* An errno, 0 when all is done. */
+/* Runs the threads. Returns 0 or an errno. */
 static int share_out(job *j)
 {
     pthread_t threads[PLAIN_DISK_THREADS];
@@ -84,7 +84,7 @@ static int share_out(job *j)
     return error ? error : atomic_load(&j->error);
 }
 
-/* Moves `bytes` of an open file, which is closed. */
+/* Transfers `bytes` of an open file, then closes it. */
 static int move_file(plain_disk *d, int fd, bool write, uint64_t bytes, const char *path,
                      void *memory)
 {
@@ -107,7 +107,7 @@ static int move_file(plain_disk *d, int fd, bool write, uint64_t bytes, const ch
     return error ? trip_fail_errno(write ? "write" : "read", path, NULL) : 0;
 }
 
-/* With O_DIRECT, or without where that is refused. */
+/* Opens a file with O_DIRECT, or without it if the file system refuses it. */
 static int open_file(plain_disk *d, const char *path, int flags)
 {
     int fd = open(path, flags | O_CLOEXEC | O_DIRECT, 0600);
@@ -141,7 +141,7 @@ void plain_disk_forget(const char *path)
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0)
         return;
-    fsync(fd); /* only clean pages are let go */
+    fsync(fd); /* the kernel drops clean pages only */
     posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
     close(fd);
 }

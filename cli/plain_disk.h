@@ -1,5 +1,6 @@
-/* What the disk gives a program that does nothing else: a file from end to end, past the page cache
- * where that is possible, in large transfers, several at once. */
+/* Measures the bandwidth of the disk for a program that only reads or writes. It transfers one
+ * whole file in large parts by several threads, past the page cache if possible. The caller's
+ * thread waits. */
 #ifndef TRIP_CLI_PLAIN_DISK_H
 #define TRIP_CLI_PLAIN_DISK_H
 
@@ -10,20 +11,20 @@
 enum { PLAIN_DISK_THREADS = 8, PLAIN_DISK_TRANSFER_BYTES = 1 << 20 };
 #define PLAIN_DISK_MEMORY_BYTES ((size_t)PLAIN_DISK_THREADS * PLAIN_DISK_TRANSFER_BYTES)
 
-/* Adds up over calls. */
+/* Zeroed at first; seconds and bytes add up over the calls. */
 typedef struct plain_disk {
     double seconds;
     uint64_t bytes;
-    bool direct; /* the last file was opened with O_DIRECT */
-    bool look;   /* a byte of every cache line that is read is looked at */
+    bool direct; /* true if O_DIRECT worked for the last file */
+    bool look;   /* true: the reader also loads a byte of every cache line */
 } plain_disk;
 
-/* `memory`: PLAIN_DISK_MEMORY_BYTES, aligned to 4096. */
+/* Reads a file. `memory` has PLAIN_DISK_MEMORY_BYTES and is aligned to 4096. */
 int plain_disk_read(plain_disk *d, const char *path, void *memory);
-/* `bytes` of an unnamed file in `folder`, up to whole transfers, until the disk has them. */
+/* Writes an unnamed file in `folder` and syncs it. Rounds `bytes` up to whole transfers. */
 int plain_disk_write(plain_disk *d, const char *folder, uint64_t bytes, void *memory);
 
-/* Advises the system to drop what it holds of a file, if that is one. */
+/* Advises the kernel to drop the cached pages of a file, if it exists. */
 void plain_disk_forget(const char *path);
 
 #endif

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 static const double interval_seconds = 0.25;
-static const double steady_seconds = 1; /* before that, a rate says little */
+static const double steady_seconds = 1; /* a rate over a shorter time is too uncertain */
 
 static double now_seconds(void)
 {
@@ -20,7 +20,7 @@ trip_progress trip_progress_start(bool quiet)
     return (trip_progress){ .shown = !quiet && isatty(STDERR_FILENO) == 1 };
 }
 
-/* "0:42", "12:05", "3:02:10". */
+/* Formats a duration, for example "0:42", "12:05" or "3:02:10". */
 static const char *format_time(double seconds, char *text, size_t bytes)
 {
     unsigned s = seconds < 359999 ? (unsigned)(seconds + 0.5) : 359999;
@@ -39,7 +39,7 @@ static void print_line(const trip_progress *p, double share, double rate, double
     if (rate > 0)
         fprintf(stderr, "  %.*f million %s/s  %s left", rate < 1e7, rate / 1e6, things,
                 format_time(left, time_text, sizeof time_text));
-    fputc('\r', stderr); /* what is printed next stands in its place */
+    fputc('\r', stderr); /* the next output overwrites the line */
     fflush(stderr);
 }
 

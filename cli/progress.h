@@ -1,5 +1,5 @@
-/* One line on a terminal that shows how far a long run is, how fast it goes and how long it has to
- * go on; nothing where stderr is not a terminal. Main thread only. */
+/* One line on a terminal with the progress of a long run, its rate and the time left. Shows nothing
+ * if stderr is not a terminal. Main thread only. */
 #ifndef TRIP_PROGRESS_H
 #define TRIP_PROGRESS_H
 
@@ -7,18 +7,18 @@
 #include <stdint.h>
 
 typedef struct trip_progress {
-    bool shown; /* on a terminal, and wanted */
-    bool line;  /* something stands there now */
+    bool shown; /* stderr is a terminal, and the user has not asked for silence */
+    bool line;  /* the line is on the terminal now */
     char stage[16];
-    double stage_begin, last_shown; /* seconds */
+    double stage_begin, last_shown; /* seconds of the monotonic clock */
 } trip_progress;
 
 trip_progress trip_progress_start(bool quiet);
-/* `done` of `total` things of a kind ("voxels") in this stage; at most a few lines a second appear.
- */
+/* Shows `done` of `total` items in this stage, at most four times a second. `things` names the
+ * items, for example "voxels". */
 void trip_progress_show(trip_progress *p, const char *stage, uint64_t done, uint64_t total,
                         const char *things);
-/* Clears the line, so that results and errors stand alone. */
+/* Clears the line before results or errors are printed. */
 void trip_progress_end(trip_progress *p);
 
 #endif

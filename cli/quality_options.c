@@ -26,19 +26,16 @@ int quality_option_error(const char *text, quality_options *q)
 int quality_options_check(const quality_options *q)
 {
     if (q->given && q->error > 0)
-        return trip_option_fail("--error", "finds settings, and so does --quality: give one or the "
-                                           "other");
+        return trip_option_fail("--error", "excludes --quality; give one of them");
     if (q->measurable && q->error > 0)
-        return trip_fail(
-            TRIP_USAGE, "usage", "--error",
-            "finds settings that were measured, --%s among them: give one or the other",
-            q->measurable);
+        return trip_fail(TRIP_USAGE, "usage", "--error",
+                         "excludes --%s, because --error selects that setting too", q->measurable);
     if (q->report && !(q->error > 0))
-        return trip_option_fail("--report", "is what --error takes settings from: give that");
+        return trip_option_fail("--report", "requires --error E");
     return 0;
 }
 
-/* That of a data set; of a volume, which is bricked later, "". */
+/* Returns the checksum of a data set. For a volume, which is bricked later, text becomes "". */
 static int find_checksum(const char *input, char text[ACCURACY_CHECKSUM_BYTES])
 {
     triptych *t = NULL;
@@ -102,8 +99,8 @@ static int use_report(quality_options *q, const quality_drawn *drawn, triptych_s
         snprintf(q->measured, sizeof q->measured, "%s", checksum[0] ? "" : found.checksum);
         q->says_levels = found.says_levels;
         q->levels_for = found.levels_for;
-        trip_note("--error", "%s, measured to be off by %.2f, in %.1f ms", found.setting.name,
-                  found.error, found.ms);
+        trip_note("--error", "uses %s, measured error %.2f of 255, measured time %.1f ms",
+                  found.setting.name, found.error, found.ms);
     }
     free(beside);
     return status;
@@ -115,6 +112,6 @@ int quality_options_use(quality_options *q, const quality_drawn *drawn, triptych
     if (q->error > 0)
         return use_report(q, drawn, s, renderer, slow_too);
     if (q->given && triptych_set_quality(s, q->quality))
-        return trip_option_fail("--quality", "there is no such quality");
+        return trip_option_fail("--quality", "unknown quality");
     return 0;
 }

@@ -1,5 +1,5 @@
-/* --quality, --error and --report: what accuracy is traded for time by, in one word or one number,
- * for all commands that draw. Main thread only. */
+/* --quality, --error and --report select the compromise between accuracy and time, for all commands
+ * that draw. Main thread only. */
 #ifndef TRIP_QUALITY_OPTIONS_H
 #define TRIP_QUALITY_OPTIONS_H
 
@@ -9,19 +9,20 @@
 #include "triptych.h"
 
 typedef struct quality_options {
-    bool given; /* a quality */
+    bool given; /* --quality was given */
     triptych_quality quality;
-    double error;       /* 0: not given */
-    const char *report; /* NULL: NAME.accuracy beside the data */
-    /* An option that was given of those that a report has measured, "classify"; NULL: none. */
+    double error;       /* 0 if --error was not given */
+    const char *report; /* NULL selects NAME.accuracy beside the data */
+    /* Name of a given option that a report also measures, such as "classify", or NULL. */
     const char *measurable;
-    /* Once used for a volume: the data set that the report is of; "": not known, or no volume. */
+    /* Set by quality_options_use(): checksum of the data set that the report measured. It is "" if
+     * the report gives none, or if the input is a data set. */
     char measured[ACCURACY_CHECKSUM_BYTES];
-    bool says_levels; /* the report, what that was bricked with: */
+    bool says_levels; /* whether the report gives levels_for, the --levels-for of its data set */
     triptych_levels_for levels_for;
 } quality_options;
 
-/* The keys are KEY_QUALITY, KEY_ERROR and KEY_REPORT. */
+/* Requires the keys KEY_QUALITY, KEY_ERROR and KEY_REPORT. */
 #define TRIP_OPTIONS_QUALITY(group)                                                                \
     { "quality",                                                                                   \
       KEY_QUALITY,                                                                                 \
@@ -44,27 +45,28 @@ typedef struct quality_options {
 
 int quality_option_quality(const char *text, quality_options *q);
 int quality_option_error(const char *text, quality_options *q);
-/* What excludes one another; after parsing. */
+/* Checks, after parsing, for options that exclude each other. */
 int quality_options_check(const quality_options *q);
 static inline bool quality_options_given(const quality_options *q)
 {
     return q->given || q->error > 0;
 }
 
-/* What is drawn: a data set or volume, and the function as of --tf or NULL. */
+/* The data set or volume to draw, and the argument of --tf or NULL. */
 typedef struct quality_drawn {
     const char *input, *function;
 } quality_drawn;
 
-/* Of a volume, once its data set is open: fails where `measured` is another, and not "". */
+/* Compares the open data set of a volume to the checksum `measured`. Fails if they differ; ""
+ * matches every data set. */
 int quality_options_check_data(const char *measured, triptych *t, const char *volume);
 
-/* The coarse levels that a volume is bricked with for settings once chosen: the measured data
- * set's; where there is none, both kinds if splats are to be drawn by coarse ones. */
+/* Returns the levels-for option for bricking a volume. The measured data set's option is used if it
+ * is known. Otherwise both kinds are made if coarse levels are drawn as splats. */
 triptych_levels_for quality_options_levels(const quality_options *q, bool coarse_splats);
 
-/* Changes settings as the options say, and with --error the renderer where it is auto. Prints what
- * --error has chosen. */
+/* Applies the options to *s. --error also selects the renderer if it is auto, and prints the
+ * selected settings. `slow_too` allows it to select the reference and integral renderers. */
 int quality_options_use(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
                         triptych_renderer *renderer, bool slow_too);
 

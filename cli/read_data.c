@@ -12,7 +12,7 @@ static int add_found(void *user, const char *path)
 int read_files_add_data(read_files *r, triptych *t, const char *input,
                         const triptych_brick_options *options)
 {
-    int status = read_files_add(r, input); /* a folder of slices as well */
+    int status = read_files_add(r, input); /* may be a folder of slices */
     if (status || !cached_volume_wanted(input))
         return status;
     r->pattern = strpbrk(input, "*?[") ? input : NULL;

@@ -24,7 +24,7 @@ int read_files_add(read_files *r, const char *path)
         const size_t room = r->room ? 2 * r->room : 16;
         struct read_file *files = reallocarray(r->files, room, sizeof *files);
         if (!files)
-            return trip_fail(TRIP_ERROR, "read", path, "no memory to note its name");
+            return trip_fail(TRIP_ERROR, "read", path, "out of memory for the list of input files");
         r->files = files;
         r->room = room;
     }
@@ -66,7 +66,7 @@ static bool has(const read_files *r, const char *path)
     return found;
 }
 
-/* The folder that a file lies in; false where its name is too long. */
+/* Copies the path of the folder that contains a file. Returns false if it is too long. */
 static bool folder_of(const char *path, char folder[PATH_MAX])
 {
     const char *slash = strrchr(path, '/');
@@ -77,8 +77,9 @@ static bool folder_of(const char *path, char folder[PATH_MAX])
 
 int read_files_check_replaced(const read_files *r, const char *output)
 {
-    return !is_folder(output) && has(r, output) /* of folders that is known elsewhere */
-               ? trip_option_fail(output, "is read, and would be replaced: give another name")
+    return !is_folder(output) &&
+                   has(r, output) /* an existing folder is reported when it is written */
+               ? trip_option_fail(output, "is an input file; give another name for the output")
                : 0;
 }
 
@@ -89,11 +90,10 @@ int read_files_check(const read_files *r, const char *output)
     if (status || is_folder(output))
         return status;
     if (folder_of(output, folder) && has(r, folder))
-        return trip_option_fail(output, "would lie among the files that are read: give the name of "
-                                        "another folder");
+        return trip_option_fail(output, "would lie among the input files; choose another folder");
     if (r->pattern && fnmatch(r->pattern, output, FNM_PATHNAME | FNM_PERIOD) == 0)
-        return trip_option_fail(output, "would be one of the slices that are read: give a name "
-                                        "that does not fit their pattern");
+        return trip_option_fail(output,
+                                "would match the pattern of the input slices; choose another name");
     return 0;
 }
 

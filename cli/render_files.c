@@ -19,11 +19,12 @@ int render_file_name(const render_options *o, const char *output, int frame,
                                     (int)(extension - output), output, frame, extension)
                          : snprintf(path, RENDER_FILE_BYTES, "%s", output);
     if (length < 0 || length >= RENDER_FILE_BYTES)
-        return trip_fail(TRIP_USAGE, "render", output, "the name is too long");
+        return trip_fail(TRIP_USAGE, "render", output,
+                         "the name is too long; at most 4095 bytes are possible");
     return 0;
 }
 
-/* The file of --stats, where it gets one of its own. */
+/* Returns the path of --stats if it is a regular file, else NULL. */
 static const char *stats_file(const render_options *o)
 {
     return o->stats && strcmp(o->stats, "-") && !render_stats_is_special(o->stats) ? o->stats
@@ -61,12 +62,12 @@ static int add_read(read_files *r, const sequence *s, triptych *t)
 static int check_name(const read_files *r, const char *name, const char *other)
 {
     if (other && read_files_are_one(name, other))
-        return trip_option_fail(name, "is to be written twice: -o, --depth and --stats take a name "
-                                      "each");
+        return trip_option_fail(
+            name, "would be written twice; -o, --depth and --stats require different names");
     return read_files_check(r, name);
 }
 
-/* A frame's picture and distances. */
+/* Checks the names of a frame's picture and distances. */
 static int check_frame(const read_files *r, const sequence *s, int frame)
 {
     const render_options *o = s->o;

@@ -1,4 +1,5 @@
-/* The files that `triptych render` writes: their names, and that these may be taken. */
+/* Names the files that `triptych render` writes, and checks that it may write them. Main thread
+ * only. */
 #ifndef TRIP_RENDER_FILES_H
 #define TRIP_RENDER_FILES_H
 
@@ -6,12 +7,13 @@
 
 enum { RENDER_FILE_BYTES = 4096 };
 
-/* Of several frames image.png -> image-007.png; a video has them all. */
+/* Returns the name of a frame's file. With several frames, image.png becomes image-007.png. A video
+ * keeps its name. */
 int render_file_name(const render_options *o, const char *output, int frame,
                      char path[RENDER_FILE_BYTES]);
 
-/* What cannot be written at the end, or would replace what is read or what else is written: 0, or a
- * reported failure. Once the sequence is loaded, before any work. */
+/* Checks the outputs before any work, after the sequence is loaded. Fails if a file cannot be
+ * written, would replace an input, or would be written twice. Returns 0 or a reported failure. */
 int render_files_check(const sequence *s, triptych *t);
 
 #endif

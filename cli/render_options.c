@@ -276,7 +276,7 @@ static const struct argp_option options[] = {
     { 0 },
 };
 
-/* While parsing: what was given, for the checks of combinations. */
+/* State of parsing: the options that were given, for the checks of combinations. */
 typedef struct parse {
     render_options *o;
     quality_options quality;
@@ -284,8 +284,8 @@ typedef struct parse {
     bool order; /* --method or --traversal */
     bool samples_per_sheet, compositing, classify;
     bool levels;           /* --lod, --max-bytes or --max-ms */
-    bool kernel, integral; /* options of the integral renderer */
-    bool again;            /* over settings that --quality or --error has chosen */
+    bool kernel, integral; /* --kernel of values; options of the integral renderer */
+    bool again;            /* second pass, over the settings that --quality or --error selected */
     bool footprint;        /* --kernel of splats, --low-pass or --flatten */
     bool weights;
 } parse;
@@ -338,7 +338,7 @@ static int parse_background(const char *text, triptych_settings *s)
     int status = trip_option_numbers("--background", text, 3, 4, s->background, &count);
     for (int i = 0; i < 4 && !status; i++)
         if (s->background[i] < 0 || s->background[i] > 1)
-            return trip_option_fail("--background", "components lie between 0 and 1");
+            return trip_option_fail("--background", "components must be between 0 and 1");
     return status;
 }
 
@@ -348,7 +348,7 @@ static int parse_window(const char *text, triptych_transfer_function *look)
     return !status && look->window == 0 ? trip_option_fail("--window", "must be above 0") : status;
 }
 
-/* One or two of the four names, joined by a comma. */
+/* Parses one or two of the four names, joined by a comma. */
 static int parse_submit(const char *text, parse *p)
 {
     static const char *const names[] = { "replicated", "indexed", "sprites", "triangles", NULL };
@@ -362,7 +362,8 @@ static int parse_submit(const char *text, parse *p)
             return status;
         bool *given = which < 2 ? &p->lists : &p->forms;
         if (*given)
-            return trip_option_fail("--submit", "replicated excludes indexed, sprites triangles");
+            return trip_option_fail("--submit",
+                                    "replicated excludes indexed, and sprites excludes triangles");
         *given = true;
         *(which < 2 ? &p->o->settings.indexed : &p->o->settings.triangles) = which % 2;
         rest = comma ? comma + 1 : NULL;
@@ -413,7 +414,6 @@ static int parse_ortho(const char *text, render_options *o)
     return trip_option_number("--ortho", text, 1e-100, 1e100, &o->ortho_height);
 }
 
-/* Which side is seen. */
 static int parse_side(int key, char *arg, parse *p)
 {
     static const char *const views[] = { "front", "back",   "left", "right",
@@ -603,7 +603,7 @@ static int parse_look(int key, char *arg, parse *p)
     }
 }
 
-/* Of values, or of splats. */
+/* Parses a kernel for values or for splats. */
 static int parse_kernel(const char *arg, parse *p)
 {
     static const char *const kernels[] = { "linear", "cubic", "gaussian", "exact",
@@ -688,22 +688,21 @@ static int check_view(const parse *p)
     if (parallel && o->fov_degrees > 0)
         return trip_option_fail("--fov", "does not apply to a parallel view (--ortho)");
     if (o->eye_given && p->side)
-        return trip_option_fail("--eye", "says where to look from, and so do --view, --azimuth and "
-                                         "--elevation: give one or the other");
+        return trip_option_fail("--eye", "excludes --view, --azimuth and --elevation");
     if (o->eye_given && o->ortho_fit)
-        return trip_option_fail("--ortho", "fit goes without --eye; give a height");
+        return trip_option_fail("--ortho", "fit excludes --eye; give a height");
     return 0;
 }
 
-/* What of the view a path fixes. */
+/* Checks that no option contradicts the views of a path. */
 static int check_path(const parse *p)
 {
     const render_options *o = p->o;
     bool other = p->side || o->eye_given || o->look_given || o->up_given || o->zoom > 0 ||
                  o->roll_degrees != 0 || o->fov_degrees > 0 || o->ortho_height > 0 || o->ortho_fit;
     if (o->path && (other || o->orbit))
-        return trip_option_fail("--path", "has the views: of other options of the view only --size "
-                                          "goes with it");
+        return trip_option_fail("--path",
+                                "excludes --orbit and all options of the view except --size");
     return 0;
 }
 
@@ -712,17 +711,17 @@ static int check_sequence(const parse *p)
     const render_options *o = p->o;
     bool several = o->orbit || o->path, moving = video_is_named(o->output);
     if (moving && !several)
-        return trip_option_fail(o->output, "is a video: --orbit or --path says of what");
+        return trip_option_fail(o->output, "is a video, which requires --orbit or --path");
     if (o->fps > 0 && !moving)
-        return trip_option_fail("--fps", "applies to videos: -o NAME.mp4");
+        return trip_option_fail("--fps", "requires a video, -o NAME.mp4");
     if (o->in_flight && !several)
-        return trip_option_fail("--in-flight", "applies to --orbit and --path only");
+        return trip_option_fail("--in-flight", "requires --orbit or --path");
     if (o->in_flight > 1 && (o->stats || o->explain))
-        return trip_option_fail("--in-flight", "is 1 with --stats and --explain");
+        return trip_option_fail("--in-flight", "must be 1 with --stats or --explain");
     return check_path(p);
 }
 
-/* Whether pictures are to be drawn by coarse levels. */
+/* Returns whether the settings allow coarse levels. */
 static bool have_levels(const triptych_settings *s)
 {
     return s->lod_px > 0 || s->max_bytes > 0 || s->max_ms > 0;
@@ -735,12 +734,12 @@ static int check_depth(const render_options *o)
     if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_option_fail("--depth", "does not apply to --renderer integral");
     if (o->settings.show == TRIPTYCH_SHOW_MERGE)
-        return trip_option_fail("--depth", "does not go with --show merge, which shows nothing of "
-                                           "the volume");
+        return trip_option_fail("--depth",
+                                "does not apply to --show merge, which does not draw the volume");
     if (o->settings.target != TRIPTYCH_RGBA32F)
-        return trip_option_fail("--depth", "goes with --target rgba32f");
+        return trip_option_fail("--depth", "requires --target rgba32f");
     if (o->settings.samples > 1)
-        return trip_option_fail("--depth", "goes with one ray a pixel, without --samples");
+        return trip_option_fail("--depth", "requires --samples 1");
     return 0;
 }
 
@@ -750,14 +749,15 @@ static int check_integral(parse *p)
     bool integral = o->renderer == TRIPTYCH_RENDERER_INTEGRAL;
     o->settings.field = o->field == RENDER_FIELD_SPLATS ? TRIPTYCH_SPLATS : TRIPTYCH_VALUES;
     if (p->integral && !integral)
-        return trip_option_fail("--field, --tolerance", "apply to --renderer integral only");
+        return trip_option_fail("--field, --tolerance", "require --renderer integral");
     if (p->kernel && o->field == RENDER_FIELD_SPLATS)
         return trip_option_fail("--kernel", "does not apply to --field splats");
     if (integral && o->settings.kernel == TRIPTYCH_GAUSSIAN)
-        return trip_option_fail("--kernel", "is linear or cubic with --renderer integral");
+        return trip_option_fail("--kernel", "must be linear or cubic with --renderer integral");
     if (o->field == RENDER_FIELD_SOURCE && !cached_volume_wanted(o->input))
-        return trip_option_fail("--field", "source is for volumes: a data set does not hold its "
-                                           "source; give the volume in its place");
+        return trip_option_fail(
+            "--field",
+            "source requires a volume as input, because a data set does not hold its source");
     if (integral && p->classify && o->settings.classify != TRIPTYCH_CLASSIFY_AUTO)
         return trip_option_fail("--classify", "does not apply to --renderer integral");
     if (integral && p->samples_per_sheet)
@@ -766,8 +766,7 @@ static int check_integral(parse *p)
                                 "sheets");
     if (integral && p->early_termination)
         return trip_option_fail("--early-termination",
-                                "does not apply to --renderer integral, whose "
-                                "--tolerance bounds what is left out");
+                                "does not apply to --renderer integral; use --tolerance");
     if (integral && (p->h || p->order || p->compositing || p->weights))
         return trip_option_fail("--method, --h, --weights, --traversal, --compositing",
                                 "do not apply to --renderer integral, which has no layers");
@@ -779,7 +778,8 @@ static int check_integral(parse *p)
             "--lod, --max-bytes, --max-ms",
             "do not apply to --renderer integral, which draws the finest level");
     if (integral && p->kernel_radius && o->field != RENDER_FIELD_SPLATS)
-        return trip_option_fail("--kernel-radius", "applies to splats: give --field splats");
+        return trip_option_fail("--kernel-radius",
+                                "requires --field splats with --renderer integral");
     return 0;
 }
 
@@ -791,18 +791,18 @@ static int check_footprint(const parse *p)
     bool reference = o->renderer == TRIPTYCH_RENDERER_REFERENCE;
     if (p->footprint && o->renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_option_fail("--kernel, --low-pass, --flatten",
-                                "of footprints do not apply to --renderer integral");
+                                "with footprints do not apply to --renderer integral");
     if (s->low_pass == TRIPTYCH_LOW_PASS_UNIFORM && !(reference && ewa))
         return trip_option_fail("--low-pass",
-                                "uniform goes with --renderer reference and --kernel ewa");
+                                "uniform requires --renderer reference and --kernel ewa");
     if (s->flatten > 1 && !ewa)
-        return trip_option_fail("--flatten", "applies to --kernel ewa only");
+        return trip_option_fail("--flatten", "requires --kernel ewa");
     if (s->flatten > 1 && o->count)
-        return trip_option_fail("--flatten", "does not go with --count");
+        return trip_option_fail("--flatten", "does not apply with --count");
     return 0;
 }
 
-/* What not every renderer draws implies one that does. */
+/* Selects the renderer that an option requires, if --renderer is auto. */
 static int choose_renderer(parse *p)
 {
     render_options *o = p->o;
@@ -810,26 +810,28 @@ static int choose_renderer(parse *p)
     const bool image = s->method == TRIPTYCH_IMAGE, reference = image || s->vertex_weights;
     const bool fixed = s->footprint == TRIPTYCH_FOOTPRINT_FIXED;
     if (s->vertex_weights && s->method != TRIPTYCH_MERGE)
-        return trip_option_fail("--weights", "vertex goes with --method merge");
+        return trip_option_fail("--weights", "vertex requires --method merge");
     if (s->vertex_weights && s->compositing == TRIPTYCH_BY_SHEET)
-        return trip_option_fail("--weights", "vertex goes with --compositing splat");
+        return trip_option_fail("--weights", "vertex requires --compositing splat");
     if (image && (p->compositing || s->traversal != TRIPTYCH_OUTWARD))
-        return trip_option_fail("--method", "image goes without --compositing and --traversal");
+        return trip_option_fail("--method",
+                                "image excludes --compositing and --traversal ascending");
     if ((image || fixed) && have_levels(s))
         return trip_option_fail(image ? "--method image" : "--kernel fixed",
-                                "goes without --lod, --max-bytes and --max-ms");
+                                "excludes --lod, --max-bytes and --max-ms");
     if (reference && o->renderer != TRIPTYCH_RENDERER_AUTO &&
         o->renderer != TRIPTYCH_RENDERER_REFERENCE)
         return trip_option_fail(image ? "--method image" : "--weights vertex",
-                                "goes with --renderer reference only");
+                                "requires --renderer reference");
     if (fixed && o->renderer == TRIPTYCH_RENDERER_CPU)
-        return trip_option_fail("--kernel fixed", "goes with --renderer reference and gl only");
+        return trip_option_fail("--kernel fixed", "requires --renderer reference or gl");
     if (o->renderer == TRIPTYCH_RENDERER_AUTO && (reference || fixed))
         o->renderer = reference ? TRIPTYCH_RENDERER_REFERENCE : TRIPTYCH_RENDERER_GL;
     return 0;
 }
 
-/* What only splats have implies them, also where it is what it would be by default. */
+/* Selects pre if an option for splats was given, even with its default value. Selects post if an
+ * option for interpolated values was given. */
 static int choose_classify(parse *p)
 {
     render_options *o = p->o;
@@ -842,10 +844,9 @@ static int choose_classify(parse *p)
     if (splats && (p->samples_per_sheet || of_values))
         return trip_option_fail(
             p->samples_per_sheet ? "--samples-per-sheet" : "--kernel linear, cubic or gaussian",
-            "does not go with --kernel exact, ewa or fixed, --low-pass, --flatten, "
-            "--kernel-radius, --method image, --weights, --compositing, --target, --submit, "
-            "--count or "
-            "--traversal ascending, which are of splats");
+            "does not apply with options for splats: --kernel exact, ewa or fixed, --low-pass, "
+            "--flatten, --kernel-radius, --method image, --weights, --compositing, --target, "
+            "--submit, --count and --traversal ascending");
     if (splats)
         o->settings.classify = TRIPTYCH_PRE;
     else if (p->samples_per_sheet || of_values)
@@ -862,23 +863,25 @@ static int check_classify(const parse *p)
         return 0;
     if (o->settings.classify == TRIPTYCH_PRE && p->kernel &&
         o->renderer != TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_option_fail("--kernel", "applies to --classify post and --renderer integral");
+        return trip_option_fail(
+            "--kernel",
+            "linear, cubic and gaussian require --classify post or --renderer integral");
     if (o->settings.classify == TRIPTYCH_PRE)
         return p->samples_per_sheet
-                   ? trip_option_fail("--samples-per-sheet", "applies to --classify post only")
+                   ? trip_option_fail("--samples-per-sheet", "requires --classify post")
                    : 0;
     if (o->settings.traversal != TRIPTYCH_OUTWARD)
-        return trip_option_fail("--traversal", "is outward with --classify post");
+        return trip_option_fail("--traversal", "must be outward with --classify post");
     if (o->settings.method == TRIPTYCH_IMAGE)
-        return trip_option_fail("--method", "image is of splats: give --classify pre");
+        return trip_option_fail("--method", "image requires --classify pre");
     if (p->kernel_radius || p->compositing || p->footprint || p->weights)
         return trip_option_fail("--kernel, --low-pass, --flatten, --weights, --kernel-radius, "
                                 "--compositing",
-                                "apply to splats: give --classify pre");
+                                "for splats require --classify pre");
     if (o->count)
-        return trip_option_fail("--count", "counts splats: give --classify pre");
+        return trip_option_fail("--count", "requires --classify pre");
     if (p->target || p->lists || p->forms)
-        return trip_option_fail("--target, --submit", "apply to splats: give --classify pre");
+        return trip_option_fail("--target, --submit", "require --classify pre");
     return 0;
 }
 
@@ -889,12 +892,12 @@ static int add_input(render_options *o, const char *path)
         return 0;
     }
     if (o->more_count == RENDER_MORE_MAX)
-        return trip_option_fail(path, "is one data set too many");
+        return trip_option_fail(path, "too many data sets; at most 64 are possible");
     o->more[o->more_count++] = path;
     return 0;
 }
 
-/* Several inputs are data sets, which were bricked to go together. */
+/* Several inputs must be data sets, not volumes. */
 static int check_more(const parse *p)
 {
     const render_options *o = p->o;
@@ -903,27 +906,30 @@ static int check_more(const parse *p)
                              : cached_volume_wanted(o->more[i]) ? o->more[i]
                                                                 : NULL;
         if (volume)
-            return trip_option_fail(volume,
-                                    TRIP_ONE_VOLUME "; what is drawn together are data sets "
-                                                    "(triptych brick --region)");
+            return trip_option_fail(
+                volume,
+                TRIP_ONE_VOLUME "; several data sets are possible (see triptych brick --region)");
     }
     if (o->more_count && p->levels)
-        return trip_option_fail("--lod, --max-bytes, --max-ms",
-                                "do not apply to several data sets, of which the finest level is "
-                                "drawn");
+        return trip_option_fail(
+            "--lod, --max-bytes, --max-ms",
+            "do not apply to several data sets, which are drawn at the finest level");
     if (o->more_count && p->quality.error > 0)
-        return trip_option_fail("--error", "takes settings that were measured on one data set");
+        return trip_option_fail(
+            "--error", "does not apply to several data sets; its settings were measured on one");
     return 0;
 }
 
-/* Options that cannot apply together; what one implies for another. */
+/* Checks combinations of options, and sets the options that others imply. */
 static int check(parse *p)
 {
     render_options *o = p->o;
     if (!o->input)
-        return trip_option_fail("VOLUME", "none given: `triptych render VOLUME -o PICTURE.png`");
+        return trip_option_fail("VOLUME",
+                                "no volume given; use `triptych render VOLUME -o PICTURE.png`");
     if (!o->output)
-        return trip_option_fail("-o", "no picture named: `triptych render VOLUME -o PICTURE.png`");
+        return trip_option_fail("-o",
+                                "no picture given; use `triptych render VOLUME -o PICTURE.png`");
     int status = trip_option_check_volume(&o->volume, o->input);
     if (!status)
         status = check_more(p);
@@ -938,8 +944,7 @@ static int check(parse *p)
     if (quality_options_given(&p->quality) && o->renderer == TRIPTYCH_RENDERER_INTEGRAL &&
         !p->again)
         return trip_option_fail("--quality, --error",
-                                "do not apply to --renderer integral, which is what they come "
-                                "close to");
+                                "do not apply to --renderer integral, which is exact");
     status = quality_options_check(&p->quality);
     if (!status)
         status = trip_option_check_effects(&o->settings, o->heat);
@@ -947,13 +952,11 @@ static int check(parse *p)
         return status;
     if (p->level != (o->function.window > 0))
         return trip_option_fail(p->level ? "--level" : "--window",
-                                "--window and --level are given together");
+                                "give --window and --level together");
     if (p->early_termination && o->settings.traversal != TRIPTYCH_OUTWARD)
-        return trip_option_fail("--early-termination",
-                                "goes with --traversal outward: from back to front "
-                                "all is drawn");
+        return trip_option_fail("--early-termination", "requires --traversal outward");
     if (p->h && o->settings.method != TRIPTYCH_MERGE)
-        return trip_option_fail("--h", "applies to --method merge only");
+        return trip_option_fail("--h", "requires --method merge");
     status = check_integral(p);
     if (!status)
         status = check_footprint(p);
@@ -967,22 +970,22 @@ static int check(parse *p)
         return status;
     if (p->target &&
         (o->renderer == TRIPTYCH_RENDERER_REFERENCE || o->renderer == TRIPTYCH_RENDERER_INTEGRAL))
-        return trip_option_fail("--target", "applies to --renderer gl and cpu only");
+        return trip_option_fail("--target", "requires --renderer gl or cpu");
     bool gl_only = p->lists || p->forms;
     if (gl_only && o->renderer != TRIPTYCH_RENDERER_AUTO && o->renderer != TRIPTYCH_RENDERER_GL)
-        return trip_option_fail("--submit", "applies to --renderer gl only");
+        return trip_option_fail("--submit", "requires --renderer gl");
     if (gl_only)
         o->renderer = TRIPTYCH_RENDERER_GL;
     if (o->occluded && o->renderer != TRIPTYCH_RENDERER_AUTO &&
         o->renderer != TRIPTYCH_RENDERER_CPU)
-        return trip_option_fail("--occluded", "applies to --renderer cpu only");
+        return trip_option_fail("--occluded", "requires --renderer cpu");
     if (o->occluded)
         o->renderer = TRIPTYCH_RENDERER_CPU;
     status = check_depth(o);
     if (status)
         return status;
     if (o->count && !o->stats && !o->explain)
-        return trip_option_fail("--count", "adds to --stats or --explain; give one of them");
+        return trip_option_fail("--count", "requires --stats or --explain");
     const char *extension = strrchr(o->output, '.');
     if (!p->background && extension && !strcasecmp(extension, ".exr"))
         memset(o->settings.background, 0, sizeof o->settings.background);
@@ -991,7 +994,8 @@ static int check(parse *p)
     return 0;
 }
 
-/* Options of the settings that reports measure, but for the renderer, by which one is chosen. */
+/* Notes an option that sets a measured setting. The renderer is left out: --error selects settings
+ * for a given renderer. */
 static void note_measurable(int key, quality_options *q)
 {
     static const int keys[] = { KEY_CLASSIFY,      KEY_COMPOSITING, KEY_SAMPLES_PER_SHEET,
@@ -1068,7 +1072,8 @@ int render_options_parse(render_options *o, int argc, char **argv)
     int status = trip_options_parse(&argp, argc, argv, &p);
     if (status || !quality_options_given(&p.quality))
         return status;
-    /* Again, over what was chosen: other options go before, wherever they stand. */
+    /* Parse the options again over the selected settings, so that explicit options take precedence
+     * in any order. */
     render_options chosen = defaults;
     chosen.renderer = o->renderer;
     chosen.settings.shading = o->settings.shading;

@@ -48,7 +48,7 @@ void render_stats_destroy(render_stats *s)
     free(s);
 }
 
-/* Milliseconds to the microsecond. */
+/* Adds milliseconds, rounded to microseconds. */
 static void add_ms(cJSON *object, const char *name, double ms)
 {
     char text[32];
@@ -56,7 +56,8 @@ static void add_ms(cJSON *object, const char *name, double ms)
     cJSON_AddRawToObject(object, name, text);
 }
 
-/* "x" at level 0, "x1" at level 1, "x halo"; only what is drawn has statistics. */
+/* Names a list: "x" at level 0, "x1" at level 1, or "x halo". Names are unique among the lists that
+ * are drawn. */
 static const char *list_name(const triptych_list *list, char name[24])
 {
     if (!strcmp(list->kind, "halo"))
@@ -68,7 +69,7 @@ static const char *list_name(const triptych_list *list, char name[24])
     return name;
 }
 
-/* What was not counted is left out. */
+/* Leaves out the splats projected and drawn if they were not counted. */
 static void add_splats(cJSON *list, const triptych_list_stats *s)
 {
     cJSON_AddNumberToObject(list, "splats_read", (double)s->splats_read);
@@ -91,8 +92,8 @@ static void add_list(cJSON *list, const triptych_list_stats *s)
     cJSON_AddNumberToObject(list, "bricks_of_other_levels", (double)s->bricks_of_other_levels);
 }
 
-/* Whether frames are drawn from the list: by splats of voxels and means, else of voxels, values and
- * the halo. */
+/* Returns whether frames use the list. pre uses the lists of voxels and means. post uses the lists
+ * of voxels, values and the halo. */
 static bool is_drawn_from(const triptych_list *list, const triptych_frame_stats *frame,
                           const triptych_list_stats *s)
 {
@@ -103,7 +104,7 @@ static bool is_drawn_from(const triptych_list *list, const triptych_frame_stats 
     return !strcmp(list->kind, "values");
 }
 
-/* Calls `one` with each list that can be drawn and its statistics. */
+/* Calls `one` with the name and the statistics of each list that can be drawn. */
 static int each_list(triptych *t,
                      void (*one)(void *user, const char *name, const triptych_list_stats *s),
                      void *user)
@@ -126,7 +127,7 @@ static int each_list(triptych *t,
     return status;
 }
 
-/* Lists of one name, of data sets that are drawn together, add up. */
+/* Adds a list to an object. Lists of the same name, from several data sets, are summed. */
 static void put_list(cJSON *lists, const char *name, cJSON *list)
 {
     const cJSON *before = cJSON_GetObjectItemCaseSensitive(lists, name);
@@ -229,7 +230,6 @@ static int write_file(const char *path, const char *text)
     return status;
 }
 
-/* How the frame was drawn. */
 static void add_method(cJSON *root, const render_options *o, const triptych_frame_stats *frame)
 {
     if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL) {
@@ -296,7 +296,7 @@ int render_stats_write(render_stats *s, const render_options *o)
     if (strcmp(o->stats, "-"))
         status = write_file(o->stats, text);
     else
-        puts(text); /* main() says when stdout cannot be written */
+        puts(text); /* main() reports a failed write to stdout */
     free(text);
     return status;
 }
@@ -313,7 +313,7 @@ int render_stats_explain_plan(triptych *t, FILE *out)
     if (!status) {
         fprintf(out, "camera      %s\n", options);
         if (view.splats)
-            fprintf(out, "fitted      to what is visible, found among %" PRIu64 " splats\n",
+            fprintf(out, "fitted      to the visible part, found among %" PRIu64 " splats\n",
                     view.splats);
         fputs(plan, out);
     }
@@ -322,7 +322,7 @@ int render_stats_explain_plan(triptych *t, FILE *out)
     return status;
 }
 
-/* What was read, a record each. */
+/* Returns the name for the records that were read. */
 static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
 {
     const bool splats = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? o->field == RENDER_FIELD_SPLATS
@@ -330,7 +330,7 @@ static const char *things_read(const render_options *o, const triptych_frame_sta
     return splats ? "splats" : "voxels";
 }
 
-/* Where lines of costs go, and what they call records. */
+/* The stream for the lines of costs, and the name for records. */
 typedef struct costs {
     FILE *out;
     const char *things;
@@ -358,10 +358,10 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
     if (frame.bytes_cached)
         fprintf(out, "cache       %s from memory\n", trip_format_bytes(frame.bytes_cached, bytes));
     if (frame.bytes_occluded)
-        fprintf(out, "occluded    %s in %" PRIu64 " runs not read: behind what is opaque\n",
+        fprintf(out, "occluded    %s in %" PRIu64 " runs not read, hidden by opaque bricks\n",
                 trip_format_bytes(frame.bytes_occluded, bytes), frame.runs_occluded);
     if (frame.light_memory_bytes)
-        fprintf(out, "light       %s read in %.1f ms, worked out in %.1f ms; %s of memory\n",
+        fprintf(out, "light       %s read in %.1f ms, computed in %.1f ms; %s of memory\n",
                 trip_format_bytes(frame.light_bytes_read, bytes), frame.light_gather_ms,
                 frame.light_sweep_ms, trip_format_bytes(frame.light_memory_bytes, memory));
     if (frame.heat_memory_bytes)

@@ -1,7 +1,7 @@
-/* The results of `triptych render` besides its pictures: JSON for programs, lines for people.
- * Times, reads and bytes are those of the frames that the user got; exact counts of splats come
- * from frames of their own, drawn once more. Frames are those of a library's context, whose
- * pictures are complete. */
+/* The results of `triptych render` besides its pictures, as JSON for programs and lines for people.
+ * Times, reads and bytes are from the frames that the user gets. Exact counts of splats are from
+ * frames that are drawn once more. The functions read statistics from a libtriptych context with a
+ * complete picture. Main thread only. */
 #ifndef TRIP_RENDER_STATS_H
 #define TRIP_RENDER_STATS_H
 
@@ -14,26 +14,29 @@ typedef struct render_stats render_stats;
 
 int render_stats_create(render_stats **out);
 void render_stats_destroy(render_stats *s);
-/* The context's last frame. */
+/* Adds the last frame of the context. */
 int render_stats_add_frame(render_stats *s, triptych *t);
-/* The same, drawn once more as frame `index` with exact counts. */
+/* Adds exact counts to frame `index`, which the context has drawn once more. */
 int render_stats_add_count(render_stats *s, int index, triptych *t);
-/* What drew the frames and the memory it took: once they are drawn, before they are counted. */
+/* Adds the renderer, the settings and the memory. Called after all frames are drawn, and before
+ * they are counted. */
 int render_stats_describe(render_stats *s, const render_options *o, triptych *t);
-/* What is written to as it is, and stays what it is: devices, pipes and links. */
+/* Returns whether a path is a device, pipe or link. The program writes into it instead of
+ * replacing it. */
 bool render_stats_is_special(const char *path);
-/* Writes the JSON to the file of --stats, by another name and a rename, or to stdout. */
+/* Writes the JSON to stdout or to the file of --stats. A regular file is replaced by a rename when
+ * it is complete. */
 int render_stats_write(render_stats *s, const render_options *o);
 
-/* The view as options, how many splats were looked at to fit it, and the plan of a frame that is
- * begun. */
+/* Prints the view as options, the number of splats examined to fit it, and the plan of the
+ * frame. */
 int render_stats_explain_plan(triptych *t, FILE *out);
-/* What the parts of the last frame cost, a line each. */
+/* Prints the cost of each part of the last frame, one line for each. */
 int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out);
-/* The exact counts of its lists, a line each. */
+/* Prints the exact counts of each list, one line for each. */
 int render_stats_explain_count(triptych *t, FILE *out);
-/* "image.png: 1024 x 1024, 1.2 million splats, 34 MB read, 0.32 s"; voxels, where values are
- * interpolated */
+/* Prints a line such as "image.png: 1024 x 1024, 1.2 million splats, 34 MB read, 0.32 s". It counts
+ * voxels if values are interpolated. */
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out);
 
 #endif

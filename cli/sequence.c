@@ -7,7 +7,7 @@
 #include "library.h"
 #include "report.h"
 
-/* At another rate a path has as many seconds, and so other frames. */
+/* Loads a path. --fps keeps its duration and changes its number of frames. */
 static int load_path(sequence *s)
 {
     const double fps = s->o->fps;
@@ -18,7 +18,8 @@ static int load_path(sequence *s)
         s->path.frames_per_second = fps;
     s->frames = trip_camera_path_frames(&s->path);
     return fps > 0 && s->frames == TRIP_CAMERA_PATH_FRAMES
-               ? trip_fail(TRIP_USAGE, "usage", "--fps", "makes the path %d frames long, or longer",
+               ? trip_fail(TRIP_USAGE, "usage", "--fps",
+                           "makes the path %d frames long or longer; use a lower rate",
                            TRIP_CAMERA_PATH_FRAMES)
                : 0;
 }
@@ -43,11 +44,11 @@ static int parse_text(const sequence *s, const char *text, trip_tf **out)
     int status = trip_tf_parse(out, s->o->path, text, strlen(text));
     if (!status && trip_tf_is_normalised(*out))
         return trip_fail(TRIP_ERROR, "path", s->o->path,
-                         "\"function_text\" is over the data's range, not in data units");
+                         "\"function_text\" must be in data units, not over the range of the data");
     return status;
 }
 
-/* ---- what functions show ---- */
+/* ---- visible values ---- */
 
 static int fail_memory(void)
 {
@@ -88,7 +89,8 @@ int sequence_find_shown(sequence *s)
         const trip_path_key *key = &s->path.keys[i];
         if (key->function)
             add_name(s, key->function);
-        if (key->text && !(text && !strcmp(text, key->text))) /* as most keys have that before */
+        if (key->text && !(text && !strcmp(text, key->text))) /* skips text equal to the previous
+                                                                 key's, which is the common case */
             status = add_range(s, text = key->text);
     }
     return status;
@@ -135,9 +137,10 @@ static int find_cameras(sequence *s, triptych *t)
     return status;
 }
 
-/* ---- functions ---- */
+/* ---- transfer functions ---- */
 
-/* A preset, a file or, without a name, the data set's own, in data units. */
+/* Loads a preset or a file, in data units. Without a name, loads the data set's own transfer
+ * function. */
 static int find_function(triptych *t, const char *name, trip_tf **out)
 {
     char *text = NULL;
@@ -156,7 +159,7 @@ static triptych_transfer_function look_of(const sequence *s, const char *text)
     return f;
 }
 
-/* Taken once, so that it is warned of. */
+/* Sets a key's transfer function once, so that the library prints its warnings. */
 static int try_function(const sequence *s, triptych *t, const trip_path_key *key)
 {
     triptych_transfer_function f = look_of(s, key->text);
@@ -185,7 +188,7 @@ static int find_functions(sequence *s, triptych *t)
     return status;
 }
 
-/* A frame's function as text, for free(). */
+/* Returns a frame's transfer function as text; the caller frees it. */
 static int mix_text(const sequence *s, int frame, char **text)
 {
     trip_path_mix mix = trip_camera_path_mix(&s->path, trip_camera_path_seconds(&s->path, frame));
@@ -211,9 +214,9 @@ static int set_function(const sequence *s, triptych *t, int frame, bool quiet)
     return status;
 }
 
-/* ---- what is cut away ---- */
+/* ---- clipping ---- */
 
-/* The path's, where it has some, in place of the command line's. */
+/* Applies the clipping of the path, if it has any, instead of the clipping on the command line. */
 static int set_clip(const sequence *s, triptych *t, int frame)
 {
     triptych_settings settings = s->o->settings;

@@ -1,6 +1,6 @@
-/* The frames that `triptych render` draws: one, those of an orbit, or those of a path of the
- * camera, whose keys may have transfer functions of their own. Read-only once it is prepared, for
- * any number of threads. */
+/* The frames that `triptych render` draws: one frame, an orbit, or a camera path. The keys of a
+ * path may have transfer functions. A prepared sequence is read-only, and any number of threads may
+ * use it. */
 #ifndef TRIP_CLI_SEQUENCE_H
 #define TRIP_CLI_SEQUENCE_H
 
@@ -11,30 +11,31 @@
 typedef struct sequence {
     const render_options *o;
     int frames;
-    trip_camera_path path;    /* without keys: none is given */
-    triptych_camera *cameras; /* of the frames, once they are prepared */
-    trip_tf **functions; /* of the path's keys, before them the default; NULL where it has none */
-    /* What functions show, the command line's and the path's: those with names, and of the others
-     * the values that they show. */
+    trip_camera_path path;    /* without keys if no path is given */
+    triptych_camera *cameras; /* of each frame, after sequence_prepare() */
+    trip_tf **functions;      /* default first, then of each key; NULL if the key has none */
+    /* Transfer functions that bricking takes into account: the names of presets and files, and the
+     * visible value ranges of transfer functions given as text. */
     const char **names;
     triptych_range *ranges;
     size_t name_count, range_count;
 } sequence;
 
-/* Zeroed at first; reads the path's file. */
+/* Reads the path's file. *s is zeroed before. */
 int sequence_load(sequence *s, const render_options *o);
-/* Finds what functions show, for bricking. */
+/* Fills names and ranges for bricking. */
 int sequence_find_shown(sequence *s);
-/* Whether the path has functions of its own. */
+/* Returns whether a key of the path has a transfer function. */
 bool sequence_has_functions(const sequence *s);
-/* Once the context has the data set, the function and the view. Warns of functions. */
+/* Computes all cameras and transfer functions, and prints the warnings for transfer functions. The
+ * context must have its data set, transfer function and view. */
 int sequence_prepare(sequence *s, triptych *t);
 void sequence_release(sequence *s);
 
 double sequence_frames_per_second(const sequence *s);
 
-/* A frame's view, and of a path its function, which is not warned of again. `quiet`: the context
- * reports nothing. */
+/* Sets a frame's view and, for a path, its transfer function and clipping. Prints no warnings.
+ * `quiet`: the context already prints no messages. */
 int sequence_set_frame(const sequence *s, triptych *t, int frame, bool quiet);
 
 #endif

@@ -24,12 +24,12 @@ struct video {
     trip_new_file file;
     const char *path;
     pid_t encoder;
-    int frames, errors; /* a socket that frames go into; a file that ffmpeg's messages go to */
+    int frames, errors; /* frames: socket to ffmpeg; errors: file with the messages of ffmpeg */
     size_t pixels;
     unsigned char *rgb;
 };
 
-/* What is given to ffmpeg for each kind of file. */
+/* Arguments of ffmpeg for each kind of file. */
 static const struct format {
     const char *extension, *name, *codec, *quality;
 } formats[] = {
@@ -71,11 +71,11 @@ int video_check(const char *path, int width, int height)
 {
     if (width % 2 || height % 2)
         return trip_fail(TRIP_USAGE, "usage", "--size",
-                         "%dx%d: width and height of a video are even", width, height);
+                         "%dx%d: width and height of a video must be even", width, height);
     if (!is_installed())
-        return trip_fail(TRIP_ERROR, "write", path,
-                         "videos are made by ffmpeg, which is not installed; -o NAME.png makes "
-                         "numbered pictures");
+        return trip_fail(
+            TRIP_ERROR, "write", path,
+            "videos require ffmpeg, which is not installed; -o NAME.png writes numbered pictures");
     return 0;
 }
 
@@ -101,7 +101,7 @@ static int start(video *v, int width, int height, double frames_per_second)
     char size[32], rate[32], file[sizeof v->file.temporary + 8];
     int ends[2];
     snprintf(size, sizeof size, "%dx%d", width, height);
-    snprintf(file, sizeof file, "file:%s", v->file.temporary); /* whatever colons are in it */
+    snprintf(file, sizeof file, "file:%s", v->file.temporary); /* protects colons in the name */
     trip_text_from_double(frames_per_second, rate);
     const char *arguments[] = {
         "ffmpeg",      "-hide_banner", "-loglevel",
@@ -148,7 +148,7 @@ int video_create(video **out, const char *path, int width, int height, double fr
     return status;
 }
 
-/* The last line that ffmpeg wrote; "" where there is none. */
+/* Copies the last line of ffmpeg's messages, or "". */
 static void last_message(const video *v, char text[256])
 {
     off_t end = lseek(v->errors, 0, SEEK_END);
@@ -179,7 +179,7 @@ static int fail_of_encoder(video *v)
     return trip_fail(TRIP_ERROR, "write", v->path, "ffmpeg failed%s%s", *why ? ": " : "", why);
 }
 
-/* Nearest, clamped; as in pictures. */
+/* Rounds to the nearest 8-bit value, clamped, as image files do. */
 static unsigned char rounded(float x)
 {
     return (unsigned char)floorf(fminf(fmaxf(x, 0), 1) * 255 + 0.5f);

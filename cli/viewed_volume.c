@@ -9,7 +9,8 @@
 #include "report.h"
 #include "transfer_function.h"
 
-/* Of volumes whose files are larger, at least, a version of so many voxels is made first. */
+/* For a volume with larger files, `view` first makes a small data set with at least this many
+ * voxels. */
 #define LARGE_BYTES (UINT64_C(8) << 20)
 #define SMALL_VOXELS (UINT64_C(1) << 21)
 
@@ -47,14 +48,14 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
     if (cached_volume_wanted(input))
         return check_volume(s, t, input);
     int status = triptych_open(t, input, resources);
-    if (!status) /* warnings are for whoever looks */
+    if (!status) /* the window prints the warnings later */
         status =
             library_set_function_quietly(t, &(triptych_transfer_function){ .name = s->function });
     triptych_close(t);
     return status;
 }
 
-/* The folder that it lies in, with the last slash, for free(). */
+/* Returns the folder that contains a path, with its last slash; the caller frees it. */
 static char *folder_of(const char *path)
 {
     char *folder = strdup(path);
@@ -68,7 +69,8 @@ static char *folder_of(const char *path)
     return folder;
 }
 
-/* What a data set was made of, for free(); NULL where that is reported not to lie beside it. */
+/* Returns the path of the volume that a data set was made of; the caller frees it. Returns NULL
+ * after reporting that the volume is not beside the data set. */
 static char *source_of(triptych *t, const char *data_set)
 {
     char *name = triptych_open(t, data_set, NULL) == 0 ? library_note(t, "source") : NULL;
@@ -78,7 +80,7 @@ static char *source_of(triptych *t, const char *data_set)
         path = NULL;
     if (!path || access(path, R_OK)) {
         trip_fail(TRIP_ERROR, "brick", name ? name : data_set,
-                  "the volume it was made of is not beside it");
+                  "the volume of this data set is not beside it");
         free(path);
         path = NULL;
     }
@@ -87,7 +89,8 @@ static char *source_of(triptych *t, const char *data_set)
     return path;
 }
 
-/* Of the data set that a volume is drawn from at first: what is made of it later holds more. */
+/* Checks the first data set of a volume against the report of --error. Data sets that are made
+ * later hold more voxels, and are not checked. */
 static int check_measured(const viewed_volume *s, triptych *t, const char *path, const char *volume)
 {
     if (!s->measured || strcmp(volume, s->measured_volume) != 0)
@@ -111,7 +114,7 @@ static int open_volume(const viewed_volume *s, cached_volume *cached, triptych *
     return status;
 }
 
-/* 1: a small one is to be made first. */
+/* Returns 1 if a small data set must be made first. */
 static int is_large(const viewed_volume *s, triptych *t, const char *volume)
 {
     const triptych_brick_options wanted = options_of(s, false);

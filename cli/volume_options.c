@@ -7,7 +7,7 @@
 int trip_option_grid(const char *name, const char **grid)
 {
     if (*grid)
-        return trip_option_fail("--grid", "takes one grid");
+        return trip_option_fail("--grid", "given twice; only one grid is possible");
     *grid = name;
     return 0;
 }
@@ -43,7 +43,8 @@ int trip_option_check_volume(const triptych_brick_options *v, const char *input)
     const bool given =
         v->grid || v->level_set || v->spacing[0] > 0 || v->coordinates || v->axes || v->allow_gaps;
     return given && !cached_volume_wanted(input)
-               ? trip_option_fail(input, "is a data set: --grid, --level-set, --spacing, "
-                                         "--coordinates, --axes and --allow-gaps are for volumes")
+               ? trip_option_fail(input,
+                                  "is a data set; --grid, --level-set, --spacing, --coordinates, "
+                                  "--axes and --allow-gaps apply to volumes only")
                : 0;
 }

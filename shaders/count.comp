@@ -1,15 +1,17 @@
-// Counts the splats of a batch that are projected and drawn, as trip_list_stats defines them, in
-// double precision like the reference; one invocation a splat. In: the batch's storage blocks and
-// the positions. Out: added to the list's counters. Runs only for frames that count.
+// Counts the projected and the drawn splats of a batch, as trip_list_stats defines them. Uses
+// double precision like the reference renderer, and one invocation for each splat. Runs only in
+// frames that count.
+// In: the batch's storage blocks and draw positions. Out: the counters of the list.
+// Mirrors trip_splat_project() in render/splat.c.
 #include "fetch.glsl"
 #include "project.glsl"
 #include "weight.glsl"
 
 layout(local_size_x = TRIP_GL_COUNT_GROUP) in;
-layout(location = TRIP_GL_PIECE) uniform uvec3 piece; // draw positions: first, count; number of the list
-layout(location = TRIP_GL_WAY) uniform int way; // of the rays that the pass is of
+layout(location = TRIP_GL_PIECE) uniform uvec3 piece; // first draw position, their number, list index
+layout(location = TRIP_GL_WAY) uniform int way; // ray direction of the pass
 
-// Low and high half of "projected", then of "drawn", by list.
+// For each list: low and high half of "projected", then of "drawn".
 layout(std430, binding = TRIP_GL_COUNTS) buffer trip_gl_counts { uint counts[]; };
 
 void count(int which)

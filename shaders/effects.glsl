@@ -1,7 +1,8 @@
-// What light reaches a place, and what heat there gives off: the lattices of render/light_grid.h as
-// textures. Mirrors trip_effects_colour() in render/effects.c and trip_emission_at() in
-// render/emission.c. SHADOWS, OCCLUSION, EMISSION and CUED are the effects that run, LIT one of the first
-// two. Places are in index space of level 0, directions in world space.
+// Computes the light and emission at a position, from the lattices of render/light_grid.h as
+// textures. Positions are in the index space of level 0, directions in world space. SHADOWS,
+// OCCLUSION, EMISSION and CUED select the effects; LIT is set if SHADOWS or OCCLUSION is.
+// In: lattices and constants. Out: colours.
+// Mirrors trip_effects_colour() in render/effects.c and trip_emission_at() in render/emission.c.
 #include "shared.h"
 
 #if defined(SHADOWS) || defined(OCCLUSION)
@@ -15,7 +16,7 @@ layout(std140, binding = TRIP_GL_EFFECTS) uniform trip_gl_effects
     TRIP_GL_EFFECTS_FIELDS(vec4)
 };
 
-// Of a place in the list's grid, list axes.
+// Returns the position in index space of level 0 for a position in the list's grid (list axes).
 vec3 position_of(vec3 voxel)
 {
     vec4 v = vec4(voxel, 1.0);
@@ -23,14 +24,14 @@ vec3 position_of(vec3 voxel)
 }
 
 #ifdef CUED
-// What is farther fades into the background.
+// Fades a colour into the background with distance.
 vec3 cued(vec3 colour, vec3 position)
 {
     return mix(colour, faded.rgb, faded.w * clamp(dot(cue, vec4(position, 1.0)), 0.0, 1.0));
 }
 #endif
 
-// Linear between nodes, in full precision, which filters of textures lack.
+// Interpolates linearly between nodes. Texture filters lack the precision of float.
 float lattice_at(sampler3D lattice, vec3 node)
 {
     ivec3 last = textureSize(lattice, 0) - 1;
@@ -51,16 +52,16 @@ float lattice_at(sampler3D lattice, vec3 node)
 #endif
 
 #if defined(LIT) || defined(SHADED)
-// How a surface is lit: strength 0 where none is.
+// The light on a surface; strength is 0 without a surface.
 struct surface {
     float strength, diffuse;
-    float gloss; // what its highlight adds
+    float gloss; // brightness of the highlight
     vec3 normal;
 };
 #endif
 
 #ifdef LIT
-// Along a unit vector, the bias times `share`.
+// Returns `share` of the bias in the direction of a unit vector.
 vec3 aside(vec3 unit, float share)
 {
     return vec3(dot(aside_0.xyz, unit), dot(aside_1.xyz, unit), dot(aside_2.xyz, unit)) * share;
@@ -70,7 +71,8 @@ vec3 aside(vec3 unit, float share)
 #ifdef SHADOWS
 layout(binding = TRIP_GL_LIGHT_REACHED) uniform sampler3D light_reached;
 
-// Towards the light, but not beyond it.
+// Returns the share of light that arrives. The lookup is shifted towards the light, but not beyond
+// it.
 float reached_at(vec3 position, float strength, vec3 towards_light)
 {
     vec3 at = position + aside(towards_light, strength);
@@ -101,7 +103,8 @@ float open_at(vec3 position, surface s)
 #endif
 
 #ifdef LIT
-// `towards_light` and `eye`, towards that, are anything without SHADOWS.
+// Returns the lit colour. `towards_light` and `eye` (direction to the eye) may be undefined without
+// SHADOWS.
 vec3 lit_at(vec3 colour, surface s, vec3 position, vec3 towards_light, vec3 eye)
 {
     float reached = 1.0, open = 1.0, scattered = 1.0;

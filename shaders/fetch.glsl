@@ -1,7 +1,9 @@
-// One splat of the batch by its draw position: its place from the eye (list axes), code and normal.
-// Mirrors stream/block.h: the bytes of blocks and normals are as in the files. With INDEXED runs
-// are places in the order of a list, each of which is an index into one array of vertices (x, y, z
-// and code in 16 bits each). With UNEVEN voxels lie where a table says (coordinates.h).
+// Fetches one splat of the batch by its draw position.
+// In: the storage blocks of the batch, with blocks and normals as in the files. Out: position
+// relative to the eye (list axes), code and normal.
+// Mirrors stream/block.h. With INDEXED a run refers to the order array of its list, which holds
+// indices into one array of vertices (x, y, z and code, 16 bits each). With UNEVEN a table gives
+// the positions of voxels (coordinates.h).
 #include "real.glsl"
 #include "effects.glsl"
 
@@ -17,8 +19,8 @@ layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip
 #endif
 
 #ifdef UNEVEN
-// Entry 3 i + a: of voxel i along axis a of the data the place, then the width, each the sum of two
-// floats.
+// Entry 3 i + a belongs to voxel i along axis a of the data. It holds the position and the width,
+// each as the sum of two floats.
 #ifdef INDEXED
 #define VOXEL_POSITIONS TRIP_GL_VOXEL_POSITIONS_INDEXED
 #else
@@ -29,17 +31,17 @@ layout(std430, binding = VOXEL_POSITIONS) readonly buffer trip_gl_voxel_position
 
 struct record {
     real3 from_eye; // list axes
-    real3 position;    // to_x . c, to_y . c in pixels from the image's centre, forward . c
+    real3 position;    // to_x . c and to_y . c in pixels from the image's centre, forward . c
     uint code, normal;
 #ifdef UNEVEN
     real3 width;    // list axes
 #endif
 #ifdef PLACED
-    vec3 voxel; // of the list's grid, list axes
+    vec3 voxel; // position in the list's grid, list axes
 #endif
 };
 
-// Offset of a splat from its run's origin, voxels.
+// Returns the offset of a splat from its run's origin, in voxels.
 #ifdef INDEXED
 real3 offset_of(uint at, out uint code)
 {
@@ -50,7 +52,7 @@ real3 offset_of(uint at, out uint code)
     return real3(p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]);
 }
 #else
-// The place of set bit number k of a mask.
+// Returns the index of set bit number k of a mask.
 uint find_bit(uint low, uint high, uint k)
 {
     uint below = uint(bitCount(low)), word = low, at = 0u;
@@ -72,7 +74,7 @@ uint find_bit(uint low, uint high, uint k)
 
 #include "code.glsl"
 
-// Every second bit of a Morton number in a square.
+// Extracts the even bits of a Morton number within a square.
 uint even_bits(uint n)
 {
     return (n & 1u) | (n >> 1 & 2u) | (n >> 2 & 4u);
@@ -103,8 +105,8 @@ uint normal_at(uint at)
 #endif
 
 #ifdef UNEVEN
-// Of a voxel and an offset from it, list axes: how far the other's place is from its place, and the
-// other's width.
+// Returns the difference in position between a voxel and the voxel at an offset from it (list
+// axes). Also sets the width of the second voxel.
 real3 position_offset(ivec3 origin, ivec3 offset, out real3 width)
 {
     real3 apart;
@@ -137,10 +139,10 @@ record fetch_record(uint position)
 #ifdef UNEVEN
     offset = position_offset(origin, ivec3(offset), r.width);
 #endif
-    // In this order: base + offset cancels almost exactly near the eye.
+    // This order keeps precision: base + offset cancels almost exactly near the eye.
     r.from_eye = (real3(run.base) + offset) + real3(run.base_low);
 #ifdef PLACED
-    // The eye's place cancels almost exactly, however far it is.
+    // The eye's position cancels almost exactly, however far it is.
     precise vec3 corner = (run.base + eye_high.xyz) + (run.base_low + eye_low.xyz);
     r.voxel = corner + offset;
 #endif
@@ -154,8 +156,8 @@ record fetch_record(uint position)
     r.position = run.position + vec3(dot(to_x.xyz, offset), dot(to_y.xyz, offset),
                                dot(forward.xyz, offset));
 #ifdef FIXED
-    // Sprites are as large at the eye as anywhere: about it no depth may be what rounding left of
-    // the run's, and that of the voxel that the eye is at is 0.
+    // Sprites keep their size at the eye. The depth of a splat near the eye must not contain
+    // rounding errors of the run's depth. A splat at the eye must have depth 0.
     if (dot(r.from_eye, r.from_eye) < dot(offset, offset))
         r.position = vec3(dot(to_x.xyz, r.from_eye), dot(to_y.xyz, r.from_eye),
                        dot(forward.xyz, r.from_eye));

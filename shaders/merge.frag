@@ -1,12 +1,13 @@
-// The picture from the layers: C = sum w^2 C_a / sum w^2 over the lists with weight (2005 section
-// 5.2, 2008 section 4.2), with the background behind, and with DEPTH the mean distance of what is
-// seen before it. In: a band of the layers. Out: premultiplied colour; world units. Mirrors merging
-// in render/reference.c and render/layer.h. LAYERS has bit a set where list a was drawn.
+// Merges the layers into the picture: C = sum w^2 C_a / sum w^2 over the lists with weight (2005,
+// section 5.2; 2008, section 4.2). Adds the background behind it. With DEPTH it also computes the
+// mean distance of the visible matter. LAYERS has bit a set if list a was drawn.
+// In: a band of the layers. Out: premultiplied colour, and distance in world units.
+// Mirrors the merging in render/reference.c and render/layer.h.
 #include "weight.glsl"
 
 layout(binding = TRIP_GL_LAYER) uniform sampler2D layers[3];
-layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
-layout(location = TRIP_GL_ROW_IN_BAND) uniform int row_in_band; // likewise
+layout(location = TRIP_GL_ROW) uniform int row; // row of the image at row 0 of the fragments
+layout(location = TRIP_GL_ROW_IN_BAND) uniform int row_in_band; // row of the band at row 0 of the fragments
 layout(location = TRIP_GL_OUT_COLOUR) out vec4 image;
 #ifdef DEPTH
 layout(binding = TRIP_GL_LAYER_DEPTH) uniform sampler2D layer_depths[3];
@@ -23,7 +24,7 @@ void add_layer(int axis, sampler2D layer, sampler2D depths, inout sums sum)
     ivec2 at = ivec2(gl_FragCoord.xy) + ivec2(0, row_in_band);
     float w = float(weight_of(real2(gl_FragCoord.xy) + real2(0.0, row), axis));
     sum.weight += w * w;
-    // Where there is no weight the layer is masked, and a layer that was not drawn is empty.
+    // Pixels without weight are masked in the layer. A layer that was not drawn is empty.
     if (!(w > 0.0) || (LAYERS & 1 << axis) == 0)
         return;
     sum.colour += w * w * texelFetch(layer, at, 0);
@@ -31,7 +32,8 @@ void add_layer(int axis, sampler2D layer, sampler2D depths, inout sums sum)
 }
 
 #ifdef DEPTH
-// World units; opacity is that of the sum of depths. Nothing is infinitely far.
+// Returns the distance in world units, or infinity for transparent pixels. `opacity` belongs to the
+// same sum.
 float distance_of(float depth_sum, float opacity)
 {
     real2 p = real2(gl_FragCoord.xy) + real2(0.0, row) - screen.xy;

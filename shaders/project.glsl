@@ -1,10 +1,12 @@
-// The projection of a splat. Mirrors trip_splat_project() in render/splat.c with the rays scaled,
-// A, B taken per unit of depth and of `step`, and all covariances times u, which alone carries the
-// size of a splat in pixels: no number leaves a float's range. See render/splat.h for the formulas.
-// `c` and `place` are a record's (fetch.glsl). With NEAR, and wherever splats are counted, some may be
-// near: then all have the numbers of near ones. With AFFINE those that are not near are affine
-// (render/splat.h), and have none of these. With UNEVEN the own_width and own_size of rays.glsl are the
-// splat's.
+// Projects a splat. render/splat.h has the formulas.
+// In: `c` and `position` of a record (fetch.glsl). Out: the footprint.
+// Mirrors trip_splat_project() in render/splat.c, with three changes that keep all numbers within
+// the range of a float. Rays are scaled; A and B are divided by depth and `step`; and all
+// covariances are multiplied by u, which carries the size of a splat in pixels.
+//
+// With NEAR, and when splats are counted, some splats may be near, and all get the fields for near
+// splats. With AFFINE all other splats are affine (render/splat.h), and these fields are 0. With
+// UNEVEN, own_width and own_size of rays.glsl must be set for the splat.
 #include "rays.glsl"
 
 #if defined(TRIP_DOUBLE) && !defined(NEAR)
@@ -17,25 +19,26 @@ struct splat {
     real ray2;        // |ray|^2 through the centre; 1 in parallel views
     real amplitude;
     real4 bounds;     // x0, y0, x1, y1
-    real radius;      // index space of the list
+    real radius;      // in the index space of the list
 #ifdef NEAR
     bool near;
-    real3 a, b, along; // dot products with (1, x, y), (x, y) pixels from the image's centre
+    real3 a, b, along; // dot products with (1, x, y) for pixels (x, y) from the image's centre
 #endif
 };
 
-// Of round kernels, sigma^2.
+// Returns sigma^2 of round kernels.
 real own_sigma2()
 {
     return kernel.x * (own_size * own_size);
 }
 
 #ifdef FLATTENED
-// Of the splat at hand: trip_flattening of render/splat.h, list axes.
+// The flattening of the current splat: trip_flattening of render/splat.h, list axes.
 vec4 flattening;
 
-// xx, xy, yy of S and its determinant, from those of the round kernel: for the gradients gx, gy of x
-// and y the part of `share` at right angles to the normal. `along` is normal . ray, of unit length.
+// Returns xx, xy, yy of S and its determinant for a flattened kernel, from the values of the round
+// kernel. gx and gy are the gradients of x and y. `share` is the share of the part at right angles
+// to the normal. `along` is normal . (unit ray).
 real4 flattened(real4 s, real3 gx, real3 gy, real along)
 {
     real3 x = cross(gx, flattening.xyz), y = cross(gy, flattening.xyz);
@@ -46,8 +49,8 @@ real4 flattened(real4 s, real3 gx, real3 gy, real along)
 
 #ifdef NEAR
 #ifdef PARALLEL
-// Sets `along`; false where all of the splat is behind the plane of the eye. `half_size` is of the
-// support of the round kernel.
+// Sets `near` and `along`. Returns false if the whole splat lies behind the plane of the eye.
+// `half_size` is the half extent of the round kernel's support.
 bool project_near(real3 position, real2 half_size, inout splat s)
 {
     real3 ray = own_vector(ray_0.xyz), x = own_vector(ray_x.xyz), y = own_vector(ray_y.xyz);
@@ -60,8 +63,8 @@ bool project_near(real3 position, real2 half_size, inout splat s)
     return middle > -reach;
 }
 #else
-// The least and greatest p of [-half_size, half_size] with
-// (x - p z)^2 <= reach^2 |to - p forward|^2; false where there are none.
+// Finds the minimum and maximum p in [-half_size, half_size] with (x - p z)^2 <= reach^2 |to - p
+// forward|^2. Returns false if there is none.
 bool bound_along(real3 to, real3 forward, real x, real z, real reach, real half_size, out real2 bounds)
 {
     real r2 = reach * reach, q2 = z * z - r2 * dot(forward, forward);
@@ -90,7 +93,8 @@ real3 form_of(real3 e, real scale)
     return real3(dot(e, ray_0.xyz), real2(dot(e, ray_x.xyz), dot(e, ray_y.xyz)) * ray_x.w) * scale;
 }
 
-// The forms, and of near splats the bounds and the amplitude too; false where nothing shows.
+// Sets the fields for near splats. For near splats it also sets the bounds and the amplitude.
+// Returns false if the splat is not visible.
 bool project_near(real3 c, real3 position, inout splat s)
 {
     real3 size = abs(c), v = c;
@@ -132,8 +136,8 @@ bool project_near(real3 c, real3 position, inout splat s)
 
 #ifdef PARALLEL
 #if defined(UNEVEN) || defined(FLATTENED)
-// The footprint where it is not that of all, from the covariances over sigma^2 `most`; half_size
-// becomes that of the support of the round kernel.
+// Computes the footprint if splats have different ones. Covariances are divided by sigma^2
+// `longest`. half_size becomes the half extent of the round kernel's support.
 void shape_footprint(inout splat s, inout real2 half_size)
 {
     real3 x = own_gradient(to_x.xyz), y = own_gradient(to_y.xyz), ray = own_vector(ray_0.xyz);
@@ -207,7 +211,8 @@ bool project_far(real3 c, real3 position, out splat s)
     s.centre = position.xy * inverse;
     s.ray2 = dot(ray, ray);
 
-    // u S = [b.b -a.b; -a.b a.a]. Beyond 1e17 splats are 1e-8 pixels and only products would suffer.
+    // u S = [b.b -a.b; -a.b a.a]. Beyond u = 1e17 a splat is smaller than 1e-8 pixels, and larger
+    // numbers could only overflow products.
     real3 rx = own_vector(ray_x.xyz), ry = own_vector(ray_y.xyz);
     real3 a = cross(ray, rx), b = cross(ray, ry);
     real to_sigma = forward.w / own_size, u = min(to_sigma * to_sigma * (position.z * position.z), real(1e17));
@@ -232,7 +237,8 @@ bool project_far(real3 c, real3 position, out splat s)
     s.conic = conic * u;
     s.amplitude = kernel.w * own_size * sqrt(det_s * inverse_det);
 
-    // The largest eigenvalue of S^-1 is that of S over |S|; of the round kernel.
+    // The maximum eigenvalue of S^-1 is the maximum eigenvalue of S divided by |S|. Both are of the
+    // round kernel.
     s.radius = sqrt(own_sigma2() * kernel.y * (1.0 + low * largest / det_s));
 
 #ifdef AFFINE
@@ -247,7 +253,7 @@ bool project_far(real3 c, real3 position, out splat s)
     s.ray2 = 1.0;
     return true;
 #else
-    // E and l over u.
+    // E and l, divided by u.
     real k = kernel.y * ray_x.w / (s.ray2 * u), k_step = k * ray_x.w;
     real exx = conic.x - k_step * dot(rx, rx);
     real exy = conic.y - k_step * dot(rx, ry);
@@ -295,8 +301,8 @@ bool project(real3 c, real3 position, out splat s)
     return seen;
 }
 
-// First and last pixel (from the image's corner) whose centre lies in the bounds and in the image;
-// none where a first exceeds its last.
+// Returns the first and last pixel (from the image's corner) with a centre inside both the bounds
+// and the image. There are none if a first pixel exceeds its last.
 ivec4 covered_pixels(splat s)
 {
     real4 inside = clamp(s.bounds + screen.xyxy, real4(-1.0), screen.zwzw + 1.0);

@@ -1,5 +1,7 @@
-// The number type of a pass: float, or double where TRIP_DOUBLE is defined (counts and weights,
-// which must agree with the reference in every decision), and the frame's constants in it.
+// Defines the number type of a pass: double if TRIP_DOUBLE is defined, else float. Counts and
+// weights need double, because every decision must agree with the reference.
+// Out: `real` types and the frame's constants. Mirrors trip_gl_frame_round() in
+// render/gl/frame_block.c.
 #include "shared.h"
 
 #ifdef TRIP_DOUBLE

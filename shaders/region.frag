@@ -1,9 +1,10 @@
-// Keeps the pixels where the present list has weight and whose rays go the way at hand: those that
-// are not discarded set the stencil, and only they are shaded. Mirrors trip_weight() > 0 and
-// trip_ray_goes().
+// Selects the pixels where the current list has weight and the ray has the direction of the pass.
+// Other pixels are discarded; the selected ones set the stencil, and only they are drawn.
+// In: pixel positions. Out: the stencil. Mirrors trip_weight() > 0 and trip_ray_goes() in
+// render/weight.h.
 #include "weight.glsl"
 
-layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
+layout(location = TRIP_GL_ROW) uniform int row; // row of the image at row 0 of the fragments
 layout(location = TRIP_GL_WAY) uniform int way;
 
 void main()

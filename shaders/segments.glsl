@@ -1,13 +1,15 @@
-// What a segment between two codes shows: colour and extinction, of a voxel's length. Mirrors
-// trip_segment_of() in render/segments.c: all terms of a sum have the same sign, and differences of
-// the integrals between whole codes are exact. With CLOSED it mirrors render/closed_form.h.
+// Computes colour and extinction of a segment between two codes. Extinction is per voxel length.
+// In: two codes and the sums of the transfer function. Out: colour and extinction.
+// Mirrors trip_segment_of() in render/segments.c. All terms of a sum have the same sign, and
+// differences of the integrals between whole codes are exact. With CLOSED it mirrors
+// render/closed_form.h.
 #include "shared.h"
 
 #ifdef CLOSED
 
 layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_closed_form
 {
-    vec4 x, k, q0, q1; // as trip_gl_closed has it
+    vec4 x, k, q0, q1; // layout of trip_gl_closed
 } form;
 
 float position_of(float code)
@@ -33,20 +35,21 @@ vec4 segment_between(float a, float b, float unit)
 
 #else
 
-// As trip_gl_sum has it.
+// The layout of trip_gl_sum.
 struct code_sums {
     uvec4 low, high;
     vec4 entry;
 };
 layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_sums { code_sums sums[]; };
 
-// Extinction times colour, and extinction; of a voxel's length.
+// Returns extinction times colour, and extinction, per voxel length.
 vec4 products(vec4 entry)
 {
     return vec4(entry.rgb * entry.a, entry.a);
 }
 
-// Their means from t0 to t1 between a code and the next, by Simpson's rule, which is exact.
+// Returns the means of these products from t0 to t1 between a code and the next. Simpson's rule is
+// exact here.
 vec4 means_within(int code, float t0, float t1)
 {
     vec4 a = sums[code].entry, b = sums[code + 1].entry;
@@ -58,7 +61,7 @@ vec4 colour_of(vec4 means)
     return vec4(means.rgb / means.a, means.a);
 }
 
-// Of the sums' unit.
+// Returns the integral between two codes, in the unit of the sums.
 vec4 integral_between(int from, int to)
 {
     uvec4 borrow, low = usubBorrow(sums[to].low, sums[from].low, borrow);
@@ -66,7 +69,7 @@ vec4 integral_between(int from, int to)
     return vec4(high) * 4294967296.0 + vec4(low);
 }
 
-// Codes may be in any order; without extinction the colour means nothing.
+// The codes may have any order. The colour is undefined if the extinction is 0.
 vec4 segment_between(float a, float b, float unit)
 {
     float from = clamp(min(a, b), 0.0, 65535.0), to = clamp(max(a, b), 0.0, 65535.0);

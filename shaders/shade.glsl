@@ -1,11 +1,14 @@
-// Light on a splat or a segment. Mirrors trip_shade() in render/shade.c and trip_normal_unpack(), or
-// with COMPACT trip_compact_normal_unpack(), in stream/normal.c. AMBIENT, DIFFUSE, SPECULAR, SHININESS and
-// FACING come from render/shade.h.
+// Lights a splat or a segment.
+// In: colour, gradient, and directions to the eye and the light. Out: the lit colour.
+// Mirrors trip_shade() in render/shade.c and trip_normal_unpack() in stream/normal.c, or
+// trip_compact_normal_unpack() with COMPACT. AMBIENT, DIFFUSE, SPECULAR, SHININESS and FACING come
+// from render/shade.h.
 #include "real.glsl"
 #include "effects.glsl"
 
 #if defined(SHADED) || defined(FLATTENED)
-// World-space gradient direction and, in w, its magnitude over that at full shading.
+// Returns the direction of the gradient in world space. w is its length divided by the length at
+// which shading is full.
 #ifdef COMPACT
 vec4 unpack_normal(uint normal)
 {
@@ -40,7 +43,8 @@ vec4 unpack_normal(uint normal)
 #endif
 
 #if defined(SHADED) || defined(SHADOWS)
-// World space, of what lies in a direction from the eye in list axes; 0 of what is at the eye.
+// Returns the direction to the eye in world space, for a point at `from_eye` (list axes). Returns 0
+// for a point at the eye.
 vec3 towards_eye(vec3 from_eye)
 {
 #ifdef PARALLEL
@@ -52,7 +56,7 @@ vec3 towards_eye(vec3 from_eye)
 #endif
 }
 
-// Likewise, where `eye` is to the eye.
+// Returns the direction to the light in world space. `eye` is the direction to the eye.
 vec3 light_from(vec3 from_eye, vec3 eye)
 {
 #ifdef HEADLIGHT
@@ -68,7 +72,8 @@ vec3 light_from(vec3 from_eye, vec3 eye)
 #endif
 
 #ifdef SHADED
-// With a gradient as unpack_normal() has it, at what lies in a direction `eye` to the eye.
+// Returns the light on a surface. `gradient` is a result of unpack_normal(), and `eye` is the
+// direction to the eye.
 surface surface_of(vec4 gradient, vec3 towards_light, vec3 eye)
 {
     surface s;
@@ -103,7 +108,7 @@ vec3 shade(vec3 colour, uint normal, vec3 from_eye)
 #endif
 
 #ifdef LIT
-// The same where effects are looked up, at a place in index space.
+// Lights a colour with effects looked up at a position in index space.
 vec3 lit_here(vec3 colour, vec4 gradient, vec3 eye, vec3 from_eye, vec3 position)
 {
     surface s = surface(0.0, 0.0, 0.0, vec3(0.0));

@@ -1,17 +1,18 @@
-// Puts the codes of a block's squares into a sheet: a work group a square, an invocation a voxel.
-// In: squares and their codes, bytes as in the files. Out: codes where voxels are. Mirrors
-// trip_block_voxels() in stream/block.c.
+// Decodes the squares of a block into a sheet. Each work group decodes one square, each invocation
+// one voxel.
+// In: squares and their codes, bytes as in the files. Out: codes of the voxels present.
+// Mirrors trip_block_voxels() in stream/block.c.
 #include "shared.h"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint voxels[]; };
 layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_sheet_square squares[]; };
 layout(r32f, binding = TRIP_GL_IMAGE) writeonly uniform image2D sheet;
-layout(location = TRIP_GL_SHEET) uniform uvec2 form; // the first square, step of codes
+layout(location = TRIP_GL_SHEET) uniform uvec2 form; // first square, step of codes
 
 #include "code.glsl"
 
-// Every second bit of a Morton number in a square.
+// Extracts the even bits of a Morton number within a square.
 uint even_bits(uint n)
 {
     return (n & 1u) | (n >> 1 & 2u) | (n >> 2 & 4u);

@@ -1,6 +1,8 @@
-// Draws some slices of the sheets into a band of a layer, front to back: an invocation a pixel
-// (render/sheet.h). In: codes and gradients of sheets, ends of segments in draw order. In and out:
-// the layer, and with DEPTH its depths (render/layer.h). Mirrors render/reference_sheets.c.
+// Draws segments between sheets into a band of a layer, front to back, with one invocation for each
+// pixel (render/sheet.h).
+// In: codes and gradients of the sheets, segment ends in draw order. In and out: the layer, and
+// with DEPTH its depths (render/layer.h).
+// Mirrors render/reference_sheets.c.
 #include "segments.glsl"
 #include "effects.glsl"
 #include "shade.glsl"
@@ -29,33 +31,33 @@ layout(rgba32f, binding = TRIP_GL_IMAGE_DEPTH) uniform image2D layer_depths;
 layout(binding = TRIP_GL_SHEET_GRADIENTS) uniform sampler2DArray gradients;
 #endif
 #ifdef UNEVEN
-// Of voxels along u, then along v: whole and the rest.
+// The positions of voxels along u, then along v: whole part and rest.
 layout(std430, binding = TRIP_GL_POSITIONS) readonly buffer trip_gl_positions
 {
     vec2 positions[];
 };
 #endif
-// x: of the image, in which the band's row 0 lies; y, z: rows of the band, the latter not drawn;
-// w: ends.
+// x: row of the image at row 0 of the band. y, z: first row and end row of the band. w: number of
+// ends.
 layout(location = TRIP_GL_ROW) uniform ivec4 rows;
 
 struct ray {
-    vec2 shift;    // along u and v, from what an end has: over a sheet, or in parallel views
-    float along;   // per depth
-    float start;   // parallel views: where it begins along the list
-    float world;   // voxels' lengths over a sheet
+    vec2 shift;    // movement along u and v relative to the ends' reference ray
+    float along;   // movement along the list for each unit of depth
+    float start;   // parallel views: start along the list
+    float world;   // voxel lengths for each unit along the list
 #if defined(SHADED) || defined(SHADOWS)
-    vec3 eye;        // towards it
-    vec3 first, way; // from the eye, list axes: at depth 0, and on over a depth
+    vec3 eye;        // direction to the eye
+    vec3 first, way; // relative to the eye, list axes: point at depth 0, step for each unit of depth
 #endif
-    float from, to; // what of it is not cut away, in depths
+    float from, to; // depths between which the clipping keeps the ray
 };
 
-// Of a ray at an end.
+// Where a ray crosses the plane of an end.
 struct position {
     ivec2 cell;
-    vec2 part; // of it
-    bool there; // all that it is interpolated from is
+    vec2 part; // fraction within the cell
+    bool there; // all voxels of the cell are present
     float code;
 };
 
@@ -98,7 +100,8 @@ ray ray_of(vec2 p)
     return r;
 }
 
-// Whether the list may have weight at a pixel position from the image's corner: merging decides.
+// Whether the list may have weight at a pixel position (from the image's corner). The merge
+// computes the exact weight.
 bool may_weigh(vec2 pixel)
 {
 #if METHOD == 2
@@ -109,7 +112,7 @@ bool may_weigh(vec2 pixel)
 #endif
 }
 
-// The corners of a cell at a sheet as textureGather() orders them.
+// Returns the corners of a cell at a sheet, in the order of textureGather().
 vec4 corners_at(ivec2 cell, int sheet)
 {
     vec2 middle = vec2(cell + 1) / vec2(textureSize(codes, 0).xy);
@@ -134,14 +137,14 @@ vec4 kernel_weights(float x)
     return w / dot(w, vec4(1.0));
 }
 
-// Of the 4 x 4 x 4 voxels around a cell: its place and layer, and its weight.
+// One of the 4 x 4 x 4 voxels around a cell: its texel and layer, and its weight.
 struct tap {
     ivec3 at;
     float weight;
 };
 
-// Number n of a place between the sheets of an end. Beyond the grid its edge repeats; another voxel
-// that is missing is the corner next to it.
+// Returns voxel number n around a position. Beyond the grid its edge repeats. Any other missing
+// voxel is replaced by the nearest corner of the cell.
 tap tap_of(position at, trip_gl_sheet_end end, vec4 weights[3], int n)
 {
     ivec3 i = ivec3(n & 3, n >> 2 & 3, n >> 4);
@@ -156,8 +159,8 @@ tap tap_of(position at, trip_gl_sheet_end end, vec4 weights[3], int n)
     return t;
 }
 
-// By differences from a corner, so that one value all around is that value, however weights are
-// rounded.
+// Sums differences from a corner. If all voxels have one value, the result is that value exactly,
+// whatever the weights round to.
 float wide_code(position at, trip_gl_sheet_end end, float corner)
 {
     vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
@@ -171,14 +174,14 @@ float wide_code(position at, trip_gl_sheet_end end, float corner)
 #endif
 
 #ifdef UNEVEN
-// How far a place is beyond that of a voxel.
+// Returns the distance of a position beyond the position of a voxel.
 float beyond(int voxel, int base, float rest)
 {
     return (float(base) - positions[voxel].x) + (rest - positions[voxel].y);
 }
 
-// The cell of a place among `count` voxels, from `first` of `places` on; `rest` is then the part of
-// it. -1: there is none.
+// Returns the cell of a position among `count` entries of positions[] starting at `first`, or -1.
+// Sets `rest` to the fraction within the cell.
 int find_cell(int first, int count, int base, inout float rest)
 {
     int lo = 0, hi = count - 1;
@@ -213,7 +216,7 @@ position position_at(ray r, trip_gl_sheet_end end)
     vec2 whole = floor(p);
     at.cell = ivec2(end.base_u, end.base_v) + ivec2(whole);
     at.part = p - whole;
-    // The grid's last voxels are within it.
+    // The last voxels of the grid belong to the last cell.
     for (int i = 0; i < 2; i++)
         if (at.cell[i] == extent[2 + i] && at.part[i] == 0.0) {
             at.cell[i]--;
@@ -230,7 +233,8 @@ position position_at(ray r, trip_gl_sheet_end end)
     if (at.there)
         at.code = wide_code(at, end, before.x);
 #else
-    // At a sheet the corners there are both. By differences from one, as wide_code().
+    // At a sheet both sets of corners are that sheet's. As in wide_code(), the sum uses differences
+    // from a corner.
     vec4 before = corners_at(at.cell, end.part < 1.0 ? end.before : end.behind), behind = before;
     if (end.part > 0.0 && end.part < 1.0)
         behind = corners_at(at.cell, end.behind);
@@ -274,7 +278,7 @@ vec3 gradient_at(position at, trip_gl_sheet_end end)
 }
 #endif
 
-// As unpack_normal() has it: the mean of the gradients of a segment's ends.
+// Returns the mean of the gradients at the two ends of a segment, in the form of unpack_normal().
 vec4 gradient_between(position a, position b, trip_gl_sheet_end from, trip_gl_sheet_end to)
 {
     vec3 sum = gradient_at(a, from) + gradient_at(b, to);
@@ -286,7 +290,7 @@ vec4 gradient_between(position a, position b, trip_gl_sheet_end from, trip_gl_sh
 
 #ifdef PLACED
 #ifdef UNEVEN
-// Of a part of the way from a voxel to the next.
+// Returns the position at a fraction of the distance from a voxel to the next.
 float place_between(int voxel, float part)
 {
     vec2 from = positions[voxel], to = positions[voxel + 1];
@@ -294,7 +298,7 @@ float place_between(int voxel, float part)
 }
 #endif
 
-// In the grid, list axes.
+// Returns the position in the grid, list axes.
 vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
 #ifdef UNEVEN
@@ -305,11 +309,12 @@ vec3 voxel_of(position at, trip_gl_sheet_end end)
 }
 #endif
 
-// Puts the segment between two ends behind what a pixel holds: colour and opacity, and depth.
+// Composites the segment between two ends behind the pixel's colour, opacity and depth.
 void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
                  inout float pixel_depth)
 {
-    // In depths; shares of the segment are inside.
+    // start and end are depths; first and last are fractions of the segment that the clipping
+    // keeps.
     float start = (to.along - to.step - r.start) / r.along, end = (to.along - r.start) / r.along;
     float first = 0.0, last = 1.0;
     if (clips.x > 0) {
@@ -378,7 +383,7 @@ void main()
         position next = position_at(r, ends[i]);
         bool visible = ends[i].step != 0.0 && next.there && last.there;
 #ifdef PARALLEL
-        // What begins behind the eye's plane is left out.
+        // Segments that start behind the eye's plane are omitted.
         visible = visible && (ends[i].along - ends[i].step - r.start) * along.w >= 0.0;
 #endif
         if (visible)

@@ -1,16 +1,17 @@
-// The gradients of a sheet's voxels, by differences of codes (render/sheet.h). In: the sheet's codes
-// and those of the sheets below and above it. Out: codes per index (UNEVEN:
-// per unit of place) along the list, u and v. Mirrors
-// difference() in render/reference_sheets.c.
+// Computes the gradients of a sheet's voxels by differences of codes (render/sheet.h).
+// In: the codes of the sheet and of the sheets below and above it. Out: codes per index along the
+// list, u and v; with UNEVEN, codes per unit of position.
+// Mirrors difference() in render/reference_sheets.c.
 #include "shared.h"
 
 layout(local_size_x = TRIP_GL_SQUARE_GROUP, local_size_y = TRIP_GL_SQUARE_GROUP) in;
 layout(binding = TRIP_GL_SHEET_CODES) uniform sampler2DArray codes;
 layout(rgba16f, binding = TRIP_GL_IMAGE) writeonly uniform image2D gradients;
-layout(location = TRIP_GL_SHEET) uniform ivec3 layers; // of the sheet, below, above; -1: there is none
-layout(location = TRIP_GL_SHEET_SIZE) uniform ivec3 size; // width, height, the first row
+layout(location = TRIP_GL_SHEET) uniform ivec3 layers; // of the sheet, below, above; -1 if missing
+layout(location = TRIP_GL_SHEET_SIZE) uniform ivec3 size; // width, height, first row
 #ifdef UNEVEN
-// To the sheets below and above; of voxels along u, then along v, whole and the rest.
+// Distances to the sheets below and above, and positions of voxels along u, then along v: whole
+// part and rest.
 layout(location = TRIP_GL_SHEET_APART) uniform vec2 sheets_apart;
 layout(std430, binding = TRIP_GL_POSITIONS) readonly buffer trip_gl_positions
 {
@@ -18,7 +19,7 @@ layout(std430, binding = TRIP_GL_POSITIONS) readonly buffer trip_gl_positions
 };
 #endif
 
-// Below 0: there is none.
+// Returns the code, or a negative number if there is no voxel.
 float code_at(ivec2 position, int layer)
 {
     if (layer < 0 || any(lessThan(position, ivec2(0))) || any(greaterThanEqual(position, size.xy)))
@@ -26,7 +27,8 @@ float code_at(ivec2 position, int layer)
     return texelFetch(codes, ivec3(position, layer), 0).r;
 }
 
-// From voxel i, of `count` from `first` of `places` on, to those before and after it.
+// Returns the distances from voxel i to its neighbours on both sides. `count` entries of
+// positions[] start at `first`.
 vec2 voxels_apart(int first, int i, int count)
 {
 #ifdef UNEVEN
@@ -58,6 +60,6 @@ void main()
     vec3 g = vec3(difference(code_at(p, layers.y), here, code_at(p, layers.z), sheets_apart),
                   difference(code_at(p - u, layers.x), here, code_at(p + u, layers.x), u_apart),
                   difference(code_at(p - v, layers.x), here, code_at(p + v, layers.x), v_apart));
-    // Within what 16 bits hold.
+    // The range of 16-bit floats.
     imageStore(gradients, p, vec4(clamp(g, -65504.0, 65504.0), 0.0));
 }

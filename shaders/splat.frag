@@ -1,11 +1,12 @@
-// A splat's colour and opacity at a pixel. In: the footprint, flat. Out: premultiplied colour, for
-// blending in list order, and with DEPTH the distance likewise (render/layer.h); with SUMS optical
-// depth in the place of opacity, to be added up. Mirrors
-// trip_splat_radius2() and the opacity in render/splat.h; beyond the cut-off nothing is added.
+// Computes a splat's colour and opacity at a pixel. Beyond the cut-off they are 0.
+// In: the footprint, flat. Out: premultiplied colour for blending in list order, and with DEPTH the
+// distance, also premultiplied (render/layer.h). With SUMS optical depth replaces opacity and is
+// added up.
+// Mirrors trip_splat_radius2() and the opacity in render/splat.h.
 #include "rays.glsl"
 #include "opacity.glsl"
 
-layout(location = TRIP_GL_ROW) uniform int row; // of the image, in which fragments' row 0 lies
+layout(location = TRIP_GL_ROW) uniform int row; // row of the image at row 0 of the fragments
 
 layout(location = 0) flat in vec4 footprint;
 layout(location = 1) flat in vec4 colour;
@@ -13,7 +14,7 @@ layout(location = 2) flat in float shear;
 layout(location = TRIP_GL_OUT_COLOUR) out vec4 fragment;
 #ifdef DEPTH
 layout(location = 3) flat in float centre_depth;
-layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // its opacity is what is blended by
+layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // blending uses the opacity in its fourth component
 #endif
 
 #ifdef OWN_RAYS
@@ -23,8 +24,8 @@ layout(location = 7) flat in vec3 width; // own_width of rays.glsl
 #ifdef NEAR
 layout(location = 4) flat in mat3 forms; // as in splat.vert
 
-// front(p) of render/splat.h by s(p). The error function is by Abramowitz and Stegun 1964, 7.1.26,
-// within 1.5e-7.
+// Returns front(p) of render/splat.h from s(p). The error function follows Abramowitz and Stegun
+// 1964, 7.1.26, within 1.5e-7.
 float front_of(float s)
 {
     float end = sqrt(kernel.y), x = min(abs(s), end) * 0.70710678, t = 1.0 / (1.0 + 0.3275911 * x);
@@ -43,7 +44,7 @@ void main()
     float m = q.x * (footprint.z * q.x + shear * q.y) + footprint.w * q.y * q.y;
     float stretch = 1.0;
 #ifdef AFFINE
-    // Near splats alone have the stretch of the pixel's ray, below.
+    // Only near splats use the stretch of the pixel's ray; see below.
 #elif defined(ANISOTROPIC)
     float inverse_ray2 = 1.0 / own_ray2(p);
     m *= inverse_ray2;
@@ -72,7 +73,7 @@ void main()
 #endif
     float falloff = max(exp(-0.5 * m) - edge.x, 0.0);
 #ifdef SUMS
-    float alpha = min(colour.a, 1e25) * stretch * front * falloff; // sums stay within a float's range
+    float alpha = min(colour.a, 1e25) * stretch * front * falloff; // sums fit a float
 #else
     float alpha = opacity(colour.a * stretch * front * falloff);
 #endif

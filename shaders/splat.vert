@@ -1,7 +1,7 @@
-// Splats of a batch to footprints on the screen. In: draw positions by gl_VertexID (four vertices
-// per splat with QUADS), the batch's storage blocks, the frame's constants. Out: the pixels to
-// cover, and flat the numbers of the footprint that splat.frag evaluates. Mirrors
-// trip_splat_project(), trip_weight_may_reach() and trip_shade().
+// Projects the splats of a batch to footprints on the screen.
+// In: draw positions by gl_VertexID (four vertices for each splat with QUADS), the batch's storage
+// blocks, the frame's constants. Out: the pixels to cover, and the flat inputs of splat.frag.
+// Mirrors trip_splat_project(), trip_weight_may_reach() and trip_shade() in render/.
 #include "fetch.glsl"
 #include "project.glsl"
 #include "weight.glsl"
@@ -13,7 +13,7 @@ layout(location = 0) flat out vec4 footprint;  // centre, conic xx and yy times 
 layout(location = 1) flat out vec4 colour;     // r, g, b, extinction * amplitude
 layout(location = 2) flat out float shear;     // 2 conic xy times ray2
 #ifdef DEPTH
-layout(location = 3) flat out float centre_depth;  // of the centre's plane, as layers hold it
+layout(location = 3) flat out float centre_depth;  // depth of the centre's plane, as in layers
 #endif
 #ifdef NEAR
 layout(location = 4) flat out mat3 forms; // a, b and along of project.glsl
@@ -28,8 +28,8 @@ out gl_PerVertex
     float gl_PointSize;
 };
 
-// Corners at pixel borders, so that every pixel of the bounds is covered and rounding cannot
-// decide; a sprite is a square round the middle.
+// Sets the corners at pixel borders. Every pixel of the bounds is covered, and rounding cannot
+// change the set. A sprite is a square about the middle.
 void cover(ivec4 pixels)
 {
     vec2 image = vec2(screen.zw), corner = vec2(pixels.xy), size = vec2(pixels.zw - pixels.xy + 1);
@@ -42,8 +42,8 @@ void cover(ivec4 pixels)
     gl_Position = vec4(corner * 2.0 / image - 1.0, 0.0, 1.0);
 }
 
-// What a code looks like. That of a mean (stream/mean.h) has the extinction of the part of the cube
-// that was kept.
+// Returns colour and extinction of a code. The code of a mean (stream/mean.h) gets the extinction
+// of the kept part of its cube.
 vec4 look_up(uint code)
 {
     float length = float(means.x);

@@ -1,7 +1,8 @@
-// A sheet of splats, summed, as one fragment (render/splat.h). In: the sheet's sums of optical depth
-// times colour and of optical depth, and with DEPTH of optical depth times distance. Out:
-// premultiplied colour, for blending in list order, and with DEPTH the distance likewise. Mirrors
-// composite_sheet() in render/reference.c.
+// Composites the summed splats of a sheet as one fragment (render/splat.h).
+// In: the sheet's sums of optical depth times colour and of optical depth, and with DEPTH of
+// optical depth times distance. Out: premultiplied colour for blending in list order, and with
+// DEPTH the distance, also premultiplied.
+// Mirrors composite_sheet() in render/reference.c.
 #include "real.glsl"
 #include "opacity.glsl"
 
@@ -9,7 +10,7 @@ layout(binding = TRIP_GL_LAYER) uniform sampler2D sheet;
 layout(location = TRIP_GL_OUT_COLOUR) out vec4 fragment;
 #ifdef DEPTH
 layout(binding = TRIP_GL_LAYER_DEPTH) uniform sampler2D sheet_depth;
-layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // its opacity is what is blended by
+layout(location = TRIP_GL_OUT_DEPTH) out vec4 fragment_depth; // blending uses the opacity in its fourth component
 #endif
 
 void main()

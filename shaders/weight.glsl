@@ -1,5 +1,6 @@
-// The weights of the layers at a pixel. Mirrors render/weight.c. METHOD: 0 merge, 1 clip, 2
-// axis, as trip_method.
+// Computes the weights of the layers at a pixel.
+// In: a pixel position. Out: the weight of a list. Mirrors render/weight.c. METHOD is 0 for merge,
+// 1 for clip and 2 for axis, as in trip_method.
 #include "real.glsl"
 
 #if defined(PARALLEL) || defined(UNCULLED) || METHOD == 2
@@ -19,14 +20,14 @@ int largest_axis(real3 r)
     return a.y >= a.z ? 1 : 2;
 }
 
-// Of a pixel position (from the image's corner) in the data's axes.
+// Returns the ray of a pixel position (from the image's corner), in the data's axes.
 real3 pixel_ray(real2 pixel)
 {
     precise real3 ray = camera_r0.xyz + (camera_rx.xyz * pixel.x + camera_ry.xyz * pixel.y);
     return ray;
 }
 
-// trip_weight() of such a position.
+// Returns trip_weight() at a pixel position.
 real weight_of(real2 pixel, int axis)
 {
 #if METHOD == 2
@@ -42,13 +43,14 @@ real weight_of(real2 pixel, int axis)
 #endif
 }
 
-// Whether its ray goes a way, as trip_ray_goes().
+// Whether the ray of a pixel position goes in a direction; mirrors trip_ray_goes().
 bool goes(real2 pixel, int axis, int way)
 {
     return way == TRIP_GL_WAY_ANY || (pixel_ray(pixel)[axis] >= 0.0) == (way == TRIP_GL_WAY_UP);
 }
 
-// trip_weight_may_reach() of a splat, list axes; where weights are constant the plan has decided.
+// Mirrors trip_weight_may_reach() for a splat in list axes. The plan has already culled by constant
+// weights.
 bool may_reach(real3 from_eye, real radius)
 {
 #ifdef WEIGHT_IS_CONSTANT

@@ -295,9 +295,8 @@ static void a_plot_takes_the_place_of_nothing_that_is_read(void **state)
     static const char function[] = "0 0 0 0 0\n255 1 1 1 0.5\n";
     const char *const plots[] = { "f.tf", "./f.tf", "block.trip/index.trip", "block.trip/new.svg",
                                   "missing/new.svg" };
-    const char *const says[] = { "is read, and would be replaced", "is read, and would be replaced",
-                                 "among the files that are read", "among the files that are read",
-                                 "cannot create" };
+    const char *const says[] = { "is an input file", "is an input file", "among the input files",
+                                 "among the input files", "cannot create" };
     program_run r;
     char text[64];
     FILE *f = fopen("f.tf", "w");

@@ -247,7 +247,7 @@ class Accuracy(program.ProgramTest):
         self.assertNotEqual(small, SMALL)
         run = self.works("accuracy", "a.trip", "-o", "fits", *small, "--no-ladder", "--settings",
                          "post,popping-pre", "--memory", "108M")
-        self.assertIn("left out: popping-pre: 16200000 bytes of changes do not fit",
+        self.assertIn("left out: popping-pre: the changes need 16200000 bytes",
                       run.stdout.decode())
         with open("fits/accuracy.json", encoding="utf-8") as f:
             report = json.load(f)
@@ -307,11 +307,11 @@ class Accuracy(program.ProgramTest):
         options = [x for k, v in fastest["options"].items() for x in ("--" + k, v)]
         drawn = self.picture("a.trip", *view[:4], *options)
         run = self.works("render", "a.trip", "-o", "e.exr", *view, "--error", repr(bound))
-        self.assertIn(f"note: --error: {fastest['name']}, ", run.stderr)
+        self.assertIn(f"note: --error: uses {fastest['name']}, ", run.stderr)
         self.assertTrue((program.read_exr("e.exr") == drawn).all())
         run = self.works("render", "a.trip", "-o", "e.exr", "--size", "40x32", "--report", "report",
                          "--error", "255", "--no-shading")
-        self.assertIn("the data set's own: errors", run.stderr)
+        self.assertIn("the data set's own; errors", run.stderr)
         self.assertIn("measured with light", run.stderr)
 
     def test_without_a_report_an_error_is_refused(self):
@@ -319,7 +319,7 @@ class Accuracy(program.ProgramTest):
         self.fails(1, "render", "a.trip", *size, "--error", "1", says="triptych accuracy")
         self.fails(1, "render", "a.trip", *size, "--error", "1", "--report", "a.tf", says="accuracy.json")
         self.fails(1, "render", "a.trip", *size, "--error", "1e-6", "--report", "report",
-                   says="comes closest")
+                   says="has the smallest")
 
     def test_a_report_is_of_its_data_set(self):
         """Bricked again alike it is the same, otherwise not."""
@@ -331,7 +331,7 @@ class Accuracy(program.ProgramTest):
         self.fails(1, "render", "other.trip", *size, "--report", "report", says="another data set")
         run = program.call("render", "a.nrrd", *size[:4], "--error", "255", "--report", "report")
         self.assertEqual(run.returncode, 1)
-        self.assertIn("triptych: --error: a.nrrd: the report is of another data set", run.stderr)
+        self.assertIn("triptych: --error: a.nrrd: the report measured another data set", run.stderr)
 
     def test_a_volume_is_bricked_with_the_levels_of_the_report(self):
         """Whichever of its settings is the fastest."""

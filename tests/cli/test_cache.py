@@ -300,7 +300,7 @@ class Cache(program.ProgramTest):
             with self.subTest(name):
                 change()
                 run = self.works("render", "v.nrrd", "-o", "one.exr", *SIZE)
-                self.assertIn("is damaged and is made anew", run.stderr)
+                self.assertIn("is damaged and will be made again", run.stderr)
                 self.same(program.read_exr("one.exr"), wanted)
                 self.same(self.draw("v.nrrd", bricked=False), wanted)
 
@@ -311,7 +311,7 @@ class Cache(program.ProgramTest):
             self.damage(f"{list_name}0.voxels", lambda d: bytes([d[0] ^ 255]) + d[1:])
         run = program.call("render", "v.nrrd", "-o", "one.exr", *SIZE)
         self.assertEqual(run.returncode, 1)
-        self.assertIn("the same command makes it anew", run.stderr)
+        self.assertIn("the same command makes it again", run.stderr)
         self.same(self.draw("v.nrrd", bricked=True), wanted)
 
     # Bounded

@@ -90,9 +90,9 @@ class Emission(program.ProgramTest):
             (HEAT, "--effects emission"),
             (("--effects", "emission"), "--emission HEAT.trip"),
             (("--effects", "cueing", *HEAT), "--effects emission"),
-            (("--temperature", "0:2000"), "--emission only"),
+            (("--temperature", "0:2000"), "requires --emission"),
             ((*GLOWS, "--temperature", "2000:1000"), "smaller first"),
-            ((*GLOWS, "--temperature", "-5:1000"), "between 0 and"),
+            ((*GLOWS, "--temperature", "-5:1000"), "from 0 to 100000"),
         ):
             self.fails(2, *draw, *options, says=says)
         self.fails(1, *draw, "--effects", "emission", "--emission", "none.trip", says="none.trip")

@@ -52,7 +52,7 @@ class Look(program.ProgramTest):
         program.write("thick.tf", b"0 1 1 1 0.1\n")
         program.write("peak.tf", b"0 1 1 1 0\n100.001 1 1 1 0\n100.0015 1 1 1 1\n100.002 1 1 1 0\n")
         for tf, options, says in (
-                ("thin", ["--target", "rgba16f"], "--compositing sheet rounds once a sheet"),
+                ("thin", ["--target", "rgba16f"], "--compositing sheet rounds once per sheet"),
                 ("thin", ["--target", "rgba8"], "--compositing sheet"),
                 ("thin", ["--target", "rgba8", "--compositing", "sheet"], "--target rgba32f"),
                 ("thin", ["--target", "rgba32f"], ""),
@@ -101,7 +101,7 @@ class Look(program.ProgramTest):
             (["--early-termination=-0.01"], "-0.01 is not between 0 and 0.1"),
             (["--early-termination=little"], "not a number"),
             (["--early-termination=0.01", "--renderer", "integral"], "does not apply to --renderer integral"),
-            (["--early-termination=0.01", "--traversal", "ascending"], "goes with --traversal outward"),
+            (["--early-termination=0.01", "--traversal", "ascending"], "requires --traversal outward"),
             *(([*pre, "--early-termination=0.01", "--renderer", gl], "draws all splats") for gl in program.GL),
         ):
             self.fails(2, "render", "ball.trip", "-o", "a.png", "--size=32x32", *options, says=says)
@@ -172,16 +172,16 @@ class Look(program.ProgramTest):
     def test_a_volume_is_warned_of_once(self):
         for _ in "bricked", "found":
             run = self.works("render", "ball.nrrd", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
-            self.assertEqual(run.stderr.count("are hardly Hounsfield units"), 1)
+            self.assertEqual(run.stderr.count("do not look like the Hounsfield units"), 1)
 
     def test_a_function_that_shows_nothing_says_so(self):
         program.write("nothing.tf", b"300 1 1 1 0\n400 1 1 1 1\n")
         run = self.works("render", "ball.trip", "-o", "a.png", "--size=20x20", "--tf=nothing.tf")
-        self.assertIn("shows nothing of the values from 0 to 200", run.stderr)
+        self.assertIn("no value from 0 to 200 is visible", run.stderr)
 
     def test_a_picture_of_nothing_says_so(self):
         ground = ("--size=20x20", "--background=0.5,0.2,0.1,0.5", "-o", "a.png")
-        nothing = "nothing but the background"
+        why = "check the view, the clipping and the transfer function"
         for options in (
             ["--clip-box=1e4,1e4,1e4,2e4,2e4,2e4"],
             ["--eye=500,500,500", "--look=900,900,900"],
@@ -190,14 +190,14 @@ class Look(program.ProgramTest):
         ):
             run = self.works("render", "ball.trip", *ground, *options)
             self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
-            self.assertIn(f"warning: a.png: the picture shows {nothing}", run.stderr)
+            self.assertIn(f"warning: a.png: the picture is empty: {why}", run.stderr)
         self.assertEqual(self.works("render", "ball.trip", *ground).stderr, "")
         away = dict(triptych_path=1, frames_per_second=1, keys=[
             dict(seconds=s, eye=[9.5, -90, 9.5], look=look, up=[0, 0, 1], fov=30)
             for s, look in ((0, [9.5, 9.5, 9.5]), (1, [900, -90.5, 9.5]))])
         program.write("away.json", json.dumps(away).encode())
         run = self.works("render", "ball.trip", *ground, "--path=away.json")
-        self.assertIn(f"warning: a.png: 1 of 2 pictures show {nothing}", run.stderr)
+        self.assertIn(f"warning: a.png: 1 of 2 pictures are empty: {why}", run.stderr)
 
     def test_volumes_are_told_apart(self):
         self.assertEqual(self.kind("chest.nrrd"), "ct")
@@ -265,7 +265,7 @@ class Look(program.ProgramTest):
         for view in views:
             self.works("brick", name, "--range=150:255", *brick)
             run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", *view)
-            command = re.search(r"to have them: triptych (brick .*)\n", run.stderr)
+            command = re.search(r"to keep them: triptych (brick .*)\n", run.stderr)
             self.assertTrue(command, run.stderr)
             subprocess.run(
                 f"'{program.PROGRAM}' {command[1]} -q", shell=True, check=True, stderr=subprocess.PIPE
@@ -278,7 +278,7 @@ class Look(program.ProgramTest):
         """What `info` says of a data set, and of the one by the command that is printed."""
         before = self.brick(source, "again.trip", "--range=150:255", *options)
         run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", "--tf", "low.tf")
-        command = re.search(r"to have them: triptych (brick .*)\n", run.stderr)
+        command = re.search(r"to keep them: triptych (brick .*)\n", run.stderr)
         self.assertTrue(command, run.stderr)
         shutil.rmtree("again.trip")
         subprocess.run(

@@ -253,7 +253,7 @@ class Measured(program.ProgramTest):
     def test_count_alone_is_refused(self):
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", says="--stats or --explain")
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", "--explain",
-                   "--classify", "post", says="counts splats")
+                   "--classify", "post", says="requires --classify pre")
 
     def test_count_alone_draws_splats_and_says_so(self):
         stats = self.stats("cube.trip", *VIEW[:-2], "--count")

@@ -310,7 +310,7 @@ static void a_function_that_shows_what_was_left_out_warns_with_a_count(void **st
     assert_works(&run);
     program_call(&run, "render part.trip -o a.png --size 32x32 --tf all.tf");
     assert_works(&run);
-    const char *about = strstr(run.err, "shows about ");
+    const char *about = strstr(run.err, "reveals about ");
     assert_int_equal(strncmp(run.err, "triptych: warning: part.trip: ", 30), 0);
     assert_non_null(about);
     /* 6124 voxels were read and those kept show: the count is of the others. */

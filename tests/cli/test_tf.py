@@ -30,7 +30,7 @@ class Tf(program.ProgramTest):
             name = line.split()[0]
             if "histogram" in line:
                 made += 1
-                self.fails(2, "tf", "show", name, says="made from a histogram")
+                self.fails(2, "tf", "show", name, says="needs a histogram")
                 self.shown("--tf", name, "ball.trip")
             else:
                 self.assertGreater(len(self.shown(name)), 2)

@@ -73,7 +73,7 @@ class Trouble(program.ProgramTest):
 
     def test_messages_name_what_to_do(self):
         for command in ["brick", "-o", "out.trip"], ["render", "-o", "out.png"], ["serve"]:
-            says = "folder, or a pattern in quotes"
+            says = "folder, or by a pattern in quotes"
             self.fails(2, *command, "small.nrrd", "cloud.nrrd", says=says)
         self.fails(2, "small.nrrd", says="triptych render small.nrrd -o")
         self.fails(1, "brick", "small.nrrd", "-o", "cloud.trip", says="--force")
@@ -134,7 +134,7 @@ class Trouble(program.ProgramTest):
         path = dict(triptych_path=1, keys=[dict(key, seconds=0, function="grey.tf")])
         program.write("path.json", json.dumps(path).encode())
         os.symlink("grey.tf", "link.tf")
-        read = "is read, and would be replaced"
+        read = "is an input file"
         for arguments in (
             ["volume.exr", "-o", "volume.exr"],
             ["volume.exr", "-o", "a.png", "--depth", "./volume.exr"],
@@ -150,11 +150,11 @@ class Trouble(program.ProgramTest):
             ["small.trip", "-o", "a.png", "--path", "path.json", "--stats", "grey.tf"],
         ):
             self.refused(*arguments, says=read)
-        among = "would lie among the files that are read"
+        among = "would lie among the input files"
         self.refused("small.trip", "-o", "a.png", "--stats", "small.trip/index.trip", says=among)
         self.refused("slices", "-o", "slices/picture.png", says=among)
         self.refused("small.trip", "-o", "small.trip/picture.png", says=among)
-        self.refused("slices/*.tif", "-o", "slices/picture.tif", says="one of the slices")
+        self.refused("slices/*.tif", "-o", "slices/picture.tif", says="the pattern of the input slices")
         self.fails(2, "tf", "convert", "small.nrrd", "small.nrrd", "--force", "--format", "tf",
                    says=read)
         self.works("tf", "convert", "grey.tf", "grey.tf", "--force")
@@ -168,7 +168,7 @@ class Trouble(program.ProgramTest):
             ["-o", "a.exr", "--depth", "small.trip/../a.exr", "--orbit", "2"],
             ["-o", "a.png", "--orbit", "2", "--stats", "a-001.png"],
         ):
-            self.refused("small.trip", *arguments, says="is to be written twice")
+            self.refused("small.trip", *arguments, says="would be written twice")
         self.works("render", "small.trip", "--size", "9x9", "-o", "a.png", "--orbit", "2",
                    "--stats", "a.png")
 

@@ -24,7 +24,7 @@ static void memory_is_charged_before_it_is_taken(void **state)
     assert_true(trip_budget_charge(budget, ((uint64_t)1 << 20) - 1000));
     test_catch_reports();
     assert_int_equal(trip_json_parse(&j, text, "a.trip", budget), TRIP_ERROR);
-    assert_one_report("a.trip: its text takes 1 MiB of memory: give more with --memory");
+    assert_one_report("a.trip: its text takes 1 MiB of memory; raise --memory");
     trip_json_free(&j);
     trip_budget_discharge(budget, ((uint64_t)1 << 20) - 1000);
     trip_budget_destroy(budget);

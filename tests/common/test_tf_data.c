@@ -102,11 +102,11 @@ static void hounsfield_units_are_told_from_other_values(void **state)
     (void)state;
     warned_of("ct-bone", -1024, 3071, NULL);
     warned_of("ct-bone", -3024, 1900, NULL);
-    warned_of("ct-bone", 0, 255, "hardly Hounsfield units");
-    warned_of("ct-soft", 0, 1, "hardly Hounsfield units");
-    warned_of("ct-skin", 0, 4095, "hardly Hounsfield units");
+    warned_of("ct-bone", 0, 255, "do not look like the Hounsfield units");
+    warned_of("ct-soft", 0, 1, "do not look like the Hounsfield units");
+    warned_of("ct-skin", 0, 4095, "do not look like the Hounsfield units");
     warned_of("bone", 0, 255, NULL);
-    warned_of("ct-bone", -1024, 120, "shows nothing of the values from -1024 to 120");
+    warned_of("ct-bone", -1024, 120, "no value from -1024 to 120 is visible");
 }
 
 static void the_span_of_what_shows_reaches_to_the_points_beside_it(void **state)

@@ -119,7 +119,7 @@ static void opacity_by_gradient_is_warned_of(void **state)
                                " gradientOpacity=\"4 0 0 255 1\"/>";
     test_catch_reports();
     assert_int_equal(trip_tf_parse_any(&tf, "m.xml", text, strlen(text), NULL), TRIP_OK);
-    assert_one_report("opacity by gradient is left out");
+    assert_one_report("opacity by gradient is ignored");
     trip_tf_destroy(tf);
 }
 

@@ -128,7 +128,7 @@ static int count_parts(triptych *t)
     int parts = 1;
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
-    for (const char *at = text; (at = strstr(at, "along the view on")); at++)
+    for (const char *at = text; (at = strstr(at, ", from depth ")); at++)
         parts++;
     free(text);
     triptych_end(t);
@@ -225,7 +225,7 @@ static void steps_come_to_the_same_bits(void **state)
 /* Which of the pictures it is, from 1 on; lists of its level are read, or have no weight. */
 static int check_plan(triptych *t)
 {
-    static const char said[] = "of 3 pictures, what follows is of number ";
+    static const char said[] = "3 pictures are drawn; the lines below explain number ";
     char *text = NULL;
     int number, read = 0;
     unsigned level;
@@ -285,13 +285,13 @@ static void the_plan_says_why_levels_are_what_they_are(void **state)
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
     triptych_settings s = plain(4);
-    assert_levels(t, &s, ": the coarsest whose voxels are at most 4 pixels wide\n");
+    assert_levels(t, &s, ": the coarsest with voxels at most 4 pixels wide\n");
     s.lod_px = 0.25;
     assert_levels(t, &s,
-                  "do not run: level 0: voxels of coarser ones are more than 0.25 pixels wide\n");
+                  "do not run: level 0: coarser levels have voxels more than 0.25 pixels wide\n");
     s.lod_px = 0;
     s.max_bytes = 100;
-    assert_levels(t, &s, ": the coarsest there is, of more bytes than the bound allows\n");
+    assert_levels(t, &s, ": the coarsest level, with more bytes than the bound allows\n");
     triptych_destroy(t);
 }
 

@@ -196,7 +196,7 @@ static void the_plan_of_a_frame_can_be_printed(void **state)
     triptych *t = new_context();
     char *text;
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    assert_fails(t, triptych_explain(t, &text), TRIPTYCH_USAGE, "none is begun");
+    assert_fails(t, triptych_explain(t, &text), TRIPTYCH_USAGE, "no frame is begun");
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
     assert_non_null(strstr(text, "merge"));
@@ -248,9 +248,9 @@ static void pictures_take_of_the_memory_given(void **state)
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_fails(t, triptych_new_picture(t, 0, 8, 4, &rgba), TRIPTYCH_USAGE, "pixels");
     assert_fails(t, triptych_new_picture(t, 8, 8, 3, &rgba), TRIPTYCH_USAGE, "channels");
-    assert_fails(t, triptych_new_picture(t, 4096, 4096, 4, &rgba), TRIPTYCH_ERROR, "memory given");
+    assert_fails(t, triptych_new_picture(t, 4096, 4096, 4, &rgba), TRIPTYCH_ERROR, "fit in memory");
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK); /* 36 of 64 MiB */
-    assert_fails(t, triptych_new_picture(t, 1536, 1536, 4, &other), TRIPTYCH_ERROR, "memory given");
+    assert_fails(t, triptych_new_picture(t, 1536, 1536, 4, &other), TRIPTYCH_ERROR, "fit in memory");
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 1, &other), TRIPTYCH_OK);
     triptych_release_picture(t, rgba);
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK);
@@ -286,22 +286,22 @@ static void what_only_splats_have_is_drawn_by_them(void **state)
     open_data(t, TRIPTYCH_RENDERER_CPU);
     check_classified(t, &s, TRIPTYCH_POST, "by the view");
     s.samples_per_sheet = 4;
-    check_classified(t, &s, TRIPTYCH_POST, "in 4 slices");
+    check_classified(t, &s, TRIPTYCH_POST, "at 4 samples per sheet");
     s = defaults;
     s.kernel_radius = 1.75;
-    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: a kernel radius");
+    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: a kernel radius");
     s = defaults;
     s.lod_px = 2;
     check_classified(t, &s, TRIPTYCH_POST, "the data set has none");
     s = defaults;
     s.target = TRIPTYCH_RGBA8;
-    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: the target");
+    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: the target");
     s = defaults;
     s.traversal = TRIPTYCH_ASCENDING;
-    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: lists");
+    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: traversal");
     s = defaults;
     s.count = 1;
-    check_classified(t, &s, TRIPTYCH_PRE, "in place of post: splats are counted");
+    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: splats are counted");
     s.count = 0;
     s.classify = TRIPTYCH_PRE;
     check_classified(t, &s, TRIPTYCH_PRE, "classify    pre");
@@ -657,7 +657,7 @@ static void what_fails_says_why_and_the_context_goes_on(void **state)
     assert_fails(t, triptych_open(t, "none.trip", NULL), TRIPTYCH_ERROR, "none.trip");
     assert_fails(t, triptych_open(t, DATA_SET, &(triptych_resources){ .memory_bytes = 4096 }),
                  TRIPTYCH_ERROR, "memory");
-    assert_fails(t, triptych_step(t, 0), TRIPTYCH_USAGE, "none is begun");
+    assert_fails(t, triptych_step(t, 0), TRIPTYCH_USAGE, "no frame is begun");
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_string_equal(triptych_error(t), "");
     assert_fails(t, triptych_set_settings(t, &bad), TRIPTYCH_USAGE, "h lies between");
@@ -666,7 +666,7 @@ static void what_fails_says_why_and_the_context_goes_on(void **state)
     assert_fails(t, triptych_set_view(t, &(triptych_view){ .width = -1 }), TRIPTYCH_USAGE,
                  "pixels");
     assert_fails(t, triptych_set_view(t, &(triptych_view){ .up = (double[3]){ 0 } }),
-                 TRIPTYCH_USAGE, "up is zero");
+                 TRIPTYCH_USAGE, "up direction is zero");
     assert_fails(t, triptych_turn(t, INFINITY), TRIPTYCH_USAGE, "finite");
     assert_fails(t,
                  triptych_set_transfer_function(
@@ -832,13 +832,13 @@ static void the_integral_of_what_is_kept_is_that_of_the_volume(void **state)
     assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, stored), TRIPTYCH_OK);
-    assert_fails(t, triptych_set_source(t, other, NULL), TRIPTYCH_ERROR, "its grid is another");
+    assert_fails(t, triptych_set_source(t, other, NULL), TRIPTYCH_ERROR, "the grids differ");
     assert_int_equal(triptych_set_source(t, VOLUME, NULL), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, source), TRIPTYCH_OK);
     assert_memory_equal(stored, source, sizeof stored);
     s.field = TRIPTYCH_SPLATS;
     assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
-    assert_fails(t, triptych_draw(t, source), TRIPTYCH_USAGE, "splats are made of");
+    assert_fails(t, triptych_draw(t, source), TRIPTYCH_USAGE, "the sum of the splats");
     triptych_destroy(t);
 }
 
@@ -1265,12 +1265,12 @@ static void measurements_keep_their_colours_unless_effects_are_asked_for(void **
     assert_int_equal(draw(t, rgba).effects, TRIPTYCH_CUEING);
     s.effects = TRIPTYCH_SHADOWS;
     s.headlight = 1;
-    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "give its direction");
+    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "give the light a direction");
     s.effects = TRIPTYCH_EMISSION;
     assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
-    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "no data set of heat");
+    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "needs a data set of heat");
     s.effects = 32;
-    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "no such effect");
+    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "unknown effect");
     triptych_destroy(t);
 }
 

@@ -533,11 +533,11 @@ static void coordinates_are_read_as_written_and_bad_ones_refused(void **state)
     trip_dataset_close(d);
 #define PLACES ((double *)(void *)(c.bytes + c.header->coordinates_offset))
     REFUSE(PLACES[7] = NAN, "not finite");
-    REFUSE(PLACES[7] = PLACES[6], "do not ascend");
-    REFUSE(PLACES[40] = -1, "do not ascend");
-    REFUSE(PLACES[0] = -1, "do not run from 0");
-    REFUSE(PLACES[33] = 34, "do not run from 0");
-    REFUSE(PLACES[71] = 17.5, "do not run from 0");
+    REFUSE(PLACES[7] = PLACES[6], "must ascend");
+    REFUSE(PLACES[40] = -1, "must ascend");
+    REFUSE(PLACES[0] = -1, "must run from 0");
+    REFUSE(PLACES[33] = 34, "must run from 0");
+    REFUSE(PLACES[71] = 17.5, "must run from 0");
     REFUSE(c.header->coordinates_offset = c.header->lists_offset, "");
     fixture_free(&shared);
     shared = defaults;

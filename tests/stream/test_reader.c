@@ -1306,7 +1306,7 @@ static void parameters_out_of_range_are_refused(void **state)
                     &(trip_reader_params){
                         .slots = 2, .slot_bytes = 4096, .planes = 3, .engine = TRIP_ENGINE_NULL },
                     small) < 0);
-    assert_non_null(strstr(fixture_reports(), "give more with --memory"));
+    assert_non_null(strstr(fixture_reports(), "raise --memory"));
     trip_budget_destroy(small);
     close_fixture(&f, d);
 }
