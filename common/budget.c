@@ -28,7 +28,7 @@ enum { ALIGNMENT_BYTES = 4096, SMALL_BYTES = 64 << 10, LARGE_BYTES = 2 << 20 };
 
 struct trip_budget {
     uint64_t limit_bytes;
-    _Atomic uint64_t used_bytes, peak_bytes; /* counters only, they order nothing: relaxed */
+    _Atomic uint64_t used_bytes, peak_bytes; /* relaxed, since the counters order no other memory */
 };
 
 int trip_budget_create(trip_budget **out, uint64_t limit_bytes)
@@ -62,16 +62,16 @@ uint64_t trip_budget_peak_bytes(const trip_budget *b)
     return atomic_load_explicit(&b->peak_bytes, memory_order_relaxed);
 }
 
-/* Small memory, which every frame takes and releases, is of the heap: to give pages back to the
- * system interrupts all threads. Under AddressSanitizer all is, so that it watches the borders and
- * finds what is not released. */
+/* Small memory, which every frame takes and releases, comes from the heap. Returning pages to the
+ * system would interrupt all threads. Under AddressSanitizer all memory comes from the heap, so
+ * that it checks bounds and leaks. */
 static bool is_on_heap(size_t bytes)
 {
     return TRIP_BUDGET_ON_HEAP || bytes <= SMALL_BYTES;
 }
 
-/* Else pages straight from the system: zeroed without being touched, and given back on release;
- * large ones where it has them, since direct reads into these take far fewer pieces. */
+/* Larger memory is mapped from the system: already zero, and returned on release. Huge pages are
+ * used where available, since direct reads into them need far fewer segments. */
 static void *map_pages(size_t bytes)
 {
     if (is_on_heap(bytes)) {
@@ -94,7 +94,7 @@ static void unmap_pages(void *memory, size_t bytes)
         munmap(memory, bytes);
 }
 
-/* Whole pages, one at least; 0 when that overflows. */
+/* Rounds up to whole pages, at least one. Returns 0 on overflow. */
 static size_t round_up(size_t bytes)
 {
     size_t rounded;
@@ -162,7 +162,7 @@ uint64_t trip_memory_peak_rss_bytes(void)
     return trip_proc_field_bytes("/proc/self/status", "VmHWM");
 }
 
-/* Power of two that a suffix stands for, or -1. */
+/* Returns the exponent of 2 for a suffix, or -1. */
 static int suffix_shift(const char *suffix)
 {
     static const char letters[] = "KMGT";

@@ -1,7 +1,7 @@
-/* TRIP_ALSO_V3 before a function: it is compiled for any processor and once more, with what it
- * inlines, for those of x86-64-v3 (AVX2, BMI, POPCNT); which of the two runs is decided when the
- * program is loaded. Both compute the same, since no operations are fused anywhere
- * (cmake/warnings.cmake). Not with compilers, loaders and sanitizers that could not cope. */
+/* TRIP_ALSO_V3 before a function compiles it twice, with everything it inlines: for any processor,
+ * and for x86-64-v3 (AVX2, BMI, POPCNT). The loader selects one when the program starts. Both give
+ * the same results, since no operations are fused (cmake/warnings.cmake). The macro is empty for
+ * compilers, loaders and sanitizers that do not support it. */
 #ifndef TRIP_CLONES_H
 #define TRIP_CLONES_H
 

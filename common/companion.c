@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* `folder` is relative to the one that holds `file`. */
+/* `folder` is relative to the folder of `file`. */
 static bool is_at(char path[PATH_MAX], const char *file, const char *folder, const char *name,
                   int access_mode)
 {

@@ -6,10 +6,10 @@ const char *trip_coordinates_fault(const double *table, int64_t count)
         if (!isfinite(table[i]))
             return "a coordinate is not finite";
         if (i > 0 && !(table[i] - table[i - 1] >= TRIP_COORDINATES_NEAREST))
-            return "coordinates do not ascend by a millionth of their mean step or more";
+            return "coordinates must ascend by at least a millionth of their mean step";
     }
     if (table[0] != 0 || table[count - 1] != (double)(count - 1))
-        return "coordinates do not run from 0 to the number of voxels less 1";
+        return "coordinates must run from 0 to the number of voxels minus 1";
     return NULL;
 }
 
@@ -27,10 +27,10 @@ trip_coordinates trip_coordinates_make(const double *const along[3], const int64
     return c;
 }
 
-/* The last voxel at or before a place that another one follows. */
+/* Returns the last voxel at or before a position that has a voxel after it. */
 static int64_t interval_of(const double *x, int64_t voxels, double position)
 {
-    int64_t lo = 0, hi = voxels - 1; /* x[lo] <= place < x[hi], but for places beyond the ends */
+    int64_t lo = 0, hi = voxels - 1; /* x[lo] <= position < x[hi], except beyond the ends */
     while (hi - lo > 1) {
         int64_t middle = lo + (hi - lo) / 2;
         if (x[middle] <= position)
@@ -48,7 +48,8 @@ double trip_coordinates_position(const trip_coordinates *c, int axis, double ind
     if (!x || last < 1)
         return index;
     int64_t i = (int64_t)fmax(0, fmin(floor(index), (double)last - 1));
-    /* Exactly its place at the last voxel, too: how the difference is rounded vanishes in it. */
+    /* Gives exactly x[last] at the last voxel, since the rounding error of the difference vanishes.
+     */
     return x[i] + (index - (double)i) * (x[i + 1] - x[i]);
 }
 

@@ -1,9 +1,11 @@
-/* Where the voxels of a grid lie along its axes, for grids with uneven spacing. Voxel (i, j, k)
- * then has its centre at the place (x[i], y[j], z[k]), one table an axis, which the grid's
- * index_to_world takes to the world as it takes (i, j, k) where spacing is even. Places are counted
- * in mean spacings: the first is 0, the last the number of voxels less 1, so that the grid fills
- * the same box either way. Rays are straight among places, and values are interpolated linearly in
- * each cell between them. Plain values; the tables are the caller's. */
+/* Positions of voxels along the axes of a grid with uneven spacing. Voxel (i, j, k) then has its
+ * centre at position (x[i], y[j], z[k]), with one table per axis. The grid's index_to_world maps
+ * positions to world space; with even spacing, a position equals the index.
+ *
+ * Positions are in units of the mean spacing. The first is 0 and the last is the number of voxels
+ * minus 1, so the grid fills the same box as with even spacing. Rays are straight lines in
+ * positions, and values are interpolated linearly in each cell. Plain values; the caller owns the
+ * tables. */
 #ifndef TRIP_COORDINATES_H
 #define TRIP_COORDINATES_H
 
@@ -18,15 +20,14 @@
 extern "C" {
 #endif
 
-/* Of an axis with one voxel the table is { 0 }. No two voxels are nearer to one another than this:
- */
+/* Minimum distance of two neighbouring voxels. The table of an axis with one voxel is { 0 }. */
 #define TRIP_COORDINATES_NEAREST 1e-6
 
 typedef struct trip_coordinates {
-    const double *along[3]; /* by axis, ascending; all NULL: the spacing is even */
+    const double *along[3]; /* one table per axis, ascending; all NULL for even spacing */
     int64_t voxels[3];
-    double widest;  /* the most of trip_coordinates_width() */
-    double nearest; /* the least distance of two voxels along an axis */
+    double widest;  /* maximum of trip_coordinates_width() */
+    double nearest; /* minimum distance of two neighbouring voxels along an axis */
 } trip_coordinates;
 
 static inline bool trip_coordinates_uneven(const trip_coordinates *c)
@@ -34,23 +35,23 @@ static inline bool trip_coordinates_uneven(const trip_coordinates *c)
     return c->along[0] != NULL;
 }
 
-/* Why `count` numbers are no table; NULL: they are one. */
+/* Returns why `count` numbers are not a valid table, or NULL if they are. */
 const char *trip_coordinates_fault(const double *table, int64_t count);
 
-/* Of three tables that are without fault; NULL: even spacing. */
+/* Makes coordinates from three valid tables. NULL selects even spacing. */
 trip_coordinates trip_coordinates_make(const double *const along[3], const int64_t voxels[3]);
 
-/* The place of a position between voxels; beyond the first and last the spacing next to them goes
- * on. */
+/* Returns the position of an index between voxels. Beyond the ends, the spacing of the nearest two
+ * voxels continues. */
 double trip_coordinates_position(const trip_coordinates *c, int axis, double index);
-/* The other way round. */
+/* Returns the index of a position. */
 double trip_coordinates_index(const trip_coordinates *c, int axis, double position);
 
-/* How long a voxel is along an axis: half of what its neighbours are apart, at the ends of the grid
- * what the one neighbour is away. 1 where the spacing is even. */
+/* Returns the length of a voxel along an axis: half the distance between its two neighbours. At the
+ * ends of the grid, it is the distance to the one neighbour. Returns 1 for even spacing. */
 double trip_coordinates_width(const trip_coordinates *c, int axis, int64_t voxel);
 
-/* Of a voxel, from its integer indices. */
+/* Returns the position of a voxel, given as integer indices. */
 static inline trip_vec3 trip_coordinates_point(const trip_coordinates *c, trip_vec3 voxel)
 {
     if (!trip_coordinates_uneven(c))
@@ -59,7 +60,7 @@ static inline trip_vec3 trip_coordinates_point(const trip_coordinates *c, trip_v
                    c->along[2][(int64_t)voxel.z]);
 }
 
-/* Of a voxel, along each axis. */
+/* Returns the length of a voxel along each axis. */
 static inline trip_vec3 trip_coordinates_widths(const trip_coordinates *c, trip_vec3 voxel)
 {
     return trip_v3(trip_coordinates_width(c, 0, (int64_t)voxel.x),

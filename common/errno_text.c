@@ -6,9 +6,9 @@
 const char *trip_errno_text(int error, char *room, size_t bytes)
 {
     if (error == EFBIG)
-        return "larger than files may be here: see the limit on file sizes (ulimit -f) and the "
-               "file system's own";
+        return "the file would be larger than the limit on file sizes (ulimit -f) or the file "
+               "system allows";
     if (error == EMFILE)
-        return "too many open files: see the limit on them (ulimit -n)";
+        return "too many open files; raise the limit (ulimit -n)";
     return strerror_r(error, room, bytes);
 }

@@ -1,4 +1,4 @@
-/* What the system's numbers of errors mean, for people. */
+/* Texts for the error numbers of the system. */
 #ifndef TRIP_ERRNO_TEXT_H
 #define TRIP_ERRNO_TEXT_H
 
@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-/* Without a dot or a line's end; in `room`, or of static storage. */
+/* Returns the text, without a dot or a line feed. It lies in `room` or in static storage. */
 const char *trip_errno_text(int error, char *room, size_t bytes);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* Double-precision vectors and affine maps. cglm has single precision only, and the reference
- * renderer and all preprocessing geometry are double; GL code converts at upload. */
+/* Vectors and affine maps in double precision. The reference renderer and all preprocessing
+ * geometry use double precision, which cglm does not offer. GL code converts on upload. */
 #ifndef TRIP_GEOMETRY_H
 #define TRIP_GEOMETRY_H
 
@@ -14,12 +14,14 @@ typedef struct trip_vec3 {
     double x, y, z;
 } trip_vec3;
 
-/* Affine map p -> linear * p + translation, row-major 3 x 4, last column the translation. */
+/* Maps p to linear * p + translation. A row-major 3 x 4 matrix with the translation in the last
+ * column. */
 typedef struct trip_affine {
     double m[3][4];
 } trip_affine;
 
-/* Voxels of these lengths in the world can be drawn: extinctions are floats per world unit. */
+/* Bounds of the voxel length in world units that can be drawn. Extinctions are floats per world
+ * unit. */
 #define TRIP_VOXEL_WORLD_MIN 1e-32
 #define TRIP_VOXEL_WORLD_MAX 1e32
 
@@ -48,7 +50,7 @@ static inline double trip_dot(trip_vec3 a, trip_vec3 b)
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-/* Component by component. */
+/* Multiplies component by component. */
 static inline trip_vec3 trip_vec3_times(trip_vec3 a, trip_vec3 b)
 {
     return trip_v3(a.x * b.x, a.y * b.y, a.z * b.z);
@@ -69,7 +71,7 @@ static inline double trip_length(trip_vec3 a)
     return sqrt(trip_dot(a, a));
 }
 
-/* The zero vector stays zero. */
+/* Returns the zero vector for the zero vector. */
 static inline trip_vec3 trip_normalize(trip_vec3 a)
 {
     double l = trip_length(a);
@@ -84,15 +86,15 @@ static inline double trip_component(trip_vec3 a, int axis)
 trip_affine trip_affine_identity(void);
 trip_vec3 trip_affine_point(const trip_affine *a, trip_vec3 p);
 trip_vec3 trip_affine_vector(const trip_affine *a, trip_vec3 v);
-/* linear^T * n: maps a gradient in the target space of `a` back to its source space; with the
- * inverse of index-to-world it takes index-space gradients to world space. */
+/* Returns linear^T * n, which maps a gradient in the target space of `a` to its source space. With
+ * the inverse of index-to-world it maps gradients from index space to world space. */
 trip_vec3 trip_affine_transpose_vector(const trip_affine *a, trip_vec3 n);
 trip_affine trip_affine_multiply(const trip_affine *a, const trip_affine *b);
 double trip_affine_determinant(const trip_affine *a);
-/* Whether it is made of a rotation, which may be mirrored, and one scale: a voxel is as long every
- * way. */
+/* Whether the map is a rotation, possibly mirrored, times one scale. A voxel then has the same
+ * length in all directions. */
 bool trip_affine_is_similarity(const trip_affine *a);
-/* False when the map is singular or not finite. */
+/* Returns false if the map is singular or not finite. */
 bool trip_affine_invert(const trip_affine *a, trip_affine *out);
 
 #ifdef __cplusplus

@@ -15,8 +15,8 @@ int trip_input_open(const char *path)
     return open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 }
 
-/* Waits until there is something to read or the file ends; false after an interruption. A pipe that
- * has no writer yet is not at its end. */
+/* Waits until there is data or the file ends. Returns false after an interruption. A pipe without a
+ * writer is not at its end. */
 static bool wait_for_data(int fd)
 {
     while (!trip_interrupted()) {

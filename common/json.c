@@ -10,15 +10,15 @@
 
 enum {
     MAX_DEPTH = 64,
-    /* The node, and beside the bytes of its texts what the allocator adds to all three. */
+    /* The node, and the allocator's overhead for it and its two texts, besides their bytes. */
     NODE_BYTES = sizeof(cJSON) + 16 + 2 * 32,
 };
 
-/* The size of a text's JSON tree as a parser would find it up to the first fault; the text need not
- * be sound. */
+/* Size of the JSON tree that a parser would build up to the first error. The text may be invalid.
+ */
 typedef struct outline {
     uint64_t nodes, bytes;
-    int depth; /* the deepest */
+    int depth; /* maximum */
 } outline;
 
 static outline outline_of(const char *text)
@@ -51,10 +51,12 @@ int trip_json_parse(trip_json *out, const char *text, const char *path, trip_bud
     if (o.depth > MAX_DEPTH)
         return trip_fail(TRIP_ERROR, "read", path, "its text is nested more than %d deep",
                          MAX_DEPTH);
-    uint64_t bytes = o.bytes + o.nodes * NODE_BYTES; /* far from overflow: nodes are bytes */
+    uint64_t bytes =
+        o.bytes +
+        o.nodes * NODE_BYTES; /* cannot overflow, since a node has at least one byte of text */
     if (budget && !trip_budget_charge(budget, bytes))
         return trip_fail(TRIP_ERROR, "read", path,
-                         "its text takes %llu MiB of memory: give more with --memory",
+                         "its text takes %llu MiB of memory; raise --memory",
                          (unsigned long long)(bytes >> 20) + 1);
     out->bytes = budget ? bytes : 0;
     out->root = cJSON_ParseWithOpts(text, &out->end, false);
@@ -69,7 +71,8 @@ void trip_json_free(trip_json *j)
     *j = (trip_json){ 0 };
 }
 
-/* Outside strings a JSON text has nothing to escape but the blanks that it is laid out with. */
+/* Escapes characters. Outside strings, JSON text has only printable characters and the white space
+ * of its layout. */
 static void write_escaped(FILE *f, const char *text)
 {
     while (*text) {
@@ -77,7 +80,7 @@ static void write_escaped(FILE *f, const char *text)
         if (c.printable || *text == '\n' || *text == '\t')
             fwrite(text, 1, c.bytes, f);
         else
-            fprintf(f, "\\u%04x", (unsigned)c.code); /* none of them is beyond 16 bits */
+            fprintf(f, "\\u%04x", (unsigned)c.code); /* no such code exceeds 16 bits */
         text += c.bytes;
     }
 }

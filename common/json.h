@@ -1,5 +1,5 @@
-/* Parses JSON from files within the memory budget, and prints JSON that any terminal and parser can
- * take. Any thread. */
+/* Parses JSON from files within the memory budget. Prints JSON that is safe for any terminal and
+ * parser. Any thread. */
 #ifndef TRIP_JSON_H
 #define TRIP_JSON_H
 
@@ -11,21 +11,22 @@
 struct cJSON;
 
 typedef struct trip_json {
-    struct cJSON *root; /* NULL where the text is not JSON */
-    const char *end;    /* in the text: behind its value, or where it is not JSON */
+    struct cJSON *root; /* NULL if the text is not JSON */
+    /* In the text: after the JSON value, or at the first error. */
+    const char *end;
     trip_budget *budget;
-    uint64_t bytes; /* charged to it */
+    uint64_t bytes; /* charged to the budget */
 } trip_json;
 
-/* Parses `text` of the file `path`. Takes time in proportion to its length, and at most as much
- * memory as is charged to the budget first (NULL: not charged). What does not fit or is nested more
- * than 64 deep is a reported failure; what is not JSON is none. */
+/* Parses `text`, the content of the file `path`. Takes time linear in its length. Charges the
+ * memory to the budget before it parses; NULL charges nothing. Text that does not fit or is nested
+ * more than 64 deep is a reported failure. Text that is not JSON is not a failure. */
 int trip_json_parse(trip_json *out, const char *text, const char *path, trip_budget *budget);
-/* May also be called for a zeroed *j. */
+/* Frees the tree. *j may be zeroed. */
 void trip_json_free(trip_json *j);
 
-/* The tree as text, for free(): valid UTF-8 whatever its strings hold, control characters escaped.
- * NULL when memory runs out. */
+/* Returns the tree as text, for free(). The text is valid UTF-8 for any strings, with control
+ * characters escaped. Returns NULL if memory is exhausted. */
 char *trip_json_print(const struct cJSON *root, bool formatted);
 
 #endif

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* "max", an empty file or none at all: no limit. */
+/* Reads a limit. "max", an empty file or no file means no limit. */
 static uint64_t read_limit(const char *path)
 {
     uint64_t limit = UINT64_MAX;
@@ -19,7 +19,7 @@ static uint64_t read_limit(const char *path)
     return limit;
 }
 
-/* The limits of `group` ("/a/b") and of every group above it. */
+/* Returns the smallest limit of `group` ("/a/b") and the groups above it. */
 static uint64_t smallest_limit(const char *root, const char *mount, char *group, const char *file)
 {
     uint64_t smallest = UINT64_MAX;
@@ -45,8 +45,7 @@ static bool names_memory_controller(const char *controllers)
     return false;
 }
 
-/* A line of /proc/self/cgroup is "ID:CONTROLLERS:/GROUP"; version 2 has ID 0 and no controllers.
- * */
+/* A line of /proc/self/cgroup is "ID:CONTROLLERS:/GROUP". Version 2 has ID 0 and no controllers. */
 static uint64_t limit_of_line(const char *root, char *text)
 {
     char *controllers = strchr(text, ':');

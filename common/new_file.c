@@ -15,7 +15,7 @@
 
 enum { TRIES = 100 };
 
-/* Another name beside `path` at every call; false when it is too long. */
+/* Chooses a new random name beside `path`. Returns false if it is too long. */
 static bool choose_name(trip_new_file *f)
 {
     uint64_t number = 0;
@@ -28,7 +28,7 @@ static bool choose_name(trip_new_file *f)
     return length < (int)sizeof f->temporary;
 }
 
-/* The mode of a file that is to be replaced; others get what the umask leaves. */
+/* Copies the mode of a file that will be replaced. New files get their mode from the umask. */
 static void keep_mode(const trip_new_file *f)
 {
     struct stat old;
@@ -36,7 +36,7 @@ static void keep_mode(const trip_new_file *f)
         (void)!fchmod(f->fd, old.st_mode & 0777);
 }
 
-/* Links of /proc, as /dev/stdout is one, stand for files that are open. */
+/* Links into /proc, such as /dev/stdout, stand for open files. */
 static bool leads_to_open_file(const char *path)
 {
     static const char proc[] = "/proc/";
@@ -51,7 +51,7 @@ static int refuse_special(const char *stage, const char *path)
     if (leads_to_open_file(path) ||
         (stat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode)))
         return trip_fail(TRIP_ERROR, stage, path,
-                         "is a device, a pipe or a socket, which a file cannot take the place of");
+                         "is a device, a pipe or a socket, which a file cannot replace");
     return 0;
 }
 

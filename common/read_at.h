@@ -1,4 +1,4 @@
-/* Reads a part of a file. Any thread. */
+/* Reads part of a file. Any thread. */
 #ifndef TRIP_READ_AT_H
 #define TRIP_READ_AT_H
 
@@ -6,9 +6,9 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-/* Reads from `offset` on until at least `least` of `bytes` bytes are read or the file ends; returns
- * how many were read, or -1 with errno. Reading in whole sectors beyond the end of a file, as
- * direct I/O needs it, has `least` below `bytes`. */
+/* Reads from `offset` until at least `min` of `bytes` bytes are read or the file ends. Returns the
+ * number of bytes read, or -1 with errno. Direct I/O reads whole sectors, beyond the end of the
+ * file, with `min` below `bytes`. */
 ssize_t trip_read_at(int fd, void *to, size_t bytes, size_t min, uint64_t offset);
 
 #endif

@@ -21,7 +21,7 @@ typedef struct held {
     int64_t bytes;
 } held;
 
-/* A file that is nowhere else. */
+/* Holds a file open if it has no other name. */
 static void hold(held *h, int folder, const char *name)
 {
     struct stat st;
@@ -44,7 +44,8 @@ static void let_go(const held *h)
         close(h->files[i]);
 }
 
-/* Neither pthread_atfork() handlers nor SIGCHLD, which are not for processes of this kind. */
+/* Forks without pthread_atfork() handlers and without SIGCHLD, which are not meant for this
+ * process. */
 static pid_t fork_silently(void)
 {
     return (pid_t)syscall(SYS_clone, 0, NULL, NULL, NULL, NULL);
@@ -58,7 +59,8 @@ static bool is_held(const held *h, int fd)
     return false;
 }
 
-/* Locks and pipes of this process end when it closes them, not when the new one does. */
+/* Closes the other files. Otherwise this process's locks and pipes would not end when it closes
+ * them. */
 static void close_all_but(const held *h, int in, int out)
 {
     int last = in > out ? in : out;
@@ -70,8 +72,8 @@ static void close_all_but(const held *h, int in, int out)
     closefrom(last + 1);
 }
 
-/* In the process that was made: writes a byte once it has nothing open but these. When `names_gone`
- * ends, closes the files, which frees them, and then ends `freed`. */
+/* Runs in the new process. Writes a byte once only these files are open. When `names_gone` ends,
+ * closes the files, which frees their space, and then ends `freed`. */
 static void free_them(const held *h, int names_gone, int freed)
 {
     char byte = 0;
@@ -81,7 +83,7 @@ static void free_them(const held *h, int names_gone, int freed)
     _exit(0);
 }
 
-/* The process is nobody's child, so that no caller finds it among its own. */
+/* Detaches the process from this one, so that no caller finds it among its children. */
 static bool start_freeing(const held *h, int names_gone, int freed)
 {
     pid_t between = fork_silently();
@@ -113,8 +115,9 @@ static bool has_begun(int freed)
     return got == 1;
 }
 
-/* A process frees what is held, once the first descriptor is closed, and the second one ends when
- * that is done. False: there is none, and closing frees. */
+/* Starts a process that frees the held files after the first descriptor is closed. The second
+ * descriptor ends when they are freed. Returns false if there is no such process; closing the files
+ * then frees them. */
 static bool free_apart(const held *h, int *names_gone, int *freed)
 {
     int gone[2], done[2];
@@ -137,7 +140,7 @@ static bool free_apart(const held *h, int *names_gone, int *freed)
     return false;
 }
 
-/* Calls `run` with the names in a folder. */
+/* Calls `run` with the names in a folder that `ours` selects. */
 static void for_files(int folder, bool (*ours)(const char *name), held *h,
                       void (*run)(held *h, int folder, const char *name))
 {

@@ -12,7 +12,7 @@
 
 enum { LINE_BYTES = 4096, WHERE_BYTES = 2560 };
 
-/* A line under construction; what does not fit is cut and marked. */
+/* A line under construction. Text that does not fit is cut, with a mark. */
 typedef struct line {
     char text[LINE_BYTES];
     size_t length;
@@ -45,7 +45,7 @@ static void put_visible(line *l, const char *text)
     }
 }
 
-/* Only the end of a long place, so that there is room for the cause. */
+/* Writes only the end of a long position, which leaves room for the reason. */
 static void put_where(line *l, const char *where)
 {
     size_t length = strlen(where);
@@ -59,7 +59,8 @@ static void put_where(line *l, const char *where)
     put(l, ": ", 2);
 }
 
-/* On a terminal the line may replace a longer line of progress, the rest of which is cleared. */
+/* On a terminal the line may replace a longer progress line, so the rest of that line is cleared.
+ */
 static void end_line(line *l, bool terminal)
 {
     static const char clear[] = { 27, '[', 'K' };
@@ -72,7 +73,7 @@ static void end_line(line *l, bool terminal)
 
 static _Thread_local trip_held_report *held;
 
-/* One write(2) a line, so that lines of several threads do not mix. */
+/* Uses one write(2) per line, so that lines of several threads do not mix. */
 static void print(const char *text)
 {
     line l = { .length = strlen(text) };
@@ -88,10 +89,10 @@ static void print(const char *text)
     }
 }
 
-/* Around the outermost scope: what is reported there goes to stderr. */
+/* The scope around the outermost scope. Its reports go to stderr. */
 static _Thread_local trip_scope outside;
 
-/* Passes a line to the innermost scope that takes it. */
+/* Passes a line to the innermost scope that accepts it. */
 static void emit(int status, const char *text)
 {
     const trip_scope *s = trip_scope_current();
@@ -101,8 +102,8 @@ static void emit(int status, const char *text)
         print(text);
         return;
     }
-    trip_scope *here =
-        trip_scope_enter(s->around ? s->around : &outside); /* where its functions report to */
+    trip_scope *here = trip_scope_enter(
+        s->around ? s->around : &outside); /* the functions report to the enclosing scope */
     if (s->failed && status != TRIP_OK)
         s->failed(s->user, status, text);
     else
@@ -123,7 +124,7 @@ static void keep(int status, const char *text)
     held->status = status;
 }
 
-/* Of an interruption, which ends the work of all threads, one report is enough. */
+/* Reports an interruption only once, since it ends the work of all threads. */
 static void deliver(int status, const char *text)
 {
     if (status != TRIP_OK && held)

@@ -3,7 +3,7 @@
 #include <stddef.h>
 
 static _Thread_local trip_scope own;
-static _Thread_local trip_scope *current; /* NULL: own */
+static _Thread_local trip_scope *current; /* NULL means `own` */
 
 trip_scope *trip_scope_current(void)
 {
@@ -17,7 +17,7 @@ trip_scope *trip_scope_enter(trip_scope *s)
     return before;
 }
 
-/* Relaxed: no other memory is published by it. */
+/* Relaxed, since the flag publishes no other memory. */
 void trip_scope_cancel(trip_scope *s)
 {
     __atomic_store_n(&s->cancelled, true, __ATOMIC_RELAXED);
@@ -50,7 +50,7 @@ const volatile sig_atomic_t *trip_scope_signal(void)
     return NULL;
 }
 
-/* The scope that was cancelled, or the outermost. */
+/* Returns the cancelled scope, or the outermost scope. */
 static trip_scope *ended_scope(void)
 {
     trip_scope *s = trip_scope_current();

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static pthread_once_t c_locale_once = PTHREAD_ONCE_INIT;
-static locale_t c_locale; /* written once, never freed: needed until the process ends */
+static locale_t c_locale; /* written once, never freed, since it is needed until the process ends */
 
 static void make_c_locale(void)
 {
@@ -53,12 +53,12 @@ const char *trip_text_from_double(double value, char *text)
     return text;
 }
 
-/* The code that `count` bytes from *p on stand for, the first of them giving `bits`; 0 unless all
- * that follow belong to it. */
+/* Decodes the code point of `count` bytes from *p; `bits` are the bits of the first byte. Returns 0
+ * unless all following bytes belong to it. */
 static uint32_t decode(const unsigned char *p, uint32_t bits, unsigned count)
 {
     for (unsigned i = 1; i < count; i++) {
-        if ((p[i] & 0xc0) != 0x80) /* the zero at the end, too */
+        if ((p[i] & 0xc0) != 0x80) /* also stops at the final zero */
             return 0;
         bits = bits << 6 | (p[i] & 0x3f);
     }
@@ -138,7 +138,7 @@ size_t trip_text_distance(const char *a, const char *b)
     for (size_t j = 0; j <= n; j++)
         row[j] = j;
     for (size_t i = 1; i <= m; i++) {
-        size_t diagonal = row[0]; /* of the row above, one to the left */
+        size_t diagonal = row[0]; /* entry above and to the left */
         row[0] = i;
         for (size_t j = 1; j <= n; j++) {
             size_t above = row[j], changed = diagonal + (a[i - 1] != b[j - 1]);

@@ -1,33 +1,36 @@
-/* A transfer function from a histogram alone. Most voxels of most volumes are background: air, the
- * zeros around a simulation, the black of an angiogram. Everything up to the upper edge of that
- * peak gets opacity 0, so that it is culled. Above it, opacity grows with a power of a value's
- * standing, half its rank (the fraction of the foreground below it) and half its place in the
- * range, so that what is common stays a veil and what is rare and high stands out. */
+/* Makes a transfer function from a histogram alone. In most volumes, most voxels are background:
+ * air, the zeros around a simulation, the black of an angiogram. All values up to the upper edge of
+ * the background peak get opacity 0, so that their voxels are culled.
+ *
+ * Above that edge, opacity grows with a power of a value's standing. The standing combines the rank
+ * (the fraction of the foreground below the value) with the position in the range. Common values
+ * stay a faint veil; rare, high values stand out. */
 #include "tf_internal.h"
 
 #include <math.h>
 
 enum { BINS = 1024, GROUPS = 64, GROUP_BINS = BINS / GROUPS, LEVELS = 24 };
 
-static const double solid_opacity =
-    0.3;                              /* where background and foreground cannot be distinguished */
-static const double even_depth = 1.2; /* optical, of a cube of all voxels of one value */
+static const double solid_opacity = 0.3; /* if background and foreground cannot be separated */
+static const double even_depth =
+    1.2; /* optical depth of a cube of all voxels, if all have one value */
 static const double strongest_opacity = 0.7; /* at rank 1 */
-static const double invisible = 0.1;         /* up to this standing opacity is 0: mostly noise */
-/* The optical depth that the lower four fifths of the foreground may have along a typical ray. */
+static const double invisible = 0.1; /* opacity is 0 up to this standing, which is mostly noise */
+/* Optical depth that the lower four fifths of the foreground may have along a typical ray. */
 static const double veil_depth = 1.2;
 
-/* Dusk to daylight: luminance rises throughout. */
+/* From dusk to daylight: luminance always rises. */
 static const double colours[][3] = {
     { 0.20, 0.16, 0.42 }, { 0.36, 0.20, 0.55 }, { 0.63, 0.25, 0.52 }, { 0.86, 0.38, 0.38 },
     { 0.96, 0.58, 0.31 }, { 0.98, 0.80, 0.45 }, { 1.00, 0.97, 0.85 },
 };
 
 typedef struct analysis {
-    double low, range; /* of the values; range is negative when bins go downwards */
+    double low, range; /* of the values; range is negative if bins are in descending order */
     double counts[BINS];
-    int end;                         /* the last bin of the background */
-    double total, foreground, under; /* voxels: all, above the background peak, below it */
+    int end; /* last bin of the background */
+    double total, foreground,
+        under; /* numbers of voxels: all, above the background peak, below it */
 } analysis;
 
 static trip_rgba colour_at(double t, double opacity)
@@ -41,8 +44,8 @@ static trip_rgba colour_at(double t, double opacity)
     return (trip_rgba){ c[0], c[1], c[2], opacity };
 }
 
-/* The background peak is the lowest group of bins that is no mere tail; it ends where it no longer
- * falls steeply. */
+/* Finds the background peak: the lowest group of bins that is more than a tail. It ends where its
+ * slope is no longer steep. */
 static void find_background(analysis *a)
 {
     double group[GROUPS] = { 0 }, max = 0;
@@ -82,8 +85,8 @@ static double upper_edge(const analysis *a, int bin)
     return a->low + a->range * (bin + 1) / BINS;
 }
 
-/* The standing of a bin among the foreground, 0 to 1: mostly by its rank, the rest by its value, so
- * that the noise within one peak of the histogram is not stretched over all opacities. */
+/* Returns the standing of a bin in the foreground, 0 to 1. It depends mostly on the rank and partly
+ * on the value. The noise within one peak is thus not spread over all opacities. */
 static double standing(const analysis *a, int bin, double rank)
 {
     return 0.65 * rank + 0.35 * (bin - a->end) / (BINS - 1 - a->end);
@@ -95,7 +98,7 @@ static double opacity_at(double standing_of_bin, double power)
     return t > 0 ? strongest_opacity * pow(t, power) : 0;
 }
 
-/* Mean extinction of the lower four fifths of the foreground. */
+/* Returns the mean extinction of the lower four fifths of the foreground. */
 static double veil_extinction(const analysis *a, double power)
 {
     double sum = 0, below = 0;
@@ -107,8 +110,8 @@ static double veil_extinction(const analysis *a, double power)
     return sum / a->foreground;
 }
 
-/* The power that keeps the optical depth of the veil on a ray through `foreground_voxels` voxels at
- * veil_depth or less. */
+/* Chooses the power. The veil on a ray through `foreground_voxels` voxels then has at most the
+ * optical depth veil_depth. */
 static double choose_power(const analysis *a, double foreground_voxels)
 {
     double power = 2;
@@ -117,14 +120,15 @@ static double choose_power(const analysis *a, double foreground_voxels)
     return power;
 }
 
-/* One point at the background's edge, one whenever the rank has grown by 1 / LEVELS. */
+/* Makes a point at the edge of the background, and one each time the rank has grown by 1 / LEVELS.
+ */
 static size_t make_points(const analysis *a, trip_tf_point points[LEVELS + 2])
 {
     double power = choose_power(a, cbrt(a->total) * a->foreground / a->total);
     double below = 0;
     size_t count = 0;
     int level = 1;
-    /* A code's width further up: values are stored in 16 bits, and may be rounded upwards. */
+    /* Starts one code higher, since stored values have 16 bits and may be rounded up. */
     points[count++] = (trip_tf_point){ upper_edge(a, a->end) + a->range / 65535, colour_at(0, 0) };
     for (int i = a->end + 1; i < BINS; i++) {
         below += a->counts[i];
@@ -162,7 +166,7 @@ int trip_tf_from_histogram(trip_tf **out, const trip_histogram *h)
     if (h->value_min == h->value_max)
         return trip_tf_even_fog(out, h);
     analyse(&a, h, false);
-    bool downwards = a.foreground * 1000 < a.under; /* a bright background */
+    bool downwards = a.foreground * 1000 < a.under; /* the background is bright */
     if (downwards)
         analyse(&a, h, true);
     if (!(a.foreground > 0) || !isfinite(a.range)) {

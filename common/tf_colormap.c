@@ -1,4 +1,4 @@
-/* ParaView colour maps (JSON), and the JSON that 3D Slicer keeps volume properties in. */
+/* Reads colour maps of ParaView (JSON), and volume properties of 3D Slicer in JSON. */
 #include "tf_curves.h"
 
 #include "report.h"
@@ -20,7 +20,7 @@ static double number_of(const cJSON *item)
     return cJSON_IsNumber(item) ? item->valuedouble : NAN;
 }
 
-/* The numbers of `array`, four to a node. */
+/* Reads the numbers of `array`, four per node. */
 static int read_nodes(const map_reader *r, const cJSON *array, const char *key, trip_tf_nodes *out)
 {
     int numbers = cJSON_IsArray(array) ? cJSON_GetArraySize(array) : -1, status = TRIP_OK;
@@ -92,7 +92,7 @@ static int read_map(map_reader *r)
     return TRIP_OK;
 }
 
-/* { "points": [ { "x": X, "y": OPACITY } or { "x": X, "color": [R, G, B] }, ... ] } */
+/* Reads { "points": [ { "x": X, "y": OPACITY } or { "x": X, "color": [R, G, B] }, ... ] }. */
 static int read_slicer_points(const map_reader *r, const cJSON *component, const char *key,
                               trip_tf_nodes *out)
 {
@@ -112,7 +112,7 @@ static int read_slicer_points(const map_reader *r, const cJSON *component, const
     return status;
 }
 
-/* The first component of a Slicer volume property. */
+/* Reads the first component of a Slicer volume property. */
 static int read_slicer(map_reader *r)
 {
     const cJSON *components = cJSON_GetObjectItemCaseSensitive(r->map, "components");
@@ -156,7 +156,7 @@ static void report_syntax(const char *name, const char *text, const char *at)
     trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "not JSON from here on");
 }
 
-/* NULL, and a report, where the text is not JSON from end to end. */
+/* Parses JSON. Returns NULL after a report if any part of the text is not JSON. */
 static cJSON *parse_json(const char *name, const char *text, size_t bytes)
 {
     const char *end = text;

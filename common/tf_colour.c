@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
-static const double white[3] = { 0.9505, 1.0, 1.089 }; /* D65 in CIE XYZ, as VTK has it */
+static const double white[3] = { 0.9505, 1.0, 1.089 }; /* D65 in CIE XYZ, with the numbers of VTK */
 
 static void mix(const double a[3], const double b[3], double s, double out[3])
 {
@@ -28,7 +28,7 @@ static double min3(const double v[3])
     return fmin(v[0], fmin(v[1], v[2]));
 }
 
-/* Hue, saturation and value, all in [0, 1]; grey has hue 0. */
+/* Converts to hue, saturation and value, all in [0, 1]. Grey has hue 0. */
 static void rgb_to_hsv(const double rgb[3], double hsv[3])
 {
     double high = max3(rgb), range = high - min3(rgb), hue = 0;
@@ -81,7 +81,8 @@ static void rgb_to_lab(const double rgb[3], double lab[3])
     lab[2] = 200 * (f[1] - f[2]);
 }
 
-/* Colours too bright for the display keep their hue, negative parts are cut, as in VTK. */
+/* As in VTK, colours too bright for the display keep their hue, and negative components become 0.
+ */
 static void lab_to_rgb(const double lab[3], double rgb[3])
 {
     static const double from_xyz[3][3] = { { 3.2406, -1.5372, -0.4986 },
@@ -100,7 +101,7 @@ static void lab_to_rgb(const double lab[3], double rgb[3])
         rgb[i] = fmax(0, rgb[i] / high);
 }
 
-/* Moreland's polar form of Lab: magnitude, saturation angle, hue angle. */
+/* Converts to Moreland's polar form of Lab: magnitude, saturation angle, hue angle. */
 static void rgb_to_msh(const double rgb[3], double msh[3])
 {
     double lab[3];
@@ -123,7 +124,8 @@ static double angle_between(double a, double b)
     return d > M_PI ? 2 * M_PI - d : d;
 }
 
-/* The hue an unsaturated colour of magnitude m takes so that the way to `msh` looks even. */
+/* Returns the hue of an unsaturated colour of magnitude m that makes the transition to `msh` look
+ * even. */
 static double adjusted_hue(const double msh[3], double m)
 {
     if (msh[0] >= m - 0.1)
@@ -193,5 +195,5 @@ void trip_colour_between(trip_colour_space space, const double a[3], const doubl
         break;
     }
     for (int i = 0; i < 3; i++)
-        out[i] = fmin(1, fmax(0, out[i])); /* NaN to 0 */
+        out[i] = fmin(1, fmax(0, out[i])); /* NaN becomes 0 */
 }

@@ -8,8 +8,8 @@
 #include <string.h>
 
 enum {
-    COLOUR_SAMPLES = 256,   /* over the whole curve, as ParaView's own tables */
-    OPACITY_SAMPLES = 1024, /* over the whole curve; at least 8 a bent segment */
+    COLOUR_SAMPLES = 256,   /* over the whole curve, as in ParaView's tables */
+    OPACITY_SAMPLES = 1024, /* over the whole curve; at least 8 per curved segment */
 };
 
 static double clamp_unit(double x)
@@ -17,7 +17,7 @@ static double clamp_unit(double x)
     return fmin(1, fmax(0, x));
 }
 
-/* Exported numbers may pass 0 or 1 by a rounding error. */
+/* Accepts rounding errors below 0 and above 1 in exported numbers. */
 static bool is_unit(double x)
 {
     return x > -1e-6 && x < 1 + 1e-6;
@@ -64,7 +64,7 @@ int trip_tf_nodes_add(trip_tf_nodes *n, trip_tf_node node, const char *where, co
     return TRIP_OK;
 }
 
-/* The next number between blanks, and *text behind it; NAN where there is none. */
+/* Returns the next number and moves *text behind it, or returns NAN. */
 static double next_number(const char **text)
 {
     char word[64];
@@ -87,8 +87,8 @@ int trip_tf_nodes_add_text(trip_tf_nodes *n, const char *text, int numbers_per_n
     if (!(numbers >= 0 && numbers <= 4 * TRIP_TF_MAX_POINTS) ||
         fmod(numbers, numbers_per_node) != 0)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where,
-                         "%s: does not begin with a number of numbers that is a multiple of %d",
-                         key, numbers_per_node);
+                         "%s: must start with the number of numbers, a multiple of %d", key,
+                         numbers_per_node);
     for (double i = 0; i < numbers && !status; i += numbers_per_node) {
         trip_tf_node node = { .part = { 0, 0.5, 0 } };
         node.value = next_number(&text);
@@ -97,11 +97,12 @@ int trip_tf_nodes_add_text(trip_tf_nodes *n, const char *text, int numbers_per_n
         status = trip_tf_nodes_add(n, node, where, key);
     }
     if (!status && text[strspn(text, " \t\r\n")])
-        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "%s: more numbers than it says", key);
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where,
+                         "%s: more numbers than its first number says", key);
     return status;
 }
 
-/* Over its own range. */
+/* Normalises values over the range of the nodes. */
 static void normalise(trip_tf_nodes *n)
 {
     double lo = n->count ? n->data[0].value : 0;
@@ -125,7 +126,7 @@ void trip_tf_curves_stretch(trip_tf_curves *c)
 typedef struct samples {
     trip_tf curve;
     size_t room;
-    bool failed; /* for want of memory */
+    bool failed; /* memory is exhausted */
 } samples;
 
 static void add(samples *s, double value, trip_rgba colour)
@@ -153,13 +154,13 @@ static void add_opacity(samples *s, double value, double opacity)
     add(s, value, (trip_rgba){ 0, 0, 0, opacity });
 }
 
-/* How many equal parts a segment is cut into, when `total` are to cover all nodes. */
+/* Returns the number of equal parts of a segment, if `total` parts cover all nodes. */
 static int parts_of(const trip_tf_nodes *n, size_t i, int total, int min)
 {
     double span = n->data[n->count - 1].value - n->data[0].value;
     double fraction = (n->data[i + 1].value - n->data[i].value) / span;
-    int parts =
-        fraction >= 0 && fraction <= 1 ? (int)ceil(fraction * total) : 1; /* span may overflow */
+    int parts = fraction >= 0 && fraction <= 1 ? (int)ceil(fraction * total)
+                                               : 1; /* the span may overflow */
     return parts > min ? parts : min;
 }
 
@@ -188,7 +189,7 @@ static void sample_colours(const trip_tf_curves *c, samples *out)
     }
 }
 
-/* vtkPiecewiseFunction::GetTable: s is 0.5 at the midpoint; sharpness in [0.01, 0.99]. */
+/* As vtkPiecewiseFunction::GetTable: s is 0.5 at the midpoint; sharpness is in [0.01, 0.99]. */
 static double sharpened(double y1, double y2, double s, double sharpness)
 {
     double exponent = 1 + 10 * sharpness, t = (1 - sharpness) * (y2 - y1);
@@ -198,7 +199,7 @@ static double sharpened(double y1, double y2, double s, double sharpness)
     return fmin(fmax(y1, y2), fmax(fmin(y1, y2), y));
 }
 
-/* The inner points of the opacity segment after node i. */
+/* Adds the inner points of the opacity segment after node i. */
 static void sample_segment(const trip_tf_nodes *n, size_t i, samples *out)
 {
     const trip_tf_node *at = &n->data[i];
@@ -212,7 +213,7 @@ static void sample_segment(const trip_tf_nodes *n, size_t i, samples *out)
             add_opacity(out, along(n, i, midpoint), (y1 + y2) / 2);
     } else {
         int parts = parts_of(n, i, OPACITY_SAMPLES, 8);
-        parts += parts % 2; /* so that the midpoint is a sample */
+        parts += parts % 2; /* an even number has a sample at the midpoint */
         for (int k = 1; k < parts; k++) {
             double s = (double)k / parts;
             double x = s < 0.5 ? 2 * s * midpoint : midpoint + (2 * s - 1) * (1 - midpoint);
@@ -247,7 +248,8 @@ static bool same_rgba(const trip_rgba *a, const trip_rgba *b)
     return a->r == b->r && a->g == b->g && a->b == b->b && a->opacity == b->opacity;
 }
 
-/* Every value of either curve once, twice where one of them steps. */
+/* Merges the curves. The result has each value of either curve once, or twice if a curve has a step
+ * there. */
 static void merge_curves(const trip_tf *colour, const trip_tf *opacity, samples *merged)
 {
     size_t i = 0, j = 0;

@@ -1,14 +1,15 @@
-/* Transfer functions as other programs describe them: colours and opacities as separate curves,
+/* Transfer functions as other programs describe them: separate curves of colours and opacities,
  * each with its own interpolation (vtkColorTransferFunction, vtkPiecewiseFunction). Readers of
- * their files fill curves, which are then sampled where they are not linear, and merged. Only the
- * tf_*.c files include this. */
+ * foreign files fill the curves. trip_tf_curves_build() samples the parts that are not linear, and
+ * merges both. Only the tf_*.c files include this header. */
 #ifndef TRIP_TF_CURVES_H
 #define TRIP_TF_CURVES_H
 
 #include "tf_colour.h"
 #include "tf_internal.h"
 
-/* Of colours: value, r, g, b. Of opacities: value, opacity, midpoint, sharpness. */
+/* Nodes of colours have value, r, g, b; nodes of opacities have value, opacity, midpoint,
+ * sharpness. */
 typedef struct trip_tf_node {
     double value, part[3];
 } trip_tf_node;
@@ -22,20 +23,20 @@ typedef struct trip_tf_curves {
     trip_colour_space space;
     trip_tf_nodes colours, opacities;
     bool normalised;
-    double unit_world; /* 0: one voxel */
+    double unit_world; /* 0 means one voxel */
 } trip_tf_curves;
 
-/* Appends a node; an impossible one is a reported failure, in which `where` and `key` name the
- * place. */
+/* Appends a node. An invalid node is a reported failure; `where` and `key` name its position. */
 int trip_tf_nodes_add(trip_tf_nodes *n, trip_tf_node node, const char *where, const char *key);
-/* Appends the nodes of "COUNT number number ...": COUNT numbers, four to a node for colours, two
- * for opacities (straight lines between). */
+/* Appends the nodes of the text "COUNT number number ...". COUNT numbers follow, four per node for
+ * colours, two for opacities (linear between nodes). */
 int trip_tf_nodes_add_text(trip_tf_nodes *n, const char *text, int numbers_per_node,
                            const char *where, const char *key);
-/* Where the colours span 0 to 1 or -1 to 1 the curves are meant to be stretched over the data, as
- * ParaView does on loading them; normalises them then. */
+/* Normalises the curves if the colours span 0 to 1 or -1 to 1. ParaView stretches such curves over
+ * the data when it loads them. */
 void trip_tf_curves_stretch(trip_tf_curves *c);
-/* Without opacities, they rise from 0 to 1 over the colours' range, ParaView's default. */
+/* Builds the transfer function. Without opacities, opacity rises from 0 to 1 over the range of the
+ * colours, as in ParaView. */
 int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *where);
 void trip_tf_curves_free(trip_tf_curves *c);
 

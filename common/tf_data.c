@@ -1,4 +1,4 @@
-/* Functions that depend on the data they are for, and functions moved over its values. */
+/* Adapts functions to their data, and stretches functions over a window of values. */
 #include "tf_internal.h"
 
 #include "report.h"
@@ -31,9 +31,9 @@ int trip_tf_adapt(trip_tf *tf, const trip_tf_data *data, const char *where)
     }
     trip_tf_kind kind = tf->as == TRIP_TF_AUTOMATIC ? data->kind : tf->as;
     if (!data->histogram)
-        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where,
-                         "holds no histogram to make a function from; give a file or another "
-                         "preset");
+        return trip_fail(
+            TRIP_ERROR, TRIP_TF_STAGE, where,
+            "has no histogram to make a transfer function from; give a file or another preset");
     int status = trip_tf_make_automatic(&made, kind, data->histogram);
     if (status)
         return status;
@@ -50,12 +50,12 @@ int trip_tf_window(trip_tf *tf, double width, double level)
     double from = level - width / 2, to = level + width / 2;
     if (!isfinite(from) || !isfinite(to) || !(from < to))
         return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, "--window",
-                         "the window from %g to %g is empty or not a range", from, to);
+                         "the window from %g to %g is empty or invalid", from, to);
     if (!(lo < hi))
         return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, "--window",
-                         "the function is of a single value; there is nothing to stretch");
+                         "the transfer function has a single value, which cannot be stretched");
     for (size_t i = 0; i < tf->count; i++) {
-        double t = tf->points[i].value / 2 - lo / 2; /* halves: the span may be too large */
+        double t = tf->points[i].value / 2 - lo / 2; /* halves, since the span may overflow */
         t /= hi / 2 - lo / 2;
         double value = from * (1 - t) + to * t;
         /* Rounding must not put a point before its predecessor. */
@@ -76,10 +76,10 @@ void trip_tf_check_range(const trip_tf *tf, double value_min, double value_max, 
 {
     if (tf->hounsfield && !may_be_hounsfield(value_min, value_max))
         trip_warn(where,
-                  "values from %g to %g are hardly Hounsfield units, which the function is in; "
-                  "--window and --level move it",
+                  "the values from %g to %g do not look like the Hounsfield units of the transfer "
+                  "function; --window and --level move it",
                   value_min, value_max);
     else if (value_min <= value_max && !trip_tf_visible_in(tf, value_min, value_max))
-        trip_warn(where, "the transfer function shows nothing of the values from %g to %g",
-                  value_min, value_max);
+        trip_warn(where, "no value from %g to %g is visible with the transfer function", value_min,
+                  value_max);
 }

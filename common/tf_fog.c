@@ -1,17 +1,18 @@
-/* A transfer function for a density of unknown scale: smoke, clouds, fog. Extinction is
- * proportional to density, as in nature, and scaled by the histogram alone: a ray through a cube of
- * all the voxels there are meets `ray_depth`. Colours hardly differ, cool where it is thin and warm
- * where it is dense, so that the eye sees the shape and not the values. */
+/* Makes a transfer function for a density of unknown scale: smoke, clouds, fog. Extinction is
+ * proportional to density, as in nature. The histogram alone sets its scale: a ray through a cube
+ * of all existing voxels has the optical depth `ray_depth`. Colours vary little, cool in thin parts
+ * and warm in dense parts, so that the eye sees the shape and not the values. */
 #include "tf_internal.h"
 
 #include <math.h>
 
 enum { BINS = 1024, POINTS = 32 };
 
-static const double ray_depth = 4;           /* optical, at the mean density */
-static const double thinnest = 1.0 / 64;     /* of the mean density: thinner does not show */
+static const double ray_depth = 4; /* optical depth at the mean density */
+static const double thinnest =
+    1.0 / 64; /* fraction of the mean density below which nothing is visible */
 static const double strongest_opacity = 0.8; /* per voxel */
-static const double solid_opacity = 0.3;     /* where most voxels are as dense as it gets */
+static const double solid_opacity = 0.3;     /* if most voxels have the maximum density */
 
 static double bin_centre(const trip_histogram *h, int bin)
 {

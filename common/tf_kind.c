@@ -1,5 +1,5 @@
-/* Recognises the kind of a volume from its histogram and the header of its file. The rules are in
- * TRANSFER_FUNCTIONS.md. */
+/* Recognises the kind of a volume from its histogram and the header of its file.
+ * TRANSFER_FUNCTIONS.md has the rules. */
 #include "tf_internal.h"
 
 #include <math.h>
@@ -34,7 +34,7 @@ trip_tf_kind trip_tf_kind_from_name(const char *name)
     return TRIP_TF_AUTOMATIC;
 }
 
-/* Voxels per unit of value in [lo, hi], as a fraction of all. */
+/* Returns the number of voxels per unit of value in [lo, hi], as a fraction of all voxels. */
 static double density_in(const trip_histogram *h, double lo, double hi)
 {
     double range = h->value_max - h->value_min, sum = 0;
@@ -61,9 +61,9 @@ static int compare(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* How much the numbers of voxels differ from one frequent value to the next: the median of
- * |ln(ratio)|, 0 where there are few such. Images vary smoothly, labels as the sizes of things do.
- */
+/* Measures how much the counts differ from one frequent value to the next, as the median of
+ * |ln(ratio)|. Returns 0 if few values are frequent. Counts vary smoothly in images, but not in
+ * labels. */
 static double roughness(const trip_histogram *h)
 {
     double steps[BINS], before = 0;
@@ -92,7 +92,8 @@ static bool are_labels(const trip_histogram *h)
     return occurring <= 512 && roughness(h) > 0.5;
 }
 
-/* Above a background at the lowest values there is a broad mass of tissue, and a valley between. */
+/* Whether there is a broad mass of tissue above the background at the lowest values, with a valley
+ * between them. */
 static bool is_mr(const trip_histogram *h)
 {
     trip_tf_tissue t;
@@ -100,8 +101,8 @@ static bool is_mr(const trip_histogram *h)
            t.sharpest < 0.3;
 }
 
-/* What DICOM calls CT is in Hounsfield units, unless its rescaling was lost: then nothing is below
- * zero, where the air around a patient is. */
+/* DICOM's modality CT means Hounsfield units, unless rescaling was lost. Without rescaling, no
+ * value is below zero, although the air around a patient is. */
 static bool is_stated_ct(const char *modality, const trip_histogram *h)
 {
     return !strcmp(modality, "CT") && h->value_min >= -32768 && h->value_min <= -100 &&

@@ -1,5 +1,5 @@
-/* The automatic function for labels, whole numbers that name things: every value has a colour of
- * its own, and what lies between two of them is neither. */
+/* Makes the automatic function for labels, integers that name objects. Each integer has its own
+ * colour. Values between two integers show neither colour. */
 #include "tf_internal.h"
 
 #include "report.h"
@@ -11,7 +11,8 @@ enum { BINS = 1024 };
 
 static const double label_opacity = 0.5;
 
-/* Hues a golden section apart, so that neighbours differ; lighter and darker in turn. */
+/* Returns a hue a golden section away from the previous label's hue, so that neighbours differ.
+ * Lightness alternates. */
 static trip_rgba colour_of(double label)
 {
     double hue = fmod(label * 0.61803398875, 1), x = 6 * hue, rgb[3];
@@ -22,7 +23,7 @@ static trip_rgba colour_of(double label)
     return (trip_rgba){ rgb[0], rgb[1], rgb[2], label_opacity };
 }
 
-/* Zero, or the most frequent where there is none. */
+/* Returns 0, or the most frequent value if the range does not include 0. */
 static double background_of(const trip_histogram *h)
 {
     int max = 0;
@@ -34,7 +35,7 @@ static double background_of(const trip_histogram *h)
     return ceil(h->value_min + (h->value_max - h->value_min) * max / BINS);
 }
 
-/* A label's colour holds half way to the whole numbers beside it. */
+/* Adds a label. Its colour holds half way to the neighbouring integers. */
 static size_t add_label(trip_tf_point *points, size_t count, double label, double background)
 {
     trip_rgba colour = colour_of(label);
@@ -44,7 +45,7 @@ static size_t add_label(trip_tf_point *points, size_t count, double label, doubl
     return count;
 }
 
-/* The whole numbers of a bin; one that lies on its edge was perhaps the last of the bin before. */
+/* Adds the integers of a bin. An integer on the lower edge may already belong to the bin before. */
 static size_t add_bin(trip_tf_point *points, size_t count, const trip_histogram *h, int bin,
                       double background)
 {
@@ -62,8 +63,9 @@ int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *h)
     int occurring = 0;
     for (int i = 0; i < BINS; i++)
         occurring += h->counts[i] > 0;
-    const bool counts = fmax(fabs(h->value_min), fabs(h->value_max)) < 0x1p52; /* by ones */
-    if (occurring <= 2 || !(range >= 1 && range < 16384) || !counts) /* a solid, or no labels */
+    const bool counts =
+        fmax(fabs(h->value_min), fabs(h->value_max)) < 0x1p52;       /* integers are exact */
+    if (occurring <= 2 || !(range >= 1 && range < 16384) || !counts) /* solid, or not labels */
         return trip_tf_from_histogram(out, h);
     trip_tf_point *points = calloc(2 * (size_t)range + 4, sizeof *points);
     if (!points)

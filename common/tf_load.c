@@ -1,4 +1,4 @@
-/* Where transfer functions come from: names and files. */
+/* Loads transfer functions by name or from files. */
 #include "tf_internal.h"
 
 #include "input_file.h"
@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* The name without folder and extension, for free(). */
+/* Returns the file name without folder and extension, for free(). */
 static char *stem_of(const char *path)
 {
     const char *slash = strrchr(path, '/'), *base = slash ? slash + 1 : path;
@@ -32,7 +32,7 @@ static int fail_to_open(const char *path)
                      nearest);
 }
 
-/* Reads at most TRIP_TF_MAX_FILE_BYTES; *text is the caller's to free. */
+/* Reads at most TRIP_TF_MAX_FILE_BYTES. The caller frees *text. */
 static int read_file(const char *path, char **text, size_t *bytes)
 {
     int fd = trip_input_open(path);
@@ -61,7 +61,7 @@ static int read_file(const char *path, char **text, size_t *bytes)
     return status;
 }
 
-/* A .vp begins with a line of a single number, which no `.tf` has. */
+/* A .vp starts with a line of a single number, which no `.tf` has. */
 static bool is_vp(const char *text, size_t bytes)
 {
     size_t i = 0;
@@ -79,7 +79,7 @@ int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t 
     size_t i = bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
     while (i < bytes && text[i] && strchr(" \t\r\n", text[i]))
         i++;
-    char first = i < bytes ? text[i] : 0; /* a bracket is none of `.tf` */
+    char first = i < bytes ? text[i] : 0; /* a `.tf` never starts with a bracket */
     *out = NULL;
     if (first == '{' || first == '[')
         return trip_tf_parse_colormap(out, name, text, bytes, preset);
@@ -87,7 +87,8 @@ int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t 
         return trip_tf_parse_xml(out, name, text, bytes, preset);
     if (preset)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, name,
-                         "#%s picks one of several functions, and this file holds one", preset);
+                         "#%s selects one of several functions, but the file has a single function",
+                         preset);
     return is_vp(text + i, bytes - i) ? trip_tf_parse_vp(out, name, text, bytes)
                                       : trip_tf_parse(out, name, text, bytes);
 }
@@ -103,7 +104,7 @@ static int load_file(trip_tf **out, const char *path, const char *preset)
     return status;
 }
 
-/* "FILE#NAME", unless a file of that whole name exists. */
+/* Loads "FILE#NAME", or the file of that whole name if it exists. */
 static int load_path(trip_tf **out, const char *path)
 {
     const char *hash = strrchr(path, '#');
@@ -123,7 +124,7 @@ int trip_tf_load(trip_tf **out, const char *path_or_preset)
     *out = NULL;
     if (strncmp(path_or_preset, prefix, sizeof prefix - 1) == 0)
         return trip_tf_from_preset(out, path_or_preset + sizeof prefix - 1);
-    if (trip_tf_is_preset(path_or_preset)) /* none has a slash or a dot */
+    if (trip_tf_is_preset(path_or_preset)) /* no preset has a slash or a dot */
         return trip_tf_from_preset(out, path_or_preset);
     return load_path(out, path_or_preset);
 }

@@ -1,5 +1,6 @@
-/* Automatic functions for CT in Hounsfield units, whose values mean the same in every scan, and for
- * magnetic resonance, whose values mean nothing but that tissue is brighter than air. */
+/* Makes automatic functions for CT and magnetic resonance. Hounsfield units of CT have the same
+ * meaning in every scan. Values of magnetic resonance have no meaning, except that tissue is
+ * brighter than air. */
 #include "tf_internal.h"
 
 #include <math.h>
@@ -7,7 +8,7 @@
 
 enum { BINS = 1024, GROUPS = 64 };
 
-/* The optical depth of muscle and organs along a typical ray through all there is of them. */
+/* Optical depth of all muscle and organs along a typical ray. */
 static const double veil_depth = 1.5;
 
 static double value_at(const trip_histogram *h, double bin)
@@ -15,7 +16,7 @@ static double value_at(const trip_histogram *h, double bin)
     return h->value_min + (h->value_max - h->value_min) * bin / BINS;
 }
 
-/* Voxels that a typical ray meets with values in [lo, hi]. */
+/* Returns the number of voxels with values in [lo, hi] on a typical ray. */
 static double voxels_on_ray(const trip_histogram *h, double lo, double hi)
 {
     double sum = 0;
@@ -42,7 +43,7 @@ int trip_tf_ct_from_histogram(trip_tf **out, const trip_histogram *h)
     return trip_tf_from_points(out, points, sizeof points / sizeof *points, false, 0);
 }
 
-/* The bin below which a fraction of the voxels from bin `first` on lies. */
+/* Returns the bin below which a fraction of the voxels from bin `first` on lies. */
 static int quantile(const trip_histogram *h, int first, double fraction)
 {
     double total = 0, below = 0;
@@ -56,7 +57,8 @@ static int quantile(const trip_histogram *h, int first, double fraction)
     return BINS - 1;
 }
 
-/* Counts in GROUPS equal groups of the bins [first, past), each bin divided by overlap. */
+/* Counts voxels in GROUPS equal groups of the bins [first, past). Splits a bin on a border by
+ * overlap. */
 static void group_bins(const trip_histogram *h, int first, int past, double groups[GROUPS])
 {
     double width = (double)(past - first) / GROUPS;
@@ -68,8 +70,8 @@ static void group_bins(const trip_histogram *h, int first, int past, double grou
         }
 }
 
-/* The rarest of the groups above the background's peak from which the counts rise again to at least
- * twice as many; -1: none. */
+/* Returns the group with the fewest voxels above the background's peak, if counts rise again to at
+ * least twice as many. Returns -1 if there is none. */
 static int find_valley(const double groups[GROUPS])
 {
     int peak = 0, valley = -1;
@@ -91,7 +93,7 @@ static int find_valley(const double groups[GROUPS])
 bool trip_tf_find_tissue(trip_tf_tissue *out, const trip_histogram *h)
 {
     double groups[GROUPS], total = 0, tissue = 0, sharpest = 0;
-    int past = quantile(h, 1, 0.998) + 1; /* a few bright voxels say nothing of the rest */
+    int past = quantile(h, 1, 0.998) + 1; /* a few bright voxels must not stretch the range */
     for (int i = 0; i < BINS; i++)
         total += (double)h->counts[i];
     group_bins(h, 0, past, groups);

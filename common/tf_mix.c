@@ -1,4 +1,4 @@
-/* Between two transfer functions. */
+/* Mixes two transfer functions. */
 #include <stdlib.h>
 
 #include "report.h"
@@ -10,7 +10,7 @@ static trip_rgba mix(trip_rgba a, trip_rgba b, double t)
                         a.opacity + t * (b.opacity - a.opacity) };
 }
 
-/* The next value above those before i and j that either has a point at; both pass its points. */
+/* Returns the next value at which `a` or `b` has a point, and moves i and j behind its points. */
 static double next_value(const trip_tf *a, const trip_tf *b, size_t *i, size_t *j)
 {
     bool first = *j == b->count || (*i < a->count && a->points[*i].value <= b->points[*j].value);
@@ -22,8 +22,8 @@ static double next_value(const trip_tf *a, const trip_tf *b, size_t *i, size_t *
     return value;
 }
 
-/* Both are linear between the values at which one of them has a point; at those, each may have a
- * step. */
+/* Mixes the points. Both functions are linear between values at which one of them has a point. At
+ * such a value, each may have a step. */
 static size_t mix_points(const trip_tf *a, const trip_tf *b, double t, trip_tf_point *out)
 {
     size_t i = 0, j = 0, count = 0;
@@ -44,8 +44,9 @@ int trip_tf_mix(trip_tf **out, const trip_tf *a, const trip_tf *b, double t)
 {
     *out = NULL;
     if (a->normalised || b->normalised || a->unit_world != b->unit_world)
-        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "",
-                         "functions of different units cannot go over into one another");
+        return trip_fail(
+            TRIP_ERROR, TRIP_TF_STAGE, "",
+            "transfer functions with different units of opacity cannot be interpolated");
     trip_tf_point *points = malloc(2 * (a->count + b->count) * sizeof *points);
     if (!points)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "out of memory");

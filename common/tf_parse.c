@@ -10,7 +10,7 @@
 
 enum { LINE_BYTES = 1024 };
 
-/* A `.tf` text being read; format in TRANSFER_FUNCTIONS.md. */
+/* State of parsing a `.tf` text. TRANSFER_FUNCTIONS.md has the format. */
 typedef struct parser {
     const char *name;
     long line_number;
@@ -51,7 +51,7 @@ static int parse_directive(parser *p, char **words, int count)
     if (count != 2)
         return fail_at(p, "`%s` takes one word", words[0]);
     if (p->count)
-        return fail_at(p, "`%s` after a point; it belongs before the first", words[0]);
+        return fail_at(p, "`%s` after a point; move it before the first point", words[0]);
     return words[0][0] == 'u' ? parse_unit(p, words[1]) : parse_values(p, words[1]);
 }
 
@@ -75,7 +75,7 @@ static int parse_point(parser *p, char **words, int count)
     return TRIP_OK;
 }
 
-/* `line` holds one line without its end; it is cut into words in place. */
+/* Parses one line without its line feed. Splits it into words in place. */
 static int parse_line(parser *p, char *line)
 {
     char *words[6], *rest = NULL;
@@ -113,7 +113,7 @@ static int parse_lines(parser *p, const char *text, size_t bytes)
     return TRIP_OK;
 }
 
-/* No line makes more than one point. */
+/* A line has at most one point. */
 static size_t max_points(const char *text, size_t bytes)
 {
     size_t lines = 1;

@@ -1,6 +1,6 @@
-/* The built-in names: functions over the data's range, functions in Hounsfield units, and those
- * that are made from the volume's histogram. Opacities are per voxel and meant for volumes of some
- * 256 voxels across, drawn with shading. */
+/* The built-in presets: functions over the data's range, functions in Hounsfield units, and
+ * functions made from the volume's histogram. Opacities are per voxel, for volumes about 256 voxels
+ * across, drawn with shading. */
 #include "tf_internal.h"
 
 #include "report.h"
@@ -12,11 +12,11 @@
 
 enum { MAX_POINTS = 10, PRESETS = 16 };
 
-/* What a preset's values are. */
+/* The units of a preset's values. */
 typedef enum basis {
     OVER_RANGE, /* 0 to 1 over the data's range */
-    HOUNSFIELD, /* Hounsfield units */
-    HISTOGRAM,  /* not known before the volume is: made by `kind` */
+    HOUNSFIELD,
+    HISTOGRAM, /* made by `kind` from the volume's histogram */
 } basis;
 
 typedef struct preset {
@@ -32,7 +32,6 @@ static const preset presets[PRESETS] = {
                   { 0.10, { 0.25, 0.25, 0.25, 0.000 } },
                   { 0.40, { 0.60, 0.60, 0.60, 0.030 } },
                   { 1.00, { 1.00, 1.00, 1.00, 0.300 } } } },
-    /* Skin and muscle as a faint red veil, bone ivory and solid. */
     { "bone", "CT of any scale: soft tissue as a veil, bone solid", OVER_RANGE,
       .points = { { 0.00, { 0.55, 0.25, 0.15, 0.000 } },
                   { 0.22, { 0.62, 0.28, 0.18, 0.000 } },
@@ -64,7 +63,6 @@ static const preset presets[PRESETS] = {
                   { 0.30, { 0.78, 0.10, 0.08, 0.150 } },
                   { 0.55, { 0.95, 0.35, 0.22, 0.500 } },
                   { 1.00, { 1.00, 0.85, 0.65, 0.900 } } } },
-    /* Faint everywhere, so that depths add up; best without shading. */
     { "xray", "faint everywhere, so that depths add up; best with --no-shading", OVER_RANGE,
       .points = { { 0.00, { 1.00, 1.00, 1.00, 0.000 } },
                   { 0.05, { 1.00, 1.00, 1.00, 0.000 } },
@@ -84,7 +82,7 @@ static const preset presets[PRESETS] = {
                   { 180, { 0.90, 0.52, 0.40, 0.250 } },
                   { 350, { 0.97, 0.90, 0.78, 0.500 } },
                   { 1500, { 1.00, 1.00, 0.96, 0.900 } } } },
-    /* The walls of lungs and airways: what lies between air and tissue, and nothing denser. */
+    /* The walls of lungs and airways: values between air and tissue only. */
     { "ct-lung", "CT in Hounsfield units: lungs and airways", HOUNSFIELD,
       .points = { { -960, { 0.35, 0.55, 0.80, 0.000 } },
                   { -860, { 0.45, 0.65, 0.85, 0.004 } },
@@ -98,11 +96,12 @@ static const preset presets[PRESETS] = {
                   { -100, { 0.93, 0.72, 0.60, 0.600 } },
                   { 100, { 0.95, 0.74, 0.62, 0.800 } },
                   { 3000, { 1.00, 0.85, 0.75, 0.900 } } } },
-    { "auto", "whichever of the following the volume is", HISTOGRAM, .kind = TRIP_TF_AUTOMATIC },
+    { "auto", "the one of the following that suits the volume", HISTOGRAM,
+      .kind = TRIP_TF_AUTOMATIC },
     { "ct", "CT in Hounsfield units", HISTOGRAM, .kind = TRIP_TF_CT },
     { "mr", "magnetic resonance", HISTOGRAM, .kind = TRIP_TF_MR },
     { "fog", "smoke, clouds, fog", HISTOGRAM, .kind = TRIP_TF_FOG },
-    { "labels", "whole numbers that name things", HISTOGRAM, .kind = TRIP_TF_LABELS },
+    { "labels", "integers that name objects", HISTOGRAM, .kind = TRIP_TF_LABELS },
     { "simulation", "anything else", HISTOGRAM, .kind = TRIP_TF_SIMULATION },
 };
 

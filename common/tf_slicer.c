@@ -1,5 +1,5 @@
-/* The text that 3D Slicer keeps a volume property in (.vp): nine lines, of which the seventh holds
- * the opacities and the ninth the colours. */
+/* Reads volume properties of 3D Slicer as text (.vp). They have nine lines; the seventh holds the
+ * opacities and the ninth the colours. */
 #include "tf_curves.h"
 
 #include "report.h"
@@ -16,12 +16,12 @@ void trip_tf_warn_of_gradient(const trip_tf_nodes *gradient, const char *where)
     for (size_t i = 0; i < gradient->count; i++) {
         if (gradient->data[i].part[0] == 1)
             continue;
-        trip_warn(where, "opacity by gradient is left out; what it hides will show");
+        trip_warn(where, "opacity by gradient is ignored; parts that it hides are visible");
         return;
     }
 }
 
-/* Cuts the text into lines in place. Returns how many there are, at most LINES. */
+/* Splits the text into lines in place. Returns the number of lines, at most LINES. */
 static int split(char *text, char *lines[LINES])
 {
     int count = 0;
@@ -63,7 +63,7 @@ int trip_tf_parse_vp(trip_tf **out, const char *name, const char *text, size_t b
         status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, name, "a zero byte; this is not a text file");
     else if (split(copy, lines) < LINES)
         status = trip_fail(TRIP_ERROR, TRIP_TF_STAGE, name,
-                           "fewer than %d lines; a volume property has as many", LINES);
+                           "fewer than %d lines; a volume property has exactly that many", LINES);
     else
         status = read_lines(&curves, lines, name);
     if (!status)

@@ -1,6 +1,6 @@
-/* Functions in the forms that other programs read. Those keep colours and opacities as separate
- * curves, in which most take a value once only: of a step the colour below stands at the number
- * just below it. */
+/* Writes functions in the formats of other programs. These formats keep colours and opacities as
+ * separate curves. Most formats accept a value only once, so the lower colour of a step is written
+ * at the next smaller number. */
 #include "tf_internal.h"
 
 #include "report.h"
@@ -14,12 +14,13 @@
 typedef struct writer {
     FILE *f;
     char name[128];        /* printable ASCII */
-    trip_tf_point *points; /* values rise; room for two more */
+    trip_tf_point *points; /* ascending values; room for two more */
     size_t count;
     double unit_world;
 } writer;
 
-/* Whether point i can be left out: of several with one value the first and the last matter. */
+/* Whether point i can be left out. Of several points with one value, only the first and the last
+ * matter. */
 static bool is_idle(const trip_tf *tf, size_t i)
 {
     return i > 0 && i + 1 < tf->count && tf->points[i - 1].value == tf->points[i].value &&
@@ -62,8 +63,8 @@ static void write_rgb(FILE *f, const char *between, const trip_tf_point *p)
     write_numbers(f, between, (const double[]){ p->colour.r, p->colour.g, p->colour.b }, 3);
 }
 
-/* ParaView stretches what spans 0 to 1 or -1 to 1: a further point keeps a function in data units
- * from it. */
+/* ParaView stretches maps that span 0 to 1 or -1 to 1. A further point protects a function in data
+ * units from this. */
 static void guard_range(writer *w, const trip_tf *tf)
 {
     double lo = w->points[0].value;
@@ -74,8 +75,8 @@ static void guard_range(writer *w, const trip_tf *tf)
     w->points[w->count++] = last;
 }
 
-/* Over the data's range ParaView's maps go from 0 to 1; beyond a function's points its ends hold.
- */
+/* ParaView's maps span 0 to 1 over the data's range. Beyond its points, a function keeps its end
+ * colours. */
 static void widen_to_range(writer *w, const trip_tf *tf)
 {
     if (!tf->normalised)
@@ -128,7 +129,7 @@ static void write_paraview(writer *w, const trip_tf *tf)
     fputs("\n]\n} ]\n", w->f);
 }
 
-/* "COUNT value opacity ...": COUNT numbers. */
+/* Writes "COUNT value opacity ...", where COUNT is the number of numbers. */
 static void write_opacity_text(const writer *w)
 {
     fprintf(w->f, "%zu", 2 * w->count);
@@ -150,12 +151,12 @@ static void write_colour_text(const writer *w)
     }
 }
 
-/* Linear interpolation, shaded, diffuse 0.9, ambient 0.1, specular 0.2 of power 10 as in Slicer's
- * own presets; opacity does not depend on the gradient. */
+/* Linear interpolation, shaded, with diffuse 0.9, ambient 0.1 and specular 0.2 of power 10, as in
+ * Slicer's presets. Opacity does not depend on the gradient. */
 static void write_vp(writer *w)
 {
     if (w->unit_world > 0)
-        trip_warn(w->name, "a .vp has no unit of opacity; .vp.json has");
+        trip_warn(w->name, "a .vp has no unit of opacity; use .vp.json");
     fputs("1\n1\n0.9\n0.1\n0.2\n10\n", w->f);
     write_opacity_text(w);
     fputs("\n4 0 1 255 1\n", w->f);
@@ -309,8 +310,8 @@ int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, ch
     }
     if (tf->normalised && format != TRIP_TF_PARAVIEW)
         return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, name,
-                         "runs over the data's range, which this form cannot say; give the range "
-                         "by --range LO:HI");
+                         "the function is relative to the range of the data, which this format "
+                         "cannot express; give the range with --range LO:HI");
     take_name(&w, name);
     int status = take_points(&w, tf);
     w.f = status ? NULL : open_memstream(text, &bytes);

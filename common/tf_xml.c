@@ -1,7 +1,9 @@
-/* Functions in XML: 3D Slicer's presets (MRML), where a VolumeProperty has its curves in
- * attributes; VTK's volume properties (vtkXMLVolumePropertyWriter), where they are elements; and
- * the colour maps of older ParaViews. Read in one pass as expat meets the elements. Documents with
- * a type declaration are refused, so that no entity is ever expanded. */
+/* Reads transfer functions in XML:
+ * - presets of 3D Slicer (MRML): a VolumeProperty with curves in attributes
+ * - volume properties of VTK (vtkXMLVolumePropertyWriter): curves in elements
+ * - colour maps of older versions of ParaView
+ * expat reads the text in one pass. Documents with a type declaration are refused, so no entity is
+ * ever expanded. */
 #include "tf_curves.h"
 
 #include "report.h"
@@ -17,18 +19,18 @@ typedef struct xml_reader {
     XML_Parser parser;
     const char *name, *wanted;
     char where[512];
-    bool found;            /* the element that is wanted */
-    bool inside;           /* within that element */
-    bool vtk, map;         /* it is VTK's, ParaView's */
-    bool component;        /* inside the first component of VTK's */
+    bool found;            /* the wanted element was found */
+    bool inside;           /* inside the wanted element */
+    bool vtk, map;         /* the element is from VTK; from ParaView */
+    bool component;        /* inside the first component (VTK) */
     bool grey;             /* colours are brightness */
-    trip_tf_nodes *points; /* where points belong, or NULL */
+    trip_tf_nodes *points; /* destination of points, or NULL */
     trip_tf_nodes gradient;
     trip_tf_curves curves;
     int status;
 } xml_reader;
 
-/* The first failure ends the reading. */
+/* Stops the parser at the first failure. */
 static void stop(xml_reader *r, int status)
 {
     if (!status)
@@ -113,7 +115,7 @@ static trip_colour_space space_of(const char **attributes)
     return number >= 0 && number <= 5 ? vtk_spaces[(int)number] : TRIP_COLOUR_RGB;
 }
 
-/* The elements inside the component of a VTK property. */
+/* Handles elements inside the component of a VTK property. */
 static void begin_in_component(xml_reader *r, const char *element, const char **attributes)
 {
     if (!strcmp(element, "RGBTransferFunction") || !strcmp(element, "GrayTransferFunction")) {
@@ -128,7 +130,7 @@ static void begin_in_component(xml_reader *r, const char *element, const char **
     }
 }
 
-/* <Point X="" Value="" MidPoint="" Sharpness=""/>; of colours the value is three numbers. */
+/* Reads <Point X="" Value="" MidPoint="" Sharpness=""/>. A colour's Value has three numbers. */
 static int read_point(xml_reader *r, const char **attributes)
 {
     trip_tf_node node = { number_at(attributes, "X", NAN), { NAN, 0.5, 0 } };
@@ -167,7 +169,7 @@ static void begin_map(xml_reader *r, const char **attributes)
                                                         : TRIP_COLOUR_LAB;
 }
 
-/* <Point x="" o="" r="" g="" b=""/> */
+/* Reads <Point x="" o="" r="" g="" b=""/>. */
 static int read_map_point(xml_reader *r, const char **a)
 {
     const trip_tf_node colour = { number_at(a, "x", NAN),
@@ -221,7 +223,7 @@ static void XMLCALL on_type_declaration(void *user, const char *name, const char
     xml_reader *r = user;
     (void)name, (void)system, (void)public, (void)internal;
     stop(r, trip_fail(TRIP_ERROR, TRIP_TF_STAGE, r->name,
-                      "a document type declaration; no such document is read"));
+                      "has a document type declaration; remove it"));
 }
 
 static int parse(xml_reader *r, const char *text, size_t bytes)

@@ -34,8 +34,8 @@ const char *trip_tf_point_fault(const trip_tf_point *point, const trip_tf_point 
 static int check_points(const trip_tf_point *points, size_t count, bool normalised)
 {
     if (count == 0 || count > TRIP_TF_MAX_POINTS)
-        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "%zu points; it takes 1 to %d", count,
-                         TRIP_TF_MAX_POINTS);
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "",
+                         "%zu points; a transfer function has 1 to %d", count, TRIP_TF_MAX_POINTS);
     for (size_t i = 0; i < count; i++) {
         const char *fault = trip_tf_point_fault(&points[i], i ? &points[i - 1] : NULL, normalised);
         if (fault)
@@ -52,7 +52,7 @@ int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count
     if (status)
         return status;
     if (!isfinite(unit_world) || unit_world < 0)
-        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "the unit of length is not positive");
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "the unit of length must be positive");
     trip_tf *tf = calloc(1, sizeof *tf);
     trip_tf_point *copy = calloc(count, sizeof *copy);
     if (!tf || !copy) {
@@ -103,7 +103,7 @@ const trip_tf_point *trip_tf_points(const trip_tf *tf, size_t *count)
     return tf->points;
 }
 
-/* Index of the first point above `value`; tf->count when there is none. */
+/* Returns the index of the first point above `value`, or tf->count if there is none. */
 static size_t first_above(const trip_tf *tf, double value)
 {
     size_t low = 0, high = tf->count;
@@ -117,7 +117,7 @@ static size_t first_above(const trip_tf *tf, double value)
     return low;
 }
 
-/* Where `value` lies between a < b; halves where b - a is too large for a double. */
+/* Returns the position of `value` between a < b, 0 to 1. Halves the terms if b - a overflows. */
 static double fraction_between(double a, double b, double value)
 {
     double span = b - a;
@@ -154,8 +154,8 @@ trip_rgba trip_tf_evaluate_below(const trip_tf *tf, double value)
     return tf->points[i - 1].colour;
 }
 
-/* Opacities are never negative, so between two points something shows exactly when one of them
- * does; at single values (the ends, the points) trip_tf_evaluate() decides. */
+/* Opacities are never negative. Between two points, a value is visible exactly if one of the points
+ * is visible. At single values (the ends, the points), trip_tf_evaluate() decides. */
 bool trip_tf_visible_in(const trip_tf *tf, double lo, double hi)
 {
     if (!(lo <= hi))
@@ -184,7 +184,7 @@ bool trip_tf_visible_span(const trip_tf *tf, double lo, double hi, double span[2
     return trip_tf_visible_in(tf, lo, hi);
 }
 
-/* What a picture does not show by half of 1/255 need not be known. */
+/* Opacities below half of 1/255 are not visible in a picture. */
 static const double faint = 0.5 / 255;
 
 bool trip_tf_lost_peak(const trip_tf *tf, double lo, double hi, trip_tf_point *out)

@@ -1,12 +1,11 @@
-/* Transfer functions: scalar value -> colour and opacity, piecewise linear. A function is built
- * once, is read-only afterwards, and may be shared by threads. Forms: our plain `.tf` text, the
- * files of other programs, built-in presets, and those made from a histogram; TRANSFER_FUNCTIONS.md
- * describes them all.
+/* Transfer functions: a scalar value maps to a colour and an opacity, piecewise linear. A function
+ * is built once and is read-only afterwards, so threads may share it. Sources are `.tf` text, files
+ * of other programs, built-in presets, and histograms. TRANSFER_FUNCTIONS.md describes them all.
  *
- * Opacity is per unit length: a constant region of opacity o and thickness L units has opacity
- * 1 - (1 - o)^L. So extinction is tau = -ln(1 - o) / unit. One voxel is the default unit, that is
- * the cube root of the voxel's volume in world space. Opacity 1 (infinite extinction) is clamped
- * to TRIP_OPACITY_MAX. */
+ * Opacity is per unit of length: a constant region of opacity o and thickness L units has opacity
+ * 1 - (1 - o)^L. The extinction is tau = -ln(1 - o) / unit. The default unit is one voxel, the cube
+ * root of the voxel's volume in world space. Opacity 1 (infinite extinction) is clamped to
+ * TRIP_OPACITY_MAX. */
 #ifndef TRIP_TRANSFER_FUNCTION_H
 #define TRIP_TRANSFER_FUNCTION_H
 
@@ -24,7 +23,7 @@ typedef struct trip_tf trip_tf;
 
 typedef struct trip_rgba {
     double r, g, b; /* display values in [0, 1], not premultiplied */
-    double opacity; /* per unit length, in [0, 1] */
+    double opacity; /* per unit of length, in [0, 1] */
 } trip_rgba;
 
 typedef struct trip_tf_point {
@@ -32,7 +31,7 @@ typedef struct trip_tf_point {
     trip_rgba colour;
 } trip_tf_point;
 
-/* Counts of a volume's finite values in equal bins over [value_min, value_max]; `total` is their
+/* Counts the finite values of a volume in equal bins over [value_min, value_max]. `total` is the
  * sum. */
 typedef struct trip_histogram {
     double value_min, value_max;
@@ -40,113 +39,114 @@ typedef struct trip_histogram {
     uint64_t total;
 } trip_histogram;
 
-/* The kinds of volumes, each of which has an automatic function of its own. */
+/* Kinds of volumes. Each kind has an automatic transfer function. */
 typedef enum trip_tf_kind {
     TRIP_TF_AUTOMATIC, /* not recognised yet */
     TRIP_TF_CT,        /* in Hounsfield units */
     TRIP_TF_MR,
     TRIP_TF_FOG,
     TRIP_TF_LABELS,
-    TRIP_TF_SIMULATION, /* and all else */
+    TRIP_TF_SIMULATION, /* and all other data */
     TRIP_TF_KINDS
 } trip_tf_kind;
 
-/* "auto", "ct", "mr", "fog", "labels", "simulation"; of a text that is none of them
- * TRIP_TF_AUTOMATIC. */
+/* Names of the kinds: "auto", "ct", "mr", "fog", "labels", "simulation". trip_tf_kind_from_name()
+ * returns TRIP_TF_AUTOMATIC for other texts. */
 const char *trip_tf_kind_name(trip_tf_kind kind);
-/* The same for people: "CT in Hounsfield units", ... */
+/* Returns a title for people, such as "CT in Hounsfield units". */
 const char *trip_tf_kind_title(trip_tf_kind kind);
 trip_tf_kind trip_tf_kind_from_name(const char *name);
 
 /* Properties of a volume besides its values. */
 typedef struct trip_tf_origin {
-    bool sparse;          /* only some voxels exist, and the histogram holds those */
-    bool integers;        /* values are whole numbers */
+    bool sparse;          /* only some voxels exist, and the histogram counts only these */
+    bool integers;        /* values are integers */
     bool patient;         /* world space is anatomical */
-    const char *modality; /* of DICOM: "CT", "MR", ...; NULL or "": not known */
+    const char *modality; /* from DICOM: "CT", "MR", ...; NULL or "" if unknown */
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
 
-/* A preset's name ("bone", "preset:bone"), or a file, distinguished by its content: `.tf` text,
- * JSON of ParaView or 3D Slicer, a .vp, XML of Slicer, VTK or ParaView; "FILE#NAME" for one of
- * several. A name without a slash or a dot that is a preset's is the preset. All report and return
- * a negative status on failure, TRIP_USAGE for an unknown preset. trip_tf_parse() takes `.tf` text
- * itself. */
+/* Loads a transfer function. `path_or_preset` may be:
+ * - the name of a preset ("bone", "preset:bone"), even if a file of that name exists
+ * - a file, recognised by its content: `.tf` text, JSON of ParaView or 3D Slicer, a .vp, or XML
+ *   of Slicer, VTK or ParaView
+ * - "FILE#NAME" for one of several functions in a file
+ * trip_tf_parse() takes `.tf` text. All report a failure and return a negative status, TRIP_USAGE
+ * for an unknown preset. */
 int trip_tf_load(trip_tf **out, const char *path_or_preset);
 int trip_tf_parse(trip_tf **out, const char *name, const char *text, size_t bytes);
 int trip_tf_from_points(trip_tf **out, const trip_tf_point *points, size_t count, bool normalised,
                         double unit_world);
 int trip_tf_from_histogram(trip_tf **out, const trip_histogram *histogram);
-/* The same for densities, as of smoke and clouds, where the histogram holds only the voxels in
- * which there is any: for values below zero it is trip_tf_from_histogram(). */
+/* Makes a function for densities of smoke or clouds. The histogram counts only voxels that contain
+ * some. If there are values below zero, this equals trip_tf_from_histogram(). */
 int trip_tf_fog_from_histogram(trip_tf **out, const trip_histogram *histogram);
 int trip_tf_ct_from_histogram(trip_tf **out, const trip_histogram *histogram);
 int trip_tf_mr_from_histogram(trip_tf **out, const trip_histogram *histogram);
 int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *histogram);
-/* The one of these for a kind other than TRIP_TF_AUTOMATIC. */
+/* Makes the automatic function of a kind other than TRIP_TF_AUTOMATIC. */
 int trip_tf_make_automatic(trip_tf **out, trip_tf_kind kind, const trip_histogram *histogram);
-/* Share 1 - t of the function `a` and share t of `b`, both in data units, t from 0 to 1: colours
- * and opacities mixed at every value. Refuses functions of different units of opacity. */
+/* Mixes share 1 - t of function `a` and share t of `b`, for t from 0 to 1. Both must be in data
+ * units. Colours and opacities are mixed at every value. Fails if the units of opacity differ. */
 int trip_tf_mix(trip_tf **out, const trip_tf *a, const trip_tf *b, double t);
 void trip_tf_destroy(trip_tf *tf);
 
-/* The built-in presets, by number from 0; NULL beyond the last. The basis is what the values are
- * relative to. */
+/* The built-in presets, counted from 0. The functions return NULL beyond the last. The basis says
+ * which units the values have. */
 bool trip_tf_is_preset(const char *name);
 const char *trip_tf_preset_name(size_t i);
 const char *trip_tf_preset_summary(size_t i);
 const char *trip_tf_preset_basis(size_t i);
 
-/* True when values are fractions of the data's range rather than in the data's own units. */
+/* Whether values are fractions of the data's range. Otherwise they are in data units. */
 bool trip_tf_is_normalised(const trip_tf *tf);
-/* Turns a normalised function into data units in place; no effect otherwise. */
+/* Converts a normalised function to data units in place. Leaves other functions unchanged. */
 void trip_tf_denormalise(trip_tf *tf, double value_min, double value_max);
 
 /* The data that a function is for. */
 typedef struct trip_tf_data {
     double value_min, value_max;
-    const trip_histogram *histogram; /* NULL: not known */
-    trip_tf_kind kind;               /* what the data was recognised as */
+    const trip_histogram *histogram; /* NULL if unknown */
+    trip_tf_kind kind;               /* the recognised kind */
 } trip_tf_data;
 
-/* Whether the function is normalised, or to be made from a histogram ("auto", "mr", ...). */
+/* Whether the function is normalised, or still to be made from a histogram ("auto", "mr", ...). */
 bool trip_tf_needs_data(const trip_tf *tf);
-/* Turns such a function into data units in place. Fails where a histogram is needed and not known;
- * `where` is for the message. */
+/* Converts such a function to data units in place. Fails if it needs a histogram and there is none.
+ * `where` names the data in the message. */
 int trip_tf_adapt(trip_tf *tf, const trip_tf_data *data, const char *where);
-/* Stretches the function, in data units from then on, so that its domain (0 to 1 where it is
- * normalised, else its first to its last point) spans level - width / 2 to level + width / 2. */
+/* Stretches the function over level - width / 2 to level + width / 2, and converts it to data
+ * units. Its domain is 0 to 1 if it is normalised, otherwise from its first to its last point. */
 int trip_tf_window(trip_tf *tf, double width, double level);
-/* Warns where nothing in [value_min, value_max] shows, and where a function in Hounsfield units is
- * used on values that are not. */
+/* Warns if no value in [value_min, value_max] is visible, and if a function in Hounsfield units is
+ * used for other values. */
 void trip_tf_check_range(const trip_tf *tf, double value_min, double value_max, const char *where);
 
-/* The first point that shows between two codes of a data set and less than half as much at both, so
- * that a table of the codes (below) does not show it: a peak narrower than a code. False where
- * there is none. */
+/* Finds the first peak narrower than a code: a point between two codes with more than twice the
+ * opacity of both. A table of the codes does not show it. Returns false if there is none. */
 bool trip_tf_lost_peak(const trip_tf *tf, double lo, double hi, trip_tf_point *out);
 
-/* Unit of length in world units; 0 means one voxel. */
+/* Returns the unit of length in world units; 0 means one voxel. */
 double trip_tf_unit_world(const trip_tf *tf);
 
-/* The points that the function is linear between, by ascending value. */
+/* Returns the points of the piecewise linear function, by ascending value. */
 const trip_tf_point *trip_tf_points(const trip_tf *tf, size_t *count);
 
-/* Colour and opacity at a value in data units; outside the points the end points hold. At a
- * repeated value (a step) the later point holds. */
+/* Returns the colour and opacity at a value in data units. Outside the points, the end points hold.
+ * At a repeated value (a step), the later point holds. */
 trip_rgba trip_tf_evaluate(const trip_tf *tf, double value);
 
 /* Whether any value of [lo, hi] has opacity > 0. */
 bool trip_tf_visible_in(const trip_tf *tf, double lo, double hi);
 
-/* The lowest and highest values of [lo, hi] that have opacity > 0, or are next to such; false where
- * there is none. */
+/* Finds the lowest and highest value of [lo, hi] with opacity > 0 or with visible values next to
+ * it. Returns false if there are none. */
 bool trip_tf_visible_span(const trip_tf *tf, double lo, double hi, double span[2]);
 
-/* The function as `.tf` text, for keeping in a data set; caller frees. */
+/* Returns the function as `.tf` text, to store in a data set. Free it with free(). */
 char *trip_tf_to_text(const trip_tf *tf);
 
-/* The forms that functions are written in. */
+/* Formats that functions are written in. */
 typedef enum trip_tf_format {
     TRIP_TF_TEXT, /* `.tf` */
     TRIP_TF_PARAVIEW,
@@ -156,16 +156,17 @@ typedef enum trip_tf_format {
     TRIP_TF_VTK,
 } trip_tf_format;
 
-/* *text, for free(), becomes the function, with the name `name`. Refuses a normalised function in a
- * form that has data units only; warns where the unit of opacity is lost. */
+/* Writes the function under the name `name` to *text, for free(). Fails for a normalised function
+ * if the format has data units only. Warns if the unit of opacity is lost. */
 int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, char **text);
 
-/* Extinction per unit length of an opacity: -ln(1 - min(opacity, TRIP_OPACITY_MAX)). */
+/* Returns the extinction per unit of length of an opacity: -ln(1 - min(opacity, TRIP_OPACITY_MAX)).
+ */
 double trip_extinction(double opacity);
 
-/* The function sampled at the 65536 codes of a data set, value(c) = lo + (hi - lo) * c / 65535:
- * r, g, b in [0, 1] and extinction per *world* unit, as floats. `voxel_world` is the length that
- * stands for one voxel. */
+/* One entry per code of a data set: r, g, b in [0, 1] and extinction per world unit, as floats.
+ * Code c, 0 to 65535, stands for value lo + (hi - lo) * c / 65535. `voxel_world` is the length of
+ * one voxel. */
 typedef struct trip_tf_entry {
     float r, g, b, extinction;
 } trip_tf_entry;

@@ -20,7 +20,8 @@ static void write_volume(FILE *f, const char *volume)
     write_word(f, volume);
 }
 
-/* The source beside the data set, where it is there; else the name alone. */
+/* Writes the path of the source: beside the data set, if it is there and not at the recorded path.
+ * Otherwise writes the recorded path. */
 static void write_source(FILE *f, const char *path, const char *source)
 {
     char *beside = NULL;
@@ -56,7 +57,7 @@ char *brick_command(const trip_dataset_metadata *text, const char *path, const c
         free(option);
     }
     if (volume) {
-        write_volume(f, volume); /* without a name for the data set, which is called after it */
+        write_volume(f, volume); /* without -o: the data set is then named after the volume */
     } else {
         fputs(" --force -o", f);
         write_word(f, path);

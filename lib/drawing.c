@@ -33,7 +33,8 @@ void trip_context_drop_level(triptych *t)
     t->level = 0;
 }
 
-/* What frames are drawn from. */
+/* Returns the session with the data set that frames are drawn from: the coarse level, if one is in
+ * use. */
 static session drawn_session(const triptych *t)
 {
     session s = t->session;
@@ -41,7 +42,7 @@ static session drawn_session(const triptych *t)
     return s;
 }
 
-/* The picture of parts that are drawn. */
+/* Releases the picture of the parts already drawn. */
 static void drop_before(triptych *t)
 {
     trip_budget_release(t->session.budget, t->before, t->before_bytes);
@@ -59,10 +60,9 @@ void trip_context_drop_renderer(triptych *t)
     t->renderer = NULL;
 }
 
-/* One that reads the planes wanted, of any level: its lists keep their numbers; where it keeps what
- * it has read, one that reads more will do. Counting is by
- * a reader of its own, so that nothing that was read then is in the cache of the frames that are
- * timed. */
+/* Makes a reader for the wanted planes, or keeps the current one if it serves. Readers serve all
+ * levels. A reader with a cache also serves if it reads more planes. Counting uses a reader of its
+ * own, so that its reads do not fill the cache of timed frames. */
 static int make_reader(triptych *t, unsigned planes)
 {
     const triptych_resources *r = &t->resources;
@@ -86,8 +86,8 @@ static int make_reader(triptych *t, unsigned planes)
     return session_make_reader(&t->session, &t->reader, &wanted);
 }
 
-/* Pixels of the frame along each side of one of the picture: where more than one ray a pixel is
- * wanted, renderers but the integral, which has them itself, draw a larger picture. */
+/* Returns the number of frame pixels along each side of a picture pixel. For several rays per
+ * pixel, renderers draw a larger picture. The integral traces several rays itself. */
 static int pixels_a_side(const triptych *t)
 {
     return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->settings.samples;
@@ -101,10 +101,10 @@ static int make_camera(triptych *t)
     return trip_camera_make(&t->camera, &view, &drawn_session(t).data->index_to_world);
 }
 
-/* Bytes that a processor draws in a millisecond, where nothing was measured yet. */
+/* Bytes that a processor draws per millisecond, until frames have been measured. */
 #define DEFAULT_BYTES_PER_MS 20e3
 
-/* A bound of time as one of bytes. */
+/* Returns the settings with the bound of time converted to a bound of bytes. */
 static trip_settings bounded_settings(const triptych *t)
 {
     trip_settings s = t->settings;
@@ -115,7 +115,7 @@ static trip_settings bounded_settings(const triptych *t)
     return s;
 }
 
-/* From here on frames are drawn from that level. */
+/* Selects the level that frames are drawn from. */
 static int use_level(triptych *t, unsigned level)
 {
     int status = 0;
@@ -128,7 +128,7 @@ static int use_level(triptych *t, unsigned level)
     return status;
 }
 
-/* What of the frame only splats have; NULL: nothing. */
+/* Returns why the frame must be drawn by splats, or NULL if post can draw it. */
 static const char *needs_splats(const triptych *t)
 {
     const trip_settings *s = &t->drawn_settings;
@@ -136,27 +136,27 @@ static const char *needs_splats(const triptych *t)
     if (t->counting)
         return "splats are counted";
     if (s->traversal != TRIP_TRAVERSAL_OUTWARD)
-        return "lists are traversed ascending";
+        return "traversal is ascending";
     if (s->target != TRIP_TARGET_RGBA32F)
-        return "the target is rounded";
+        return "the target is not rgba32f";
     if (s->indexed || s->triangles)
-        return "a form of submission is set";
+        return "indexed or triangles is set";
     if (s->compositing != TRIP_COMPOSITING_SPLAT)
-        return "splats are to be composited by sheets";
+        return "compositing is by sheet";
     if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
-        return "a kernel or low-pass of splats is set";
+        return "a footprint or low-pass filter of splats is set";
     if (s->method == TRIP_METHOD_IMAGE || s->vertex_weights)
-        return "image-aligned sheets or weights of vertices are of splats";
+        return "image-aligned sheets and vertex weights need splats";
     if (s->kernel_radius != TRIP_KERNEL_RADIUS_VOXELS)
         return "a kernel radius is set";
     if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
         return "the grid is one voxel thick";
     if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
-        return "voxels were left out, and their halo is not in the data set";
+        return "voxels were dropped, and the data set has no halo";
     return NULL;
 }
 
-/* What of the frame's settings does not depend on its levels, and what classifies it. */
+/* Chooses the settings that do not depend on the level, and the classification. */
 static void choose_settings(triptych *t)
 {
     bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
@@ -166,14 +166,16 @@ static void choose_settings(triptych *t)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
         trip_settings_sum_sheets(&t->drawn_settings) &&
-        t->drawn_settings.footprint == TRIP_FOOTPRINT_EXACT) /* which are not summed there */
+        t->drawn_settings.footprint ==
+            TRIP_FOOTPRINT_EXACT) /* exact footprints are not summed with uneven spacing */
         t->drawn_settings.footprint = TRIP_FOOTPRINT_EWA;
-    if (t->normalise) /* what is behind comes after that, but what is far fades into its colour */
+    if (t->normalise) /* normalising adds the background later; depth cueing still uses its colour
+                       */
         t->drawn_settings.background[3] = 0;
 }
 
-/* The levels of the frame, by the view of level 0. Distances are of one surface, and light that
- * reaches places is worked out for one level. */
+/* Chooses the levels of the frame by the view of level 0. A frame with distances or with a light
+ * map needs one level: distances belong to one surface, and a light map to one level. */
 static int choose_parts(triptych *t)
 {
     const trip_settings *s = &t->drawn_settings;
@@ -189,12 +191,12 @@ static int choose_parts(triptych *t)
         t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return status;
     status = trip_lod_parts_make(&t->parts, t->session.data, &t->camera, s, one, t->session.budget);
-    if (t->parts.count > 1) /* what is behind comes after the last */
+    if (t->parts.count > 1) /* the background is added after the last part */
         t->drawn_settings.background[3] = 0;
     return status;
 }
 
-/* Takes up the level of the part that is next, and makes its camera. */
+/* Selects the level of the next part and makes its camera. */
 static int enter_part(triptych *t)
 {
     int status = use_level(t, t->parts.level[t->part]);
@@ -217,8 +219,8 @@ static size_t pixels_drawn(const triptych *t)
     return (size_t)t->camera.width * (size_t)t->camera.height;
 }
 
-/* Of a frame that is planned, before the reader takes its part of what is left: one picture, and
- * another where a third part is put behind both. */
+/* Allocates the picture of the parts already drawn, and one more if there are three parts or more.
+ * Called after planning, before the reader takes its share of the memory left. */
 static int take_before(triptych *t)
 {
     const size_t pictures = t->parts.count > 2 ? 2 : t->parts.count > 1;
@@ -232,10 +234,10 @@ static int take_before(triptych *t)
     if (t->before)
         return 0;
     return trip_fail(TRIP_ERROR, "render", "levels",
-                     "pictures of several levels do not fit the memory given; raise --memory");
+                     "the pictures of several levels do not fit in memory; raise --memory");
 }
 
-/* Between frames it is kept where it is a small part of the memory that is left. */
+/* Keeps the picture between frames only if it is a small part of the memory left. */
 static void keep_small_before(triptych *t)
 {
     enum { SMALL_PART = 8 };
@@ -260,24 +262,25 @@ static int prepare(triptych *t)
     return status;
 }
 
-/* The plan of a frame by the integral renderer: what its field is made of. */
+/* Plans a frame of the integral renderer, by the kinds of lists that make up its field. */
 static int plan_field(triptych *t)
 {
     session *s = &t->session;
     if (t->settings.kernel == TRIP_KERNEL_GAUSSIAN)
         return trip_fail(TRIP_USAGE, "render", "kernel",
-                         "the integral goes through polynomials: linear or cubic");
+                         "the integral renderer has no gaussian kernel; use linear or cubic");
     unsigned kinds = 1u << TRIP_KIND_VOXELS;
     if (t->settings.field == TRIP_FIELD_VALUES)
         kinds = t->source ? 0 : kinds | 1u << TRIP_KIND_HALO;
     else if (t->source)
-        return trip_fail(TRIP_USAGE, "render", "field",
-                         "splats are made of what the data set holds, not of the volume itself");
+        return trip_fail(
+            TRIP_USAGE, "render", "field",
+            "the sum of the splats needs the values of the data set; do not give a volume");
     return trip_plan_make_field(&t->plan, s->data, &t->camera, &t->drawn_settings, kinds,
                                 s->budget);
 }
 
-/* What of the splats' settings the renderer or the data set cannot do. */
+/* Fails for settings of splats that the renderer or the data set does not support. */
 static int check_splats(const triptych *t)
 {
     const trip_settings *s = &t->settings;
@@ -285,17 +288,18 @@ static int check_splats(const triptych *t)
     bool splats = s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA;
     if (splats && renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return trip_fail(TRIP_USAGE, "render", "kernel",
-                         "the integral has no footprints and no low-pass");
+                         "the integral renderer has no footprints and no low-pass filter; leave "
+                         "both at their defaults");
     if (s->low_pass == TRIP_LOW_PASS_UNIFORM && renderer != TRIPTYCH_RENDERER_REFERENCE)
         return trip_fail(TRIP_USAGE, "render", "low-pass",
-                         "uniform scaling is drawn by the reference alone");
+                         "the uniform low-pass filter requires --renderer reference");
     if (s->flatten > 1 && !(t->session.data->header.planes >> TRIP_PLANE_NORMALS & 1))
         return trip_fail(TRIP_USAGE, "render", t->name,
-                         "has no gradients to flatten kernels along");
+                         "has no normals, which flattened kernels need; brick it with normals");
     return 0;
 }
 
-/* The size of sprites that all have one. */
+/* Computes the common size of fixed footprints. */
 static int choose_sprites(triptych *t)
 {
     trip_settings *s = &t->drawn_settings;
@@ -308,8 +312,8 @@ static int choose_sprites(triptych *t)
     if (s->sprite_px > 0)
         return 0;
     return trip_fail(TRIP_USAGE, "render", "kernel",
-                     "footprints of a fixed size have that of one in the middle of the volume, "
-                     "which lies behind the eye");
+                     "fixed footprints take their size from the middle of the volume, which lies "
+                     "behind the eye; move the eye");
 }
 
 static int plan_frame(triptych *t)
@@ -321,13 +325,14 @@ static int plan_frame(triptych *t)
     if (status)
         return status;
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL && t->settings.show)
-        return trip_fail(TRIP_USAGE, "render", "show", "the integral has no lists and no levels");
+        return trip_fail(TRIP_USAGE, "render", "show",
+                         "the integral renderer has no lists and no levels to show");
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return plan_field(t);
     if (t->settings.samples > 1 && t->settings.depth)
-        return trip_fail(TRIP_USAGE, "render", "samples", "distances have one a pixel");
+        return trip_fail(TRIP_USAGE, "render", "samples", "--depth requires --samples 1");
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST ||
-        !trip_settings_has_levels(&t->drawn_settings)) /* such frames have all the memory */
+        !trip_settings_has_levels(&t->drawn_settings)) /* these frames get all the memory */
         trip_mean_tables_release(&s->mean_tables, s->budget);
     status =
         trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
@@ -336,7 +341,8 @@ static int plan_frame(triptych *t)
     return status;
 }
 
-/* Once for a function and settings. The reference and the integral round nothing. */
+/* Checks rounding once per transfer function and settings. The reference and the integral do not
+ * round. */
 static void check_rounding(triptych *t)
 {
     const trip_settings *s = &t->drawn_settings;
@@ -346,7 +352,7 @@ static void check_rounding(triptych *t)
     t->rounding_checked = true;
 }
 
-/* The coarsest levels may have more than the bound allows, and a data set may have none. */
+/* Warns if the coarsest level exceeds the bound of bytes, or if the data set has no levels. */
 static void check_bound(const triptych *t)
 {
     const double max = t->settings.max_bytes;
@@ -361,14 +367,12 @@ static void check_bound(const triptych *t)
         return;
     trip_format_bytes((uint64_t)bytes, is);
     trip_format_bytes((uint64_t)max, allowed);
-    trip_warn(
-        t->session.input,
-        "codes and normals of up to %s are read by the coarsest level that the data set has, more "
-        "than the %s allowed",
-        is, allowed);
+    trip_warn(t->session.input,
+              "the coarsest level reads up to %s of codes and normals, more than the %s allowed",
+              is, allowed);
 }
 
-/* The part that is next. */
+/* Plans the next part. */
 static int plan(triptych *t)
 {
     uint64_t start = trip_frame_now_ns();
@@ -397,7 +401,7 @@ static int plan_first(triptych *t)
     return status;
 }
 
-/* Once for a kernel, of frames that are drawn. */
+/* Warns once per kernel, when a frame is drawn. */
 static void warn_of_halo(triptych *t)
 {
     const session *s = &t->session;
@@ -405,13 +409,13 @@ static void warn_of_halo(triptych *t)
         return;
     t->kernel_warned = true;
     trip_warn(s->input,
-              "has %s voxel about what it keeps, and the %s kernel reaches two: those beyond count "
-              "as the ones next to them; brick --keep-all leaves nothing out",
+              "has %s voxel of halo, but the %s kernel needs two; missing voxels count as the "
+              "nearest voxel (brick with --keep-all to keep all)",
               t->frame.data->header.halo ? "one" : "no", trip_kernel_name(t->settings.kernel));
 }
 
-/* Once for a data set, of frames that are drawn by levels: it has those of the other classification
- * alone. */
+/* Warns once per data set, when a frame asks for levels and the data set has only levels for the
+ * other classification. */
 static void warn_of_levels(triptych *t)
 {
     const trip_dataset *data = t->session.data;
@@ -421,11 +425,10 @@ static void warn_of_levels(triptych *t)
         trip_dataset_levels(data, post ? TRIP_KIND_MEANS : TRIP_KIND_VALUES) == 0)
         return;
     t->levels_warned = true;
-    trip_warn(
-        t->session.input,
-        "has no coarse levels for %s: the finest is drawn everywhere; brick --levels-for both "
-        "makes them",
-        post ? "post" : "pre");
+    trip_warn(t->session.input,
+              "has no coarse levels for %s, so the finest level is drawn everywhere; brick with "
+              "--levels-for both",
+              post ? "post" : "pre");
 }
 
 static int start(triptych *t)
@@ -487,7 +490,7 @@ int triptych_begin(triptych *t)
 
 static int check_drawing(const triptych *t)
 {
-    return t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "none is begun");
+    return t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "no frame is begun");
 }
 
 int triptych_await(triptych *t, uint64_t timeout_ns)
@@ -501,7 +504,7 @@ int triptych_await(triptych *t, uint64_t timeout_ns)
     return trip_context_leave(before, status);
 }
 
-/* The mean of each square of `side` x `side` pixels of `fine`. */
+/* Averages each square of `side` x `side` pixels of `fine`. */
 static void take_means(const float *fine, int side, int width, int height, float *rgba)
 {
     const size_t row = (size_t)width * (size_t)side * 4;
@@ -517,7 +520,7 @@ static void take_means(const float *fine, int side, int width, int height, float
         }
 }
 
-/* With what parts before it have, and what is behind all. */
+/* Takes the picture drawn so far, with the earlier parts and the background. */
 static int take_drawn(triptych *t, float *rgba, float *depth)
 {
     const double *behind = t->settings.background;
@@ -544,8 +547,8 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     float *fine = trip_budget_take(budget, bytes);
     if (!fine)
         return trip_fail(TRIP_ERROR, "render", "samples",
-                         "a picture %d times as wide and high does not fit the memory given; raise "
-                         "--memory or take fewer",
+                         "a picture %d times as wide and high does not fit in memory; raise "
+                         "--memory or lower --samples",
                          side);
     int status = take_drawn(t, fine, NULL);
     if (!status)
@@ -554,7 +557,7 @@ static int take_colours(triptych *t, float *rgba, float *depth)
     return status;
 }
 
-/* Adds the part that is drawn to those before it. */
+/* Adds the drawn part to the picture of the earlier parts. */
 static int keep_before(triptych *t)
 {
     float *picture = t->part == 0 ? t->before : t->before + 4 * pixels_drawn(t);
@@ -564,7 +567,7 @@ static int keep_before(triptych *t)
     return status;
 }
 
-/* A part is drawn: begins the next. */
+/* Ends a part that is drawn, and begins the next. */
 static int begin_next(triptych *t)
 {
     int status = keep_before(t);
@@ -592,7 +595,7 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
     return trip_context_leave(before, status);
 }
 
-/* Of the picture's own pixels, whatever was drawn. */
+/* Draws the weights at the pixels of the picture, independent of the frame. */
 static void draw_merge_map(const triptych *t, float *rgba)
 {
     const int side = pixels_a_side(t), width = t->turned.width, height = t->turned.height;
@@ -607,14 +610,14 @@ static void draw_merge_map(const triptych *t, float *rgba)
         }
 }
 
-/* Distances go with a frame that has them, and only with that. */
+/* A frame with distances must be taken with distances, and any other frame without. */
 static int take_picture(triptych *t, float *rgba, float *depth)
 {
     int status = check_drawing(t);
     if (!status && t->settings.depth != (depth != NULL))
-        status =
-            trip_fail(TRIP_USAGE, "render", "depth", "%s",
-                      depth ? "the frame was begun without" : "is to be taken with the picture");
+        status = trip_fail(TRIP_USAGE, "render", "depth", "%s",
+                           depth ? "the frame was begun without distances"
+                                 : "the frame has distances; use triptych_picture_and_depth()");
     if (!status)
         status = take_colours(t, rgba, depth);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
@@ -638,13 +641,13 @@ int triptych_picture_and_depth(triptych *t, float *rgba, float *depth)
 
 void triptych_end(triptych *t)
 {
-    trip_scope *before = trip_scope_enter(&t->scope); /* the error of the last call stays */
+    trip_scope *before = trip_scope_enter(&t->scope); /* keeps the error of the last call */
     end(t);
     keep_small_before(t);
     trip_context_leave(before, 0);
 }
 
-/* Waits for the disk for so long at a time, so that a call to cancel is noticed. */
+/* Waits for the disk in short intervals, so that cancelling takes effect soon. */
 int triptych_draw(triptych *t, float *rgba)
 {
     enum { LOOK_NS = 20000000 };

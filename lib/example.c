@@ -1,9 +1,11 @@
-/* Draws a data set with libtriptych: cc example.c $(pkg-config --cflags --libs triptych)
+/* Draws a data set with libtriptych. Build it with
+ * cc example.c $(pkg-config --cflags --libs triptych)
  *
  *     example DATA.trip FUNCTION PICTURE.png
  *
- * FUNCTION is a preset or a file, "" for the data set's own. While the picture is drawn, the
- * program has a hundredth of a second at a time for other things: here it counts them. */
+ * FUNCTION is a preset or a file; "" selects the transfer function of the data set. Drawing
+ * proceeds in steps of 10 ms. Between steps the program can do other work; here it counts the
+ * steps. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
@@ -42,7 +44,7 @@ static int draw(triptych *t, float *rgba)
         steps++;
         if (status == TRIPTYCH_WAITS)
             triptych_await(t, 10000000);
-        status = triptych_picture(t, rgba); /* so far: here it would be shown */
+        status = triptych_picture(t, rgba); /* unfinished; a program would show it here */
     }
     if (!status)
         status = triptych_picture(t, rgba);

@@ -1,4 +1,5 @@
-/* Transfer functions as things of their own: the built-in ones, and as text for other programs. */
+/* Transfer functions on their own: presets, histograms, and conversion to the formats of other
+ * programs. */
 #include <string.h>
 
 #include "library_context.h"
@@ -54,11 +55,11 @@ static int load_for_volume(triptych *t, const triptych_conversion *c, trip_tf **
 static int load_alone(const triptych_conversion *c, const char *name, trip_tf **tf)
 {
     if (!c->function)
-        return trip_fail(TRIP_USAGE, "tf", name, "there is neither a function nor data");
+        return trip_fail(TRIP_USAGE, "tf", name, "give a transfer function or data");
     int status = trip_tf_load(tf, c->function);
     if (!status && trip_tf_needs_data(*tf) && !trip_tf_is_normalised(*tf))
         return trip_fail(TRIP_USAGE, "tf", name,
-                         "is made from a histogram: `triptych tf show --tf %s DATA`, DATA being a "
+                         "needs a histogram; use `triptych tf show --tf %s DATA`, where DATA is a "
                          "data set or a volume",
                          name);
     if (!status && c->lo < c->hi)
@@ -80,7 +81,7 @@ static int check(const triptych *t, const triptych_conversion *c)
     int status = trip_context_check_idle(t, false);
     bool known = c->form >= TRIPTYCH_FORM_TF && c->form <= TRIPTYCH_FORM_VTK;
     if (!status && !known)
-        return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "there is no such form");
+        return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "unknown format");
     if (!status && !(isfinite(c->lo) && isfinite(c->hi)))
         return trip_fail(TRIP_USAGE, "tf", name_of(t, c), "the range is not finite");
     return status;

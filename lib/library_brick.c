@@ -1,4 +1,4 @@
-/* Data sets of volumes: triptych_brick.h. */
+/* Makes data sets of volumes (triptych_brick.h). */
 #include "triptych_brick.h"
 
 #include <stdio.h>
@@ -38,7 +38,7 @@ static trip_region region_of(const triptych_brick_options *o)
     };
 }
 
-/* `ranges`: the options', as the bricker takes them. */
+/* `ranges` has the ranges of the options in the type of the bricker. */
 static trip_brick_params brick_params(triptych *t, const char *volume,
                                       const triptych_brick_options *o,
                                       const trip_value_range *ranges)
@@ -74,19 +74,19 @@ static const char *fault_of_volume(const triptych_brick_options *o)
 {
     for (int a = 0; a < 3; a++) {
         if (!(o->spacing[a] >= 0 && isfinite(o->spacing[a])))
-            return "the spacing of voxels is finite and not below 0";
+            return "the spacing of voxels must be finite and at least 0";
         if (o->raw_dims[a] < 0 || o->raw_dims[a] > INT32_MAX)
-            return "raw data has 1 to 2147483647 voxels along each axis";
+            return "raw data must have 1 to 2147483647 voxels along each axis";
     }
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
-        return "the axes are three letters: one of R and L, of A and P and of S and I each";
+        return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
     if (o->raw_type && !triptych_is_raw_type(o->raw_type))
-        return "there is no such type of raw data";
+        return "unknown type of raw data";
     if (o->raw_offset_bytes > UINT64_C(1) << 62)
         return "raw data starts too far into the file";
     if (o->level_set < TRIPTYCH_LEVEL_SET_DEFAULT || o->level_set > TRIPTYCH_LEVEL_SET_BAND ||
         o->raw_endian < TRIPTYCH_ENDIAN_NATIVE || o->raw_endian > TRIPTYCH_ENDIAN_BIG)
-        return "there is no such level set or byte order";
+        return "unknown level set or byte order";
     return NULL;
 }
 
@@ -94,25 +94,25 @@ static const char *fault_of_options(const triptych_brick_options *o)
 {
     unsigned tile = o->tile_voxels;
     if (tile && tile != 16 && tile != 32 && tile != 64 && tile != 128)
-        return "a tile has 16, 32, 64 or 128 voxels either way";
+        return "the edge of a tile must be 16, 32, 64 or 128 voxels";
     if (o->slab_sheets > 64)
-        return "a brick has 1 to 64 sheets";
+        return "a brick must have 1 to 64 sheets";
     if (o->code_bits < TRIPTYCH_CODE_BITS_AUTO || o->code_bits > TRIPTYCH_CODE_BITS_16)
-        return "codes have 8 or 16 bits";
+        return "codes must have 8 or 16 bits";
     if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_NONE)
-        return "there are no such normals";
+        return "unknown kind of normals";
     if (o->levels_for < TRIPTYCH_LEVELS_FOR_AUTO || o->levels_for > TRIPTYCH_LEVELS_FOR_BOTH)
-        return "coarse levels are for post, pre or both";
+        return "coarse levels must be for post, pre or both";
     if (o->no_halo &&
         (o->levels_for == TRIPTYCH_LEVELS_FOR_POST || o->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
-        return "coarse levels for post need the halo";
+        return "coarse levels for post require the halo";
     for (size_t i = 0; i < o->range_count; i++)
         if (!(o->ranges[i].lo <= o->ranges[i].hi))
-            return "the lower end of a range is above the upper";
+            return "a range has its minimum above its maximum";
     return fault_of_volume(o);
 }
 
-/* Bricking's parameters; *ranges is for free(). */
+/* Makes the parameters of bricking. Free *ranges with free(). */
 static int make_params(triptych *t, const char *volume, const triptych_brick_options *options,
                        trip_value_range **ranges, trip_brick_params *out)
 {
@@ -205,8 +205,8 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
     trip_context_show_stage(user, "look", done, total);
 }
 
-/* The options and the program's version: another one may make another data set of the same volume.
- */
+/* Describes the options and the version of the program, since another version may make a different
+ * data set of the same volume. */
 static int describe_options(const trip_brick_params *params, char **text)
 {
     char *options = NULL;
@@ -291,10 +291,11 @@ static int use_source(triptych *t, const char *path, const triptych_brick_option
         status = trip_fail(TRIP_USAGE, "read", path, "%s", fault);
     if (!status && t->resources.renderer != TRIPTYCH_RENDERER_INTEGRAL)
         status = trip_fail(TRIP_USAGE, "render", path,
-                           "only the integral renderer draws from a volume's own values");
+                           "only the integral renderer draws the values of a volume itself; use "
+                           "--renderer integral");
     if (status)
         return status;
-    trip_context_drop_renderer(t); /* the field of which would take as much again */
+    trip_context_drop_renderer(t); /* since its field would take as much memory again */
     trip_field_destroy(t->source);
     return trip_source_field_read(&t->source, t->session.data, path, &params, t->session.budget);
 }

@@ -1,5 +1,5 @@
-/* What is behind a triptych handle, for the library's own files. One thread at a time, but for
- * trip_scope_cancel(). */
+/* The structure behind a triptych handle, for the library's own files. One thread at a time may use
+ * a context, except for trip_scope_cancel(). */
 #ifndef TRIP_CONTEXT_H
 #define TRIP_CONTEXT_H
 
@@ -19,7 +19,7 @@
 
 enum { TRIP_CONTEXT_MAX_THREADS = 256 };
 
-/* A picture's memory, of the budget. */
+/* Memory of a picture, taken from the budget. */
 typedef struct trip_context_picture {
     struct trip_context_picture *next;
     float *pixels;
@@ -29,7 +29,7 @@ typedef struct trip_context_picture {
 struct triptych {
     trip_scope scope;
     pthread_mutex_t lock;
-    char error[4096]; /* under lock */
+    char error[4096]; /* guarded by lock */
     void (*take)(void *user, const char *line);
     void *take_user;
     void (*show)(void *user, const char *stage, uint64_t done, uint64_t total);
@@ -40,99 +40,111 @@ struct triptych {
     session session;
     bool open, has_function;
     trip_context_picture *pictures;
-    trip_field *source;      /* of a volume's own values; NULL: the data set's */
-    trip_renderer *renderer; /* NULL until a frame is begun */
-    trip_reader *reader;     /* the same; of these planes: */
+    trip_field *source;      /* values of the volume itself; NULL: the data set's values */
+    trip_renderer *renderer; /* NULL until a frame begins */
+    /* Reads `planes`. NULL until a frame begins. */
+    trip_reader *reader;
     unsigned planes;
-    trip_dataset *at_level; /* what a part is drawn from that has a coarse level; else NULL */
-    unsigned level;         /* that */
-    trip_lod_parts parts;   /* of the frame that is begun */
-    int part;               /* of these the one that is drawn, */
-    float *before;          /* and the picture of those before it, of the budget; else NULL */
-    size_t before_bytes;    /* what that takes; it may be kept for the next frame */
-    triptych_frame_stats before_stats; /* theirs */
-    trip_settings settings;            /* slices 0: by the view */
-    triptych_clip clip;                /* as given; frames have it in drawn_settings */
-    double max_ms;                     /* 0: no bound of time */
-    double bytes_per_ms;               /* that bounded frames took; 0: none was drawn */
-    bool kernel_warned;                /* that the halo is short for it */
-    bool levels_warned;                /* that there are none for the classification */
-    bool classify_auto;                /* settings.classify is what that has come to for a frame */
+    /* The coarse level that the current part is drawn from; NULL for level 0. */
+    trip_dataset *at_level;
+    unsigned level;       /* of at_level, otherwise 0 */
+    trip_lod_parts parts; /* of the begun frame */
+    int part;             /* index of the part that is drawn */
+    /* Picture of the parts before `part`, taken from the budget; otherwise NULL. */
+    float *before;
+    /* Size of `before`, which may be kept for the next frame. */
+    size_t before_bytes;
+    triptych_frame_stats before_stats; /* of the parts before `part` */
+    trip_settings settings;            /* samples_per_sheet is 0 if the view determines it */
+    triptych_clip clip;                /* as set; frames use drawn_settings.clip */
+    double max_ms;                     /* 0 sets no bound */
+    double bytes_per_ms;               /* measured in bounded frames; 0 if none was drawn */
+    bool kernel_warned;                /* warned about the halo for the kernel */
+    bool levels_warned;                /* warned about missing levels for the classification */
+    bool classify_auto;                /* drawn_settings.classify has the choice */
     double kelvin[2];                  /* of emission, as set */
-    int effects;                       /* as set; frames have what they come to in drawn_settings */
-    const char *why_effects; /* of those that auto chose or left; NULL: nothing was left to it */
-    trip_light_map *light;   /* of frames with shadows or occlusion; NULL: none was drawn of late */
-    trip_emission *heat;     /* NULL: none is given */
-    bool normalise;          /* colours by opacity, as set */
-    bool
-        counting; /* frames count exactly, and draw what is occluded too; the reader is for that: */
+    int effects;                       /* as set; frames use drawn_settings.effects */
+    /* Reason for the choice of TRIPTYCH_EFFECTS_AUTO; NULL without it. */
+    const char *why_effects;
+    /* For shadows and occlusion. NULL if the last frames had neither. */
+    trip_light_map *light;
+    trip_emission *heat; /* NULL if no data set of heat is open */
+    bool normalise;      /* divides colours by opacity */
+    /* If true, frames count exactly and draw occluded bricks too. reader_counts says whether
+     * `reader` was made for counting. */
+    bool counting;
     bool reader_counts;
 
     bool has_view;
     trip_camera_params view, turned;
-    trip_vec3 axis;      /* that a turn goes about */
-    uint64_t fit_splats; /* looked at to fit the view */
+    trip_vec3 axis;      /* axis of triptych_turn() */
+    uint64_t fit_splats; /* splats examined to fit the view */
 
-    trip_settings drawn_settings; /* of the frame that is begun, with what was chosen */
-    const char *why_pre;          /* where pre was; else NULL */
-    trip_view_samples_per_sheet samples_per_sheet; /* that the view calls for */
-    bool begun, drawn; /* the camera and the plan are there; the drawing, too */
+    trip_settings drawn_settings;                  /* of the begun frame, with all choices made */
+    const char *why_pre;                           /* reason if auto chose pre, otherwise NULL */
+    trip_view_samples_per_sheet samples_per_sheet; /* for the view */
+    /* `begun`: camera and plan exist. `drawn`: the drawing exists, too. */
+    bool begun, drawn;
     trip_camera camera;
     trip_plan plan;
     double plan_ms;
     trip_frame frame;
     trip_drawing drawing;
 
-    bool rounding_checked; /* of the function and the settings that are set */
+    bool rounding_checked; /* for the current transfer function and settings */
     bool has_stats;
     triptych_frame_stats stats;
-    char device[128]; /* whose text that has: the renderer may go before the data set */
-    triptych_list_stats *list_stats; /* by the data set's lists, of the budget; NULL: not yet */
+    /* Text of stats.device, since the renderer may be destroyed before the data set. */
+    char device[128];
+    /* One per list of the data set, taken from the budget; NULL before the first frame. */
+    triptych_list_stats *list_stats;
 
     trip_image_files files;
 };
 
-/* Every call works in the context's scope: trip_context_leave() with what enter returned, which
- * gives back `status`. */
+/* Enters the context's scope for a call and clears the last error. Returns the scope to pass to
+ * trip_context_leave(). */
 trip_scope *trip_context_enter(triptych *t);
-/* The same for a call that is not about a frame that is begun: what was cancelled before is
- * forgotten. */
+/* Like trip_context_enter(), for a call that does not belong to a begun frame. It also clears an
+ * earlier cancellation, unless a frame is begun. */
 trip_scope *trip_context_enter_anew(triptych *t);
 int trip_context_leave(trip_scope *before, int status);
 
-/* Fails while a frame is begun, or without the data set that is needed. */
+/* Fails with TRIP_USAGE (reported) if a frame is begun, or if the data set is needed and not open.
+ */
 int trip_context_check_idle(const triptych *t, bool needs_data);
 int trip_context_check_open(const triptych *t);
-/* Fails where the data set has no such list, or none is open. */
+/* Fails with TRIP_USAGE (reported) if no data set is open or it has no such list. */
 int trip_context_check_list(const triptych *t, unsigned number);
 
-/* As the public functions, in the context's scope and with checked parameters. */
+/* Like the public functions of the same name, but inside the context's scope, and with checked
+ * parameters. */
 int trip_context_use_transfer_function(triptych *t, const triptych_transfer_function *f);
 int trip_context_find_view(triptych *t, const triptych_view *given);
 void trip_context_drop_reader(triptych *t);
-/* Frames are drawn from the data set itself again. */
+/* Closes the coarse level. Frames then use the data set itself again. */
 void trip_context_drop_level(triptych *t);
-/* What is cut away, in world space. */
+/* Returns the clipping in world space. */
 trip_clip trip_context_clip(const triptych *t);
-/* And the reader, which may be in its memory. */
+/* Also destroys the reader, which may lie in the renderer's memory. */
 void trip_context_drop_renderer(triptych *t);
-/* The effects of a frame that is planned: sets them in drawn_settings. */
+/* Chooses the effects of the planned frame and sets them in drawn_settings. */
 int trip_context_choose_effects(triptych *t);
-/* Begins what light reaches, and heat, for the frame that is planned; drops them where nothing
- * depends on them. */
+/* Prepares the light map and the heat for the planned frame. Destroys them if no effect needs them.
+ */
 int trip_context_begin_light(triptych *t);
 void trip_context_drop_light(triptych *t);
 void trip_context_drop_heat(triptych *t);
-/* An effect a line: whether it runs and why. */
+/* Prints one line per effect: whether it runs, and why. */
 void trip_context_explain_effects(const triptych *t, FILE *out);
-/* What the frame has come to, once its picture is complete. */
+/* Records the statistics of the frame, once its picture is complete. */
 int trip_context_note_stats(triptych *t);
 void trip_context_drop_stats(triptych *t);
 
-/* Passes on how far bricking's stage is; `user` is the context, which shows progress. */
+/* Reports the progress of bricking. `user` is a context with a progress function. */
 void trip_context_show_stage(void *user, const char *stage, uint64_t done, uint64_t total);
 
-/* So many threads as a renderer or reader takes. */
+/* Returns `wanted`, at most the maximum of a renderer or reader. */
 static inline unsigned trip_context_threads(unsigned wanted)
 {
     return wanted < TRIP_CONTEXT_MAX_THREADS ? wanted : TRIP_CONTEXT_MAX_THREADS;

@@ -1,10 +1,10 @@
-/* Which effects a frame has, and why; what light reaches, from frame to frame. */
+/* Chooses the effects of a frame, with reasons, and keeps the light map from frame to frame. */
 #include "library_context.h"
 #include "report.h"
 
 enum { CODES = 65536 };
 
-/* Whether most of what the function shows is opaque within a voxel. */
+/* Whether most visible codes are opaque within a voxel. */
 static bool is_of_surfaces(const triptych *t)
 {
     const trip_tf_entry *table = t->session.table;
@@ -12,33 +12,33 @@ static bool is_of_surfaces(const triptych *t)
     int shown = 0, opaque = 0;
     for (int code = 0; code < CODES; code++) {
         shown += table[code].extinction > 0;
-        opaque += (double)table[code].extinction * voxel > 0.69314718055994531; /* half */
+        opaque += (double)table[code].extinction * voxel > 0.69314718055994531; /* opacity 1/2 */
     }
     return 2 * opaque > shown;
 }
 
-/* What the kind of data and the function call for. */
+/* Returns the effects that suit the kind of data and the transfer function. */
 static int choose(triptych *t)
 {
     const trip_tf_kind kind = trip_dataset_metadata_kind(t->session.text);
     const bool surfaces = kind == TRIP_TF_LABELS && is_of_surfaces(t);
     switch (kind) {
     case TRIP_TF_FOG:
-        t->why_effects =
-            t->settings.headlight
-                ? "smoke, clouds or fog, lit from the eye: give the light a direction or place"
-                : "smoke, clouds or fog scatter the light";
+        t->why_effects = t->settings.headlight
+                             ? "smoke, clouds or fog would scatter the light, but it comes from "
+                               "the eye; give it a direction or position"
+                             : "smoke, clouds or fog scatter the light";
         return t->settings.headlight ? 0 : TRIPTYCH_SHADOWS;
     case TRIP_TF_LABELS:
-        t->why_effects = surfaces ? "labels are drawn as surfaces"
-                                  : "labels that are seen through keep their colours";
+        t->why_effects =
+            surfaces ? "labels are drawn as surfaces" : "transparent labels keep their colours";
         return surfaces ? TRIPTYCH_OCCLUSION : 0;
     case TRIP_TF_CT:
     case TRIP_TF_MR:
-        t->why_effects = "a picture of measurements keeps the colours of its function";
+        t->why_effects = "measured values keep the colours of the transfer function";
         return 0;
     default:
-        t->why_effects = "values keep the colours of their function";
+        t->why_effects = "values keep the colours of the transfer function";
         return 0;
     }
 }
@@ -46,10 +46,10 @@ static int choose(triptych *t)
 static int check_effects(const triptych *t, int effects)
 {
     if (!TRIP_HAS_EFFECTS && effects)
-        return trip_fail(TRIP_USAGE, "render", "effects", "this build has none");
+        return trip_fail(TRIP_USAGE, "render", "effects", "this build has no effects");
     if (effects & TRIPTYCH_EMISSION && !t->heat)
         return trip_fail(TRIP_USAGE, "render", "emission",
-                         "there is no data set of heat that it could be of");
+                         "emission needs a data set of heat; give one");
     return 0;
 }
 
@@ -63,7 +63,7 @@ int trip_context_choose_effects(triptych *t)
         effects |= status ? 0 : choose(t);
         effects |= t->heat ? TRIPTYCH_EMISSION : 0;
     }
-    if (t->settings.show == TRIP_SHOW_MERGE) /* nothing of the volume is */
+    if (t->settings.show == TRIP_SHOW_MERGE) /* the merge map shows nothing of the volume */
         effects = 0;
     if (!status)
         status = check_effects(t, effects);
@@ -97,7 +97,7 @@ void trip_context_drop_heat(triptych *t)
     t->heat = NULL;
 }
 
-/* The integral has each voxel's. */
+/* For the integral, `cells` is 0, which makes one node per voxel. */
 static int begin_heat(triptych *t)
 {
     const trip_effects *e = &t->drawn_settings.effects;
@@ -148,8 +148,8 @@ static void explain(const triptych *t, const char *name, int effect, bool runs, 
     const bool automatic = t->effects & TRIPTYCH_EFFECTS_AUTO;
     const char *why = t->effects & effect ? "asked for" : "not asked for";
     if (t->settings.show == TRIP_SHOW_MERGE && (automatic || t->effects & effect))
-        why = "the merge map has nothing of the volume";
-    /* Of fog it is shadows that there is something to say about, whether they run or not. */
+        why = "the merge map does not show the volume";
+    /* for fog, why_effects is about shadows, whether or not they run */
     else if (automatic && !(t->effects & effect) && effect == TRIPTYCH_EMISSION)
         why = runs ? "a data set of heat is given" : "no data set of heat is given";
     else if (automatic && !(t->effects & effect))
@@ -161,17 +161,16 @@ static void explain(const triptych *t, const char *name, int effect, bool runs, 
 static void explain_lattice(const triptych *t, FILE *out)
 {
     if (t->plan.gathers) {
-        fprintf(out, "light       by an integral from each place, %s\n",
-                t->drawn_settings.effects.occlusion ? "and as many as there are directions"
+        fprintf(out, "light       an integral from each position, %s\n",
+                t->drawn_settings.effects.occlusion ? "also in each direction of the occlusion"
                                                     : "towards the light");
         return;
     }
     const trip_light_grid *grid = trip_light_map_gathered(t->light);
     fprintf(out, "light       %d x %d x %d nodes, one in %g voxels: %s\n", grid->nodes[0],
             grid->nodes[1], grid->nodes[2], grid->spacing,
-            trip_light_map_is_complete(t->light)
-                ? "kept from the frame before, nothing is read for it"
-                : "one more list is read for it");
+            trip_light_map_is_complete(t->light) ? "kept from the frame before, so nothing is read"
+                                                 : "one more list is read");
 }
 
 static void explain_heat(const triptych *t, FILE *out)
@@ -181,7 +180,7 @@ static void explain_heat(const triptych *t, FILE *out)
     fprintf(out, "heat        %d x %d x %d nodes, one in %g voxels, %g to %g K: %s\n",
             grid->nodes[0], grid->nodes[1], grid->nodes[2], grid->spacing, t->kelvin[0],
             t->kelvin[1],
-            trip_light_map_is_complete(map) ? "kept from the frame before, nothing is read for it"
+            trip_light_map_is_complete(map) ? "kept from the frame before, so nothing is read"
                                             : "a list of its data set is read");
 }
 

@@ -12,8 +12,8 @@ static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 
 enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MAX };
 
-/* Whether values which show were left out of some part, where the caller wants that in place of a
- * warning. */
+/* Whether bricking dropped visible values of a part. Only examined if the caller wants this instead
+ * of a warning. */
 static bool find_missing(const session *s, const trip_tf *tf, const session_look *look)
 {
     double range[2];
@@ -25,7 +25,8 @@ static bool find_missing(const session *s, const trip_tf *tf, const session_look
     return missing;
 }
 
-/* Else it stands for a volume, whose name the user knows it by. */
+/* Whether the user knows the part by its path. If not, it stands for a volume, and messages have
+ * the volume's name. */
 static bool is_named_by_path(const session *s, unsigned part)
 {
     const char *path = s->parts[part]->path;
@@ -45,13 +46,13 @@ static void warn_of_culled_values(const session *s, unsigned part, const trip_tf
     char *command = brick_command(s->texts[part], input, is_named_by_path(s, part) ? NULL : input,
                                   look->tf, named ? NULL : span);
     trip_warn(input,
-              "the transfer function shows about %.0f voxels with values from %g to %g that were "
-              "left out when the data set was made; to have them: %s",
-              voxels, range[0], range[1], command ? command : "brick it again");
+              "the transfer function reveals about %.0f voxels with values from %g to %g that "
+              "bricking dropped; to keep them: %s",
+              voxels, range[0], range[1], command ? command : "brick the volume again");
     free(command);
 }
 
-/* An opacity o becomes 1 - (1 - o)^scale. */
+/* Opacity o becomes 1 - (1 - o)^scale. */
 static void warn_of_lost_peak(const session *s, const trip_tf *tf)
 {
     const trip_file_header *h = &s->data->header;
@@ -59,7 +60,7 @@ static void warn_of_lost_peak(const session *s, const trip_tf *tf)
     if (trip_tf_lost_peak(tf, h->code_lo, h->code_hi, &peak))
         trip_warn(s->input,
                   "the transfer function has a peak at %.9g that is narrower than the %.3g between "
-                  "two codes of the data: it is not shown; make it wider",
+                  "two codes, so it is not drawn; make it wider",
                   peak.value, (h->code_hi - h->code_lo) / 65535);
 }
 
@@ -70,7 +71,7 @@ static void scale_extinction(trip_tf_entry *table, double scale)
             table[code].extinction = (float)(table[code].extinction * scale);
 }
 
-/* The function in data units, with its window. */
+/* Loads the transfer function in data units and applies the window. */
 static int load_function(const session *s, const session_look *look, trip_tf **tf)
 {
     int status = look->tf_text ? trip_tf_parse(tf, s->input, look->tf_text, strlen(look->tf_text))
@@ -88,7 +89,7 @@ static int take_table(session *s)
     if (s->table)
         return 0;
     return trip_fail(TRIP_ERROR, "render", s->input,
-                     "the transfer function's table does not fit the memory given; raise --memory");
+                     "the table of the transfer function does not fit in memory; raise --memory");
 }
 
 int session_read_text(session *s)
@@ -138,7 +139,7 @@ int session_use_function(session *s, const session_look *look)
     return status;
 }
 
-/* Opens one more, which is not drawn yet. */
+/* Opens another data set, without drawing it yet. */
 static int open_part(session *s, const char *input)
 {
     trip_dataset **parts = realloc(s->parts, (s->part_count + 1) * sizeof *parts);
@@ -210,7 +211,8 @@ void session_close(session *s)
     *s = (session){ 0 };
 }
 
-/* Memory of the renderer's for the ring; NULL where it has none, or none that reads land in. */
+/* Returns the renderer's memory for the ring. Returns NULL if the renderer has none, or if the
+ * engine cannot read into it. */
 static void *const *take_slots(const session *s, const session_reader *wanted, unsigned count,
                                size_t bytes)
 {
@@ -224,8 +226,9 @@ static void *const *take_slots(const session *s, const session_reader *wanted, u
 
 enum { SLOTS = 8, MAX_SLOTS = 16, MAX_SLOT_BYTES = 512 << 10 };
 
-/* Slots are handed out in order, so that one late read delays those behind it, and the less so the
- * more reads are under way. But what is read ahead may turn out to be occluded. */
+/* Slots are handed out in order, so one late read delays the slots behind it. More slots keep more
+ * reads running meanwhile. With `skip`, fewer slots avoid reading blocks that later turn out to be
+ * occluded. */
 static unsigned choose_slots(const session_reader *wanted, uint64_t ring_bytes, size_t plane_count)
 {
     bool fit = ring_bytes / MAX_SLOTS / plane_count >= MAX_SLOT_BYTES;
@@ -267,10 +270,10 @@ int session_take_image(const session *s, int width, int height, float **rgba)
     *rgba = trip_budget_take(s->budget, image_bytes(width, height));
     if (*rgba)
         return 0;
-    return trip_fail(TRIP_ERROR, "render", s->input,
-                     "an image of %d x %d does not fit the memory given; raise --memory or make "
-                     "it smaller",
-                     width, height);
+    return trip_fail(
+        TRIP_ERROR, "render", s->input,
+        "a picture of %d x %d pixels does not fit in memory; raise --memory or lower --size", width,
+        height);
 }
 
 void session_release_image(const session *s, int width, int height, float *rgba)

@@ -1,5 +1,6 @@
-/* What frames of a data set have in common: the budget, an opened data set, its transfer function
- * as a table, and readers whose rings fit the memory given. One thread. */
+/* A session has the parts that the frames of a data set share: the budget, the opened data sets and
+ * the table of the transfer function. It also makes readers with rings that fit the memory limit.
+ * One thread. */
 #ifndef TRIP_SESSION_H
 #define TRIP_SESSION_H
 
@@ -11,65 +12,67 @@
 #include "transfer_function.h"
 
 typedef struct session {
-    const char *input; /* the first data set, for messages */
+    const char *input; /* the first data set, in messages */
     trip_budget *budget;
-    trip_dataset **parts; /* the data sets that were opened, in this order */
+    trip_dataset **parts; /* opened data sets, in the order of opening */
     unsigned part_count;
-    trip_dataset *joined;            /* all of them as one; NULL where there is one */
-    trip_dataset *data;              /* that is drawn: that, or the one there is */
-    trip_dataset_metadata **texts;   /* by part; NULL until they are wanted */
-    trip_dataset_metadata *text;     /* the first of these */
-    trip_tf_entry *table;            /* 65536 entries; the same */
-    trip_classification *classified; /* of frames before, by level */
-    trip_mean_tables mean_tables;    /* of coarse levels: they may be kept for the next frame */
+    trip_dataset *joined;            /* all parts as one data set; NULL if there is one part */
+    trip_dataset *data;              /* the data set that is drawn: joined, or parts[0] */
+    trip_dataset_metadata **texts;   /* one per part; NULL until read */
+    trip_dataset_metadata *text;     /* texts[0] */
+    trip_tf_entry *table;            /* 65536 entries; NULL until a transfer function is used */
+    trip_classification *classified; /* results of earlier frames, one per level */
+    trip_mean_tables mean_tables;    /* of coarse levels; may be kept for the next frame */
 } session;
 
-/* The transfer function; zero means the one kept in the data set, as it is. */
+/* A choice of transfer function. Zero selects the function stored in the data set. */
 typedef struct session_look {
     const char *tf;       /* file or preset */
-    const char *tf_text;  /* in its place a `.tf` text */
-    double opacity_scale; /* of extinction; 0: 1 */
-    double window, level; /* what the function's domain spans; window 0: not moved */
-    bool *missing;        /* set, in the place of a warning, where values that show were left out */
+    const char *tf_text;  /* text of a `.tf` file, instead of tf */
+    double opacity_scale; /* factor on extinction; 0 means 1 */
+    double window,
+        level; /* range that the function's domain is stretched over; window 0 leaves it */
+    /* If not NULL, set to true if visible values were dropped, instead of a warning. */
+    bool *missing;
 } session_look;
 
-/* The data set alone. */
+/* Opens a data set. `input` must outlive the session. Close the session also after a failure. */
 int session_open_data(session *s, const char *input, uint64_t memory_bytes);
-/* Another data set to be drawn with it, and to be closed with it: its function is then to be used
- * anew. After a failure all is as it was. */
+/* Opens another data set to draw together with the first; session_close() closes both. The transfer
+ * function must then be set again. A failure leaves the session unchanged. */
 int session_add_data(session *s, const char *input);
-/* What `brick` wrote about it, where that is not read yet. */
+/* Reads the text that `brick` wrote for each part, unless it has been read. */
 int session_read_text(session *s);
-/* Its function, from now on: reads the text and takes the table where they are not there yet. */
+/* Sets the transfer function for later frames. Reads the texts and allocates the table if needed.
+ * Warns about visible values that bricking dropped, with the command that bricks again. */
 int session_use_function(session *s, const session_look *look);
-/* Between frames: keeps the tables of coarse levels where they are a small part of the memory that
- * is left. */
+/* Called between frames. Keeps the tables of coarse levels only if they are a small part of the
+ * memory left. */
 void session_keep_tables(session *s);
-/* What is known of frames that are drawn from a level of its data with its function, and is added
- * to by each. */
+/* Returns the results of earlier frames at a level with the current function. Each frame adds to
+ * them. */
 trip_classification *session_classified(const session *s, unsigned level);
-/* Both. Warns when the function shows values that were left out when the data set was made, with
- * the command that makes it anew. Close it also after a failure. */
+/* Calls session_open_data() and session_use_function(). Close the session also after a failure. */
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);
 void session_close(session *s);
 
-/* What a reader is for; zero means the default. */
+/* Parameters of a reader. Zero selects the default. */
 typedef struct session_reader {
     trip_engine engine;
-    unsigned planes; /* bit per trip_plane */
+    unsigned planes; /* one bit per trip_plane */
     int threads;
-    bool cache; /* keep pages for the frames to come */
-    /* On whose threads blocks are checked, and in whose memory the ring lies where it has such. */
+    bool cache; /* keeps pages for later frames */
+    /* Its threads check blocks. The ring lies in its memory if it offers memory for it. */
     trip_renderer *renderer;
     bool (*skip)(void *user, const trip_selection *selection, const trip_run *run);
     void *skip_user;
 } session_reader;
 
-/* Its ring takes at most a quarter of the memory that is left, its cache half. The renderer must
- * outlive it. */
+/* Makes a reader. Its ring takes at most a quarter of the memory left, its cache half. The renderer
+ * must outlive the reader. */
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted);
 
-/* width * height * 4 floats; release with session_release_image(). */
+/* Allocates width * height * 4 floats. Release them with session_release_image(). */
 int session_take_image(const session *s, int width, int height, float **rgba);
 void session_release_image(const session *s, int width, int height, float *rgba);
 

@@ -14,13 +14,13 @@ static trip_vec3 vector(const double v[3])
     return trip_v3(v[0], v[1], v[2]);
 }
 
-/* Whether something of the view is left to find. */
+/* Whether part of the view must be fitted to the visible voxels. */
 static bool is_fitted(const triptych_view *o)
 {
     return !(o->eye && o->look);
 }
 
-/* The axis that a grid has a single slice along; -1: none. */
+/* Returns the axis along which the grid has a single slice, or -1. */
 static int slice_axis(const trip_dataset *d)
 {
     int axis = -1, singles = 0;
@@ -32,8 +32,8 @@ static int slice_axis(const trip_dataset *d)
     return singles == 1 ? axis : -1;
 }
 
-/* A single slice faces the viewer, as a picture: rows from the left to the right, and up is what
- * comes next to what is up of the object, or else to its front. */
+/* A single slice faces the viewer like a picture. Rows run from left to right. The other axis
+ * points up or down, whichever is closer to the object's up direction, or else to its front. */
 static void face_slice(trip_camera_framing *f, const trip_dataset *d, int axis)
 {
     const trip_affine *m = &d->index_to_world;
@@ -72,7 +72,7 @@ static trip_camera_framing framing_of(const triptych_view *o, const session *s)
     return f;
 }
 
-/* Another up where the default one lies along the view. */
+/* Replaces a default up direction that is parallel to the view direction. */
 static void avoid_up_along_view(trip_camera_params *view)
 {
     trip_vec3 view_direction = trip_normalize(trip_sub(view->look, view->eye));
@@ -80,7 +80,7 @@ static void avoid_up_along_view(trip_camera_params *view)
         view->up = fabs(view->up.z) > 0.5 ? trip_v3(0, 1, 0) : trip_v3(0, 0, 1);
 }
 
-/* The view from a given eye at a given point or the middle. */
+/* Makes the view from a given eye, towards a given point or the middle. */
 static void view_from_eye(const triptych_view *o, const trip_camera_framing *f, const session *s,
                           trip_camera_params *view)
 {
@@ -111,7 +111,7 @@ static int view_framed(const triptych_view *o, const trip_camera_framing *f, con
     return status;
 }
 
-/* As through another lens: the eye stays where it is. */
+/* Zooms as with another lens: the eye stays in its position. */
 static int zoom(trip_camera_params *view, double factor)
 {
     if (factor == 0)
@@ -122,8 +122,8 @@ static int zoom(trip_camera_params *view, double factor)
                                    view->fov_degrees <= TRIPTYCH_FOV_MAX_DEGREES))
         return 0;
     return trip_fail(TRIP_USAGE, "usage", "--zoom",
-                     "%g makes an angle of view of %g degrees, which is not between %g and %g",
-                     factor, view->fov_degrees, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES);
+                     "%g gives an angle of view of %g degrees; it must be %g to %g", factor,
+                     view->fov_degrees, TRIPTYCH_FOV_MIN_DEGREES, TRIPTYCH_FOV_MAX_DEGREES);
 }
 
 static int make_view(trip_found_view *v, const triptych_view *o, const session *s,
@@ -138,8 +138,9 @@ static int make_view(trip_found_view *v, const triptych_view *o, const session *
     return status ? status : zoom(&v->params, o->zoom);
 }
 
-/* Half of a splat's reach counts: beyond it is faint, and the margin holds the rest. Of small
- * things the margin is too narrow for that, and more counts. */
+/* Returns the radius of a splat that must be inside the picture. It is half of the kernel radius,
+ * since the splat is faint beyond, and the margin holds the rest. For small objects the margin is
+ * too narrow, so the radius is larger. */
 static double kernel_that_counts(const trip_camera_framing *f, double radius)
 {
     const double margin = (1 - TRIP_FRAMING_FILL) / 2;
@@ -149,7 +150,8 @@ static double kernel_that_counts(const trip_camera_framing *f, double radius)
     return fmax(radius / 2, radius - margin * voxels);
 }
 
-/* What is fitted: voxels that are seen alone, and what shows together with others. */
+/* The view must contain `visible`, voxels visible on their own, and `outline`, the visible voxels
+ * that are faint on their own. */
 typedef struct fitted {
     trip_visible *visible;
     trip_outline *outline;
@@ -163,7 +165,7 @@ static int reach_of_fitted(void *user, const trip_reach_origin *origin, const tr
     return trip_visible_raise(f->visible, origin, wanted, count, values);
 }
 
-/* Of the view that has all of the box in it. */
+/* Makes the outline for the view that contains the whole box. */
 static int make_outline(trip_outline **out, const session *s, trip_reader *reader,
                         const trip_camera_framing *f)
 {
@@ -196,8 +198,8 @@ static int make_outlined(trip_found_view *v, const triptych_view *o, const sessi
     return make_view(v, o, s, f);
 }
 
-/* With a reader that is gone before the one of the frames is made. What turns shows sides that the
- * outline does not have. */
+/* Uses a temporary reader, which is destroyed before the reader of the frames is made. A turntable
+ * has no outline, since turning shows other sides. */
 static int make_fitted(trip_found_view *v, const triptych_view *o, const session *s,
                        double kernel_radius, const session_reader *wanted, trip_camera_framing *f)
 {
@@ -239,18 +241,18 @@ static int check(const triptych_view *o)
         why = "a number is not finite";
     else if (o->width < 1 || o->height < 1 || o->width > TRIP_PICTURE_MAX_PX ||
              o->height > TRIP_PICTURE_MAX_PX)
-        why = "a picture has 1 to 65536 pixels either way";
+        why = "the width and height of a picture must be 1 to 65536 pixels";
     else if (o->up && !(trip_length(vector(o->up)) > 0))
-        why = "the direction that is up is zero";
+        why = "the up direction is zero";
     else if (o->zoom < 0 || o->ortho_height < 0)
-        why = "neither zoom nor the height of a parallel view is below 0";
+        why = "the zoom and the height of a parallel view must not be below 0";
     else if (o->fov_degrees != 0 && !(o->fov_degrees >= TRIPTYCH_FOV_MIN_DEGREES &&
                                       o->fov_degrees <= TRIPTYCH_FOV_MAX_DEGREES))
-        why = "the angle of view lies between 1e-6 and 179.999 degrees";
+        why = "the angle of view must be 1e-6 to 179.999 degrees";
     else if (o->side < TRIPTYCH_SIDE_DEFAULT || o->side > TRIPTYCH_ISO)
-        why = "there is no such side";
+        why = "unknown side";
     else if (o->eye && o->ortho_fit)
-        why = "with an eye, a parallel view has a given height";
+        why = "a parallel view with an eye needs a height";
     return why ? trip_fail(TRIP_USAGE, "render", "view", "%s", why) : 0;
 }
 

@@ -1,4 +1,4 @@
-/* What is drawn: the transfer function, the settings and the view of triptych.h. */
+/* The appearance of a picture: transfer function, settings and view (triptych.h). */
 #include "library_context.h"
 #include "report.h"
 #include "splat.h"
@@ -23,22 +23,21 @@ int trip_context_use_transfer_function(triptych *t, const triptych_transfer_func
     return status;
 }
 
-/* More would make extinctions that are not finite. */
+/* A larger scale could make extinctions infinite. */
 #define OPACITY_SCALE_MAX 1e6
 
 static int check_function(const triptych_transfer_function *f)
 {
     bool finite = isfinite(f->window) && isfinite(f->level);
     if (f->name && f->text)
-        return trip_fail(TRIP_USAGE, "render", "function",
-                         "is given by a name or as text, not both");
+        return trip_fail(TRIP_USAGE, "render", "function", "give a name or a text, not both");
     if (!(f->opacity_scale >= 0 && f->opacity_scale <= OPACITY_SCALE_MAX))
-        return trip_fail(TRIP_USAGE, "render", "function", "an opacity scale lies between 0 and %g",
+        return trip_fail(TRIP_USAGE, "render", "function", "the opacity scale must be 0 to %g",
                          OPACITY_SCALE_MAX);
     return finite && f->window >= 0
                ? 0
                : trip_fail(TRIP_USAGE, "render", "function",
-                           "a window is finite and not below 0, and so is its level");
+                           "the window must be finite and at least 0, and its level finite");
 }
 
 int triptych_set_transfer_function(triptych *t, const triptych_transfer_function *function)
@@ -112,26 +111,27 @@ static const char *fault_of_integral(const triptych_settings *s)
 {
     if (s->field < TRIPTYCH_VALUES || s->field > TRIPTYCH_SPLATS || s->kernel < TRIPTYCH_LINEAR ||
         s->kernel > TRIPTYCH_GAUSSIAN)
-        return "there is no such field or kernel";
+        return "unknown field or kernel";
     if (!(s->tolerance >= 1e-12 && s->tolerance <= 0.1))
-        return "the tolerance lies between 1e-12 and 0.1";
+        return "the tolerance must be 1e-12 to 0.1";
     if (!(s->samples >= 1 && s->samples <= 64))
-        return "a pixel has 1 to 64 samples along each side";
+        return "the samples along each side of a pixel must be 1 to 64";
     return NULL;
 }
 
 static const char *fault_of_splats(const triptych_settings *s)
 {
     if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
-        return "there is no such compositing";
+        return "unknown compositing";
     if (s->footprint < TRIPTYCH_FOOTPRINT_EXACT || s->footprint > TRIPTYCH_FOOTPRINT_FIXED ||
         s->low_pass < TRIPTYCH_LOW_PASS_EWA || s->low_pass > TRIPTYCH_LOW_PASS_NONE)
-        return "there is no such footprint or low-pass";
+        return "unknown footprint or low-pass filter";
     if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
-        return "the kernel radius lies between 0.1 and 100 voxels";
+        return "the kernel radius must be 0.1 to 100 voxels";
     if (!(s->flatten >= 1 && s->flatten <= 100))
-        return "kernels are 1 to 100 times as flat as round ones";
-    return s->flatten > 1 && s->count ? "flat kernels are not counted" : NULL;
+        return "the flattening of kernels must be 1 to 100";
+    return s->flatten > 1 && s->count ? "count requires round kernels; set the flattening to 1"
+                                      : NULL;
 }
 
 static bool is_a_box(const double lo[3], const double hi[3])
@@ -145,14 +145,14 @@ static bool is_a_box(const double lo[3], const double hi[3])
 static const char *fault_of_clip(const triptych_clip *c)
 {
     if (c->box && !is_a_box(c->box_lo, c->box_hi))
-        return "the clipping box ends before it begins";
+        return "the clipping box has its minimum not below its maximum";
     if (!(c->planes >= 0 && c->planes <= TRIP_CLIP_GIVEN_PLANES))
-        return "there are 0 to 6 clipping planes";
+        return "the number of clipping planes must be 0 to 6";
     for (int i = 0; i < c->planes; i++) {
         const double *p = c->plane[i];
         double length = trip_length(trip_v3(p[0], p[1], p[2]));
         if (!(length > 0 && isfinite(length) && isfinite(p[3])))
-            return "the normal of a clipping plane is zero, or not finite";
+            return "the normal of a clipping plane is zero or not finite";
     }
     return NULL;
 }
@@ -162,17 +162,18 @@ static const char *fault_of_effects(const triptych_settings *s)
     const int all = TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING |
                     TRIPTYCH_EFFECTS_AUTO | TRIPTYCH_EMISSION;
     if (s->effects & ~all)
-        return "there is no such effect";
+        return "unknown effect";
     if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
-        return "light from the eye casts no shadows that are seen; give its direction or place";
+        return "light from the eye casts no visible shadows; give the light a direction or "
+               "position";
     if (!(s->anisotropy >= -0.95 && s->anisotropy <= 0.95))
-        return "the anisotropy of scattering lies between -0.95 and 0.95";
+        return "the anisotropy must be -0.95 to 0.95";
     if (s->effects & TRIPTYCH_CUEING && !(s->cueing > 0 && s->cueing <= 1))
-        return "depth cueing lies above 0 and up to 1";
+        return "depth cueing must be above 0 and at most 1";
     if (!(s->kelvin[0] >= 0 && s->kelvin[0] < s->kelvin[1] && s->kelvin[1] <= 100000))
-        return "temperatures of emission lie between 0 and 100000 K, the smaller first";
+        return "the temperatures of emission must be 0 to 100000 K in ascending order";
     if (s->effects && !(s->light_cells >= 8 && s->light_cells <= TRIP_LIGHT_CELLS_MAX))
-        return "the light's lattice has 8 to 1024 cells";
+        return "the light lattice must have 8 to 1024 cells";
     return NULL;
 }
 
@@ -183,31 +184,32 @@ static const char *fault_of_settings(const triptych_settings *s)
     if (s->method < TRIPTYCH_MERGE || s->method > TRIPTYCH_IMAGE ||
         s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
         s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
-        return "there is no such method, traversal or target";
+        return "unknown method, traversal or target";
     if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_CLASSIFY_AUTO)
-        return "there is no such classification";
+        return "unknown classification";
     if (!(s->samples_per_sheet >= 0 && s->samples_per_sheet <= TRIP_SHEET_SAMPLES_MAX))
-        return "a sheet has 1 to 16 slices, or as many as the view calls for (0)";
+        return "the samples per sheet must be 1 to 16, or 0 to let the view decide";
     if (s->depth && s->target != TRIPTYCH_RGBA32F)
-        return "rounded layers have no depth; leave the target at rgba32f";
+        return "depth requires the target rgba32f";
     if (!(s->h >= 0 && s->h < 1) && s->h != TRIPTYCH_H_AUTO)
-        return "h lies between 0 and below 1, or is by the classification (-1)";
+        return "h must be 0 to below 1, or -1 to let the classification decide";
     if (!(s->early_termination >= 0 && s->early_termination <= TRIP_EARLY_TERMINATION_MAX) &&
         s->early_termination != TRIPTYCH_EARLY_TERMINATION_AUTO)
-        return "saturation lies between 0 and 0.1, or is by the classification (-1)";
+        return "early termination must be 0 to 0.1, or -1 to let the classification decide";
     if ((s->shading || s->effects) && !s->headlight && !isfinite(length))
-        return "the light is too far away, or not finite";
+        return "the light is too far away or not finite";
     if ((s->shading || s->effects) && !s->headlight && !s->point_light && !(length > 0))
         return "the direction to the light is zero";
     for (int i = 0; i < 4; i++)
         if (!(s->background[i] >= 0 && s->background[i] <= 1))
-            return "components of the background lie between 0 and 1";
+            return "the components of the background must be 0 to 1";
     if (!(s->lod_px >= 0 && s->lod_px <= 1000))
-        return "levels are chosen by 0 to 1000 pixels a voxel";
+        return "the voxel width that selects levels must be 0 to 1000 pixels";
     if (!(s->max_bytes >= 0 && s->max_bytes <= 1e18 && s->max_ms >= 0 && s->max_ms <= 1e9))
-        return "bounds of bytes and milliseconds lie between 0 (none) and 1e18 and 1e9";
+        return "the bound of bytes must be 0 (none) to 1e18, the bound of milliseconds 0 (none) to "
+               "1e9";
     if (s->show < TRIPTYCH_SHOW_PICTURE || s->show > TRIPTYCH_SHOW_LEVELS)
-        return "there is nothing such to be shown";
+        return "unknown value to show";
     const char *fault = fault_of_splats(s);
     fault = fault ? fault : fault_of_clip(&s->clip);
     fault = fault ? fault : fault_of_effects(s);
@@ -218,7 +220,7 @@ typedef struct positions {
     double at[3];
 } positions;
 
-/* Of voxels; no bounds stay none. */
+/* Converts indices to positions. Infinite bounds stay infinite. */
 static positions positions_of(const triptych *t, const double voxels[3])
 {
     positions out;
@@ -247,7 +249,7 @@ trip_clip trip_context_clip(const triptych *t)
     return clip;
 }
 
-/* Splats of a smaller radius leave a pattern that shows. */
+/* Splats with a smaller radius leave a visible pattern. */
 #define SMOOTH_KERNEL_VOXELS 1.5
 
 static void warn_of_ripple(double kernel_radius)
@@ -255,9 +257,9 @@ static void warn_of_ripple(double kernel_radius)
     trip_splat_ripple own = trip_splat_ripple_of(kernel_radius);
     trip_splat_ripple defaults = trip_splat_ripple_of(TRIP_KERNEL_RADIUS_VOXELS);
     trip_warn("render",
-              "a kernel radius of %g leaves a pattern of voxels: the extinction of constant fog is "
-              "off by %+.0f %% through voxels and by %+.0f %% between them; at %g by %+.1f and "
-              "%+.1f",
+              "a kernel radius of %g leaves a visible pattern of voxels: the extinction of "
+              "constant fog is off by %+.0f %% through voxels and %+.0f %% between them; a radius "
+              "of %g gives %+.1f and %+.1f",
               kernel_radius, 100 * (own.through - 1), 100 * (own.between - 1),
               TRIP_KERNEL_RADIUS_VOXELS, 100 * (defaults.through - 1),
               100 * (defaults.between - 1));
@@ -288,7 +290,7 @@ int triptych_set_settings(triptych *t, const triptych_settings *s)
     t->rounding_checked &= (trip_target)s->target == t->settings.target &&
                            (trip_compositing)s->compositing == t->settings.compositing;
     t->kernel_warned &= (trip_kernel)s->kernel == t->settings.kernel;
-    /* What was taken for frames before may be in the way of the light's lattice. */
+    /* The memory of earlier frames may be needed for the light map. */
     if (s->effects != t->effects || s->light_cells != t->settings.effects.cells)
         trip_context_drop_renderer(t);
     t->effects = s->effects;

@@ -1,9 +1,9 @@
-/* What is seen at a place of the picture, by a ray of its own. */
+/* Finds the visible point at a position of the picture, with one ray. */
 #include "library_context.h"
 #include "ray_probe.h"
 #include "report.h"
 
-/* In parallel views a ray begins in the plane of the eye. */
+/* In parallel views a ray starts in the plane of the eye. */
 static trip_vec3 origin_of(const trip_camera *c, double x, double y)
 {
     if (!c->ortho)
@@ -33,7 +33,7 @@ static triptych_hit hit_of(const trip_ray_probe *probe, const trip_ray_hit *foun
     return hit;
 }
 
-/* With a reader that is gone before the one of the frames is made. */
+/* Uses a temporary reader, which is destroyed before the reader of the frames is made. */
 static int find_hit(triptych *t, trip_ray_probe *probe, triptych_hit *out)
 {
     const triptych_resources *r = &t->resources;
@@ -56,7 +56,7 @@ static int prepare(triptych *t, double x, double y, trip_camera *camera)
 {
     int status = trip_context_check_idle(t, true);
     if (!status && !(isfinite(x) && isfinite(y)))
-        status = trip_fail(TRIP_USAGE, "render", "probe", "the place is not finite");
+        status = trip_fail(TRIP_USAGE, "render", "probe", "the position is not finite");
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status)

@@ -24,9 +24,9 @@ double trip_rounding_opacity(const session *s, const trip_settings *settings)
     return -expm1(-max * voxel * share);
 }
 
-/* A splat of opacity a changes one of 3/4 by a / 4. Rounded to steps of that size u, a constant
- * splat's change is off by up to u / 2. By floats transmittance is what is kept, near 1 at first,
- * where steps are 2^-24. */
+/* A splat of opacity a changes an opacity of 3/4 by a / 4. Rounding to steps of that size u adds an
+ * error of up to u / 2 to each constant splat. Float layers store transmittance, which starts near
+ * 1, where steps are 2^-24. */
 double trip_rounding_min(trip_target target)
 {
     static const double steps[] = { [TRIP_TARGET_RGBA32F] = 0x1p-24,
@@ -43,11 +43,11 @@ void trip_rounding_check(const session *s, const trip_settings *settings)
     if (!(opacity > 0) || opacity >= trip_rounding_min(settings->target))
         return;
     trip_warn(s->input,
-              "%s have an opacity of %.2g at most, and layers of %s, rounded at each, lose much of "
-              "what is less than %.2g: %s",
+              "%s have an opacity of at most %.2g; layers of %s lose much of opacities below %.2g "
+              "to rounding; %s",
               by_sheets ? "sheets" : "splats", opacity, names[settings->target],
               trip_rounding_min(settings->target),
-              !by_sheets                                ? "--compositing sheet rounds once a sheet"
-              : settings->target != TRIP_TARGET_RGBA32F ? "--target rgba32f loses less"
+              !by_sheets ? "--compositing sheet rounds once per sheet"
+              : settings->target != TRIP_TARGET_RGBA32F ? "--target rgba32f rounds less"
                                                         : "--renderer reference rounds nothing");
 }

@@ -1,17 +1,17 @@
-/* Whether layers can hold the splats of a frame: what is composited is rounded to the layers'
- * format each time, and what is far below a step of that is lost, however many there are. */
+/* Checks whether layers can hold the splats of a frame. Compositing rounds to the layer's format at
+ * each splat. Changes far below one step of the format are lost, however many splats there are. */
 #ifndef TRIP_ROUNDING_H
 #define TRIP_ROUNDING_H
 
 #include "library_session.h"
 
-/* The largest opacity that is composited at once, of a splat or, by sheets, of a sheet, over the
- * values that the data have; 0 without any. */
+/* Returns the largest opacity composited at once, over the values of the data: of a splat, or of a
+ * sheet if splats are added by sheet. Returns 0 without visible values. */
 double trip_rounding_opacity(const session *s, const trip_settings *settings);
-/* What it has to be at least for layers of the format to come within a tenth of what they should
- * hold, up to opacities of 3/4. */
+/* Returns the minimum of that opacity for which layers of this format stay within a tenth of the
+ * exact result, up to opacities of 3/4. */
 double trip_rounding_min(trip_target target);
-/* Warns where it is less. Of settings that draw splats. */
+/* Warns if the opacity is below the minimum. For settings that draw splats. */
 void trip_rounding_check(const session *s, const trip_settings *settings);
 
 #endif

@@ -13,7 +13,7 @@ typedef struct reading {
     const trip_dataset *data;
     trip_volume *volume;
     trip_field *field;
-    float *values; /* of a box */
+    float *values; /* of one box */
     trip_budget *budget;
 } reading;
 
@@ -62,7 +62,7 @@ static int put_range(reading *r, const trip_volume_portion *portion, const int64
     return status;
 }
 
-/* Of a sparse volume one voxel around belongs to it. */
+/* In a sparse volume, one voxel around the portion belongs to it. */
 static int put_portion(reading *r, const trip_volume_portion *portion)
 {
     const trip_volume_info *info = trip_volume_get_info(r->volume);
@@ -103,7 +103,7 @@ static int check_grid(const reading *r, const char *path)
         same = same_coordinates(info->coordinates[a], r->data->coordinates.along[a], info->dims[a]);
     return same ? 0
                 : trip_fail(TRIP_ERROR, "read", path,
-                            "is not the volume that %s was made of: its grid is another",
+                            "is not the volume that %s was made of, since the grids differ",
                             r->data->path);
 }
 

@@ -1,5 +1,5 @@
-/* The values of a volume as the integral renderer takes them: all of them, as its file gives them,
- * in the place of those that a data set made of it keeps. */
+/* Reads the values of a volume itself for the integral renderer, instead of the values that a data
+ * set keeps of it. */
 #ifndef TRIP_SOURCE_FIELD_H
 #define TRIP_SOURCE_FIELD_H
 
@@ -7,9 +7,9 @@
 #include "field.h"
 #include "volume.h"
 
-/* Reads the volume, which must have the grid of the data set. Of a sparse one, voxels beside those
- * that exist are there too, with the background's value. Values that are not finite are left out.
- */
+/* Reads the volume. Its grid must equal the data set's grid, otherwise TRIP_ERROR (reported). In a
+ * sparse volume, the neighbours of existing voxels have the background value. Values that are not
+ * finite are left out. */
 int trip_source_field_read(trip_field **out, const trip_dataset *data, const char *path,
                            const trip_volume_params *params, trip_budget *budget);
 

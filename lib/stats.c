@@ -1,11 +1,11 @@
-/* What a frame takes: the plan in words, statistics of the frame and by list. */
+/* The costs of a frame: the plan in words, and statistics per frame and list. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "library_context.h"
 #include "report.h"
 
-/* The levels of a frame that classifies after interpolation, from the eye on. */
+/* Explains the levels of a post frame, from the eye outward. */
 static void explain_parts(const triptych *t, FILE *out)
 {
     const trip_lod_parts *p = &t->parts;
@@ -20,36 +20,38 @@ static void explain_parts(const triptych *t, FILE *out)
     }
     fprintf(out, "levels      %s: level %u", coarse ? "run" : "do not run", p->level[0]);
     if (p->share > 0)
-        fprintf(out, ", and %.0f %% of the picture of level %u", 100 * p->share, p->level[1]);
+        fprintf(out, ", and %.0f %% of the picture from level %u", 100 * p->share, p->level[1]);
     for (int i = 1; i < p->count && !(p->share > 0); i++)
-        fprintf(out, ", from %.6g along the view on level %u", p->distance[i], p->level[i]);
+        fprintf(out, ", from depth %.6g on level %u", p->distance[i], p->level[i]);
     if (p->bounded && p->bytes > s->max_bytes)
-        fputs(": the coarsest there is, of more bytes than the bound allows\n", out);
+        fputs(": the coarsest level, with more bytes than the bound allows\n", out);
     else if (p->bounded)
         fputs(": the finest that the bound on bytes allows\n", out);
     else if (s->lod_px > 0 && coarse)
-        fprintf(out, ": the coarsest whose voxels are at most %g pixels wide\n", s->lod_px);
+        fprintf(out, ": the coarsest with voxels at most %g pixels wide\n", s->lod_px);
     else if (s->lod_px > 0)
-        fprintf(out, ": voxels of coarser ones are more than %g pixels wide\n", s->lod_px);
+        fprintf(out, ": coarser levels have voxels more than %g pixels wide\n", s->lod_px);
     else
         fputs(": the finest\n", out);
     if (p->count > 1)
-        fprintf(out, "            of %d pictures, what follows is of number %d, at level %u\n",
-                p->count, t->part + 1, p->level[t->part]);
+        fprintf(
+            out,
+            "            %d pictures are drawn; the lines below explain number %d, at level %u\n",
+            p->count, t->part + 1, p->level[t->part]);
 }
 
-/* What was not set, and what it came to. */
+/* Explains the choices for settings that were left open. */
 static void explain_choices(const triptych *t, FILE *out)
 {
     if (t->plan.gathers)
         return;
     if (t->why_pre)
-        fprintf(out, "default     pre in place of post: %s\n", t->why_pre);
+        fprintf(out, "default     pre instead of post: %s\n", t->why_pre);
     explain_parts(t, out);
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
         fprintf(out,
-                "slices      %d by the view: rays move up to %.2f voxels along a sheet to the "
-                "next, voxels count as up to %.3g %s wide\n",
+                "samples     %d per sheet, by the view: between sheets rays move up to %.2f voxels "
+                "sideways; voxels are up to %.3g %s wide\n",
                 t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.slope,
                 t->samples_per_sheet.voxel_px, t->settings.samples > 1 ? "samples" : "px");
 }
@@ -59,7 +61,7 @@ int triptych_explain(triptych *t, char **text)
     trip_scope *before = trip_context_enter(t);
     size_t bytes;
     *text = NULL;
-    int status = t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "none is begun");
+    int status = t->drawn ? 0 : trip_fail(TRIP_USAGE, "render", "frame", "no frame is begun");
     FILE *f = status ? NULL : open_memstream(text, &bytes);
     if (f)
         explain_choices(t, f);
@@ -75,14 +77,14 @@ int triptych_explain(triptych *t, char **text)
     return trip_context_leave(before, status);
 }
 
-/* Where reads land, and how the renderer gets at it. */
+/* Says where blocks are read to, and how the renderer reaches them. */
 static const char *ring_text(const trip_renderer *renderer, const trip_reader *reader)
 {
     if (renderer->resident)
         return "not used: the renderer holds the data";
     if (trip_reader_in_place(reader))
-        return "mapped: reads land in the renderer's memory";
-    return renderer->ops->take_slots ? "copied: batches go to the renderer's memory"
+        return "mapped: the disk writes into the renderer's memory";
+    return renderer->ops->take_slots ? "copied: batches are copied to the renderer's memory"
                                      : "shared: the renderer draws from the ring";
 }
 
@@ -175,7 +177,8 @@ static triptych_list_stats list_stats(const triptych *t, unsigned i)
     };
 }
 
-/* Of frames whose levels are bounded: what bounds of time are made of. */
+/* Measures the bytes drawn per millisecond in frames with bounded levels. A bound of time is
+ * converted to bytes by this rate. */
 static void note_rate(triptych *t)
 {
     const double bytes = t->plan.lod.limit.bytes + t->parts.bytes;
@@ -185,7 +188,7 @@ static void note_rate(triptych *t)
     t->bytes_per_ms = t->bytes_per_ms > 0 ? 0.5 * (t->bytes_per_ms + bytes / ms) : bytes / ms;
 }
 
-/* A frame takes what all of its parts take. */
+/* Adds the costs of earlier parts of a frame. */
 static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *before)
 {
     to->ms += before->ms;
@@ -202,7 +205,7 @@ static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *befo
     to->bytes_unused += before->bytes_unused;
 }
 
-/* The lists of parts before keep their numbers. */
+/* Whether list i belongs to an earlier part, so that its statistics are complete. */
 static bool is_of_part_before(const triptych *t, unsigned i)
 {
     for (int part = 0; part < t->part; part++)
@@ -218,7 +221,7 @@ int trip_context_note_stats(triptych *t)
         t->list_stats = trip_budget_take(t->session.budget, list_stats_bytes(t));
     if (!t->list_stats)
         return trip_fail(TRIP_ERROR, "render", t->name,
-                         "the frame's statistics do not fit the memory given; raise --memory");
+                         "the frame's statistics do not fit in memory; raise --memory");
     t->stats = frame_stats(t);
     snprintf(t->device, sizeof t->device, "%s", t->stats.device);
     t->stats.device = t->device;

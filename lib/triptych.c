@@ -1,4 +1,4 @@
-/* The contexts of triptych.h, the data sets in them, and pictures. */
+/* Contexts, their data sets, and pictures (triptych.h). */
 #include "triptych.h"
 
 #include <stdio.h>
@@ -12,7 +12,7 @@
 
 /* ---- contexts ---- */
 
-/* The first failure of a call is the one that it returns. */
+/* triptych_error() has the first failure of a call. */
 static void keep_failure(void *user, int status, const char *line)
 {
     triptych *t = user;
@@ -113,7 +113,7 @@ int trip_context_check_open(const triptych *t)
 int trip_context_check_idle(const triptych *t, bool needs_data)
 {
     if (t->begun)
-        return trip_fail(TRIP_USAGE, "render", "frame", "one is begun: end it first");
+        return trip_fail(TRIP_USAGE, "render", "frame", "a frame is begun; end it first");
     return needs_data ? trip_context_check_open(t) : 0;
 }
 
@@ -121,7 +121,8 @@ int trip_context_check_list(const triptych *t, unsigned number)
 {
     int status = trip_context_check_open(t);
     if (!status && number >= t->session.data->list_count)
-        return trip_fail(TRIP_USAGE, "render", t->name, "has %u lists, numbered from 0: not %u",
+        return trip_fail(TRIP_USAGE, "render", t->name,
+                         "has %u lists, numbered from 0; there is no list %u",
                          t->session.data->list_count, number);
     return status;
 }
@@ -145,10 +146,10 @@ static int take_picture(triptych *t, int width, int height, int channels, float 
     p->pixels = trip_budget_take(t->session.budget, p->bytes);
     if (!p->pixels) {
         free(p);
-        return trip_fail(TRIP_ERROR, "render", t->name,
-                         "an image of %d x %d does not fit the memory given; raise --memory or "
-                         "make it smaller",
-                         width, height);
+        return trip_fail(
+            TRIP_ERROR, "render", t->name,
+            "a picture of %d x %d pixels does not fit in memory; raise --memory or lower --size",
+            width, height);
     }
     p->next = t->pictures;
     t->pictures = p;
@@ -163,10 +164,11 @@ int triptych_new_picture(triptych *t, int width, int height, int channels, float
     *pixels = NULL;
     if (!status &&
         (width < 1 || height < 1 || width > TRIP_PICTURE_MAX_PX || height > TRIP_PICTURE_MAX_PX))
-        status = trip_fail(TRIP_USAGE, "render", "picture", "has 1 to %d pixels either way",
-                           TRIP_PICTURE_MAX_PX);
+        status = trip_fail(TRIP_USAGE, "render", "picture",
+                           "the width and height must be 1 to %d pixels", TRIP_PICTURE_MAX_PX);
     if (!status && channels != 1 && channels != 4)
-        status = trip_fail(TRIP_USAGE, "render", "picture", "has 4 channels, or 1 for distances");
+        status = trip_fail(TRIP_USAGE, "render", "picture",
+                           "the number of channels must be 4, or 1 for distances");
     if (!status)
         status = take_picture(t, width, height, channels, pixels);
     return trip_context_leave(before, status);
@@ -249,9 +251,7 @@ static int check_resources(const triptych_resources *r)
     bool known = r->renderer >= TRIPTYCH_RENDERER_AUTO &&
                  r->renderer <= TRIPTYCH_RENDERER_INTEGRAL && r->engine >= TRIPTYCH_ENGINE_AUTO &&
                  r->engine <= TRIPTYCH_ENGINE_NULL;
-    return known ? 0
-                 : trip_fail(TRIP_USAGE, "render", "resources",
-                             "there is no such renderer or engine");
+    return known ? 0 : trip_fail(TRIP_USAGE, "render", "resources", "unknown renderer or engine");
 }
 
 int triptych_open(triptych *t, const char *path, const triptych_resources *resources)
@@ -291,14 +291,14 @@ int triptych_add(triptych *t, const char *path)
     return trip_context_leave(before, status);
 }
 
-/* Where a voxel ends along an axis. */
+/* Returns the position of a voxel's upper or lower edge along an axis. */
 static double edge_of(const trip_coordinates *c, int axis, int64_t voxel, bool upper)
 {
     const double half = 0.5 * trip_coordinates_width(c, axis, voxel);
     return trip_coordinates_at(c, axis, voxel) + (upper ? half : -half);
 }
 
-/* The box of world space about voxels `first` to `last`, from edge to edge. */
+/* Finds the edges of voxels `first` to `last`, and their bounding box in world space. */
 static void find_box(const trip_dataset *d, triptych_info *out)
 {
     const trip_affine *m = &d->index_to_world;

@@ -1,6 +1,6 @@
-/* Triptych as a library: draws volumes that do not fit in memory. A context holds one opened data
- * set (NAME.trip, as `triptych brick` or triptych_brick() of triptych_brick.h makes it) and draws
- * frames of it:
+/* The public interface of libtriptych, which draws volumes that do not fit in memory. A context
+ * holds one opened data set (NAME.trip) and draws frames of it. The program `triptych brick` makes
+ * data sets, and so does triptych_brick() (triptych_brick.h).
  *
  *     triptych *t;
  *     if (triptych_create(&t) == 0 && triptych_open(t, "head.trip", NULL) == 0) {
@@ -8,17 +8,25 @@
  *         triptych_draw(t, rgba);
  *     }
  *
- * One thread at a time uses a context, but for triptych_cancel(); any number of contexts may be
- * used by as many threads, and share nothing. Functions return 0 or a negative triptych_status, and
- * triptych_error() then says why. Parameters are plain structs in which zero means the default,
- * but for triptych_settings, which begins as triptych_default_settings() has it; what they point to
- * is needed during the call only.
+ * Threads: one thread at a time may use a context. Only triptych_cancel() may be called from other
+ * threads. Contexts share nothing, so different threads may use different contexts.
  *
- * World space is the data's own (millimetres, metres, ...), as the volume's file says. Pictures are
- * floats: height rows of width pixels, row 0 at the top, each red, green, blue, alpha, multiplied
- * by alpha; colours are display values (sRGB), 0 to 1. The same data, view, function and settings
- * give the same picture, bit for bit, however it is drawn and whatever memory and threads it gets.
- */
+ * Errors: unless a comment says otherwise, functions that return int return 0 or a negative
+ * triptych_status. triptych_error() then gives the reason. Each of these functions may return
+ * TRIPTYCH_USAGE (invalid arguments, or a call in the wrong order) and TRIPTYCH_ERROR (files,
+ * memory, devices).
+ *
+ * Parameters: structs, in which 0 or NULL selects the default. The exception is triptych_settings,
+ * which starts from triptych_default_settings(). The library does not use pointers in these structs
+ * after a call returns.
+ *
+ * Coordinates: world space has the length units of the volume's file (millimetres, metres, ...).
+ * Index space has voxel (i, j, k) at (i, j, k).
+ *
+ * Pictures: `height` rows of `width` pixels, the top row first. A pixel is four floats: red, green,
+ * blue and alpha. Colours are sRGB display values from 0 to 1, multiplied by alpha. Equal data,
+ * views, transfer functions and settings give equal pictures, bit for bit. A picture does not
+ * depend on memory, threads or the way a frame is drawn. */
 #ifndef TRIPTYCH_H
 #define TRIPTYCH_H
 
@@ -37,184 +45,237 @@ extern "C" {
 typedef enum triptych_status {
     TRIPTYCH_OK = 0,
     TRIPTYCH_ERROR = -1,
-    TRIPTYCH_USAGE = -2,     /* the caller's parameters are at fault */
-    TRIPTYCH_CANCELLED = -3, /* by triptych_cancel() */
+    TRIPTYCH_USAGE = -2,     /* invalid arguments or a call in the wrong order */
+    TRIPTYCH_CANCELLED = -3, /* triptych_cancel() stopped the call */
 } triptych_status;
 
 typedef struct triptych triptych;
 
 /* ---- contexts ---- */
 
-/* Fails only without memory. */
+/* Creates a context without a data set. Returns TRIPTYCH_ERROR if memory is exhausted; *out is then
+ * NULL. Free it with triptych_destroy(). */
 TRIPTYCH_API int triptych_create(triptych **out);
-/* NULL is fine. */
+/* Ends the frame, closes the data set and frees the context. Does nothing if `t` is NULL. */
 TRIPTYCH_API void triptych_destroy(triptych *t);
-/* Why the last call failed: one line without its end, "triptych: read: head.trip: ..."; "" where it
- * did not. Valid until the next call. */
+/* Returns the reason why the last call failed, or "" if it succeeded. The reason is one line
+ * without a line feed, such as "triptych: read: head.trip: ...". It is valid until the next call
+ * with this context. */
 TRIPTYCH_API const char *triptych_error(const triptych *t);
-/* Calls `take` with each line for people as it comes: warnings, notes and failures. NULL: they are
- * dropped. It may be called by other threads, but only during a call with this context. */
+/* Sets a function that receives each message for people: warnings, notes and failures, one line
+ * each. NULL, the default, discards messages. The library may call `take` from other threads, but
+ * only during a call with this context. */
 TRIPTYCH_API void triptych_set_messages(triptych *t, void (*take)(void *user, const char *line),
                                         void *user);
-/* Calls `show` now and then during long work, on the calling thread: how much of a stage is done.
- * Stages are "draw" (of voxels, post), "splat" and "count" (of splats, pre), "integrate" (of
- * pixels), and those of triptych_brick.h. NULL: no calls. */
+/* Sets a function that receives progress during long work: `done` of `total` units of a stage. The
+ * library calls `show` on the calling thread. NULL, the default, reports no progress. Drawing has
+ * these stages; triptych_brick.h lists the stages of bricking.
+ * - "draw": voxels, in post
+ * - "splat": splats, in pre
+ * - "count": splats, with triptych_settings.count
+ * - "integrate": pixels, with the integral renderer */
 TRIPTYCH_API void triptych_set_progress(triptych *t,
                                         void (*show)(void *user, const char *stage, uint64_t done,
                                                      uint64_t total),
                                         void *user);
-/* "0.1.0". */
+/* Returns the version, such as "0.1.0". */
 TRIPTYCH_API const char *triptych_version(void);
 
 /* ---- data ---- */
 
 typedef enum triptych_renderer {
-    TRIPTYCH_RENDERER_AUTO, /* GL on graphics hardware, else CPU */
-    TRIPTYCH_RENDERER_GL,   /* OpenGL 4.5, without a window */
+    TRIPTYCH_RENDERER_AUTO, /* GL if the machine has graphics hardware, otherwise CPU */
+    TRIPTYCH_RENDERER_GL,   /* OpenGL 4.5 without a window */
     TRIPTYCH_RENDERER_CPU,
     TRIPTYCH_RENDERER_REFERENCE, /* double precision, slow */
-    TRIPTYCH_RENDERER_INTEGRAL,  /* what the others approximate: ray by ray, slower; all of the
-                                    volume has to fit the memory, 16 bytes a voxel */
+    /* The integral along each ray in double precision, which all other renderers approximate.
+     * Slowest. The whole volume must fit in memory, at 16 bytes per voxel. */
+    TRIPTYCH_RENDERER_INTEGRAL,
 } triptych_renderer;
 
 typedef enum triptych_engine {
-    TRIPTYCH_ENGINE_AUTO, /* io_uring where the kernel allows it, else pread */
+    TRIPTYCH_ENGINE_AUTO, /* io_uring if the kernel allows it, otherwise pread */
     TRIPTYCH_ENGINE_URING,
     TRIPTYCH_ENGINE_PREAD,
-    TRIPTYCH_ENGINE_NULL, /* everything is read into memory first */
+    TRIPTYCH_ENGINE_NULL, /* reads everything into memory first */
 } triptych_engine;
 
 typedef struct triptych_resources {
-    uint64_t memory_bytes; /* that all data may take; default: a quarter of what may be used */
-    unsigned threads;      /* that draw and read, up to 256; default: one a processor */
+    uint64_t memory_bytes; /* limit for all data; default: a quarter of the memory available */
+    unsigned threads;      /* for drawing and reading, up to 256; default: one per processor */
     triptych_renderer renderer;
     triptych_engine engine;
-    int keep_pages; /* not 0: half of the memory left keeps what was read for the frames to come */
-    int read_occluded; /* not 0: bricks behind what is opaque are read too; the same picture */
-    const char *name;  /* of the data in messages; default: its path */
+    /* If not 0, a cache keeps the bytes read for later frames. The cache takes up to half of the
+     * memory left. */
+    int keep_pages;
+    /* If not 0, bricks behind opaque matter are read too. The picture does not change. */
+    int read_occluded;
+    const char *name; /* names the data in messages; default: the path of the data set */
 } triptych_resources;
 
-/* Closes what is open, and opens a data set; resources NULL: the defaults. */
+/* Closes the open data set, if any, and opens the data set at `path`. NULL for `resources` selects
+ * the defaults. Fails with TRIPTYCH_USAGE if `resources` is invalid or while a frame is begun. If
+ * opening fails, no data set is open.
+ */
 TRIPTYCH_API int triptych_open(triptych *t, const char *path, const triptych_resources *resources);
-/* Opens one more, to be drawn in one picture with what is open, sheet by sheet in one order:
- * another region of the same volume, with the same codes, as triptych_brick_options.region_first
- * makes them. All of them are drawn at their finest level. A function and a view that were set are
- * forgotten; the default function is the first data set's. A voxel that several hold counts once in
- * post, and for each of them in pre. After a failure what was open still is. */
+/* Opens another data set and draws it together with the open data set, sheet by sheet in one order.
+ * The new data set must be another region of the same volume with the same codes
+ * (triptych_brick_options.region_first). Effects of the call:
+ * - All data sets are drawn at their finest level.
+ * - The transfer function and the view are reset. The default transfer function is the one of the
+ *   first data set.
+ * - A voxel in several data sets counts once in post, and once for each of them in pre.
+ * If it fails, the data sets that were open stay open. */
 TRIPTYCH_API int triptych_add(triptych *t, const char *path);
-/* Opens a data set of the heat of what is open, on any grid, in the place of one that was: for
- * TRIPTYCH_EMISSION, until what is open is closed. NULL: none. */
+/* Opens a data set of heat for TRIPTYCH_EMISSION, on any grid. It replaces an earlier one and stays
+ * open until triptych_close() or triptych_open(). NULL for `path` closes the data set of heat. */
 TRIPTYCH_API int triptych_set_heat(triptych *t, const char *path);
+/* Ends the frame and closes the data set, the data set of heat and all pictures of
+ * triptych_new_picture(). The settings stay. Does nothing if no data set is open. */
 TRIPTYCH_API void triptych_close(triptych *t);
 
 typedef struct triptych_info {
-    int64_t dims[3];             /* voxels of the volume along i, j, k */
-    double index_to_world[3][4]; /* world = matrix . (i, j, k, 1), where spacing is even */
-    /* Least and most distance of neighbours along i, j, k in the world. They differ where spacing
-     * is uneven; the matrix then takes places to the world, which are indices on the average. */
+    /* Voxels of the volume along i, j, k. */
+    int64_t dims[3];
+    /* Maps index space to world space: world = matrix * (i, j, k, 1). With uneven spacing it maps
+     * positions (spacing_min) instead of indices. */
+    double index_to_world[3][4];
+    /* Minimum and maximum distance of neighbouring voxels along i, j, k, in world units. They
+     * differ if the spacing is uneven. index_to_world then maps positions to world space. A
+     * position is an index scaled unevenly, and equals the index on average. */
     double spacing_min[3], spacing_max[3];
-    int64_t first[3], last[3]; /* voxels kept along i, j, k */
-    double lo[3], hi[3];       /* box of those in world space, from edge to edge */
-    /* Where those begin and end along i, j, k, and where the grid does: for the matrix. */
+    int64_t first[3], last[3]; /* first and last kept voxel along i, j, k */
+    double lo[3], hi[3];       /* bounding box of the kept voxels in world space, edge to edge */
+    /* Lower and upper edges along i, j, k of the kept voxels and of the grid, for index_to_world.
+     */
     double edges[2][3], grid_edges[2][3];
-    double value_min, value_max; /* of the volume */
+    double value_min, value_max; /* minimum and maximum of the volume */
     double code_lo, code_hi;     /* values of codes 0 and 65535 (FORMAT.md) */
     uint64_t voxels;             /* of the volume */
-    uint64_t kept;               /* of those: not what no function given to `brick` shows */
-    uint64_t halo;               /* neighbours of those, for interpolation */
-    uint64_t bytes, index_bytes; /* on disk: of everything, of the index */
-    uint64_t
-        checksum; /* of the index, which has those of all else: the same data, the same number */
-    unsigned format_version, lists, code_bytes, normal_bytes; /* 0: splats are not shaded */
-    double gradient_step[3], gradient_full;                   /* of normals of 3 bytes, of all */
+    uint64_t kept; /* kept voxels, which are visible with a transfer function given to `brick` */
+    uint64_t halo; /* transparent neighbours of kept voxels, stored for interpolation */
+    uint64_t bytes, index_bytes; /* size on disk of the whole data set and of its index */
+    /* Checksum of the index, which contains the checksums of all other bytes. Equal data sets have
+     * equal checksums. */
+    uint64_t checksum;
+    /* normal_bytes is 0 if the data set has no normals; its splats are then not shaded. */
+    unsigned format_version, lists, code_bytes, normal_bytes;
+    /* gradient_step is the unit of 3-byte normals. Shading is full from gradients of gradient_full
+     * on. */
+    double gradient_step[3], gradient_full;
     unsigned tile_voxels, slab_sheets, page_bytes;
-    const char *notes; /* as its maker left them, JSON by `brick`; last until it is closed */
+    /* Text from the maker of the data set; `brick` writes JSON. Valid until the data set is closed.
+     */
+    const char *notes;
 } triptych_info;
 
+/* Describes the open data set; of several, their union. Fails with TRIPTYCH_USAGE if none is open.
+ */
 TRIPTYCH_API int triptych_get_info(triptych *t, triptych_info *out);
 
-/* Records of one kind along one axis at one level of detail. */
+/* A list: records of one kind along one axis at one level of detail. */
 typedef struct triptych_list {
-    const char *path; /* of its data set; lasts until that is closed */
-    int axis;         /* 0 to 2 */
-    unsigned level;   /* 0: all details */
-    const char *kind; /* "voxels", "halo" */
-    int drawn;        /* 0: there for interpolation alone */
-    int64_t dims[3];  /* of the list's own grid */
+    const char *path; /* of the data set that has the list; valid until it is closed */
+    int axis;         /* 0 to 2 for X, Y, Z */
+    unsigned level;   /* 0 is the finest */
+    const char *kind; /* "voxels", "halo", "means" or "values" */
+    int drawn;        /* 1 if its records are drawn as splats, 0 if they only serve interpolation */
+    int64_t dims[3];  /* of the grid of its level */
     double index_to_world[3][4];
-    double sheet_first, sheet_step; /* sheets along the axis, in voxels of level 0 */
+    /* Sheet s lies at sheet_first + sheet_step * s, in voxels of level 0 along the axis. */
+    double sheet_first, sheet_step;
     uint64_t records, slabs, bricks, bytes;
 } triptych_list;
 
-/* Lists are numbered from 0 to below triptych_info.lists. */
+/* Describes a list. `number` is from 0 to triptych_info.lists - 1, otherwise TRIPTYCH_USAGE. */
 TRIPTYCH_API int triptych_get_list(triptych *t, unsigned number, triptych_list *out);
-/* Reads everything and checks it against its checksums and the index. */
+/* Reads the whole data set and checks it against its checksums and its index. Returns
+ * TRIPTYCH_ERROR if anything is damaged. */
 TRIPTYCH_API int triptych_verify(triptych *t);
 
 enum { TRIPTYCH_HISTOGRAM_BINS = 1024 };
 
 typedef struct triptych_histogram {
-    double lo, hi;                            /* what the bins divide equally */
-    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* of finite values of the volume, kept or not */
+    /* Bins divide the range from lo to hi equally. */
+    double lo, hi;
+    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* finite values of the volume, kept or not */
     uint64_t total;
 } triptych_histogram;
 
-/* As it is kept in the data set, nothing is read for it; total 0: none is. */
+/* Returns the histogram that the data set stores. Reads no voxels. `total` is 0 if the data set
+ * stores none. */
 TRIPTYCH_API int triptych_get_histogram(triptych *t, triptych_histogram *out);
 
-/* ---- what is drawn ---- */
+/* ---- appearance ---- */
 
 typedef struct triptych_transfer_function {
-    const char *name;     /* preset or file, as of --tf; default: the one kept in the data set */
-    double opacity_scale; /* multiplies extinction, up to 1e6; default 1 */
-    double window, level; /* window > 0: stretched over level - window / 2 to level + window / 2 */
-    int *left_out;        /* not NULL: set to 1 (else 0), in place of a warning, where values that
-                             would show were not kept; the function is then not taken */
-    const char *text;     /* the function itself, as the text of a `.tf`; not with a name */
+    /* Name of a preset or path of a file, as for --tf. The default is the transfer function stored
+     * in the data set. */
+    const char *name;
+    double opacity_scale; /* factor on extinction, up to 1e6; default 1 */
+    /* If window > 0, the function is stretched over level - window / 2 to level + window / 2, in
+     * data units. */
+    double window, level;
+    /* If not NULL, replaces the warning about visible values that bricking dropped. The call then
+     * sets *left_out to 1 and leaves the transfer function unchanged. Otherwise it sets *left_out
+     * to 0. */
+    int *left_out;
+    const char *text; /* the function as the text of a `.tf` file; excludes `name` */
 } triptych_transfer_function;
 
-/* From the next frame on; NULL: the default. */
+/* Sets the transfer function for later frames. NULL selects the default. Fails with TRIPTYCH_USAGE
+ * if a number is out of range or while a frame is begun, with TRIPTYCH_ERROR if the function cannot
+ * be read. */
 TRIPTYCH_API int triptych_set_transfer_function(triptych *t,
                                                 const triptych_transfer_function *function);
 
 typedef struct triptych_preset {
-    const char *name, *values, *summary; /* values: what the function's values are relative to */
+    /* `values` says which units the values of the function have: data units, relative to the range,
+     * ... */
+    const char *name, *values, *summary;
 } triptych_preset;
 
-/* Built-in functions, numbered from 0; returns 0 beyond the last, else 1. */
+/* Describes the built-in transfer function `number`, counted from 0. Returns 1, or 0 if there is no
+ * such function. */
 TRIPTYCH_API int triptych_get_preset(unsigned number, triptych_preset *out);
 
 typedef enum triptych_form {
-    TRIPTYCH_FORM_TF,       /* Triptych's own text */
-    TRIPTYCH_FORM_PARAVIEW, /* JSON */
-    TRIPTYCH_FORM_VP,       /* 3D Slicer, as text and as JSON */
+    TRIPTYCH_FORM_TF,       /* Triptych's own text format */
+    TRIPTYCH_FORM_PARAVIEW, /* ParaView, JSON */
+    TRIPTYCH_FORM_VP,       /* 3D Slicer, text */
     TRIPTYCH_FORM_VP_JSON,
-    TRIPTYCH_FORM_SLICER, /* presets in XML */
-    TRIPTYCH_FORM_VTK,    /* XML */
+    TRIPTYCH_FORM_SLICER, /* 3D Slicer, presets in XML */
+    TRIPTYCH_FORM_VTK,    /* VTK, XML */
 } triptych_form;
 
 typedef struct triptych_conversion {
-    const char *function; /* preset or file; default: the data's own */
-    const char *volume;   /* the data, a file; default: the data set that is open, or none */
-    double lo, hi;        /* lo < hi: without data, what a function over the data's range spans */
+    const char *function; /* preset or file; default: the transfer function of the data */
+    const char *volume;   /* file of the volume; default: the open data set, or no data */
+    /* If no data is given and lo < hi, functions relative to the range of the data span lo to hi.
+     */
+    double lo, hi;
     triptych_form form;
-    const char *name; /* of what is converted, for the text and messages; default: of the above */
+    /* Name of the result, in its text and in messages. The default is the function's name, then the
+     * volume's, then the data set's. */
+    const char *name;
 } triptych_conversion;
 
-/* A function in data units, as text that other programs read; *text is for free(). */
+/* Converts a transfer function to data units, as text that other programs read. Free *text with
+ * free(). *text is NULL after a failure. */
 TRIPTYCH_API int triptych_convert(triptych *t, const triptych_conversion *wanted, char **text);
 
 typedef enum triptych_method {
-    TRIPTYCH_MERGE, /* three layers, blended */
-    TRIPTYCH_CLIP,  /* each pixel from one layer */
-    TRIPTYCH_AXIS,  /* one layer for the picture */
-    TRIPTYCH_IMAGE, /* sheets parallel to the image plane (Mueller & Crawfis 1998), which have no
-                       order of lists; pre, by the reference alone */
+    TRIPTYCH_MERGE, /* blends the layers of up to three lists */
+    TRIPTYCH_CLIP,  /* draws each pixel from one list */
+    TRIPTYCH_AXIS,  /* draws the whole picture from one list */
+    /* Cuts splats into sheets parallel to the image plane (Mueller & Crawfis 1998). Needs pre and
+     * the reference renderer. */
+    TRIPTYCH_IMAGE,
 } triptych_method;
 
 typedef enum triptych_traversal {
-    TRIPTYCH_OUTWARD,   /* front to back from the eye */
-    TRIPTYCH_ASCENDING, /* in the order of the file */
+    TRIPTYCH_OUTWARD,   /* from the eye outward, front to back */
+    TRIPTYCH_ASCENDING, /* in file order */
 } triptych_traversal;
 
 typedef enum triptych_target {
@@ -224,167 +285,205 @@ typedef enum triptych_target {
 } triptych_target;
 
 typedef enum triptych_field {
-    TRIPTYCH_VALUES, /* interpolated between voxels, then classified */
+    TRIPTYCH_VALUES, /* values interpolated between voxels, then classified */
     TRIPTYCH_SPLATS, /* the sum of the splats */
 } triptych_field;
 
 typedef enum triptych_kernel {
-    TRIPTYCH_LINEAR,   /* between the 8 voxels around */
-    TRIPTYCH_CUBIC,    /* Catmull and Rom's, between 64 */
-    TRIPTYCH_GAUSSIAN, /* a splat's, of 64, which smooths; not of the integral */
+    TRIPTYCH_LINEAR, /* between the 8 nearest voxels */
+    TRIPTYCH_CUBIC,  /* Catmull-Rom, between 64 voxels */
+    /* The profile of a splat over 64 voxels, which smooths. Not for the integral. */
+    TRIPTYCH_GAUSSIAN,
 } triptych_kernel;
 
-/* What comes first. */
+/* The order of classification and interpolation. */
 typedef enum triptych_classify {
-    TRIPTYCH_PRE,  /* voxels are classified, and their splats drawn */
-    TRIPTYCH_POST, /* values are interpolated in sheets, and classified at pixels */
-    /* Post, but pre where something is set that only splats have (ascending traversal, the
-     * method image, weights of vertices, a rounded target, indexed, triangles, by
-     * sheet, EWA footprints, another low-pass or kernel radius than 2, count), or the data has no
-     * cells to interpolate in: one voxel thick, or culled without a halo. triptych_explain() says
-     * which. Memory has no part in it: where post does not fit, the frame fails, and names what
-     * would do. */
+    TRIPTYCH_PRE,  /* voxels are classified, then drawn as splats */
+    TRIPTYCH_POST, /* values are interpolated in sheets, then classified at each pixel */
+    /* Uses post unless a setting exists only for splats or the data cannot be interpolated.
+     * Settings that exist only for splats:
+     * - ascending traversal, method image, vertex_weights, indexed, triangles, count
+     * - a target other than rgba32f, a kernel_radius other than 2
+     * - compositing by sheet, footprints other than exact, low-pass filters other than EWA
+     * Data that cannot be interpolated:
+     * - a grid one voxel thick
+     * - a data set without a halo from which bricking dropped voxels
+     * triptych_explain() gives the reason. Memory has no influence: if post does not fit, the frame
+     * fails, and the error names a remedy. */
     TRIPTYCH_CLASSIFY_AUTO,
 } triptych_classify;
 
-/* How many coarse levels there are to draw the data set's pictures by, of values (post, auto) or of
- * means (pre). */
+/* Sets *levels to the number of coarse levels for a classification: levels of values for post and
+ * auto, levels of means for pre. */
 TRIPTYCH_API int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *levels);
 
-/* What of splats (pre) is composited. */
+/* The unit of compositing for splats (pre). */
 typedef enum triptych_compositing {
-    TRIPTYCH_BY_SPLAT, /* each, in list order */
-    TRIPTYCH_BY_SHEET, /* the sum of those of each sheet, whose order does not matter then */
+    TRIPTYCH_BY_SPLAT, /* each splat, in list order */
+    /* The sum of the splats of a sheet. Their order within the sheet then does not matter. */
+    TRIPTYCH_BY_SHEET,
 } triptych_compositing;
 
-/* How the footprint of a splat is worked out (pre). */
+/* How the footprint of a splat is computed (pre). */
 typedef enum triptych_footprint {
-    TRIPTYCH_FOOTPRINT_EXACT, /* from the distance of every pixel's ray */
-    TRIPTYCH_FOOTPRINT_EWA,   /* by the affine map at its centre, as EWA volume splatting does */
-    TRIPTYCH_FOOTPRINT_FIXED, /* a circle of one size in pixels, that of one in the middle of the
-                                 volume; by the reference and gl */
+    TRIPTYCH_FOOTPRINT_EXACT, /* from the distance of each pixel's ray */
+    /* By the affine approximation at the centre (EWA, Zwicker et al. 2001). */
+    TRIPTYCH_FOOTPRINT_EWA,
+    /* A circle of one size in pixels, computed for a splat in the middle of the volume. Reference
+     * and GL renderers only. */
+    TRIPTYCH_FOOTPRINT_FIXED,
 } triptych_footprint;
 
-/* What keeps splats from falling between pixels (pre). */
+/* The low-pass filter that keeps splats from falling between pixels (pre). */
 typedef enum triptych_low_pass {
-    TRIPTYCH_LOW_PASS_EWA,     /* convolution with a Gaussian */
-    TRIPTYCH_LOW_PASS_UNIFORM, /* Swan's scaling; of EWA footprints, by the reference alone */
+    TRIPTYCH_LOW_PASS_EWA, /* convolution with a Gaussian */
+    /* Swan's scaling. Needs EWA footprints and the reference renderer. */
+    TRIPTYCH_LOW_PASS_UNIFORM,
     TRIPTYCH_LOW_PASS_NONE,
 } triptych_low_pass;
 
-/* What is cut away. Of splats (pre) those are drawn whose voxels are inside: they reach over the
- * cut by their radius. Where values are interpolated (post, the integral) rays are cut. */
+/* Clipping. Post and the integral cut rays exactly. Pre drops whole splats by the position of their
+ * voxel, so remaining splats reach over the cut by their radius. */
 typedef struct triptych_clip {
-    int box;                     /* not 0: what lies outside of box_lo to box_hi is cut away */
-    int box_of_voxels;           /* not 0: those are indices; else world space */
-    double box_lo[3], box_hi[3]; /* lo < hi; infinities are no bounds */
-    int planes;                  /* 0 to 6 half-spaces besides: */
-    double plane[6][4]; /* a, b, c, d: what is kept has a x + b y + c z + d >= 0, world space */
+    int box;                     /* if not 0, keeps only box_lo to box_hi */
+    int box_of_voxels;           /* if not 0, the box is in index space, otherwise in world space */
+    double box_lo[3], box_hi[3]; /* lo < hi; infinities set no bound */
+    int planes;                  /* number of half-spaces in plane[], 0 to 6 */
+    /* Plane (a, b, c, d) keeps the points of world space with a x + b y + c z + d >= 0. */
+    double plane[6][4];
 } triptych_clip;
 
-/* What a picture is coloured by. */
+/* The colours of a picture. */
 typedef enum triptych_show {
-    TRIPTYCH_SHOW_PICTURE, /* the function */
-    TRIPTYCH_SHOW_LISTS,   /* which list: x red, y green, z blue */
-    TRIPTYCH_SHOW_MERGE,   /* the weights of the lists at each pixel, alike; nothing is read */
-    TRIPTYCH_SHOW_LEVELS,  /* which level: white the finest, then blue, green, yellow, orange, red
-                              and, of all beyond, violet */
+    TRIPTYCH_SHOW_PICTURE, /* by the transfer function */
+    TRIPTYCH_SHOW_LISTS,   /* by list: x red, y green, z blue */
+    TRIPTYCH_SHOW_MERGE,   /* weights of the lists at each pixel; reads no data */
+    /* By level of detail. From the finest level on: white, blue, green, yellow, orange, red, then
+     * violet for all others. */
+    TRIPTYCH_SHOW_LEVELS,
 } triptych_show;
 
-/* Effects besides shading. What is not among them costs nothing. */
+/* Effects beyond shading. An effect that is off costs nothing. */
 enum {
-    TRIPTYCH_SHADOWS = 1,      /* what lies towards the light attenuates it, and fog scatters it;
-                                  not with the headlight */
-    TRIPTYCH_OCCLUSION = 2,    /* what lies around attenuates the light from everywhere */
-    TRIPTYCH_CUEING = 4,       /* what is farther fades into the background */
-    TRIPTYCH_EFFECTS_AUTO = 8, /* and those that the kind of data and the function call for */
-    TRIPTYCH_EMISSION = 16,    /* what is hot radiates as a black body: by triptych_set_heat() */
+    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with the
+     * headlight. */
+    TRIPTYCH_SHADOWS = 1,
+    TRIPTYCH_OCCLUSION = 2, /* matter around a point attenuates the light from everywhere */
+    TRIPTYCH_CUEING = 4,    /* distant matter fades into the background */
+    /* Adds the effects that suit the kind of data and the transfer function. */
+    TRIPTYCH_EFFECTS_AUTO = 8,
+    TRIPTYCH_EMISSION = 16, /* hot matter radiates as a black body; needs triptych_set_heat() */
 };
 
-/* The h that suits the classification: 0.85 of splats, 0.99 of values. */
+/* Selects h by classification: 0.85 for pre, 0.99 for post. */
 #define TRIPTYCH_H_AUTO (-1.0)
 
-/* The saturation that suits the classification: 1/8192 of splats, 1/512 of values. */
+/* Selects the early termination by classification: 1/8192 for pre, 1/512 for post. */
 #define TRIPTYCH_EARLY_TERMINATION_AUTO (-1.0)
 
 typedef struct triptych_settings {
     triptych_classify classify;
-    triptych_compositing compositing; /* pre */
-    triptych_footprint footprint;     /* pre */
-    triptych_low_pass low_pass;       /* pre */
-    int vertex_weights; /* not 0: merge takes weights from the corners of splats, about the eye of
-                           pixels (pre, by splat; by the reference alone) */
-    int normalise;      /* not 0: colours are divided by the opacity that has accumulated, and what
-                           is covered at all is opaque */
-    double flatten; /* of EWA footprints: how many times flatter kernels are along full gradients, 1
-                       (round) to 100; without count */
-    int samples_per_sheet; /* of a sheet, post: 1 to 16, more come closer to the integral; 0: by the
-                              view */
+    triptych_compositing compositing; /* pre only */
+    triptych_footprint footprint;     /* pre only */
+    triptych_low_pass low_pass;       /* pre only */
+    /* If not 0, merge interpolates the weights between the corners of each splat; near splats use
+     * the weights of pixels. Needs pre, compositing by splat and the reference renderer. */
+    int vertex_weights;
+    /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
+     * opaque. */
+    int normalise;
+    /* EWA footprints: how many times flatter kernels are along full gradients, 1 (round) to 100.
+     * Not with count. */
+    double flatten;
+    /* Post: 1 to 16. More samples come closer to the integral. 0 selects the number by the view. */
+    int samples_per_sheet;
     triptych_method method;
     triptych_traversal traversal;
-    triptych_target target;   /* of the layers; not of the reference */
-    int indexed, triangles;   /* how GL is given splats: one array for all lists, quads */
-    int shading;              /* from gradients */
-    int headlight;            /* light from the eye; else from light[] */
-    int point_light;          /* not 0: light[] is the light's place, as bright at any distance */
-    double light[3];          /* world direction to the light, not zero; or its place */
-    double h;                 /* where layers begin to blend, 0 to below 1, or TRIPTYCH_H_AUTO */
-    double early_termination; /* transmittance below which a pixel takes nothing of what lies
-                          behind, 0 (none is) to 0.1, or TRIPTYCH_EARLY_TERMINATION_AUTO: no
-                          component is off by more than that. By gl with pre at most the default */
-    double kernel_radius; /* of a splat, voxels, 0.1 to 100; below 1.5 warned of: a pattern shows */
-    double background[4]; /* red, green, blue, alpha, 0 to 1, not multiplied by alpha */
-    double lod_px; /* where voxels are at most so many pixels wide the coarsest such level is drawn,
-                      0 to 1000; 0, the default: the finest alone. Of those of the classification
-                      (triptych_levels_for); a warning where there are none. Not with indexed */
-    double max_bytes; /* > 0: what is widest in the picture first is drawn by the finest levels with
-                         which codes and normals of so many bytes at most are in view; not counted
-                         are positions, some 10 to 30 % more. Not beyond what lod_px calls for */
-    double max_ms; /* > 0: the same by about how long the frame takes, from how long others of the
-                      context took: depends on the machine, and so does the picture then */
-    int depth;     /* not 0: frames have distances too; not with rounded targets or the integral */
-    /* Of the integral renderer alone, but for samples. */
-    triptych_field field;   /* what it integrates */
-    triptych_kernel kernel; /* of values; of post, too */
-    double tolerance;       /* of a component of a pixel, 1e-12 to 0.1 */
-    int samples;            /* rays along each side of a pixel, 1 to 64; without depth. Renderers
-                               but the integral draw a picture so many times as wide and high */
-    int count; /* not 0: triptych_list_stats has exact counts, which takes time, of occluded bricks
-                  too */
+    triptych_target target; /* format of the layers; ignored by the reference renderer */
+    /* GL, splats: one vertex array for all lists; quads instead of point sprites. */
+    int indexed, triangles;
+    int shading;   /* if not 0, shades by gradients */
+    int headlight; /* if not 0, light comes from the eye, otherwise from light[] */
+    /* If not 0, light[] is the position of the light, which is equally bright at any distance. */
+    int point_light;
+    /* World space: direction to the light, not zero, or the position of the light. */
+    double light[3];
+    /* Merge: weight at which layers begin to blend, 0 <= h < 1, or TRIPTYCH_H_AUTO. */
+    double h;
+    /* Transmittance below which a pixel takes no more samples or splats: 0 (never) to 0.1, or
+     * TRIPTYCH_EARLY_TERMINATION_AUTO. No component of a pixel changes by more than this number. GL
+     * uses at most the default in pre. */
+    double early_termination;
+    /* Radius of a splat in voxels, 0.1 to 100. Below 1.5 a warning says that a pattern of voxels is
+     * visible. */
+    double kernel_radius;
+    double background[4]; /* red, green, blue, alpha, 0 to 1; not multiplied by alpha */
+    /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
+     * wide, 0 to 1000. 0 draws the finest level only. The data set needs coarse levels for the
+     * classification (triptych_levels_for); without them a warning says so. Not with indexed. */
+    double lod_px;
+    /* If > 0, bounds the bytes of codes and normals in view. The parts that are widest in the
+     * picture get the finest levels first. Positions are not counted; they add 10 to 30 %. Never
+     * finer than lod_px asks for. */
+    double max_bytes;
+    /* If > 0, bounds the time of a frame in ms in the same way as max_bytes, by the speed of
+     * earlier frames of this context. The picture then depends on the machine. */
+    double max_ms;
+    /* If not 0, frames have distances too. Needs the target rgba32f; not with the integral. */
+    int depth;
+    /* The integral renderer alone uses field and tolerance. */
+    triptych_field field;   /* the field to integrate */
+    triptych_kernel kernel; /* of values, in post and the integral */
+    double tolerance;       /* of each component of a pixel, 1e-12 to 0.1 */
+    /* Rays along each side of a pixel, 1 to 64. Other renderers than the integral draw a picture
+     * this many times wider and higher, and average it. Above 1 not with depth. */
+    int samples;
+    /* If not 0, triptych_list_stats has exact counts. Takes time, and draws occluded bricks too. */
+    int count;
     triptych_clip clip;
-    triptych_show show; /* not of the integral, which has no lists or levels */
-    int effects;        /* the sum of TRIPTYCH_SHADOWS, ... */
-    double anisotropy;  /* of fog that scatters: -0.95 backwards to 0.95 forwards, 0 alike */
-    double cueing;      /* share of the background in what is farthest, above 0 to 1 */
-    double kelvin[2];   /* of emission: temperature where heat is 0 and where it is greatest, 0 or
-                           more, the second above the first, up to 100000 */
-    int light_cells; /* of shadows, occlusion and emission: a lattice of at most so many cells along
-                        the longest side, 8 to 1024, at least a voxel each */
+    triptych_show show; /* not with the integral, which has no lists and no levels */
+    int effects;        /* sum of TRIPTYCH_SHADOWS, ...; 0 is none */
+    /* Scattering in fog: -0.95 (backwards) to 0.95 (forwards), 0 in all directions alike. */
+    double anisotropy;
+    double cueing; /* share of the background in the farthest colours, above 0 and up to 1 */
+    /* Emission: temperatures in kelvin where the heat is 0 and where it is greatest, ascending, 0
+     * to 100000. */
+    double kelvin[2];
+    /* Shadows, occlusion and emission: cells of the lattice along its longest side, 8 to 1024. A
+     * cell is at least one voxel long. */
+    int light_cells;
 } triptych_settings;
 
-/* Classification auto, by splat, exact footprints with EWA's low-pass, slices by the view, merge,
- * outward, rgba32f, h and saturation by the classification, kernel radius 2, shading by headlight,
- * black; values, linear, 1e-4, one ray a pixel; no effects, and where they are set scattering
- * alike, cueing 0.6, up to 2500 K, 128 cells. */
+/* Returns the default settings:
+ * - classify auto, compositing by splat, exact footprints with the EWA low-pass filter
+ * - samples per sheet by the view, h and early termination by the classification
+ * - method merge, traversal outward, target rgba32f, kernel radius 2
+ * - shading with the headlight, black background, picture without distances
+ * - finest level only, one ray per pixel
+ * - integral: values, linear kernel, tolerance 1e-4
+ * - no effects; if set: anisotropy 0, cueing 0.6, 0 to 2500 K, 128 cells */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
-/* How close to the integral pictures are to be, for the time that takes; measured by `triptych
- * accuracy`, triptych-accuracy(1) has the figures. */
+/* How close a picture comes to the integral, against the time that takes. triptych-accuracy(1) has
+ * the errors, measured by `triptych accuracy`. */
 typedef enum triptych_quality {
     TRIPTYCH_DRAFT,
     TRIPTYCH_NORMAL, /* the default settings */
     TRIPTYCH_HIGH,
-    TRIPTYCH_EXACT, /* with a saturation of 1/8192 also of values */
+    TRIPTYCH_EXACT, /* early termination is 1/8192, also in post */
 } triptych_quality;
 
-/* Changes what accuracy is traded for time by: classify, compositing, footprint, low_pass, flatten,
- * vertex_weights, slices, method, h, saturation, target, kernel_radius, lod_px, max_bytes, max_ms
- * and samples; the rest stays. TRIPTYCH_USAGE: there is no such quality. */
+/* Sets the settings that trade accuracy for time: classify, compositing, footprint, low_pass,
+ * flatten, vertex_weights, samples_per_sheet, method, h, early_termination, target, kernel_radius,
+ * lod_px, max_bytes, max_ms and samples. Leaves all other settings unchanged. Returns
+ * TRIPTYCH_USAGE if `quality` is invalid. */
 TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
+/* Sets the settings for later frames. Fails with TRIPTYCH_USAGE if a value is out of range or while
+ * a frame is begun. triptych_begin() checks settings that exclude one another. */
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
 
-/* Left and right are the object's own. */
+/* Sides by the orientation of the data. Left and right are the object's own. */
 typedef enum triptych_side {
-    TRIPTYCH_SIDE_DEFAULT, /* the front, a little from the left and above */
+    TRIPTYCH_SIDE_DEFAULT, /* the front, seen a little from the left and from above */
     TRIPTYCH_FRONT,
     TRIPTYCH_BACK,
     TRIPTYCH_LEFT,
@@ -394,152 +493,177 @@ typedef enum triptych_side {
     TRIPTYCH_ISO,
 } triptych_side;
 
-/* All zero: all that the function shows, in a picture of 1024 x 1024. */
+/* The view. All zero shows all visible voxels in a picture of 1024 x 1024 pixels. */
 typedef struct triptych_view {
-    int width, height;                      /* px, up to 65536; default 1024 */
-    const double *eye, *look, *up;          /* world space, x, y, z; NULL: found */
-    triptych_side side;                     /* that is seen, without an eye */
-    double azimuth_degrees;                 /* from there round the object, to the right */
-    double elevation_degrees, roll_degrees; /* up; the picture clockwise */
-    double zoom;                            /* as another lens would; default 1 */
-    double fov_degrees;                     /* vertical; default 30; not beyond these: */
+    int width, height;             /* in pixels, up to 65536; default 1024 */
+    const double *eye, *look, *up; /* x, y, z in world space; NULL lets the library choose */
+    triptych_side side;            /* side to look at, if eye is NULL */
+    double azimuth_degrees;        /* turns the eye from there around the object, to the right */
+    double elevation_degrees, roll_degrees; /* raises the eye; turns the picture clockwise */
+    double zoom;        /* factor on the picture size, as with another lens; default 1 */
+    double fov_degrees; /* vertical angle of view; default 30; within these limits: */
 #define TRIPTYCH_FOV_MIN_DEGREES 1e-6
 #define TRIPTYCH_FOV_MAX_DEGREES 179.999
-    double ortho_height; /* > 0: parallel, so many world units high */
-    int ortho_fit;       /* not 0: parallel, as high as needed */
-    int turntable;       /* not 0: all stays in view when it is turned */
+    double ortho_height; /* if > 0, a parallel view of this height in world units */
+    int ortho_fit;       /* if not 0, a parallel view as high as needed */
+    /* If not 0, the view shows all visible voxels from every azimuth. */
+    int turntable;
 } triptych_view;
 
-/* Works out the view; reads some of the data where it is to be fitted to what the function shows,
- * so after the function and the settings. */
+/* Computes the view and uses it for later frames. If the view has to fit the visible voxels, this
+ * reads data, so set the transfer function and the settings first. Fails with TRIPTYCH_USAGE if a
+ * number is out of range or while a frame is begun. */
 TRIPTYCH_API int triptych_set_view(triptych *t, const triptych_view *view);
-/* The view that triptych_set_view() made, turned about its up axis: counterclockwise seen from
- * above. */
+/* Turns the view of triptych_set_view() about its up axis, counterclockwise seen from above. Each
+ * call starts from that view, not from an earlier turn. */
 TRIPTYCH_API int triptych_turn(triptych *t, double degrees);
 
 typedef struct triptych_camera {
     double eye[3], look[3], up[3];
-    double fov_degrees, ortho_height; /* ortho_height > 0: parallel */
+    double fov_degrees, ortho_height; /* the view is parallel if ortho_height > 0 */
     int width, height;
-    uint64_t splats; /* that were looked at to find the view */
+    uint64_t splats; /* splats examined to fit the view */
 } triptych_camera;
 
-/* The view that frames are drawn from. */
+/* Returns the view of the next frame. Computes the default view if none is set. */
 TRIPTYCH_API int triptych_get_camera(triptych *t, triptych_camera *out);
 
-/* What is seen at a place of the picture: where half of what the ray loses is lost. */
+/* The visible point on a ray. Half of the opacity of the ray lies in front of it. */
 typedef struct triptych_hit {
-    double opacity; /* of the whole ray, unshaded; 0: nothing is seen, what follows is not set */
+    /* Opacity of the whole ray. If 0, nothing is visible and all other fields are 0. */
+    double opacity;
     double position[3]; /* world space */
-    double index[3];    /* the same in voxels */
-    double value; /* of the data where the ray meets the sheet nearest to that, interpolated */
-    double depth; /* from the eye along the ray, in parallel views from the eye's plane */
-    double depth_first; /* where what shows begins */
+    double index[3];    /* the same position in index space */
+    /* The interpolated value where the ray meets the sheet nearest to the position. */
+    double value;
+    /* World units from the eye along the ray; in parallel views, from the plane of the eye. */
+    double depth;
+    double depth_first; /* depth of the first visible matter */
 } triptych_hit;
 
-/* Of the view, function and data set, whatever was drawn; x and y in pixels from the picture's top
- * left corner, pixel centres at + 0.5, also beyond its edges. Reads the bricks along the ray. Not
- * while a frame is begun. */
+/* Finds the visible point at (x, y) for the current view, transfer function and data set. The
+ * position is in pixels from the top left corner; pixel centres are at + 0.5. Points outside the
+ * picture are allowed. Reads the bricks along the ray. Fails with TRIPTYCH_USAGE while a frame is
+ * begun. */
 TRIPTYCH_API int triptych_probe(triptych *t, double x, double y, triptych_hit *out);
 
 /* ---- frames ---- */
 
-/* rgba: width * height * 4 floats. */
+/* Draws a whole frame. `rgba` takes 4 floats per pixel of the view. */
 TRIPTYCH_API int triptych_draw(triptych *t, float *rgba);
 
-/* What triptych_step() has come to. */
+/* Results of triptych_step(). */
 enum {
     TRIPTYCH_DONE = 0,
-    TRIPTYCH_MORE = 1,  /* there is more to draw: the deadline has passed */
-    TRIPTYCH_WAITS = 2, /* nothing to draw: the disk or a graphics device is at work */
+    TRIPTYCH_MORE = 1,  /* the deadline passed before the frame was complete */
+    TRIPTYCH_WAITS = 2, /* nothing can be drawn until the disk or the graphics device delivers */
 };
 
-/* The same in steps, for programs with other things to do: begin, steps until TRIPTYCH_DONE,
- * picture, end. Until the end nothing can be set. */
+/* Begins a frame that triptych_step() draws in steps, for programs with other things to do. Call
+ * triptych_begin(), triptych_step() until it returns TRIPTYCH_DONE, triptych_picture(), and
+ * triptych_end(). Functions that change the data set, settings or view fail until then. */
 TRIPTYCH_API int triptych_begin(triptych *t);
-/* Draws what has been read, until the deadline by CLOCK_MONOTONIC in nanoseconds; something of it
- * in any case. Never waits for the disk, and for a graphics device no longer than for a picture or
- * a piece. UINT64_MAX: no deadline. */
+/* Draws data that has been read, until the deadline, and at least one piece. The deadline is in ns
+ * of CLOCK_MONOTONIC; UINT64_MAX sets none. Returns TRIPTYCH_DONE, TRIPTYCH_MORE, TRIPTYCH_WAITS or
+ * a failure. Never waits for the disk. Waits for a graphics device at most for one picture or
+ * piece. */
 TRIPTYCH_API int triptych_step(triptych *t, uint64_t deadline_ns);
-/* Waits until there is something to draw, or room for it, at most so long. */
+/* Waits until triptych_step() has something to draw, at most `timeout_ns`. */
 TRIPTYCH_API int triptych_await(triptych *t, uint64_t timeout_ns);
-/* The picture so far; after TRIPTYCH_DONE the picture. rgba as above. */
+/* Copies the picture drawn so far; after TRIPTYCH_DONE it is complete. `rgba` takes 4 floats per
+ * pixel. */
 TRIPTYCH_API int triptych_picture(triptych *t, float *rgba);
-/* The same of a frame with triptych_settings.depth, and as many distances, in world units: from the
- * eye (in parallel views its plane) to what is seen of the data, on average; +infinity: nothing. */
+/* Copies the picture and its distances, for frames with triptych_settings.depth. `depth` takes
+ * width * height floats. A distance is the mean in world units from the eye to the visible matter;
+ * in parallel views it starts at the plane of the eye. Pixels without matter have +infinity. */
 TRIPTYCH_API int triptych_picture_and_depth(triptych *t, float *rgba, float *depth);
-/* Also gives up a frame that is not done. */
+/* Ends the frame, complete or not. */
 TRIPTYCH_API void triptych_end(triptych *t);
 
-/* From any thread: the call under way ends within milliseconds, with TRIPTYCH_CANCELLED, and so do
- * those that follow for a frame that is begun. */
+/* Cancels the running call. Any thread may call this. The running call returns TRIPTYCH_CANCELLED
+ * within milliseconds, and so do further calls for a frame that is begun. */
 TRIPTYCH_API void triptych_cancel(triptych *t);
 
-/* ---- what a frame takes ---- */
+/* ---- costs of a frame ---- */
 
-/* Of a frame that is begun: what it reads and why, an effect or list a line; of post at several
- * levels, the picture that is being drawn. *text is for free(). */
+/* Explains the frame that is begun: which bricks, lists and planes it reads, and why, one effect or
+ * list per line. A post frame at several levels has a plan for each; the text shows the plan that
+ * is being drawn. Free *text with free(). *text is NULL after a failure. */
 TRIPTYCH_API int triptych_explain(triptych *t, char **text);
 
-/* Of the last frame whose picture was complete. Texts last until the data set is closed. */
+/* Statistics of the last complete frame. Strings are valid until the data set is closed. */
 typedef struct triptych_frame_stats {
-    double ms;                              /* from its begin to its picture */
-    double plan_ms;                         /* before that */
-    double wait_ms, draw_ms, merge_ms;      /* waiting for the disk, drawing, merging layers (of the
-                                               integral: its rays) */
-    uint64_t splats, bytes_read, reads;     /* of all lists, from the disk */
-    uint64_t bytes_cached;                  /* instead from memory */
-    uint64_t runs_occluded, bytes_occluded; /* not read: behind what is opaque */
-    uint64_t bytes_unused;                  /* not read: of attributes that have no effect */
-    uint64_t memory_bytes, peak_memory_bytes; /* that may be taken, and were since it was opened */
-    const char *renderer, *device, *engine;   /* "cpu", "8 threads, AVX2", "io_uring+O_DIRECT" */
-    const char *ring;                         /* where reads land, in words */
-    triptych_classify classify;               /* pre or post, what was drawn */
-    int samples_per_sheet;                    /* of a sheet, post; else 0 */
-    triptych_footprint footprint;             /* pre: what was drawn */
-    double
-        early_termination; /* transmittance below which pixels took no more; -1 of the integral */
-    int effects;           /* that ran; of shadows and occlusion: */
-    uint64_t light_bytes_read; /* not in bytes_read; 0 where it was kept */
+    double ms;      /* from the begin of drawing to the picture */
+    double plan_ms; /* planning, not in `ms` */
+    /* Parts of `ms`: waiting for the disk, drawing, merging the layers. Merging includes the rays
+     * of the integral. */
+    double wait_ms, draw_ms, merge_ms;
+    uint64_t splats, bytes_read, reads;     /* over all lists; read from disk */
+    uint64_t bytes_cached;                  /* taken from the cache instead of the disk */
+    uint64_t runs_occluded, bytes_occluded; /* not read, because they lie behind opaque matter */
+    uint64_t bytes_unused; /* not read, because the planes have no effect on the picture */
+    uint64_t memory_bytes, peak_memory_bytes; /* limit, and maximum since the data set was opened */
+    /* Such as "cpu", "8 threads, AVX2" and "io_uring+O_DIRECT". */
+    const char *renderer, *device, *engine;
+    const char *ring;             /* memory into which blocks are read, in words */
+    triptych_classify classify;   /* pre or post, as drawn */
+    int samples_per_sheet;        /* post; 0 in pre */
+    triptych_footprint footprint; /* pre, as drawn */
+    /* Transmittance below which pixels took no more samples; -1 with the integral. */
+    double early_termination;
+    int effects; /* effects that were drawn */
+    /* For shadows and occlusion. Not in bytes_read. 0 if the lattice was kept from an earlier
+     * frame. */
+    uint64_t light_bytes_read;
     uint64_t light_memory_bytes;
-    double light_gather_ms, light_sweep_ms; /* in ms: reading and gathering; working out */
-    uint64_t heat_bytes_read;               /* of emission, likewise */
+    double light_gather_ms, light_sweep_ms; /* reading the extinction; computing the light */
+    /* For emission. Not in bytes_read. 0 if the lattice was kept from an earlier frame. */
+    uint64_t heat_bytes_read;
     uint64_t heat_memory_bytes;
     double heat_ms;
-    int closed_form; /* post: the function is linear in the value, or nearly, and was not looked up
-                      */
+    /* 1 if the integrals of the transfer function have a closed form, so that no table was looked
+     * up (post). */
+    int closed_form;
 } triptych_frame_stats;
 
+/* Returns the statistics of the last complete frame. Fails with TRIPTYCH_USAGE if there is none. */
 TRIPTYCH_API int triptych_get_frame_stats(triptych *t, triptych_frame_stats *out);
 
 typedef struct triptych_list_stats {
     uint64_t bricks, bricks_selected;
-    uint64_t bricks_transparent, bricks_outside, bricks_without_weight; /* why left out */
+    /* Bricks left out because they are transparent, outside the view, or without weight at any
+     * pixel. */
+    uint64_t bricks_transparent, bricks_outside, bricks_without_weight;
     uint64_t splats_read, bytes_read;
-    int counted; /* by triptych_settings.count; else what follows is 0 */
-    uint64_t splats_projected, splats_drawn; /* not culled; of those, with a pixel centre in them */
-    uint64_t bricks_clipped, bricks_of_other_levels; /* left out, too */
+    int counted; /* 1 with triptych_settings.count; otherwise the next two are 0 */
+    uint64_t splats_projected, splats_drawn; /* splats in view; splats that cover a pixel centre */
+    uint64_t bricks_clipped, bricks_of_other_levels; /* also left out */
 } triptych_list_stats;
 
-/* The same frame's, by list. */
+/* Returns statistics of the last complete frame for one list, numbered as in
+ * triptych_get_list(). Fails with TRIPTYCH_USAGE if there is no such list or no such frame. */
 TRIPTYCH_API int triptych_get_list_stats(triptych *t, unsigned number, triptych_list_stats *out);
 
 /* ---- pictures ---- */
 
-/* Memory for a picture, zeroed, out of triptych_resources.memory_bytes: 4 channels, or 1 for
- * distances. triptych_close() releases what is left of it. */
+/* Allocates a zeroed picture within triptych_resources.memory_bytes. `channels` is 4, or 1 for
+ * distances. Fails with TRIPTYCH_ERROR if it does not fit. triptych_close() releases all pictures.
+ */
 TRIPTYCH_API int triptych_new_picture(triptych *t, int width, int height, int channels,
                                       float **pixels);
+/* Releases a picture of triptych_new_picture(). Does nothing for other pointers. */
 TRIPTYCH_API void triptych_release_picture(triptych *t, float *pixels);
 
-/* Writes a picture: .png, .jpg, .tif or, in linear light, .exr. */
+/* Writes a picture. The ending of `path` selects the format: .png, .jpg, .tif, or .exr (linear
+ * light). */
 TRIPTYCH_API int triptych_write(triptych *t, const char *path, int width, int height,
                                 const float *rgba);
-/* Writes distances, width * height of them: .exr, as channel Z, or .tif. */
+/* Writes width * height distances as .exr (channel Z) or .tif. */
 TRIPTYCH_API int triptych_write_depth(triptych *t, const char *path, int width, int height,
                                       const float *depth);
-/* May come before: refuses names that these refuse, and starts what they write by, which is then
- * ready when the first picture is. depth_path may be NULL. */
+/* Checks the paths and starts the helper that writes them, so that it is ready when the first
+ * picture is complete. Optional. Fails with TRIPTYCH_USAGE for names that the two functions above
+ * refuse. NULL is allowed for `depth_path`. */
 TRIPTYCH_API int triptych_prepare_write(triptych *t, const char *path, const char *depth_path);
 
 #ifdef __cplusplus

@@ -1,7 +1,10 @@
-/* Data sets of volumes, for triptych.h: what `triptych brick` does. Zero means the default
- * everywhere. Needs no data set open; one that is open stays open. While it works, the context's
- * progress goes by the stages "sample", "scan" and "read" (of voxels), "merge" (of splats),
- * "levels" (of sheets) and "look" (of bytes). */
+/* Makes data sets of volumes for triptych.h, as `triptych brick` does. Zero selects the default for
+ * every option. Only triptych_set_source() needs an open data set. An open data set stays open.
+ * Functions that take a context fail with TRIPTYCH_USAGE for invalid options, and all but
+ * triptych_list_files() also while a frame is begun.
+ *
+ * Progress (triptych_set_progress()) has the stages "sample", "scan" and "read" (in voxels),
+ * "merge" (in splats), "levels" (in sheets) and "look" (in bytes). */
 #ifndef TRIPTYCH_BRICK_H
 #define TRIPTYCH_BRICK_H
 
@@ -14,9 +17,9 @@ extern "C" {
 
 typedef enum triptych_level_set {
     TRIPTYCH_LEVEL_SET_DEFAULT, /* filled */
-    TRIPTYCH_LEVEL_SET_FILLED,  /* dense inside; a ramp of 4 voxels, or of the stored band
-                                   where that is narrower */
-    TRIPTYCH_LEVEL_SET_BAND,    /* densest at the surface */
+    /* Dense inside. The border is a ramp of 4 voxels, or of the stored band if that is narrower. */
+    TRIPTYCH_LEVEL_SET_FILLED,
+    TRIPTYCH_LEVEL_SET_BAND, /* densest at the surface */
 } triptych_level_set;
 
 typedef enum triptych_endian {
@@ -26,83 +29,97 @@ typedef enum triptych_endian {
 } triptych_endian;
 
 typedef enum triptych_code_bits {
-    TRIPTYCH_CODE_BITS_AUTO, /* 8 where these keep all values of the type exactly, else 16 */
-    TRIPTYCH_CODE_BITS_8, /* values are rounded to 256 codes between the least and the greatest */
+    TRIPTYCH_CODE_BITS_AUTO, /* 8 if that keeps all values of the type exactly, otherwise 16 */
+    /* Rounds values to 256 codes between the minimum and the maximum. */
+    TRIPTYCH_CODE_BITS_8,
     TRIPTYCH_CODE_BITS_16,
 } triptych_code_bits;
 
 typedef enum triptych_normals {
-    TRIPTYCH_NORMALS_AUTO,    /* compact where they change no colour by half of 1/255 */
+    /* Compact if no colour changes by half of 1/255 or more, otherwise full. */
+    TRIPTYCH_NORMALS_AUTO,
     TRIPTYCH_NORMALS_COMPACT, /* 3 bytes */
     TRIPTYCH_NORMALS_FULL,    /* 4 bytes */
     TRIPTYCH_NORMALS_NONE,
 } triptych_normals;
 
-/* What coarse levels are drawn by: interpolated values (post), splats (pre). */
+/* The classification for which coarse levels are made. */
 typedef enum triptych_levels_for {
-    TRIPTYCH_LEVELS_FOR_AUTO, /* post, or pre where there is no halo */
-    TRIPTYCH_LEVELS_FOR_POST, /* not without a halo */
+    TRIPTYCH_LEVELS_FOR_AUTO, /* post, or pre if there is no halo */
+    TRIPTYCH_LEVELS_FOR_POST, /* interpolated values; needs a halo */
     TRIPTYCH_LEVELS_FOR_PRE,
-    TRIPTYCH_LEVELS_FOR_BOTH, /* not without a halo */
+    TRIPTYCH_LEVELS_FOR_BOTH, /* needs a halo */
 } triptych_levels_for;
 
 typedef struct triptych_range {
-    double lo, hi; /* inclusive */
+    double lo, hi; /* both inclusive */
 } triptych_range;
 
 typedef struct triptych_brick_options {
-    /* How the volume is read. */
-    const char *grid; /* OpenVDB: default "density", else the first fog, else the first scalars */
-    triptych_level_set level_set; /* OpenVDB */
+    /* ---- reading the volume ---- */
+
+    /* OpenVDB grid. The default is "density", then the first fog volume, then the first scalar
+     * grid. */
+    const char *grid;
+    triptych_level_set level_set; /* for OpenVDB */
     int64_t raw_dims[3];          /* raw data: voxels along each axis, the fastest first */
-    const char *raw_type;         /* "uint8", "int16", "float", ...; default: by the file's name */
+    /* Raw data: "uint8", "int16", "float", ... The default comes from the file's name. */
+    const char *raw_type;
     triptych_endian raw_endian;
     uint64_t raw_offset_bytes;
-    const char *coordinates; /* of voxels along the axes, "X.txt,Y.txt,Z.txt": files of as many
-                                numbers, ascending or descending; an axis whose name is empty has
-                                even spacing; NULL: the file's, else even */
-    double spacing[3];       /* of voxels; default: the file's, else 1 */
-    /* Where in the patient x, y and z of a volume point to whose file does not say: three letters,
-     * one of R and L, of A and P and of S and I each, as "PIR". */
+    /* Positions of voxels along the axes: three file names, "X.txt,Y.txt,Z.txt". Each file has one
+     * number per voxel along its axis, ascending or descending. An empty name means even spacing.
+     * The default is the positions in the volume's file, otherwise even spacing. */
+    const char *coordinates;
+    double spacing[3]; /* between voxels; default: from the file, otherwise 1 */
+    /* Anatomical directions of x, y and z for a volume without orientation. Three letters, one of R
+     * and L, one of A and P, one of S and I, such as "PIR". */
     const char *axes;
-    int allow_gaps;      /* not 0: slices may be missing in a stack */
-    uint64_t max_voxels; /* not 0: of a volume of more voxels every second, third, ... along each
-                             axis is read, so that there are at most so many */
+    int allow_gaps; /* if not 0, a stack of slices may have gaps */
+    /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
+     * axis, so that at most this many are read. */
+    uint64_t max_voxels;
 
-    /* What is kept: the union of these; with none of them, as with `automatic`. */
-    const char *const *functions; /* presets or files, */
-    size_t function_count;        /* so many: what they show */
+    /* ---- the opacity envelope: the union of the following; `automatic` if none is given ---- */
+
+    /* Presets or files; keeps the values that are visible with one of them. */
+    const char *const *functions;
+    size_t function_count; /* number of `functions` */
     const triptych_range *ranges;
     size_t range_count;
-    int keep_all;  /* every finite value */
-    int automatic; /* what the automatic transfer function shows */
-    /* Of these, voxels from `first` to before `past` along i, j, k alone; past 0: to the end. All
-     * 0: of the whole volume, which is read whatever the region is: regions of a volume have codes
-     * alike, and the halo reaches beyond them, so that triptych_add() puts them together. */
+    int keep_all;  /* if not 0, keeps every finite value */
+    int automatic; /* if not 0, keeps the values visible with the automatic transfer function */
+    /* Keeps only voxels from `first` up to, but without, `past` along i, j, k. 0 for `past` selects
+     * the end of the axis. All 0 selects the whole volume. Bricking reads the whole volume in any
+     * case, so all regions have the same codes, and the halo reaches beyond the region.
+     * triptych_add() draws several regions together. */
     int64_t region_first[3], region_past[3];
 
-    /* What is made. */
-    triptych_code_bits code_bits; /* of a value */
+    /* ---- the data set ---- */
+    triptych_code_bits code_bits; /* per value */
     triptych_normals normals;
-    int no_halo; /* not 0: not the transparent neighbours of what is kept */
-    int levels;  /* coarse levels; 0: down to one brick, below 0: none */
+    int no_halo; /* if not 0, stores no halo */
+    int levels;  /* number of coarse levels; 0: until one is a single brick; below 0: none */
     triptych_levels_for levels_for;
-    unsigned tile_voxels;  /* 16, 32, 64 or 128; default 64 */
-    unsigned slab_sheets;  /* 1 to 64; default 8 */
-    int replace;           /* not 0: a data set of that name */
-    int resume;            /* not 0: goes on from where the same was killed, if it was */
-    uint64_t max_bytes;    /* more is refused before it is written */
-    uint64_t memory_bytes; /* default: a quarter of what may be used */
-    unsigned threads;      /* up to 256; default: one a processor */
+    unsigned tile_voxels; /* edge of a tile: 16, 32, 64 or 128; default 64 */
+    unsigned slab_sheets; /* 1 to 64; default 8 */
+    int replace;          /* if not 0, replaces an existing data set of the same name */
+    /* If not 0, resumes an interrupted run with the same input and options, if there is one. */
+    int resume;
+    /* Limit of the data set's size. A larger data set is refused before it is written. 0 sets no
+     * limit. */
+    uint64_t max_bytes;
+    uint64_t memory_bytes; /* default: a quarter of the memory available */
+    unsigned threads;      /* up to 256; default: one per processor */
 } triptych_brick_options;
 
-/* Its stages; none overlap. */
+/* Stages of bricking, one after the other. */
 enum {
-    TRIPTYCH_STAGE_SCAN,   /* a pass over the volume, where what is kept depends on all values */
-    TRIPTYCH_STAGE_READ,   /* the pass that makes splats */
-    TRIPTYCH_STAGE_MERGE,  /* of what was spilled, into the lists */
-    TRIPTYCH_STAGE_LEVELS, /* coarse levels, of the lists written */
-    TRIPTYCH_STAGE_FINISH, /* the index, and everything onto the disk */
+    TRIPTYCH_STAGE_SCAN,   /* reads all values, if the envelope or the normals depend on them */
+    TRIPTYCH_STAGE_READ,   /* makes splats */
+    TRIPTYCH_STAGE_MERGE,  /* merges spilled splats into the lists */
+    TRIPTYCH_STAGE_LEVELS, /* makes coarse levels from the lists */
+    TRIPTYCH_STAGE_FINISH, /* writes the index and syncs all files */
     TRIPTYCH_STAGES
 };
 
@@ -115,65 +132,77 @@ typedef struct triptych_brick_summary {
     int64_t dims[3];
     double spacing[3], value_min, value_max;
     uint64_t voxels, kept, halo, not_finite;
-    unsigned code_bytes, normal_bytes; /* of a splat in a list */
-    const char *kind, *kind_title;     /* what it was taken for: "ct", "CT in Hounsfield units" */
-    uint64_t input_bytes;              /* decompressed */
-    uint64_t bytes, halo_bytes;        /* of all lists, of those of the halo */
-    uint64_t level_bytes;              /* of those of coarse levels, of which there are */
-    unsigned levels;                   /* so many */
-    uint64_t temporary_bytes;          /* written and removed again */
+    /* Bytes per splat in a list. */
+    unsigned code_bytes, normal_bytes;
+    /* Recognised kind of data, such as "ct" and "CT in Hounsfield units". */
+    const char *kind, *kind_title;
+    uint64_t input_bytes;       /* size of the volume, decompressed */
+    uint64_t bytes, halo_bytes; /* size of all lists; size of the halo lists */
+    uint64_t level_bytes;       /* size of the coarse levels' lists */
+    unsigned levels;            /* number of coarse levels */
+    /* Written to temporary files and removed again. */
+    uint64_t temporary_bytes;
     int resumed;
-    char note[1024]; /* what was chosen where the file leaves a choice, or "" */
+    char note[1024]; /* choices made where the file leaves several, or "" */
     triptych_brick_stage stages[TRIPTYCH_STAGES];
-    uint64_t memory_bytes, peak_memory_bytes; /* that could be taken, and were */
+    uint64_t memory_bytes, peak_memory_bytes; /* limit; maximum used */
 } triptych_brick_summary;
 
-/* Makes a data set of a volume: .nrrd, .nhdr, .nii (.gz, or .hdr with .img), .nc, .vdb, .vol, raw
- * data, DICOM, or slices by their folder or a pattern of names. `options` and `summary` may be
- * NULL. */
+/* Makes the data set `data_set` of the volume `volume`. NULL is allowed for `options` and
+ * `summary`. Volumes are:
+ * - a file: .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img, .nc, .vdb, .vol, or raw data
+ * - DICOM files
+ * - slices: their folder, or a pattern of their names
+ * The data set appears under its name only when it is complete. */
 TRIPTYCH_API int triptych_brick(triptych *t, const char *volume, const char *data_set,
                                 const triptych_brick_options *options,
                                 triptych_brick_summary *summary);
 
-/* For the integral renderer, once the data set is open: values come from the volume that it was
- * made of, all of them and not rounded, and gradients from those values. Reads the volume; of
- * `options`, which may be NULL, only how it is read counts. Opening a data set ends this. */
+/* Lets the integral renderer use the volume's own values and their gradients. These values are
+ * not rounded to codes and include dropped voxels. Reads the volume. The data set made of it must
+ * be open, with the integral renderer, and its grid must match. Only the options for reading count;
+ * NULL is allowed. Opening another data set ends this. */
 TRIPTYCH_API int triptych_set_source(triptych *t, const char *volume,
                                      const triptych_brick_options *options);
 
 typedef struct triptych_brick_estimate {
     uint64_t voxels, kept, halo;
-    uint64_t bytes, temporary_bytes, free_bytes; /* where the data set would be */
+    /* Size of the data set, size of temporary files, and free space on their disk. */
+    uint64_t bytes, temporary_bytes, free_bytes;
     double seconds;
 } triptych_brick_estimate;
 
-/* What that would come to, from parts of the volume. */
+/* Estimates triptych_brick() with the same arguments from parts of the volume. Writes nothing. */
 TRIPTYCH_API int triptych_estimate(triptych *t, const char *volume, const char *data_set,
                                    const triptych_brick_options *options,
                                    triptych_brick_estimate *out);
 
-/* Names for what a data set would be made of, of 32 hexadecimal digits each: for a cache. */
+/* Identifies the data set that a volume and options would give, as keys for a cache. Each key has
+ * 32 hexadecimal digits. */
 typedef struct triptych_identity {
-    char state[33];   /* of the options and the files' places, sizes and times */
-    char content[33]; /* of the options and all bytes of the files; "" where they were not read */
-    uint64_t bytes;   /* of the files */
-    int stable; /* 0: a file changed so lately that changing again may leave `state` as it is */
+    char state[33]; /* from the options and the paths, sizes and times of the files */
+    /* From the options and all bytes of the files, or "" if the files were not read. */
+    char content[33];
+    uint64_t bytes; /* total size of the files */
+    /* 0 if a file changed so recently that another change might not change `state`. */
+    int stable;
 } triptych_identity;
 
-/* Files of up to `max_content_bytes` together are read for `content`; 0: none are. What does not
- * change the data set, such as memory and threads, does not count. */
+/* Computes the keys. Reads the files for `content` if they have at most `max_content_bytes` in
+ * total; 0 never reads them. Options that do not change the data set, such as memory and threads,
+ * do not count. */
 TRIPTYCH_API int triptych_identify(triptych *t, const char *volume,
                                    const triptych_brick_options *options,
                                    uint64_t max_content_bytes, triptych_identity *out);
 
-/* Calls `found` with the path of every file that a volume is read from; of a folder or a pattern
- * perhaps with some more. Of `options`, which may be NULL, only how it is read counts. What `found`
- * returns below 0 ends it, and is returned. */
+/* Calls `found` with the path of every file of the volume. For a folder or a pattern there may be
+ * further files. Only the options for reading count; NULL is allowed. If `found` returns a negative
+ * number, the function stops and returns that number. */
 TRIPTYCH_API int triptych_list_files(triptych *t, const char *volume,
                                      const triptych_brick_options *options,
                                      int (*found)(void *user, const char *path), void *user);
 
-/* Whether a type is one of triptych_brick_options.raw_type. */
+/* Returns 1 if `name` is a valid triptych_brick_options.raw_type, otherwise 0. */
 TRIPTYCH_API int triptych_is_raw_type(const char *name);
 
 #ifdef __cplusplus

@@ -6,14 +6,14 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-/* A voxel's u and v in its square, by its Morton number. */
+/* u and v of a voxel in its square, by Morton number. */
 #define PLACE(n)                                                                                   \
     (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4) | ((n)&2) << 7 | ((n)&8) << 6 | ((n)&32) << 5)
 #define PLACES4(n) PLACE(n), PLACE((n) + 1), PLACE((n) + 2), PLACE((n) + 3)
 #define PLACES16(n) PLACES4(n), PLACES4((n) + 4), PLACES4((n) + 8), PLACES4((n) + 12)
 static const uint32_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
-/* u and v of a square's corner in the tile, by its Morton number. */
+/* Returns u and v of a square's corner in the tile, by the square's Morton number. */
 static uint32_t corner_of(uint32_t square)
 {
     uint32_t x = (square & 0x55) | (square & 0xaa) << 15; /* v in the upper half */
@@ -22,7 +22,7 @@ static uint32_t corner_of(uint32_t square)
     return (x & 15) << 3 | (x >> 16) << 11;
 }
 
-/* The Morton number of a voxel in the tile. */
+/* Returns the Morton number of a voxel in the tile. */
 static uint32_t number_of(uint32_t voxel)
 {
     uint32_t x = (voxel & 0x7f) | (voxel & 0x7f00) << 8;
@@ -37,7 +37,7 @@ static uint32_t code_words(uint32_t bytes)
     return (bytes + 7) / 8;
 }
 
-/* Words of so many forms. */
+/* Returns the words of the forms of `groups` groups. */
 static uint32_t form_words(uint32_t groups)
 {
     return (groups + 1) / 2;
@@ -66,7 +66,7 @@ bool trip_block_words_fit(const trip_block_form *f, uint32_t records, uint32_t w
 
 /* ---- groups ---- */
 
-/* The square behind the group that begins with `square`. */
+/* Returns the square after the group that starts with `square`. */
 static uint32_t group_end(const uint64_t *masks, uint32_t squares, uint32_t square)
 {
     uint32_t records = 0;
@@ -104,7 +104,7 @@ static uint32_t count_records(const uint64_t *masks, uint32_t squares)
     return records;
 }
 
-/* Bytes of packed codes. */
+/* Returns the bytes of the packed codes. */
 static uint32_t packed_bytes(const uint64_t *masks, uint32_t squares, const uint32_t *forms)
 {
     uint32_t bytes = 0;
@@ -147,7 +147,7 @@ TRIP_ALSO_V3 trip_block trip_block_make(const trip_block_form *f, uint32_t recor
     return b;
 }
 
-/* What lies behind the masks. */
+/* Returns the part after the masks. */
 static const void *forms_of(const trip_block *b)
 {
     return b->masks + b->squares;
@@ -166,7 +166,7 @@ size_t trip_block_codes_bytes(const trip_block *b)
 
 /* ---- packing ---- */
 
-/* The Morton numbers of some voxels; false when one is not in the tile. */
+/* Finds the Morton numbers of voxels. Returns false if a voxel is outside the tile. */
 static bool find_numbers(unsigned tile_log2, const uint32_t *voxels, uint32_t count,
                          uint32_t *numbers)
 {
@@ -178,8 +178,8 @@ static bool find_numbers(unsigned tile_log2, const uint32_t *voxels, uint32_t co
     return outside == 0;
 }
 
-/* Sets the bits of presence and masks; the number of squares, or 0 when voxels are not in order or
- * not in the tile. */
+/* Sets the bits of presence and masks. Returns the number of squares, or 0 if voxels are out of
+ * order or outside the tile. */
 static uint32_t pack_positions(unsigned tile_log2, const uint32_t *voxels, uint32_t count,
                                uint64_t *present, uint64_t *masks)
 {
@@ -227,7 +227,7 @@ static bool are_steps(const uint32_t *voxels, uint32_t count)
     return rest == 0;
 }
 
-/* The form that fits the codes. */
+/* Returns the form that fits the codes. */
 static uint32_t form_of(const uint32_t *voxels, uint32_t count, uint32_t step)
 {
     uint32_t min = UINT16_MAX, max = 0;
@@ -242,13 +242,13 @@ static uint32_t form_of(const uint32_t *voxels, uint32_t count, uint32_t step)
     return min | (width + width % 2) << 16;
 }
 
-/* A square's codes; returns the bytes. */
+/* Packs the codes of a square. Returns the number of bytes. */
 INLINE uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t step, uint32_t form,
                             unsigned char *out)
 {
     const uint32_t min = form & UINT16_MAX, width = width_of(form), bytes = (count * width + 7) / 8;
     unsigned char packed[2 * 64 + sizeof(uint64_t)];
-    for (uint32_t i = 0; i < count; i += 4) { /* four begin at a whole byte */
+    for (uint32_t i = 0; i < count; i += 4) { /* four codes start at a whole byte */
         uint64_t four = 0;
         for (uint32_t k = 0; k < 4 && i + k < count; k++)
             four |= (uint64_t)(trip_voxel_code(voxels[i + k]) / step - min) << k * width;
@@ -258,7 +258,8 @@ INLINE uint32_t pack_square(const uint32_t *voxels, uint32_t count, uint32_t ste
     return bytes;
 }
 
-/* Forms and codes of all groups; returns the words. `step` is a constant where it is called. */
+/* Packs the forms and codes of all groups. Returns the number of words. Callers pass a constant
+ * `step`. */
 INLINE uint32_t pack_groups(const uint32_t *voxels, uint32_t step, const uint64_t *masks,
                             uint32_t squares, uint64_t *out)
 {
@@ -320,7 +321,8 @@ TRIP_ALSO_V3 uint32_t trip_block_squares(const trip_block *b,
 {
     const bool packed = b->code_bytes != 1;
     const uint32_t *forms = forms_of(b);
-    uint32_t n = 0, first = 0, groups = 0, left = 0; /* records that the group is short of */
+    uint32_t n = 0, first = 0, groups = 0,
+             left = 0; /* number of records that the group still needs */
     for (unsigned w = 0; w < b->present_words; w++)
         for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, n++) {
             const uint64_t mask = b->masks[n];
@@ -332,7 +334,7 @@ TRIP_ALSO_V3 uint32_t trip_block_squares(const trip_block *b,
                                         .number = 64 * w + (uint32_t)__builtin_ctzll(bits),
                                         .first = first,
                                         .count = count,
-                                        .min = groups - 1 /* whose it is */ };
+                                        .min = groups - 1 /* index of the square's group */ };
             first += count;
         }
     const void *behind = b->masks + b->squares + (packed ? form_words(groups) : 0);
@@ -349,7 +351,7 @@ TRIP_ALSO_V3 uint32_t trip_block_squares(const trip_block *b,
     return n;
 }
 
-/* Packed codes of a square, and room for four more to be read behind them. */
+/* Packed codes of a square, with room to read four more codes behind them. */
 typedef struct packed_codes {
     unsigned char bytes[2 * 64 + sizeof(uint64_t)];
 } packed_codes;
@@ -361,8 +363,8 @@ static void copy_codes(const trip_square *s, packed_codes *p)
     memset(p->bytes + bytes, 0, sizeof(uint64_t));
 }
 
-/* What codes i to i + 3 are above the least one, the first lowest. Four begin at a whole byte and
- * take at most 8. */
+/* Returns codes i to i + 3 minus the minimum, the first one lowest. Four codes start at a whole
+ * byte and take at most 8 bytes. */
 INLINE uint64_t four_above(const packed_codes *p, uint32_t width, uint32_t i)
 {
     const uint64_t max = (UINT64_C(1) << width) - 1;
@@ -372,7 +374,7 @@ INLINE uint64_t four_above(const packed_codes *p, uint32_t width, uint32_t i)
            (four >> 3 * width & max) << 48;
 }
 
-/* `with` is compiled for each width that there is. */
+/* Compiles `with` once for each possible width. */
 #define WITH_WIDTH(width, with)                                                                    \
     switch (width) {                                                                               \
         OF_WIDTH(2, with);                                                                         \
@@ -383,7 +385,7 @@ INLINE uint64_t four_above(const packed_codes *p, uint32_t width, uint32_t i)
         OF_WIDTH(12, with);                                                                        \
         OF_WIDTH(14, with);                                                                        \
         OF_WIDTH(16, with);                                                                        \
-    default: /* all are the least */                                                               \
+    default: /* all codes equal the minimum */                                                     \
         with(0);                                                                                   \
     }
 #define OF_WIDTH(width, with)                                                                      \
@@ -425,8 +427,8 @@ TRIP_ALSO_V3 void trip_square_codes(const trip_square *s, uint16_t codes[64])
 
 /* ---- checking ---- */
 
-/* Bits of a square whose u is less than x, and those whose v is: of x they are the first column and
- * row, moved by the Morton numbers of those before. */
+/* Masks of the voxels of a square with u less than x, and with v less than x. The mask for x is the
+ * first column or row, moved by the Morton numbers of the coordinates below x. */
 #define COLUMN UINT64_C(0x0000050500000505)
 #define ROW UINT64_C(0x0000000000330033)
 #define COLUMNS4 (COLUMN | COLUMN << 1 | COLUMN << 4 | COLUMN << 5)
@@ -454,14 +456,14 @@ static const uint64_t rows_below[9] = {
     UINT64_MAX,
 };
 
-/* Bits below the coordinate x, the square starting at `corner`. */
+/* Returns the bits below the coordinate x, for a square that starts at `corner`. */
 static uint64_t bits_below(const uint64_t table[9], int x, int corner)
 {
     int n = x - corner;
     return table[n < 0 ? 0 : n > 8 ? 8 : n];
 }
 
-/* The bits of a square that lie within the brick's bounds. */
+/* Returns the bits of a square inside the brick's bounds. */
 static uint64_t bits_within(const trip_file_brick *b, uint32_t corner)
 {
     int u = (int)trip_voxel_u(corner), v = (int)trip_voxel_v(corner);
@@ -475,7 +477,7 @@ static const char *check_positions(const trip_block *b, const trip_file_brick *b
     uint64_t outside = 0;
     bool empty = false;
     if (b->present_words + b->squares > b->words)
-        return "a run's squares are more than its block has room for";
+        return "a run has more squares than its block has room for";
     const uint64_t *mask = b->masks;
     for (unsigned w = 0; w < b->present_words; w++)
         for (uint64_t bits = b->present[w]; bits; bits &= bits - 1, mask++) {
@@ -503,19 +505,19 @@ static bool are_bytes_within(const trip_block *b, const trip_file_brick *brick)
            (max + TRIP_CODE_FIRST) * TRIP_CODE_STEP <= brick->code_max;
 }
 
-/* Whether no code is further above the least one. */
+/* Whether all codes exceed the minimum by at most `max`. */
 static bool are_above_at_most(const trip_square *s, uint32_t max)
 {
     uint16_t above[64] = { 0 }, greatest = 0;
     unpack_square(s, above);
-    for (uint32_t i = s->count; i % 4; i++) /* unpacked with those before */
+    for (uint32_t i = s->count; i % 4; i++) /* unpacked together with the previous codes */
         above[i] = 0;
     for (uint32_t i = 0; i < 64; i++)
         greatest = above[i] > greatest ? above[i] : greatest;
     return greatest <= max;
 }
 
-/* Codes are looked at where the width's bits could say more than the brick's range has. */
+/* Looks at the codes only if their width allows values beyond the brick's range. */
 static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
 {
     if (s->min * s->step < brick->code_min)
@@ -525,7 +527,7 @@ static bool is_square_within(const trip_square *s, const trip_file_brick *brick)
            (s->min <= max && are_above_at_most(s, max - s->min));
 }
 
-static const char wrong_length[] = "a run's block has not the length of its codes",
+static const char wrong_length[] = "the length of a run's block does not match its codes",
                   wrong_value[] = "a value is outside its brick's range";
 
 static const char *check_bytes(const trip_block *b, const trip_file_brick *brick)
@@ -535,7 +537,7 @@ static const char *check_bytes(const trip_block *b, const trip_file_brick *brick
     return are_bytes_within(b, brick) ? NULL : wrong_value;
 }
 
-/* Codes are looked at once the widths are some that there are, and the block ends where they do. */
+/* Looks at the codes only after all widths are valid and the block ends where the codes end. */
 static const char *check_packed(const trip_block *b, const trip_file_brick *brick)
 {
     const uint32_t groups = count_groups(b->masks, b->squares),
@@ -546,7 +548,7 @@ static const char *check_packed(const trip_block *b, const trip_file_brick *bric
         return wrong_length;
     for (uint32_t i = 0; i < groups; i++)
         if (width_of(forms[i]) > 16 || width_of(forms[i]) % 2)
-            return "codes have a width that there is not";
+            return "the width of codes is invalid";
     const uint32_t count = trip_block_squares(b, squares);
     const trip_square *last = &squares[count - 1];
     const unsigned char *end = last->codes + trip_square_code_bytes(last);
@@ -566,7 +568,7 @@ TRIP_ALSO_V3 const char *trip_block_check(const trip_block *b, const trip_file_b
     return b->code_bytes == 1 ? check_bytes(b, brick) : check_packed(b, brick);
 }
 
-/* Whether the bits behind the last code of each square, in its last byte, are zero. */
+/* Whether the bits after the last code of each square are zero, in its last byte. */
 static bool are_squares_padded(const trip_block *b)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
@@ -593,7 +595,8 @@ bool trip_block_is_padded(const trip_block *b)
 
 /* ---- decoding ---- */
 
-/* The places of at most `count` bits of a mask, the first `skip` left out; how many. */
+/* Lists the positions of at most `count` set bits of a mask, after the first `skip`. Returns their
+ * number. */
 static uint32_t square_positions(uint64_t mask, uint32_t corner, uint32_t skip, uint32_t count,
                                  uint32_t *voxels)
 {
@@ -624,7 +627,7 @@ void trip_square_voxels(const trip_square *s, uint32_t voxels[64])
         voxels[i] |= (uint32_t)codes[i] << 16;
 }
 
-/* Adds codes of 16 bits to the places of all records from `first` on. */
+/* Adds 16-bit codes to the positions of all records from `first` on. */
 static void add_codes(const trip_block *b, uint32_t first, uint32_t count, uint32_t *voxels)
 {
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];

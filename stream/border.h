@@ -1,14 +1,15 @@
-/* Pages at the borders of slots. A slot mostly ends in mid page, with which the next slot of that
- * plane begins: it is read once, for the first of the two, and copied for the second when both are
- * handed out, which they are one right after the other. Belongs to the reader's thread. */
+/* Pages at the borders of slots. A slot usually ends inside a page, and the next slot of the same
+ * plane starts with that page. The page is read once, for the first slot. It is copied to the
+ * second slot when that slot is handed out, right after the first. Owned by the reader's thread. */
 #ifndef TRIP_BORDER_H
 #define TRIP_BORDER_H
 
 #include "extent.h"
 
-#define TRIP_BORDERS_MAX 4 /* pages of as many planes; slots of more lists read some twice */
+/* Pages of as many planes. With more lists, some pages are read twice. */
+#define TRIP_BORDERS_MAX 4
 
-/* A page that a slot ends with, by draw order, and where it lies in the slot. */
+/* The page at the end of a slot, in draw order, and its offset in the slot. */
 typedef struct trip_border {
     const trip_list *list;
     int plane;
@@ -21,7 +22,7 @@ typedef struct trip_borders {
     unsigned count;
 } trip_borders;
 
-/* A page to copy: the number of the border, and where it goes. */
+/* A page to copy: index of the border, and the offset of the copy in the slot. */
 typedef struct trip_border_copy {
     unsigned border;
     size_t slot_offset;
@@ -32,14 +33,13 @@ typedef struct trip_border_copies {
     unsigned count;
 } trip_border_copies;
 
-/* The pages that an extent ends with. */
+/* Finds the pages at the end of an extent. */
 void trip_borders_find(trip_borders *b, const trip_extent *e, bool descending, size_t page_bytes);
-/* The bytes of a range that are left to read, [*first, *end), when a page at either end is among
- * the borders, which is added to the copies. */
+/* Finds the bytes [*first, *end) of a range that must be read. If the page at either end is a
+ * border, adds it to the copies and leaves it out. */
 void trip_borders_trim(const trip_borders *b, const trip_byte_range *range, size_t page_bytes,
                        trip_border_copies *copies, size_t *first, size_t *end);
-/* Copies between a slot's memory and the pages kept of the slot before, TRIP_BORDERS_MAX of them.
- */
+/* Copy between a slot and the kept pages of the slot before, at most TRIP_BORDERS_MAX pages. */
 void trip_borders_fetch(const trip_border_copies *copies, const unsigned char *kept,
                         unsigned char *slot, size_t page_bytes);
 void trip_borders_keep(const trip_borders *b, unsigned char *kept, const unsigned char *slot,

@@ -8,12 +8,13 @@
 #include <string.h>
 
 enum {
-    SEARCH_MAX = 8,     /* entries looked at for one that may go */
-    UNUSED_PASSES = 12, /* two frames of three lists with two sides: what is unused longer may go */
+    SEARCH_MAX = 8, /* entries examined to find one to evict */
+    UNUSED_PASSES =
+        12, /* two frames of three lists with two sides; entries unused for longer may be evicted */
 };
 
 typedef struct entry {
-    uint32_t page;                     /* this and the passes: reader's thread */
+    uint32_t page;                     /* page and passes: reader's thread only */
     uint32_t reserved_pass, last_pass; /* last_pass: no later pass has a request for the page */
     const void *filler;                /* set before its request is submitted */
     _Atomic bool valid;                /* release when stored, acquire when found */
@@ -25,10 +26,10 @@ struct trip_cache {
     unsigned list_count;
     unsigned page_log2;
     uint32_t page_count, entry_count, used, hand, pass;
-    uint32_t frame_pass; /* the last pass of the frames before this one */
-    uint32_t ended_pass; /* no request of this pass and those before it is under way */
-    /* Of a page: position + 1, 0 = not here. Written by the reader's thread, release; acquire in
-     * engine threads. */
+    uint32_t frame_pass; /* last pass of the frames before this one */
+    uint32_t ended_pass; /* requests of this pass and all earlier passes are over */
+    /* Index of a page's entry plus 1, or 0 if it has none. The reader's thread writes it (release);
+     * engine threads read it (acquire). */
     _Atomic uint32_t *entry_of;
     entry *entries;
     unsigned char *memory;
@@ -53,7 +54,7 @@ static size_t memory_bytes(const trip_cache *c)
     return (size_t)c->entry_count << c->page_log2;
 }
 
-/* Numbers the pages of the planes that are read. */
+/* Numbers the pages of the planes to read. */
 static void number_pages(trip_cache *c, const trip_dataset *d, unsigned planes)
 {
     uint64_t first = 0;
@@ -90,7 +91,7 @@ int trip_cache_create(trip_cache **out, const trip_dataset *d, unsigned planes, 
     }
     trip_cache_destroy(c);
     return trip_fail(TRIP_ERROR, "read", d->path,
-                     "no memory to keep %zu bytes of it: give more with --memory", bytes);
+                     "no memory for a cache of %zu bytes; raise --memory", bytes);
 }
 
 void trip_cache_destroy(trip_cache *c)
@@ -114,7 +115,7 @@ static unsigned char *memory_of(const trip_cache *c, uint32_t position)
     return c->memory + ((size_t)(position - 1) << c->page_log2);
 }
 
-/* Every page has its own place. */
+/* Whether every page has its own entry. */
 static bool holds_all(const trip_cache *c)
 {
     return c->entry_count == c->page_count;
@@ -154,7 +155,7 @@ bool trip_cache_find(trip_cache *c, uint32_t page)
     return true;
 }
 
-/* The page's own entry. Where a request under way may store it, it is left to that. */
+/* Returns the page's own entry. Returns NULL if a running request may still store the page. */
 static entry *own_entry(trip_cache *c, entry *e)
 {
     bool under_way = e->last_pass > c->ended_pass;
@@ -167,7 +168,7 @@ static bool may_go(const trip_cache *c, const entry *e)
     return c->pass - e->last_pass > UNUSED_PASSES && e->last_pass <= c->ended_pass;
 }
 
-/* An entry for the page: its own, an empty one, or one that may go. */
+/* Returns an entry for the page: its own, an empty one, or one that may be evicted. */
 static entry *find_room(trip_cache *c, uint32_t page)
 {
     uint32_t position = atomic_load_explicit(&c->entry_of[page], memory_order_relaxed);

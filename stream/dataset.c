@@ -45,7 +45,7 @@ static void set_path(char *where, size_t room, const trip_dataset *d, const char
     snprintf(where, room, "%s/%s", d->path, name);
 }
 
-/* Not a failure: the folder was replaced by another data set while it was being opened. */
+/* REPLACED is not a failure: another data set replaced the folder while it was being opened. */
 enum { REPLACED = 1, REPLACED_TRIES = 100 };
 
 static bool was_replaced(const trip_dataset *d, int folder)
@@ -55,7 +55,8 @@ static bool was_replaced(const trip_dataset *d, int folder)
            (opened.st_dev != named.st_dev || opened.st_ino != named.st_ino);
 }
 
-/* Opens a regular file of the data set and gives its size. Never waits, as opening a pipe would. */
+/* Opens a regular file of the data set and returns its size. Never waits, as opening a pipe would.
+ */
 static int open_file(const trip_dataset *d, int folder, const char *name, int *fd, uint64_t *bytes)
 {
     char where[4096];
@@ -65,9 +66,9 @@ static int open_file(const trip_dataset *d, int folder, const char *name, int *f
     if (*fd < 0 && errno == ENOENT && was_replaced(d, folder))
         return REPLACED;
     if (*fd < 0 && errno == ENOENT)
-        return trip_fail(TRIP_ERROR, "open", where,
-                         "the file is missing, so this is no data set: `triptych brick` makes one "
-                         "of a volume");
+        return trip_fail(
+            TRIP_ERROR, "open", where,
+            "the file is missing, so this is not a data set; make one with `triptych brick`");
     if (*fd < 0 || fstat(*fd, &st) < 0)
         return trip_fail_errno("open", where, "cannot open");
     if (!S_ISREG(st.st_mode))
@@ -87,7 +88,7 @@ static int read_at(int fd, const char *where, uint64_t offset, void *data, uint6
     return TRIP_OK;
 }
 
-/* The whole index into memory. */
+/* Reads the whole index into memory. */
 static int read_index(trip_dataset *d, int fd, uint64_t file_bytes)
 {
     char where[4096];
@@ -104,7 +105,7 @@ static int read_index(trip_dataset *d, int fd, uint64_t file_bytes)
     d->memory_bytes = file_bytes;
     if (!d->memory)
         return trip_fail(TRIP_ERROR, "open", where,
-                         "no memory for the index of %llu bytes: give more with --memory",
+                         "no memory for the index of %llu bytes; raise --memory",
                          (unsigned long long)file_bytes);
     status = read_at(fd, where, 0, d->memory, file_bytes);
     if (status == TRIP_OK)
@@ -159,8 +160,8 @@ static int set_lists(trip_dataset *d)
     unsigned count = d->header.list_count;
     d->lists = trip_budget_take(d->budget, count * sizeof *d->lists); /* zeroed */
     if (!d->lists)
-        return trip_fail(TRIP_ERROR, "open", d->path,
-                         "no memory for its %u lists: give more with --memory", count);
+        return trip_fail(TRIP_ERROR, "open", d->path, "no memory for its %u lists; raise --memory",
+                         count);
     memcpy(d->index_to_world.m, d->header.index_to_world, sizeof d->index_to_world.m);
     set_coordinates(d);
     for (; d->list_count < count; d->list_count++) {
@@ -179,7 +180,7 @@ static int set_text(trip_dataset *d)
     d->text = trip_budget_take(d->budget, d->header.text_bytes + 1); /* zeroed */
     if (!d->text)
         return trip_fail(TRIP_ERROR, "open", d->path,
-                         "no memory for its text of %llu bytes: give more with --memory",
+                         "no memory for its text of %llu bytes; raise --memory",
                          (unsigned long long)d->header.text_bytes);
     memcpy(d->text, table(d, d->header.text_offset), d->header.text_bytes);
     return TRIP_OK;
@@ -234,7 +235,7 @@ static trip_dataset *allocate(const char *path, trip_budget *budget)
     return d;
 }
 
-/* The files are opened relative to the folder, so that all are of one data set even while another
+/* Opens the files relative to the folder. All files thus belong to one data set, even if another
  * takes its name. */
 static int open_once(trip_dataset **out, const char *path, trip_budget *budget)
 {
@@ -245,7 +246,7 @@ static int open_once(trip_dataset **out, const char *path, trip_budget *budget)
     int status = TRIP_OK;
     if (folder < 0 && errno == ENOTDIR)
         status = trip_fail(TRIP_ERROR, "open", path,
-                           "is not a data set: `triptych brick` makes one of a volume, NAME.trip");
+                           "is not a data set; make one, NAME.trip, with `triptych brick`");
     else if (folder < 0)
         status = trip_fail_errno("open", path, "cannot open");
     else
@@ -266,7 +267,8 @@ int trip_dataset_open(trip_dataset **out, const char *path, trip_budget *budget)
     for (int i = 0; i < REPLACED_TRIES && status == REPLACED; i++)
         status = open_once(out, path, budget);
     if (status == REPLACED)
-        return trip_fail(TRIP_ERROR, "open", path, "is being replaced all the time");
+        return trip_fail(TRIP_ERROR, "open", path,
+                         "is replaced again and again by another process");
     return status;
 }
 
@@ -312,7 +314,7 @@ const trip_list *trip_dataset_along(const trip_dataset *d, const trip_list *list
     return along;
 }
 
-/* Widens the box to the bricks of a list along z. */
+/* Extends the box by the bricks of the list along z. */
 static void add_kept(const trip_dataset *d, const trip_list *list, double lo[3], double hi[3])
 {
     for (uint64_t i = 0; i < list->slab_count; i++) {
@@ -332,7 +334,7 @@ static void add_kept(const trip_dataset *d, const trip_list *list, double lo[3],
     }
 }
 
-/* From the bricks along one axis: those along all three hold every splat. */
+/* Uses the bricks along one axis, since the lists along all axes hold the same splats. */
 void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3])
 {
     const trip_list *list = NULL;

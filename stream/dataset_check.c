@@ -40,13 +40,14 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
         return FAIL_FIELD(magic, "not the index of a data set (no " TRIP_MAGIC ")");
     if (h->version > 0 && h->version < TRIP_FORMAT_VERSION)
         return trip_fail(TRIP_ERROR, "open", where,
-                         "byte %zu: format version %u, which is not read any more: make the data "
-                         "set again with `triptych brick`",
+                         "byte %zu: format version %u is no longer supported; make the data set "
+                         "again with `triptych brick`",
                          offsetof(trip_file_header, version), h->version);
     if (h->version != TRIP_FORMAT_VERSION)
-        return trip_fail(TRIP_ERROR, "open", where,
-                         "byte %zu: format version %u, this program reads version %d",
-                         offsetof(trip_file_header, version), h->version, TRIP_FORMAT_VERSION);
+        return trip_fail(
+            TRIP_ERROR, "open", where,
+            "byte %zu: format version %u is not supported; this program reads version %d",
+            offsetof(trip_file_header, version), h->version, TRIP_FORMAT_VERSION);
     if (XXH64(&copy, sizeof copy, 0) != h->header_checksum)
         return FAIL_FIELD(header_checksum, "the header is damaged (checksum)");
     if (h->header_bytes != TRIP_HEADER_BYTES)
@@ -81,20 +82,20 @@ static int check_grid(const trip_file_header *h, const char *where)
     if (!trip_affine_invert(&map, &inverse))
         return FAIL_FIELD(index_to_world, "the index-to-world map is singular or not finite");
     if (!isfinite(h->code_lo) || !isfinite(h->code_hi) || h->code_lo > h->code_hi)
-        return FAIL_FIELD(code_lo, "no range of codes");
+        return FAIL_FIELD(code_lo, "the range of codes is invalid");
     if (!isfinite(h->value_min) || !isfinite(h->value_max) || h->value_min > h->value_max)
-        return FAIL_FIELD(value_min, "no range of values");
+        return FAIL_FIELD(value_min, "the range of values is invalid");
     if (!is_length(h->gradient_full))
-        return FAIL_FIELD(gradient_full, "no length of gradients");
+        return FAIL_FIELD(gradient_full, "the length of gradients is invalid");
     for (int a = 0; a < 3; a++)
         if (!is_length(h->gradient_step[a]))
-            return FAIL_FIELD(gradient_step, "no gradient step");
+            return FAIL_FIELD(gradient_step, "the gradient step is invalid");
     if ((double)h->voxels > voxels)
         return FAIL_FIELD(voxels, "more voxels than the grid has");
     if (h->kept > h->voxels)
-        return FAIL_FIELD(kept, "more was kept than there are voxels");
+        return FAIL_FIELD(kept, "there are more kept voxels than voxels");
     if ((double)h->halo > voxels - (double)h->kept)
-        return FAIL_FIELD(halo, "more was kept, with what is around it, than the grid has");
+        return FAIL_FIELD(halo, "there are more kept voxels and halo voxels than the grid has");
     return TRIP_OK;
 }
 
@@ -109,17 +110,17 @@ static int check_layout(const trip_file_header *h, const char *where)
     if (!(h->planes & 1u << TRIP_PLANE_VOXELS) || h->planes >> TRIP_PLANES)
         return FAIL_FIELD(planes, "unknown planes, or no voxels");
     if (h->code_bytes < 1 || h->code_bytes > 2)
-        return FAIL_FIELD(code_bytes, "codes have 1 or 2 bytes");
+        return FAIL_FIELD(code_bytes, "codes must have 1 or 2 bytes");
     if (h->planes >> TRIP_PLANE_NORMALS & 1 ? h->normal_bytes < 3 || h->normal_bytes > 4
                                             : h->normal_bytes != 0)
-        return FAIL_FIELD(normal_bytes, "normals have 3 or 4 bytes, and 0 where there are none");
+        return FAIL_FIELD(normal_bytes, "normals must have 3 or 4 bytes, or 0 if there are none");
     if (h->list_count < 3 || h->list_count > TRIP_LISTS_MAX)
-        return FAIL_FIELD(list_count, "the number of lists is not between 3 and 4096");
+        return FAIL_FIELD(list_count, "the number of lists must be 3 to 4096");
     if (h->checksums_offset % 8 || h->checksums_offset < TRIP_HEADER_BYTES ||
         h->checksums_offset > h->index_bytes ||
         h->index_bytes - h->checksums_offset !=
             8 * trip_page_count(h->checksums_offset - TRIP_HEADER_BYTES, h->page_log2))
-        return FAIL_FIELD(checksums_offset, "the checksums are not where they must be");
+        return FAIL_FIELD(checksums_offset, "the checksums are at the wrong offset");
     if (h->text_bytes > TRIP_TEXT_BYTES_MAX)
         return FAIL_FIELD(text_bytes, "the text is too long");
     return TRIP_OK;
@@ -161,8 +162,8 @@ typedef struct sections {
     unsigned count;
 } sections;
 
-/* Notes a table of count * item_bytes bytes; false when it does not lie between the header and the
- * checksums at a multiple of 8. */
+/* Records a table of count * item_bytes bytes. Returns false unless it lies between the header and
+ * the checksums, at a multiple of `alignment`. */
 static bool add_section(sections *s, const trip_file_header *h, uint64_t offset, uint64_t count,
                         uint64_t item_bytes, unsigned alignment)
 {
@@ -210,15 +211,15 @@ static int check_list_grid(const trip_file_header *h, const trip_file_list *f, c
         return fail_at(where, at, "the list's index-to-world map is singular or not finite");
     if (!(f->sheet_step > 0) ||
         !isfinite(f->sheet_first + f->sheet_step * (double)f->dims[f->axis]))
-        return fail_at(where, at, "the list's sheets have no ascending coordinates");
+        return fail_at(where, at, "the coordinates of the list's sheets do not ascend");
     if (f->level == 0 && (memcmp(f->dims, h->dims, sizeof f->dims) != 0 ||
                           memcmp(f->index_to_world, h->index_to_world, sizeof map.m) != 0 ||
                           f->sheet_first != 0 || f->sheet_step != 1))
-        return fail_at(where, at, "a list of level 0 is not of the header's grid");
+        return fail_at(where, at, "a list of level 0 has a different grid than the header");
     return TRIP_OK;
 }
 
-/* Bytes of a plane whose records all have the same length. */
+/* Whether the lengths of the planes fit the records of the list. */
 static bool plane_bytes_fit(const trip_file_header *h, const trip_file_list *f)
 {
     uint64_t bytes;
@@ -238,15 +239,16 @@ static int check_list_kind(const trip_file_header *h, const trip_file_list *f, c
 {
     const trip_kind_info *kind = f->kind < TRIP_KINDS ? trip_kind_of((trip_kind)f->kind) : NULL;
     if (f->axis > 2 || !kind)
-        return fail_at(where, at, "no such axis or kind of list");
+        return fail_at(where, at, "unknown axis or kind of list");
     if (f->planes != (kind->planes & h->planes))
-        return fail_at(where, at, "the list has not the planes of its kind");
+        return fail_at(where, at, "the list does not have the planes of its kind");
     if (f->level == 0 && kind->coarse)
-        return fail_at(where, at, "a list of level 0 is of a kind of coarse levels");
+        return fail_at(where, at, "a list of level 0 has a kind of coarse levels");
     if (f->level == 0 && f->records != (f->kind == TRIP_KIND_VOXELS ? h->kept : h->halo))
-        return fail_at(where, at, "the list does not hold the voxels that were kept");
+        return fail_at(where, at,
+                       "the number of the list's records is not the number of kept voxels");
     if (!plane_bytes_fit(h, f))
-        return fail_at(where, at, "the list's planes have not the bytes of its records");
+        return fail_at(where, at, "the sizes of the list's planes do not match its records");
     if (!all_zero(f->reserved, sizeof f->reserved))
         return fail_at(where, at, "reserved bytes are not zero");
     return TRIP_OK;
@@ -285,7 +287,7 @@ static bool same_grid(const trip_file_list *f, const trip_file_list *g)
             (f->sheet_first == g->sheet_first && f->sheet_step == g->sheet_step));
 }
 
-/* What lists are to one another. */
+/* Checks the lists against each other. */
 static int check_set(const trip_file_header *h, const trip_file_list *lists, const char *where)
 {
     unsigned axes = 0;
@@ -303,20 +305,21 @@ static int check_set(const trip_file_header *h, const trip_file_list *lists, con
             if (f->axis == g->axis)
                 return fail_at(where, at, "two lists have the same axis, level and kind");
             if (f->records != g->records)
-                return fail_at(where, at, "lists of a kind and level hold different numbers");
+                return fail_at(where, at,
+                               "lists of a kind and level have different numbers of records");
         }
         if (f->level == 0 && f->kind == TRIP_KIND_VOXELS)
             axes |= 1u << f->axis;
         halo |= f->level == 0 && f->kind == TRIP_KIND_HALO;
     }
     if (h->halo && !halo)
-        return FAIL_FIELD(halo, "a halo was kept, and there is no list of it");
+        return FAIL_FIELD(halo, "there is a halo, but no list of it");
     if (axes != 7)
-        return fail_at(where, h->lists_offset, "the voxels of level 0 are not there for each axis");
+        return fail_at(where, h->lists_offset, "a list of voxels of level 0 is missing");
     return TRIP_OK;
 }
 
-/* A list's tables and the place in the file that faults are reported at. */
+/* The tables of a list, and the file that faults are reported for. */
 typedef struct list_check {
     const char *where;
     const trip_file_header *h;
@@ -325,7 +328,7 @@ typedef struct list_check {
     const trip_file_slab *slabs;
     const trip_file_brick *bricks;
     const trip_file_run *runs;
-    uint64_t bricks_before, records_before, bytes_before; /* of what was checked so far */
+    uint64_t bricks_before, records_before, bytes_before; /* of the tables checked so far */
 } list_check;
 
 static int fail_brick(const list_check *c, uint64_t i, const char *why)
@@ -333,8 +336,11 @@ static int fail_brick(const list_check *c, uint64_t i, const char *why)
     return fail_at(c->where, c->f->bricks_offset + i * sizeof *c->bricks, why);
 }
 
-/* Runs of a brick: none outside its sheets, some in the first and last, no more records than the
- * bounds have room for, the right sum, and blocks of a length that their records can have. */
+/* Checks the runs of a brick:
+ * - there are none outside its sheets, and some in the first and the last
+ * - no run has more records than the bounds have room for
+ * - the sum is right
+ * - the length of each block is possible for its records */
 static bool runs_fit(const list_check *c, uint64_t i, uint64_t *bytes)
 {
     const trip_file_brick *b = &c->bricks[i];
@@ -398,9 +404,9 @@ static int check_slabs(list_check *c)
             return fail_at(c->where, at, "the slabs are not ascending");
         if (slab->first_brick != c->bricks_before || slab->brick_count < 1 ||
             slab->brick_count > c->f->brick_count - c->bricks_before)
-            return fail_at(c->where, at, "the slab's bricks do not follow those before");
+            return fail_at(c->where, at, "the slab's bricks do not follow the previous bricks");
         if (slab->first_record != c->records_before || slab->first_block != c->bytes_before)
-            return fail_at(c->where, at, "the slab's records do not follow those before");
+            return fail_at(c->where, at, "the slab's records do not follow the previous records");
         int status = check_slab_bricks(c, slab);
         if (status < 0)
             return status;
@@ -415,11 +421,11 @@ static int check_slabs(list_check *c)
 static int check_text(const unsigned char *index, const trip_file_header *h, const char *where)
 {
     if (memchr(index + h->text_offset, 0, h->text_bytes))
-        return fail_at(where, h->text_offset, "the text holds a zero byte");
+        return fail_at(where, h->text_offset, "the text contains a zero byte");
     return TRIP_OK;
 }
 
-/* The tables of a grid with uneven spacing, which has no coarse levels. */
+/* Checks the tables of a grid with uneven spacing, which has no coarse levels. */
 static int check_coordinates(const unsigned char *index, const trip_file_header *h,
                              const trip_file_list *lists, const char *where)
 {

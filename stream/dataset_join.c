@@ -15,26 +15,26 @@ static bool has_same_coordinates(const trip_dataset *a, const trip_dataset *b)
     return same;
 }
 
-/* What of a data set is not as in the first; NULL: nothing that matters. */
+/* Returns how a data set differs from the first, or NULL if they can be joined. */
 static const char *find_difference(const trip_dataset *first, const trip_dataset *d)
 {
     const trip_file_header *a = &first->header, *b = &d->header;
     if (memcmp(a->dims, b->dims, sizeof a->dims) != 0 ||
         memcmp(a->index_to_world, b->index_to_world, sizeof a->index_to_world) != 0 ||
         !has_same_coordinates(first, d))
-        return "is on another grid";
+        return "has a different grid";
     if (a->code_lo != b->code_lo || a->code_hi != b->code_hi || a->code_bytes != b->code_bytes)
-        return "has another scale of values";
+        return "has a different scale of values";
     if (a->normal_bytes != b->normal_bytes || a->gradient_full != b->gradient_full ||
         memcmp(a->gradient_step, b->gradient_step, sizeof a->gradient_step) != 0)
-        return "has other normals";
+        return "has different normals";
     if (a->tile_log2 != b->tile_log2 || a->slab_sheets != b->slab_sheets ||
         a->page_log2 != b->page_log2)
-        return "has other tiles, slabs or pages";
+        return "has different tiles, slabs or pages";
     return NULL;
 }
 
-/* Lists of all parts at level 0. */
+/* Counts the lists of all parts at level 0. */
 static unsigned count_lists(trip_dataset *const *parts, unsigned count)
 {
     unsigned lists = 0;
@@ -49,7 +49,8 @@ static bool meet(unsigned a_min, unsigned a_max, unsigned b_min, unsigned b_max)
     return a_min <= b_max && b_min <= a_max;
 }
 
-/* Whether bricks of one place may have a voxel in common, which has one value in both. */
+/* Whether bricks in the same position may have a voxel in common, which would have one value in
+ * both. */
 static bool bricks_meet(const trip_file_brick *a, const trip_file_brick *b)
 {
     return meet(a->u_min, a->u_max, b->u_min, b->u_max) &&
@@ -58,7 +59,8 @@ static bool bricks_meet(const trip_file_brick *a, const trip_file_brick *b)
            meet(a->code_min, a->code_max, b->code_min, b->code_max);
 }
 
-/* Of slabs of one number; bricks lie in the order of their places. */
+/* Whether slabs of the same number have bricks that meet. Bricks are in the order of their
+ * positions. */
 static bool slabs_meet(const trip_list *a, const trip_file_slab *in_a, const trip_list *b,
                        const trip_file_slab *in_b)
 {
@@ -75,8 +77,8 @@ static bool slabs_meet(const trip_list *a, const trip_file_slab *in_a, const tri
     return false;
 }
 
-/* Whether data sets on one grid may both keep some voxel, by the bounds of their bricks: never so
- * of boxes of the grid that do not overlap. */
+/* Whether two data sets on one grid may keep the same voxel, by the bounds of their bricks. Always
+ * false for boxes of the grid that do not overlap. */
 static bool overlap(const trip_dataset *first, const trip_dataset *second)
 {
     const trip_list *a = trip_dataset_find(first, 0, 0, TRIP_KIND_VOXELS);
@@ -91,15 +93,15 @@ static bool overlap(const trip_dataset *first, const trip_dataset *second)
     return false;
 }
 
-/* Those before were joined before. */
+/* Checks the last part against the earlier parts, which were checked against each other before. */
 static int check_overlap(trip_dataset *const *parts, unsigned count)
 {
     const trip_dataset *last = parts[count - 1];
     for (unsigned p = 0; p + 1 < count; p++)
         if (overlap(parts[p], last))
             return trip_fail(TRIP_ERROR, "open", last->path,
-                             "overlaps %s, and what both have would be drawn twice: regions that "
-                             "are drawn together have no voxel in common",
+                             "overlaps %s, so some voxels would be drawn twice; draw only regions "
+                             "without common voxels together",
                              parts[p]->path);
     return TRIP_OK;
 }
@@ -110,14 +112,15 @@ static int check(trip_dataset *const *parts, unsigned count)
         const char *why = find_difference(parts[0], parts[p]);
         if (why)
             return trip_fail(TRIP_ERROR, "open", parts[p]->path,
-                             "%s than %s: what is drawn together are regions of one volume, "
+                             "%s than %s; data sets drawn together must be regions of one volume, "
                              "bricked alike (triptych brick --region)",
                              why, parts[0]->path);
     }
     if (count_lists(parts, count) > TRIP_LISTS_MAX)
-        return trip_fail(TRIP_ERROR, "open", parts[count - 1]->path,
-                         "has more lists, with those before it, than the %d there may be",
-                         TRIP_LISTS_MAX);
+        return trip_fail(
+            TRIP_ERROR, "open", parts[count - 1]->path,
+            "brings the number of lists above the maximum of %d; draw fewer data sets together",
+            TRIP_LISTS_MAX);
     return check_overlap(parts, count);
 }
 
@@ -133,7 +136,7 @@ static void add_lists(trip_dataset *d, const trip_dataset *part, unsigned number
     }
 }
 
-/* What is of all of them. Where one has no halo, values cannot be interpolated at its border. */
+/* Updates the common header. If a part has no halo, values cannot be interpolated at its border. */
 static void add_header(trip_dataset *d, const trip_dataset *part)
 {
     trip_file_header *h = &d->header;
@@ -160,7 +163,7 @@ int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned c
     trip_dataset *d = trip_budget_take(budget, sizeof *d + lists * sizeof *d->lists);
     if (!d)
         return trip_fail(TRIP_ERROR, "open", parts[count - 1]->path,
-                         "no memory for the %u lists of all: give more with --memory", lists);
+                         "no memory for the %u lists of all data sets; raise --memory", lists);
     *d = *parts[0];
     d->budget = budget;
     d->lists = (trip_list *)(void *)(d + 1);

@@ -1,15 +1,16 @@
-/* Several data sets as one, which are drawn in one picture: its lists are theirs at level 0, and a
- * pass merges them by list coordinate. They are on one grid and have one scale of codes, as regions
- * of a volume do (`brick --region`); a voxel may be in several of them, as halo of one and splat of
- * another. It shares everything with them, and they must outlive it. */
+/* Joins several data sets for one picture. The joined data set has all their lists of level 0; a
+ * pass merges these by list coordinate. The parts have one grid and one scale of codes, like
+ * regions of a volume (`brick --region`). A voxel may be in several parts, as halo of one and splat
+ * of another. The joined data set shares all memory with its parts, which must outlive it. */
 #ifndef TRIP_DATASET_JOIN_H
 #define TRIP_DATASET_JOIN_H
 
 #include "dataset.h"
 
-/* Fails (reported, with the name of the data set that does not go with the others) where they have
- * different grids, codes, normals or tiles, or more lists in all than one may have, or where the
- * last keeps voxels that one before it keeps: those before have been joined before. */
+/* Joins the parts. Reports a failure, with the name of the part at fault, in these cases:
+ * - grids, codes, normals or tiles differ
+ * - there are more than TRIP_LISTS_MAX lists
+ * - the last part keeps voxels that an earlier part keeps; earlier parts were checked before */
 int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned count,
                       trip_budget *budget);
 void trip_dataset_join_close(trip_dataset *d);

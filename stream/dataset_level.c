@@ -14,7 +14,7 @@ unsigned trip_dataset_levels(const trip_dataset *d, trip_kind kind)
     return level;
 }
 
-/* Its list takes the place of one of level 0, and its grid that of the data set. */
+/* Makes the list a list of level 0, and its grid the grid of the data set. */
 static void put_first(trip_dataset *d, trip_list *list)
 {
     list->level = 0;
@@ -31,8 +31,7 @@ int trip_dataset_level_open(trip_dataset **out, const trip_dataset *d, unsigned 
     const size_t lists = d->list_count * sizeof *d->lists;
     trip_dataset *at = *out = trip_budget_take(d->budget, sizeof *at + lists);
     if (!at)
-        return trip_fail(TRIP_ERROR, "open", d->path,
-                         "no memory for a level: give more with --memory");
+        return trip_fail(TRIP_ERROR, "open", d->path, "no memory for a level; raise --memory");
     *at = *d;
     at->lists = (trip_list *)(void *)(at + 1);
     memcpy(at->lists, d->lists, lists);
@@ -41,7 +40,7 @@ int trip_dataset_level_open(trip_dataset **out, const trip_dataset *d, unsigned 
         if (list->level == level && list->kind == TRIP_KIND_VALUES)
             put_first(at, list);
         else
-            list->level = UINT_MAX; /* of no level that is looked for */
+            list->level = UINT_MAX; /* no search finds this level */
     }
     return TRIP_OK;
 }

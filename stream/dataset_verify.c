@@ -1,5 +1,5 @@
-/* Checks a whole data set: every page by its checksum and every block against its brick, through
- * the reader; padding; and the lists against one another. */
+/* Checks a whole data set. The reader checks every page and every block. This file checks padding,
+ * and the lists against each other. */
 #include "dataset.h"
 
 #include "reader.h"
@@ -7,8 +7,8 @@
 
 #include <stdio.h>
 
-/* Sums over a list's voxels that do not depend on their order: equal lists have equal sums, and
- * different ones have not, but for chance. */
+/* Sums over a list's voxels that do not depend on their order. Equal lists have equal sums.
+ * Different lists have different sums, except by chance. */
 typedef struct voxel_sums {
     uint64_t sum, twist;
 } voxel_sums;
@@ -16,11 +16,11 @@ typedef struct voxel_sums {
 typedef struct list_verifier {
     const trip_dataset *data;
     const trip_list *list;
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of one run */
     voxel_sums sums;
 } list_verifier;
 
-/* The runs of a list, one by one. */
+/* Reads the runs of a list one by one. */
 typedef struct run_stream {
     trip_reader *reader;
     trip_selection all;
@@ -58,7 +58,8 @@ static int fail_run(const trip_dataset *d, const trip_list *list, const trip_run
 
 /* ---- streams of runs ---- */
 
-/* Slots that hold all of a small list, where the usual ones would be cleared for nothing. */
+/* Returns a slot size that holds all of a small list, since clearing default slots would waste
+ * time. */
 static size_t slot_bytes_for(const trip_list *list)
 {
     const uint64_t small = 1 << 19;
@@ -87,7 +88,7 @@ static void close_stream(run_stream *s, trip_budget *budget)
     trip_selection_destroy(&s->all, budget);
 }
 
-/* 1: the next run is there; 0: the list is over; negative: failed. */
+/* Returns 1 with the next run, 0 at the end of the list, or a negative status. */
 static int next_run(run_stream *s)
 {
     while (s->next == s->batch.run_count) {
@@ -140,7 +141,7 @@ static int check_list(list_verifier *v, trip_budget *budget)
 
 /* ---- lists against one another ---- */
 
-/* Order of runs in lists of the same grid and axis. */
+/* Compares the positions of two runs in lists of the same grid and axis. */
 static int compare_positions(const trip_run *a, const trip_run *b)
 {
     uint64_t m = trip_morton((uint32_t)a->u, (uint32_t)a->v);
@@ -150,7 +151,7 @@ static int compare_positions(const trip_run *a, const trip_run *b)
     return (m > n) - (m < n);
 }
 
-/* Whether blocks of the same tile share a voxel. */
+/* Whether two blocks of the same tile share a voxel. */
 static bool share_voxels(const trip_block *a, const trip_block *b)
 {
     const uint64_t *mask_a = a->masks, *mask_b = b->masks;
@@ -168,7 +169,7 @@ static bool share_voxels(const trip_block *a, const trip_block *b)
     return shared != 0;
 }
 
-/* Goes on with whichever stream is behind. */
+/* Advances the stream that is behind. */
 static int compare_streams(run_stream *a, run_stream *b)
 {
     int status_a = next_run(a), status_b = next_run(b);
@@ -176,7 +177,7 @@ static int compare_streams(run_stream *a, run_stream *b)
         int order = compare_positions(&a->run, &b->run);
         if (order == 0 && share_voxels(&a->block, &b->block))
             return fail_run(a->all.data, b->all.list, &b->run,
-                            "a voxel is in a list of another kind too");
+                            "a voxel is also in a list of another kind");
         if (order <= 0)
             status_a = next_run(a);
         if (order >= 0)
@@ -199,7 +200,7 @@ static int check_apart(const trip_dataset *d, const trip_list *a, const trip_lis
     return status;
 }
 
-/* A list against those before it. */
+/* Compares a list with the lists before it. */
 static int compare_lists(const trip_dataset *d, unsigned i, const voxel_sums *sums,
                          trip_budget *budget)
 {
@@ -210,9 +211,10 @@ static int compare_lists(const trip_dataset *d, unsigned i, const voxel_sums *su
         if (l->level != m->level)
             continue;
         if (l->kind == m->kind && (sums[i].sum != sums[j].sum || sums[i].twist != sums[j].twist))
-            status = trip_fail(TRIP_ERROR, "verify", d->path,
-                               "the lists of %s along %c and %c at level %u do not hold the same",
-                               trip_kind_of(l->kind)->name, 'x' + m->axis, 'x' + l->axis, l->level);
+            status =
+                trip_fail(TRIP_ERROR, "verify", d->path,
+                          "the lists of %s along %c and %c at level %u differ in their records",
+                          trip_kind_of(l->kind)->name, 'x' + m->axis, 'x' + l->axis, l->level);
         else if (l->kind != m->kind && l->axis == m->axis && trip_kind_of(l->kind)->lattice &&
                  trip_kind_of(m->kind)->lattice)
             status = check_apart(d, m, l, budget);
@@ -244,8 +246,8 @@ int trip_dataset_verify(const trip_dataset *d, trip_budget *budget)
         v->data = d;
         status = check_lists(d, v, sums, budget);
     } else {
-        status = trip_fail(TRIP_ERROR, "verify", d->path,
-                           "no memory to decode runs in: give more with --memory");
+        status =
+            trip_fail(TRIP_ERROR, "verify", d->path, "no memory to decode runs; raise --memory");
     }
     trip_budget_release(budget, sums, d->list_count * sizeof *sums);
     trip_budget_release(budget, v, sizeof *v);

@@ -1,5 +1,5 @@
-/* Carries out requests on its own threads. The reader submits from one thread; requests come back
- * by their `done` in any order, on any of the engine's threads. */
+/* Carries out requests on threads of its own. The reader submits from one thread. Requests return
+ * through `done`, in any order and on any of the engine's threads. */
 #ifndef TRIP_ENGINE_H
 #define TRIP_ENGINE_H
 
@@ -7,12 +7,12 @@
 
 typedef struct trip_engine_ops {
     const char *name;
-    /* 0, or -errno when the system refuses; nothing is reported. At most `depth` requests will be
-     * under way at once. */
+    /* Returns 0, or -errno if the system refuses; reports nothing. At most `depth` requests run at
+     * once. */
     int (*create)(void **engine, unsigned depth, unsigned threads);
-    /* A chain by `next`, which is the engine's from here on. */
+    /* Submits a chain linked by `next`. The engine owns it until `done`. */
     void (*submit)(void *engine, trip_request *chain);
-    /* Nothing may be under way. */
+    /* No request may be running. */
     void (*destroy)(void *engine);
 } trip_engine_ops;
 

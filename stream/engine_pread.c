@@ -1,4 +1,4 @@
-/* Threads that read with pread(2): works on every kernel and file system. */
+/* Reads with pread(2) on threads. Works on every kernel and file system. */
 #include "engine.h"
 
 #include <errno.h>
@@ -8,13 +8,13 @@
 typedef struct pread_engine {
     pthread_mutex_t lock;
     pthread_cond_t work;
-    trip_request *first, *last; /* under lock: those not yet taken by a thread */
-    bool stop;                  /* under lock */
+    trip_request *first, *last; /* guarded by lock: requests that no thread has taken yet */
+    bool stop;                  /* guarded by lock */
     unsigned thread_count;
     pthread_t threads[];
 } pread_engine;
 
-/* The next request in order, or NULL when the engine stops. */
+/* Returns the next request in order, or NULL if the engine stops. */
 static trip_request *take(pread_engine *e)
 {
     pthread_mutex_lock(&e->lock);

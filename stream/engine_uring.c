@@ -1,5 +1,5 @@
-/* io_uring: the submission queue belongs to the reader's thread, the completion queue to the
- * checking threads, of which one waits in the kernel while the others check what it got before. */
+/* Reads with io_uring. The reader's thread owns the submission queue. The checking threads own the
+ * completion queue: one waits in the kernel while the others check earlier completions. */
 #include "engine.h"
 
 #include <assert.h>
@@ -18,7 +18,7 @@ typedef struct uring_engine {
     pthread_t threads[];
 } uring_engine;
 
-/* Hands what is queued to the kernel. It refuses for a moment when short of memory or swamped. */
+/* Submits the queue to the kernel. Retries if the kernel is short of memory or overloaded. */
 static void submit_queue(uring_engine *e)
 {
     while (io_uring_sq_ready(&e->ring) > 0)
@@ -46,14 +46,14 @@ static void uring_submit(void *engine, trip_request *chain)
         else
             io_uring_prep_read(sqe, read.fd, read.data, (unsigned)read.bytes, read.offset);
         io_uring_sqe_set_data(sqe, q);
-        /* Release, for the thread that reaps it: that the kernel orders the two is not specified.
-         */
+        /* Release, for the thread that reaps the request. The kernel is not specified to order the
+         * two. */
         atomic_store_explicit(&q->given, true, memory_order_release);
     }
     submit_queue(e);
 }
 
-/* Waits for a completion; NULL when the engine stops. */
+/* Waits for a completion. Returns NULL if the engine stops. */
 static trip_request *reap(uring_engine *e, int *result)
 {
     struct io_uring_cqe *cqe;
@@ -72,7 +72,7 @@ static void *work(void *engine)
     trip_request *q;
     int result;
     while ((q = reap(engine, &result))) {
-        /* Acquires what uring_submit() released. */
+        /* Acquires the writes released in uring_submit(). */
         bool given = atomic_load_explicit(&q->given, memory_order_acquire);
         assert(given);
         (void)given;
@@ -103,8 +103,8 @@ static void uring_destroy(void *engine)
     free(e);
 }
 
-/* Sets up the ring and sends one empty request round, since a filter may allow the one and not the
- * other. */
+/* Sets up the ring and sends an empty request through it, since a system call filter may allow one
+ * but not the other. */
 static int create_ring(struct io_uring *ring, unsigned depth)
 {
     struct io_uring_params params = { .flags = IORING_SETUP_CQSIZE };

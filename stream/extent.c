@@ -7,7 +7,7 @@ static uint64_t page_floor(const trip_planner *p, uint64_t offset)
     return offset & ~(uint64_t)(p->page_bytes - 1);
 }
 
-/* Bytes of the pages that hold [low, high). */
+/* Returns the bytes of the pages that hold [low, high). */
 static size_t paged_bytes(const trip_planner *p, uint64_t low, uint64_t high)
 {
     return (size_t)(page_floor(p, high + p->page_bytes - 1) - page_floor(p, low));
@@ -24,7 +24,7 @@ size_t trip_planner_min_slot(const trip_dataset *d, unsigned planes)
     size_t max[TRIP_PLANES] = { 8 * (size_t)trip_block_max_words(&form),
                                 ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes };
     for (int plane = 0; plane < TRIP_PLANES; plane++)
-        if (planes >> plane & 1) /* from anywhere in a page */
+        if (planes >> plane & 1) /* a run may start anywhere in a page */
             bytes += (max[plane] + page - 1) / page * page + page;
     return bytes;
 }
@@ -51,7 +51,7 @@ static size_t run_bytes(const trip_planner *p, const trip_run *run, int plane)
     return plane == TRIP_PLANE_VOXELS ? 8 * (size_t)run->words : run->count * p->normal_bytes;
 }
 
-/* The next run as a piece of its own. */
+/* Returns the next run as a piece of its own. */
 static trip_piece piece_of(const trip_planner *p)
 {
     const trip_run *run = &p->run;
@@ -72,8 +72,7 @@ static size_t piece_bytes(const trip_planner *p, const trip_piece *piece)
     return bytes;
 }
 
-/* The last piece of the same list, when the gap to the next one is small enough to read through.
- */
+/* Returns the last piece of the same list, if the gap to `next` is small enough to read through. */
 static trip_piece *find_piece(const trip_planner *p, trip_extent *e, const trip_piece *next)
 {
     trip_piece *piece = NULL;
@@ -99,7 +98,7 @@ static uint64_t greater(uint64_t a, uint64_t b)
     return a > b ? a : b;
 }
 
-/* What a piece takes more with another joined to it. */
+/* Returns the number of bytes that a piece grows by if it includes `next`. */
 static size_t bytes_more(const trip_planner *p, const trip_piece *piece, const trip_piece *next)
 {
     size_t bytes = 0;
@@ -117,7 +116,7 @@ static void join(trip_piece *piece, const trip_piece *next)
     }
 }
 
-/* Puts the next run into the extent; false when there is no room for it. */
+/* Adds the next run to the extent. Returns false if it does not fit. */
 static bool position(trip_planner *p, trip_extent *e)
 {
     const trip_piece next = piece_of(p);
@@ -151,7 +150,7 @@ static bool skip_run(trip_planner *p)
     return true;
 }
 
-/* Places the pieces in the slot, plane after plane. */
+/* Assigns the pieces to the slot, plane by plane. */
 static void place_pieces(const trip_planner *p, trip_extent *e)
 {
     size_t at = 0;
@@ -173,8 +172,8 @@ static void place_pieces(const trip_planner *p, trip_extent *e)
     }
 }
 
-/* Whether the range has all of those bytes. Ranges may share a page: where the gap between two
- * pieces is large in one plane it may be small in another. */
+/* Whether the range includes all these bytes. Ranges may share a page, since a gap between two
+ * pieces may be large in one plane and small in another. */
 static bool is_in(const trip_byte_range *s, const trip_list *list, int plane, uint64_t offset,
                   size_t bytes)
 {
@@ -182,8 +181,8 @@ static bool is_in(const trip_byte_range *s, const trip_list *list, int plane, ui
            offset - s->offset + bytes <= s->bytes;
 }
 
-/* Turns a place in a plane file into one in the slot's part for the plane. `from` is the range
- * that the last one was in: neighbours mostly are in the same. */
+/* Converts an offset in a plane file to an offset in the slot's part for the plane. `from` is the
+ * range of the last offset, which neighbours usually share. */
 static size_t position_in_slot(const trip_extent *e, const trip_list *list, int plane,
                                uint64_t offset, size_t bytes, unsigned *from)
 {

@@ -11,8 +11,8 @@ enum { THREADS = 2 };
 struct trip_flusher {
     pthread_mutex_t lock;
     pthread_cond_t work, done;
-    trip_flush_job *first, **last; /* under lock */
-    bool stop;                     /* under lock */
+    trip_flush_job *first, **last; /* guarded by lock */
+    bool stop;                     /* guarded by lock */
     unsigned thread_count;
     pthread_t threads[THREADS];
 };
@@ -36,7 +36,7 @@ int trip_flusher_write(int fd, const void *data, size_t bytes, uint64_t offset)
         offset += (uint64_t)n;
         bytes -= (size_t)n;
         if (bytes > 0)
-            use_page_cache(fd); /* the rest may not be aligned any more */
+            use_page_cache(fd); /* the rest may no longer be aligned */
     }
     return 0;
 }

@@ -22,7 +22,7 @@ static bool is_own_file(const char *name)
            !strncmp(name, TRIP_SPOOL_PREFIX, strlen(TRIP_SPOOL_PREFIX));
 }
 
-/* Removes a data set; a folder that holds anything else stays. */
+/* Removes a data set. A folder with other files stays. */
 static int remove_dataset(const char *path)
 {
     int fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
@@ -53,16 +53,16 @@ static bool is_dataset_file(const char *name)
            strcmp(name, "..") == 0 || trip_plane_file_is_named(name);
 }
 
-/* What stands in a data set's folder and is not a data set's could neither be kept nor removed. */
+/* Fails if the folder holds other files, which could be neither kept nor removed. */
 static int check_all_known(const char *path)
 {
     DIR *dir = opendir(path);
-    int status = dir ? TRIP_OK : trip_fail_errno("write", path, "cannot look into it");
+    int status = dir ? TRIP_OK : trip_fail_errno("write", path, "cannot list the folder");
     for (struct dirent *e; status == TRIP_OK && (e = readdir(dir));)
         if (!is_dataset_file(e->d_name))
             status = trip_fail(TRIP_ERROR, "write", path,
-                               "holds %s, which is not a data set's, so it is not replaced: move "
-                               "that elsewhere",
+                               "contains %s, which does not belong to a data set, so it is not "
+                               "replaced; move that file elsewhere",
                                e->d_name);
     if (dir)
         closedir(dir);
@@ -86,8 +86,8 @@ static bool exists(const char *path)
     return lstat(path, &st) == 0;
 }
 
-/* A replacement that was cut off between its two renames is undone; one cut off after them is
- * completed, since the old data set would be in the way of the next. With the lock. */
+/* Undoes a replacement that was interrupted between its two renames. Completes a replacement that
+ * was interrupted after them, since the old data set would obstruct the next. Requires the lock. */
 static void restore_aside(const trip_folder *f)
 {
     if (!is_dataset(f->aside))
@@ -104,10 +104,11 @@ static int check_target(const trip_folder *f)
         return TRIP_OK;
     if (!f->replace)
         return trip_fail(TRIP_ERROR, "write", f->path,
-                         "exists already: --force replaces it, -o gives another name");
+                         "exists already; use --force to replace it or -o for another name");
     if (!is_dataset(f->path))
-        return trip_fail(TRIP_ERROR, "write", f->path,
-                         "exists and is not a data set, so it is not replaced");
+        return trip_fail(
+            TRIP_ERROR, "write", f->path,
+            "exists and is not a data set, so it is not replaced; use -o for another name");
     return check_all_known(f->path);
 }
 
@@ -118,11 +119,11 @@ static int check_own(int fd, const char *path, const char *stage)
         return trip_fail_errno(stage, path, "cannot open");
     if (st.st_uid != geteuid())
         return trip_fail(TRIP_ERROR, stage, path,
-                         "belongs to another user: remove it, or write elsewhere");
+                         "belongs to another user; remove it or write elsewhere");
     return TRIP_OK;
 }
 
-/* What was made just now is not checked: some file servers give it to another user. */
+/* A folder just created is not checked, since some file servers assign it to another user. */
 int trip_folder_open_own(int *fd, const char *path, mode_t mode, const char *stage,
                          const char *busy)
 {
@@ -147,7 +148,7 @@ static int check_file(int fd, const char *where, const char *stage)
     struct stat st;
     int status = check_own(fd, where, stage);
     if (status == TRIP_OK && (fstat(fd, &st) < 0 || !S_ISREG(st.st_mode) || st.st_nlink != 1))
-        status = trip_fail(TRIP_ERROR, stage, where, "is not a file of this program's: remove it");
+        status = trip_fail(TRIP_ERROR, stage, where, "is not a file of this program; remove it");
     return status;
 }
 
@@ -164,7 +165,7 @@ int trip_folder_open_file(int *fd, int folder, const char *path, const char *nam
     if (*fd < 0 && errno == ENOENT && !(flags & O_CREAT))
         return TRIP_OK;
     if (*fd < 0 && errno == ELOOP)
-        return trip_fail(TRIP_ERROR, stage, where, "is a link, which is not followed: remove it");
+        return trip_fail(TRIP_ERROR, stage, where, "is a link, which is not followed; remove it");
     if (*fd < 0)
         return trip_fail_errno(stage, where, "cannot open");
     int status = check_file(*fd, where, stage);
@@ -182,8 +183,8 @@ static bool same_folder(int fd, const char *path)
            a.st_ino == b.st_ino;
 }
 
-/* Opens and locks the partial folder. Another writer may rename it between the two: then the lock
- * is on its finished data set, and another folder has to be made. */
+/* Opens and locks the partial folder. Another writer may rename it in between. The lock then
+ * belongs to that writer's finished data set, and a new folder must be created. */
 static int open_partial(trip_folder *f)
 {
     do {
@@ -197,7 +198,7 @@ static int open_partial(trip_folder *f)
     trip_remove_files(f->fd, is_own_file);
     if (!is_empty(f->fd))
         return trip_fail(TRIP_ERROR, "write", f->partial,
-                         "holds files that are not a data set's: remove it");
+                         "contains files that do not belong to a data set; remove it");
     return TRIP_OK;
 }
 
@@ -207,8 +208,8 @@ static bool is_link(const char *path)
     return lstat(path, &st) == 0 && S_ISLNK(st.st_mode);
 }
 
-/* The name without slashes at its end; where it is a link, what it leads to, so that the link stays
- * and that is replaced. */
+/* Returns the path without slashes at its end. A link is resolved, so that its target is replaced
+ * and the link stays. */
 static char *plain_path(const char *path)
 {
     size_t length = strlen(path);
@@ -232,7 +233,7 @@ static int set_paths(trip_folder *f, const char *path)
     if (!f->path || !f->partial || !f->aside)
         return trip_fail(TRIP_ERROR, "write", path, "out of memory");
     if (!*f->path || strcmp(f->path, "/") == 0)
-        return trip_fail(TRIP_ERROR, "write", path, "not a name for a data set");
+        return trip_fail(TRIP_ERROR, "write", path, "is not a valid name for a data set");
     return TRIP_OK;
 }
 
@@ -254,7 +255,7 @@ static int check_parent(const trip_folder *f)
     int status = TRIP_OK;
     if (copy && stat(parent, &st) < 0 && errno == ENOENT)
         status = trip_fail(TRIP_ERROR, "write", f->path,
-                           "the folder %s is not there: No such file or directory", parent);
+                           "the folder %s does not exist: No such file or directory", parent);
     free(copy);
     return status;
 }
@@ -296,9 +297,9 @@ static int sync_parent(const trip_folder *f)
     if (fd >= 0)
         close(fd);
     free(copy);
-    /* Some file systems refuse to sync a folder and do so by themselves. */
+    /* Some file systems refuse to sync a folder, and sync it on their own. */
     return status < 0 && errno != EINVAL && errno != EACCES
-               ? trip_fail_errno("write", f->path, "cannot sync the folder it is in")
+               ? trip_fail_errno("write", f->path, "cannot sync its parent folder")
                : TRIP_OK;
 }
 
@@ -319,7 +320,7 @@ static int replace_old(const trip_folder *f)
     if (errno != EINVAL && errno != ENOSYS)
         return trip_fail_errno("write", f->path, "cannot replace");
     if (rename(f->path, f->aside) < 0)
-        return trip_fail_errno("write", f->aside, "cannot put the old data set there");
+        return trip_fail_errno("write", f->aside, "cannot move the old data set there");
     if (rename(f->partial, f->path) < 0) {
         trip_fail_errno("write", f->path, "cannot replace");
         restore_aside(f);
@@ -329,7 +330,7 @@ static int replace_old(const trip_folder *f)
     return TRIP_OK;
 }
 
-/* The lock keeps other writers of this name out, so that what exists() says holds. */
+/* The lock keeps other writers of this name out, so the result of exists() stays valid. */
 int trip_folder_commit(trip_folder *f)
 {
     if (fsync(f->fd) < 0 && errno != EINVAL)

@@ -6,14 +6,15 @@
 #include "writer_state.h"
 
 struct trip_list_buffer {
-    const trip_list_writer *list; /* whose blocks it holds, from byte to byte of the plane */
+    const trip_list_writer
+        *list; /* list of the blocks in the buffer, which are bytes [first, past) of the plane */
     uint64_t first, past;
     uint64_t blocks[TRIP_BLOCK_WORDS_MAX];
     unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
 };
 
-/* At a run of a slab. The tables of the slab at hand are in memory, as they are while it is
- * written: their length is bounded by the tiles of a sheet. */
+/* Stands at a run of a slab. The tables of the current slab are in memory, as during writing. Their
+ * length is bounded by the tiles of a sheet. */
 struct trip_list_cursor {
     trip_budget *budget;
     const trip_writer *writer;
@@ -23,15 +24,15 @@ struct trip_list_cursor {
     trip_file_slab slab;
     trip_file_brick *bricks; /* of the slab */
     trip_file_run *runs;     /* [brick][sheet] */
-    size_t tables_bytes;     /* of both, from the budget */
-    uint64_t sheet, brick;   /* the next run, within the slab */
+    size_t tables_bytes;     /* of bricks and runs together, from the budget */
+    uint64_t sheet, brick;   /* next run, within the slab */
     uint64_t at[TRIP_PLANES];
 };
 
 static int fail_memory(const trip_writer *w)
 {
     return trip_fail(TRIP_ERROR, "brick", w->folder.path,
-                     "no memory to read a list back: give more with --memory");
+                     "no memory to read a list back; raise --memory");
 }
 
 int trip_list_buffer_create(trip_list_buffer **out, const trip_writer *w, trip_budget *budget)
@@ -84,7 +85,7 @@ void trip_list_cursor_close(trip_list_cursor *c)
     trip_budget_release(c->budget, c, sizeof *c);
 }
 
-/* Room for the tables of the slab at hand. */
+/* Allocates the tables of the current slab. */
 static int fit_tables(trip_list_cursor *c)
 {
     size_t runs = (size_t)c->slab.brick_count * c->writer->params.slab_sheets;
@@ -124,7 +125,7 @@ static int enter_slab(trip_list_cursor *c)
     return status;
 }
 
-/* The block of a run, and with it what fits of `words`. */
+/* Fetches the block of a run, and as much of `words` as fits. */
 static int fetch_block(const trip_list_writer *l, const trip_list_position *position,
                        uint64_t words, trip_list_buffer *to, const uint64_t **block)
 {
@@ -145,7 +146,7 @@ static int fetch_block(const trip_list_writer *l, const trip_list_position *posi
 static int fail_changed(const trip_list_writer *l)
 {
     return trip_fail(TRIP_ERROR, "brick", l->planes[TRIP_PLANE_VOXELS].path,
-                     "is not what was written: the disk, or another program, changed it");
+                     "differs from the bytes written; the disk or another program changed it");
 }
 
 int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *position,
@@ -155,7 +156,8 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *p
     const trip_file_run *r = &position->run;
     const bool normals = c->normals;
     const uint64_t *block;
-    if (!trip_block_words_fit(&l->form, r->records, r->words)) /* nor would the buffer do */
+    if (!trip_block_words_fit(&l->form, r->records,
+                              r->words)) /* it would not fit into the buffer either */
         return fail_changed(l);
     int status = fetch_block(l, position, words, to, &block);
     if (status == TRIP_OK && normals)
@@ -167,7 +169,7 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *p
     return trip_block_check(out, &position->brick) ? fail_changed(l) : TRIP_OK;
 }
 
-/* Goes on to the next run of the slab; true where *place is of one that is wanted. */
+/* Advances to the next run of the slab. Returns true if *position is a wanted run. */
 static bool take_run(trip_list_cursor *c, trip_list_position *position)
 {
     const uint64_t sheets = c->writer->params.slab_sheets;

@@ -53,7 +53,7 @@ unsigned trip_mean_pack(const trip_mean_scale *scale, double value, double cover
     return trip_mean_pack_value(scale, value) | trip_mean_pack_shares(cover, depth);
 }
 
-/* `column`: minus the opacity of a column. */
+/* `column` is minus the opacity of a column. */
 static double extinction_of(double cover, double extinction, double column, double length)
 {
     return cover < 1 ? -log1p(cover * column) / length : extinction;

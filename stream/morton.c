@@ -1,6 +1,6 @@
 #include "format.h"
 
-/* Bit n of x as bit 2n, zeros between. */
+/* Moves bit n of x to bit 2n, with zeros in between. */
 static uint64_t dilate(uint32_t x)
 {
     uint64_t b = x;

@@ -1,5 +1,5 @@
-/* Directions: the sphere is mapped to an octahedron, that is unfolded to the square [-1, 1]^2,
- * whose two coordinates are quantised. */
+/* Directions are mapped from the sphere to an octahedron, which is unfolded to the square [-1,
+ * 1]^2. The two coordinates in the square are quantised. */
 #include "normal.h"
 
 enum { COORDINATE_MAX = 4095, PART_BITS = 10, PART_MAX = 511, LENGTH_MAX = 127 };
@@ -11,13 +11,13 @@ static double fold(double a, double b)
     return copysign(1 - fabs(b), a);
 }
 
-/* Comparisons, since calls of fmin and fmax take a third of the time. */
+/* Uses comparisons, since calls of fmin() and fmax() would take a third of the time. */
 static inline double clamp(double x)
 {
     return x > 0 ? x < 1 ? x : 1 : 0; /* 0 for NaN */
 }
 
-/* Octahedral coordinates in [0, most]. */
+/* Packs octahedral coordinates in [0, max]. */
 static void pack_octahedral(const double g[3], double max, uint32_t to[2])
 {
     double sum = fabs(g[0]) + fabs(g[1]) + fabs(g[2]), x = g[0] / sum, y = g[1] / sum;
@@ -26,7 +26,7 @@ static void pack_octahedral(const double g[3], double max, uint32_t to[2])
     to[1] = (uint32_t)(clamp(b * 0.5 + 0.5) * max + 0.5);
 }
 
-/* To a vector of the given length. */
+/* Unpacks to a vector of the given length. */
 static void unpack_octahedral(uint32_t first, uint32_t second, double max, double length,
                               double g[3])
 {
@@ -53,8 +53,8 @@ void trip_direction_unpack(uint32_t direction, double unit[3])
     unpack_octahedral(direction & UINT16_MAX, direction >> 16, UINT16_MAX, 1, unit);
 }
 
-/* The nearest corner of the lattice's cubes, or the nearest of their centres, which are at 1/2 from
- * the corners; its squared distance. No |part| is above PART_MAX. */
+/* Rounds to the nearest corner of the lattice's cubes, or to the nearest centre, at 1/2 from the
+ * corners. Returns the squared distance. |part| is at most PART_MAX. */
 static double round_parts(const double part[3], double centre, uint32_t *normal)
 {
     double squared = 0;
@@ -81,7 +81,7 @@ uint32_t trip_normal_pack(const double gradient[3], double full)
     double sum = fabs(gradient[0]) + fabs(gradient[1]) + fabs(gradient[2]);
     if (!(sum > 0) || !isfinite(sum) || !(full > 0))
         return 0;
-    /* Squares of gradients need not be finite. */
+    /* Squares of gradients may overflow. */
     double x = gradient[0] / sum, y = gradient[1] / sum, z = gradient[2] / sum;
     double length = sqrt(x * x + y * y + z * z) * (sum / full);
     uint32_t c[2];
@@ -106,7 +106,8 @@ void trip_normal_unpack(uint32_t normal, double full, double gradient[3])
     }
 }
 
-/* `unit` divided by the power of two with which the steps still reach `most`, or not at all. */
+/* Returns `unit` divided by the largest power of two with which the steps still reach `max`.
+ * Returns max / STEPS_MAX if even `unit` does not reach it. */
 static double finest_step(double unit, double max)
 {
     int halvings = (int)fmax(0, ilogb(unit * STEPS_MAX / max));
@@ -119,7 +120,7 @@ bool trip_compact_normals_choose(const trip_affine *index_to_world, double full,
     const double(*m)[4] = index_to_world->m;
     bool exact = true;
     for (int a = 0; a < 3; a++) {
-        /* The component along an axis of what is as long as `full` in world space, at most. */
+        /* The maximum component along an axis of gradients as long as `full` in world space. */
         double max = full * trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
         step[a] = finest_step(unit, max);
         exact = exact && unit * STEPS_MAX >= max;
@@ -155,7 +156,7 @@ static uint32_t pack_compact_direction(const double g[3])
     return COMPACT_STRONG | q << 12 | p;
 }
 
-/* The nearest multiple of the step; none is further than the steps reach. */
+/* Returns the nearest multiple of the step, within STEPS_MAX. */
 static int32_t steps_of(double x, double step)
 {
     double steps = x / step;

@@ -17,7 +17,7 @@ static int fail_write(const trip_output *o, uint64_t offset, int error)
         return TRIP_ERROR;
     if (error == ENOSPC || error == EDQUOT)
         return trip_fail(TRIP_ERROR, "write", o->path,
-                         "no space left on the disk after %llu bytes: free some or write elsewhere",
+                         "no space left on the disk after %llu bytes; free some or write elsewhere",
                          (unsigned long long)offset);
     errno = error;
     return trip_fail_errno("write", o->path, "cannot write");
@@ -39,7 +39,7 @@ static int create_named(trip_output *o)
     if (o->fd < 0)
         return trip_fail_errno("write", o->path, "cannot create");
     if (o->flusher)
-        fcntl(o->fd, F_SETFL, O_DIRECT); /* where refused, through the page cache */
+        fcntl(o->fd, F_SETFL, O_DIRECT); /* if refused, writes go through the page cache */
     return TRIP_OK;
 }
 
@@ -60,8 +60,7 @@ static int open_output(trip_output *o, const trip_output_params *p)
     o->buffer = trip_budget_take(o->budget, memory_bytes(o));
     if (!o->buffer)
         return trip_fail(TRIP_ERROR, "write", o->path,
-                         "no memory for a buffer of %zu bytes: give more with --memory",
-                         memory_bytes(o));
+                         "no memory for a buffer of %zu bytes; raise --memory", memory_bytes(o));
     return p->unnamed ? TRIP_OK : create_named(o);
 }
 
@@ -81,7 +80,7 @@ int trip_output_create(trip_output *o, const trip_output_params *params, trip_bu
     return status;
 }
 
-/* Checksums of the buffered pages, the last one possibly short. */
+/* Appends the checksums of the buffered pages. The last page may be short. */
 static int append_checksums(trip_output *o)
 {
     for (size_t at = 0; at < o->used_bytes; at += o->page_bytes) {
@@ -94,14 +93,14 @@ static int append_checksums(trip_output *o)
     return TRIP_OK;
 }
 
-/* Waits for what the flusher does. */
+/* Waits for the flusher's job. */
 static int wait_written(trip_output *o)
 {
     int error = o->flusher ? trip_flusher_wait(o->flusher, &o->job) : 0;
     return error ? fail_write(o, o->job.offset, error) : TRIP_OK;
 }
 
-/* A full buffer goes to the flusher, and the other is filled next. */
+/* Passes the full buffer to the flusher, and switches to the other buffer. */
 static int send_buffer(trip_output *o)
 {
     int status = o->page_bytes ? append_checksums(o) : TRIP_OK;
@@ -118,13 +117,13 @@ static int send_buffer(trip_output *o)
     return TRIP_OK;
 }
 
-/* Only unnamed files are not there from the start. */
+/* Unnamed files do not exist from the start. */
 static bool has_file(const trip_output *o)
 {
     return o->fd >= 0;
 }
 
-/* What is left need not be whole sectors, so it goes through the page cache. */
+/* The remaining bytes may not be whole sectors, so they go through the page cache. */
 int trip_output_flush(trip_output *o)
 {
     uint64_t offset = o->bytes - o->used_bytes;

@@ -11,11 +11,11 @@
 
 enum {
     DEFAULT_SLOTS = 8,
-    DEFAULT_SLOT_BYTES = 512 << 10, /* a plane */
+    DEFAULT_SLOT_BYTES = 512 << 10, /* per plane */
     SLOT_BYTES_MAX = 1 << 30,
     DEFAULT_GAP_BYTES = 32 << 10,
     DEFAULT_THREADS = 4,
-    SLOT_BYTES_PER_RUN = 128, /* room for runs; where they are shorter, slots are not filled */
+    SLOT_BYTES_PER_RUN = 128, /* room for runs; slots with shorter runs are not filled */
 };
 
 static size_t run_room(const trip_reader *r)
@@ -59,12 +59,12 @@ static int check_params(const trip_reader *r)
     if (p->planes & ~h->planes)
         return trip_fail(TRIP_ERROR, "read", r->data->path, "the data set has no normals");
     if (p->slots < 2 || p->slots > 4096)
-        return trip_fail(TRIP_USAGE, "read", r->data->path, "%u slots: 2 to 4096", p->slots);
+        return trip_fail(TRIP_USAGE, "read", r->data->path, "%u slots; use 2 to 4096", p->slots);
     size_t min = trip_planner_min_slot(r->data, p->planes);
     if (p->slot_bytes % ((size_t)1 << h->page_log2) || p->slot_bytes < min ||
         p->slot_bytes > SLOT_BYTES_MAX)
         return trip_fail(TRIP_USAGE, "read", r->data->path,
-                         "slots of %zu bytes: a multiple of the page size %u, %zu to %zu",
+                         "slots of %zu bytes; use a multiple of the page size %u, %zu to %zu",
                          p->slot_bytes, 1u << h->page_log2, min, (size_t)SLOT_BYTES_MAX);
     return TRIP_OK;
 }
@@ -90,7 +90,7 @@ static int take_memory(trip_reader *r)
     if (!r->slots || !r->queue || !r->runs || !r->cursors || !r->border_memory || !r->list_bytes ||
         (!r->params.slot_memory && !r->slot_memory))
         return trip_fail(TRIP_ERROR, "read", r->data->path,
-                         "no memory for %u slots of %zu bytes: give more with --memory", n,
+                         "no memory for %u slots of %zu bytes; raise --memory", n,
                          r->params.slot_bytes);
     for (unsigned i = 0; i < n; i++) {
         trip_slot *s = &r->slots[i];
@@ -139,7 +139,7 @@ static int create_engine(trip_reader *r)
     errno = -status;
     return trip_fail_errno("read", r->data->path,
                            r->params.engine == TRIP_ENGINE_URING
-                               ? "io_uring is refused, use another engine"
+                               ? "the system refuses io_uring; use another engine"
                                : "cannot start threads");
 }
 
@@ -166,7 +166,7 @@ static int make_sources(trip_reader *r)
     r->sources = trip_budget_take(r->budget, lists * sizeof *r->sources);
     if (!r->sources)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
-                         "no memory for its %u lists: give more with --memory", lists);
+                         "no memory for its %u lists; raise --memory", lists);
     for (unsigned i = 0; i < lists; i++)
         for (int plane = 0; plane < TRIP_PLANES; plane++)
             r->sources[i][plane] = make_source(r, &r->data->lists[i], plane);
@@ -211,7 +211,7 @@ static int load_list(trip_reader *r, const trip_list *list)
     return status;
 }
 
-/* For the null engine: passes that leave everything in the cache. */
+/* For the null engine: runs passes that leave all pages in the cache. */
 static int load_lists(trip_reader *r)
 {
     bool (*skip)(void *, const trip_selection *, const trip_run *) = r->params.skip;

@@ -1,4 +1,5 @@
-/* Passes: extents are planned and requested as slots become free, and handed out in draw order. */
+/* Runs passes: plans and requests extents as slots become free, and hands them out in draw order.
+ */
 #include "reader.h"
 
 #include "errno_text.h"
@@ -11,10 +12,10 @@
 #include <string.h>
 #include <time.h>
 
-/* While it waits it looks so often whether the work was interrupted. */
+/* Interval of the checks for an interruption while waiting. */
 #define LOOK_NS UINT64_C(20000000)
 
-/* On an engine's thread: the last thing it does with the request. */
+/* Runs on an engine's thread, as its last access to the request. */
 static void request_done(trip_request *q)
 {
     trip_slot *s = q->owner;
@@ -44,7 +45,8 @@ static trip_request *add_request(trip_slot *s, const trip_source *source,
     return q;
 }
 
-/* Bytes from `offset` on, at least a page, up to which all or no pages are cached. */
+/* Returns the bytes from `offset` on, at least a page, in which either all or no pages are cached.
+ */
 static size_t alike_bytes(trip_reader *r, const trip_source *source, uint64_t offset, size_t bytes,
                           bool cached)
 {
@@ -62,8 +64,8 @@ static void reserve_pages(trip_reader *r, const trip_request *q)
         trip_cache_reserve(r->cache, page++, q);
 }
 
-/* Requests for bytes [at, end) of a range: one, or by turns what is cached and what is not. A
- * slot always keeps a request for every range still to come. */
+/* Adds requests for bytes [at, end) of a range. There is one request, or cached and other parts
+ * alternate. The slot keeps at least one request for each following range. */
 static void add_requests(trip_reader *r, trip_slot *s, const trip_byte_range *range, size_t at,
                          size_t end)
 {
@@ -121,8 +123,8 @@ static void enter_pass(trip_reader *r)
         r->cache_pass = trip_cache_begin_pass(r->cache);
 }
 
-/* What the slot will hold, of the pass being planned or else of those behind it; false when no runs
- * are left. */
+/* Plans the content of the slot, from the current pass or the passes after it. Returns false if no
+ * runs are left. */
 static bool plan_slot(trip_reader *r, trip_slot *s)
 {
     for (; r->pass < r->pass_count; r->pass++, enter_pass(r)) {
@@ -133,7 +135,7 @@ static bool plan_slot(trip_reader *r, trip_slot *s)
     return false;
 }
 
-/* Frees the slots that were given up and have nothing pending any more. */
+/* Frees the slots that were given up and have nothing pending. */
 static void reclaim_slots(trip_reader *r)
 {
     uint32_t first_pass = UINT32_MAX;
@@ -154,8 +156,8 @@ static void reclaim_slots(trip_reader *r)
         trip_cache_end_passes(r->cache, first_pass);
 }
 
-/* Plans and requests as much as there are free slots for; where nothing has to be on its way, the
- * next alone, since later more may be skipped. */
+/* Plans and requests as many slots as are free. If no reads need to run ahead, plans only the next
+ * slot, since later more runs may be skipped. */
 static void fill_slots(trip_reader *r)
 {
     if (r->given_up_count > 0)
@@ -192,7 +194,7 @@ static void count_requests(trip_reader *r, const trip_slot *s)
     }
 }
 
-/* Gives up what is being read, without waiting for it. */
+/* Gives up the slots being read, without waiting. */
 static void give_up_slots(trip_reader *r)
 {
     for (; r->queue_count > 0; r->queue_count--) {
@@ -205,8 +207,8 @@ static void give_up_slots(trip_reader *r)
     }
 }
 
-/* Whether the first slot of the queue was read, or one that was given up can be used again. Under
- * the lock. */
+/* Whether the first slot of the queue has been read, or a slot that was given up can be used again.
+ * Requires the lock. */
 static bool slot_is_ready(const trip_reader *r)
 {
     if (r->queue_count > 0 && r->queue[r->queue_first]->pending == 0)
@@ -217,7 +219,7 @@ static bool slot_is_ready(const trip_reader *r)
     return false;
 }
 
-/* Waits for that; false when the time is over before. */
+/* Waits until slot_is_ready(). Returns false after the timeout. */
 static bool wait_for_slot(trip_reader *r, const struct timespec *until)
 {
     int late = 0;
@@ -231,7 +233,7 @@ static bool wait_for_slot(trip_reader *r, const struct timespec *until)
     return ready;
 }
 
-/* Whether trip_reader_next() need not wait. */
+/* Whether trip_reader_next() would not wait. */
 static bool has_answer(trip_reader *r)
 {
     if (r->queue_count == 0)
@@ -323,7 +325,7 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass)
                          TRIP_READER_PASSES_MAX);
     if (pass->selection_count > r->data->list_count)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
-                         "%u selections in a pass, more than there are lists",
+                         "%u selections in a pass, more than the data set has lists",
                          pass->selection_count);
     r->passes[r->pass_count++] = pass;
     if (r->pass == r->pass_count - 1)
@@ -339,10 +341,10 @@ static int report_fault(const trip_request *q)
     snprintf(where, sizeof where, "%s/%s", q->list->path,
              trip_list_plane_name(q->list, q->plane, name));
     if (q->fault == TRIP_REQUEST_CHECKSUM)
-        return trip_fail(TRIP_ERROR, "read", where,
-                         "byte %llu: the page that starts here is damaged (checksum): make the "
-                         "data set again",
-                         at);
+        return trip_fail(
+            TRIP_ERROR, "read", where,
+            "byte %llu: the page that starts here is damaged (checksum); make the data set again",
+            at);
     if (q->fault == TRIP_REQUEST_SHORT)
         return trip_fail(TRIP_ERROR, "read", where, "byte %llu: the file ends early", at);
     char reason[256];
@@ -358,7 +360,8 @@ static int check_slot(const trip_slot *s)
     return TRIP_OK;
 }
 
-/* Where a slot's part of a plane lies. In memory an extent is one piece, and lies in the cache. */
+/* Returns the address of a slot's part of a plane. With in_memory, an extent is one piece in the
+ * cache. */
 static const unsigned char *plane_memory(const trip_reader *r, const trip_slot *s, int plane)
 {
     if (r->runs_only || !r->read_planes[plane])
@@ -373,7 +376,7 @@ static const unsigned char *plane_memory(const trip_reader *r, const trip_slot *
     return NULL;
 }
 
-/* Where in its file a run's block stands. */
+/* Returns the offset of a run's block in its file. */
 static unsigned long long block_offset(const trip_slot *s, const trip_run *run)
 {
     size_t at = s->extent.plane_at[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
@@ -389,7 +392,7 @@ static int report_block(const trip_batch *b, const trip_run *run, const char *wh
     char name[32], where[4096];
     snprintf(where, sizeof where, "%s/%s", list->path,
              trip_list_plane_name(list, TRIP_PLANE_VOXELS, name));
-    return trip_fail(TRIP_ERROR, "read", where, "byte %llu: %s: make the data set again",
+    return trip_fail(TRIP_ERROR, "read", where, "byte %llu: %s; make the data set again",
                      block_offset(b->slot, run), why);
 }
 
@@ -399,12 +402,12 @@ static const char *fault_of(const trip_batch *b, const trip_run *run)
     return trip_block_check(&block, &trip_batch_list(b, run)->bricks[run->brick]);
 }
 
-/* Runs of a batch, in tasks of some each. */
+/* Number of runs that one task checks. */
 enum { CHECKED_AT_ONCE = 32 };
 
 typedef struct block_check {
     const trip_batch *batch;
-    _Atomic size_t first; /* run at fault, of those found */
+    _Atomic size_t first; /* first faulty run found so far */
 } block_check;
 
 static void check_some(void *context, unsigned number)
@@ -422,8 +425,8 @@ static void check_some(void *context, unsigned number)
     }
 }
 
-/* What draws takes blocks as they are: those that do not agree with their bricks end here. Those of
- * a data set in memory were checked when it was loaded. */
+/* Renderers use blocks without further checks, so blocks that disagree with their bricks are
+ * refused here. Blocks in memory were checked when they were loaded. */
 static int check_blocks(const trip_reader *r, const trip_batch *b)
 {
     block_check check = { .batch = b, .first = b->run_count };
@@ -471,7 +474,7 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
         return 0;
     if (r->queue_count == 0)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
-                         "all %u slots of the ring are held: release one first", r->params.slots);
+                         "all %u slots of the ring are in use; release one first", r->params.slots);
     trip_slot *s = take_first(r);
     r->failed = check_slot(s);
     if (!r->failed) {

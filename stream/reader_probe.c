@@ -10,7 +10,7 @@ static void read_ended(trip_request *q)
     sem_post(q->owner);
 }
 
-/* Carries out the request by an engine of its own. */
+/* Carries out the request with an engine of its own. */
 static bool run(trip_engine engine, trip_request *q)
 {
     const trip_engine_ops *ops;

@@ -19,7 +19,7 @@ void trip_request_start(trip_request *q)
     q->fault = TRIP_REQUEST_OK;
 }
 
-/* A direct read takes whole sectors: at the file's end it goes beyond. */
+/* A direct read has whole sectors, and may reach beyond the end of the file. */
 trip_read trip_request_read(const trip_request *q)
 {
     size_t bytes = q->bytes - q->done_bytes;
@@ -38,7 +38,7 @@ static void fail(trip_request *q, trip_request_fault fault, uint64_t at, int num
     q->fault_errno = number;
 }
 
-/* Checks the pages, and keeps those that the cache has made room for. */
+/* Checks the pages, and stores the pages for which the cache has reserved room. */
 static void check_pages(trip_request *q)
 {
     const trip_source *s = q->source;
@@ -68,8 +68,8 @@ static void copy_pages(trip_request *q)
     q->done(q);
 }
 
-/* Whether the read can be tried again. The first direct read fails where the file system or the
- * memory takes none. */
+/* Whether the read can be tried again. The first direct read fails if the file system or the memory
+ * does not support it. */
 static bool take_error(trip_request *q, int number)
 {
     if (number == EINTR || number == EAGAIN)
@@ -93,7 +93,7 @@ static bool take_bytes(trip_request *q, size_t bytes)
     }
     if (bytes == 0)
         fail(q, TRIP_REQUEST_SHORT, q->offset + q->done_bytes, 0);
-    /* The rest may not be aligned any more. */
+    /* The rest may no longer be aligned. */
     q->direct = false;
     return bytes > 0;
 }

@@ -1,6 +1,6 @@
-/* One read of some pages of a plane file into a slot: made by the reader, carried out and checked
- * on an engine's thread, which then calls `done`. Faults are noted here and reported by the reader
- * when their turn comes, so that the message does not depend on timing. */
+/* One read of some pages of a plane file into a slot. The reader creates it. A thread of the engine
+ * carries it out, checks the pages, and calls `done`. Faults are stored here. The reader reports
+ * them in draw order, so that messages do not depend on timing. */
 #ifndef TRIP_REQUEST_H
 #define TRIP_REQUEST_H
 
@@ -9,16 +9,16 @@
 
 #include "cache.h"
 
-/* A plane file being read. */
+/* A plane file to read. */
 typedef struct trip_source {
     int fd;
-    int direct_fd;                /* the same file with O_DIRECT; -1 where that is refused */
-    _Atomic bool *direct_refused; /* set by the first engine thread that finds out: relaxed */
+    int direct_fd;                /* the same file with O_DIRECT, or -1 */
+    _Atomic bool *direct_refused; /* set by the first engine thread that is refused (relaxed) */
     uint64_t file_bytes;
     unsigned page_log2;
     const uint64_t *checksums; /* of the file's pages */
-    trip_cache *cache;         /* or NULL */
-    uint32_t first_page;       /* of the file, in the cache */
+    trip_cache *cache;         /* may be NULL */
+    uint32_t first_page;       /* index of the file's first page in the cache */
     long (*fault)(void *user, void *data, uint64_t offset, size_t bytes, long result);
     void *fault_user;
 } trip_source;
@@ -34,17 +34,17 @@ typedef struct trip_request {
     const trip_source *source;
     unsigned char *data; /* room for whole pages */
     uint64_t offset;     /* of a page */
-    size_t bytes;        /* whole pages, but not beyond the file's end */
+    size_t bytes;        /* whole pages, but not beyond the end of the file */
     void (*done)(struct trip_request *q);
     void *owner;
     const trip_list *list;
     int plane;
-    bool cached;               /* all its pages are in the cache and are copied from there */
-    bool keep;                 /* pages that the cache has made room for are stored there */
-    struct trip_request *next; /* the engine's */
-    _Atomic bool given;        /* the engine's: set (release) when it goes to the kernel */
-    _Atomic bool given_up;     /* set by the reader (relaxed): it ends before its next read */
-    /* Result; the reader's again after `done`. */
+    bool cached;               /* all pages are copied from the cache */
+    bool keep;                 /* stores pages for which the cache has reserved room */
+    struct trip_request *next; /* used by the engine */
+    _Atomic bool given;        /* used by the engine: set (release) when the kernel gets it */
+    _Atomic bool given_up; /* set by the reader (relaxed): the request ends before its next read */
+    /* The result, which belongs to the reader after `done`. */
     bool direct;
     size_t done_bytes;
     unsigned reads;
@@ -63,11 +63,12 @@ typedef struct trip_read {
 
 void trip_request_start(trip_request *q);
 trip_read trip_request_read(const trip_request *q);
-/* Takes the result of that read, a count or -errno. True when another is needed; false when the
- * request is over: then it has been checked and `done` called, and it belongs to the reader. */
+/* Takes the result of that read, a count or -errno. Returns true if another read is needed. Returns
+ * false if the request is over: it has been checked, `done` was called, and it belongs to the
+ * reader. */
 bool trip_request_step(trip_request *q, long result);
-/* Carries out the rest of the request on this thread: all of it where it is cached. One that was
- * given up is over at once, and nothing may be made of its result. */
+/* Carries out the rest of the request on this thread, or all of a cached request. A request that
+ * was given up ends at once, and its result is invalid. */
 void trip_request_run(trip_request *q);
 
 #endif

@@ -19,7 +19,7 @@ int trip_selection_create(trip_selection *s, const trip_dataset *d, const trip_l
     s->bricks = trip_budget_take(budget, bitmap_bytes(s));
     if (!s->bricks)
         return trip_fail(TRIP_ERROR, "plan", d->path,
-                         "no memory for the choice of %llu bricks: give more with --memory",
+                         "no memory for a selection of %llu bricks; raise --memory",
                          (unsigned long long)list->brick_count);
     return TRIP_OK;
 }
@@ -79,8 +79,8 @@ static bool slab_wanted(const trip_run_iterator *it)
            any_selected(s, slab->first_brick, slab->first_brick + slab->brick_count);
 }
 
-/* Goes on to the next slab with selected bricks, `it->slab` included, and to its first run in draw
- * order. False when there is none. */
+/* Advances to the next slab with selected bricks, `it->slab` included, and to its first run in draw
+ * order. Returns false if there is none. */
 static bool enter_slab(trip_run_iterator *it)
 {
     const trip_list *l = list_of(it);
@@ -109,7 +109,8 @@ trip_run_iterator trip_run_begin(const trip_selection *s)
     return it;
 }
 
-/* Goes on to the next sheet, or slab, where all runs of one were taken; false at the end. */
+/* Advances to the next sheet or slab after all runs of the current one. Returns false at the end.
+ */
 static bool find_run(trip_run_iterator *it)
 {
     const trip_list *l = list_of(it);
@@ -126,7 +127,7 @@ static bool find_run(trip_run_iterator *it)
     return enter_slab(it);
 }
 
-/* The run that the iterator stands at, which may be empty; goes on to the next. */
+/* Returns the current run, which may be empty, and advances to the next. */
 static trip_run take_run(trip_run_iterator *it)
 {
     const trip_selection *s = it->selection;
@@ -180,7 +181,7 @@ trip_pass_iterator trip_pass_begin(const trip_pass *pass, trip_pass_cursor *curs
     return (trip_pass_iterator){ .pass = pass, .cursors = cursors };
 }
 
-/* The selection whose sheet comes next; NULL at the end. */
+/* Returns the selection with the next sheet, or NULL at the end. */
 static trip_pass_cursor *find_next(const trip_pass_iterator *it)
 {
     trip_pass_cursor *best = NULL;

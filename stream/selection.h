@@ -1,6 +1,7 @@
-/* Which bricks of lists a pass reads, and the runs they give in draw order. A selection is of one
- * list; a pass merges several by list coordinate. Both are made by the plan, then read-only;
- * iterators are owned by one thread. Memory is one bit per brick, whatever the number of runs. */
+/* The bricks of lists that a pass reads, and their runs in draw order. A selection belongs to one
+ * list; a pass merges several selections by list coordinate. The plan creates both, and they are
+ * read-only afterwards. One thread owns an iterator. A selection takes one bit per brick, for any
+ * number of runs. */
 #ifndef TRIP_SELECTION_H
 #define TRIP_SELECTION_H
 
@@ -11,14 +12,14 @@
 typedef struct trip_selection {
     const trip_dataset *data;
     const trip_list *list;
-    bool descending;                 /* draw order is the exact reverse of the file's */
-    int64_t sheet_first, sheet_last; /* inclusive; what of the list this pass covers */
-    uint64_t *bricks;                /* bit per brick of the list */
+    bool descending;                 /* draw order is the exact reverse of file order */
+    int64_t sheet_first, sheet_last; /* inclusive range of sheets that the pass covers */
+    uint64_t *bricks;                /* one bit per brick of the list */
 } trip_selection;
 
-/* One direction over one or several selections of a data set, all with this direction. Runs come by
- * list coordinate of their sheets, at equal coordinates by selection, within a selection in its own
- * order; descending, exactly the other way round. */
+/* One or more selections of a data set, all in the same direction. Runs are ordered by the list
+ * coordinate of their sheets, at equal coordinates by selection, and within a selection in its own
+ * order. A descending pass has exactly the reverse order. */
 typedef struct trip_pass {
     const trip_selection *selections;
     unsigned selection_count;
@@ -30,14 +31,15 @@ static inline trip_pass trip_pass_of(const trip_selection *s)
     return (trip_pass){ s, 1, s->descending };
 }
 
-/* A brick's records in one sheet: [first, first + count) of the list, of tile origin (u, v). In a
- * descending pass they are drawn last to first. */
+/* The records of a brick in one sheet: [first, first + count) of the list, with tile origin (u, v).
+ * A descending pass draws them from the last to the first. */
 typedef struct trip_run {
     uint64_t first;
-    size_t at[TRIP_PLANES]; /* where its bytes start: in the plane files, or a batch's planes */
+    /* Offset of its bytes in the plane files, or in a batch's planes. */
+    size_t at[TRIP_PLANES];
     uint32_t count;
     uint32_t brick;
-    uint16_t selection; /* its number in the pass */
+    uint16_t selection; /* index in the pass */
     uint16_t words;     /* of its block, 8 bytes each */
     int32_t sheet;
     int32_t u, v;
@@ -45,18 +47,19 @@ typedef struct trip_run {
 
 typedef struct trip_run_iterator {
     const trip_selection *selection;
-    int64_t slab;           /* position in list->slabs */
-    int64_t sheet;          /* within the slab */
-    int64_t brick;          /* within the slab */
-    uint64_t record, block; /* where the current brick's run starts (descending: ends) in the list,
-                               and its block in the voxel plane */
+    int64_t slab;  /* index in list->slabs */
+    int64_t sheet; /* within the slab */
+    int64_t brick; /* within the slab */
+    /* Start (descending: end) of the current brick's run in the list, and of its block in the voxel
+     * plane. */
+    uint64_t record, block;
 } trip_run_iterator;
 
-/* Without bricks. */
+/* Creates a selection without bricks. */
 int trip_selection_create(trip_selection *s, const trip_dataset *d, const trip_list *list,
                           bool descending, int64_t sheet_first, int64_t sheet_last,
                           trip_budget *budget);
-/* All of the list. */
+/* Creates a selection of the whole list. */
 int trip_selection_create_whole(trip_selection *s, const trip_dataset *d, const trip_list *list,
                                 bool descending, trip_budget *budget);
 void trip_selection_destroy(trip_selection *s, trip_budget *budget);
@@ -77,10 +80,10 @@ static inline bool trip_selection_has(const trip_selection *s, uint64_t brick)
 }
 
 trip_run_iterator trip_run_begin(const trip_selection *s);
-/* False at the end. Runs with count 0 are left out. */
+/* Returns false at the end. Leaves out runs with count 0. */
 bool trip_run_next(trip_run_iterator *it, trip_run *run);
 
-/* A selection of a pass and its next run. */
+/* A selection of a pass, with its next run. */
 typedef struct trip_pass_cursor {
     trip_run_iterator it;
     trip_run run;
@@ -90,12 +93,12 @@ typedef struct trip_pass_cursor {
 
 typedef struct trip_pass_iterator {
     const trip_pass *pass;
-    trip_pass_cursor *cursors; /* the caller's: one for each selection */
-    trip_pass_cursor *at;      /* that gives runs until its sheet ends; NULL: to be found */
+    trip_pass_cursor *cursors; /* the caller's, one per selection */
+    trip_pass_cursor *at;      /* current cursor until its sheet ends; NULL before it is found */
 } trip_pass_iterator;
 
 trip_pass_iterator trip_pass_begin(const trip_pass *pass, trip_pass_cursor *cursors);
-/* False at the end. */
+/* Returns false at the end. */
 bool trip_pass_next(trip_pass_iterator *it, trip_run *run);
 
 #endif

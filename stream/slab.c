@@ -40,9 +40,9 @@ static int grow(trip_slab *s)
     n.runs_spare = trip_budget_take(n.budget, run_bytes);
     if (!n.bricks || !n.bricks_spare || !n.runs || !n.runs_spare) {
         release(&n);
-        return trip_fail(TRIP_ERROR, "write", "",
-                         "no memory for the %zu bricks of a slab: give more, or use larger tiles",
-                         n.room);
+        return trip_fail(
+            TRIP_ERROR, "write", "",
+            "no memory for the %zu bricks of a slab; raise --memory or use larger tiles", n.room);
     }
     if (s->brick_count > 0) {
         memcpy(n.bricks, s->bricks, s->brick_count * sizeof *n.bricks);
@@ -53,7 +53,8 @@ static int grow(trip_slab *s)
     return TRIP_OK;
 }
 
-/* The tile's brick from an earlier sheet, or a new one at the end. NULL: no memory. */
+/* Returns the tile's brick from an earlier sheet, or a new brick at the end. Returns NULL if memory
+ * is exhausted. */
 static trip_slab_brick *find(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v)
 {
     uint64_t tile = trip_morton(tile_u, tile_v);
@@ -132,8 +133,7 @@ static void swap_spare(trip_slab *s)
     s->runs_spare = runs;
 }
 
-/* Merges the bricks new in this sheet, in order among themselves, with those of the sheets before.
- */
+/* Merges the new bricks of this sheet, which are in order, with the bricks of earlier sheets. */
 void trip_slab_end_sheet(trip_slab *s)
 {
     size_t old = 0, added = s->merged;

@@ -32,16 +32,17 @@ static void set_defaults(trip_writer_params *p)
 static int check_codes(const trip_writer_codes *c, const char *path)
 {
     if (!isfinite(c->code_lo) || !isfinite(c->code_hi) || c->code_lo > c->code_hi)
-        return trip_fail(TRIP_ERROR, "write", path, "value range %g to %g", c->code_lo, c->code_hi);
+        return trip_fail(TRIP_ERROR, "write", path, "invalid value range %g to %g", c->code_lo,
+                         c->code_hi);
     const double gradients[] = { c->gradient_step[0], c->gradient_step[1], c->gradient_step[2],
                                  c->gradient_full };
     for (size_t i = 0; i < sizeof gradients / sizeof *gradients; i++)
         if (!isfinite(gradients[i]) || gradients[i] < 0)
-            return trip_fail(TRIP_ERROR, "write", path, "gradient scale %g", gradients[i]);
+            return trip_fail(TRIP_ERROR, "write", path, "invalid gradient scale %g", gradients[i]);
     return TRIP_OK;
 }
 
-/* Of two lists of a level. */
+/* Whether two lists of a level have the same grid. */
 static bool same_grid(const trip_writer_list *a, const trip_writer_list *b)
 {
     return memcmp(a->dims, b->dims, sizeof a->dims) == 0 &&
@@ -50,7 +51,7 @@ static bool same_grid(const trip_writer_list *a, const trip_writer_list *b)
             (a->sheet_first == b->sheet_first && a->sheet_step == b->sheet_step));
 }
 
-/* The grid of level 0, along an axis. */
+/* Returns a list of level 0 along an axis. */
 static trip_writer_list level_0(const trip_writer_params *p, int axis)
 {
     return (trip_writer_list){ .axis = axis,
@@ -75,25 +76,25 @@ static int check_list(const trip_writer_params *p, unsigned i, const char *path)
     const trip_writer_list full = level_0(p, l->axis);
     trip_affine inverse;
     if (l->axis < 0 || l->axis > 2 || !trip_kind_of(l->kind))
-        return fail_list(path, i, "no such axis or kind");
+        return fail_list(path, i, "its axis or kind is unknown");
     for (unsigned j = 0; j < i; j++) {
         if (same_list(l, &p->lists[j]))
-            return fail_list(path, i, "there are two of its axis, level and kind");
+            return fail_list(path, i, "another list has the same axis, level and kind");
         if (l->level == p->lists[j].level && !same_grid(l, &p->lists[j]))
-            return fail_list(path, i, "another of its level has another grid");
+            return fail_list(path, i, "another list of its level has a different grid");
     }
     for (int a = 0; a < 3; a++)
         if (l->dims[a] < 1 || l->dims[a] > INT32_MAX)
-            return fail_list(path, i, "its grid has 1 to 2147483647 voxels along an axis");
+            return fail_list(path, i, "its grid must have 1 to 2147483647 voxels along each axis");
     if (!trip_affine_invert(&l->index_to_world, &inverse))
         return fail_list(path, i, "its index-to-world map is singular or not finite");
     if (!(l->sheet_step > 0) ||
         !isfinite(l->sheet_first + l->sheet_step * (double)l->dims[l->axis]))
-        return fail_list(path, i, "its sheets have no ascending coordinates");
+        return fail_list(path, i, "the coordinates of its sheets do not ascend");
     if (l->level == 0 && trip_kind_of(l->kind)->coarse)
-        return fail_list(path, i, "is of level 0 and of a kind of coarse levels");
+        return fail_list(path, i, "it is of level 0, but its kind is for coarse levels");
     if (l->level == 0 && !same_grid(l, &full))
-        return fail_list(path, i, "is of level 0 and not of the data set's grid");
+        return fail_list(path, i, "it is of level 0, but its grid is not the data set's grid");
     return TRIP_OK;
 }
 
@@ -102,7 +103,7 @@ static int check_lists(const trip_writer_params *p, const char *path)
     int status = TRIP_OK;
     unsigned axes = 0;
     if (p->list_count < 3 || p->list_count > TRIP_LISTS_MAX)
-        return trip_fail(TRIP_ERROR, "write", path, "%u lists: 3 to %d are possible", p->list_count,
+        return trip_fail(TRIP_ERROR, "write", path, "%u lists; use 3 to %d", p->list_count,
                          TRIP_LISTS_MAX);
     for (unsigned i = 0; i < p->list_count && status == TRIP_OK; i++) {
         status = check_list(p, i, path);
@@ -110,12 +111,11 @@ static int check_lists(const trip_writer_params *p, const char *path)
             axes |= 1u << p->lists[i].axis;
     }
     if (status == TRIP_OK && axes != 7)
-        return trip_fail(TRIP_ERROR, "write", path,
-                         "the voxels of level 0 are not there along each axis");
+        return trip_fail(TRIP_ERROR, "write", path, "a list of voxels of level 0 is missing");
     return status;
 }
 
-/* X, Y and Z of the voxels, and then of the halo. */
+/* Sets X, Y and Z of the voxels, then X, Y and Z of the halo. */
 static void set_default_lists(trip_writer *w)
 {
     trip_writer_params *p = &w->params;
@@ -134,21 +134,23 @@ static int check_params(const trip_writer_params *p, const char *path)
     trip_affine inverse;
     for (int a = 0; a < 3; a++)
         if (p->dims[a] < 1 || p->dims[a] > INT32_MAX)
-            return trip_fail(TRIP_ERROR, "write", path,
-                             "%lld voxels along axis %d: 1 to %d are possible",
+            return trip_fail(TRIP_ERROR, "write", path, "%lld voxels along axis %d; use 1 to %d",
                              (long long)p->dims[a], a, INT32_MAX);
     if (!is_power_of_two(p->tile_voxels) || p->tile_voxels < 16 || p->tile_voxels > 128)
-        return trip_fail(TRIP_USAGE, "write", path, "tile of %u voxels: 16, 32, 64 or 128",
+        return trip_fail(TRIP_USAGE, "write", path, "tile of %u voxels; use 16, 32, 64 or 128",
                          p->tile_voxels);
     if (p->slab_sheets > 64)
-        return trip_fail(TRIP_USAGE, "write", path, "slab of %u sheets: 1 to 64", p->slab_sheets);
+        return trip_fail(TRIP_USAGE, "write", path, "slab of %u sheets; use 1 to 64",
+                         p->slab_sheets);
     if (!is_power_of_two(p->page_bytes) || p->page_bytes < 4096 || p->page_bytes > 1 << 24)
         return trip_fail(TRIP_USAGE, "write", path,
-                         "page of %u bytes: a power of two from 4096 to 16777216", p->page_bytes);
+                         "page of %u bytes; use a power of two from 4096 to 16777216",
+                         p->page_bytes);
     if (p->code_bytes > 2)
-        return trip_fail(TRIP_ERROR, "write", path, "codes of %u bytes: 1 or 2", p->code_bytes);
+        return trip_fail(TRIP_ERROR, "write", path, "codes of %u bytes; use 1 or 2", p->code_bytes);
     if (p->normal_bytes && p->normal_bytes != 3 && p->normal_bytes != 4)
-        return trip_fail(TRIP_ERROR, "write", path, "normals of %u bytes: 3 or 4", p->normal_bytes);
+        return trip_fail(TRIP_ERROR, "write", path, "normals of %u bytes; use 3 or 4",
+                         p->normal_bytes);
     if (!trip_affine_invert(&p->index_to_world, &inverse))
         return trip_fail(TRIP_ERROR, "write", path,
                          "the index-to-world map is singular or not finite");
@@ -164,7 +166,7 @@ static void set_header_codes(trip_file_header *h, const trip_writer_codes *c)
     h->gradient_full = c->gradient_full;
 }
 
-/* The parts of the header known from the start. */
+/* Fills the parts of the header that are known from the start. */
 static void fill_header(trip_writer *w)
 {
     const trip_writer_params *p = &w->params;
@@ -202,7 +204,7 @@ static size_t larger(size_t a, size_t b)
     return a > b ? a : b;
 }
 
-/* What is written of many lists at once takes no more memory than of few. */
+/* Returns a buffer size with which many lists at once take no more memory than a few. */
 static size_t plane_buffer_bytes(const trip_writer *w, unsigned level)
 {
     size_t share = level ? SPOOL_BUFFER_BYTES : PLANE_BUFFER_BYTES, lists = 0;
@@ -258,7 +260,7 @@ static int open_lists(trip_writer *w)
     w->lists = trip_budget_take(w->budget, count * sizeof *w->lists); /* zeroed */
     if (!w->lists)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "no memory for %u lists: give more with --memory", count);
+                         "no memory for %u lists; raise --memory", count);
     w->list_count = count;
     for (unsigned i = 0; i < count && status == TRIP_OK; i++)
         status = open_list(w, &w->lists[i], &w->params.lists[i]);
@@ -286,7 +288,7 @@ int trip_writer_open(trip_writer **out, const char *path, const trip_writer_para
         status = trip_fail_errno("write", path, "cannot start threads");
     if (status == TRIP_OK)
         status = open_lists(w);
-    w->params.lists = NULL; /* the caller's: copied by now */
+    w->params.lists = NULL; /* the caller's lists are copied by now */
     if (status < 0) {
         trip_writer_abort(w);
         return status;
@@ -320,7 +322,7 @@ int trip_writer_end_slab(trip_writer *w, trip_list_writer *l)
     return status;
 }
 
-/* A run starts; ends the sheet and the slab before it where it is in another. */
+/* Begins a run. Ends the previous sheet and slab if the run is in another. */
 static int enter_sheet(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint64_t tile)
 {
     int status = TRIP_OK;
@@ -353,7 +355,7 @@ static int check_run(const trip_writer *w, const trip_list_writer *l, uint32_t s
                      sheet, inside ? "out of order" : "outside the grid");
 }
 
-/* A tile at the border reaches beyond the grid; its splats do not. */
+/* A tile at the border reaches beyond the grid, but its splats must not. */
 static int check_bounds(const trip_writer *w, const trip_list_writer *l, uint32_t sheet,
                         const trip_file_brick *b)
 {
@@ -378,7 +380,7 @@ static int append_normals(trip_list_writer *l, const uint32_t *normals, uint32_t
     return trip_output_append(o, packed, (size_t)count * l->form.normal_bytes);
 }
 
-/* A run that belongs where it comes. */
+/* Appends a run that is in order. */
 static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint32_t tile_u,
                       uint32_t tile_v, const uint32_t *voxels, uint32_t count)
 {
@@ -386,8 +388,8 @@ static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint3
     uint32_t words = trip_block_pack(&l->form, voxels, count, block);
     if (words == 0)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "list %c: records of tile (%u, %u) of sheet %u are out of order, out of "
-                         "the tile, or their codes have more than %u bytes",
+                         "list %c: records of tile (%u, %u) of sheet %u are out of order, outside "
+                         "the tile, or have codes of more than %u bytes",
                          'x' + l->is.axis, tile_u, tile_v, sheet, l->form.code_bytes);
     const trip_file_brick *b = trip_slab_add(&l->slab, sheet % w->params.slab_sheets, tile_u,
                                              tile_v, voxels, count, words);
@@ -432,7 +434,7 @@ static double grid_voxels(const trip_writer *w)
     return (double)dims[0] * (double)dims[1] * (double)dims[2];
 }
 
-/* Records of the lists of a kind at a level; 0 where there are none. */
+/* Returns the records of a list of a kind at a level, or 0 if there is none. */
 static uint64_t records_of(const trip_writer *w, unsigned level, trip_kind kind)
 {
     for (unsigned i = 0; i < w->list_count; i++)
@@ -447,11 +449,11 @@ static int check_records(const trip_writer *w)
         const trip_list_writer *l = &w->lists[i];
         uint64_t wanted = records_of(w, l->is.level, l->is.kind);
         if (l->records != wanted)
-            return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                             "lists of the same %s hold %llu and %llu records: they must hold the "
-                             "same",
-                             trip_kind_of(l->is.kind)->name, (unsigned long long)wanted,
-                             (unsigned long long)l->records);
+            return trip_fail(
+                TRIP_ERROR, "write", w->folder.path,
+                "lists of the same %s have %llu and %llu records; the numbers must be equal",
+                trip_kind_of(l->is.kind)->name, (unsigned long long)wanted,
+                (unsigned long long)l->records);
     }
     return TRIP_OK;
 }
@@ -461,8 +463,8 @@ static int check_text(const trip_writer *w, const char *text)
     const uint64_t bytes = strlen(text);
     if (bytes > TRIP_TEXT_BYTES_MAX)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "the text about the volume has %llu bytes, of %llu at most: give fewer or "
-                         "simpler transfer functions",
+                         "the text about the volume has %llu bytes, more than the maximum of %llu; "
+                         "give fewer or simpler transfer functions",
                          (unsigned long long)bytes, (unsigned long long)TRIP_TEXT_BYTES_MAX);
     return TRIP_OK;
 }
@@ -475,13 +477,14 @@ static int check_summary(const trip_writer *w, const trip_writer_summary *s)
     if (status < 0)
         return status;
     if (!isfinite(s->value_min) || !isfinite(s->value_max) || s->value_min > s->value_max)
-        return trip_fail(TRIP_ERROR, "write", w->folder.path, "value range %g to %g", s->value_min,
-                         s->value_max);
-    /* What is around kept voxels need not exist in a sparse volume, but the grid has it. */
+        return trip_fail(TRIP_ERROR, "write", w->folder.path, "invalid value range %g to %g",
+                         s->value_min, s->value_max);
+    /* In a sparse volume, neighbours of kept voxels may not exist, but they are in the grid. */
     if (s->voxels < kept || (double)s->voxels > grid_voxels(w) ||
         (double)halo > grid_voxels(w) - (double)kept)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "%llu voxels kept and %llu around them of %llu read, of %.0f in the grid",
+                         "%llu kept voxels and %llu halo voxels do not fit %llu voxels read and "
+                         "%.0f in the grid",
                          (unsigned long long)kept, (unsigned long long)halo,
                          (unsigned long long)s->voxels, grid_voxels(w));
     return TRIP_OK;
@@ -496,7 +499,7 @@ static int for_planes(trip_list_writer *l, int (*stage)(trip_output *))
     return status;
 }
 
-/* All of them at once, since each waits for the disk. */
+/* Starts all syncs at once, since each waits for the disk. */
 static int sync_planes(trip_writer *w)
 {
     int status = TRIP_OK;
@@ -510,7 +513,7 @@ static int sync_planes(trip_writer *w)
     return status;
 }
 
-/* Appends a table at the next multiple of 8 bytes and notes where it starts. */
+/* Appends a table at the next multiple of 8 bytes, and records its offset. */
 static int append_table(trip_output *index, trip_output *table, uint64_t *offset)
 {
     int status = trip_output_align(index, 8);
@@ -550,7 +553,7 @@ static int append_list(trip_output *index, trip_list_writer *l, trip_file_list *
     return status;
 }
 
-/* The descriptors follow the tables, whose places they give. */
+/* Appends the descriptors after the tables, since they contain the tables' offsets. */
 static int append_lists(trip_writer *w, trip_output *index)
 {
     size_t bytes = w->list_count * sizeof(trip_file_list);
@@ -558,7 +561,7 @@ static int append_lists(trip_writer *w, trip_output *index)
     int status = TRIP_OK;
     if (!lists)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
-                         "no memory for %u lists: give more with --memory", w->list_count);
+                         "no memory for %u lists; raise --memory", w->list_count);
     for (unsigned i = 0; i < w->list_count && status == TRIP_OK; i++)
         status = append_list(index, &w->lists[i], &lists[i]);
     if (status == TRIP_OK)
@@ -613,7 +616,7 @@ static int hash_range(trip_output *o, uint64_t first, uint64_t end, uint64_t *ha
     return status;
 }
 
-/* Appends the index's own page checksums and writes the header. */
+/* Appends the page checksums of the index, and writes the header. */
 static int seal_index(trip_writer *w, trip_output *index, trip_output *checksums)
 {
     trip_file_header *h = &w->header;
@@ -692,7 +695,7 @@ static void close_list(trip_list_writer *l)
     trip_slab_free(&l->slab);
 }
 
-/* After a commit nothing stands under the partial name, so this only frees. */
+/* After a commit there is no partial folder, so this only frees memory. */
 void trip_writer_abort(trip_writer *w)
 {
     if (!w)

@@ -133,10 +133,10 @@ class Parts(program.ProgramTest):
         self.make("flat.trip", "--normals", "none")
         self.make("tiles.trip", "--tile", 32)
         for other, why in (
-            ("moved.trip", "another grid"),
-            ("float.trip", "another scale of values"),
-            ("flat.trip", "other normals"),
-            ("tiles.trip", "other tiles"),
+            ("moved.trip", "a different grid"),
+            ("float.trip", "a different scale of values"),
+            ("flat.trip", "different normals"),
+            ("tiles.trip", "different tiles"),
         ):
             says = f"open: {other}: "
             run = self.leaves_nothing(1, "render", self.halves[0], other, "-o", "x.png", says=says)

@@ -91,7 +91,7 @@ class Records(program.ProgramTest):
 
     def test_more_squares_than_masks(self):
         change = lambda present, masks, codes: [2**64 - 1, *masks, *codes]
-        self.refused(self.change_block("y", 0, change), "squares are more than its block has room for")
+        self.refused(self.change_block("y", 0, change), "more squares than its block has room for")
 
     def test_masks_that_do_not_hold_as_many_voxels(self):
         def drop(present, masks, codes):

@@ -38,7 +38,7 @@ def refuses(program, data, folder):
     """Returns whether the program refuses effects, as a build without effects must."""
     done = subprocess.run([program, "render", data, "--output", os.path.join(folder, "a.tif"),
                            "--effects=occlusion"], capture_output=True, text=True, check=False)
-    return done.returncode == 2 and done.stderr == "triptych: render: effects: this build has none\n"
+    return done.returncode == 2 and done.stderr == "triptych: render: effects: this build has no effects\n"
 
 
 def main():

@@ -250,7 +250,8 @@ static void pictures_take_of_the_memory_given(void **state)
     assert_fails(t, triptych_new_picture(t, 8, 8, 3, &rgba), TRIPTYCH_USAGE, "channels");
     assert_fails(t, triptych_new_picture(t, 4096, 4096, 4, &rgba), TRIPTYCH_ERROR, "fit in memory");
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK); /* 36 of 64 MiB */
-    assert_fails(t, triptych_new_picture(t, 1536, 1536, 4, &other), TRIPTYCH_ERROR, "fit in memory");
+    assert_fails(t, triptych_new_picture(t, 1536, 1536, 4, &other), TRIPTYCH_ERROR,
+                 "fit in memory");
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 1, &other), TRIPTYCH_OK);
     triptych_release_picture(t, rgba);
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK);

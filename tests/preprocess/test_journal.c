@@ -453,8 +453,7 @@ static void links_and_what_is_no_file_are_not_followed(void **state)
         p.resume = true;
         test_report[0] = 0;
         assert_true(trip_brick(&p, &s) < 0);
-        assert_non_null(
-            strstr(test_report, fifo ? "is not a file of this program's" : "is a link"));
+        assert_non_null(strstr(test_report, fifo ? "is not a file of this program" : "is a link"));
         check_one_line();
         FILE *f = fopen(test_path("victim"), "rb");
         assert_int_equal(fread(text, 1, sizeof text, f), sizeof text);

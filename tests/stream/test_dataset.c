@@ -280,10 +280,10 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     static crafted c;
     (void)state;
     REFUSE(c.header->magic[0] = 'X', "not the index of a data set");
-    REFUSE(c.header->version = 1, "format version 1, which is not read any more");
-    REFUSE(c.header->version = 2, "format version 2, which is not read any more");
-    REFUSE(c.header->version = 3, "format version 3, which is not read any more");
-    REFUSE(c.header->version = 4, "format version 4, which is not read any more");
+    REFUSE(c.header->version = 1, "format version 1 is no longer supported");
+    REFUSE(c.header->version = 2, "format version 2 is no longer supported");
+    REFUSE(c.header->version = 3, "format version 3 is no longer supported");
+    REFUSE(c.header->version = 4, "format version 4 is no longer supported");
     REFUSE(c.header->version = 6, "format version 6");
     REFUSE(c.header->header_bytes = 512, "header size");
     REFUSE(c.header->reserved[690] = 1, "reserved");
@@ -303,12 +303,12 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->value_max = NAN, "range of values");
     REFUSE(c.header->value_min = c.header->value_max + 1, "range of values");
     REFUSE(c.header->voxels = UINT64_MAX, "more voxels");
-    REFUSE(c.header->voxels = 1, "more was kept");
-    REFUSE(c.header->halo = UINT64_MAX, "more was kept");
+    REFUSE(c.header->voxels = 1, "more kept voxels");
+    REFUSE(c.header->halo = UINT64_MAX, "more kept voxels");
     REFUSE(c.header->halo = 34 * 20 * 18 - c.header->kept + 1, "than the grid has");
     REFUSE(c.header->halo = 1, "no list of it");
     REFUSE(c.header->gradient_step[1] = NAN, "gradient step");
-    REFUSE(c.header->gradient_full = -1, "no length of gradients");
+    REFUSE(c.header->gradient_full = -1, "length of gradients");
     REFUSE(c.header->tile_log2 = 3, "tile size");
     REFUSE(c.header->tile_log2 = 8, "tile size");
     REFUSE(c.header->slab_sheets = 0, "sheets per slab");
@@ -324,10 +324,10 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->code_bytes = 0, "1 or 2 bytes");
     REFUSE(c.header->code_bytes = 3, "1 or 2 bytes");
     REFUSE(c.header->normal_bytes = 2, "3 or 4 bytes");
-    REFUSE(c.header->normal_bytes = 3, "not the bytes of its records");
+    REFUSE(c.header->normal_bytes = 3, "do not match its records");
     REFUSE(c.header->planes = 1, "3 or 4 bytes");
-    REFUSE(c.header->checksums_offset = UINT64_MAX - 7, "checksums are not where");
-    REFUSE(c.header->checksums_offset -= 8, "checksums are not where");
+    REFUSE(c.header->checksums_offset = UINT64_MAX - 7, "checksums are at the wrong offset");
+    REFUSE(c.header->checksums_offset -= 8, "checksums are at the wrong offset");
     REFUSE(c.header->text_bytes = TRIP_TEXT_BYTES_MAX + 1, "text is too long");
     REFUSE(c.header->text_bytes = UINT64_MAX, "text is too long");
     REFUSE(c.header->text_offset = UINT64_MAX - 4, "text lies outside");
@@ -343,35 +343,35 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
 #define BRICK ((trip_file_brick *)(void *)(c.bytes + c.lists[1].bricks_offset))
 #define RUN ((trip_file_run *)(void *)(c.bytes + c.lists[1].runs_offset))
     REFUSE(c.lists[1].axis = 0, "same axis, level and kind");
-    REFUSE(c.lists[1].axis = 3, "no such axis or kind");
-    REFUSE(c.lists[1].kind = 4, "no such axis or kind");
-    REFUSE(c.lists[1].kind = 1, "not the planes of its kind");
-    REFUSE(c.lists[1].planes = 1, "not the planes of its kind");
-    REFUSE(c.lists[0].level = 1, "not there for each axis");
-    REFUSE(c.lists[1].kind = TRIP_KIND_MEANS, "of a kind of coarse levels");
+    REFUSE(c.lists[1].axis = 3, "unknown axis or kind");
+    REFUSE(c.lists[1].kind = 4, "unknown axis or kind");
+    REFUSE(c.lists[1].kind = 1, "not have the planes of its kind");
+    REFUSE(c.lists[1].planes = 1, "not have the planes of its kind");
+    REFUSE(c.lists[0].level = 1, "list of voxels of level 0 is missing");
+    REFUSE(c.lists[1].kind = TRIP_KIND_MEANS, "has a kind of coarse levels");
     REFUSE((c.lists[1].level = 1, c.lists[1].records = 34 * 20 * 18 + 1,
             c.lists[1].plane_bytes[1] = 4 * c.lists[1].records),
            "more records than its grid has voxels");
     REFUSE((c.lists[1].level = c.lists[2].level = 1, c.lists[2].records--,
             c.lists[2].plane_bytes[1] -= 4),
-           "hold different numbers");
+           "have different numbers");
     REFUSE((c.lists[1].level = c.lists[2].level = 1, c.lists[2].axis = 1,
             c.lists[2].kind = TRIP_KIND_MEANS, c.lists[2].sheet_first = 2),
            "lists of a level have different grids");
-    REFUSE(c.lists[2].records++, "that were kept");
-    REFUSE(c.lists[2].dims[0]--, "not of the header's grid");
+    REFUSE(c.lists[2].records++, "is not the number of kept voxels");
+    REFUSE(c.lists[2].dims[0]--, "a different grid than the header");
     REFUSE(c.lists[2].dims[1] = 0, "grid size");
-    REFUSE(c.lists[2].index_to_world[3] = 7, "not of the header's grid");
+    REFUSE(c.lists[2].index_to_world[3] = 7, "a different grid than the header");
     REFUSE(c.lists[2].index_to_world[0] = NAN, "singular or not finite");
-    REFUSE(c.lists[2].sheet_first = 1, "not of the header's grid");
-    REFUSE(c.lists[2].sheet_step = 0, "no ascending coordinates");
-    REFUSE(c.lists[2].sheet_step = NAN, "no ascending coordinates");
-    REFUSE(c.lists[2].sheet_step = 1e308, "no ascending coordinates");
-    REFUSE(c.lists[2].sheet_first = INFINITY, "no ascending coordinates");
-    REFUSE(c.lists[2].plane_bytes[0] += 4, "not the bytes of its records");
+    REFUSE(c.lists[2].sheet_first = 1, "a different grid than the header");
+    REFUSE(c.lists[2].sheet_step = 0, "do not ascend");
+    REFUSE(c.lists[2].sheet_step = NAN, "do not ascend");
+    REFUSE(c.lists[2].sheet_step = 1e308, "do not ascend");
+    REFUSE(c.lists[2].sheet_first = INFINITY, "do not ascend");
+    REFUSE(c.lists[2].plane_bytes[0] += 4, "do not match its records");
     REFUSE(c.lists[2].plane_bytes[0] += 8, "do not add up");
-    REFUSE(c.lists[2].plane_bytes[1]++, "not the bytes of its records");
-    REFUSE(c.lists[2].plane_bytes[3] = 4, "not the bytes of its records");
+    REFUSE(c.lists[2].plane_bytes[1]++, "do not match its records");
+    REFUSE(c.lists[2].plane_bytes[3] = 4, "do not match its records");
     REFUSE(c.lists[2].reserved[4] = 1, "reserved");
     REFUSE(c.lists[1].brick_count = UINT64_MAX, "more bricks");
     REFUSE(c.lists[1].slab_count = UINT64_MAX / 8, "outside the file");

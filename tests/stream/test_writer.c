@@ -155,8 +155,8 @@ static void only_a_data_set_is_replaced(void **state)
     fixture_run_command("mkdir %s && touch %s/mine", path, path);
     expect_refused(&f, path, "not a data set");
     fixture_run_command("test -f %s/mine", path);
-    expect_refused(&f, "/", "not a name");
-    expect_refused(&f, "", "not a name");
+    expect_refused(&f, "/", "not a valid name");
+    expect_refused(&f, "", "not a valid name");
     expect_refused(&f, "/nowhere/a.trip", "No such file");
     fixture_free(&f);
 }
@@ -174,7 +174,7 @@ static void what_an_interrupted_run_left_is_removed(void **state)
     expect_sound(&f, path);
     fixture_run_command("test ! -e %s.partial", path);
     fixture_run_command("rm -r %s; mkdir %s.partial && touch %s.partial/mine", path, path, path);
-    expect_refused(&f, path, "holds files that are not");
+    expect_refused(&f, path, "contains files that do not belong");
     fixture_run_command("test -f %s.partial/mine", path);
     fixture_free(&f);
 }
@@ -329,7 +329,7 @@ static void lists_of_other_levels_and_kinds_are_kept_and_verified(void **state)
     fixture_run_command("test -e %s/z0.halo && test -e %s/y1.voxels", path, path);
     expect_verified(path, f.budget, NULL);
     write_many(path, within, 9, f.budget);
-    expect_verified(path, f.budget, "a voxel is in a list of another kind too");
+    expect_verified(path, f.budget, "a voxel is also in a list of another kind");
     write_many(path, around, 10, f.budget);
     expect_verified(path, f.budget, "the lists of voxels along x and y at level 1");
     fixture_free(&f);
@@ -391,7 +391,7 @@ static void a_voxel_of_two_kinds_is_found_in_any_square(void **state)
         for (unsigned list = 0; list < 6; list++)
             append_points(w, list, list < 3 ? kept : i ? apart : shared);
         assert_int_equal(trip_writer_finish(w, &(trip_writer_summary){ .voxels = 4096 }), TRIP_OK);
-        expect_verified(path, f.budget, i ? NULL : "a voxel is in a list of another kind too");
+        expect_verified(path, f.budget, i ? NULL : "a voxel is also in a list of another kind");
     }
     fixture_free(&f);
 }
@@ -533,7 +533,7 @@ static void numbers_of_voxels_that_cannot_be_are_refused(void **state)
         assert_int_equal(trip_writer_finish(w, &summary), i == 0 ? TRIP_OK : TRIP_ERROR);
         if (i > 0)
             trip_writer_abort(w);
-        assert_int_equal(i > 0, strstr(fixture_reports(), "voxels kept and") != NULL);
+        assert_int_equal(i > 0, strstr(fixture_reports(), "kept voxels and") != NULL);
         fixture_run_command("rm -rf %s", path);
     }
     fixture_free(&f);
