@@ -58,7 +58,7 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
         if (s->kernel != TRIPTYCH_LINEAR)
             put(out, &count, "kernel", "%s", kernels[s->kernel]);
         if (s->samples_per_sheet)
-            put(out, &count, "samples_per_sheet", "%d", s->samples_per_sheet);
+            put(out, &count, "samples-per-sheet", "%d", s->samples_per_sheet);
     }
     if (one->renderer == TRIPTYCH_RENDERER_REFERENCE && s->classify == TRIPTYCH_PRE)
         count--; /* removes the target, which this renderer lacks */
@@ -66,7 +66,7 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
     if (s->method == TRIPTYCH_MERGE && s->h >= 0)
         put(out, &count, "h", "%g", s->h);
     if (s->early_termination >= 0)
-        put(out, &count, "early_termination", "%.10g", s->early_termination);
+        put(out, &count, "early-termination", "%.10g", s->early_termination);
     if (s->lod_px > 0)
         put(out, &count, "lod", "%g", s->lod_px);
     return count;
@@ -94,12 +94,12 @@ static bool read_number(const char *name, const char *text, triptych_settings *s
 {
     if (!strcmp(name, "samples"))
         return read_integer(text, &s->samples);
-    if (!strcmp(name, "samples_per_sheet"))
+    if (!strcmp(name, "samples-per-sheet"))
         return read_integer(text, &s->samples_per_sheet);
     double *number = !strcmp(name, "h")                   ? &s->h
                      : !strcmp(name, "kernel-radius")     ? &s->kernel_radius
                      : !strcmp(name, "flatten")           ? &s->flatten
-                     : !strcmp(name, "early_termination") ? &s->early_termination
+                     : !strcmp(name, "early-termination") ? &s->early_termination
                      : !strcmp(name, "lod")               ? &s->lod_px
                      : !strcmp(name, "tolerance")         ? &s->tolerance
                                                           : NULL;

@@ -27,8 +27,8 @@ static void unknown_options_are_refused(void **state)
     (void)state;
     static const char *const pairs[][2] = { { "h", "much" },
                                             { "h", "" },
-                                            { "samples_per_sheet", "1.5" },
-                                            { "samples_per_sheet", "-1" },
+                                            { "samples-per-sheet", "1.5" },
+                                            { "samples-per-sheet", "-1" },
                                             { "samples", "1e9" },
                                             { "classify", "late" },
                                             { "sharpness", "1" },
@@ -50,9 +50,9 @@ static void unknown_options_are_refused(void **state)
 static const char report[] =
     REPORT(ROW("slow", "90", "0.1", "\"renderer\":\"reference\",\"classify\":\"post\"") "," ROW(
         "fine", "40", "0.5",
-        "\"renderer\":\"cpu\",\"samples_per_sheet\":\"4\"") "," ROW("quick", "10", "2",
-                                                                    "\"renderer\":\"gl\",\"samples_"
-                                                                    "per_sheet\":"
+        "\"renderer\":\"cpu\",\"samples-per-sheet\":\"4\"") "," ROW("quick", "10", "2",
+                                                                    "\"renderer\":\"gl\",\"samples-"
+                                                                    "per-sheet\":"
                                                                     "\"1\"") "," ROW("odd", "1",
                                                                                      "0",
                                                                                      "\"renderer\":"

@@ -165,7 +165,7 @@ class Look(program.ProgramTest):
 
     def test_presets_for_ct_warn_of_other_values(self):
         run = self.works("render", "ball.trip", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
-        self.assertRegex(run.stderr, r"warning: ball.trip: values from 0 to 200 are hardly Houns")
+        self.assertRegex(run.stderr, r"warning: ball.trip: the values from 0 to 200 do not look like the Houns")
         run = self.works("render", "chest.trip", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
         self.assertEqual(run.stderr, "")
 

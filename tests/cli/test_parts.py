@@ -181,7 +181,7 @@ class Parts(program.ProgramTest):
         self.works("brick", "v.nrrd", "-o", "less.trip", "-q", "--range", "180:255", "--region",
                    "21:,:,:", "--force")
         run = self.works("render", self.halves[0], "less.trip", "-o", "a.exr", *SIZE)
-        self.assertIn("less.trip: the transfer function shows", run.stderr)
+        self.assertIn("less.trip: the transfer function reveals", run.stderr)
         self.assertIn("--region=21:,0:,0:", run.stderr)
         self.assertEqual(run.stderr.count("warning"), 1)
 

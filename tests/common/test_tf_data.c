@@ -72,7 +72,7 @@ static void functions_made_from_a_histogram_take_one(void **state)
     trip_tf_data data = { h.value_min, h.value_max, NULL, TRIP_TF_CT };
     test_catch_reports();
     assert_int_equal(trip_tf_adapt(tf, &data, "a.trip"), TRIP_ERROR);
-    assert_one_report("a.trip: holds no histogram");
+    assert_one_report("a.trip: has no histogram");
     data.histogram = &h;
     assert_int_equal(trip_tf_adapt(tf, &data, "a.trip"), TRIP_OK);
     assert_int_equal(trip_tf_ct_from_histogram(&expected, &h), TRIP_OK);

@@ -117,7 +117,7 @@ static void a_helper_that_dies_is_a_reported_failure(void **state)
     if (status == 0)
         status = trip_image_helper_outcome(h, &bytes);
     assert_int_equal(status, TRIP_ERROR);
-    assert_one_report("deadly.tif: brought the decoder down");
+    assert_one_report("deadly.tif: crashed the decoder");
     catch_reports();
     assert_int_equal(trip_image_helper_request(h, TRIP_IMAGE_READ, "next.tif", NULL, -1),
                      TRIP_ERROR);
@@ -201,7 +201,7 @@ static void an_answer_that_cannot_be_is_a_reported_failure(void **state)
     (void)state;
     begin_answer(true);
     add_reply(77, 0, 0, 0);
-    expect_distrust("some.tif: triptych-images gives an answer that cannot be: an unknown outcome");
+    expect_distrust("some.tif: triptych-images sent an invalid reply: an unknown outcome");
     begin_answer(true);
     add_reply(TRIP_IMAGE_FAILED, 1, 0, 0);
     expect_distrust("an unknown status");
@@ -210,10 +210,10 @@ static void an_answer_that_cannot_be_is_a_reported_failure(void **state)
     expect_distrust("an unknown status");
     begin_answer(true);
     add_reply(TRIP_IMAGE_DONE, 0, 4096, 0);
-    expect_distrust("a text without end");
+    expect_distrust("a text that is too long");
     begin_answer(true);
     add_reply(TRIP_IMAGE_WARNING, 0, 0, 1);
-    expect_distrust("data where there is none");
+    expect_distrust("unexpected data");
 }
 
 static void warnings_have_an_end(void **state)
@@ -225,7 +225,7 @@ static void warnings_have_an_end(void **state)
     uint64_t bytes;
     assert_int_equal(request(&bytes), TRIP_ERROR);
     assert_int_equal(reports, 65); /* 64 of them and the failure */
-    assert_non_null(strstr(reported, "warnings without end"));
+    assert_non_null(strstr(reported, "too many warnings"));
 }
 
 static void signs_of_life_are_passed_over(void **state)
@@ -251,7 +251,7 @@ static void silence_and_an_early_end_are_reported_failures(void **state)
     expect_distrust("has not answered");
     begin_answer(false);
     add_bytes("half", 4);
-    expect_distrust("ended before it was done");
+    expect_distrust("ended too early");
 }
 
 static void a_wait_for_a_silent_helper_ends_with_a_signal(void **state)

@@ -128,7 +128,7 @@ void what_is_named_as_a_slice_and_is_none_is_an_error(void **)
 {
     make_folder("bad", { "im1", "im2", "im4" });
     assert_int_equal(symlink("nowhere", "bad/im3"), 0);
-    assert_refused("bad", "bad/im3: is a link that leads nowhere");
+    assert_refused("bad", "bad/im3: is a broken link");
     unlink("bad/im3");
     assert_int_equal(mkfifo("bad/im3", 0666), 0);
     assert_refused("bad", "bad/im3: is a pipe");
@@ -144,7 +144,7 @@ void what_is_named_as_a_slice_and_is_none_is_an_error(void **)
     make_slice("bad/im3");
     assert_true(why_refused("bad").empty());
     assert_int_equal(symlink("nowhere", "bad/other.tif"), 0);
-    assert_refused("bad", "bad/other.tif: is a link that leads nowhere");
+    assert_refused("bad", "bad/other.tif: is a broken link");
 }
 
 void a_slice_that_may_not_be_read_is_an_error(void **)
@@ -194,8 +194,8 @@ void a_place_that_is_left_out_is_named_by_its_neighbours(void **)
         fail_msg("%s", "no gap is found");
     } catch (const trip_slice_error &e) {
         assert_string_equal(e.where.c_str(), "c");
-        assert_string_equal(e.what(), "a slice is missing after it: the next one, d, lies 3 steps "
-                                      "on; --allow-gaps goes on as if its neighbours touched");
+        assert_string_equal(e.what(), "a slice is missing after it: the next slice, d, is 3 steps "
+                                      "away; --allow-gaps lets its neighbours touch");
     }
     warnings = 0;
     const double squeeze = trip_check_positions(positions, names, true);

@@ -132,7 +132,7 @@ static void answers_of_the_image_helper_are_not_trusted(void **state)
         { "answer_outcome", "an unknown outcome" },
         { "answer_sizes", "slices of no size" },
         { "answer_large_sizes", "has slices of an impossible size" },
-        { "answer_data_bytes", "data of another size than it has to be" },
+        { "answer_data_bytes", "data of the wrong size" },
     };
     trip_budget *budget;
     (void)state;

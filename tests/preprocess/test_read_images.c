@@ -122,7 +122,7 @@ static void a_tiff_with_depth_in_its_tiles_is_refused(void **state)
     bytes b = { .count = 0 };
     append_deep_tiff(&b);
     write_file("deep.tif", &b);
-    assert_refused(path_of("deep.tif"), "slices must be its pages");
+    assert_refused(path_of("deep.tif"), "store its slices as pages");
 }
 
 /* Names say the reverse of what the positions do; slices lie along a tilted direction. */
@@ -246,7 +246,7 @@ static void dicom_slices_beside_their_line_are_refused(void **state)
                            "p0.dcm: slice 4 of its series lies 0.3 beside the line"));
     assert_non_null(
         strstr(report_of_positions(gap, axial, TRIP_ERROR), "p3.dcm: a slice is missing after it"));
-    assert_non_null(strstr(report_of_positions(uneven, axial, 0), "perhaps some are missing"));
+    assert_non_null(strstr(report_of_positions(uneven, axial, 0), "some may be missing"));
     assert_int_equal(reports, 1);
     assert_non_null(strstr(report_of_positions(straight, "1\\0\\0\\0.5\\1\\0", TRIP_ERROR),
                            "not at right angles"));
@@ -371,7 +371,7 @@ static void slices_that_do_not_fit_or_are_missing_are_refused(void **state)
     write_tiff("h3.tif", TRIP_U8, 2, 2);
     assert_refused(path_of("h[34].tif"), "holds several slices");
     write_bytes("h3.tif", "nothing", 7);
-    assert_refused(path_of("h%d.tif"), "h3.tif: is no TIFF");
+    assert_refused(path_of("h%d.tif"), "h3.tif: is not a TIFF");
     b.count = 0;
     append_png(&b, TRIP_U8, 0, 1);
     write_file("h3.tif", &b);

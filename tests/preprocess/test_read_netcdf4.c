@@ -165,8 +165,8 @@ static void what_is_no_whole_file_is_refused(void **state)
     const size_t count = fread(whole, 1, sizeof whole, f);
     fclose(f);
     assert_in_range(count, 1000, sizeof whole - 1);
-    assert_refused(write_bytes("f.nc", "\x89HDF\r\n\x1a\n\0\0\0\0", 12), "libnetcdf says");
-    assert_refused(write_bytes("f.nc", whole, count / 2), "libnetcdf says");
+    assert_refused(write_bytes("f.nc", "\x89HDF\r\n\x1a\n\0\0\0\0", 12), "libnetcdf reports");
+    assert_refused(write_bytes("f.nc", whole, count / 2), "libnetcdf reports");
 }
 
 /* The program lives on, whatever the library makes of it: it reads something, or says one line. */

@@ -504,7 +504,7 @@ static void runs_out_of_order_or_place_are_refused(void **state)
     trip_writer_summary summary = { .voxels = 64000 };
     assert_int_equal(trip_writer_finish(w, &summary), TRIP_ERROR);
     trip_writer_abort(w);
-    assert_non_null(strstr(fixture_reports(), "lists of the same voxels hold"));
+    assert_non_null(strstr(fixture_reports(), "lists of the same voxels have"));
     assert_false(is_there(path));
     fixture_run_command("test ! -e %s.partial", path);
     fixture_free(&f);
