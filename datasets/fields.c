@@ -11,9 +11,9 @@ static void set_gradient(trip_vec3 *gradient, trip_vec3 g)
         *gradient = g;
 }
 
-/* Marschner & Lobb, An evaluation of reconstruction filters for volume rendering (1994), with their
- * f_M = 6 and alpha = 0.25: most of its energy lies just below the Nyquist frequency at 40 samples.
- */
+/* Marschner & Lobb, An evaluation of reconstruction filters for volume rendering (1994), with f_M =
+ * 6 and alpha = 0.25. At 40 samples the largest part of its energy lies just below the Nyquist
+ * frequency. */
 static double marschner_lobb(trip_vec3 p, double detail, trip_vec3 *gradient)
 {
     const double alpha = 0.25, f = 6 * detail, norm = 2 * (1 + alpha);
@@ -39,7 +39,8 @@ static double shells(trip_vec3 p, double detail, trip_vec3 *gradient)
     return wave * fade;
 }
 
-/* A sparse network of filaments: near the curves where a gyroid and a Schwarz P surface meet. */
+/* A sparse network of filaments, near the curves where a gyroid and a Schwarz P surface intersect.
+ */
 static double filaments(trip_vec3 p, double detail, trip_vec3 *gradient)
 {
     const double thickness2 = 0.02;
@@ -96,8 +97,7 @@ static double value_noise(trip_vec3 p, trip_vec3 *gradient)
     return value;
 }
 
-/* Fractal cloud: five octaves of value noise above a threshold, squared so that its edge is smooth.
- */
+/* A fractal cloud: five octaves of value noise above a threshold, squared for a smooth edge. */
 static double cloud(trip_vec3 p, double detail, trip_vec3 *gradient)
 {
     const double threshold = 0.05, top = 1.9375; /* sum of the octaves' amplitudes */

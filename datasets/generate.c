@@ -1,5 +1,5 @@
-/* triptych-generate: writes a volume of any size whose every value is known in closed form, a few
- * slices or one cube at a time, so that a terabyte needs no more memory than they take. */
+/* triptych-generate: writes a volume of any size with values known in closed form. It holds only a
+ * few slices or one cube at a time, so memory use does not grow with the volume. */
 #include <argp.h>
 #include <errno.h>
 #include <pthread.h>
@@ -33,16 +33,17 @@ typedef struct job {
     long threads;
 } job;
 
-/* A part of the volume; threads take its rows from `next`. */
+/* A part of the volume. Threads take its rows from `next`. */
 typedef struct box {
     const job *job;
     long first[3], size[3];
     long next;
-    void *values; /* i fastest; the first of row r is number r * stride */
+    void *values; /* i fastest; row r starts at number r * stride */
     size_t stride;
 } box;
 
-/* Index to the cube: the longest axis spans [-1, 1] between its first and last voxel centres. */
+/* Maps an index to the cube. The longest axis spans [-1, 1] between its first and last voxel
+ * centres. */
 static trip_vec3 position(const job *j, long x, long y, long z)
 {
     long longest = 2;
@@ -108,7 +109,7 @@ static int write_box(const box *b, FILE *file)
     return TRIP_OK;
 }
 
-/* A few whole slices at a time. */
+/* Writes a few whole slices at a time. */
 static int write_slices(const job *j, FILE *file)
 {
     const long *dims = j->dims;
@@ -117,9 +118,9 @@ static int write_slices(const job *j, FILE *file)
               .size = { dims[0], dims[1], SLICES },
               .stride = (size_t)dims[0],
               .values = malloc(slice_values * SLICES * sample_types[j->type].bytes) };
-    int status =
-        b.values ? TRIP_OK
-                 : trip_fail(TRIP_ERROR, "generate", j->output, "no memory for %d slices", SLICES);
+    int status = b.values ? TRIP_OK
+                          : trip_fail(TRIP_ERROR, "generate", j->output,
+                                      "out of memory for %d slices", SLICES);
     for (; status == TRIP_OK && b.first[2] < dims[2]; b.first[2] += SLICES) {
         long left = dims[2] - b.first[2];
         b.size[2] = left < SLICES ? left : SLICES;
@@ -225,29 +226,31 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
         return 0;
     case 's':
         if (parse_size(arg, j->dims) != 0)
-            argp_error(state, "--size: '%s' is neither N nor NXxNYxNZ", arg);
+            argp_error(state, "invalid value '%s' for --size; use N or NXxNYxNZ", arg);
         return 0;
     case 't':
         if (parse_type(arg, &j->type) != 0)
-            argp_error(state, "--type: '%s' is not uint8, uint16 or float", arg);
+            argp_error(state, "invalid value '%s' for --type; use uint8, uint16 or float", arg);
         return 0;
     case 'd':
         if (!trip_text_to_double(arg, &j->detail) || !(j->detail > 0 && j->detail < 1e6))
-            argp_error(state, "--detail: '%s' is not a positive number", arg);
+            argp_error(state, "invalid value '%s' for --detail; use a positive number", arg);
         return 0;
     case 'j':
         j->threads = strtol(arg, &end, 10);
         if (*end || j->threads < 1 || j->threads > MAX_THREADS)
-            argp_error(state, "--threads: '%s' is not a number from 1 to %d", arg, MAX_THREADS);
+            argp_error(state, "invalid value '%s' for --threads; use a number from 1 to %d", arg,
+                       MAX_THREADS);
         return 0;
     case ARGP_KEY_ARG:
         j->field = state->arg_num == 0 ? trip_field_find(arg) : NULL;
         if (!j->field)
-            argp_error(state, "no such field: '%s'", arg);
+            argp_error(state, "unknown field '%s'; use marschner-lobb, cloud, shells or filaments",
+                       arg);
         return 0;
     case ARGP_KEY_END:
         if (!j->field || !j->output)
-            argp_error(state, "a FIELD and -o FILE are needed");
+            argp_error(state, "FIELD and -o FILE are required");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;

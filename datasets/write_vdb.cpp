@@ -25,10 +25,10 @@ static_assert(Lower::DIM == TRIP_VDB_CUBE, "the cube is a node");
 const float background = 0;
 
 struct Stopped {
-    int status; /* the source has said why */
+    int status; /* already reported by the source */
 };
 
-/* The origins of the nodes that reach into [first, end), in the order in which files have them. */
+/* Returns the origins of the nodes that intersect [first, end), in file order. */
 std::vector<Coord> nodes(const Coord &first, const Coord &end, openvdb::Index dim)
 {
     std::vector<Coord> origins;
@@ -40,8 +40,8 @@ std::vector<Coord> nodes(const Coord &first, const Coord &end, openvdb::Index di
     return origins;
 }
 
-/* Writes what the library's File would, but for the grid's tree being whole at any time: its two
- * upper levels are written here, and below these one node at a time, made when its turn comes. */
+/* Writes the same file as the library's File class without holding the whole tree. It writes the
+ * two upper levels directly, and creates one lower node at a time. */
 class CubeArchive : public openvdb::io::Archive
 {
   public:
@@ -50,7 +50,7 @@ class CubeArchive : public openvdb::io::Archive
     {
     }
 
-    /* `grid` is empty: name, class and transform. */
+    /* `grid` holds no voxels, only name, class and transform. */
     void write_grid(std::ostream &os, const Grid &grid)
     {
         const int32_t grid_count = 1;
@@ -90,7 +90,7 @@ class CubeArchive : public openvdb::io::Archive
         }
     }
 
-    /* Which children there are is known after them: the head is written twice. */
+    /* Writes the head twice, because the set of children is known only after them. */
     void write_upper(std::ostream &os, const Coord &origin)
     {
         UpperMask children;
@@ -111,7 +111,7 @@ class CubeArchive : public openvdb::io::Archive
         os.seekp(after);
     }
 
-    /* Of one length whatever the mask says, since no value is active. */
+    /* Its length does not depend on the mask, because no value is active. */
     static void write_upper_head(std::ostream &os, const UpperMask &children)
     {
         const UpperMask active;

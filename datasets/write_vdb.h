@@ -1,7 +1,7 @@
-/* Writes a fog-volume VDB of any size in bounded memory: it holds one cube of 128^3 voxels, a node
- * of the tree above the leaves, and reads each cube twice, once to write which voxels are there
- * and once for their values. What is zero is left out. Single-threaded; the source may use threads.
- */
+/* Writes a fog-volume VDB of any size in bounded memory. It holds one cube of 128^3 voxels, which
+ * is a node above the leaves of the tree. It reads each cube twice: first to write the set of
+ * active voxels, then to write their values. Zeros are omitted. Single-threaded; the source may use
+ * threads. */
 #ifndef TRIP_WRITE_VDB_H
 #define TRIP_WRITE_VDB_H
 
@@ -13,9 +13,9 @@ extern "C" {
 
 enum { TRIP_VDB_CUBE = 128 };
 
-/* Fills in the values of the `size` voxels from `first` on, none beyond a cube: that of (i, j, k)
- * goes to values[(k * size[1] + j) * TRIP_VDB_CUBE + i]. Returns a status that ends the writing
- * when it is negative; the same values every time. */
+/* Sets the values of `size` voxels from `first` on, within one cube. Voxel (i, j, k) goes to
+ * values[(k * size[1] + j) * TRIP_VDB_CUBE + i]. Must set the same values in every call. A negative
+ * return value stops the writing. */
 typedef int trip_vdb_source(void *user, const int64_t first[3], const int64_t size[3],
                             float *values);
 

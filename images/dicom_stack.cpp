@@ -1,6 +1,6 @@
-/* DICOM slices through DCMTK. OpenImageIO reads DICOM too, but hands out the decoder's intermediate
- * values in another type than it says, and neither place, spacing nor rescaling. World space is the
- * patient's, in millimetres: x to the left, y to the back, z to the head. */
+/* Reads DICOM slices with DCMTK. OpenImageIO reads DICOM too, but returns the decoder's
+ * intermediate values in another type than it states, and no position, spacing or rescaling. World
+ * space is patient space in millimetres: x to the left, y to the back, z to the head. */
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -35,7 +35,7 @@ struct Rescale {
     }
 };
 
-/* What a slice's file says besides its pixels; what it does not say is empty or NAN. */
+/* The information of a slice's file, without its pixels. Missing values are empty or NAN. */
 struct Header {
     std::string file;
     std::string series;
@@ -43,13 +43,13 @@ struct Header {
     int64_t width = 0, height = 0, frames = 1;
     unsigned allocated = 0, stored = 0, high = 0; /* bits */
     bool is_signed = false;
-    std::vector<Rescale> rescales; /* of every frame, or one of all */
+    std::vector<Rescale> rescales; /* one for each frame, or one for all */
     trip_vec3 origin = { 0, 0, 0 };
-    std::vector<trip_vec3> positions;  /* of the first pixel, for every frame, or none */
+    std::vector<trip_vec3> positions;  /* of the first pixel of each frame, or none */
     std::vector<double> rows;          /* directions of i, then j */
     std::vector<double> pixel_spacing; /* between rows, then between columns */
     double location = NAN, number = NAN, spacing = NAN;
-    bool biped = true; /* x, y and z are left, back and head, as they are in a man */
+    bool biped = true; /* x, y and z point left, back and head, as in humans */
 
     bool placed() const
     {
@@ -122,14 +122,14 @@ unsigned get_count(DcmItem &item, const DcmTagKey &tag, unsigned missing)
     return item.findAndGetUint16(tag, v).good() ? v : missing;
 }
 
-/* DCMTK has no conversion from the text of a whole number to a float. */
+/* DCMTK cannot convert the text of an integer to a float. */
 double get_integer(DcmItem &item, const DcmTagKey &tag, double missing)
 {
     Sint32 v;
     return item.findAndGetSint32(tag, v).good() ? v : missing;
 }
 
-/* A length between samples, or NAN. */
+/* Returns a distance between samples, or NAN. */
 double get_length(DcmItem &item, const DcmTagKey &tag, bool nested)
 {
     double v = std::fabs(get_number(item, tag, nested, NAN));
@@ -147,7 +147,7 @@ bool are_alike(const std::vector<double> &rows, const std::vector<double> &other
                       [](double a, double b) { return std::fabs(a - b) <= 1e-3; });
 }
 
-/* Of several frames each has an item of its own; none where not every frame has one. */
+/* Returns the item of each frame. Returns none if any frame has no item. */
 std::vector<DcmItem *> get_frame_items(DcmItem &item, int64_t count)
 {
     DcmSequenceOfItems *frames = nullptr;
@@ -163,14 +163,14 @@ std::vector<DcmItem *> get_frame_items(DcmItem &item, int64_t count)
     return items;
 }
 
-/* There is nothing to go by unless all frames say where they are. */
+/* Returns the position of each frame. Returns none if any frame has no position. */
 std::vector<trip_vec3> get_frame_positions(const std::vector<DcmItem *> &frames, const Header &h)
 {
     std::vector<trip_vec3> positions;
     for (DcmItem *frame : frames) {
         std::vector<double> rows = get_numbers(*frame, DCM_ImageOrientationPatient, 6, true);
         if (!rows.empty() && !are_alike(rows, h.rows))
-            throw trip_slice_error(h.file, "has frames that are oriented differently");
+            throw trip_slice_error(h.file, "has frames with different orientations");
         std::vector<double> position = get_numbers(*frame, DCM_ImagePositionPatient, 3, true);
         if (position.empty())
             return {};
@@ -179,14 +179,16 @@ std::vector<trip_vec3> get_frame_positions(const std::vector<DcmItem *> &frames,
     return positions;
 }
 
-/* What an item says, itself or in those within it; the rest as in `missing`. */
+/* Returns the rescaling of an item, or also of its nested items if `nested`. Missing numbers are
+ * taken from `missing`. */
 Rescale get_rescale(DcmItem &item, bool nested, const Rescale &missing)
 {
     return { get_number(item, DCM_RescaleSlope, nested, missing.slope),
              get_number(item, DCM_RescaleIntercept, nested, missing.inter) };
 }
 
-/* A frame may say how it is rescaled, as may what all frames share, and the file itself. */
+/* Returns the rescaling of each frame. A frame's own item overrides the file, which overrides the
+ * item shared by all frames. */
 std::vector<Rescale> get_rescales(DcmItem &item, const std::vector<DcmItem *> &frames, bool nested)
 {
     DcmItem *shared = nullptr;
@@ -202,18 +204,18 @@ std::vector<Rescale> get_rescales(DcmItem &item, const std::vector<DcmItem *> &f
     return rescales;
 }
 
-/* The directions of rows and columns are given together, and at right angles. */
+/* Checks that rows and columns are at right angles. A file states both directions or none. */
 void check_rows(const Header &h)
 {
     if (h.rows.empty())
         return;
     trip_vec3 i = trip_normalize(vector_of(h.rows, 0)), j = trip_normalize(vector_of(h.rows, 3));
     if (!(trip_length(trip_cross(i, j)) > 0.999))
-        throw trip_slice_error(h.file,
-                               "has rows and columns that are not at right angles in the patient");
+        throw trip_slice_error(
+            h.file, "has rows and columns that are not at right angles in patient space");
 }
 
-/* Files that may hold several frames keep their geometry in nested items. */
+/* Files that may hold several frames store their geometry in nested items. */
 void read_geometry(DcmItem &item, Header &h)
 {
     bool nested = h.frames > 1 || item.tagExists(DCM_SharedFunctionalGroupsSequence);
@@ -244,17 +246,18 @@ void read_geometry(DcmItem &item, Header &h)
 void check_header(const Header &h, unsigned samples)
 {
     if (h.width < 1 || h.height < 1 || h.frames < 1)
-        throw trip_slice_error(h.file, "has no picture");
+        throw trip_slice_error(h.file, "contains no picture");
     if (samples != 1)
         throw trip_slice_error(h.file, "is in colour; only grey DICOM slices are read");
     if ((h.allocated != 8 && h.allocated != 16 && h.allocated != 32) || h.stored < 1 ||
         h.stored > h.allocated || h.high + 1 < h.stored || h.high >= h.allocated)
         throw trip_slice_error(h.file, "has pixels of " + std::to_string(h.stored) + " bits in " +
-                                           std::to_string(h.allocated) + ", which are not read");
+                                           std::to_string(h.allocated) +
+                                           ", which are not supported");
 }
 
-/* Of at most 16 letters, digits, blanks and underscores, as the standard has it; of another form it
- * says nothing. */
+/* Returns the modality. The standard allows at most 16 upper-case letters, digits, blanks and
+ * underscores; other texts are ignored. */
 std::string get_modality(DcmItem &item)
 {
     OFString text;
@@ -294,8 +297,8 @@ template <typename Has> bool all_have(const std::vector<Header> &headers, const 
     return std::all_of(headers.begin(), headers.end(), has);
 }
 
-/* Puts the slices in order of `key`, which must differ from slice to slice and leave no gap unless
- * that is allowed. Returns what trip_check_positions() does. */
+/* Sorts the slices by `key`. Keys must differ, and a gap is an error unless it is allowed. Returns
+ * the result of trip_check_positions(). */
 template <typename Key>
 double sort_by(std::vector<Header> &headers, const Key &key, const char *stage, bool allow_gaps)
 {
@@ -306,7 +309,8 @@ double sort_by(std::vector<Header> &headers, const Key &key, const char *stage, 
     for (const Header &h : headers) {
         if (!keys.empty() && !(key(h) - keys.back() > 1e-6))
             throw trip_slice_error(h.file, std::string("has the same ") + stage + " as " +
-                                               names.back() + ": several series in one folder?");
+                                               names.back() +
+                                               "; does the folder hold several series?");
         keys.push_back(key(h));
         names.push_back(h.file);
     }
@@ -318,8 +322,8 @@ bool all_placed(const std::vector<Header> &headers)
     return all_have(headers, [](const Header &h) { return h.placed(); });
 }
 
-/* By place along the slices' normal, else by the location or the number that they state, else as
- * the names are ordered. */
+/* Sorts by position along the slices' normal if all slices have positions. Otherwise sorts by slice
+ * location, or by instance number. Without any of them the order of the names remains. */
 double sort_slices(std::vector<Header> &headers, bool allow_gaps)
 {
     if (all_placed(headers)) {
@@ -328,9 +332,9 @@ double sort_slices(std::vector<Header> &headers, bool allow_gaps)
         trip_vec3 normal = headers[0].normal();
         for (const Header &h : headers)
             if (!are_alike(h.rows, rows))
-                throw trip_slice_error(h.file, "is oriented unlike " + first);
+                throw trip_slice_error(h.file, "has another orientation than " + first);
         return sort_by(
-            headers, [&](const Header &h) { return trip_dot(h.positions[0], normal); }, "place",
+            headers, [&](const Header &h) { return trip_dot(h.positions[0], normal); }, "position",
             allow_gaps);
     }
     if (all_have(headers, [](const Header &h) { return std::isfinite(h.location); })) {
@@ -344,8 +348,8 @@ double sort_slices(std::vector<Header> &headers, bool allow_gaps)
     return 1;
 }
 
-/* The frames of one file in order of their place; none where places are not known. Sets `squeeze`
- * to what trip_check_positions() returns of them. */
+/* Returns the frames of one file in order of their positions; empty if positions are not known.
+ * Sets `squeeze` to the result of trip_check_positions(). */
 std::vector<Uint32> sort_frames(Header &h, bool allow_gaps, double &squeeze)
 {
     std::vector<Uint32> order(h.placed() ? h.positions.size() : 0);
@@ -360,7 +364,8 @@ std::vector<Uint32> sort_frames(Header &h, bool allow_gaps, double &squeeze)
                      [&](Uint32 a, Uint32 b) { return depths[a] < depths[b]; });
     for (size_t i = 0; i < order.size(); i++) {
         if (i > 0 && !(depths[order[i]] - depths[order[i - 1]] > 1e-6))
-            throw trip_slice_error(h.file, "has several frames at one place: of several times?");
+            throw trip_slice_error(h.file,
+                                   "has several frames at one position; split a time series first");
         sorted.push_back(h.positions[order[i]]);
         sorted_depths.push_back(depths[order[i]]);
         names.push_back(h.file + ": frame " + std::to_string(order[i] + 1));
@@ -373,9 +378,9 @@ std::vector<Uint32> sort_frames(Header &h, bool allow_gaps, double &squeeze)
     return order;
 }
 
-/* Slices are the sheets of one grid, sheared where the gantry was tilted, if they all lie on one
- * straight line; half a pixel beside it is refused. Steps of several lengths are a grid still, with
- * slices missing perhaps, and draw a warning. */
+/* Checks that slices lie on one straight line, so that they are sheets of one grid, sheared if the
+ * gantry was tilted. A deviation of more than half a pixel is an error. Unequal steps draw a
+ * warning, because slices may be missing. */
 void check_line(const std::string &file, const std::vector<trip_vec3> &positions, trip_vec3 normal,
                 trip_vec3 step, double pixel)
 {
@@ -388,7 +393,7 @@ void check_line(const std::string &file, const std::vector<trip_vec3> &positions
             char text[200];
             std::snprintf(text, sizeof text,
                           "slice %zu of its series lies %.3g beside the line through the first and "
-                          "the last: no grid holds such slices",
+                          "the last; such slices form no grid",
                           i + 1, aside);
             throw trip_slice_error(file, text);
         }
@@ -397,11 +402,13 @@ void check_line(const std::string &file, const std::vector<trip_vec3> &positions
         before = steps;
     }
     if (max - min > 0.02)
-        trip_warn(file.c_str(), "slices are %g to %g apart, perhaps some are missing; drawn evenly",
+        trip_warn(file.c_str(),
+                  "slices are %g to %g apart and some may be missing; they are drawn evenly spaced",
                   min * trip_length(step), max * trip_length(step));
 }
 
-/* The step from slice to slice in space, from where they are, else from what they state. */
+/* Returns the step between slices in space, from their positions if known, else from the stated
+ * location or spacing. */
 trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal, double pixel)
 {
     const Header &first = headers.front(), &last = headers.back();
@@ -421,7 +428,7 @@ trip_vec3 slice_step(const std::vector<Header> &headers, trip_vec3 normal, doubl
     return trip_scale(normal, length);
 }
 
-/* `squeeze` shortens the step from slice to slice where gaps are passed over. */
+/* Returns index_to_world. `squeeze` scales the step between slices if gaps were allowed. */
 trip_affine make_map(const std::vector<Header> &headers, double squeeze)
 {
     const Header &h = headers[0];
@@ -441,7 +448,7 @@ trip_affine make_map(const std::vector<Header> &headers, double squeeze)
     return map;
 }
 
-/* Stored bits to whole numbers: the bits below high - stored are dropped, the sign is extended. */
+/* Converts stored bits to integers. Drops the bits below high - stored and extends the sign. */
 template <typename T> void align_bits(const Header &h, T *values, size_t count)
 {
     using Unsigned = typename std::make_unsigned<T>::type;
@@ -481,13 +488,15 @@ class DicomStack : public trip_slice_stack
     void read_frame(const Header &h, Uint32 frame);
 
     std::vector<Header> headers_;
-    std::vector<Uint32> frames_; /* of one file, in order of their place; none: as they come */
+    std::vector<Uint32>
+        frames_; /* of one file, in order of positions; empty for the order in the file */
     trip_scalar stored_ = TRIP_U8;
     trip_slice_buffer frame_;
     uint64_t frame_bytes_ = 0;
-    std::unique_ptr<DcmFileFormat> format_; /* of the slice that was read last */
+    std::unique_ptr<DcmFileFormat> format_; /* of the slice read last */
     std::string loaded_;
-    Uint32 next_frame_ = 0, fragment_ = 0; /* where the frame after the last one read begins */
+    Uint32 next_frame_ = 0,
+           fragment_ = 0; /* the frame after the last one read, and its first fragment */
 };
 
 DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool allow_gaps)
@@ -504,7 +513,7 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool 
         if (h.series != first.series)
             throw trip_slice_error(name, "belongs to another series than " + first.file);
         if (h.frames > 1 && files.names.size() > 1)
-            throw trip_slice_error(name, "holds several frames, and is one of several files");
+            throw trip_slice_error(name, "holds several frames but is one of several files");
         rescaled_alike = rescaled_alike && h.all_rescaled(first.rescales[0]);
     }
     double squeeze = sort_slices(headers_, allow_gaps);
@@ -526,7 +535,7 @@ DicomStack::DicomStack(const trip_slice_files &files, trip_budget *budget, bool 
     slope = rescaled_alike ? h.rescales[0].slope : 1;
     inter = rescaled_alike ? h.rescales[0].inter : 0;
     frame_bytes_ = (uint64_t)h.width * (uint64_t)h.height * (h.allocated / 8);
-    frame_.take(budget, h.file, frame_bytes_ + 1); /* the decoder needs an even number */
+    frame_.take(budget, h.file, frame_bytes_ + 1); /* the decoder needs an even number of bytes */
 }
 
 void DicomStack::load(const std::string &file)
@@ -540,7 +549,7 @@ void DicomStack::load(const std::string &file)
     loaded_ = file;
 }
 
-/* Decompressed where it has to be. */
+/* Reads a frame into frame_, decompressing it if necessary. */
 void DicomStack::read_frame(const Header &h, Uint32 frame)
 {
     load(h.file);
@@ -549,12 +558,12 @@ void DicomStack::read_frame(const Header &h, Uint32 frame)
     Uint32 bytes = 0;
     DcmDataset *set = format_->getDataset();
     if (frame != next_frame_)
-        fragment_ = 0; /* to be looked for */
+        fragment_ = 0; /* unknown; DCMTK searches for it */
     require(h.file, set->findAndGetElement(DCM_PixelData, element));
     DcmPixelData *pixels = dynamic_cast<DcmPixelData *>(element);
     if (!pixels || pixels->getUncompressedFrameSize(set, bytes).bad() ||
         (bytes != frame_bytes_ && bytes != frame_bytes_ + 1))
-        throw trip_slice_error(h.file, "has pixels that do not fit its size");
+        throw trip_slice_error(h.file, "has pixel data of the wrong size");
     require(h.file,
             pixels->getUncompressedFrame(set, frame, fragment_, frame_.data(),
                                          (Uint32)((frame_bytes_ + 1) & ~(uint64_t)1), colours));

@@ -21,17 +21,16 @@
 
 enum {
     TEXT_BYTES = 4096,
-    MAX_WARNINGS = 64,    /* of one request */
-    MAX_SIGNS = 1 << 20,  /* of life in one request; they come a second apart */
-    PATIENCE_MS = 120000, /* without a byte from the helper */
-    WAIT_MS = 100,        /* between looks at the interrupt flag */
+    MAX_WARNINGS = 64,    /* in one request */
+    MAX_SIGNS = 1 << 20,  /* of TRIP_IMAGE_WORKING in one request; they come a second apart */
+    PATIENCE_MS = 120000, /* maximum time without a byte from the helper */
+    WAIT_MS = 100,        /* between checks of the interrupt flag */
     REAP_MS = 1000,
 };
 
-/* A program that may help. */
 typedef struct helper_program {
     const char *name;
-    const char *built; /* NULL: it was not */
+    const char *built; /* path in the build folder; NULL if it was not built */
     const char *does;
 } helper_program;
 
@@ -44,13 +43,13 @@ struct trip_image_helper {
     const char *stage;
     const char *program;
     char path[PATH_MAX]; /* of the last request */
-    pid_t pid;           /* 0: gone */
+    pid_t pid;           /* 0 once it has ended */
     int fd;
     int patience_ms;
     bool broken;
 };
 
-/* What stands in for the program in tests. */
+/* Replaces the helper program in tests. */
 static _Thread_local trip_image_stand_in stand_in;
 static _Thread_local int stand_in_patience_ms;
 
@@ -60,16 +59,16 @@ void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms)
     stand_in_patience_ms = patience_ms;
 }
 
-/* What the new process needs of this one, and what it leaves for it. */
+/* Data for the new process, and its result. */
 typedef struct launch {
     char *program;
     int fd;
     pid_t parent;
-    volatile int error; /* why the program did not start */
+    volatile int error; /* errno if the program did not start */
 } launch;
 
-/* The process shares its parent's memory here, so that no handler of a signal may run in it before
- * the program does: all signals are blocked. */
+/* Resets signal handlers in the new process. Until execve() this process shares the memory of its
+ * parent, so no handler may run in it. For this reason all signals are blocked before. */
 static void reset_signals(void)
 {
     struct sigaction handler;
@@ -82,9 +81,9 @@ static void reset_signals(void)
     sigprocmask(SIG_SETMASK, &none, NULL);
 }
 
-/* The connection as descriptor 3, nothing to read or to print to, signals as they come. The kernel
- * ends the process with the thread that started it from its first instruction on; a parent that
- * ended before that was set is not its parent any more. */
+/* Runs in the new process. Makes the connection descriptor 3, opens /dev/null as descriptors 0 to 2
+ * and unblocks signals. From its first instruction on, the kernel ends the program with the thread
+ * that started it. If the parent ended before prctl(), the parent id has changed. */
 static _Noreturn void become_helper(launch *l)
 {
     char *argv[] = { l->program, NULL };
@@ -104,7 +103,7 @@ static _Noreturn void become_helper(launch *l)
     _exit(127);
 }
 
-/* 0, or the errno of what failed. */
+/* Returns 0, or the errno of the failure. */
 static int spawn(char *program, int fd, pid_t *pid)
 {
     launch l = { .program = program, .fd = fd, .parent = getpid() };
@@ -128,12 +127,13 @@ static int start(trip_image_helper **out, const char *stage, const helper_progra
     char program[PATH_MAX] = "";
     int fds[2], error = ENOMEM;
     if (!stand_in && !of->built)
-        return trip_fail(TRIP_ERROR, stage, of->name, "was not built; it %s", of->does);
+        return trip_fail(TRIP_ERROR, stage, of->name, "was not built; this program %s", of->does);
     if (!stand_in && !trip_companion_find(program, of->name, of->built, X_OK))
         return trip_fail(TRIP_ERROR, stage, of->name,
-                         "is not beside this program nor in ../libexec/triptych; it %s", of->does);
+                         "is neither beside triptych nor in ../libexec/triptych; this program %s",
+                         of->does);
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fds) != 0)
-        return trip_fail_errno(stage, program, "cannot connect");
+        return trip_fail_errno(stage, program, "cannot create a connection");
     trip_image_helper *h = calloc(1, sizeof *h);
     if (h)
         error = stand_in ? stand_in(fds[1]) : spawn(program, fds[1], &h->pid);
@@ -162,8 +162,8 @@ int trip_image_helper_start_netcdf(trip_image_helper **out, const char *stage)
     return start(out, stage, &netcdf_program);
 }
 
-/* Ends the process and returns its status. One that the kernel cannot end at once, in the middle of
- * a read from a dead network disk, is left to it. */
+/* Ends the process and returns its status. The kernel may not be able to end it at once, for
+ * example during a read from a dead network disk. Then it remains, and the kernel ends it later. */
 static int end_process(trip_image_helper *h)
 {
     int status = 0;
@@ -187,28 +187,29 @@ void trip_image_helper_stop(trip_image_helper *h)
     free(h);
 }
 
-/* The connection is gone: the helper is, too. */
+/* Reports that the helper has closed the connection. */
 static int helper_lost(trip_image_helper *h)
 {
     int status = end_process(h);
     h->broken = true;
     if (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL)
-        return trip_fail(TRIP_ERROR, h->stage, h->path,
-                         "brought the decoder down (%s): corrupt, or of an unusual kind",
-                         strsignal(WTERMSIG(status)));
-    return trip_fail(TRIP_ERROR, h->stage, h->path, "%s ended before it was done", h->program);
+        return trip_fail(
+            TRIP_ERROR, h->stage, h->path,
+            "crashed the decoder (%s); the file may be corrupt or of an unsupported kind",
+            strsignal(WTERMSIG(status)));
+    return trip_fail(TRIP_ERROR, h->stage, h->path, "%s ended too early", h->program);
 }
 
 int trip_image_helper_distrust(trip_image_helper *h, const char *why)
 {
     end_process(h);
     h->broken = true;
-    return trip_fail(TRIP_ERROR, h->stage, h->path, "%s gives an answer that cannot be: %s",
-                     h->program, why);
+    return trip_fail(TRIP_ERROR, h->stage, h->path, "%s sent an invalid reply: %s", h->program,
+                     why);
 }
 
-/* Until the connection can be read or written. 0, or a reported failure, after which the helper is
- * gone. */
+/* Waits until the connection can be read or written. Returns 0 or a reported failure; the helper is
+ * then ended. */
 static int wait_for(trip_image_helper *h, short events)
 {
     for (int waited_ms = 0; waited_ms < h->patience_ms;) {
@@ -227,9 +228,10 @@ static int wait_for(trip_image_helper *h, short events)
     }
     end_process(h);
     h->broken = true;
-    return trip_fail(TRIP_ERROR, h->stage, h->path,
-                     "%s has not answered for %g s: corrupt, or of an unusual kind", h->program,
-                     h->patience_ms / 1e3);
+    return trip_fail(
+        TRIP_ERROR, h->stage, h->path,
+        "%s has not answered for %g s; the file may be corrupt or of an unsupported kind",
+        h->program, h->patience_ms / 1e3);
 }
 
 static bool has_to_wait(ssize_t n)
@@ -266,7 +268,7 @@ int trip_image_helper_receive(trip_image_helper *h, void *data, size_t bytes)
     return 0;
 }
 
-/* One byte, with the descriptor beside it where there is one. */
+/* Sends one byte, and the descriptor with it unless it is -1. */
 static int send_descriptor(trip_image_helper *h, int fd)
 {
     union {
@@ -303,7 +305,7 @@ int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, c
     if (numbers)
         memcpy(request.numbers, numbers, sizeof request.numbers);
     if (request.path_bytes >= PATH_MAX)
-        return trip_fail(TRIP_ERROR, h->stage, path, "has a name that is too long");
+        return trip_fail(TRIP_ERROR, h->stage, path, "has a path that is too long");
     memcpy(h->path, path, request.path_bytes + 1);
     if (h->broken)
         return helper_lost(h);
@@ -313,7 +315,7 @@ int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, c
     return status < 0 ? status : trip_image_helper_send(h, path, request.path_bytes);
 }
 
-/* A reply and its texts, all of which can be. */
+/* Receives a reply with its texts, and checks that it is valid. */
 static int receive_reply(trip_image_helper *h, trip_image_reply *reply, char where[TEXT_BYTES],
                          char why[TEXT_BYTES])
 {
@@ -321,7 +323,7 @@ static int receive_reply(trip_image_helper *h, trip_image_reply *reply, char whe
     if (status < 0)
         return status;
     if (reply->where_bytes >= TEXT_BYTES || reply->why_bytes >= TEXT_BYTES)
-        return trip_image_helper_distrust(h, "a text without end");
+        return trip_image_helper_distrust(h, "a text that is too long");
     status = trip_image_helper_receive(h, where, reply->where_bytes);
     if (status == 0)
         status = trip_image_helper_receive(h, why, reply->why_bytes);
@@ -330,7 +332,7 @@ static int receive_reply(trip_image_helper *h, trip_image_reply *reply, char whe
     where[reply->where_bytes] = why[reply->why_bytes] = 0;
     bool done = reply->outcome == TRIP_IMAGE_DONE, failed = reply->outcome == TRIP_IMAGE_FAILED;
     if (!done && reply->data_bytes > 0)
-        return trip_image_helper_distrust(h, "data where there is none");
+        return trip_image_helper_distrust(h, "unexpected data");
     if (failed && reply->status != TRIP_ERROR && reply->status != TRIP_USAGE)
         return trip_image_helper_distrust(h, "an unknown status");
     return 0;
@@ -353,12 +355,12 @@ int trip_image_helper_outcome(trip_image_helper *h, uint64_t *data_bytes_out)
             return trip_fail(reply.status, h->stage, where, "%s", why);
         case TRIP_IMAGE_WARNING:
             if (++warnings > MAX_WARNINGS)
-                return trip_image_helper_distrust(h, "warnings without end");
+                return trip_image_helper_distrust(h, "too many warnings");
             trip_warn(where, "%s", why);
             break;
         case TRIP_IMAGE_WORKING:
             if (++signs > MAX_SIGNS)
-                return trip_image_helper_distrust(h, "work without end");
+                return trip_image_helper_distrust(h, "too many signs of life");
             break;
         default:
             return trip_image_helper_distrust(h, "an unknown outcome");
@@ -371,6 +373,6 @@ int trip_image_helper_expect(trip_image_helper *h, uint64_t data_bytes)
     uint64_t bytes;
     int status = trip_image_helper_outcome(h, &bytes);
     if (status == 0 && bytes != data_bytes)
-        return trip_image_helper_distrust(h, "data of another size than it has to be");
+        return trip_image_helper_distrust(h, "data of the wrong size");
     return status;
 }

@@ -1,16 +1,17 @@
-/* Picture files are read by a second program, triptych-images, and written by it but for PNG, which
- * needs none of its libraries; files of netCDF-4 are read by another, triptych-netcdf. This is how
- * the others talk to them. OpenImageIO brings some 250 libraries, 120 MB of resident memory and a
- * fifth of a second to start; here they count only where they are needed, and not towards the
- * memory that the renderer promises. A decoder that a broken file brings down takes nobody with it,
- * and what the libraries print goes nowhere.
+/* Connections to the two helper programs. triptych-images reads picture files, and writes all of
+ * them except PNG. triptych-netcdf reads netCDF-4 files. The helpers are separate programs for
+ * three reasons:
+ * - OpenImageIO brings some 250 libraries, needs 120 MB of memory and takes a fifth of a second to
+ *   start. A helper pays this only when needed, outside the memory limit of the renderer.
+ * - A decoder that crashes on a corrupt file ends only the helper.
+ * - The output that libraries print is discarded.
  *
- * Nor is a decoder that a hostile file has taken over trusted: the helper may read files, use the
- * memory it is given and write to the descriptor it is given, and no more (sandbox.h); whatever it
- * answers is checked; and every wait for it ends when it is silent for two minutes, or by Ctrl-C.
+ * A hostile file might take over a decoder, so the helper is not trusted. It may only read files,
+ * use a limited amount of memory and write to the descriptor it was given (sandbox.h). All its
+ * replies are checked. A wait for it ends after two minutes of silence, or by Ctrl-C.
  *
- * A helper is one process and one connection; it is used by one thread at a time. The kernel ends
- * it with the thread that started it. */
+ * A helper is one process with one connection; one thread at a time may use it. The kernel ends it
+ * with the thread that started it. */
 #ifndef TRIP_IMAGE_HELPER_H
 #define TRIP_IMAGE_HELPER_H
 
@@ -21,7 +22,7 @@
 extern "C" {
 #endif
 
-/* What slices and pictures may be. */
+/* The kinds of slice and picture files. */
 typedef enum trip_image_kind {
     TRIP_IMAGE_OTHER,
     TRIP_IMAGE_TIFF,
@@ -30,34 +31,36 @@ typedef enum trip_image_kind {
     TRIP_IMAGE_DICOM,
 } trip_image_kind;
 
-/* By content; 132 bytes are enough. */
+/* Detects the kind from the first bytes of a file; 132 bytes suffice. */
 trip_image_kind trip_image_kind_of(const unsigned char *head, size_t bytes);
 const char *trip_image_kind_name(trip_image_kind kind);
 
 enum trip_image_task {
-    /* A picture to the descriptor, which is open for writing; the path says its format. numbers:
-     * width, height, depth (trip_image_depth), trip_image_form, JPEG quality. Then rows of floats
-     * from the top, RGBA or distances; then the reply. */
+    /* Writes a picture to the descriptor, which must be open for writing. The path selects the
+     * format. numbers: width, height, depth (trip_image_depth), trip_image_form, JPEG quality. Rows
+     * of floats follow from the top, RGBA or distances. The reply comes after the rows. */
     TRIP_IMAGE_WRITE = 1,
-    /* A picture from a file. numbers: bytes the helper may use. The reply's data: trip_image_size,
+    /* Reads a picture from a file. numbers: bytes the helper may use. Reply data: trip_image_size,
      * then float RGBA rows. */
     TRIP_IMAGE_READ,
-    /* Opens a stack of slices. numbers: bytes the helper may use, 1 to go on where slices are
-     * missing. Data: trip_image_stack. */
+    /* Opens a stack of slices. numbers: bytes the helper may use; 1 to accept missing slices. Reply
+     * data: trip_image_stack. */
     TRIP_IMAGE_OPEN_STACK,
-    /* numbers: k. Data: the slice's values as stored, in this machine's byte order. */
+    /* Reads a slice. numbers: k. Reply data: the stored values in this machine's byte order. */
     TRIP_IMAGE_READ_SLICE,
-    /* Opens a variable of a file of netCDF-4, whose slices are then read. numbers: bytes the helper
-     * may use, bytes of the variable's name, which follow; 0: of its own choice. Data:
-     * trip_image_netcdf, and the coordinates that it announces. */
+    /* Opens a variable of a netCDF-4 file, so that slices of it can be read. numbers: bytes the
+     * helper may use; length of the variable's name. The name follows the request; length 0 lets
+     * the helper choose a variable. Reply data: trip_image_netcdf, then the coordinates that it
+     * announces. */
     TRIP_IMAGE_OPEN_NETCDF,
 };
 
-/* What a picture's file holds, of rows of RGBA the first two, of rows of distances the last. */
+/* The contents of a picture file. The rows for RGBA and RGB are RGBA, the rows for DISTANCES are
+ * distances. */
 enum trip_image_form { TRIP_IMAGE_FORM_RGBA, TRIP_IMAGE_FORM_RGB, TRIP_IMAGE_FORM_DISTANCES };
 
-/* After one byte of any value, with which a descriptor may come; before the path, without a zero at
- * its end. */
+/* A request. One byte of any value comes before it, possibly with a descriptor. The path follows
+ * it, without a terminating zero. */
 typedef struct trip_image_request {
     uint32_t task;
     uint32_t path_bytes;
@@ -68,10 +71,10 @@ enum trip_image_outcome {
     TRIP_IMAGE_DONE = 1,
     TRIP_IMAGE_FAILED,
     TRIP_IMAGE_WARNING,
-    TRIP_IMAGE_WORKING, /* a sign of life in a long task, at most one a second */
+    TRIP_IMAGE_WORKING, /* the helper is still working; sent at most once a second */
 };
 
-/* Followed by where and why, for people, and by data. Warnings and signs of life come before the
+/* A reply. Two texts (where and why) and the data follow it. Warnings and WORKING come before the
  * outcome. */
 typedef struct trip_image_reply {
     uint32_t outcome;
@@ -87,59 +90,59 @@ typedef struct trip_image_size {
 typedef struct trip_image_stack {
     int64_t dims[3];
     int32_t type;     /* trip_scalar */
-    int32_t oriented; /* the map's directions are the file's */
+    int32_t oriented; /* the file states the directions of the map */
     double slope, inter;
     double index_to_world[3][4];
     char space[8];         /* anatomical, as in anatomy.h; terminated */
-    char modality[24];     /* of DICOM, at most 16 characters; terminated */
-    uint64_t helper_bytes; /* of the allowed memory that it uses until it ends */
+    char modality[24];     /* from DICOM, at most 16 characters; terminated */
+    uint64_t helper_bytes; /* part of the allowed memory used until the helper ends */
 } trip_image_stack;
 
 typedef struct trip_image_netcdf {
     int64_t dims[3];
-    int32_t type;   /* trip_scalar; floats, not a number where nothing is, where some are missing */
-    int32_t placed; /* bit a: coordinates along axis a follow, dims[a] doubles, those of i first */
+    int32_t type;   /* trip_scalar; float with NaN for missing values if the variable has any */
+    int32_t placed; /* bit a: dims[a] doubles with the coordinates along axis a follow, i first */
     double slope, inter;
-    char name[64];         /* of the variable; terminated */
-    int32_t others;        /* 1: there are more volumes in the file */
-    int32_t deeper;        /* 1: it has more dimensions */
-    uint64_t helper_bytes; /* of the allowed memory that it uses until it ends, beside a slice */
+    char name[64];  /* of the variable; terminated */
+    int32_t others; /* 1 if the file holds more volumes */
+    int32_t deeper; /* 1 if the variable has more than three dimensions */
+    uint64_t
+        helper_bytes; /* part of the allowed memory used until the helper ends, besides a slice */
 } trip_image_netcdf;
 
 typedef struct trip_image_helper trip_image_helper;
 
-/* Starts the program; it gets ready while the caller goes on. `what` ("read", "write") begins the
- * lines about it and must outlive it. */
+/* Starts triptych-images. It starts up while the caller continues. Messages about the helper begin
+ * with `stage` ("read", "write"), which must outlive it. */
 int trip_image_helper_start(trip_image_helper **out, const char *stage);
-/* The same of triptych-netcdf; fails where that was not built. */
+/* Starts triptych-netcdf. Fails if it was not built. */
 int trip_image_helper_start_netcdf(trip_image_helper **out, const char *stage);
-/* Ends it, also in the middle of something. NULL is fine. */
+/* Ends the helper, even during a request. Does nothing for NULL. */
 void trip_image_helper_stop(trip_image_helper *h);
 
-/* The functions below return 0 or a reported failure. After one that is not an answer of the helper
- * itself (it is lost, silent or sends what cannot be, or the work was interrupted), the helper is
- * gone, and every further request fails. */
+/* The functions below return 0 or a negative code, reported. The helper is ended if it fails to
+ * answer, answers with invalid data, or the user interrupts. Every later request then fails. */
 
-/* `fd` goes along with the request unless it is -1, and stays the caller's. */
+/* Sends a request with the descriptor `fd`, or without one for -1. The caller keeps `fd`. */
 int trip_image_helper_request(trip_image_helper *h, enum trip_image_task task, const char *path,
                               const int64_t numbers[5], int fd);
 int trip_image_helper_send(trip_image_helper *h, const void *data, size_t bytes);
-/* Passes warnings on and waits for the outcome: 0 and how many bytes of data follow, or a failure,
- * which is reported. */
+/* Waits for the outcome and prints warnings on the way. Sets the number of data bytes that follow.
+ * A failure is reported. */
 int trip_image_helper_outcome(trip_image_helper *h, uint64_t *data_bytes_out);
-/* The same where exactly `data_bytes` must follow. */
+/* Waits for an outcome with exactly `data_bytes` of data. Fails for any other size. */
 int trip_image_helper_expect(trip_image_helper *h, uint64_t data_bytes);
 int trip_image_helper_receive(trip_image_helper *h, void *data, size_t bytes);
-/* What it sent cannot be, and `why` says what: ends the helper, reports, returns TRIP_ERROR. */
+/* Ends the helper because it sent invalid data. Reports `why` and returns TRIP_ERROR. */
 int trip_image_helper_distrust(trip_image_helper *h, const char *why);
 
-/* For tests: what takes the program's place from the calling thread's next start on, NULL for the
- * program again. It gets the helper's end of the connection, which is closed when it returns; 0, or
- * an errno. */
+/* For tests: replaces the helper program from the calling thread's next start on. NULL restores the
+ * program. The function gets the helper's end of the connection, which is closed when it returns.
+ * It returns 0 or an errno value. */
 typedef int (*trip_image_stand_in)(int fd);
 void trip_image_helper_replace(trip_image_stand_in peer, int patience_ms);
 
-/* The helper's connection in its own process. */
+/* The descriptor of the connection in the helper's process. */
 #define TRIP_IMAGE_HELPER_FD 3
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
 /* triptych-images: answers the requests of image_helper.h on descriptor 3, one after another, until
- * the connection ends. Every exception of the libraries ends up in a reply. */
+ * the connection closes. Every exception of the libraries becomes a reply. */
 #include <algorithm>
 #include <csignal>
 #include <cstring>
@@ -23,7 +23,8 @@
 namespace
 {
 
-/* A line that common/report would print, "triptych: warning: WHERE: why". */
+/* Sends a warning to the other end. `line` has the form of common/report, "triptych: warning:
+ * WHERE: why". */
 void pass_warning(const char *line, void *)
 {
     std::string text = line;
@@ -43,7 +44,7 @@ void reply_data(uint64_t bytes)
     trip_connection_reply(TRIP_IMAGE_DONE, 0, "", "", bytes);
 }
 
-/* A descriptor that came with a request. */
+/* Owns a descriptor that came with a request. */
 class Descriptor
 {
   public:
@@ -136,8 +137,8 @@ class Session
                                                 : trip_picture_stack(files, budget_);
         bool frames = files.kind == TRIP_IMAGE_DICOM && stack_->dims[2] > 1;
         if (allow_gaps && files.names[0] == path && !frames)
-            throw trip_slice_error(path, "is one file: --allow-gaps is for stacks of several",
-                                   TRIP_USAGE);
+            throw trip_slice_error(
+                path, "is one file; --allow-gaps requires a stack of several files", TRIP_USAGE);
         trip_image_stack s = {};
         std::memcpy(s.dims, stack_->dims, sizeof s.dims);
         s.type = stack_->type;
@@ -169,7 +170,7 @@ class Session
     std::vector<char> slice_;
 };
 
-/* Set where memory was refused, whatever the libraries make of that. */
+/* Set if an allocation failed. Libraries may report this failure in another way. */
 bool memory_refused;
 
 void on_memory_refused()
@@ -178,7 +179,7 @@ void on_memory_refused()
     throw std::bad_alloc();
 }
 
-/* The libraries say it in many ways. */
+/* Whether a library's message is about memory. */
 bool speaks_of_memory(const std::string &why)
 {
     static const char *const words[] = { "bad_alloc", "memory", "allocat" };
@@ -192,8 +193,8 @@ void reply_failure(const std::string &where, const std::string &why, int status)
     if (!ours && (memory_refused || speaks_of_memory(why)))
         trip_connection_reply(
             TRIP_IMAGE_FAILED, TRIP_ERROR, where,
-            "needs more memory to decode than is allowed: a larger --memory would "
-            "do, unless it is corrupt",
+            "needs more memory to decode than allowed; raise --memory, unless the file is "
+            "corrupt",
             0);
     else
         trip_connection_reply(TRIP_IMAGE_FAILED, status, where, why, 0);
@@ -214,7 +215,8 @@ void answer_one(Session &session)
     }
 }
 
-/* Threads count towards the memory that the helper may use, and decode one slice at a time. */
+/* Limits the threads. They decode one slice at a time, and their stacks count towards the helper's
+ * memory. */
 void set_up_threads()
 {
     const int threads = (int)std::min(8u, std::max(1u, std::thread::hardware_concurrency()));
@@ -231,13 +233,13 @@ void set_up_threads()
 
 int main()
 {
-    /* Ctrl-C, and the end of a terminal, go to the whole group; the other end decides what becomes
-     * of a request. */
+    /* Ctrl-C and the end of a terminal signal the whole process group. The other end decides
+     * whether to end a request. */
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGHUP, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
-    std::signal(SIGXFSZ, SIG_IGN); /* a write that fails says so itself */
-    (void)trip_sandbox_enter();    /* where the kernel can */
+    std::signal(SIGXFSZ, SIG_IGN); /* write() then fails with EFBIG */
+    (void)trip_sandbox_enter();    /* continues without a sandbox if the kernel has none */
     set_up_threads();
     std::set_new_handler(on_memory_refused);
     trip_report_redirect(pass_warning, nullptr);

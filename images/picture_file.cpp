@@ -18,8 +18,8 @@
 namespace
 {
 
-/* Bytes go to the file by write(2) as the encoder hands them over, so that a full disk is seen with
- * its errno whatever the encoder makes of it. */
+/* Writes the encoder's bytes with pwrite(2) and keeps errno. A full disk is then reported, even if
+ * the encoder ignores the error. */
 class FileSink : public OIIO::Filesystem::IOProxy
 {
   public:
@@ -65,12 +65,12 @@ class FileSink : public OIIO::Filesystem::IOProxy
     int64_t size_ = 0;
 };
 
-/* How a picture is stored. */
+/* The format of a stored picture. */
 struct Encoding {
     const char *plugin;
     trip_image_depth depth;
-    int channels; /* four: the fourth is associated alpha */
-    bool linear;  /* light, where others hold display values */
+    int channels; /* with four, the fourth is associated alpha */
+    bool linear;  /* stores linear light instead of display values */
 };
 
 Encoding choose_encoding(const trip_picture &p)
@@ -89,8 +89,8 @@ Encoding choose_encoding(const trip_picture &p)
     return e;
 }
 
-/* The sRGB transfer function (IEC 61966-2-1) and its inverse; negative numbers mirror positive
- * ones, so that none is lost. */
+/* The sRGB transfer function (IEC 61966-2-1) and its inverse. Negative numbers mirror positive
+ * ones, so no colour is clipped. */
 float linear_of_display(float v)
 {
     double x = std::fabs((double)v);
@@ -105,8 +105,8 @@ float display_of_linear(float v)
     return (float)std::copysign(y, (double)v);
 }
 
-/* A curve is for colours as they are, not for what alpha leaves of them. Colour without alpha is
- * light that is added, and taken as it is. */
+/* Applies a curve to the colour before multiplication by alpha. Colour with alpha 0 is added light,
+ * and the curve applies to it directly. */
 template <typename Curve> void apply_curve(const Curve &curve, float rgba[4], bool associated)
 {
     float alpha = associated && rgba[3] > 0 ? rgba[3] : 1;
@@ -120,7 +120,7 @@ template <typename T> void quantise(const float *from, int channels, T *to)
         to[c] = (T)trip_image_integer(from[c], (T)-1);
 }
 
-/* One row in the file's channels and type. Distances are left as they are. */
+/* Converts one row to the file's channels and type. Distances are copied. */
 void convert_row(const Encoding &e, int width, const float *from, void *to)
 {
     if (e.channels == 1) {
@@ -156,7 +156,7 @@ OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
     OIIO::ImageSpec spec(p.width, p.height, e.channels, type);
     if (e.channels == 4) {
         spec.alpha_channel = 3;
-        /* Says what the values are, so that OpenImageIO leaves them alone. */
+        /* declares the values as associated, so OpenImageIO does not change them */
         spec.attribute("oiio:UnassociatedAlpha", 0);
     }
     if (e.channels == 1) {
@@ -169,7 +169,7 @@ OIIO::ImageSpec make_spec(const trip_picture &p, const Encoding &e)
     } else {
         spec.attribute("compression", "zip");
     }
-    /* Otherwise OpenImageIO notes the time, and the same picture would be another file. */
+    /* OpenImageIO would store the time, and equal pictures would give different files. */
     spec.attribute("DateTime", "");
     return spec;
 }
@@ -209,7 +209,7 @@ void encode(const trip_picture &p, const trip_picture_row &next_row, FileSink &s
     std::vector<char> encoded((size_t)p.width * (size_t)e.channels * type.size());
     for (int y = 0; y < p.height; y++) {
         if (!next_row(row.data()))
-            throw trip_slice_error(p.path, "only part of the picture came");
+            throw trip_slice_error(p.path, "received only part of the picture");
         convert_row(e, p.width, row.data(), encoded.data());
         if (!out->write_scanline(y, 0, type, encoded.data()))
             fail_encoding(p, sink, *out);
@@ -218,7 +218,7 @@ void encode(const trip_picture &p, const trip_picture_row &next_row, FileSink &s
         fail_encoding(p, sink, *out);
 }
 
-/* `channels` values as RGBA, premultiplied. */
+/* Converts `channels` values to premultiplied RGBA. */
 void to_rgba(const float *from, int channels, bool premultiplied, float rgba[4])
 {
     bool grey = channels < 3;
@@ -241,13 +241,13 @@ void trip_picture_write(const trip_picture &p, const trip_picture_row &next_row)
 std::vector<float> trip_picture_read(const std::string &path, int &width, int &height)
 {
     OIIO::ImageSpec hints;
-    hints.attribute("oiio:UnassociatedAlpha", 1); /* premultiplied here, in float */
+    hints.attribute("oiio:UnassociatedAlpha", 1); /* premultiplied below, in float */
     auto in = OIIO::ImageInput::open(path, &hints);
     if (!in)
         throw trip_slice_error(path, trim(OIIO::geterror()));
     const OIIO::ImageSpec spec = in->spec();
     if (spec.nchannels > 4 || spec.depth > 1 || spec.width < 1 || spec.height < 1)
-        throw trip_slice_error(path, "is no picture of one to four channels");
+        throw trip_slice_error(path, "is not a picture with one to four channels");
     std::vector<float> row((size_t)spec.width * (size_t)spec.nchannels);
     std::vector<float> rgba((size_t)spec.width * (size_t)spec.height * 4);
     bool premultiplied = !spec.get_int_attribute("oiio:UnassociatedAlpha", 0);

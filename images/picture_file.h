@@ -1,5 +1,5 @@
-/* Pictures to and from files, through OpenImageIO. Throws trip_slice_error with the file at fault.
- */
+/* Reads and writes picture files with OpenImageIO. Throws trip_slice_error with the path of the
+ * file. One thread at a time. */
 #ifndef TRIP_PICTURE_FILE_H
 #define TRIP_PICTURE_FILE_H
 
@@ -10,21 +10,22 @@
 #include "image_file.h"
 
 struct trip_picture {
-    std::string path; /* says the format; what is wrong is said of it */
+    std::string path; /* selects the format and appears in error messages */
     int fd;           /* open for writing, empty */
     int width, height;
     trip_image_params params;
 };
 
-/* Fills one row of float RGBA, or of distances; false when no more come, which abandons the
- * picture. */
+/* Fills one row of float RGBA or distances. Returns false if no more rows come; the picture is then
+ * abandoned. */
 using trip_picture_row = std::function<bool(float *pixels)>;
 
-/* As trip_image_write(), for a path and params that are known to be right, to the descriptor; takes
- * all rows from the top, and only for those that it has use for. */
+/* Implements trip_image_write() for a valid path and params, writing to the descriptor. Requests
+ * all rows from the top, and no more. */
 void trip_picture_write(const trip_picture &picture, const trip_picture_row &next_row);
 
-/* Premultiplied RGBA rows of a picture of one to four channels, display values in any format. */
+/* Returns premultiplied RGBA rows of a picture with one to four channels. They are display values
+ * for all formats. */
 std::vector<float> trip_picture_read(const std::string &path, int &width, int &height);
 
 #endif

@@ -12,7 +12,7 @@ namespace
 
 using Input = std::unique_ptr<OIIO::ImageInput>;
 
-/* What all slices must have in common. */
+/* The properties that all slices must share. */
 struct Form {
     int width, height, channels, x, y;
     OIIO::TypeDesc type;
@@ -56,7 +56,7 @@ trip_scalar scalar_of(const std::string &file, OIIO::TypeDesc type)
     for (const auto &m : map)
         if (type == OIIO::TypeDesc(m.from))
             return m.to;
-    throw trip_slice_error(file, std::string("has numbers of an unknown kind, ") + type.c_str());
+    throw trip_slice_error(file, std::string("has an unsupported number type, ") + type.c_str());
 }
 
 class PictureStack : public trip_slice_stack
@@ -77,18 +77,18 @@ class PictureStack : public trip_slice_stack
     trip_scalar stored_ = TRIP_U8;
     Input current_;
     int64_t current_file_ = -1;
-    trip_slice_buffer colour_; /* a slice with all channels, for colour */
+    trip_slice_buffer colour_; /* a slice with all channels; only for colour */
 };
 
 Input PictureStack::open(const std::string &file) const
 {
     OIIO::ImageSpec hints;
-    hints.attribute("oiio:UnassociatedAlpha", 1); /* leave colours as they are */
+    hints.attribute("oiio:UnassociatedAlpha", 1); /* do not premultiply */
     Input in = OIIO::ImageInput::open(file, &hints);
     if (!in)
         throw trip_slice_error(file, message(OIIO::geterror()));
     if (in->spec().depth > 1 || in->spec().tile_depth > 1)
-        throw trip_slice_error(file, "is a picture with depth; slices must be its pages");
+        throw trip_slice_error(file, "is a picture with depth; store its slices as pages");
     return in;
 }
 
@@ -100,7 +100,7 @@ void PictureStack::check_same(const std::string &stage, const OIIO::ImageSpec &s
                                           form_->text());
 }
 
-/* ImageJ writes stacks beyond 4 GB as one page and the rest behind it, which no library reads. */
+/* ImageJ writes stacks beyond 4 GB as one page followed by raw data, which no library reads. */
 void check_imagej(const std::string &file, const OIIO::ImageSpec &spec, int pages)
 {
     const std::string text = spec.get_string_attribute("ImageDescription");
@@ -110,11 +110,11 @@ void check_imagej(const std::string &file, const OIIO::ImageSpec &spec, int page
     long images = std::strtol(text.c_str() + at + 7, nullptr, 10);
     if (pages == 1 && images > 1)
         throw trip_slice_error(file, "holds " + std::to_string(images) +
-                                         " slices in ImageJ's own way; save it as raw data or as "
-                                         "an image sequence");
+                                         " slices in a form private to ImageJ; save it as raw data "
+                                         "or as an image sequence");
 }
 
-/* Slices of a single file: the pages of a TIFF. */
+/* Counts the pages of a single file, which are the slices of a TIFF. */
 void PictureStack::count_pages(OIIO::ImageInput &in)
 {
     const std::string &file = files_.names[0];
@@ -129,7 +129,7 @@ void PictureStack::count_pages(OIIO::ImageInput &in)
         pages++;
         trip_connection_working();
     }
-    /* Past the last page the library has nothing to say but the file's name. */
+    /* After the last page the library reports only the file's name, which is no error. */
     std::string why = in.geterror();
     if (files_.kind == TRIP_IMAGE_TIFF && !why.empty() && message(why) != file)
         throw trip_slice_error(file, "after page " + std::to_string(pages) + ": " + message(why));
@@ -143,7 +143,7 @@ void PictureStack::choose_channels(trip_budget *budget)
     stored_ = type = scalar_of(file, form_->type);
     if (form_->channels > 4)
         throw trip_slice_error(file, "has " + std::to_string(form_->channels) +
-                                         " channels; a slice has one, or colour");
+                                         " channels; a slice must have one channel, or colour");
     if (form_->channels == 2)
         trip_warn(file.c_str(), "has two channels; the first one is read");
     if (form_->channels < 3)
@@ -165,8 +165,7 @@ PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) :
     if (files.names.size() == 1)
         count_pages(*in);
     else if (files.kind == TRIP_IMAGE_TIFF && in->seek_subimage(1, 0))
-        throw trip_slice_error(files.names[0], "holds several slices by itself, and is one of "
-                                               "several files");
+        throw trip_slice_error(files.names[0], "holds several slices but is one of several files");
     in->geterror();
     choose_channels(budget);
     for (size_t i = 1; i < files.names.size(); i++) {
@@ -178,10 +177,10 @@ PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) :
 bool on_progress(void *, float)
 {
     trip_connection_working();
-    return false; /* go on */
+    return false; /* continue */
 }
 
-/* Luma of the stored numbers (Rec. ITU-R BT.709-6, 3.2); alpha is left out. */
+/* Converts to the luma of the stored numbers (Rec. ITU-R BT.709-6, 3.2). Alpha is ignored. */
 void PictureStack::colour_to_luma(float *values) const
 {
     const int channels = form_->channels;

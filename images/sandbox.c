@@ -12,7 +12,7 @@
 
 #include "memory_limits.h"
 
-/* AddressSanitizer keeps what was released, which would count. */
+/* AddressSanitizer keeps freed memory, which would count against the limit. */
 #if defined(__SANITIZE_ADDRESS__)
 #define TRIP_HEAP_IS_WATCHED 1
 #elif defined(__has_feature)
@@ -24,11 +24,11 @@
 #define TRIP_HEAP_IS_WATCHED 0
 #endif
 
-/* Decoders' tables, file buffers and the stacks of their threads. */
+/* Room for decoders' tables, file buffers and the stacks of their threads. */
 #define LIBRARIES_BYTES ((uint64_t)64 << 20)
 
-/* Calls that headers older than the kernel lack; x86-64 and 64-bit ARM have the same numbers for
- * them. */
+/* System calls that are missing in headers older than the kernel. x86-64 and 64-bit ARM use the
+ * same numbers. */
 enum {
     CALL_FCHMODAT2 = 452,
     CALL_SETXATTRAT = 463,
@@ -36,8 +36,8 @@ enum {
     CALL_FILE_SETATTR = 469,
 };
 
-/* Never of use to a decoder. The names are libseccomp's, which passes over those that a machine
- * does not have. */
+/* Calls that no decoder needs. libseccomp defines the names and ignores calls that the machine does
+ * not have. */
 static const int denied[] = {
     /* programs and processes */
     SCMP_SYS(execve),
@@ -62,7 +62,7 @@ static const int denied[] = {
     SCMP_SYS(accept),
     SCMP_SYS(accept4),
     SCMP_SYS(socketcall),
-    /* names of files, and what is said of them */
+    /* names and attributes of files */
     SCMP_SYS(creat),
     SCMP_SYS(unlink),
     SCMP_SYS(unlinkat),
@@ -140,14 +140,14 @@ static bool deny(scmp_filter_ctx filter, int call)
     return seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), call, 0) == 0;
 }
 
-/* `argument` has all of `bits`. */
+/* Denies a call if `argument` has all of `bits` set. */
 static bool deny_bits(scmp_filter_ctx filter, int call, unsigned argument, uint64_t bits)
 {
     struct scmp_arg_cmp has = SCMP_CMP64(argument, SCMP_CMP_MASKED_EQ, bits, bits);
     return seccomp_rule_add_array(filter, SCMP_ACT_ERRNO(EPERM), call, 1, &has) == 0;
 }
 
-/* The flags of a file and its project, which a descriptor for reading is enough to change. */
+/* Denies changes to a file's flags and project, which need only a descriptor for reading. */
 static bool deny_flags(scmp_filter_ctx filter)
 {
     static const unsigned requests[] = { FS_IOC_SETFLAGS, FS_IOC_FSSETXATTR };
@@ -160,7 +160,8 @@ static bool deny_flags(scmp_filter_ctx filter)
     return good;
 }
 
-/* Opening is for reading. openat2() hides its flags from filters and is said to be unknown. */
+/* Denies opening files for writing. Filters cannot see the flags of openat2(), so it fails as an
+ * unknown call. */
 static bool deny_writing(scmp_filter_ctx filter)
 {
     static const uint64_t flags[] = { O_WRONLY, O_RDWR, O_CREAT, O_TRUNC };
@@ -171,8 +172,9 @@ static bool deny_writing(scmp_filter_ctx filter)
     return good;
 }
 
-/* Threads are started, other processes are not; signals reach this process only, as abort() needs.
- * clone3() hides its flags and is said to be unknown: the C library uses clone() then. */
+/* Allows threads but no other processes, and signals only to this process, which abort() needs.
+ * Filters cannot see the flags of clone3(), so it fails as an unknown call. The C library then uses
+ * clone(). */
 static bool deny_others(scmp_filter_ctx filter)
 {
     static const int signals[] = { SCMP_SYS(kill), SCMP_SYS(tgkill), SCMP_SYS(rt_sigqueueinfo),
@@ -192,7 +194,7 @@ static bool deny_others(scmp_filter_ctx filter)
 bool trip_sandbox_enter(void)
 {
     scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ALLOW);
-    /* Also for the threads that libraries have started by now, where the kernel can. */
+    /* Includes the threads that libraries have already started, if the kernel supports it. */
     if (filter)
         (void)seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1);
     bool good = filter && deny_writing(filter) && deny_flags(filter) && deny_others(filter);

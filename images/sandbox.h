@@ -1,5 +1,5 @@
-/* What the helper gives up before it looks at a file, so that a decoder that a hostile file takes
- * over can do little: it may read files and answer, no more. One thread, before others start. */
+/* Restricts the helper process before it opens a file. A hostile file that takes over a decoder can
+ * then only read files and answer. Call it with one thread, before others start. */
 #ifndef TRIP_SANDBOX_H
 #define TRIP_SANDBOX_H
 
@@ -10,14 +10,16 @@
 extern "C" {
 #endif
 
-/* From here on, for this process and all its threads: no other program or process, no network, no
- * file opened for writing, made, changed, renamed or removed, no signal to others, and what else a
- * decoder has no use for (tracing, mounting, name spaces, kernel modules). Such calls fail with
- * EPERM. False, with nothing given up, where the kernel cannot do it. */
+/* Restricts this process and all its threads permanently. Forbidden calls fail with EPERM:
+ * - starting programs or processes, and signals to other processes,
+ * - network,
+ * - opening files for writing, and creating, changing, renaming or removing files,
+ * - calls that no decoder needs, such as tracing, mounting, name spaces and kernel modules.
+ * Returns false, without any restriction, if the kernel does not support it. */
 bool trip_sandbox_enter(void);
 
-/* From here on memory that is more than `bytes` beyond what is held
- * already, with some room for the libraries' own needs, is refused. */
+/* Limits the memory that this process may allocate from now on to `bytes`, plus some room for the
+ * libraries' own needs. */
 void trip_sandbox_limit_memory(uint64_t bytes);
 
 #ifdef __cplusplus

@@ -19,7 +19,7 @@
 namespace
 {
 
-/* Runs of digits compare as numbers, the rest as bytes. */
+/* Orders names naturally: digits compare as numbers, other characters as bytes. */
 bool natural_less(const std::string &a, const std::string &b)
 {
     auto digits = [](const std::string &s, size_t &at) {
@@ -47,7 +47,7 @@ bool natural_less(const std::string &a, const std::string &b)
     return a_ends != b_ends ? a_ends : a < b;
 }
 
-/* Not blocking, so that a FIFO is refused rather than waited for. */
+/* Opens without blocking, so that a FIFO is refused and not waited for. */
 trip_image_kind kind_of_file(const std::string &name)
 {
     unsigned char head[132];
@@ -66,28 +66,29 @@ trip_image_kind kind_of_file(const std::string &name)
     return trip_image_kind_of(head, (size_t)n);
 }
 
-/* Also of a link that leads nowhere: false. */
+/* Returns false for a broken link, too. */
 bool is_regular(const std::string &name)
 {
     struct stat st;
     return ::stat(name.c_str(), &st) == 0 && S_ISREG(st.st_mode);
 }
 
-/* What stands where a slice should be. */
+/* Describes a file that is not a slice. */
 std::string describe(const std::string &name)
 {
     struct stat st;
     if (::stat(name.c_str(), &st) != 0)
         return ::lstat(name.c_str(), &st) == 0 && S_ISLNK(st.st_mode)
-                   ? "is a link that leads nowhere"
-                   : std::string("cannot be looked at: ") + std::strerror(errno);
-    return S_ISDIR(st.st_mode)    ? "is a folder"
-           : S_ISREG(st.st_mode)  ? "holds no TIFF, PNG, EXR or DICOM picture: is it damaged?"
+                   ? "is a broken link"
+                   : std::string("cannot be examined: ") + std::strerror(errno);
+    return S_ISDIR(st.st_mode) ? "is a folder"
+           : S_ISREG(st.st_mode)
+               ? "holds no TIFF, PNG, EXR or DICOM picture; the file may be damaged"
            : S_ISFIFO(st.st_mode) ? "is a pipe"
                                   : "is not a regular file";
 }
 
-/* Names in a folder, without those that begin with a dot. */
+/* Returns the names in a folder, without hidden files. */
 std::vector<std::string> list_folder(const std::string &folder)
 {
     std::unique_ptr<DIR, int (*)(DIR *)> dir(::opendir(folder.c_str()), ::closedir);
@@ -103,7 +104,7 @@ std::vector<std::string> list_folder(const std::string &folder)
     return names;
 }
 
-/* "folder/name" as "folder/" and "name". */
+/* Splits "folder/name" into "folder/" and "name". */
 void split_path(const std::string &path, std::string &folder, std::string &name)
 {
     size_t slash = path.rfind('/');
@@ -114,11 +115,11 @@ void split_path(const std::string &path, std::string &folder, std::string &name)
 /* A file name with one number in it. */
 struct NumberPattern {
     std::string before, after;
-    size_t width = 0; /* digits at least, filled up with zeros */
+    size_t width = 0; /* minimum number of digits, padded with zeros */
 };
 
-/* True when `name` has exactly one of %d, %i, %u, with a width perhaps ("%03d"). "%%" is a
- * percent sign. */
+/* Returns true if `name` has exactly one of %d, %i or %u, optionally with a width ("%03d"). "%%" is
+ * a percent sign. */
 bool parse_pattern(const std::string &name, NumberPattern &pattern)
 {
     int conversions = 0;
@@ -140,7 +141,8 @@ bool parse_pattern(const std::string &name, NumberPattern &pattern)
     return conversions == 1;
 }
 
-/* The number of a name that fits, written as the pattern would write it. */
+/* Matches a name against the pattern and sets its number. The number must be written exactly as the
+ * pattern writes it. */
 bool match_number(const NumberPattern &p, const std::string &name, long long &number)
 {
     if (name.size() <= p.before.size() + p.after.size() ||
@@ -201,8 +203,9 @@ bool is_named_as_slice(const std::string &name)
            });
 }
 
-/* Passes over other files, but not over what is named as a slice, by its extension or as slices
- * there are, and is none: that would bring its neighbours together. */
+/* Finds the slices in a folder and ignores other files. A file with a slice's name that is not a
+ * picture is an error, because its neighbours would then touch. A name is a slice's by its
+ * extension, or by its shape if slices have that shape. */
 std::vector<std::string> find_in_folder(const std::string &path)
 {
     std::vector<std::string> names, others;
@@ -242,8 +245,9 @@ std::vector<std::string> find_names(const std::string &path)
     if (name.find('%') == std::string::npos)
         return find_glob(path);
     if (!parse_pattern(name, pattern))
-        throw trip_slice_error(path, "a pattern has one number in the file's name, like %d or %03d",
-                               TRIP_USAGE);
+        throw trip_slice_error(
+            path, "a pattern must have one number in the file name, such as %d or %03d",
+            TRIP_USAGE);
     return find_numbered(path, folder, pattern);
 }
 
@@ -255,7 +259,7 @@ trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps)
     for (const std::string &name : files.names) {
         trip_image_kind kind = is_regular(name) ? kind_of_file(name) : TRIP_IMAGE_OTHER;
         if (kind == TRIP_IMAGE_OTHER)
-            throw trip_slice_error(name, is_regular(name) ? "is no TIFF, PNG, EXR or DICOM file"
+            throw trip_slice_error(name, is_regular(name) ? "is not a TIFF, PNG, EXR or DICOM file"
                                                           : describe(name) + ", not a slice");
         if (&name == &files.names.front())
             files.kind = kind;
@@ -263,7 +267,7 @@ trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps)
             throw trip_slice_error(path, std::string("has slices of different kinds, ") +
                                              trip_image_kind_name(files.kind) + " and " +
                                              trip_image_kind_name(kind) +
-                                             "; a pattern like \"*.tif\" would choose");
+                                             "; select one kind with a pattern such as \"*.tif\"");
     }
     if (files.kind != TRIP_IMAGE_DICOM || path.find('%') != std::string::npos)
         trip_check_numbers(path, files.names, allow_gaps);

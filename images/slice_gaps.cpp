@@ -18,7 +18,8 @@ bool is_digit(char c)
     return isdigit((unsigned char)c) != 0;
 }
 
-/* The last part of a path, as texts and digits in turn: text, digits, text, ..., text. */
+/* Splits the last part of a path into alternating texts and digits: text, digits, text, ..., text.
+ */
 std::vector<std::string> split_name(const std::string &path)
 {
     size_t slash = path.rfind('/');
@@ -36,7 +37,7 @@ std::vector<std::string> split_name(const std::string &path)
 
 using Parts = std::vector<std::string>;
 
-/* The place of the only number that differs, or 0. */
+/* Returns the index of the only number that differs, or 0. */
 size_t find_counter(const std::vector<Parts> &names)
 {
     size_t counter = 0;
@@ -69,7 +70,7 @@ std::vector<Numbered> numbers_of(const std::vector<Parts> &names, size_t counter
     return numbered;
 }
 
-/* What the slice would be called, with zeros in front as its neighbour has. */
+/* Returns the name of a missing slice, with leading zeros like its neighbour. */
 std::string name_with(const Numbered &neighbour, size_t counter, long long number)
 {
     std::string name;
@@ -86,8 +87,8 @@ std::string name_with(const Numbered &neighbour, size_t counter, long long numbe
 void report_gap(const std::string &path, const std::string &stage, bool allow_gaps)
 {
     if (!allow_gaps)
-        throw trip_slice_error(path, stage + "; --allow-gaps goes on as if its neighbours touched");
-    trip_warn(path.c_str(), "%s; drawn as if its neighbours touched", stage.c_str());
+        throw trip_slice_error(path, stage + "; --allow-gaps lets its neighbours touch");
+    trip_warn(path.c_str(), "%s; its neighbours are drawn as if they touched", stage.c_str());
 }
 
 void check_one_shape(const std::string &path, const std::vector<Parts> &names, bool allow_gaps)
@@ -155,8 +156,8 @@ double trip_check_positions(const std::vector<double> &positions,
         if (!(whole >= 2 && whole < 1e6 && std::fabs(times - whole) <= 0.1))
             continue;
         report_gap(names[i],
-                   "a slice is missing after it: the next one, " + names[i + 1] + ", lies " +
-                       std::to_string((long)whole) + " steps on",
+                   "a slice is missing after it: the next slice, " + names[i + 1] + ", is " +
+                       std::to_string((long)whole) + " steps away",
                    allow_gaps);
         return defaults * (double)steps.size() / (positions.back() - positions.front());
     }

@@ -1,24 +1,25 @@
-/* Slices that are missing among others, found by the numbers in their names or by their places. */
+/* Detects missing slices, by the numbers in their names or by their positions. Pure functions,
+ * except for warnings. */
 #ifndef TRIP_SLICE_GAPS_H
 #define TRIP_SLICE_GAPS_H
 
 #include <string>
 #include <vector>
 
-/* A name with its numbers replaced: names of one shape differ in their numbers only. */
+/* Returns a name with its numbers replaced. Names with one shape differ only in their numbers. */
 std::string trip_name_shape(const std::string &name);
 
-/* Slices that one number in their names counts, the names otherwise alike, must have equal steps
- * between their numbers; two slices, a step of 1. Names in several shapes are looked at shape by
- * shape, and those in which several numbers differ, as dates and times do, not at all. Throws
- * trip_slice_error for `path` with the number and name of a missing slice; with `allow_gaps` that
- * is a warning. */
+/* Checks names that differ in exactly one number. The steps between the numbers must be equal; with
+ * two names the step must be 1. Names of several shapes are checked shape by shape. Names that
+ * differ in several numbers, such as dates and times, are not checked. Throws trip_slice_error for
+ * `path` with the number and name of a missing slice, or warns if `allow_gaps` is set. */
 void trip_check_numbers(const std::string &path, const std::vector<std::string> &names,
                         bool allow_gaps);
 
-/* The same by where slices are, `places` in ascending order, one for each of `names`: most steps
- * have one length, the usual one, and a step of about two or more of it has slices missing in it.
- * Returns the usual step over the mean one where gaps were found and allowed, else 1. */
+/* Checks `positions`, in ascending order, with one entry of `names` each. The median step is the
+ * normal one, and a step of about two or more times its length has slices missing. Throws or warns
+ * as trip_check_numbers() does. Returns the normal step divided by the mean step if gaps were found
+ * and allowed, else 1. */
 double trip_check_positions(const std::vector<double> &positions,
                             const std::vector<std::string> &names, bool allow_gaps);
 

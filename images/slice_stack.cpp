@@ -12,10 +12,10 @@ void trip_slice_buffer::take(trip_budget *budget, const std::string &file, uint6
     memory_ = trip_budget_take(budget, bytes);
     if (!memory_)
         throw trip_slice_error(file, std::string("a slice needs ") +
-                                         trip_format_bytes(bytes, needed) + ", but " +
+                                         trip_format_bytes(bytes, needed) +
+                                         " of memory, but only " +
                                          trip_format_bytes(trip_budget_left_bytes(budget), left) +
-                                         " are left of the memory allowed; a larger --memory would "
-                                         "do");
+                                         " are left; raise --memory");
     budget_ = budget;
     bytes_ = bytes;
 }

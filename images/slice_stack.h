@@ -1,5 +1,5 @@
-/* A stack of slices, wherever they are stored. What is needed of it is read when it is made; slices
- * are read one at a time, by one thread. Throws trip_slice_error with the file at fault. */
+/* A stack of slices in files. Creating it reads all headers; slices are read one at a time, by one
+ * thread. Throws trip_slice_error with the path of the file. */
 #ifndef TRIP_SLICE_STACK_H
 #define TRIP_SLICE_STACK_H
 
@@ -9,7 +9,7 @@
 #include "slice_files.h"
 #include "volume.h"
 
-/* Memory from the budget, or an error that says how much was wanted. */
+/* Memory from the budget. take() throws an error with the size if the budget refuses. */
 class trip_slice_buffer
 {
   public:
@@ -33,7 +33,7 @@ class trip_slice_stack
 {
   public:
     virtual ~trip_slice_stack() = default;
-    /* Slice k, dims[0] * dims[1] values of the stored type in the machine's byte order. */
+    /* Reads slice k: dims[0] * dims[1] values of the stored type in the machine's byte order. */
     virtual void read(int64_t k, void *values) = 0;
 
     int64_t dims[3] = { 0, 0, 0 };
@@ -41,16 +41,16 @@ class trip_slice_stack
     double slope = 1, inter = 0; /* value = slope * stored + inter */
     trip_affine index_to_world = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
     char space[8] = "";     /* anatomical, as in anatomy.h */
-    char modality[24] = ""; /* of DICOM: "CT", "MR", ... */
-    bool oriented = false;  /* the map's directions are the file's */
+    char modality[24] = ""; /* from DICOM: "CT", "MR", ... */
+    bool oriented = false;  /* the file states the directions of the map */
 };
 
-/* TIFF, PNG or EXR, through OpenImageIO: picture_stack.cpp. The pages of one TIFF
- * are slices, too. */
+/* Opens TIFF, PNG or EXR files with OpenImageIO (picture_stack.cpp). The pages of a single TIFF
+ * file are slices, too. */
 std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
                                                      trip_budget *budget);
-/* DICOM, through DCMTK: dicom_stack.cpp. Slices are put in order of their place in space, where
- * none may be missing in between unless `allow_gaps`. */
+/* Opens DICOM files with DCMTK (dicom_stack.cpp). Slices are sorted by their position in space.
+ * None may be missing in between, unless `allow_gaps` is set. */
 std::unique_ptr<trip_slice_stack> trip_dicom_stack(const trip_slice_files &files,
                                                    trip_budget *budget, bool allow_gaps);
 

@@ -48,7 +48,7 @@ vec4 products(vec4 entry)
     return vec4(entry.rgb * entry.a, entry.a);
 }
 
-// Returns the means of these products from t0 to t1 between a code and the next. Simpson's rule is
+// Returns the means of products() from t0 to t1 between a code and the next. Simpson's rule is
 // exact here.
 vec4 means_within(int code, float t0, float t1)
 {

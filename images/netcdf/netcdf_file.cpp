@@ -13,7 +13,7 @@
 namespace
 {
 
-/* By the number of a type; of characters there are no volumes. */
+/* trip_scalar by netCDF type; -1 for types that hold no volumes. */
 const int scalar_of[] = { -1,       TRIP_I8, -1,       TRIP_I16, TRIP_I32, TRIP_F32,
                           TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64 };
 constexpr int types = sizeof scalar_of / sizeof *scalar_of;
@@ -21,7 +21,7 @@ constexpr int types = sizeof scalar_of / sizeof *scalar_of;
 void check(int status)
 {
     if (status != NC_NOERR)
-        throw trip_netcdf_error(std::string("libnetcdf says: ") + nc_strerror(status));
+        throw trip_netcdf_error(std::string("libnetcdf reports: ") + nc_strerror(status));
 }
 
 bool is_number(int type)
@@ -29,7 +29,7 @@ bool is_number(int type)
     return type >= 0 && type < types && scalar_of[type] >= 0;
 }
 
-/* Of an attribute with numbers, the first; what there is none of stays. */
+/* Sets `value` to the first number of an attribute. Leaves it unchanged if there is none. */
 void take_attribute(int group, int variable, const char *name, double &value)
 {
     nc_type type;
@@ -78,7 +78,8 @@ size_t length_of(int group, int dimension)
     return length;
 }
 
-/* Values of the last three dimensions; 0: it is no volume. */
+/* Returns the number of values in the last three dimensions, or 0 if the variable is not a volume.
+ */
 double volume_of(int group, int variable)
 {
     nc_type type;
@@ -125,7 +126,8 @@ trip_netcdf_file::~trip_netcdf_file()
     nc_close(file_);
 }
 
-/* That of the name, else the largest, of a group and those in it. */
+/* Finds the variable `name`, or the largest one if `name` is empty, in a group and its subgroups.
+ */
 void trip_netcdf_file::find(int group, const std::string &prefix, const std::string &name,
                             variable &found)
 {
@@ -174,7 +176,8 @@ void trip_netcdf_file::set_type(int type)
     about.type = decoded_ ? TRIP_F32 : stored_;
 }
 
-/* A dimension has its coordinates from a variable of its name, in its group or one around. */
+/* Reads the coordinates of a dimension from the variable with its name, in the same group or an
+ * enclosing one. */
 void trip_netcdf_file::position(int axis, int dimension)
 {
     char name[NC_MAX_NAME + 1] = "";
@@ -206,8 +209,8 @@ void trip_netcdf_file::position(int axis, int dimension)
     }
 }
 
-/* Chunks are kept that slices of the same chunks are read of, if they take half of the memory at
- * most: each is then decoded once. */
+/* Sets the chunk cache to all chunks of a slice, so that each chunk is decoded only once. If they
+ * need more than half of the memory, caches one chunk. */
 void trip_netcdf_file::keep_chunks(uint64_t memory_bytes)
 {
     int storage;
@@ -223,9 +226,8 @@ void trip_netcdf_file::keep_chunks(uint64_t memory_bytes)
         across *= std::ceil((double)about.dims[a] / (double)chunk[(size_t)(count_ - 1 - a)]);
     const double all = one * across <= 0.5 * (double)memory_bytes ? one * across : one;
     if (!(all <= 0.5 * (double)memory_bytes))
-        throw trip_netcdf_error("its chunks do not fit the memory allowed; a larger --memory would "
-                                "do");
-    /* A hash table with a hundred times as many places as chunks, as HDF5 recommends. */
+        throw trip_netcdf_error("its chunks do not fit the memory allowed; raise --memory");
+    /* HDF5 recommends a hash table with a hundred times as many slots as chunks. */
     const size_t positions = 100 * (size_t)std::min(across, 1e5) + 1;
     check(nc_set_var_chunk_cache(group_, variable_, (size_t)all, positions, 1.0F));
     about.helper_bytes += (uint64_t)(all + one) + positions * sizeof(void *);
@@ -253,8 +255,7 @@ void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_by
         about.dims[a] = (int64_t)std::min(length, (size_t)INT64_MAX);
     }
     if ((double)about.dims[0] * (double)about.dims[1] * 8 > (double)memory_bytes)
-        throw trip_netcdf_error("its slices do not fit the memory allowed; a larger --memory would "
-                                "do");
+        throw trip_netcdf_error("its slices do not fit the memory allowed; raise --memory");
     for (int a = 0; a < 3; a++)
         position(a, dimensions[(size_t)(count_ - 1 - a)]);
     std::strncpy(about.name, found.name.c_str(), sizeof about.name - 1);

@@ -1,5 +1,6 @@
-/* A variable of a file of netCDF-4, by libnetcdf: one of three dimensions or more, the last of
- * which are k, j and i; of those before, the first place. Throws trip_netcdf_error. One thread. */
+/* Reads a variable of a netCDF-4 file with libnetcdf. It must have at least three dimensions; the
+ * last three are k, j and i. It reads the first index of any other dimension. Throws
+ * trip_netcdf_error. One thread. */
 #ifndef TRIP_NETCDF_FILE_H
 #define TRIP_NETCDF_FILE_H
 
@@ -19,19 +20,19 @@ class trip_netcdf_error : public std::runtime_error
 class trip_netcdf_file
 {
   public:
-    /* The variable of that name ("GROUP/NAME" in a group), or, where `name` is empty, that with the
-     * most values. What is kept of it while it is read takes a part of `memory_bytes`. */
+    /* Opens the variable `name` ("GROUP/NAME" in a group). An empty name selects the variable with
+     * the most values. Caches use part of `memory_bytes`. */
     trip_netcdf_file(const std::string &path, const std::string &name, uint64_t memory_bytes);
     ~trip_netcdf_file();
     trip_netcdf_file(const trip_netcdf_file &) = delete;
     trip_netcdf_file &operator=(const trip_netcdf_file &) = delete;
 
-    /* What is said of it; `coordinates` are those of the axes that it names. */
+    /* Describes the variable. `coordinates` holds the values of the axes in `about.placed`. */
     trip_image_netcdf about = {};
     std::vector<double> coordinates;
 
     size_t slice_bytes() const;
-    /* Slice k as `about` says. */
+    /* Reads slice k in the type and size of `about`. */
     void read(int64_t k, void *values);
 
   private:

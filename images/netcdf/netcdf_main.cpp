@@ -1,5 +1,5 @@
-/* triptych-netcdf: answers the requests of image_helper.h about files of netCDF-4 on descriptor 3,
- * one after another, until the connection ends. */
+/* triptych-netcdf: answers the requests of image_helper.h about netCDF-4 files on descriptor 3, one
+ * after another, until the connection closes. */
 #include <csignal>
 #include <memory>
 #include <new>
@@ -71,8 +71,8 @@ void answer_one(Session &session)
     } catch (const std::bad_alloc &) {
         trip_connection_reply(
             TRIP_IMAGE_FAILED, TRIP_ERROR, path,
-            "needs more memory to decode than is allowed: a larger --memory would "
-            "do, unless it is corrupt",
+            "needs more memory to decode than allowed; raise --memory, unless the file is "
+            "corrupt",
             0);
     } catch (const std::exception &e) {
         trip_connection_reply(TRIP_IMAGE_FAILED, TRIP_ERROR, path, e.what(), 0);
@@ -83,12 +83,12 @@ void answer_one(Session &session)
 
 int main()
 {
-    /* Ctrl-C, and the end of a terminal, go to the whole group; the other end decides what becomes
-     * of a request. */
+    /* Ctrl-C and the end of a terminal signal the whole process group. The other end decides
+     * whether to end a request. */
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGHUP, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
-    (void)trip_sandbox_enter(); /* where the kernel can */
+    (void)trip_sandbox_enter(); /* continues without a sandbox if the kernel has none */
     Session session;
     try {
         for (;;)

@@ -5,10 +5,10 @@
 #include "gl/frame_block.h"
 #include "report.h"
 
-/* Blocks: those of the layers, then those of the lists. */
+/* The blocks of the layers come first, then the blocks of the lists. */
 enum { LAYER_BLOCKS = 3, TABLE_BYTES = 65536 * sizeof(trip_tf_entry) };
 
-/* All blocks in float come first, then all in double. */
+/* The buffer holds all blocks in float, then all blocks in double. */
 static GLintptr offset_of(const trip_gl_constants *c, unsigned block, bool in_double)
 {
     size_t small = trip_gl_ring_after(0, sizeof(trip_gl_frame_float));
@@ -40,7 +40,7 @@ static void upload(const trip_gl_constants *c, unsigned block, const trip_gl_fra
     glNamedBufferSubData(c->blocks, offset_of(c, block, true), sizeof *exact, exact);
 }
 
-/* Of compositing a sheet: all of the image. */
+/* Returns the cost of compositing one sheet over the whole picture. */
 static uint32_t sheet_cost(const trip_camera *camera)
 {
     int64_t pixels = (int64_t)camera->width * camera->height, cost = pixels / TRIP_GL_COST_PX + 1;
@@ -72,7 +72,7 @@ static void fill_list(trip_gl_constants *c, const trip_frame *frame, const trip_
     upload(c, LAYER_BLOCKS + list->index, &p->constants);
 }
 
-/* Room for so many lists. */
+/* Ensures a capacity of `lists` lists. */
 static int fit(trip_gl_constants *c, const trip_gl_context *context, unsigned lists)
 {
     if (c->blocks && lists <= c->room)

@@ -12,8 +12,8 @@
 #include "debug_view.h"
 #include "weight.h"
 
-/* Components of a vector of the data's axes in list axes; an even permutation, so that cross
- * products keep their sign. */
+/* Returns the components of a vector in list axes. The axes are permuted evenly, so cross products
+ * keep their sign. */
 static trip_gl_double4 in_list_axes(trip_vec3 v, int axis, double w)
 {
     return (trip_gl_double4){ { trip_component(v, axis), trip_component(v, (axis + 1) % 3),
@@ -25,7 +25,8 @@ static trip_gl_double4 as_it_is(trip_vec3 v, double w)
     return (trip_gl_double4){ { v.x, v.y, v.z, w } };
 }
 
-/* Coefficients of |r0 + x rx + y ry|^2 by (1, x, y, x x) and (x y, y y), times `scale`. */
+/* Sets the coefficients of scale |r0 + x rx + y ry|^2. a holds the terms (1, x, y, x x), and b
+ * holds (x y, y y). */
 static void square(trip_gl_double4 *a, trip_gl_double4 *b, trip_vec3 r0, trip_vec3 rx, trip_vec3 ry,
                    double scale)
 {
@@ -34,8 +35,8 @@ static void square(trip_gl_double4 *a, trip_gl_double4 *b, trip_vec3 r0, trip_ve
     *b = (trip_gl_double4){ { scale * 2 * trip_dot(rx, ry), scale * trip_dot(ry, ry), 0, 0 } };
 }
 
-/* Pixel steps of a length about 1, so that no square of theirs leaves a float's range however
- * narrow the view. */
+/* Scales the pixel steps to a length of about 1, so that the squares of components fit a float in
+ * any view, however narrow. */
 static void set_steps(trip_gl_frame_double *f, int axis, trip_vec3 forward, trip_vec3 r0,
                       trip_vec3 rx, trip_vec3 ry, double sigma)
 {
@@ -47,14 +48,15 @@ static void set_steps(trip_gl_frame_double *f, int axis, trip_vec3 forward, trip
     f->ray_y = in_list_axes(y, axis, volume * volume);
 }
 
-/* What rays are divided by. */
+/* Returns the length by which set_projection() divides all rays. */
 static double centre_length(const trip_camera *c)
 {
     return c->ortho ? 1 : trip_length(trip_camera_ray(c, 0.5 * c->width, 0.5 * c->height));
 }
 
-/* Rays from the image's centre, scaled so that the one there has length 1: projected numbers do not
- * depend on the scale, and floats keep far from their limits whatever the world's unit. */
+/* Sets the rays relative to the image centre, scaled so that the ray at the centre has length 1.
+ * Projected numbers do not depend on this scale, and floats stay far from their limits for any
+ * world unit. */
 static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int axis, double sigma,
                            double flatten)
 {
@@ -75,7 +77,7 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
     f->to_x = in_list_axes(to_x, axis, flatten);
     f->to_y = in_list_axes(to_y, axis, 0);
     if (c->ortho)
-        rx = ry = trip_v3(0, 0, 0); /* all rays are alike */
+        rx = ry = trip_v3(0, 0, 0); /* all rays are parallel */
     square(&f->ray2_a, &f->ray2_b, r0, rx, ry, 1);
 
     const trip_affine *j = &c->index_to_world;
@@ -83,7 +85,7 @@ static void set_projection(trip_gl_frame_double *f, const trip_camera *c, int ax
            trip_affine_vector(j, ry), 1 / (c->voxel_world * c->voxel_world));
 }
 
-/* Footprints of one size in perspective. */
+/* Sets the constants of footprints of one size in perspective. */
 static void set_fixed(trip_gl_frame_double *f, const trip_splat_frame *constants)
 {
     const trip_camera *c = &constants->camera;
@@ -96,7 +98,7 @@ static void set_fixed(trip_gl_frame_double *f, const trip_splat_frame *constants
     };
 }
 
-/* All splats of a parallel view have the same footprint and the same world length along the ray. */
+/* In parallel views all splats have the same footprint and the same world length along the ray. */
 static void set_parallel(trip_gl_frame_double *f, const trip_splat_frame *constants)
 {
     trip_splat s;
@@ -187,7 +189,7 @@ static void set_debug_view(trip_gl_frame_double *out, const trip_settings *s, in
         out->tint = (trip_gl_double4){ { rgb[0], rgb[1], rgb[2], 1 } };
 }
 
-/* Of a voxel along an axis. */
+/* Returns the length of a voxel along an axis in world units. */
 static double world_length(const trip_camera *c, int axis)
 {
     const double(*m)[4] = c->index_to_world.m;
@@ -268,14 +270,19 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
     return effects;
 }
 
-/* With r_max and r_min the largest and smallest |ray| of the image and of its plane, any support
- * reaches at most  k sigma |ry| r_max / (K depth) + k low-pass r_max / r_min  pixels from its
- * centre along x within the image (from S'_xx and g >= (r_min / r_max)^2 in splat.h), and alike
- * along y. Of affine supports the centre's ray is at most 1 / (1 - TRIP_SPLAT_AFFINE) as long: by
- * TRIP_SPLAT_AFFINE / (1 - TRIP_SPLAT_AFFINE) lengths of the pixel's ray away from that in the
- * index space in which the kernel is round, and by up to `ratio` times as much in the list's. What
- * keeps exact supports small, whose low-pass is by lengths of rays in that space, is not known
- * there. */
+/* Let r_max and r_min be the largest and smallest |ray| of the image and of its plane. With S'_xx
+ * and g >= (r_min / r_max)^2 of splat.h the reach of a support within the image is bounded. It is
+ * at most this many pixels from its centre along x:
+ *     k sigma |ry| r_max / (K depth) + k low-pass r_max / r_min
+ * The bound along y is analogous.
+ *
+ * The ray of an affine support's centre is at most 1 / (1 - TRIP_SPLAT_AFFINE) times as long as the
+ * ray of the pixel. The two rays differ by at most TRIP_SPLAT_AFFINE / (1 - TRIP_SPLAT_AFFINE)
+ * lengths of the pixel's ray, measured in the index space in which the kernel is round. In the
+ * index space of the list they differ by up to `ratio` times as much.
+ *
+ * For exact supports and ratio > 1 the low-pass term depends on ray lengths in the kernel's own
+ * space, and no bound of it is known. The result is then infinite. */
 double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_camera *c, double ratio,
                                   double point_size_px)
 {
@@ -311,8 +318,8 @@ double trip_gl_frame_ratio(const trip_coordinates *coordinates)
     return coordinates->widest / coordinates->nearest;
 }
 
-/* trip_splat_parallel_near(), or what is not less for kernels of other widths: slants are at most
- * those of rays and pixel steps that run alike. */
+/* Returns trip_splat_parallel_near(), or an upper bound of it for kernels of other widths. The
+ * bound assumes pixel steps parallel to the rays, which maximises the slopes. */
 static double parallel_near(const trip_splat_frame *f, double ratio)
 {
     const trip_camera *c = &f->camera;
@@ -325,18 +332,19 @@ static double parallel_near(const trip_splat_frame *f, double ratio)
            trip_length(c->r0);
 }
 
-/* With r = |r_c|, r_min the least |ray| of the image's plane, the splat of a depth z is not near
- * where  (z r)^2 >= 2 R^2 (r^2 / r_min^2 + 1) + 2 k^2 low-pass^2 z^2 (rx.rx + ry.ry):  that is the
- * condition of render/cpu/kernels/project_tmpl.h. With 1 / TRIP_SPLAT_AFFINE^2 in place of 2 it is
- * that of affine splats. In the index space in which a kernel is round rays are up to 1 / w times
- * as long, w being its least width, and not shorter than 1 / (w ratio) times. */
+/* Let r = |r_c|, and let r_min be the minimum |ray| of the image plane. A splat of
+ * depth z is not near if (see render/cpu/kernels/project_tmpl.h)
+ *     (z r)^2 >= 2 R^2 (r^2 / r_min^2 + 1) + 2 k^2 low-pass^2 z^2 (rx.rx + ry.ry)
+ * For affine splats 1 / TRIP_SPLAT_AFFINE^2 replaces the factor 2. Let w be the
+ * minimum width of a kernel. In the index space in which it is round, rays are at most 1 / w times
+ * and at least 1 / (w ratio) times as long. */
 double trip_gl_frame_near_depth(const trip_settings *settings, const trip_camera *c, double ratio)
 {
     const trip_splat_frame f = trip_splat_frame_make(c, settings);
     if (c->ortho)
         return parallel_near(&f, ratio);
     if (settings->footprint == TRIP_FOOTPRINT_FIXED)
-        return -HUGE_VAL; /* none is near, wherever it is */
+        return -HUGE_VAL; /* no splat is near */
     trip_vec3 normal = trip_cross(c->rx, c->ry);
     double r_min2 = pow(trip_dot(c->r0, normal), 2) / trip_dot(normal, normal);
     double times = f.affine ? 1 / (TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE) : 2;

@@ -8,7 +8,8 @@
 #include "report.h"
 #include "settings.h"
 
-/* OpenGL 4.5 promises storage blocks of 128 MiB; vertex numbers, four a splat, stay below 2^31. */
+/* OpenGL 4.5 guarantees storage blocks of 128 MiB. Vertex numbers, four for each splat, stay below
+ * 2^31. */
 enum { MAX_BLOCK_BYTES = 1 << 27, MAX_POSITIONS = MAX_BLOCK_BYTES / sizeof(uint32_t) };
 
 static int count_positions(trip_gl_batch *b, const trip_batch *batch)
@@ -34,7 +35,8 @@ static trip_gl_part next_part(size_t *end, size_t bytes)
     return part;
 }
 
-/* A plane that lies in GL memory: from where a storage block may start. */
+/* Returns the part of a slot that contains a plane. The part begins at an aligned offset; *start is
+ * the offset of the plane in it. */
 static trip_gl_part part_in(const trip_gl_slot *slot, const trip_batch *batch, int plane,
                             size_t *start)
 {
@@ -79,20 +81,20 @@ static void copy_planes(trip_gl_batch *b, const trip_batch *batch)
                batch->plane_bytes[normals]);
 }
 
-/* u and v in the tile of a square's corner, by its Morton number. */
+/* Returns u and v of a square's corner in its tile, from its Morton number. */
 static uint32_t corner_of(uint32_t number)
 {
     return 8 * (trip_morton_even(number) | trip_morton_even(number >> 1) << 16);
 }
 
-/* The filling of squares and positions. */
+/* State while squares and draw positions are filled. */
 typedef struct filling {
     struct trip_gl_square *squares;
     uint32_t *entries;
     uint32_t square, position;
 } filling;
 
-/* Bit k of the result: whether voxel number k of those of `mask` is one of `drawn`. */
+/* Returns a mask by rank: bit k tells whether the k-th voxel of `mask` is in `drawn`. */
 static uint64_t ranks_of(uint64_t mask, uint64_t drawn)
 {
     uint64_t ranks = 0;
@@ -101,7 +103,7 @@ static uint64_t ranks_of(uint64_t mask, uint64_t drawn)
     return ranks;
 }
 
-/* Positions for those of the square's voxels that are drawn. */
+/* Adds a square, and the draw positions of its drawn voxels. */
 static void fill_square(filling *f, struct trip_gl_square square, uint64_t mask, uint64_t drawn,
                         bool reversed)
 {
@@ -123,7 +125,8 @@ static uint64_t drawn_of(const trip_plan *plan, const trip_list *list, const tri
                             run->v + (int64_t)(corner >> 16));
 }
 
-/* The squares of a run, in draw order, with their draw positions; returns the number of these. */
+/* Adds the squares of a run and their draw positions, in draw order. Returns the number of
+ * positions. */
 static uint32_t fill_squares(trip_gl_batch *b, filling *f, const trip_plan *plan,
                              const trip_batch *batch, uint32_t run)
 {
@@ -152,7 +155,7 @@ static uint32_t fill_squares(trip_gl_batch *b, filling *f, const trip_plan *plan
     return f->position - before;
 }
 
-/* One piece for each run at most. */
+/* A batch has at most one piece for each run. */
 static int make_room(trip_gl_batch *b, size_t runs)
 {
     b->piece_count = 0;
@@ -171,14 +174,14 @@ static double dot(const trip_gl_double4 *a, const double c[3])
     return a->v[0] * c[0] + a->v[1] * c[1] + a->v[2] * c[2];
 }
 
-/* Of a voxel of level 0, along a list axis. */
+/* Returns the position of a voxel of level 0 along a list axis. */
 static double position_of(const trip_gl_placing *p, int i, int64_t voxel)
 {
     return trip_coordinates_at(p->coordinates, (p->axis + i) % 3, voxel);
 }
 
-/* The record of `count` draw positions from `position` on. Positions in GL memory are whole: there
- * the origin is the volume's. */
+/* Returns the GPU record of a run with its draw positions starting at `position`. If `whole`, the
+ * vertices hold positions from the origin of the volume. */
 static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run, uint64_t first,
                                    bool descending, bool whole, uint32_t position)
 {
@@ -206,7 +209,8 @@ static struct trip_gl_run make_run(const trip_gl_placing *p, const trip_run *run
     return r;
 }
 
-/* Of the last voxel of a tile, and of the grid where spacing is uneven. */
+/* Returns the position of the last voxel of a tile. With uneven spacing the grid bounds the tile.
+ */
 static double last_position(const trip_gl_placing *p, int i, int64_t first)
 {
     const trip_coordinates *c = p->coordinates;
@@ -215,7 +219,7 @@ static double last_position(const trip_gl_placing *p, int i, int64_t first)
     return position_of(p, i, trip_coordinates_uneven(c) && last > end ? end : last);
 }
 
-/* The least depth of the places in the run's tile. */
+/* Returns the minimum depth of all positions in the run's tile. */
 static double nearest_depth(const trip_gl_placing *p, const trip_run *run)
 {
     int u = (p->axis + 1) % 3, v = (p->axis + 2) % 3;
@@ -235,7 +239,8 @@ static bool is_near(const trip_gl_placing *p, double depth)
     return !(depth >= p->near_depth);
 }
 
-/* Whether splats of that depth may be larger than sprites can be drawn: near ones may cover all. */
+/* Whether splats at a depth may exceed the maximum size of point sprites. Near splats may cover the
+ * whole image. */
 static bool needs_quads(const trip_gl_placing *p, double depth)
 {
     if (p->quads || p->sprite_depth == HUGE_VAL)
@@ -243,7 +248,7 @@ static bool needs_quads(const trip_gl_placing *p, double depth)
     return p->sprite_depth > 0 && (depth < p->sprite_depth || is_near(p, depth));
 }
 
-/* A bound on the length of a splat of that depth along a step of one pixel of the camera. */
+/* Returns an upper bound on the length of a splat at a depth along a pixel step of the camera. */
 static double length_px(const trip_gl_placing *p, trip_vec3 step, double depth, double image_px)
 {
     double low_pass = 2 * TRIP_CUTOFF * TRIP_LOW_PASS_PX;

@@ -1,6 +1,6 @@
-/* A batch of splats in GL memory: its records, a record for each run, the run of every draw
- * position, and the pieces to draw in one form. Owned by one renderer, refilled for every batch;
- * its memory is a slot of the ring, but for records that lie in GL memory already. */
+/* A batch of splats in GL memory: its records, one entry for each run and each draw position, and
+ * the pieces to draw. Owned by one renderer and refilled for every batch. Its memory is a slot of
+ * the ring; the records may lie in another slot that the reader filled. */
 #ifndef TRIP_GL_BATCH_H
 #define TRIP_GL_BATCH_H
 
@@ -12,35 +12,35 @@
 #include "gl/shared.h"
 #include "renderer.h"
 
-/* A list of a frame: its constants, and what places its runs. */
+/* The constants of a list and the data that places its runs. */
 typedef struct trip_gl_placing {
-    const trip_camera *camera; /* of the list */
+    const trip_camera *camera;
     const trip_coordinates *coordinates;
     trip_gl_frame_double constants;
     unsigned effects;
     int axis;
     double tile_voxels;
-    double kernel_radius; /* of the widest */
-    bool quads;           /* always */
-    double sprite_depth;  /* and where voxels may be nearer, trip_gl_frame_sprite_depth() */
-    double near_depth;    /* likewise, trip_gl_frame_near_depth() */
-    uint32_t sheet_cost;  /* of compositing a sheet, where splats are summed; else 0 */
+    double kernel_radius; /* of the widest kernel */
+    bool quads;           /* always draws quads */
+    double sprite_depth;  /* draws quads below this depth; see trip_gl_frame_sprite_depth() */
+    double near_depth;    /* see trip_gl_frame_near_depth() */
+    uint32_t sheet_cost;  /* cost of compositing one sheet if splats are summed, else 0 */
 } trip_gl_placing;
 
-/* Draw positions [first, first + count), all of one list. */
+/* The draw positions [first, first + count). They belong to one list. */
 typedef struct trip_gl_piece {
     uint32_t first, count;
-    uint32_t cost;   /* of each splat, a power of two: at least its pixels over TRIP_GL_COST_PX */
-    unsigned list;   /* its number in the data set */
-    int32_t sheet;   /* where splats are summed; else 0 */
-    uint32_t before; /* cost of the sheet that ends before it */
+    uint32_t cost;   /* of each splat: a power of two, at least its pixels / TRIP_GL_COST_PX */
+    unsigned list;   /* index in the data set */
+    int32_t sheet;   /* the sheet if splats are summed, else 0 */
+    uint32_t before; /* cost of compositing the sheet that ends before this piece */
     bool quads;
-    bool near; /* some of them may be near (render/splat.h) */
+    bool near; /* some of its splats may be near (render/splat.h) */
 } trip_gl_piece;
 
-/* What a part of the GPU's work may cost: a step passes its deadline by the time of one. Splats of
- * up to so many pixels cost 1; larger parts would keep a frame on a software GL from ending soon,
- * where a part is a fourth of that. */
+/* The maximum cost of one part of the GPU's work. A step exceeds its deadline by at most one part.
+ * A splat of up to TRIP_GL_COST_PX pixels costs 1. In software GL a part is a fourth as large, so
+ * that a frame can end soon. */
 enum {
     TRIP_GL_COST_PX = 128,
     TRIP_GL_PART_COST = TRIP_FRAME_PIECE,
@@ -48,30 +48,32 @@ enum {
 };
 
 typedef struct trip_gl_part {
-    size_t offset, bytes; /* in its slot; bytes 0: not there */
+    size_t offset, bytes; /* in its slot; bytes is 0 if the part is absent */
 } trip_gl_part;
 
 typedef struct trip_gl_batch {
-    trip_gl_slot *slot;    /* of what is made of the runs */
-    trip_gl_slot *records; /* of voxels and normals */
+    trip_gl_slot *slot;    /* holds runs, squares and run_of */
+    trip_gl_slot *records; /* holds voxels and normals */
     trip_gl_part voxels, normals, runs, squares, run_of;
-    size_t voxels_start, normals_start; /* of the batch's planes in those parts */
+    size_t voxels_start,
+        normals_start; /* offsets of the batch's planes in `voxels` and `normals` */
     uint32_t square_count;
     uint32_t positions;
     trip_gl_piece *pieces;
     size_t piece_count, piece_room;
 } trip_gl_batch;
 
-/* How far a batch is drawn. */
+/* The progress of drawing a batch. */
 typedef struct trip_gl_cursor {
     size_t piece;
-    uint32_t done; /* of its positions */
+    uint32_t done; /* positions of this piece already drawn */
 } trip_gl_cursor;
 
-/* Fills `b` from a batch of the reader in draw order. `records` is the slot that its planes lie in;
- * NULL: they are copied. `placings` are by
- * the data set's lists. `resident`: by the data set's lists, whose records are in GL memory
- * already; the batch has runs only. NULL: it has its records. */
+/* Fills `b` from a batch of the reader, in draw order.
+ * - `placings` has one entry for each list of the data set.
+ * - `records` is the slot that holds the batch's planes. NULL copies the planes.
+ * - `resident` has one entry for each list if the records are in GL memory already. The batch then
+ *   has runs only. NULL takes the records from the batch. */
 int trip_gl_batch_fill(trip_gl_batch *b, trip_gl_ring *ring, const trip_gl_placing *placings,
                        const trip_plan *plan, const trip_batch *batch, trip_gl_slot *records,
                        const trip_gl_resident_list *resident);
@@ -80,8 +82,8 @@ static inline bool trip_gl_batch_is_drawn(const trip_gl_batch *b, const trip_gl_
     return at->piece == b->piece_count;
 }
 
-/* The splats behind the cursor, all of one piece, that cost no more than *room, but one at least;
- * the cursor moves on, and their cost is taken from *room. */
+/* Returns the next splats of one piece. They cost at most *room, but at least one splat is
+ * returned. Advances the cursor and subtracts the cost from *room. */
 trip_gl_piece trip_gl_batch_next(const trip_gl_batch *b, trip_gl_cursor *at, uint32_t *room);
 void trip_gl_batch_release(trip_gl_batch *b);
 

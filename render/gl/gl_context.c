@@ -29,7 +29,7 @@ static void GLAPIENTRY debug_message(GLenum source, GLenum type, GLuint id, GLen
                                      GLsizei length, const GLchar *message, const void *user)
 {
     (void)id, (void)length, (void)user;
-    /* program.c reports what compilers say, with file and line. */
+    /* program.c reports the messages of shader compilers, with file and line. */
     if (severity == GL_DEBUG_SEVERITY_NOTIFICATION || type == GL_DEBUG_TYPE_PERFORMANCE ||
         source == GL_DEBUG_SOURCE_SHADER_COMPILER)
         return;
@@ -46,8 +46,8 @@ static void report_debug_messages(void)
 #endif
 }
 
-/* A context that needs no surface; where EGL has no context without a configuration, any for
- * OpenGL. */
+/* Creates a context that needs no surface. Some EGL versions require a configuration; then any
+ * configuration for OpenGL will do. */
 static EGLContext create_context(EGLDisplay display, bool robust)
 {
 #ifndef NDEBUG
@@ -78,7 +78,7 @@ static EGLContext create_context(EGLDisplay display, bool robust)
     return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
 }
 
-/* Displays are one per process and platform and may be another context's too, so that they are
+/* A process has one display for each platform, and other contexts may share it. So displays are
  * never terminated. */
 static bool try_display(trip_gl_context *c, EGLDisplay display)
 {
@@ -102,7 +102,8 @@ static bool try_display(trip_gl_context *c, EGLDisplay display)
     return false;
 }
 
-/* Hardware first: EGL also lists Mesa's software renderer as a device. */
+/* Tries hardware devices first. EGL also lists Mesa's software renderer as a device, which is
+ * skipped here. */
 static bool try_hardware_devices(trip_gl_context *c, const char *client_extensions)
 {
     EGLDeviceEXT devices[MAX_DEVICES];
@@ -141,7 +142,7 @@ static void describe(trip_gl_context *c)
     snprintf(c->device, sizeof c->device, "%s, OpenGL %s", renderer, version);
 }
 
-/* By the names that Mesa's and SwiftShader's devices give. */
+/* Recognises the device names of Mesa and SwiftShader. */
 static bool is_software(const char *device)
 {
     static const char *const names[] = { "llvmpipe", "softpipe", "swrast", "SwiftShader" };
@@ -169,7 +170,7 @@ static void read_limits(trip_gl_limits *limits, const char *device)
     };
 }
 
-/* Drivers may offer none to vertex shaders and still be OpenGL 4.5. */
+/* OpenGL 4.5 allows drivers to offer no storage blocks to vertex shaders. */
 static int check_storage_blocks(const trip_gl_context *c)
 {
     GLint blocks = 0;
@@ -177,8 +178,8 @@ static int check_storage_blocks(const trip_gl_context *c)
     if (blocks >= NEEDED_STORAGE_BLOCKS)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", c->device,
-                     "%d of %d storage blocks for vertex shaders; use another renderer", blocks,
-                     NEEDED_STORAGE_BLOCKS);
+                     "only %d of %d storage blocks for vertex shaders; use another renderer",
+                     blocks, NEEDED_STORAGE_BLOCKS);
 }
 
 int trip_gl_context_create(trip_gl_context **out)
@@ -190,7 +191,7 @@ int trip_gl_context_create(trip_gl_context **out)
     if (!epoxy_has_egl() || !try_all(c)) {
         free(c);
         return trip_fail(TRIP_ERROR, "gl", "EGL",
-                         "no device here offers OpenGL 4.5 core; install a driver "
+                         "no device offers OpenGL 4.5 core; install a driver "
                          "(libegl1 and libgl1-mesa-dri draw in software) or use another renderer");
     }
     report_debug_messages();

@@ -1,8 +1,10 @@
-/* trip_gl_create(): the picture by OpenGL. Splats are drawn in list order and blended into one
- * layer per list, pixels where the list has no weight, or whose rays go the other way, masked by
- * the stencil, or sheets are drawn into it slice by slice (gl/sheets.h); a full-screen pass merges
- * the layers. The shaders (shaders/) mirror the reference; nothing is computed here but a frame's
- * constants and the places of runs. */
+/* The OpenGL renderer, trip_gl_create(). It fills one layer for each list. In `pre` it blends the
+ * splats in list order, and a stencil masks the pixels that the current pass does not draw. In
+ * `post` it draws the sheets sample by sample (gl/gl_sheets.h). A full-screen pass then merges the
+ * layers.
+ *
+ * The shaders in shaders/ mirror the reference renderer. The code here computes only the constants
+ * of a frame and the positions of runs. */
 #include "renderer.h"
 
 #include <assert.h>
@@ -30,7 +32,7 @@
 #include "weight.h"
 
 enum {
-    COUNTS = 4, /* of a list: low and high half of projected and drawn */
+    COUNTS = 4, /* counters of one list: low and high half of projected, then of drawn */
     QUAD_VERTICES = 4,
     QUAD_INDICES = 6,
 };
@@ -43,29 +45,29 @@ typedef struct gl_renderer {
     trip_gl_target target;
     trip_gl_queue queue;
     trip_gl_ring ring;
-    trip_gl_slots slots; /* of a reader that reads into GL memory */
-    bool copies;         /* readers are given none: batches are copied */
+    trip_gl_slots slots; /* memory for a reader that reads directly into GL memory */
+    bool copies;         /* take_slots() returns NULL, so batches are copied */
     trip_gl_batch batch;
-    trip_gl_cursor at;         /* in the batch */
-    bool in_batch;             /* which is not all drawn */
-    bool prepared;             /* for the frame, what its commands use */
-    const trip_gl_band *band;  /* being drawn into */
-    trip_gl_resident resident; /* submission form "indexed" only */
+    trip_gl_cursor at;         /* progress in the batch */
+    bool in_batch;             /* the batch is not completely drawn */
+    bool prepared;             /* prepare() has finished for this frame */
+    const trip_gl_band *band;  /* the current band */
+    trip_gl_resident resident; /* only for the submission form "indexed" */
     GLuint vertex_array, quad_indices;
     GLuint counts;
     trip_gl_constants constants;
     trip_gl_voxel_positions positions;
-    trip_gl_lattices lattices; /* frames with effects that look light or heat up only */
-    trip_gl_sheets sheets;     /* frames that classify after interpolation only */
-    trip_gl_sums sums;         /* frames that composite splats sheet by sheet only */
+    trip_gl_lattices lattices; /* only for frames with effects */
+    trip_gl_sheets sheets;     /* only for `post` */
+    trip_gl_sums sums;         /* only for frames that composite sheet by sheet */
     const trip_frame *frame;
-    bool in_layer;          /* whose sheets may not all be drawn */
-    int axis;               /* of the layer being drawn */
-    unsigned layers;        /* bit a: the layer of axis a was begun */
-    bool masked;            /* the layer being drawn, by the stencil */
-    trip_way way;           /* of the rays that the pass at hand is of */
-    uint64_t quads;         /* splats of the frame drawn as quads, not sprites as set */
-    trip_list_stats *stats; /* by number of the list; `counts` has room for as many */
+    bool in_layer;          /* some sheets of the current layer may not be drawn yet */
+    int axis;               /* of the current layer */
+    unsigned layers;        /* bit a is set once the layer of axis a has begun */
+    bool masked;            /* the stencil masks the current layer */
+    trip_way way;           /* direction of the rays of the current pass */
+    uint64_t quads;         /* splats of the frame drawn as quads although sprites were requested */
+    trip_list_stats *stats; /* by list index; `counts` has the same capacity */
     unsigned stats_room;
     char device[320];
 } gl_renderer;
@@ -92,7 +94,7 @@ static void destroy(trip_renderer *base)
     }
     trip_gl_batch_release(&r->batch);
     free(r->stats);
-    trip_gl_context_destroy(r->context); /* and with it what is left */
+    trip_gl_context_destroy(r->context); /* frees all remaining GL objects */
     free(r);
 }
 
@@ -102,12 +104,12 @@ static int check_size(const gl_renderer *r, const trip_camera *camera)
     if (camera->width <= max && camera->height <= max)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", "image",
-                     "%d x %d px exceed the %d px either way that this driver can draw; "
-                     "use another renderer or a smaller size",
+                     "%d x %d px exceed this driver's limit of %d px; use a smaller size or "
+                     "another renderer",
                      camera->width, camera->height, max);
 }
 
-/* Room for the counts of so many lists. */
+/* Ensures that the counters can hold `lists` lists. */
 static int fit_stats(gl_renderer *r, unsigned lists)
 {
     if (lists <= r->stats_room)
@@ -134,7 +136,8 @@ static bool sums_sheets(const gl_renderer *r)
     return trip_settings_sum_sheets(r->frame->settings);
 }
 
-/* Where nothing of an earlier frame is under way: what is freed here is in no use. */
+/* Prepares the frame. Call it only after the GPU has finished all earlier frames, because it frees
+ * memory that they use. */
 static int prepare(gl_renderer *r)
 {
     const trip_frame *frame = r->frame;
@@ -167,21 +170,21 @@ static int prepare(gl_renderer *r)
     return trip_gl_check(r->context, "frame");
 }
 
-/* Once all that was begun is done: 0, prepared; TRIP_FRAME_WAITS: not yet. */
+/* Prepares the frame if the GPU has finished all its work. Otherwise returns TRIP_FRAME_WAITS. */
 static int prepare_when_done(gl_renderer *r)
 {
     int done = trip_gl_queue_is_done(&r->queue, r->queue.ended, false);
     return done < 0 ? done : done ? prepare(r) : TRIP_FRAME_WAITS;
 }
 
-/* Splats are all blended, which is within the default of what saturated pixels are. */
+/* gl blends all splats. The result is within the tolerance of the default early termination. */
 static int check_early_termination(const trip_settings *s)
 {
     if (s->classify == TRIP_CLASSIFY_POST || s->early_termination <= TRIP_EARLY_TERMINATION_PRE)
         return TRIP_OK;
     return trip_fail(TRIP_USAGE, "render", "gl",
-                     "draws all splats, however little is seen of them: a saturation of %g is of "
-                     "cpu and reference, or of --classify post",
+                     "draws all splats: --early-termination %g requires --renderer cpu or "
+                     "reference, or --classify post",
                      s->early_termination);
 }
 
@@ -229,7 +232,7 @@ static void await(trip_renderer *base, uint64_t timeout_ns)
         trip_gl_queue_await(&r->queue, timeout_ns);
 }
 
-/* 0: a part may be begun; else TRIP_FRAME_WAITS, or negative. */
+/* Returns 0 if a part may begin, TRIP_FRAME_WAITS if not yet, or a negative failure. */
 static int await_room(gl_renderer *r)
 {
     int room = trip_gl_queue_has_room(&r->queue);
@@ -247,7 +250,7 @@ static int use_program(gl_renderer *r, trip_gl_pass pass, unsigned effects)
     return status;
 }
 
-/* A pass over the layer, strip by strip. */
+/* Runs the current program over the whole layer, strip by strip. */
 static int draw_screen(gl_renderer *r, int axis)
 {
     const trip_gl_target *t = &r->target;
@@ -266,7 +269,8 @@ static int draw_screen(gl_renderer *r, int axis)
     return status;
 }
 
-/* What the stencil is where the layer has weight and rays go that way; elsewhere it is 0. */
+/* Returns the stencil value for pixels with weight and rays in direction `way`. All others have 0.
+ */
 static GLint mark_of(trip_way way)
 {
     return way == TRIP_WAY_DOWN ? 2 : 1;
@@ -274,7 +278,7 @@ static GLint mark_of(trip_way way)
 
 static const GLuint all_marks = 3;
 
-/* Only pixels of the pass at hand are drawn from now on. */
+/* Restricts drawing to the pixels of the current pass. */
 static void draw_masked(const gl_renderer *r)
 {
     glEnable(GL_STENCIL_TEST);
@@ -299,7 +303,8 @@ static int mark_region(gl_renderer *r, int axis, trip_way way)
     return status;
 }
 
-/* Marks the pixels of the layer, by their rays' ways where passes are parted by them. */
+/* Marks the pixels with weight. If the passes of a layer differ by ray direction, each direction
+ * gets its own mark. */
 static int mask_region(gl_renderer *r, int axis)
 {
     if (!r->frame->plan->layers[axis].parted)
@@ -308,7 +313,7 @@ static int mask_region(gl_renderer *r, int axis)
     return status ? status : mark_region(r, axis, TRIP_WAY_DOWN);
 }
 
-/* The last sheets of the layer begun, if any are open: a part of them. */
+/* Draws a part of the last sheets of the current layer, if any are open. */
 static int end_passes(trip_renderer *base)
 {
     gl_renderer *r = (gl_renderer *)base;
@@ -350,7 +355,7 @@ static int begin_layer(trip_renderer *base, int axis)
     if (!status)
         status = trip_gl_target_begin_layer(&r->target, axis, !whole, sums_sheets(r));
     if (status)
-        return status; /* more of the layer before may be to come, its last sheet with it */
+        return status; /* the previous layer may have more sheets to draw */
     trip_gl_sums_begin_layer(&r->sums, axis);
     glDisable(GL_BLEND);
     glDisable(GL_STENCIL_TEST);
@@ -427,13 +432,13 @@ static int count_piece(gl_renderer *r, const trip_gl_piece *piece)
     return TRIP_OK;
 }
 
-/* A processor that stands for a GPU works on vertices within the calls that draw them. */
+/* Software GL processes vertices within the draw calls, so its parts are smaller. */
 static uint32_t part_cost(const gl_renderer *r)
 {
     return r->base.software ? TRIP_GL_PART_COST / TRIP_GL_SOFTWARE_PARTS : TRIP_GL_PART_COST;
 }
 
-/* Does `run` with the pieces of a part of the batch from the cursor on. */
+/* Calls `run` for the pieces of the next part of the batch, starting at the cursor. */
 static int for_part(gl_renderer *r, trip_gl_cursor *at,
                     int (*run)(gl_renderer *, const trip_gl_piece *))
 {
@@ -446,7 +451,8 @@ static int for_part(gl_renderer *r, trip_gl_cursor *at,
     return status;
 }
 
-/* Whatever was done since the part before, such as a picture taken. */
+/* Sets all GL state for drawing splats. Other calls, such as picture(), may have changed it since
+ * the last part. */
 static void prepare_drawing(gl_renderer *r, bool front_to_back)
 {
     glEnable(GL_BLEND);
@@ -495,7 +501,7 @@ static void count_read(gl_renderer *r, const trip_batch *batch)
             batch->runs[i].count;
 }
 
-/* Takes up the way of the rays that a batch's pass is of. */
+/* Selects the ray direction of the batch's pass. */
 static int use_way(gl_renderer *r, const trip_batch *batch)
 {
     const trip_way way = trip_plan_way(r->frame->plan, r->axis, batch->pass->descending);
@@ -529,8 +535,8 @@ static int draw_sheets(gl_renderer *r, const trip_batch *batch)
     return status;
 }
 
-/* 0: there is a slot of the ring where the batch calls for one; else TRIP_FRAME_WAITS, or negative.
- */
+/* Returns 0 if the ring has a free slot or the batch already holds one, TRIP_FRAME_WAITS if not
+ * yet, or a negative failure. */
 static int await_slot(const gl_renderer *r)
 {
     bool taken = classifies_post(r) ? r->sheets.batch.begun : r->in_batch;
@@ -586,7 +592,7 @@ static int is_done(trip_renderer *base, const trip_batch *batch)
     return status ? status : trip_gl_queue_is_done(&r->queue, slot->part, false);
 }
 
-/* A strip of the band's rows from `y` on, merged and read. */
+/* Merges a strip of the band, from row `y` on, and reads it back. */
 static int merge_strip(gl_renderer *r, const trip_gl_band *band, int y, float *rgba, float *depth)
 {
     const trip_gl_target *t = &r->target;
@@ -639,7 +645,7 @@ static void describe(gl_renderer *r)
     const char *name = trip_gl_context_device(r->context);
     if (r->quads)
         snprintf(r->device, sizeof r->device,
-                 "%s (%" PRIu64 " splats as triangles: sprites end at %g px)", name, r->quads,
+                 "%s (%" PRIu64 " splats as triangles: sprite limit %g px)", name, r->quads,
                  trip_gl_context_limits(r->context)->point_size_px);
     else
         snprintf(r->device, sizeof r->device, "%s", name);
@@ -705,7 +711,8 @@ static const trip_renderer_ops gl_ops = {
     .stats = stats,
 };
 
-/* Quads of a part share one list of vertex numbers: two triangles over corners 0 to 3 of each. */
+/* Makes the index list that all quads of a part share: two triangles over corners 0 to 3 of each
+ * quad. */
 static int make_quad_indices(gl_renderer *r)
 {
     static const GLuint corners[QUAD_INDICES] = { 0, 1, 2, 2, 1, 3 };
@@ -739,8 +746,8 @@ static int choose_slots(gl_renderer *r)
     r->copies = !slots || !strcmp(slots, "copy");
     if (!slots || r->copies || !strcmp(slots, "mapped"))
         return TRIP_OK;
-    return trip_fail(TRIP_USAGE, "gl", "TRIPTYCH_GL_SLOTS", "'%s' is neither mapped nor copy",
-                     slots);
+    return trip_fail(TRIP_USAGE, "gl", "TRIPTYCH_GL_SLOTS",
+                     "invalid value '%s'; use mapped or copy", slots);
 }
 
 static void set_up_sheets(gl_renderer *r)

@@ -8,13 +8,14 @@
 #include "report.h"
 #include "sheet.h"
 
-/* Of a part of the work: pixels times ends, squares that are decoded, voxels that get gradients. */
+/* Limits of one part of the work: pixels times segment ends, squares to decode, voxels that get
+ * gradients. */
 enum { PART_ENDS = 1 << 20, PART_SQUARES = 1 << 14, PART_VOXELS = 1 << 20 };
 
 /* ---- frames, layers, passes ---- */
 
-/* Sheets about an interval that what is seen in it depends on: by the kernel, and by gradients, at
- * one sheet more. */
+/* Returns the number of sheets on each side that affect an interval. The kernel needs some;
+ * gradients need one more. */
 static int sheets_about(const trip_settings *s)
 {
     return trip_sheet_reach(s->kernel) - 1;
@@ -68,7 +69,7 @@ void trip_gl_sheets_release(trip_gl_sheets *s)
     s->pass_block = s->ends_block = 0;
 }
 
-/* A rectangle of voxels of a list's u and v, inclusive. */
+/* A rectangle of voxels along u and v of a list; the bounds are inclusive. */
 typedef struct rectangle {
     int64_t lo[2], hi[2];
 } rectangle;
@@ -90,7 +91,8 @@ static void widen(rectangle *r, const trip_selection *selection, unsigned tile_l
     }
 }
 
-/* Of all that the layer's passes read; one voxel where that is nothing. */
+/* Finds the rectangle of all voxels that the layer's passes read. It is one voxel if they read
+ * none. */
 static void find_extent(trip_gl_sheets *s)
 {
     const trip_plan_layer *layer = &s->frame->plan->layers[s->axis];
@@ -109,7 +111,7 @@ int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis)
     s->axis = axis;
     forget(s);
     find_extent(s);
-    /* Those of an interval, those behind it, and one before it where that is kept. */
+    /* An interval needs the sheets around it on both sides, and one before it may still be held. */
     const unsigned min = 2 * (unsigned)sheets_about(s->frame->settings) + 1;
     int status = trip_gl_sheet_textures_fit(&s->textures, s->size[0], s->size[1], min,
                                             s->frame->settings->shading);
@@ -146,14 +148,15 @@ static GLuint groups_over(int length)
 
 /* ---- from runs to sheets ---- */
 
-/* u and v in the tile of a square's corner, by its Morton number. */
+/* Sets u and v of a square's corner in its tile, from its Morton number. */
 static void corner_of(uint32_t number, uint32_t at[2])
 {
     at[0] = 8 * trip_morton_even(number);
     at[1] = 8 * trip_morton_even(number >> 1);
 }
 
-/* The squares of a run, whose codes are at `codes` of the slot's; returns how many. */
+/* Fills the squares of a run with codes at offset `codes` of the slot's codes. Returns their
+ * number. */
 static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const trip_block *block,
                              size_t codes, struct trip_gl_sheet_square *out)
 {
@@ -163,7 +166,8 @@ static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const
         const trip_square *of = &squares[n];
         uint32_t at[2];
         corner_of(of->number, at);
-        /* A square may begin before the sheet's first voxels: 16 bits go round. */
+        /* A square may begin before the first voxel of the sheet; its corner then wraps in 16 bits.
+         */
         uint32_t u = (uint32_t)(run->u - s->first[0]) + at[0];
         uint32_t v = (uint32_t)(run->v - s->first[1]) + at[1];
         out[n] = (struct trip_gl_sheet_square){
@@ -177,10 +181,10 @@ static uint32_t fill_squares(const trip_gl_sheets *s, const trip_run *run, const
     return count;
 }
 
-/* Squares and codes of all runs into a slot. */
+/* Copies the squares and codes of all runs into a slot. */
 static int begin_batch(trip_gl_sheets *s, const trip_batch *batch)
 {
-    size_t squares = 0, bytes = sizeof(uint32_t); /* codes may have none, which cannot be bound */
+    size_t squares = 0, bytes = sizeof(uint32_t); /* not 0: GL cannot bind an empty range */
     for (size_t i = 0; i < batch->run_count; i++) {
         const trip_block block = trip_block_of(batch, &batch->runs[i]);
         squares += block.squares;
@@ -217,7 +221,7 @@ static void begin_sheet(trip_gl_sheets *s, int64_t number)
     trip_gl_sheet_textures_clear(&s->textures, layer, (int)s->size[0], (int)s->size[1]);
 }
 
-/* The codes of a run's brick are among those of the sheet. */
+/* Widens the code range of the last sheet by the range of the run's brick. */
 static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_run *run)
 {
     const trip_file_brick *brick = &trip_batch_list(batch, run)->bricks[run->brick];
@@ -248,7 +252,7 @@ static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
     return status;
 }
 
-/* The batch's next runs of the last sheet, a part of them. */
+/* Decodes some of the batch's next runs for the last sheet. */
 static int decode_runs(trip_gl_sheets *s, const trip_batch *batch)
 {
     trip_gl_sheet_batch *b = &s->batch;
@@ -268,8 +272,8 @@ static int decode_runs(trip_gl_sheets *s, const trip_batch *batch)
 
 /* ---- drawing sheets ---- */
 
-/* Where the eye is behind held[i], in sheets; below 0: before it. In parallel views rays begin
- * elsewhere each. */
+/* Returns the distance in sheets by which the eye lies behind held[i]; negative if it lies before.
+ * Returns 0 in parallel views, where each ray has its own start. */
 static double eye_behind(const trip_gl_sheets *s, int i)
 {
     if (s->frame->camera->ortho)
@@ -277,7 +281,8 @@ static double eye_behind(const trip_gl_sheets *s, int i)
     return (s->eye - (double)s->held[i].number) * (double)s->way;
 }
 
-/* Whether something between held[i] and the next may show; false where there is no next. */
+/* Whether a sample between held[i] and the next sheet may be visible. Returns false without a next
+ * sheet. */
 static bool shows(const trip_gl_sheets *s, int i)
 {
     const int about = sheets_about(s->frame->settings) - 1;
@@ -296,7 +301,7 @@ static bool shows(const trip_gl_sheets *s, int i)
                                   (unsigned)fmin(65535, ceil(bounds[1])));
 }
 
-/* How far the sheets below and above one are. */
+/* Sets the distances to the sheets below and above a sheet. */
 static void bind_positions(const trip_gl_sheets *s, int64_t sheet)
 {
     const trip_coordinates *c = s->coordinates;
@@ -335,9 +340,9 @@ static int make_gradients(trip_gl_sheets *s, int i)
     return status;
 }
 
-/* Of the sheets that what is to be drawn is interpolated from, the first that something shows about
- * and that has no gradients: from the next group on, those before it are not at hand. -1: there is
- * none. All held are complete. */
+/* Returns the first sheet that the drawing needs gradients of and that has none, or -1. A sheet
+ * needs gradients if an interval near it may be visible. The next group no longer holds the sheets
+ * before, so gradients are made now. All held sheets must be complete. */
 static int without_gradients(const trip_gl_sheets *s)
 {
     const int about = sheets_about(s->frame->settings);
@@ -348,8 +353,8 @@ static int without_gradients(const trip_gl_sheets *s)
     return -1;
 }
 
-/* The layer of held[i]; beyond the grid that of the last one there, and -1 where another sheet is
- * not at hand: then it has no voxels. */
+/* Returns the texture layer of held[i]. Beyond the grid it is the layer of the last sheet. Returns
+ * -1 for another sheet that is not held, which then has no voxels. */
 static int layer_of(const trip_gl_sheets *s, int i)
 {
     const int64_t number = s->held[0].number + i * s->way;
@@ -359,16 +364,17 @@ static int layer_of(const trip_gl_sheets *s, int i)
     return number >= 0 && number < sheets ? -1 : s->held[i < 0 ? 0 : s->count - 1].layer;
 }
 
-/* Where along the list a part of the way from a sheet to the next is. */
+/* Returns the position along the list at a fraction `part` of the way from a sheet to the next. */
 static double position_at(const trip_gl_sheets *s, const trip_gl_sheet *from, double part)
 {
     return trip_coordinates_position(s->coordinates, s->axis,
                                      (double)from->number + part * (double)s->way);
 }
 
-/* The ends of the slices from held[i] to the next; returns how many there are then. `first`: those
- * of the interval before are not there, whose last end is the first of these but for kernels of 64
- * voxels, which weigh others there. */
+/* Appends the ends of the segments between held[i] and the next sheet. Returns the new count. An
+ * interval needs its own first end if `first` is set, because the previous interval is not drawn.
+ * Kernels of 64 voxels always need it, because their sheets differ. Otherwise the last end of the
+ * previous interval serves. */
 static int add_ends(const trip_gl_sheets *s, int i, bool first, trip_gl_sheet_end *ends, int count)
 {
     const trip_gl_sheet *from = &s->held[i];
@@ -390,7 +396,7 @@ static int add_ends(const trip_gl_sheets *s, int i, bool first, trip_gl_sheet_en
     return count;
 }
 
-/* Takes as many of the intervals that are to be drawn as fit. */
+/* Puts as many of the remaining intervals into a group as fit. */
 static void begin_group(trip_gl_sheets *s)
 {
     trip_gl_sheet_end ends[TRIP_GL_ENDS_MAX];
@@ -436,7 +442,7 @@ static int bind_drawing(trip_gl_sheets *s, const trip_gl_band *band)
     return TRIP_OK;
 }
 
-/* Some rows of the group. */
+/* Draws some rows of the group. */
 static int draw_rows(trip_gl_sheets *s)
 {
     trip_gl_sheet_drawing *d = &s->drawing;
@@ -456,7 +462,7 @@ static int draw_rows(trip_gl_sheets *s)
     return trip_gl_queue_end_part(s->queue);
 }
 
-/* Lets go of what is drawn, but for what the kernel still reaches. */
+/* Releases the drawn sheets, except one that the kernel still needs. */
 static void end_group(trip_gl_sheets *s)
 {
     trip_gl_sheet_drawing *d = &s->drawing;
@@ -473,7 +479,7 @@ static void end_group(trip_gl_sheets *s)
         d->to = 0;
 }
 
-/* A part of what is to be drawn. */
+/* Does one part of the drawing. */
 static int draw_part(trip_gl_sheets *s)
 {
     trip_gl_sheet_drawing *d = &s->drawing;
@@ -489,8 +495,8 @@ static int draw_part(trip_gl_sheets *s)
     return status;
 }
 
-/* Has the complete sheets drawn: up to the last one when `all`, after which none is held; else as
- * far as none is missing behind them that they depend on. */
+/* Begins to draw complete sheets. With `all` it draws up to the last sheet and then releases all.
+ * Otherwise it draws only intervals with all surrounding sheets held. */
 static void begin_drawing(trip_gl_sheets *s, bool all)
 {
     const int to = s->count - 1 - (all ? 0 : sheets_about(s->frame->settings));
@@ -501,7 +507,8 @@ static void begin_drawing(trip_gl_sheets *s, bool all)
 
 /* ---- batches ---- */
 
-/* The batch's next run is of no sheet at hand: a sheet for it, or what is to be drawn before. */
+/* The next run belongs to a sheet that is not held. Makes room by drawing held sheets, or begins
+ * the new sheet. */
 static void make_position(trip_gl_sheets *s, const trip_batch *batch)
 {
     int64_t number = batch->runs[s->batch.next_run].sheet;

@@ -1,8 +1,8 @@
-/* Frames that classify after interpolation (render/sheet.h): the runs of a pass are decoded into
- * sheets in GL memory; as soon as some in a row are complete, what lies between them is drawn into
- * the layer, and they are let go of. All of it is done in parts of a bounded cost. What a pixel
- * gets depends on the slices alone, never on how many are drawn at a time. Owned by one renderer;
- * needs its context current. */
+/* Draws `post` frames (render/sheet.h). It decodes the runs of a pass into sheets in GL memory.
+ * When enough consecutive sheets are complete, it draws the intervals between them into the layer
+ * and releases them. All work is split into parts of bounded cost. The result at a pixel does not
+ * depend on how many sheets are drawn at once. Owned by one renderer; the context must be current.
+ */
 #ifndef TRIP_GL_SHEETS_H
 #define TRIP_GL_SHEETS_H
 
@@ -16,35 +16,35 @@
 #include "gl/target.h"
 #include "gl/variant.h"
 
-/* A sheet at hand; complete once another one begins. */
+/* A sheet in GL memory. It is complete once the next sheet begins. */
 typedef struct trip_gl_sheet {
     int64_t number;
-    int layer;         /* of the textures */
-    unsigned min, max; /* codes lie in between; least > most: none */
+    int layer;         /* index in the textures */
+    unsigned min, max; /* bounds of its codes; min > max if it is empty */
     bool has_gradients;
 } trip_gl_sheet;
 
-/* The batch at hand, as it is in a slot of the ring. */
+/* The current batch, copied into a slot of the ring. */
 typedef struct trip_gl_sheet_batch {
     trip_gl_slot *slot;
-    size_t codes_offset; /* behind the squares */
-    size_t next_run;     /* not decoded */
+    size_t codes_offset; /* offset of the codes, which follow the squares */
+    size_t next_run;     /* the first run not yet decoded */
     uint32_t next_square;
     bool begun;
 } trip_gl_sheet_batch;
 
-/* What is being drawn: from the front to sheet `to`. */
+/* The current drawing, from `front` to sheet `to` of held[]. */
 typedef struct trip_gl_sheet_drawing {
-    int to;        /* the front or less: nothing */
-    bool all;      /* then no sheet is held */
-    bool in_group; /* up to `done` are being drawn */
+    int to;        /* nothing is drawn if to <= front */
+    bool all;      /* releases all sheets afterwards */
+    bool in_group; /* the sheets up to `done` are being drawn */
     int done;
     int ends;
-    int band, row; /* next */
+    int band, row; /* of the next draw call */
 } trip_gl_sheet_drawing;
 
 typedef struct trip_gl_sheets {
-    /* The renderer's. */
+    /* Owned by the renderer. */
     const trip_gl_context *context;
     trip_gl_ring *ring;
     trip_gl_queue *queue;
@@ -61,23 +61,23 @@ typedef struct trip_gl_sheets {
     const trip_coordinates *coordinates;
     unsigned effects;
     int axis;
-    const trip_pass *pass; /* being drawn; NULL: none */
-    int64_t way;           /* from one sheet to the next: 1 or -1 */
+    const trip_pass *pass; /* the current pass; NULL before the first */
+    int64_t way;           /* step from one sheet to the next: 1 or -1 */
     int64_t first[2], size[2];
     trip_gl_sheet_view view;
-    double eye;                             /* along the sheets, as they are numbered */
-    trip_gl_sheet held[TRIP_GL_SHEETS_MAX]; /* in a row; the last may not be complete */
+    double eye; /* the eye's coordinate along the list, in sheet numbers */
+    trip_gl_sheet held[TRIP_GL_SHEETS_MAX]; /* consecutive sheets; the last may be incomplete */
     int count;
-    int front; /* the first that is not drawn from: 1 where what lies before it reaches over it */
+    int front; /* first sheet not yet drawn from; 1 if the kernel still needs held[0] */
     trip_gl_sheet_batch batch;
     trip_gl_sheet_drawing drawing;
 } trip_gl_sheets;
 
 int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame);
 int trip_gl_sheets_begin_layer(trip_gl_sheets *s, int axis);
-/* A part of the work that the batch calls for; 1: there is more. */
+/* Does one part of the work for the batch. Returns 1 if more is left. */
 int trip_gl_sheets_draw(trip_gl_sheets *s, const trip_batch *batch);
-/* Every batch of the layer was drawn: a part of its last sheets is; 1: there is more. */
+/* Draws one part of the last sheets, after all batches of the layer. Returns 1 if more is left. */
 int trip_gl_sheets_end_layer(trip_gl_sheets *s);
 void trip_gl_sheets_release(trip_gl_sheets *s);
 

@@ -9,7 +9,7 @@
 #include "gl/ring.h"
 #include "report.h"
 
-/* Bytes of a lattice that are copied at a time, at least a layer of nodes. */
+/* Bytes of a lattice that are copied at once. At least one layer of nodes is copied. */
 enum { PART_BYTES = 4 << 20 };
 
 static_assert((int)TRIP_GL_EMISSION_STEPS == (int)TRIP_EMISSION_STEPS, "shared.h");
@@ -42,7 +42,7 @@ static int no_memory(const trip_light_grid *grid, const char *whose)
                      strcmp(whose, "given") ? "" : "raise --memory or ");
 }
 
-/* `grid` NULL: the frame has none. */
+/* Allocates the texture for a grid. NULL frees it. */
 static int take(trip_gl_lattices *e, trip_gl_lattice *l, const trip_light_grid *grid)
 {
     if (l->texture && !(grid && !memcmp(l->nodes, grid->nodes, sizeof l->nodes)))
@@ -65,7 +65,7 @@ static int take(trip_gl_lattices *e, trip_gl_lattice *l, const trip_light_grid *
     return TRIP_OK;
 }
 
-/* Where a frame's lattices come from; a grid NULL: it has none. */
+/* The source of a lattice's values. `grid` is NULL if the frame does not use it. */
 typedef struct source {
     const trip_light_map *map;
     const trip_light_grid *grid;
@@ -135,7 +135,8 @@ static trip_gl_float4 row(double x, double y, double z, double w)
     return (trip_gl_float4){ { (float)x, (float)y, (float)z, (float)w } };
 }
 
-/* From the list's grid, list axes, to index space of level 0; the eye in the list's grid. */
+/* Sets the map from the list's grid (list axes) to the index space of level 0, and the eye's
+ * position in the list's grid. */
 static void set_positions(trip_gl_effects_block *b, const trip_frame *frame, const trip_list *list,
                           int axis)
 {

@@ -1,8 +1,7 @@
-/* What a frame's effects are drawn from (render/effects.h, render/emission.h): the lattices of what
- * light reaches and of heat as textures, kept until their numbers change, and the constants by
- * which shaders place what they draw in them and along the view. A frame without effects has none
- * of it. Owned by one
- * renderer; needs its context current. Textures count against the budget. */
+/* The GPU data of a frame's effects (render/effects.h, render/emission.h). The lattices of light
+ * and heat are textures, kept until their values change. Uniform blocks hold the constants by which
+ * shaders find positions in the lattices and along the view. Owned by one renderer; the context
+ * must be current. The textures count against the budget. */
 #ifndef TRIP_GL_LATTICES_H
 #define TRIP_GL_LATTICES_H
 
@@ -16,10 +15,10 @@
 #include "renderer.h"
 
 typedef struct trip_gl_lattice {
-    GLuint texture; /* 0: the frame has none */
+    GLuint texture; /* 0 if the frame does not use this lattice */
     int nodes[3];
-    uint64_t made_ns; /* that its numbers are of, trip_light_map_made_ns(); */
-    int layers;       /* of nodes along k, that it has of them */
+    uint64_t made_ns; /* trip_light_map_made_ns() of the values */
+    int layers;       /* number of node layers along k already loaded */
 } trip_gl_lattice;
 
 enum { TRIP_GL_REACHED_LATTICE, TRIP_GL_OPEN_LATTICE, TRIP_GL_HEAT_LATTICE, TRIP_GL_LATTICES };
@@ -27,27 +26,29 @@ enum { TRIP_GL_REACHED_LATTICE, TRIP_GL_OPEN_LATTICE, TRIP_GL_HEAT_LATTICE, TRIP
 typedef struct trip_gl_lattices {
     trip_budget *budget;
     trip_gl_lattice lattices[TRIP_GL_LATTICES];
-    GLuint blocks, colours; /* 0: not yet */
-    unsigned room;          /* blocks */
+    GLuint blocks, colours; /* 0 before the first use */
+    unsigned room;          /* capacity, in blocks */
 } trip_gl_lattices;
 
 /* Whether a frame has effects. */
 bool trip_gl_lattices_wanted(const trip_frame *frame);
-/* Takes memory for a frame whose light and heat are begun, and gives back what an earlier one
- * needed; sets the constants: of lists, or of the layers of frames that classify after
- * interpolation. What earlier frames drew is done. */
+/* Allocates the textures for a frame, and frees the ones that an earlier frame left. Light and heat
+ * must have begun. Sets the constants: of each list in `pre`, of each layer in `post`. The GPU must
+ * have finished earlier frames. */
 int trip_gl_lattices_begin(trip_gl_lattices *e, const trip_gl_context *context,
                            const trip_frame *frame);
-/* Once light and heat are complete: a part of the numbers that are not there yet, until
- * TRIP_FRAME_DONE. */
+/* Loads one part of the missing values, after light and heat are complete. Call it again until it
+ * returns TRIP_FRAME_DONE. */
 int trip_gl_lattices_load(trip_gl_lattices *e, const trip_gl_context *context,
                           const trip_frame *frame);
-/* The frame's textures; then the constants of a list by its number, or of the layer of an axis. */
+/* Binds the frame's textures, and then the constants of a list (by its index) or of a layer (by its
+ * axis). */
 void trip_gl_lattices_bind(const trip_gl_lattices *e);
 void trip_gl_lattices_bind_block(const trip_gl_lattices *e, unsigned number);
 void trip_gl_lattices_release(trip_gl_lattices *e);
 
-/* Pure: the constants of a list that the plan draws, NULL: of the layer of `axis`. */
+/* Returns the constants of a list that the plan draws, or of the layer of `axis` if `list` is NULL.
+ * Pure function. */
 trip_gl_effects_block trip_gl_effects_block_of(const trip_frame *frame, const trip_list *list,
                                                int axis);
 

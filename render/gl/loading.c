@@ -11,26 +11,27 @@ static_assert(TRIP_RUN_RECORDS_MAX <= TRIP_FRAME_PIECE, "a run fits a piece");
 
 struct trip_gl_loading {
     trip_gl_resident *to;
-    /* The list being loaded is that along axis (base's + turn) % 3 of the level and kind of the
-     * list number `base`. */
+    /* The current list has the level and kind of list number `base` and the axis (base's + turn) %
+     * 3. */
     unsigned base;
     int turn;
-    const trip_list *list; /* NULL: to be begun */
-    uint64_t filled;       /* of its records */
-    /* Of the present level, by place in its base list. */
+    const trip_list *list; /* NULL before the list begins */
+    uint64_t filled;       /* number of its records already loaded */
+    /* Data of the current level, in the order of its base list. */
     trip_gl_vertex *vertices;
     size_t vertex_bytes;
-    uint64_t *sheet_firsts; /* of every sheet of the base list, and the end */
+    uint64_t *sheet_firsts; /* first record of every sheet of the base list, and the end */
     size_t sheet_bytes;
-    /* NULL while closed. */
+    /* The fields down to next_run are used only while the reader is open; `reader` is NULL
+     * otherwise. */
     trip_reader *reader;
     trip_selection selection;
     trip_pass pass;
     trip_batch batch;
     bool in_batch;
     size_t next_run;
-    /* Of the present piece. */
-    uint32_t piece; /* records */
+    /* The current piece. */
+    uint32_t piece; /* number of records */
     uint32_t positions[TRIP_FRAME_PIECE], normals[TRIP_FRAME_PIECE];
     uint32_t voxels[TRIP_RUN_RECORDS_MAX];
 };
@@ -40,7 +41,7 @@ static const trip_list *base_of(const trip_gl_loading *l)
     return &l->to->data->lists[l->base];
 }
 
-/* ---- places ---- */
+/* ---- positions ---- */
 
 static void position_of(int axis, const trip_run *run, uint32_t voxel, uint32_t p[3])
 {
@@ -54,7 +55,7 @@ static uint64_t morton_of(int axis, const uint32_t p[3])
     return trip_morton(p[(axis + 1) % 3], p[(axis + 2) % 3]);
 }
 
-/* The place of a voxel in the base list, by its Morton code in its sheet; -1 when not there. */
+/* Returns the index of a voxel in the base list, or -1. Searches its sheet by Morton code. */
 static int64_t find_vertex(const trip_gl_loading *l, const uint32_t p[3])
 {
     const trip_list *base = base_of(l);
@@ -110,7 +111,9 @@ static int add_run(trip_gl_loading *l, const trip_run *run)
     int status = TRIP_OK;
     if (run->count > l->list->records - l->filled)
         return trip_fail(TRIP_ERROR, "gl", l->to->data->path,
-                         "list %c holds more splats than it says", "xyz"[l->list->axis]);
+                         "list %c contains more splats than its header states; brick the volume "
+                         "again",
+                         "xyz"[l->list->axis]);
     trip_block_voxels(&block, 0, run->count, l->voxels);
     if (l->list != base_of(l))
         status = find_vertices(l, run);
@@ -132,7 +135,7 @@ static void upload_part(GLuint buffer, uint64_t first, size_t count, size_t each
                          from);
 }
 
-/* The records loaded last. */
+/* Uploads the current piece. */
 static void upload(trip_gl_loading *l)
 {
     const trip_gl_resident *to = l->to;
@@ -168,7 +171,7 @@ static int load_piece(trip_gl_loading *l)
 
 /* ---- lists ---- */
 
-/* The first list not yet loaded; NULL: there is none. */
+/* Returns the first list not yet loaded, or NULL. */
 static const trip_list *next_list(trip_gl_loading *l)
 {
     const trip_dataset *data = l->to->data;
@@ -227,8 +230,10 @@ static int end_list(trip_gl_loading *l)
     const trip_list *list = l->list;
     if (l->filled != list->records)
         return trip_fail(TRIP_ERROR, "gl", l->to->data->path,
-                         "list %c holds fewer splats than it says", "xyz"[list->axis]);
-    /* Sheets without splats end where the one before them does. */
+                         "list %c contains fewer splats than its header states; brick the volume "
+                         "again",
+                         "xyz"[list->axis]);
+    /* Empty sheets end where the sheet before them ends. */
     for (int64_t s = 0; s < list->dims[list->axis] && list == base_of(l); s++)
         if (l->sheet_firsts[s + 1] < l->sheet_firsts[s])
             l->sheet_firsts[s + 1] = l->sheet_firsts[s];
@@ -237,7 +242,7 @@ static int end_list(trip_gl_loading *l)
     return TRIP_OK;
 }
 
-/* The next batch, or the end of the list. */
+/* Takes the next batch from the reader, or ends the list. */
 static int next_batch(trip_gl_loading *l)
 {
     if (!trip_reader_await(l->reader, 0))

@@ -8,10 +8,10 @@
 #include "gl/gl_shader_text.h"
 #include "report.h"
 
-/* Some compilers drop the file number of #line, so that the line number carries it. */
+/* Some compilers drop the file number of #line. So the line number encodes the file as well. */
 enum { MAX_FILES = 16, MAX_SHADER_BYTES = 1 << 20, MAX_NAME = 64, LINES_PER_FILE = 10000 };
 
-/* One stage's text with its includes, and the files it came from. */
+/* The text of one stage with its includes, and the names of the source files. */
 typedef struct stage_text {
     FILE *out;
     char *bytes;
@@ -44,7 +44,7 @@ static char *from_disk(const char *folder, const char *name)
     return NULL;
 }
 
-/* The shared header always comes from the binary, whose C code was compiled with it. */
+/* The shared header always comes from the binary, because the C code was compiled with it. */
 static char *load(const char *name)
 {
     const char *folder = getenv("TRIPTYCH_SHADER_DIR");
@@ -64,7 +64,7 @@ static bool seen(const stage_text *t, const char *name)
     return false;
 }
 
-/* The name in `#include "name"` at the start of a line, or an empty string. */
+/* Extracts the name from a line `#include "name"`, or sets an empty string. */
 static void include_name(const char *line, char name[MAX_NAME])
 {
     name[0] = 0;
@@ -77,7 +77,7 @@ static void include_name(const char *line, char name[MAX_NAME])
     }
 }
 
-/* Appends a file, each only once, with its includes in place. */
+/* Appends a file with its includes, unless the text already contains it. */
 static int append_file(stage_text *t, const char *name)
 {
     if (seen(t, name))
@@ -120,8 +120,8 @@ static int make_text(stage_text *t, const char *name, const char *defines)
     return status;
 }
 
-/* The number behind the first "0:" or "0(" of a line: "0:12(3): error: ..." (Mesa), "0(12) : error
- * ..." (NVIDIA), "ERROR: 0:12: ..." (others). -1 where there is none. */
+/* Returns the number after the first "0:" or "0(" of a line, or -1. The formats are "0:12(3):
+ * error: ..." (Mesa), "0(12) : error ..." (NVIDIA) and "ERROR: 0:12: ..." (others). */
 static long line_number_in(const char *line)
 {
     for (const char *at = strchr(line, '0'); at; at = strchr(at + 1, '0'))
@@ -130,7 +130,7 @@ static long line_number_in(const char *line)
     return -1;
 }
 
-/* Reports the first error of a compiler's log at the file and line it is about. */
+/* Reports the first error of a compiler's log with the original file and line. */
 static int fail_compile(const stage_text *t, const char *name, char *log)
 {
     char *error = strstr(log, "error");
@@ -165,7 +165,7 @@ static int compile(GLuint program, GLenum kind, const char *name, const char *de
     }
     if (!status)
         glAttachShader(program, shader);
-    glDeleteShader(shader); /* lives on while it is attached */
+    glDeleteShader(shader); /* GL keeps the shader while it is attached */
     free(text.bytes);
     return status;
 }

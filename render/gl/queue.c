@@ -3,7 +3,7 @@
 #include "renderer.h"
 #include "report.h"
 
-/* How long a wait does not notice that the frame is cancelled. */
+/* Interval between checks for cancellation during a wait. */
 static const GLuint64 look_ns = 1000000;
 
 static int wait_failed(void)
@@ -12,7 +12,8 @@ static int wait_failed(void)
                      glGetError());
 }
 
-/* The oldest part under way: GL_TIMEOUT_EXPIRED when it is not done within `ns`. */
+/* Waits for the oldest part in progress. Returns GL_TIMEOUT_EXPIRED if it does not finish within
+ * `ns`. */
 static GLenum look_at_oldest(trip_gl_queue *q, GLuint64 ns)
 {
     GLsync *fence = &q->fences[(q->done + 1) % TRIP_GL_QUEUE_PARTS];
@@ -40,7 +41,7 @@ int trip_gl_queue_is_done(trip_gl_queue *q, uint64_t part, bool wait)
     return 1;
 }
 
-/* The part that must be done before there is room for one more; 0: none. */
+/* Returns the number of the part that must finish before another can end; 0 if none. */
 static uint64_t before_next(const trip_gl_queue *q)
 {
     return q->ended < TRIP_GL_QUEUE_PARTS ? 0 : q->ended - (TRIP_GL_QUEUE_PARTS - 1);

@@ -1,6 +1,6 @@
-/* The GPU's work in parts: a fence stands behind each, and only a few are under way at a time, so
- * that a picture does not wait long. What a frame that is given up has under way is left to end by
- * itself. Owned by one renderer; needs its context current. */
+/* Splits the GPU's work into parts with a fence after each. At most TRIP_GL_QUEUE_PARTS
+ * parts are in progress, so a picture waits only briefly. When a frame is cancelled, its parts in
+ * progress finish by themselves. Owned by one renderer; the context must be current. */
 #ifndef TRIP_GL_QUEUE_H
 #define TRIP_GL_QUEUE_H
 
@@ -10,26 +10,26 @@
 
 enum { TRIP_GL_QUEUE_PARTS = 4 };
 
-/* Parts are numbered from 1 on, and done in that order. */
+/* Parts are numbered from 1 and finish in this order. */
 typedef struct trip_gl_queue {
-    GLsync fences[TRIP_GL_QUEUE_PARTS]; /* of part n at n % TRIP_GL_QUEUE_PARTS */
-    uint64_t ended, done;               /* the last part that is */
+    GLsync fences[TRIP_GL_QUEUE_PARTS]; /* the fence of part n is at n % TRIP_GL_QUEUE_PARTS */
+    uint64_t ended, done; /* number of the last part submitted, and of the last one finished */
 } trip_gl_queue;
 
-/* Whether a part can be ended without waiting: 1, or 0: not yet; negative: failed (reported). */
+/* Returns 1 if a part can end without waiting, 0 if not yet, or a negative failure (reported). */
 int trip_gl_queue_has_room(trip_gl_queue *q);
-/* Ends a part: all commands since the part before. Waits where the queue had no room; fails
- * (reported) when the frame is cancelled, after which trip_gl_queue_leave() follows. */
+/* Ends a part: all commands since the previous part. Waits if the queue is full. Fails (reported)
+ * if the frame is cancelled; then call trip_gl_queue_leave(). */
 int trip_gl_queue_end_part(trip_gl_queue *q);
-/* 1: the part is done, as is part 0; 0: not yet, never where `wait` is set; negative: failed, or
- * cancelled while waiting (reported). */
+/* Returns 1 if the part is finished; part 0 always is. Returns 0 if it is not finished and `wait`
+ * is false. Returns a negative number if the wait failed or the frame was cancelled (reported). */
 int trip_gl_queue_is_done(trip_gl_queue *q, uint64_t part, bool wait);
-/* Waits until one more part is done, at most so long. */
+/* Waits until one more part is finished, for at most `timeout_ns`. */
 void trip_gl_queue_await(trip_gl_queue *q, uint64_t timeout_ns);
-/* The frame is over or given up: the last part ends behind all commands so far. Waits for nothing.
- */
+/* Ends a frame, complete or cancelled, without waiting. The last part then includes all commands so
+ * far. */
 void trip_gl_queue_leave(trip_gl_queue *q);
-/* Waits until the GPU is done with all commands, those of no part included, cancelled or not. */
+/* Waits until the GPU has finished all commands, even in a cancelled frame. */
 void trip_gl_queue_drain(trip_gl_queue *q);
 
 #endif

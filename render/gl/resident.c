@@ -23,7 +23,7 @@ static bool is_splatted(const trip_list *list)
     return kind->splatted && !kind->coarse;
 }
 
-/* Gives every list its place in the arrays. */
+/* Assigns every list its range in the arrays. */
 static void lay_out(trip_gl_resident *r)
 {
     const trip_dataset *data = r->data;
@@ -51,8 +51,8 @@ static int check_size(const trip_gl_resident *r, size_t block_bytes)
         for (int a = 0; a < AXES; a++)
             if (is_splatted(&data->lists[i]) && data->lists[i].dims[a] > MAX_COORDINATE)
                 return trip_fail(TRIP_ERROR, "gl", data->path,
-                                 "indexed lists take up to %d voxels either way; use replicated "
-                                 "lists",
+                                 "indexed lists are limited to %d voxels along each axis; use "
+                                 "replicated lists",
                                  MAX_COORDINATE);
     uint64_t max = r->vertex_count;
     for (int a = 0; a < AXES; a++)
@@ -61,7 +61,7 @@ static int check_size(const trip_gl_resident *r, size_t block_bytes)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", data->path,
                      "indexed lists of %" PRIu64
-                     " splats exceed the %zu bytes of a buffer of this driver; "
+                     " splats exceed this driver's buffer limit of %zu bytes; "
                      "use replicated lists",
                      max, block_bytes);
 }

@@ -1,7 +1,7 @@
-/* The submission form "indexed" (2008 section 5.1): of each level of the data set one vertex array,
- * a list's voxels with their places written out, and for each list an array of places in it. All of
- * it stays in GL memory, so that it must fit there and in the budget; loaded in pieces when a data
- * set is first drawn. Owned by one renderer; needs its context current. */
+/* The submission form "indexed" (2008, section 5.1). Each level of the data set has one vertex
+ * array: the voxels of one list with explicit positions. Each list has an array of indices into it.
+ * All arrays stay in GL memory and must fit the budget. They are loaded in pieces when a data set
+ * is first drawn. Owned by one renderer; the context must be current. */
 #ifndef TRIP_GL_RESIDENT_H
 #define TRIP_GL_RESIDENT_H
 
@@ -11,15 +11,15 @@
 
 #include "reader.h"
 
-/* As the shaders read it: x, y, z and code in 16 bits each. */
+/* Layout in the shaders: x, y, z and code, 16 bits each. */
 typedef struct trip_gl_vertex {
     uint32_t xy, zc;
 } trip_gl_vertex;
 
-/* Where a list lies in the arrays. */
+/* The first elements of a list in the arrays. */
 typedef struct trip_gl_resident_list {
-    uint64_t order_first;  /* its records, in the order of its axis */
-    uint64_t vertex_first; /* the vertices of its level */
+    uint64_t order_first;  /* of its records in the array of its axis */
+    uint64_t vertex_first; /* of the vertices of its level */
 } trip_gl_resident_list;
 
 typedef struct trip_gl_loading trip_gl_loading;
@@ -27,32 +27,33 @@ typedef struct trip_gl_loading trip_gl_loading;
 typedef struct trip_gl_resident {
     trip_budget *budget;
     const trip_dataset *data;
-    uint64_t checksum; /* of its header */
+    uint64_t checksum; /* of the data set's header */
     unsigned planes;
     uint64_t vertex_count, order_counts[3];
-    trip_gl_resident_list *lists; /* by number in the data set, those that are splatted */
+    trip_gl_resident_list
+        *lists; /* by list index; filled only for lists that are drawn as splats */
     unsigned list_count;
-    uint64_t bytes; /* in GL memory */
+    uint64_t bytes; /* of GL memory */
     GLuint vertices, normals, order[3];
-    trip_gl_loading *loading; /* NULL: all is there */
+    trip_gl_loading *loading; /* NULL when loading is complete */
 } trip_gl_resident;
 
-/* Begins to load the data set unless it is there, or goes on where it was paused. `block_bytes`
- * bounds each array. */
+/* Begins to load a data set, or resumes loading after a pause. Does nothing if it is loaded.
+ * `block_bytes` limits the size of each array. */
 int trip_gl_resident_begin(trip_gl_resident *r, const trip_dataset *data, unsigned planes,
                            size_t block_bytes);
-/* Loads a piece, as trip_renderer_ops.load. */
+/* Loads a piece; implements trip_renderer_ops.load. */
 int trip_gl_resident_load(trip_gl_resident *r);
-/* Waits until a piece can be loaded, at most so long. */
+/* Waits until a piece can be loaded, for at most `timeout_ns`. */
 void trip_gl_resident_await(trip_gl_resident *r, uint64_t timeout_ns);
-/* Until the next begin the data set is not used; lists that are loaded stay. */
+/* Stops using the data set until the next begin. Loaded lists remain. */
 void trip_gl_resident_pause(trip_gl_resident *r);
-/* Before the first batch of an axis. */
+/* Binds the arrays of an axis, before its first batch. */
 void trip_gl_resident_bind(const trip_gl_resident *r, int axis);
 void trip_gl_resident_release(trip_gl_resident *r);
 
-/* The list whose records are the vertices of the level and kind of `list`: that along Z, or else Y,
- * or X. */
+/* Returns the list with the vertices for the level and kind of `list`: the Z list, or else Y, or X.
+ */
 const trip_list *trip_gl_resident_base(const trip_dataset *data, const trip_list *list);
 
 #endif

@@ -16,14 +16,14 @@ bool trip_gl_slot_make(trip_gl_slot *slot, size_t bytes, bool readable, trip_bud
     if (slot->memory)
         return true;
     trip_gl_slot_release(slot, budget);
-    glGetError(); /* the result says it */
+    glGetError(); /* clears the error; the result reports it */
     return false;
 }
 
 void trip_gl_slot_release(trip_gl_slot *slot, trip_budget *budget)
 {
     if (slot->buffer) {
-        glDeleteBuffers(1, &slot->buffer); /* unmaps it */
+        glDeleteBuffers(1, &slot->buffer); /* also unmaps it */
         trip_budget_discharge(budget, slot->bytes);
     }
     *slot = (trip_gl_slot){ 0 };

@@ -1,6 +1,6 @@
-/* GL memory that what a draw needs is copied into: a few buffers, mapped for good, each reused once
- * the last part of the GPU's work that reads it is done. Owned by one renderer; made once and grown
- * to the largest batch seen. Its bytes count against the budget. */
+/* A ring of persistently mapped GL buffers. The CPU writes the data of a draw into a slot. A slot
+ * is reused after the GPU has finished the last part that reads it. Owned by one renderer. It is
+ * created once and grows to the largest batch so far. Its bytes count against the budget. */
 #ifndef TRIP_GL_RING_H
 #define TRIP_GL_RING_H
 
@@ -16,8 +16,8 @@ enum { TRIP_GL_RING_SLOTS = 3, TRIP_GL_ALIGNMENT_BYTES = 256 };
 typedef struct trip_gl_slot {
     GLuint buffer;
     size_t bytes;
-    unsigned char *memory; /* mapped */
-    uint64_t part;         /* of the queue: the last that reads it */
+    unsigned char *memory;
+    uint64_t part; /* number of the last part in the queue that reads it */
 } trip_gl_slot;
 
 typedef struct trip_gl_ring {
@@ -27,21 +27,22 @@ typedef struct trip_gl_ring {
     unsigned next;
 } trip_gl_ring;
 
-/* Makes a slot, for writing only or to be read back too; false where it does not fit the budget or
- * the driver's memory, which is not reported. `slot` is zeroed. */
+/* Creates a slot for writing, or also for reading back. `slot` must be zeroed. Returns false,
+ * without a report, if the budget or the driver has too little memory. */
 bool trip_gl_slot_make(trip_gl_slot *slot, size_t bytes, bool readable, trip_budget *budget);
 void trip_gl_slot_release(trip_gl_slot *slot, trip_budget *budget);
 
-/* Whether the GPU has read what the next slot held: 1, or 0: not yet; negative: failed (reported).
- */
+/* Returns 1 if the GPU has finished reading the next slot, 0 if not yet, or a negative failure
+ * (reported). */
 int trip_gl_ring_is_free(const trip_gl_ring *r);
-/* Every slot is read by the queue's last part. */
+/* Marks every slot as read by the queue's last part. */
 void trip_gl_ring_leave(trip_gl_ring *r);
-/* The next slot with room for `bytes`, waiting until the GPU has read what it held. */
+/* Takes the next slot, with a capacity of at least `bytes`. Waits until the GPU has finished
+ * reading it. */
 int trip_gl_ring_take(trip_gl_ring *r, size_t bytes, trip_gl_slot **slot);
 void trip_gl_ring_release(trip_gl_ring *r);
 
-/* The offset of the next aligned part behind a part of `bytes` at `offset`. */
+/* Returns the next aligned offset after `bytes` bytes at `offset`. */
 static inline size_t trip_gl_ring_after(size_t offset, size_t bytes)
 {
     size_t end = offset + bytes + TRIP_GL_ALIGNMENT_BYTES - 1;

@@ -5,7 +5,7 @@
 
 #include "shade.h"
 
-/* Rays of which one moves farther over a sheet are not taken by that. */
+/* Maximum movement of the reference ray along u or v for each sheet. */
 #define STEEPEST 64.0
 
 static void by_list(trip_vec3 v, int axis, double out[3])
@@ -19,10 +19,10 @@ static trip_gl_float4 linear(double constant, double x, double y, double w)
     return (trip_gl_float4){ { (float)constant, (float)x, (float)y, (float)w } };
 }
 
-/* Rays from the image's centre, as trip_gl_frame has them. */
+/* Rays relative to the image's centre, scaled as in trip_gl_frame. */
 typedef struct rays {
-    double r0[3], rx[3], ry[3];              /* how they go */
-    double start[3], x_start[3], y_start[3]; /* where they begin */
+    double r0[3], rx[3], ry[3];              /* direction, and its change for each pixel */
+    double start[3], x_start[3], y_start[3]; /* start, and its change for each pixel */
 } rays;
 
 static rays rays_of(const trip_camera *c, int axis)
@@ -44,8 +44,8 @@ static rays rays_of(const trip_camera *c, int axis)
     return r;
 }
 
-/* By the ray at the image's centre where it goes this way: what others are apart from it then keeps
- * its last bits, however far the eye is. */
+/* Takes the ray at the image's centre as the reference if it goes in this direction. Differences
+ * from it keep their precision, however far the eye is. */
 static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
 {
     double u = r->r0[1] / r->r0[0], w = r->r0[2] / r->r0[0];
@@ -54,8 +54,8 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
     v->slope[1] = usable ? w : 0;
 }
 
-/* The map from differences of codes, list axes, to world space is the inverse transpose of the
- * index's. */
+/* Maps differences of codes (list axes) to world space. The map is the inverse transpose of
+ * index_to_world. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
     const trip_file_header *h = &frame->data->header;
@@ -64,7 +64,8 @@ static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
     trip_gl_float4 *columns[3] = { &v->constants.gradient_0, &v->constants.gradient_1,
                                    &v->constants.gradient_2 };
     trip_affine to_index;
-    trip_affine_invert(&frame->data->index_to_world, &to_index); /* it was checked on opening */
+    trip_affine_invert(&frame->data->index_to_world,
+                       &to_index); /* cannot fail: opening the data set checked it */
     for (int i = 0; i < 3; i++) {
         const double *row = to_index.m[(v->axis + i) % 3];
         *columns[i] =
@@ -78,7 +79,7 @@ static double inner(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Rays begin at `start`, at depth 0. */
+/* Rays start at `start`, where their depth is 0. */
 static void set_clip(trip_gl_sheet_view *v, const rays *r, const trip_clip *clip)
 {
     static_assert((int)TRIP_CLIP_MAX == 14, "shared.h");
@@ -129,7 +130,7 @@ trip_gl_sheet_view trip_gl_sheet_view_make(const trip_frame *frame, int axis, bo
     return v;
 }
 
-/* Whole voxels and the rest, from the sheets' first voxel on. */
+/* Splits a position into whole voxels, relative to `first`, and a rest. */
 static int32_t split(double position, int64_t first, float *rest)
 {
     double whole = fmin(fmax(floor(position), -0x1p40), 0x1p40);

@@ -2,7 +2,7 @@
 
 #include "report.h"
 
-/* More than the least only take their share of the memory that is left. */
+/* Layers above the minimum may take only 1 / SHARE of the memory left. */
 enum { SHARE = 4, CODE_BYTES = 4, GRADIENT_BYTES = 8 };
 
 void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t)
@@ -31,8 +31,8 @@ static int check_size(int64_t width, int64_t height)
     if (width <= max && height <= max)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", "sheets",
-                     "%lld x %lld voxels exceed the %d either way that this driver's textures "
-                     "hold; use another renderer, or --classify pre",
+                     "sheets of %lld x %lld voxels exceed this driver's texture limit of %d; use "
+                     "another renderer, or --classify pre",
                      (long long)width, (long long)height, max);
 }
 

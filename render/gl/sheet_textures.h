@@ -1,6 +1,6 @@
-/* The sheets at hand in GL memory: a few layers of codes, and of gradients where there is light,
- * over the rectangle that a list's selected voxels lie in. Owned by one renderer; needs its context
- * current; kept while they are large enough. Their bytes count against the budget. */
+/* The textures that hold sheets in GL memory: some layers of codes, and of gradients if shading is
+ * on. They cover the rectangle of a list's selected voxels. Owned by one renderer and kept while
+ * they are large enough; the context must be current. Their bytes count against the budget. */
 #ifndef TRIP_GL_SHEET_TEXTURES_H
 #define TRIP_GL_SHEET_TEXTURES_H
 
@@ -14,16 +14,16 @@ enum { TRIP_GL_SHEETS_MAX = 10 };
 
 typedef struct trip_gl_sheet_textures {
     trip_budget *budget;
-    GLuint codes;     /* r32f: codes, below 0 where no voxel is */
-    GLuint gradients; /* rgba16f; 0: without light */
+    GLuint codes;     /* r32f: codes; negative where a voxel is missing */
+    GLuint gradients; /* rgba16f; 0 without shading */
     int width, height, layers;
-    uint64_t bytes; /* of the budget */
+    uint64_t bytes; /* charged to the budget */
 } trip_gl_sheet_textures;
 
-/* Room for at least so many sheets of width x height voxels. */
+/* Ensures a capacity of at least `min` sheets of width x height voxels. */
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
                                unsigned min, bool gradients);
-/* No voxel is in the first width x height of a layer. */
+/* Marks the first width x height voxels of a layer as missing. */
 void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width,
                                   int height);
 void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t);

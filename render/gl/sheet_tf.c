@@ -8,7 +8,7 @@
 
 enum { CODES = 65536, SUMS_BYTES = CODES * sizeof(struct trip_gl_sum) };
 
-/* The greatest of the sums, about: they are whole numbers, so that differences are exact. */
+/* Approximate maximum of the sums. Sums are integers, so their differences are exact. */
 #define GREATEST 0x1p62
 
 static int no_memory(void)
@@ -35,7 +35,8 @@ static int make_sums(trip_gl_sheet_tf *f)
     return TRIP_OK;
 }
 
-/* Extinction of a voxel's length, within floats: more is opaque anyway. */
+/* Stores the extinction per voxel length, limited so that products fit a float. Higher values are
+ * opaque anyway. */
 static void fill_entries(struct trip_gl_sum *sums, const trip_tf_entry *table, double voxel_world)
 {
     for (int code = 0; code < CODES; code++) {
@@ -48,7 +49,8 @@ static void fill_entries(struct trip_gl_sum *sums, const trip_tf_entry *table, d
     }
 }
 
-/* From a code to the next: of extinction times each component of colour, and of extinction. */
+/* Returns the integrals from a code to the next: of extinction times each colour component, and of
+ * extinction. */
 static void integrate_step(const struct trip_gl_sum *at, double out[4])
 {
     const float *a = at[0].entry, *b = at[1].entry;

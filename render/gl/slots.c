@@ -5,7 +5,8 @@
 
 enum { DIRECT_ALIGNMENT_BYTES = 4096 };
 
-/* One buffer for all, with room to begin at a page: a mapping may start anywhere. */
+/* Creates one buffer for all slots. It is larger by one page, so that the first slot can start at a
+ * page boundary. */
 static bool make_whole(trip_gl_slots *s, unsigned count, size_t bytes)
 {
     GLint alignment = 1;

@@ -16,7 +16,7 @@ static uint64_t *open_of(trip_gl_sums *s, const trip_gl_band *band)
     return &s->open[band - s->target->bands];
 }
 
-/* Composites a band's open sheet, and empties it. */
+/* Composites a band's open sheet and clears the sums. */
 static int end_sheet(trip_gl_sums *s, const trip_gl_band *band)
 {
     GLuint program;

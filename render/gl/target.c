@@ -44,7 +44,7 @@ static int check_complete(GLuint framebuffer, const char *name)
     return trip_fail(TRIP_ERROR, "gl", name, "the driver cannot draw into it: status %#x", state);
 }
 
-/* A texture of the target's width, as attachment `out` of a surface. */
+/* Creates a texture of the target's width and attaches it as output `out` of a surface. */
 static int make_texture(const trip_gl_target *t, trip_gl_surface *s, GLenum format, int rows,
                         GLuint *texture, unsigned out)
 {
@@ -135,7 +135,7 @@ int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target 
     return status;
 }
 
-/* The layer's surface, made when it is first drawn into. */
+/* Allocates the layer's surface if it does not exist. */
 static int fit_layer(const trip_gl_target *t, trip_gl_band *band, int axis)
 {
     trip_gl_surface *layer = &band->layers[axis];
@@ -168,7 +168,7 @@ void trip_gl_target_clear_sheet(const trip_gl_target *t, const trip_gl_band *ban
     clear(t, &band->sheet);
 }
 
-/* Of floats, whatever the layers hold. */
+/* Sheets are floats for all target types. */
 static int begin_sheet(const trip_gl_target *t, trip_gl_band *band, bool stencil)
 {
     trip_gl_surface *sheet = &band->sheet;
@@ -202,7 +202,7 @@ static int begin_band(const trip_gl_target *t, trip_gl_band *band, int axis, boo
     if (stencil)
         glClearNamedFramebufferiv(framebuffer, GL_STENCIL, 0, &zero);
     if (t->software)
-        glFinish(); /* no more than one band is left to be cleared when a frame is given up */
+        glFinish(); /* a cancelled frame then leaves at most one band to clear */
     return trip_frame_poll();
 }
 

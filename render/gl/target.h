@@ -1,8 +1,7 @@
-/* What a frame is drawn into: one layer per axis, made when it is first drawn, the stencil
- * that masks pixels without weight, and a strip of rows of the merged image. Large layers are made
- * of bands of rows: where textures are the processor's memory, one takes a while to make. Owned by
- * one renderer; kept from frame to frame while size and type stay. Its bytes count against the
- * budget. */
+/* The surfaces of a frame: one layer for each axis, a stencil and one strip of rows of the merged
+ * picture. A layer is allocated when it is first drawn. Layers are split into bands of rows,
+ * because software GL takes long to allocate large textures. Owned by one renderer and kept while
+ * size and type stay the same. The bytes count against the budget. */
 #ifndef TRIP_GL_TARGET_H
 #define TRIP_GL_TARGET_H
 
@@ -13,20 +12,20 @@
 #include "settings.h"
 
 enum {
-    /* About; more in the largest images. On a processor smaller ones, which it has to fill with
-     * zeros before a frame can be given up. */
+    /* Approximate pixels of a band; the largest pictures have larger bands. Software GL clears a
+     * band before a frame can be cancelled, so its bands are smaller. */
     TRIP_GL_BAND_PIXELS = 1 << 24,
     TRIP_GL_SOFTWARE_BAND_PIXELS = 1 << 23,
     TRIP_GL_BANDS_MAX = 32,
-    TRIP_GL_STRIP_PIXELS = 1 << 20, /* a pass over an image is done in strips of about so many */
+    TRIP_GL_STRIP_PIXELS = 1 << 20, /* full-screen passes run in strips of about this size */
 };
 
-/* Colour and opacity; with depths these too, as wide, since they are blended by an opacity of their
- * own (TRIP_GL_OUT_COLOUR, TRIP_GL_OUT_DEPTH). */
+/* A colour texture with opacity. Pictures with depths add a depth texture of four channels, because
+ * blending needs an opacity in each texture (TRIP_GL_OUT_COLOUR, TRIP_GL_OUT_DEPTH). */
 typedef struct trip_gl_surface {
-    GLuint colour, depth; /* textures */
+    GLuint colour, depth;
     GLuint framebuffer;
-    uint64_t bytes; /* of the budget */
+    uint64_t bytes; /* charged to the budget */
 } trip_gl_surface;
 
 typedef struct trip_gl_band {
@@ -34,35 +33,37 @@ typedef struct trip_gl_band {
     trip_gl_surface layers[3]; /* by axis */
     GLuint stencil;            /* shared by the layers */
     uint64_t stencil_bytes;
-    trip_gl_surface sheet; /* sums of a sheet's splats, shared too; rgba32f and r32f */
+    trip_gl_surface sheet; /* sums of a sheet's splats, shared by the layers; rgba32f and r32f */
 } trip_gl_band;
 
 typedef struct trip_gl_target {
     trip_budget *budget;
-    bool software; /* the device is the processor */
+    bool software; /* the processor emulates the GPU */
     int width, height;
     trip_target type;
     bool depth;
     trip_gl_band bands[TRIP_GL_BANDS_MAX];
     int band_count;
     int strip_rows;
-    trip_gl_surface strip; /* rgba32f and r32f whatever the layers hold */
+    trip_gl_surface strip; /* rgba32f and r32f for all target types */
 } trip_gl_target;
 
-/* Readies an image of this size for layers of this type, with depths or without. */
+/* Prepares for a picture of the given size, with layers of the given type, with or without depths.
+ */
 int trip_gl_target_resize(trip_gl_target *t, int width, int height, trip_target type, bool depth);
-/* Empties the layer of an axis; with `stencil` it has one, all zero; with `sums` the bands' sheets
- * are empty, too, and have the same stencil. */
+/* Clears the layer of an axis. If `stencil` is set, the layer gets a stencil of zeros. If `sums` is
+ * set, the bands also get empty sheets, with the same stencil. */
 int trip_gl_target_begin_layer(trip_gl_target *t, int axis, bool stencil, bool sums);
-/* Binds a band of a layer for drawing: positions are those of the image, but row first_row of the
- * image is row 0 of the fragments. */
+/* Binds a band of a layer for drawing. Positions refer to the whole picture. Row 0 of the fragments
+ * is row first_row of the picture. */
 void trip_gl_target_bind(const trip_gl_target *t, int axis, const trip_gl_band *band);
-/* The same of the band's sheet. */
+/* Binds the sheet of a band for drawing, with the same coordinates. */
 void trip_gl_target_bind_sheet(const trip_gl_target *t, const trip_gl_band *band);
 void trip_gl_target_clear_sheet(const trip_gl_target *t, const trip_gl_band *band);
 /* Binds the first `rows` rows of the strip for drawing. */
 void trip_gl_target_bind_strip(const trip_gl_target *t, int rows);
-/* Reads them when they are drawn, width * 4 floats each; and width depths where there are any. */
+/* Reads these rows after drawing: width * 4 floats for each row, and width depths if the target has
+ * depths. */
 void trip_gl_target_read_strip(const trip_gl_target *t, int rows, float *rgba, float *depth);
 void trip_gl_target_release(trip_gl_target *t);
 

@@ -14,7 +14,7 @@
 
 static const struct {
     const char *vertex, *fragment, *compute;
-    unsigned effects; /* that mean something in the pass */
+    unsigned effects; /* that the pass uses */
     bool in_double;
 } passes[] = {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },

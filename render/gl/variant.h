@@ -1,5 +1,5 @@
-/* The programs of the renderer by pass and effects, each built when it is first called for and then
- * kept. Owned by one renderer; needs its context current. */
+/* The shader programs, by pass and effects. Each is built on first use and then kept. Owned by one
+ * renderer; the context must be current. */
 #ifndef TRIP_GL_VARIANT_H
 #define TRIP_GL_VARIANT_H
 
@@ -23,8 +23,8 @@ typedef enum trip_gl_pass {
 typedef struct trip_gl_variant {
     trip_gl_pass pass;
     trip_method method;
-    unsigned effects; /* trip_gl_effect; those without meaning in the pass make no difference */
-    unsigned layers;  /* merge only: bit a for a list that was drawn */
+    unsigned effects; /* trip_gl_effect; bits that the pass does not use are ignored */
+    unsigned layers;  /* for merge: bit a is set if list a was drawn */
 } trip_gl_variant;
 
 typedef struct trip_gl_built {

@@ -3,7 +3,7 @@
 #include "gl/frame_block.h"
 #include "report.h"
 
-/* A number as the sum of two floats. */
+/* Stores a number as the sum of two floats. */
 static void split(double x, float out[2])
 {
     out[0] = (float)x;

@@ -1,6 +1,6 @@
-/* Where the voxels of a grid with uneven spacing lie and how long they are (coordinates.h), in GL
- * memory, for drawing splats. Owned by one renderer; needs its context current. Its bytes count
- * against the budget. */
+/* The positions and widths of voxels in a grid with uneven spacing (coordinates.h), in GL memory,
+ * for drawing splats. Owned by one renderer; the context must be current. Its bytes count against
+ * the budget. */
 #ifndef TRIP_GL_VOXEL_POSITIONS_H
 #define TRIP_GL_VOXEL_POSITIONS_H
 
@@ -12,13 +12,13 @@
 
 typedef struct trip_gl_voxel_positions {
     trip_budget *budget;
-    GLuint buffer; /* as fetch.glsl reads it; 0: spacing is even */
+    GLuint buffer; /* layout as in fetch.glsl; 0 for even spacing */
     uint64_t bytes;
 } trip_gl_voxel_positions;
 
-/* None where spacing is even; fails without memory. */
+/* Fills the buffer; even spacing needs none. Fails if the memory does not suffice. */
 int trip_gl_voxel_positions_set(trip_gl_voxel_positions *p, const trip_coordinates *c);
-/* For lists that are indexed, or not. */
+/* Binds the buffer for indexed or other lists. */
 void trip_gl_voxel_positions_bind(const trip_gl_voxel_positions *p, bool indexed);
 void trip_gl_voxel_positions_release(trip_gl_voxel_positions *p);
 
