@@ -5,17 +5,17 @@
 /* Nanometres. */
 enum { FIRST = 360, LAST = 830, STEP = 5 };
 
-/* Below, next to nothing is seen, and all of that so far red that the fit does not hold. */
+/* Kelvin. Below it almost nothing is visible, and the fit is invalid for such deep red. */
 #define COLDEST_KELVIN 1000.0
 
-/* A lobe of a matching function, of another width on either side of its middle. */
+/* Evaluates one lobe of a colour matching function; its width differs on the two sides. */
 static double lobe(double nm, double middle, double below, double above)
 {
     const double t = (nm - middle) * (nm < middle ? below : above);
     return exp(-0.5 * t * t);
 }
 
-/* What an observer has of a wavelength. */
+/* Evaluates the observer's matching functions at a wavelength. */
 static void match(double nm, double xyz[3])
 {
     xyz[0] = 0.362 * lobe(nm, 442.0, 0.0624, 0.0374) + 1.056 * lobe(nm, 599.8, 0.0264, 0.0323) -
@@ -24,7 +24,7 @@ static void match(double nm, double xyz[3])
     xyz[2] = 1.217 * lobe(nm, 437.0, 0.0845, 0.0278) + 0.681 * lobe(nm, 459.0, 0.0385, 0.0725);
 }
 
-/* Planck's law, but for a factor. */
+/* Planck's law up to a constant factor. */
 static double radiance(double nm, double kelvin)
 {
     const double second_constant = 1.438776877e7; /* h c / k, nm K */

@@ -5,7 +5,7 @@
 
 #include "field.h"
 
-/* Of 4 bytes each, a few slabs of them. */
+/* Maximum number of tiles: 4 bytes each, for a few slabs. */
 #define TILES_MAX (INT64_C(1) << 24)
 
 static const trip_code_range nothing = { 65535, 0 };
@@ -20,7 +20,7 @@ static trip_code_range both(trip_code_range a, trip_code_range b)
     return (trip_code_range){ a.min < b.min ? a.min : b.min, a.max > b.max ? a.max : b.max };
 }
 
-/* The tiles that have bricks, grown by one. */
+/* Finds the range of tiles with bricks, grown by one tile. */
 static void find_tiles(trip_brick_ranges *r)
 {
     int64_t lo[2] = { INT64_MAX, INT64_MAX }, hi[2] = { -1, -1 };
@@ -106,7 +106,7 @@ static void fill(trip_brick_ranges *r, int layer, int64_t slab)
             fill_from(r, layer, &r->data->lists[i], slab);
 }
 
-/* The slab and those before and behind it; the next slab keeps all but one of them. */
+/* Loads a slab and its neighbours; stepping to the next slab loads only one more. */
 static void move_to(trip_brick_ranges *r, int64_t slab)
 {
     if (slab == r->middle)
@@ -123,7 +123,7 @@ static void move_to(trip_brick_ranges *r, int64_t slab)
     r->middle = slab;
 }
 
-/* By how far interpolated values go beyond those they come from. */
+/* Widens the range by the overshoot of the interpolation kernel. */
 static trip_code_range widened(trip_kernel kernel, trip_code_range range)
 {
     double bounds[2];

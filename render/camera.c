@@ -55,16 +55,16 @@ static double pixel_size(const trip_camera_params *p)
     return 2 * tan(p->fov_degrees * (PI / 360)) / p->height;
 }
 
-/* Along an axis of the grid but for rounding is along it: a list of weight 1e-9 shows nowhere, but
- * would be read. */
+/* Snaps a direction to a grid axis if only rounding separates them. Otherwise an invisible list of
+ * weight 1e-9 would be read. */
 static double without_rounding(double component, trip_vec3 v)
 {
     double max = fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
     return fabs(component) > 1e-9 * max ? component : 0;
 }
 
-/* The power of two that takes a length to [sqrt(1/2), sqrt(2)): 1 for what is 1 but for rounding.
- */
+/* Returns the power of two that scales a length into [sqrt(1/2), sqrt(2)); 1 for a length of 1 with
+ * rounding error. */
 static double power_of_two_for(double length)
 {
     int exponent;
@@ -72,9 +72,9 @@ static double power_of_two_for(double length)
     return ldexp(1, 1 - exponent);
 }
 
-/* Differences from the first voxel are taken before anything else: far from the world's origin they
- * are exact, products are not. Returns by what directions were scaled; in parallel views rx and ry
- * are lengths, and keep theirs. */
+/* Computes differences from the first voxel first: far from the world's origin they are exact, but
+ * products are not. Returns the scale of the directions. In parallel views rx and ry are lengths
+ * and are not scaled. */
 static double set_rays(trip_camera *c, const basis *b, const trip_affine *world_to_index, double k)
 {
     const double(*m)[4] = c->index_to_world.m;
@@ -98,8 +98,8 @@ static double set_rays(trip_camera *c, const basis *b, const trip_affine *world_
     return scale;
 }
 
-/* The inverse of set_rays, taken from the same world-space basis rather than by inverting it. A
- * depth is 1 / `scale` of a distance in the world, and so is to_x . c in perspective. */
+/* The inverse of set_rays(), computed from the same world-space basis, not by inversion. A depth is
+ * a world distance divided by `scale`, and so is to_x . c in perspective. */
 static void set_projection(trip_camera *c, const basis *b, double k, double scale)
 {
     trip_vec3 x = trip_scale(b->right, 1 / k), y = trip_scale(b->up, -1 / k);
@@ -126,7 +126,7 @@ static int check_voxel(const trip_affine *m)
     return 0;
 }
 
-/* What the renderers' numbers have room for; written so that what is not a number fails. */
+/* Checks the range of the renderers' numbers. NaN fails. */
 static int check_range(const trip_camera *c)
 {
     double far = trip_length(c->eye), x = trip_length(c->rx), y = trip_length(c->ry);

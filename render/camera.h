@@ -1,17 +1,18 @@
-/* The view, taken to the data's index space, where kernels are round and sheets are planes whatever
- * the spacing, rotation or shear. Lengths are in voxels there, so that no number of a projection
- * grows or shrinks with the unit of the world: scaled by a power of two together with the camera, a
- * volume gives the same picture bit for bit. Plain values; nothing here changes during a frame.
+/* The view in the data's index space, where kernels are round and sheets are planes, whatever the
+ * spacing, rotation or shear. Plain values; nothing here changes during a frame.
  *
- * Pixel coordinates: x to the right, y down, in pixels, (0, 0) the image's top left corner, so
- * pixel centres lie at + 0.5. The ray of pixel position p = (x, y) in index space has
+ * Lengths are in voxels, so that no number of a projection depends on the unit of world space. If a
+ * volume and the camera are scaled by a power of two, the picture has the same bits.
+ *
+ * Pixel coordinates are in pixels from the picture's top left corner, x to the right, y down. Pixel
+ * centres lie at + 0.5. The ray of pixel position p = (x, y) in index space has
  *
  *     in perspective   origin eye,                  direction r(p) = r0 + x rx + y ry
  *     in parallel      origin eye + x rx + y ry,    direction r0
  *
- * The depth z of a point satisfies  point = origin + z * direction;  directions are scaled by a
- * power of two so that the one at the image's centre has a length in [sqrt(1/2), sqrt(2)), and
- * depths are about the distance in voxels. */
+ * The depth z of a point satisfies  point = origin + z * direction.  A power of two scales the
+ * directions so that the one at the picture's centre has a length in [sqrt(1/2), sqrt(2)). Depths
+ * are therefore about distances in voxels. */
 #ifndef TRIP_CAMERA_H
 #define TRIP_CAMERA_H
 
@@ -20,7 +21,7 @@
 
 #include "geometry.h"
 
-/* Of a picture, along either side. */
+/* Maximum width and height of a picture. */
 enum { TRIP_PICTURE_MAX_PX = 65536 };
 
 typedef struct trip_camera_params {
@@ -31,35 +32,34 @@ typedef struct trip_camera_params {
 } trip_camera_params;
 
 typedef struct trip_camera {
-    trip_camera_params params; /* as given */
+    trip_camera_params params; /* world space, as given */
     int width, height;
     bool ortho;
     trip_vec3 eye, r0, rx, ry; /* index space, see above */
     trip_vec3 forward;         /* index-space covector: depth z = forward . (point - eye) */
-    trip_vec3 to_x, to_y;      /* index-space covectors: perspective x = to_x . c / z with
-                                  c = point - eye; parallel x = to_x . c; y alike */
+    trip_vec3 to_x, to_y;      /* index-space covectors, with c = point - eye: x = to_x . c / z in
+                                  perspective, x = to_x . c in parallel views; to_y gives y */
     trip_affine index_to_world;
     double voxel_world;      /* cube root of |det index_to_world|: the length of one voxel */
-    trip_vec3 world_forward; /* for lighting; of unit length */
+    trip_vec3 world_forward; /* for lighting; unit length */
 } trip_camera;
 
-/* Farther from the first voxel (in voxels) an eye cannot be: there the numbers of a projection, in
- * double precision, are off by a hundredth of a voxel. */
+/* Maximum distance of the eye from the first voxel, in voxels. There, double precision is off by a
+ * hundredth of a voxel. */
 #define TRIP_CAMERA_FARTHEST_VOXELS 0x1p46
-/* A pixel may be as many voxels wide or high (at depth 1 in perspective), or one part of as many.
- */
+/* Maximum size of a pixel in voxels (at depth 1 in perspective); the minimum is its inverse. */
 #define TRIP_CAMERA_PIXEL_VOXELS 1e15
 
-/* Fails (usage) for views that are none: eye equals look, up along the view, angles, sizes or
- * distances out of range, not finite. */
+/* Makes the camera. Fails with TRIP_USAGE for an invalid view: eye equal to look, up along the view
+ * direction, or a number that is out of range or not finite. */
 int trip_camera_make(trip_camera *c, const trip_camera_params *params,
                      const trip_affine *index_to_world);
 
-/* The view turned about an axis through the point looked at, counterclockwise as seen from where
- * the axis points to. */
+/* Returns the view turned about an axis through the point looked at, counterclockwise seen against
+ * the axis. */
 trip_camera_params trip_camera_turn(const trip_camera_params *view, trip_vec3 axis, double degrees);
 
-/* Direction (index space, not normalised) of the ray at a pixel position. */
+/* Returns the direction of the ray at a pixel position: index space, not normalised. */
 static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y)
 {
     if (c->ortho)
@@ -67,7 +67,7 @@ static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y
     return trip_add(c->r0, trip_add(trip_scale(c->rx, x), trip_scale(c->ry, y)));
 }
 
-/* Its length in world units: the distance between depths of 0 and 1 along the ray. */
+/* Returns the length of the ray's direction in world units: the distance from depth 0 to 1. */
 static inline double trip_camera_ray_length(const trip_camera *c, double x, double y)
 {
     return trip_length(trip_affine_vector(&c->index_to_world, trip_camera_ray(c, x, y)));

@@ -7,7 +7,7 @@
 #include "kind.h"
 #include "geometry.h"
 
-/* Of all that frames of level 0 may read. */
+/* Covers all lists that frames of level 0 read. */
 static void find_held(trip_classification *c, const trip_dataset *data)
 {
     unsigned min = UINT16_MAX, max = 0;
@@ -43,7 +43,7 @@ void trip_classification_codes(trip_classification *c, const trip_dataset *data,
     c->code_max = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
 }
 
-/* No ray in the volume is longer: world units. */
+/* Returns an upper bound on the length of a ray in the volume, world units. */
 static double longest_ray(const trip_dataset *data)
 {
     const trip_affine *map = &data->index_to_world;

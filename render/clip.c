@@ -63,7 +63,7 @@ uint64_t trip_clip_square(const trip_clip *clip, int axis, int64_t sheet, int64_
     return mask;
 }
 
-/* Voxels beyond the grid's last are in no block. */
+/* No block has voxels beyond the grid. */
 static bool has_voxel(const trip_clip *clip, const trip_coordinates *coordinates,
                       const int64_t voxel[3])
 {

@@ -2,21 +2,21 @@
 
 #include <math.h>
 
-/* Codes that are tried first, before all are. */
+/* Number of codes to try first, before all codes. */
 enum { TRIED = 64 };
 
-/* Fewer codes than this show no more than that they are alike. */
+/* With fewer codes, only constant entries are accepted. */
 enum { FEWEST = 16 };
 
-/* Optical depths beyond this are left to tables: single precision ends. */
+/* Larger optical depths use tables, because single precision does not suffice. */
 #define MAX 1e15
 
-/* The codes that show, of those there are. */
+/* The visible codes among the codes of the data set. */
 typedef struct span {
     int first, last;
-    bool ramp;         /* there are others, at one end */
-    int up;            /* the way extinction grows, 1 or -1: from that end */
-    bool from_nothing; /* x = 0 is where there would be none */
+    bool ramp;         /* there are invisible codes at one end */
+    int up;            /* 1 or -1: the direction in which extinction grows from that end */
+    bool from_nothing; /* at x = 0 extinction would be 0 */
 } span;
 
 static bool shows(const trip_tf_entry *table, int code)
@@ -24,7 +24,8 @@ static bool shows(const trip_tf_entry *table, int code)
     return table[code].extinction > 0;
 }
 
-/* Of two codes of which one shows, the neighbours between them that differ: the one that shows. */
+/* Bisects between a visible and an invisible code. Returns the visible one of the two neighbours at
+ * the border. */
 static int edge(const trip_tf_entry *table, int shown, int hidden)
 {
     while (shown - hidden > 1 || hidden - shown > 1) {
@@ -51,8 +52,9 @@ static bool find_span(const trip_tf_entry *table, int min, int max, span *s)
     return true;
 }
 
-/* Where extinction would begin, by the parabola through three codes at its lower end: errors are
- * then in proportion to it. A ramp begins at most a code before them, else it is a step. */
+/* Extrapolates the beginning of extinction with the parabola through three codes at its lower end,
+ * so that errors are relative. A ramp begins at most one code before them; otherwise it is a step.
+ */
 static bool set_positions(trip_closed_form *form, const trip_tf_entry *table, span *s)
 {
     const int codes = s->last - s->first, low = s->up > 0 ? s->first : s->last;
@@ -74,7 +76,7 @@ static bool set_positions(trip_closed_form *form, const trip_tf_entry *table, sp
     return true;
 }
 
-/* The polynomial through values at different places, by divided differences. */
+/* Returns the polynomial through values at distinct positions, by divided differences. */
 static void interpolate(const double *x, double *y, int count, double *c)
 {
     for (int order = 1; order < count; order++)
@@ -89,7 +91,7 @@ static void interpolate(const double *x, double *y, int count, double *c)
     }
 }
 
-/* Through codes at places where the error is least. From nothing it is x times a polynomial. */
+/* Interpolates at the codes with the smallest error. A ramp is x times a polynomial. */
 static void set_extinction(trip_closed_form *form, const trip_tf_entry *table, const span *s)
 {
     const int nodes = s->from_nothing ? 3 : 4, codes = s->last - s->first;
@@ -122,7 +124,7 @@ static void set_colours(trip_closed_form *form, const trip_tf_entry *table, cons
     }
 }
 
-/* Few codes are alike, or no polynomial. */
+/* Few codes must be equal to have a polynomial. */
 static void set_constant(trip_closed_form *form, const trip_tf_entry *table, const span *s)
 {
     *form = (trip_closed_form){ .k = { table[s->first].extinction } };
@@ -144,7 +146,7 @@ static bool has_colour(const trip_closed_form *form, const trip_tf_entry *e, dou
            off[2] <= TRIP_CLOSED_FORM_ERROR;
 }
 
-/* Whether every `step`th code from one to another is as the form has it; `least` is 1 / D. */
+/* Returns whether the form fits every `step`th code of a range. `min` is 1 / D. */
 static trip_closed_form_fault check(const trip_closed_form *form, const trip_tf_entry *table,
                                     int from, int to, int step, double min)
 {

@@ -3,15 +3,15 @@
 #include <math.h>
 #include <string.h>
 
-/* The least float that is no less. */
+/* Returns the smallest float that is at least x. */
 static float at_least(double min)
 {
     float nearest = (float)min;
     return (double)nearest < min ? nextafterf(nearest, INFINITY) : nearest;
 }
 
-/* A bit each of 64 entries. Eight bytes of 0 or 1 are moved into one by a product, whose terms do
- * not overlap; so the comparisons are left to the compiler to do several at a time. */
+/* Returns a bit for each of 64 entries. A product packs eight bytes of 0 or 1 into one without
+ * carries, so that the compiler can vectorise the comparisons. */
 static uint64_t with_extinction(const trip_tf_entry entries[64], float min)
 {
     unsigned char is_in[64];
@@ -50,7 +50,7 @@ trip_code_range trip_code_set_range(const trip_code_set *set)
                                                : (trip_code_range){ 1, 0 };
 }
 
-/* Whether some bit from first to last is set. */
+/* Returns whether any bit from first to last is set. */
 static bool has_some(const uint64_t *bits, unsigned first, unsigned last)
 {
     for (unsigned word = first / 64; word <= last / 64; word++) {

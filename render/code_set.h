@@ -1,5 +1,5 @@
-/* A set of codes, those that a transfer function shows: a bit each, and a bit for each 64 of them
- * of which some are in it. */
+/* The set of visible codes: one bit per code, and one bit per 64 codes that is set if any of them
+ * is in the set. Plain values. */
 #ifndef TRIP_CODE_SET_H
 #define TRIP_CODE_SET_H
 
@@ -9,20 +9,21 @@
 #include "transfer_function.h"
 
 typedef struct trip_code_range {
-    uint16_t min, max; /* least > most: no codes */
+    uint16_t min, max; /* min > max if empty */
 } trip_code_range;
 
 typedef struct trip_code_set {
     uint64_t codes[1024], some[16];
 } trip_code_set;
 
-/* Of a table of 65536 entries: those with at least so much extinction, which is above 0. */
+/* Collects the codes of a table of 65536 entries with at least this extinction, which is above 0.
+ */
 void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double min);
 
-/* Whether some code from first to last is in it. */
+/* Returns whether any code from first to last is in the set. */
 bool trip_code_set_has_some(const trip_code_set *set, unsigned first, unsigned last);
 
-/* All of its codes, where they follow one another without a gap; else none. */
+/* Returns the range of the codes if they are contiguous, else an empty range. */
 trip_code_range trip_code_set_range(const trip_code_set *set);
 
 static inline bool trip_code_set_has(const trip_code_set *set, unsigned code)

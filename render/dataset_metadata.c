@@ -19,8 +19,8 @@ typedef struct interval {
 struct trip_dataset_metadata {
     trip_json json;
     const cJSON *root;
-    const char *path;   /* of the data set, for messages */
-    interval *envelope; /* ascending, apart from one another; NULL where the text has none */
+    const char *path;   /* path of the data set, for messages */
+    interval *envelope; /* ascending and disjoint; NULL if the text has none */
     size_t envelope_count;
 };
 
@@ -35,7 +35,7 @@ static int by_lower_end(const void *a, const void *b)
     return (p->lo > q->lo) - (p->lo < q->lo);
 }
 
-/* Sorted, those that touch put together: one that holds a value is then found by bisection. */
+/* Sorts the intervals and merges touching ones, so that bisection finds the interval of a value. */
 static size_t join(interval *ranges, size_t count)
 {
     size_t joined = 0;
@@ -175,10 +175,10 @@ int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset 
     return trip_tf_from_points(out, ramp, 2, false, 0);
 }
 
-/* Whether the envelope keeps all of [lo, hi]. */
+/* Returns whether the envelope contains [lo, hi]. */
 static bool envelope_holds(const trip_dataset_metadata *t, double lo, double hi)
 {
-    size_t begin = 0, end = t->envelope_count; /* the last one that starts at `lo` or before */
+    size_t begin = 0, end = t->envelope_count; /* the last interval that starts at or before `lo` */
     while (begin < end) {
         size_t middle = begin + (end - begin) / 2;
         if (t->envelope[middle].lo <= lo)
@@ -189,7 +189,7 @@ static bool envelope_holds(const trip_dataset_metadata *t, double lo, double hi)
     return begin > 0 && t->envelope[begin - 1].hi >= hi;
 }
 
-/* Share of [lo, hi] that the function shows and the envelope leaves out, by samples. */
+/* Returns the sampled share of [lo, hi] that the transfer function shows but the envelope lacks. */
 static double culled_share(const trip_dataset_metadata *t, const trip_tf *tf, double lo, double hi)
 {
     enum { SAMPLES = 16 };
@@ -231,7 +231,7 @@ double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_t
     return voxels;
 }
 
-/* "+x" ... "-z" as a unit vector; zero when it is none of them. */
+/* Converts "+x" ... "-z" to a unit vector; other texts give zero. */
 static trip_vec3 direction_at(const trip_dataset_metadata *t, const char *key)
 {
     const char *text = string_at(t, key);
@@ -241,16 +241,16 @@ static trip_vec3 direction_at(const trip_dataset_metadata *t, const char *key)
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
 }
 
-/* Of what has a left and a right along z, the slices are views from the side. Such pictures run
- * from the top down and, by custom, from the front to the back. Which side is left is not known. */
+/* If the object is mirror-symmetric across z, its slices are views from the side. Such slices run
+ * from the top down and, by custom, from the front to the back. The left side is unknown. */
 static bool is_mirrored_across_z(const trip_dataset_metadata *t)
 {
     const char *mirror = string_at(t, "mirror");
     return mirror && !strcmp(mirror, "z");
 }
 
-/* Which way is up and where the front is: as the text has it, else as the patient stands, else by
- * the format's custom, else by a guess, of which preprocess/brick_metadata.c makes a note. */
+/* Sets up and front: from the text, else from the patient's position, else by the format's custom,
+ * else by a guess, which preprocess/brick_metadata.c notes. */
 static void orient(const trip_dataset_metadata *t, const trip_dataset *d, trip_vec3 *up,
                    trip_vec3 *front)
 {

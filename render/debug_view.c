@@ -4,7 +4,7 @@
 
 #include "weight.h"
 
-/* Of levels, the finest first; all beyond the last look like it. */
+/* Colours of the levels, finest first. Coarser levels share the last colour. */
 static const double level_colours[][3] = {
     { 0.9, 0.9, 0.9 },   { 0.3, 0.6, 1 },     { 0.25, 0.8, 0.4 },  { 0.95, 0.85, 0.2 },
     { 0.95, 0.5, 0.15 }, { 0.9, 0.25, 0.25 }, { 0.75, 0.3, 0.85 },

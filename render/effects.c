@@ -2,7 +2,7 @@
 
 #include "emission.h"
 
-/* On a spiral from pole to pole, each with as much of the sphere (Fibonacci's lattice). */
+/* A spiral from pole to pole with equal areas (Fibonacci lattice). */
 trip_vec3 trip_effects_direction(int number)
 {
     const double golden = 2.39996322972865332; /* pi (3 - sqrt(5)) */
@@ -10,7 +10,8 @@ trip_vec3 trip_effects_direction(int number)
     return trip_v3(r * cos(golden * number), r * sin(golden * number), z);
 }
 
-/* The form of depth cueing, from 0 where the box of voxels begins to 1 where it ends. */
+/* Computes the plane of depth cueing, from 0 at the nearest to 1 at the farthest point of the box.
+ */
 static void set_cue(trip_effects_view *e, const trip_camera *c, const uint64_t dims[3])
 {
     double near = INFINITY, far = 0;
@@ -35,7 +36,7 @@ trip_effects_view trip_effects_view_make(const trip_settings *s, const trip_came
         return e;
     const trip_light_grid grid = trip_light_grid_over(dims, s->effects.cells, 1);
     e.bias = TRIP_LIGHT_BIAS * grid.spacing * camera->voxel_world;
-    trip_affine_invert(&camera->index_to_world, &e.to_index); /* it was checked on opening */
+    trip_affine_invert(&camera->index_to_world, &e.to_index); /* opening checked it */
     e.point_light = s->point_light;
     e.light = s->point_light ? trip_light_position(s, &camera->index_to_world)
                              : trip_affine_vector(&e.to_index, s->light_direction);
@@ -56,7 +57,7 @@ static double clamp(double x)
     return x > 0 ? x < 1 ? x : 1 : 0;
 }
 
-/* What is open at a place with a unit normal in the world. */
+/* Returns the openness at a point with a unit normal in world space. */
 static double openness(const trip_effects_view *e, trip_vec3 voxel, double strength,
                        trip_vec3 normal)
 {
@@ -68,7 +69,7 @@ static double openness(const trip_effects_view *e, trip_vec3 voxel, double stren
     return fmin(1, (1 + strength) * fmax(one, other));
 }
 
-/* So far from a place on towards the light, world units; `direction` is of unit length. */
+/* Returns the offset from a point towards the light, world units. `direction` has unit length. */
 static trip_vec3 nearer(const trip_effects_view *e, trip_vec3 voxel, trip_vec3 direction,
                         double distance)
 {

@@ -11,7 +11,7 @@ enum { CODES = 65536 };
 struct trip_emission {
     trip_budget *budget;
     trip_dataset *data;
-    trip_tf_entry *table; /* v / V in the place of extinction */
+    trip_tf_entry *table; /* the table holds v / V, not extinction */
     trip_settings settings;
     trip_clip none;
     trip_light_map *map;
@@ -77,11 +77,11 @@ void trip_emission_drop(trip_emission *e)
     e->map = NULL;
 }
 
-/* From the first voxel of one to that of the other, so that no large numbers cancel. */
+/* Maps between the first voxels of both grids, so that large numbers do not cancel. */
 static trip_affine map_between(const trip_affine *from, const trip_affine *to)
 {
     trip_affine inverse, out;
-    trip_affine_invert(to, &inverse); /* it was checked on opening */
+    trip_affine_invert(to, &inverse); /* opening checked it */
     for (int k = 0; k < 4; k++) {
         const bool origin = k == 3;
         const trip_vec3 world = trip_v3(from->m[0][k] - (origin ? to->m[0][k] : 0),
@@ -117,7 +117,7 @@ static int voxels_along(const trip_dataset *data)
 
 int trip_emission_begin(trip_emission *e, const trip_emission_params *p)
 {
-    e->settings.classify = TRIP_CLASSIFY_POST; /* the halo counts */
+    e->settings.classify = TRIP_CLASSIFY_POST; /* includes the halo */
     e->settings.effects.cells = p->cells ? p->cells : voxels_along(e->data);
     e->to_heat = map_between(p->index_to_world, &e->data->index_to_world);
     if (e->kelvin[0] != p->kelvin[0] || e->kelvin[1] != p->kelvin[1])
@@ -148,7 +148,7 @@ trip_emission_view trip_emission_view_of(const trip_emission *e)
     };
 }
 
-/* 1 inside the data set, and 0 from a voxel outside of it on. */
+/* 1 inside the data set, falling to 0 at one voxel outside. */
 static double inside(const trip_emission_view *v, trip_vec3 at)
 {
     double share = 1;

@@ -1,12 +1,13 @@
-/* Light that hot matter gives off by itself: a second data set, on any grid, has its
- * temperatures, and matter radiates as a black body does, as much as it absorbs (Kirchhoff), so
- * that its colour c becomes c' = c + E(T),   linear light of E = (T / HI)^4 black body of T
- * (black_body.h) before depth cueing. Like all colours E is what a screen is given, not linear
- * light. A value v of the data set is the temperature LO + (HI - LO) v / V, V its greatest,
- * negative ones as 0. Values lie on a coarse lattice (light_grid.h), gathered by one pass over a
- * list (light_map.h) and kept from frame to frame; between nodes they are interpolated linearly,
- * and beyond the data set they fall to 0 over a voxel, as what was culled counts as 0. One thread;
- * renderers read it once its map is complete. */
+/* Light from hot matter. A second data set, on any grid, holds temperatures. Matter radiates as a
+ * black body, as much as it absorbs (Kirchhoff). Before depth cueing, its colour c becomes
+ *     c' = c + E(T),   linear light of E = (T / HI)^4 black body of T   (black_body.h).
+ * E is a display colour, like all colours. A value v of the data set means the temperature
+ * LO + (HI - LO) v / V, where V is the maximum value; negative values count as 0.
+ *
+ * The values lie on a coarse lattice (light_grid.h). One pass over a list gathers it (light_map.h),
+ * and it is kept from frame to frame. Between nodes, values are interpolated linearly. Outside the
+ * data set they fall to 0 over one voxel; culled values count as 0. One thread at a time may use
+ * it; renderers read it once its map is complete. */
 #ifndef TRIP_EMISSION_H
 #define TRIP_EMISSION_H
 
@@ -16,36 +17,36 @@ enum { TRIP_EMISSION_STEPS = 256 };
 
 typedef struct trip_emission trip_emission;
 
-/* What it is for: a frame. */
+/* Parameters of a frame. */
 typedef struct trip_emission_params {
-    const trip_affine *index_to_world; /* of what is drawn */
+    const trip_affine *index_to_world; /* of the drawn data set */
     double kelvin[2];                  /* LO, HI */
-    int cells;                         /* most along the longest side; 0: a voxel each */
+    int cells;                         /* maximum along the longest side; 0 means one per voxel */
     trip_engine engine;
     unsigned threads;
 } trip_emission_params;
 
-/* What renderers need of it. */
+/* The data that renderers need. */
 typedef struct trip_emission_view {
     const trip_light_grid *heat; /* v / V */
-    trip_affine to_heat;         /* index space of what is drawn to that of the data set */
-    double last[3];              /* of its voxels */
-    const float *rgb;            /* E of v / V from 0 to 1, TRIP_EMISSION_STEPS + 1 times 4 */
+    trip_affine to_heat;         /* maps the drawn data set's index space to the heat data set's */
+    double last[3];              /* voxels of the heat data set */
+    const float *rgb; /* E for v / V from 0 to 1: TRIP_EMISSION_STEPS + 1 entries of 4 floats */
 } trip_emission_view;
 
-/* Opens the data set; fails (reported) where there is no heat in it. */
+/* Opens the heat data set. Fails, reported, if it holds no values above 0. */
 int trip_emission_create(trip_emission **out, const char *path, trip_budget *budget);
-/* Waits for reads under way. */
+/* Frees it. Waits for reads in progress. */
 void trip_emission_destroy(trip_emission *e);
-/* As trip_light_map_begin(). */
+/* Begins a frame, like trip_light_map_begin(). */
 int trip_emission_begin(trip_emission *e, const trip_emission_params *params);
-/* Gives the lattice back. */
+/* Releases the lattice. */
 void trip_emission_drop(trip_emission *e);
-/* To be stepped before a frame is drawn; NULL before the first begin. */
+/* Returns the map to step before a frame is drawn, or NULL before the first begin. */
 trip_light_map *trip_emission_map(const trip_emission *e);
 
 trip_emission_view trip_emission_view_of(const trip_emission *e);
-/* E at a place in index space of what is drawn. */
+/* Returns E at a point in the drawn data set's index space. */
 void trip_emission_at(const trip_emission *e, trip_vec3 voxel, double rgb[3]);
 
 #endif

@@ -44,7 +44,7 @@ trip_covariance trip_covariance_mapped(const trip_covariance *v, const trip_affi
     };
 }
 
-/* The gradient of |J c| for the linear part J of a map. */
+/* Returns the gradient of |J c| for the linear part J of a map. */
 static trip_vec3 gradient_of_length(const trip_affine *map, trip_vec3 c)
 {
     return trip_affine_transpose_vector(map, trip_normalize(trip_affine_vector(map, c)));
@@ -71,7 +71,7 @@ double trip_ray_space_volume(const trip_ray_space *j)
     return fabs(trip_dot(trip_cross(j->x, j->y), j->along));
 }
 
-/* |V| V^-1, the matrix of cofactors. */
+/* Returns |V| V^-1, the adjugate. */
 static trip_covariance adjugate(const trip_covariance *v)
 {
     return (trip_covariance){
@@ -84,8 +84,8 @@ static trip_covariance adjugate(const trip_covariance *v)
     };
 }
 
-/* The determinant of P V P^T with rows x and y of P is that of the adjugate about their cross
- * product (Cauchy and Binet). */
+/* Returns the determinant of P V P^T, where x and y are the rows of P: the quadratic form of the
+ * adjugate at their cross product (Cauchy-Binet). */
 trip_covariance2 trip_covariance_integrated(const trip_covariance *v, const trip_ray_space *j)
 {
     trip_vec3 vx = times(v, j->x), vy = times(v, j->y), normal = trip_cross(j->x, j->y);
