@@ -7,14 +7,15 @@
 enum {
     EDGE = TRIP_FIELD_EDGE,
     CUBE_VOXELS = EDGE * EDGE * EDGE,
-    CHUNK_CUBES = 256, /* taken from the budget at a time */
+    CHUNK_CUBES = 256, /* taken from the budget at once */
 };
 
 struct trip_field {
     trip_budget *budget;
     int64_t dims[3], cubes[3];
-    size_t positions;    /* of the directory */
-    uint32_t *directory; /* by the cube's place in the grid: 1 + its number; 0: it has no voxels */
+    size_t positions;    /* bytes of the directory */
+    uint32_t *directory; /* by the cube's position in the grid: 1 + its number, or 0 if it has no
+                            voxels */
     trip_field_cube **chunks;
     size_t chunk_room, count;
 };
@@ -124,7 +125,7 @@ const trip_field_voxel *trip_field_at(const trip_field *f, int64_t i, int64_t j,
     return voxel && !isnan(voxel->code) ? voxel : NULL;
 }
 
-/* A new cube, without voxels; NULL when it does not fit. */
+/* Adds an empty cube. Returns NULL if it exceeds the budget. */
 static trip_field_cube *begin_cube(trip_field *f, const int64_t at[3])
 {
     size_t chunk = f->count / CHUNK_CUBES;
@@ -157,7 +158,7 @@ int trip_field_put(trip_field *f, const int64_t at[3], double code, const double
     return 0;
 }
 
-/* Of neighbours: what they are apart, for a difference. */
+/* Returns the distance between two neighbours, for a difference. */
 static double apart(const trip_field_map *map, int axis, int64_t before, int64_t after)
 {
     if (!map->coordinates)
@@ -166,7 +167,7 @@ static double apart(const trip_field_map *map, int axis, int64_t before, int64_t
            trip_coordinates_at(map->coordinates, axis, before);
 }
 
-/* Along an axis, codes per index, or per unit of place. */
+/* Returns the derivative along an axis, in codes per index or per unit of position. */
 static double difference(const trip_field *f, const trip_field_map *map, const int64_t at[3],
                          double here, int axis)
 {
@@ -235,8 +236,8 @@ int trip_field_finish(trip_field *f, const trip_field_map *map)
     return 0;
 }
 
-/* The weights of linear and gaussian are a mean, the absolute ones of cubic add up to at most 1.25
- * along each axis. */
+/* Linear and gaussian weights form a mean. The absolute cubic weights add up to at most 1.25 along
+ * each axis. */
 void trip_field_code_bounds(trip_kernel kernel, double min, double max, double bounds[2])
 {
     double sum = kernel == TRIP_KERNEL_CUBIC ? 1.25 * 1.25 * 1.25 : 1;
@@ -291,14 +292,14 @@ static bool take_corners(const trip_field *f, const int64_t at[3], const trip_fi
     return true;
 }
 
-/* Of place 0 to 3 along an axis, the voxel, cut to the grid. */
+/* Returns the voxel at position 0 to 3 along an axis, clamped to the grid. */
 static int64_t position_along(const trip_field *f, const int64_t at[3], int axis, int position)
 {
     int64_t i = at[axis] + position - 1, last = f->dims[axis] - 1;
     return i < 0 ? 0 : i > last ? last : i;
 }
 
-/* Of place 0 to 3 along an axis: which of the cell's two corners is next to it. */
+/* Returns the cell's corner, 0 or 1, nearest to position 0 to 3 along an axis. */
 static int next_corner(int position)
 {
     return position > 1;

@@ -1,15 +1,17 @@
-/* A volume in memory, for access anywhere: at each voxel of a grid a value and its gradient, or
- * nothing. Filled voxel by voxel, in any order, and read-only once it is finished, for any number
- * of threads. Voxels lie in cubes of 8 x 8 x 8, of which those without voxels take no memory: 16
- * bytes for each voxel of the others.
+/* A volume in memory for random access. Each voxel of a grid has a value and a gradient, or is
+ * missing. It is filled voxel by voxel in any order. Once finished it is read-only, for any number
+ * of threads. Voxels lie in cubes of 8 x 8 x 8. Cubes without voxels take no memory; the others
+ * take 16 bytes per voxel.
  *
- * Values are in codes of the data set, 0 to 65535, but need not be whole. Between voxels they are
- * interpolated in cells: cell (i, j, k) is the cube from voxel (i, j, k) to (i + 1, j + 1, k + 1),
- * and is empty unless all its eight corners are there. Linear weighs those; cubic the 4 x 4 x 4
- * voxels around by Catmull and Rom's spline, which goes through the values and has central
- * differences as derivatives; gaussian the same voxels (kernel.h). Beyond the grid its edge
- * repeats, and another voxel that is missing there counts as the corner next to it. The gradient is
- * interpolated alike, from those at the voxels. */
+ * Values are codes of the data set, 0 to 65535, but may be fractional. They are interpolated in
+ * cells: cell (i, j, k) is the cube from voxel (i, j, k) to (i + 1, j + 1, k + 1). A cell is empty
+ * unless all eight corners are present.
+ * - linear weights the eight corners.
+ * - cubic weights the 4 x 4 x 4 voxels around with Catmull-Rom splines. They pass through the
+ * values and have central differences as derivatives.
+ * - gaussian weights the same 64 voxels (kernel.h).
+ * Beyond the grid its edge repeats. Any other missing voxel counts as the nearest corner of the
+ * cell. The gradient is interpolated in the same way from the gradients at the voxels. */
 #ifndef TRIP_FIELD_H
 #define TRIP_FIELD_H
 
@@ -23,61 +25,62 @@
 enum { TRIP_FIELD_EDGE = 8 };
 
 typedef struct trip_field_voxel {
-    float code;        /* not a number: there is no voxel */
+    float code;        /* NaN if the voxel is missing */
     float gradient[3]; /* world space, value units per world unit */
 } trip_field_voxel;
 
 /* A cube with some voxels. */
 typedef struct trip_field_cube {
-    int64_t at[3];  /* of its first voxel */
-    float own[2];   /* least and greatest code of its voxels */
-    float range[2]; /* of what the cells that start in it are interpolated from */
+    int64_t at[3];  /* index of its first voxel */
+    float own[2];   /* minimum and maximum code of its voxels */
+    float range[2]; /* range of codes that its cells are interpolated from */
     trip_field_voxel voxels[TRIP_FIELD_EDGE * TRIP_FIELD_EDGE * TRIP_FIELD_EDGE];
 } trip_field_cube;
 
 typedef struct trip_field trip_field;
 
-/* Without voxels. Fails where the grid's directory does not fit the budget. */
+/* Creates a field without voxels. Fails if the grid's directory exceeds the budget. */
 int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budget);
 void trip_field_destroy(trip_field *f);
 
-/* Puts a voxel in the grid; gradient NULL: that of the values, by differences. Fails when the
- * memory given does not suffice. */
+/* Adds a voxel. With gradient NULL, finishing computes it by differences. Fails if memory is
+ * exhausted. */
 int trip_field_put(trip_field *f, const int64_t at[3], double code, const double gradient[3]);
 
-/* What the gradients that were not given are worked out with. */
+/* Parameters of computed gradients. */
 typedef struct trip_field_map {
     trip_affine index_to_world;
-    const trip_coordinates *coordinates; /* NULL: spacing is even */
+    const trip_coordinates *coordinates; /* NULL for even spacing */
     double value_per_code;
-    bool signless; /* gradients given may point either way: they are turned to where values rise */
+    bool signless; /* given gradients have arbitrary sign: turn them to ascending values */
 } trip_field_map;
 
-/* After the last voxel. Differences are central; where a neighbour is missing, to the other. */
+/* Finishes the field after the last voxel. Gradients are central differences, or one-sided if a
+ * neighbour is missing. */
 int trip_field_finish(trip_field *f, const trip_field_map *map);
 
 const int64_t *trip_field_dims(const trip_field *f);
-/* NULL where there is none. */
+/* Returns a voxel, or NULL if it is missing. */
 const trip_field_voxel *trip_field_at(const trip_field *f, int64_t i, int64_t j, int64_t k);
 
-/* The cubes, in the order in which they were begun. */
+/* Returns a cube by number, in the order of creation. */
 size_t trip_field_cubes(const trip_field *f);
 const trip_field_cube *trip_field_cube_by_number(const trip_field *f, size_t number);
-/* That of a voxel; NULL where it has none. */
+/* Returns the cube of a voxel, or NULL if it has none. */
 const trip_field_cube *trip_field_cube_at(const trip_field *f, const int64_t at[3]);
 
-/* What a cell is interpolated from: `edge` voxels along each axis, i fastest. */
+/* The voxels that a cell is interpolated from: `edge` along each axis, i fastest. */
 typedef struct trip_field_cell {
     int64_t at[3];
     int edge; /* 2 or 4 */
     const trip_field_voxel *voxels[64];
-    double min, max; /* no code in the cell is beyond */
+    double min, max; /* range of codes in the cell */
 } trip_field_cell;
 
-/* What values interpolated from some in [least, most] can be. */
+/* Widens [min, max] to the range of interpolated values. */
 void trip_field_code_bounds(trip_kernel kernel, double min, double max, double bounds[2]);
 
-/* False where the cell is empty. */
+/* Loads a cell. Returns false if it is empty. */
 bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t at[3],
                           trip_field_cell *out);
 

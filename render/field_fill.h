@@ -1,5 +1,5 @@
-/* A field filled from the batches of a frame: voxels and halo alike, with normals where these are
- * read and wanted. A voxel that comes twice is put twice, the same. */
+/* Fills a field from the batches of a frame, from voxels and halo, with normals if they are read
+ * and wanted. A voxel may arrive twice with the same value. One thread. */
 #ifndef TRIP_FIELD_FILL_H
 #define TRIP_FIELD_FILL_H
 
@@ -15,7 +15,7 @@ typedef struct trip_field_fill {
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } trip_field_fill;
 
-/* `planes`: those to use of what is read, a bit per trip_plane. */
+/* `planes` selects the planes to use, a bit per trip_plane. */
 void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data, trip_field *field,
                            unsigned planes);
 int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_run *run);

@@ -11,7 +11,7 @@
 
 enum { HELD_MAX = TRIP_FRAME_HELD_MAX };
 
-/* How often a frame that waits for the disk checks whether it is cancelled. */
+/* Interval at which a waiting frame checks for cancellation. */
 enum { POLL_NS = 20000000 };
 
 uint64_t trip_frame_now_ns(void)
@@ -37,8 +37,8 @@ static void report_progress(trip_drawing *d, const trip_batch *batch)
                        trip_plan_splats(d->frame->plan));
 }
 
-/* Passes are read one behind the other, so that the next is on its way while the last batches of
- * one are drawn. */
+/* The reader reads all passes in sequence, so that the next pass loads while the last batches of a
+ * pass are drawn. */
 static int begin_reading(trip_drawing *d)
 {
     trip_reader_set_runs_only(d->reader, d->renderer->resident);
@@ -51,7 +51,7 @@ static int begin_reading(trip_drawing *d)
     return status;
 }
 
-/* The layers up to `last` that have passes, in order, until TRIP_FRAME_DONE. */
+/* Merges the layers with passes up to `last`, in order, until TRIP_FRAME_DONE. */
 static int begin_layers(trip_drawing *d, int last)
 {
     int status = 0;
@@ -84,7 +84,7 @@ static const trip_batch *newest_held(const trip_drawing *d)
     return &d->held[(d->held_first + d->held_count - 1) % HELD_MAX];
 }
 
-/* Runs of the batch from the next one on: whole ones of `most` splats in all, or one. */
+/* Returns the number of next runs of the batch with at most `max` splats together, at least one. */
 static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t max)
 {
     trip_batch piece = *batch;
@@ -99,7 +99,7 @@ static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t 
     return piece;
 }
 
-/* Of the batch, whose layer is begun before. */
+/* Draws the next runs of a batch. Its layer has begun. */
 static int draw_piece(trip_drawing *d, bool whole)
 {
     const trip_renderer_ops *ops = d->renderer->ops;
@@ -131,7 +131,7 @@ static void release_oldest(trip_drawing *d)
     d->held_count--;
 }
 
-/* Gives back the slots of batches that the renderer is done with, oldest first. */
+/* Releases the slots of finished batches, oldest first. */
 static int release_drawn(trip_drawing *d)
 {
     int done = 1;
@@ -141,7 +141,7 @@ static int release_drawn(trip_drawing *d)
     return done < 0 ? done : 0;
 }
 
-/* A renderer may hold up to half of the ring, so that the disk is busy with the other half. */
+/* A renderer may hold up to half of the ring, so that the disk can fill the other half. */
 static bool holds_many(const trip_drawing *d)
 {
     unsigned half = trip_reader_slots(d->reader) / 2;
@@ -155,7 +155,8 @@ static int end_passes(trip_drawing *d)
                                                    : d->renderer->ops->end_passes(d->renderer);
 }
 
-/* The next batch, once the last one is drawn: 0 and in_batch, or where there is none all_read. */
+/* Takes the next batch after the last one is drawn. Sets in_batch, or all_read at the end, and
+ * returns 0. */
 static int next_batch(trip_drawing *d)
 {
     trip_batch batch;
@@ -168,8 +169,8 @@ static int next_batch(trip_drawing *d)
     return status < 0 ? status : 0;
 }
 
-/* A piece of what the renderer keeps; TRIP_FRAME_DONE when all of it is there, and reads are on
- * their way. */
+/* Loads a piece of the renderer's resident data. Returns TRIP_FRAME_DONE once all is loaded and the
+ * reads have begun. */
 static int load(trip_drawing *d)
 {
     if (d->loaded)
@@ -181,7 +182,7 @@ static int load(trip_drawing *d)
     return status;
 }
 
-/* The lattice that is to be made next; NULL: none is left. */
+/* Returns the next lattice to make, or NULL. */
 static trip_light_map *lattice_left(const trip_drawing *d)
 {
     const trip_frame *f = d->frame;
@@ -193,7 +194,7 @@ static trip_light_map *lattice_left(const trip_drawing *d)
     return NULL;
 }
 
-/* Light reaches places, and heat is there, before anything is drawn. */
+/* Makes the lattices of light and heat before drawing. */
 static int make_light(trip_drawing *d)
 {
     trip_light_map *map = lattice_left(d);
@@ -201,7 +202,7 @@ static int make_light(trip_drawing *d)
     return map ? trip_light_map_step(map, &runner) : TRIP_FRAME_DONE;
 }
 
-/* One piece of what is ready. */
+/* Does one piece of the ready work. */
 static int draw_next(trip_drawing *d, bool whole)
 {
     int status = make_light(d);
@@ -243,7 +244,7 @@ static void take_counts(trip_drawing *d)
     }
 }
 
-/* Renderers take a camera's numbers as they are: those that are not finite are refused here. */
+/* Refuses cameras with numbers that are not finite: renderers do not check them. */
 static int check_camera(const trip_camera *c)
 {
     const trip_vec3 all[] = { c->eye, c->r0, c->rx, c->ry, c->forward, c->to_x, c->to_y };
@@ -273,7 +274,7 @@ static int check_forms(const trip_settings *s, const trip_renderer *renderer)
     return 0;
 }
 
-/* What the renderer cannot draw. */
+/* Refuses settings that the renderer cannot draw. */
 static int check_renderer(const trip_frame *frame, const trip_renderer *renderer)
 {
     const trip_settings *s = frame->settings;
@@ -327,7 +328,7 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
     return status;
 }
 
-/* What a renderer's device or threads do meanwhile is drawing. */
+/* Waiting for the renderer's device or threads counts as drawing. */
 static void await_renderer(trip_drawing *d, uint64_t timeout_ns)
 {
     const trip_renderer_ops *ops = d->renderer->ops;
@@ -349,7 +350,7 @@ void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 }
 
 #ifndef NDEBUG
-/* Builds with assertions look at every picture: components are numbers, distances are positive. */
+/* Debug builds check every picture: components are not NaN, distances are positive. */
 static bool is_of_numbers(const trip_camera *camera, const float *rgba, const float *depth)
 {
     size_t pixels = (size_t)camera->width * (size_t)camera->height;
@@ -389,7 +390,7 @@ void trip_frame_cancel(trip_drawing *d)
 
 void trip_frame_end(trip_drawing *d)
 {
-    trip_frame_cancel(d); /* where it is done, nothing is under way */
+    trip_frame_cancel(d); /* a finished frame has no work in progress */
     if (d->begun && d->renderer->ops->end_frame)
         d->renderer->ops->end_frame(d->renderer);
     while (d->held_count > 0)

@@ -2,7 +2,8 @@
 
 #define DEGREE (3.14159265358979323846 / 180)
 #define DEFAULT_FOV_DEGREES 30.0
-#define ISO_ELEVATION_DEGREES 35.264389682754654 /* of a cube's diagonal: atan(1 / sqrt(2)) */
+#define ISO_ELEVATION_DEGREES                                                                      \
+    35.264389682754654 /* elevation of a cube's diagonal: atan(1 / sqrt(2)) */
 
 typedef struct angles {
     double azimuth, elevation; /* degrees; 0, 0 is the front */
@@ -15,17 +16,18 @@ static const angles view_angles[] = {
     [TRIP_VIEW_BOTTOM] = { 0, -90 },  [TRIP_VIEW_ISO] = { 45, ISO_ELEVATION_DEGREES },
 };
 
-/* All that the fit works with. World space, lengths counted from the origin. */
+/* The state of the fit, in world space relative to the origin. */
 typedef struct fitting {
     const trip_camera_framing *f;
     const trip_affine *index_to_world;
     trip_reach_origin origin;
     trip_vec3 right, up, forward; /* of the picture, orthonormal: right x up = -forward */
     double sin_elevation, cos_elevation, sin_roll, cos_roll;
-    double half[2]; /* of what may be filled, along right and up: tangents, or parallel lengths */
+    double half[2]; /* half size of the area to fill, along right and up: tangents, or lengths in
+                       parallel views */
 } fitting;
 
-/* The sine and cosine of an angle in degrees, exact at right angles. */
+/* Computes sine and cosine of an angle in degrees, exact at multiples of 90. */
 static void sine_cosine(double degrees, double *sine, double *cosine)
 {
     double quarters = round(degrees / 90), rest = (degrees - 90 * quarters) * DEGREE;
@@ -41,8 +43,8 @@ static trip_vec3 default_up(const trip_camera_framing *f)
     return trip_length(f->up) > 0 ? trip_normalize(f->up) : trip_v3(0, 0, 1);
 }
 
-/* The given front, made level. Without one it is -y for up +z, and +z for up +y: in both +x is to
- * the viewer's right. */
+/* Returns the given front, made perpendicular to up. The default is -y for up +z, and +z for up +y;
+ * in both cases +x points to the viewer's right. */
 static trip_vec3 level_front(const trip_camera_framing *f, trip_vec3 up)
 {
     trip_vec3 right = trip_cross(up, trip_normalize(f->front));
@@ -61,7 +63,7 @@ void trip_framing_set_up(trip_camera_framing *f, trip_vec3 up)
     f->front = front;
 }
 
-/* The greatest values over the corners of the box. */
+/* Computes the maximum values over the corners of the box. */
 static int reach_of_box(const fitting *t, const trip_reach *wanted, int count, double *values)
 {
     for (int i = 0; i < count; i++)
@@ -97,7 +99,7 @@ trip_vec3 trip_framing_middle(const trip_camera_framing *f, const trip_affine *i
     return trip_affine_point(index_to_world, box_middle(f));
 }
 
-/* The picture's axes, as seen from the view's side. */
+/* Computes the picture's axes for the view's side. */
 static void set_axes(fitting *t, trip_vec3 up)
 {
     const trip_camera_framing *f = t->f;
@@ -113,7 +115,7 @@ static void set_axes(fitting *t, trip_vec3 up)
     t->up = trip_sub(trip_scale(up, cosine), trip_scale(level, sine));
 }
 
-/* A picture turned clockwise has its up to the left of what was up. */
+/* A picture turned clockwise has its new up to the left of the old one. */
 static void roll(fitting *t)
 {
     sine_cosine(t->f->roll_degrees, &t->sin_roll, &t->cos_roll);
@@ -122,10 +124,10 @@ static void roll(fitting *t)
     t->up = trip_sub(trip_scale(up, t->cos_roll), trip_scale(right, t->sin_roll));
 }
 
-/* Along one axis of the picture: where what is framed has its middle as seen, and the smallest
- * distance at which it is within the half angle whose tangent is `half`. For a point at t along the
- * axis, d deeper than the origin: |t - middle| <= half (distance + d). In a parallel view half is 0
- * and the distance stands for the half height or width needed. */
+/* The fit along one axis of the picture: the visible centre of the object, and the minimum distance
+ * at which it stays within the half angle with tangent `half`. A point at t along the axis and d
+ * deeper than the origin satisfies |t - middle| <= half (distance + d). In a parallel view half is
+ * 0, and the distance is the needed half height or width. */
 typedef struct fit {
     double half, middle, distance;
 } fit;
@@ -142,9 +144,9 @@ static void want_fit(const fitting *t, trip_vec3 axis, double half, trip_reach w
     wanted[1] = (trip_reach){ .along = trip_sub(nearer, axis) };
 }
 
-/* From `distance`, which is more than this axis needs, the middle as seen is another: that of the
- * half angle that would need it. As long as the same two points are the outermost, the distance is
- * a linear function of 1 / half. */
+/* Returns the visible centre from a larger `distance` than this axis needs: the centre for the half
+ * angle that would need it. While the same two points are outermost, the distance is linear in 1 /
+ * half. */
 static int fit_from(const fitting *t, trip_vec3 axis, double distance, fit *own)
 {
     enum { STEPS = 8 };
@@ -154,7 +156,7 @@ static int fit_from(const fitting *t, trip_vec3 axis, double distance, fit *own)
             break;
         trip_reach wanted[2];
         double values[2], inverse = 1 / own->half + (distance - own->distance) / slope;
-        if (!(inverse > 0 && isfinite(inverse))) /* as where one side is a pixel wide */
+        if (!(inverse > 0 && isfinite(inverse))) /* as if one side were a pixel wide */
             break;
         want_fit(t, axis, 1 / inverse, wanted);
         int status = reach_of(t, wanted, 2, values);
@@ -167,7 +169,7 @@ static int fit_from(const fitting *t, trip_vec3 axis, double distance, fit *own)
     return 0;
 }
 
-/* Sets the point looked at, from the origin, and how far the eye is from there. */
+/* Sets the point looked at, relative to the origin, and the eye's distance from it. */
 static int fit_perspective(const fitting *t, trip_vec3 *look, double *distance)
 {
     const trip_vec3 axes[2] = { t->right, t->up };
@@ -186,7 +188,7 @@ static int fit_perspective(const fitting *t, trip_vec3 *look, double *distance)
     return status;
 }
 
-/* The eye of a parallel view is in front of everything. */
+/* Places the eye of a parallel view in front of everything. */
 static int fit_parallel(const fitting *t, trip_vec3 *look, double *distance, double *height)
 {
     trip_reach wanted[6];
@@ -205,12 +207,12 @@ static int fit_parallel(const fitting *t, trip_vec3 *look, double *distance, dou
     return 0;
 }
 
-/* What a point of a turning object needs at worst. With h its height above the middle and r its
- * distance from the axis, both seen at angle a from the eye's side, a direction (qx, qy) of the
- * level picture sees it at  qx r sin a + qy (h cos e - r cos a sin e),  r cos a cos e + h sin e
- * nearer than the middle, e being the elevation. That it is within half times its depth, for all a:
+/* The worst case of a point on a turning object. Let h be its height above the middle, r its
+ * distance from the axis, and a its angle from the eye's side. In direction (qx, qy) of the upright
+ * picture it appears at  qx r sin a + qy (h cos e - r cos a sin e),  r cos a cos e + h sin e nearer
+ * than the middle, where e is the elevation. It stays within half times its depth for all a if
  *     distance >= h (sin e + qy cos e / half) + r sqrt((qx / half)^2 + (cos e - qy sin e / half)^2)
- * and in a parallel view, with `half` 1 and without what comes from the depth, likewise. */
+ * A parallel view has `half` 1 and no terms from the depth. */
 static trip_reach turning(const fitting *t, trip_vec3 axis, double qx, double qy, double half)
 {
     double e = t->sin_elevation, c = t->cos_elevation, depth = t->f->parallel ? 0 : 1;
@@ -220,7 +222,7 @@ static trip_reach turning(const fitting *t, trip_vec3 axis, double qx, double qy
     };
 }
 
-/* The point looked at moves along the axis so that as much is left above as below. */
+/* Moves the point looked at along the axis so that the margins above and below are equal. */
 static int fit_turntable(const fitting *t, trip_vec3 *look, double *distance, double *height)
 {
     const trip_vec3 axis = t->origin.axis;

@@ -1,15 +1,15 @@
-/* Which view shows an object well when none is given: from a named side, everything in the picture,
- * centred, with a margin. What is to be in the picture is given by how far it reaches in given
- * directions, so that the fit is exact for any shape. One thread. */
+/* Finds the default view of an object: from a named side, with everything in the picture, centred,
+ * with a margin. The caller gives the object by its reach in given directions, so that the fit is
+ * exact for any shape. One thread at a time. */
 #ifndef TRIP_FRAMING_H
 #define TRIP_FRAMING_H
 
 #include "camera.h"
 
-#define TRIP_FRAMING_FILL 0.9 /* of the picture's width or height; the rest is margin */
+#define TRIP_FRAMING_FILL 0.9 /* share of the picture's width or height that the object fills */
 
-/* A convex function of a position p, counted from an origin o: along . (p - o) plus `around` times
- * the distance of p from the axis through o. World space and units; around >= 0. */
+/* A convex function of a position p: along . (p - o) + around * (distance of p from the axis
+ * through o). o is the origin. World space and units; around >= 0. */
 typedef struct trip_reach {
     trip_vec3 along;
     double around;
@@ -17,14 +17,14 @@ typedef struct trip_reach {
 
 enum { TRIP_REACHES_MAX = 8 };
 
-/* Where reaches are taken from. */
+/* The origin and axis of reaches. */
 typedef struct trip_reach_origin {
     trip_vec3 index; /* o, in index space */
-    trip_vec3 axis;  /* world direction, unit length; needed where some `around` is not zero */
+    trip_vec3 axis;  /* world direction, unit length; required if any `around` is not zero */
 } trip_reach_origin;
 
-/* Sides that an object can be seen from. Left and right are its own, as those of a person who faces
- * the viewer: its left side is on the viewer's right. */
+/* The sides of an object. Left and right are the object's own, like a person's who faces the
+ * viewer: its left side is on the viewer's right. */
 typedef enum trip_view {
     TRIP_VIEW_DEFAULT, /* the front, a little from its left and from above */
     TRIP_VIEW_FRONT,
@@ -36,37 +36,36 @@ typedef enum trip_view {
     TRIP_VIEW_ISO, /* equally from the front, its left and above */
 } trip_view;
 
-/* What is to be framed, and how. Zero means the default. */
+/* Parameters of the default view. Zero means the default. */
 typedef struct trip_camera_framing {
-    double lo[3], hi[3]; /* a box of index space about what is to be in the picture */
-    /* Sets values[i] to the greatest value of wanted[i], i < count <= TRIP_REACHES_MAX, over what
-     * is to be in the picture; 0, or a reported failure. NULL: that is the box. */
+    double lo[3], hi[3]; /* index-space box around the object */
+    /* Sets values[i] to the maximum of wanted[i] over the object, for i < count <=
+     * TRIP_REACHES_MAX. Returns 0, or a reported failure. NULL means that the object is the box. */
     int (*reach)(void *user, const trip_reach_origin *origin, const trip_reach *wanted, int count,
                  double *values);
     void *reach_user;
     int width, height;   /* pixels */
-    trip_vec3 up, front; /* world directions: up (+z), and the one the object faces (-y; where +y
-                            is up, +z) */
+    trip_vec3 up, front; /* world directions: up (default +z), and the object's front (default -y,
+                            or +z if +y is up) */
     trip_view view;
-    /* Relative to that: round the object to the viewer's right, up, and the picture clockwise. */
+    /* Relative to the side: azimuth to the viewer's right, elevation upward, roll of the picture
+     * clockwise. Degrees. */
     double azimuth_degrees, elevation_degrees, roll_degrees;
     double fov_degrees; /* 30 */
     bool parallel;
-    double ortho_height; /* of a parallel view; default: that all is in the picture */
-    bool turntable; /* the object may turn about up, through the box's middle: all of it stays in
-                       the picture */
+    double ortho_height; /* height of a parallel view; default: fits the whole object */
+    bool turntable;      /* fit the object at all angles about up through the centre of the box */
 } trip_camera_framing;
 
-/* Another up: the object is tipped so that this direction of it is up. It goes on facing the viewer
- * with its front, or, where that comes to lie along up, with the side that was at the bottom or at
- * the top. */
+/* Tips the object so that another of its directions is up. Its front keeps facing the viewer. If
+ * the front becomes parallel to up, its former bottom or top faces the viewer. */
 void trip_framing_set_up(trip_camera_framing *f, trip_vec3 up);
 
-/* The middle of the box, in world space. */
+/* Returns the centre of the box in world space. */
 trip_vec3 trip_framing_middle(const trip_camera_framing *f, const trip_affine *index_to_world);
 
-/* The view. In the direction that is the tighter fit, margins of 5 % of the picture are left on
- * both sides; in the other the object is in the middle. Fails as `reach` does. */
+/* Finds the view. The tighter direction has margins of 5 % of the picture on both sides; the other
+ * direction is centred. Fails if `reach` fails. */
 int trip_camera_frame(const trip_camera_framing *f, const trip_affine *index_to_world,
                       trip_camera_params *out);
 

@@ -13,7 +13,7 @@
 #include "png_file.h"
 #include "report.h"
 
-/* What a format can hold, the default depth first. */
+/* The depths that a format can hold, default first. */
 typedef struct format {
     const char *extension;
     bool is_png;
@@ -85,7 +85,7 @@ static size_t channels_of(const trip_image_params *params)
     return params->distances ? 1 : 4;
 }
 
-/* What a file takes: numbers, and of distances +infinity too. */
+/* Returns whether a file can hold the value: finite, or +infinity for distances. */
 static int check_numbers(const char *path, int width, int height, const float *pixels,
                          const trip_image_params *params)
 {
@@ -103,7 +103,7 @@ static int check_numbers(const char *path, int width, int height, const float *p
     return 0;
 }
 
-/* After a failure the connection may be in the middle of something. */
+/* A failure can leave the connection in the middle of a message. */
 static int write_by_helper(trip_image_files *files, int fd, const char *path, int width, int height,
                            const float *pixels, const trip_image_params *params)
 {
@@ -156,7 +156,7 @@ int trip_image_write(trip_image_files *files, const char *path, int width, int h
     return status < 0 ? status : write_checked(files, path, width, height, pixels, p);
 }
 
-/* The size that comes first must be that of a picture which fills the data. */
+/* The size in the reply must match the length of the data. */
 static bool is_size_of(const trip_image_size *size, uint64_t data_bytes)
 {
     uint64_t bytes = 4 * sizeof(float);

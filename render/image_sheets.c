@@ -7,14 +7,14 @@
 
 struct trip_image_sheets {
     trip_budget *budget;
-    int width, height, first, count; /* slabs from first on are there */
+    int width, height, first, count; /* number of slabs, from `first` on */
     unsigned channels;
-    double thickness; /* in depth */
+    double thickness; /* thickness in depth */
     size_t bytes;
     double *sums;
 };
 
-/* Least and greatest depth of the kernels of a grid. */
+/* Computes the minimum and maximum depth of a grid's kernels. */
 static void find_depths(const trip_camera *camera, const trip_settings *settings,
                         const uint64_t dims[3], double depths[2])
 {
@@ -29,7 +29,7 @@ static void find_depths(const trip_camera *camera, const trip_settings *settings
     depths[1] += reach;
 }
 
-/* The depth of a voxel's length along the direction of view; the map was checked on opening. */
+/* Returns the depth of one voxel length along the view direction. Opening checked the map. */
 static double voxel_depth(const trip_camera *camera)
 {
     trip_affine to_index;
@@ -96,7 +96,7 @@ const double *trip_image_sheets_at(const trip_image_sheets *s, int x, int y, int
     return at(s, x, y, n);
 }
 
-/* F of a distance along the ray, in standard deviations. */
+/* Evaluates F at a distance along the ray, in standard deviations. */
 static double share_before(const trip_splat_frame *f, double distance)
 {
     double t = distance * sqrt(0.5), end = sqrt(0.5 * f->cutoff2);

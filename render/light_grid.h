@@ -1,7 +1,7 @@
-/* Numbers at the nodes of a coarse lattice over a volume: node i along an axis lies at the voxel
- * index i * spacing (the place, where spacing is uneven, see coordinates.h), from the first voxel
- * to the last or just beyond it. Between nodes they are interpolated linearly, beyond them as at
- * the nearest. Plain values; read-only once filled, for any number of threads. */
+/* Numbers at the nodes of a coarse lattice over a volume. Node i along an axis lies at voxel index
+ * i * spacing, or at that position if spacing is uneven (coordinates.h). Nodes reach from the first
+ * voxel to the last one or just beyond. Values are interpolated linearly between nodes, and
+ * constant beyond them. Plain values; read-only once filled, for any number of threads. */
 #ifndef TRIP_LIGHT_GRID_H
 #define TRIP_LIGHT_GRID_H
 
@@ -16,8 +16,8 @@ typedef struct trip_light_grid {
     float *at;      /* i fastest */
 } trip_light_grid;
 
-/* The lattice over a volume of `dims` voxels that has at most `cells` cells along the longest axis,
- * `stride` of which then become one; without numbers. */
+/* Returns a lattice without values over `dims` voxels. It has at most `cells` cells along the
+ * longest axis; then `stride` cells become one. */
 static inline trip_light_grid trip_light_grid_over(const uint64_t dims[3], int cells, int stride)
 {
     uint64_t longest = 1;
@@ -37,9 +37,9 @@ static inline size_t trip_light_grid_count(const trip_light_grid *g)
     return (size_t)g->nodes[0] * (size_t)g->nodes[1] * (size_t)g->nodes[2];
 }
 
-/* At a place in units of nodes. */
+/* Interpolates at a position in units of nodes. */
 double trip_light_grid_at_node(const trip_light_grid *g, const double node[3]);
-/* At a place in index space. */
+/* Interpolates at a point in index space. */
 double trip_light_grid_at(const trip_light_grid *g, trip_vec3 voxel);
 
 #endif

@@ -10,45 +10,44 @@ enum {
     CODES = 65536,
     SLOTS = 4,
     SLOT_BYTES = 256 << 10,
-    PIECE_NODES = 1 << 16, /* that a step averages or clears: less than a millisecond */
+    PIECE_NODES = 1 << 16, /* nodes that a step averages or clears, in less than a millisecond */
 };
 
-/* What is to be done next. */
+/* The next stage. */
 typedef enum stage { GATHER, AVERAGE, SWEEP_REACHED, SWEEP_OPEN, COMPLETE } stage;
 
 struct trip_light_map {
     trip_budget *budget;
     trip_light_source source; /* of the frame */
 
-    /* What the extinction was gathered for. */
+    /* The inputs of the gathered extinction. */
     bool has_key, pre;
     const trip_dataset *data;
     unsigned level;
     trip_clip clip;
     float extinctions[CODES];  /* per world unit, by code */
-    uint32_t shown[CODES + 1]; /* how many codes below have some */
+    uint32_t shown[CODES + 1]; /* number of lower codes with extinction */
     bool point_light;
-    trip_vec3 light;            /* as trip_effects_view has it: that `reached` is made for */
-    bool has_reached, has_open; /* they are complete */
+    trip_vec3 light;            /* light of `reached`, as in trip_effects_view */
+    bool has_reached, has_open; /* the lattices are complete */
 
-    /* Sums of extinctions while they are gathered; then floats, and behind them those of `reached`.
-     */
+    /* Sums of extinction while gathering; then floats, followed by the floats of `reached`. */
     double *memory;
     trip_light_grid extinction, reached, open;
     size_t nodes, open_nodes;
-    trip_light_shares shares[3]; /* while it gathers and averages, where spacing is uneven */
+    trip_light_shares shares[3]; /* for uneven spacing, while gathering and averaging */
 
     stage stage;
-    trip_reader *reader;        /* while it gathers and averages; else NULL */
-    trip_selection *selections; /* then: room for all lists of the data set */
+    trip_reader *reader;        /* while gathering and averaging; otherwise NULL */
+    trip_selection *selections; /* while gathering: room for all lists of the data set */
     unsigned list_count;
     trip_pass pass;
     size_t averaged; /* rows of nodes */
-    size_t cleared;  /* nodes of the grid that is swept next */
+    size_t cleared;  /* next node of the current grid */
     trip_light_sweep sweep;
     bool sweeping;
-    int part;         /* direction of `open`, or region of a light at a place, being swept */
-    uint64_t made_ns; /* when the last of its numbers came to be */
+    int part;         /* current direction of `open`, or region of a point light */
+    uint64_t made_ns; /* time of completion */
     trip_light_stats stats;
     uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of a run */
 };
@@ -112,7 +111,7 @@ void trip_light_map_destroy(trip_light_map *m)
     trip_budget_release(m->budget, m, sizeof *m);
 }
 
-/* ---- what is the same as before ---- */
+/* ---- reuse ---- */
 
 static bool same_clip(const trip_clip *a, const trip_clip *b)
 {
@@ -146,18 +145,18 @@ static bool is_gathered_for(const trip_light_map *m, const trip_light_source *s)
 static trip_vec3 to_index(const trip_light_source *s, trip_vec3 direction)
 {
     trip_affine map;
-    trip_affine_invert(&s->data->index_to_world, &map); /* it was checked on opening */
+    trip_affine_invert(&s->data->index_to_world, &map); /* opening checked it */
     return trip_affine_vector(&map, direction);
 }
 
-/* Index space: the way to the light for a world unit, or its place. */
+/* Returns the direction to the light per world unit, or the light's position, in index space. */
 static trip_vec3 light_of(const trip_light_source *s)
 {
     return s->settings->point_light ? trip_light_position(s->settings, &s->data->index_to_world)
                                     : to_index(s, s->settings->light_direction);
 }
 
-/* Notes the light; false where `reached` is made for another. */
+/* Records the light. Returns false if `reached` belongs to another light. */
 static bool take_light(trip_light_map *m, const trip_light_source *s)
 {
     const trip_vec3 light = light_of(s), apart = trip_sub(light, m->light);
@@ -208,13 +207,13 @@ static int take_grids(trip_light_map *m, const trip_light_source *s)
     return 0;
 }
 
-/* The axis of the list that is read. */
+/* Returns the axis of the list to read. */
 static int axis_of(const trip_light_source *s)
 {
     const uint64_t *dims = s->data->header.dims;
     const trip_vec3 last = trip_v3((double)dims[0] - 1, (double)dims[1] - 1, (double)dims[2] - 1);
     trip_vec3 light = light_of(s);
-    if (s->settings->point_light) /* from the middle */
+    if (s->settings->point_light) /* from the centre */
         light = trip_sub(light, trip_scale(last, 0.5));
     int axis = 2;
     for (int a = 0; a < 2 && s->settings->effects.shadows; a++)
@@ -223,8 +222,8 @@ static int axis_of(const trip_light_source *s)
     return axis;
 }
 
-/* Halo counts where values are interpolated; where several data sets are joined not, as what is
- * halo of one and shows is kept in another. */
+/* Halo voxels count if values are interpolated. They do not count if data sets are joined, because
+ * the visible halo of one is kept in another. */
 static bool is_read(const trip_light_source *s, const trip_list *list, int axis)
 {
     const trip_kind_info *kind = trip_kind_of(list->kind);
@@ -234,7 +233,7 @@ static bool is_read(const trip_light_source *s, const trip_list *list, int axis)
            (kept_alone ? kind->splatted && !kind->coarse : kind->lattice);
 }
 
-/* All bricks in which the function shows something. */
+/* Selects all bricks with visible codes. */
 static int select_list(trip_light_map *m, const trip_list *list)
 {
     trip_selection *s = &m->selections[m->pass.selection_count];
@@ -315,7 +314,7 @@ static int take_open(trip_light_map *m)
     return m->open.at ? 0 : no_memory(&m->open, bytes);
 }
 
-/* What is left to do once the extinction is there. */
+/* Chooses the stage after the extinction is complete. */
 static stage next_stage(const trip_light_map *m)
 {
     const trip_effects *e = &m->source.settings->effects;
@@ -349,7 +348,7 @@ int trip_light_map_begin(trip_light_map *m, const trip_light_source *s)
 
 /* ---- gathering ---- */
 
-/* Adds to the nodes around a voxel in proportion to how near they are: all shares make 1. */
+/* Adds a voxel to the nodes around it in proportion to their nearness. The shares add up to 1. */
 static void add_voxel(trip_light_map *m, const int64_t at[3], double extinction)
 {
     const trip_light_grid *g = &m->extinction;
@@ -372,7 +371,7 @@ static void add_voxel(trip_light_map *m, const int64_t at[3], double extinction)
     }
 }
 
-/* The same where spacing is uneven. */
+/* Adds a voxel with uneven spacing. */
 static void add_shares(trip_light_map *m, const int64_t at[3], double extinction)
 {
     const trip_light_grid *g = &m->extinction;
@@ -419,7 +418,7 @@ static void gather_run(trip_light_map *m, const trip_batch *batch, const trip_ru
     }
 }
 
-/* What the shares of all voxels of the grid along an axis make at a node. */
+/* Returns the sum of all voxels' shares along an axis at a node. */
 static double shares_at(const trip_light_map *m, int axis, int node)
 {
     const int64_t spacing = (int64_t)m->extinction.spacing, middle = node * spacing;
@@ -428,7 +427,7 @@ static double shares_at(const trip_light_map *m, int axis, int node)
     if (m->shares[axis].sums)
         return m->shares[axis].sums[node];
     if (middle >= spacing - 1 && middle + spacing - 1 <= last)
-        return (double)spacing; /* all of them are in the grid */
+        return (double)spacing; /* the shares are all inside the grid */
     for (int64_t i = middle - spacing + 1; i < middle + spacing; i++)
         if (i >= 0 && i <= last)
             sum +=
@@ -436,7 +435,7 @@ static double shares_at(const trip_light_map *m, int axis, int node)
     return sum;
 }
 
-/* A row's sums into means, as floats, each before what is still to be read. */
+/* Converts the sums of a row to float means in place, behind the read position. */
 static void average_row(trip_light_map *m, size_t row)
 {
     const trip_light_grid *g = &m->extinction;
@@ -503,13 +502,12 @@ static bool begin_sweep(trip_light_map *m)
                           : trip_light_sweep_begin(&m->sweep, m->light, m->budget);
 }
 
-/* Of the stage. */
 static trip_light_grid *swept_grid(trip_light_map *m)
 {
     return m->stage == SWEEP_OPEN ? &m->open : &m->reached;
 }
 
-/* The grid starts from 0: a piece of that; false where nothing is left to clear. */
+/* Clears a piece of the grid. Returns false if nothing is left to clear. */
 static bool clear(trip_light_map *m)
 {
     const size_t left = trip_light_grid_count(swept_grid(m)) - m->cleared;
@@ -533,7 +531,6 @@ static int start_sweep(trip_light_map *m)
     return m->sweeping ? 0 : no_memory(out, trip_light_sweep_max_bytes(out));
 }
 
-/* Of the stage. */
 static int sweep_count(const trip_light_map *m)
 {
     return m->stage == SWEEP_OPEN ? TRIP_OPEN_DIRECTIONS : m->point_light ? TRIP_LIGHT_REGIONS : 1;

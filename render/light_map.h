@@ -1,10 +1,9 @@
-/* What of the light reaches places of a volume, on coarse lattices: made of one pass over the list
- * nearest to the light's direction, whose extinction is gathered at the nodes, and of sweeps
- * through that (light_sweep.h). Kept from frame to frame: a pass is read again when the data, the
- * transfer function or what is cut away has changed, the sweeps are made again when the light has.
- * Where spacing is uneven they lie over places
- * (coordinates.h). The lattices depend on the data's size and the settings alone. One thread;
- * renderers read the grids of a map that is complete. */
+/* The transmittance of light to all points of a volume, on coarse lattices. One pass over the list
+ * nearest to the light's direction gathers the extinction at the nodes. Sweeps over the result give
+ * the light (light_sweep.h). The lattices are kept from frame to frame. The pass is repeated if the
+ * data, the transfer function or the clipping changed, the sweeps if the light changed. With uneven
+ * spacing the lattices lie over positions (coordinates.h). Their size depends only on the data's
+ * size and the settings. One thread at a time; renderers read the grids of a complete map. */
 #ifndef TRIP_LIGHT_MAP_H
 #define TRIP_LIGHT_MAP_H
 
@@ -15,10 +14,10 @@
 
 typedef struct trip_light_map trip_light_map;
 
-/* What it is made from; all outlives the frame that it is for. */
+/* Inputs of the map. They must outlive the frame. */
 typedef struct trip_light_source {
     const trip_dataset *data;
-    unsigned level; /* that the data set is of */
+    unsigned level; /* of the data set */
     const trip_settings *settings;
     const trip_clip *clip; /* index space */
     const trip_tf_entry *table;
@@ -27,37 +26,37 @@ typedef struct trip_light_source {
 } trip_light_source;
 
 typedef struct trip_light_stats {
-    uint64_t splats, bytes_read, reads; /* of the pass; 0 where it was kept */
-    double gather_ms, sweep_ms;         /* reading and gathering; sweeps */
+    uint64_t splats, bytes_read, reads; /* bytes of the pass; 0 if the map was reused */
+    double gather_ms, sweep_ms;         /* times of reading and gathering, and of the sweeps */
     size_t memory_bytes;                /* of the lattices */
 } trip_light_stats;
 
 int trip_light_map_create(trip_light_map **out, trip_budget *budget);
-/* Waits for reads under way. */
+/* Frees the map. Waits for pending reads. */
 void trip_light_map_destroy(trip_light_map *m);
 
-/* Takes the lattices and starts the reads; what is there from before and the same is kept, as far
- * as it was made. Fails (reported) where the lattices do not fit the memory given. */
+/* Allocates the lattices and starts the reads. Keeps earlier results with the same inputs. Fails,
+ * reported, if the lattices exceed the budget. */
 int trip_light_map_begin(trip_light_map *m, const trip_light_source *source);
-/* A piece of what is ready: a batch, or some rows of nodes or columns, by `runner` (NULL: by the
- * caller's thread). trip_frame's TRIP_FRAME_* of what it has come to. */
+/* Does one piece of ready work: a batch, or some rows of nodes or columns. `runner` may do it with
+ * several threads; NULL uses the caller's. Returns a TRIP_FRAME_* of frame.h. */
 int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
-/* Waits until there is something to do, at most for the timeout. */
+/* Waits for ready work, at most for the timeout. */
 void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns);
 bool trip_light_map_is_complete(const trip_light_map *m);
-/* When its numbers came to be, once it is complete: no two lattices of a process that differ have
- * the same, so that it says of a copy whether it is of this one. */
+/* Returns the time of completion. It is unique among the lattices of a process, and so identifies
+ * copies. */
 uint64_t trip_light_map_made_ns(const trip_light_map *m);
 
-/* The means of extinction, once those are gathered. */
+/* Returns the mean extinctions, once gathered. */
 const trip_light_grid *trip_light_map_gathered(const trip_light_map *m);
-/* NULL where the effect is off. Their numbers are there once the map is complete. */
+/* Return the grids, or NULL if the effect is off. Values are valid once the map is complete. */
 const trip_light_grid *trip_light_map_reached(const trip_light_map *m);
 const trip_light_grid *trip_light_map_open(const trip_light_map *m);
-/* Lets a frame's effects look places up in the map. */
+/* Connects a frame's effects to the map. */
 void trip_light_map_view(const trip_light_map *m, trip_effects_view *view);
 
-/* Since trip_light_map_begin(). */
+/* Returns the statistics since trip_light_map_begin(). */
 trip_light_stats trip_light_map_stats(const trip_light_map *m);
 
 #endif

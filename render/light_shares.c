@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* Steps are a mean spacing but for rounding: they are not divided. */
+/* Steps equal to the mean spacing, up to rounding, are not divided. */
 #define STEP_SLACK 1e-9
 
 static int64_t next_to(const trip_light_shares *s, int64_t voxel, int way)
@@ -11,7 +11,7 @@ static int64_t next_to(const trip_light_shares *s, int64_t voxel, int way)
     return next < 0 ? 0 : next < s->voxels ? next : s->voxels - 1;
 }
 
-/* The first and the last node that a voxel may count at. */
+/* Computes the first and last node at which a voxel can count. */
 static void find_nodes(const trip_light_shares *s, const double *x, double spacing, int64_t voxel,
                        int32_t range[2])
 {
@@ -38,7 +38,7 @@ static bool take(trip_light_shares *s, const double *x, double spacing, trip_bud
     return s->shares != NULL;
 }
 
-/* A point that a voxel counts at by `weight`. */
+/* Adds a sample with `weight` for a voxel. */
 static void add_point(trip_light_shares *s, int64_t voxel, double node, double weight)
 {
     const double before = fmin(s->nodes - 1, floor(node)), part = node - before;
@@ -52,8 +52,8 @@ static void add_point(trip_light_shares *s, int64_t voxel, double node, double w
     }
 }
 
-/* The points from a voxel on to the next on one side. Its own counts for half a step to either
- * side, and at the end of the grid for as much beyond that. */
+/* Adds the samples from a voxel towards its neighbour on one side. The voxel itself counts for half
+ * a step on each side, also beyond the ends of the grid. */
 static void add_side(trip_light_shares *s, const double *x, double spacing, int64_t voxel, int way)
 {
     const int64_t next = next_to(s, voxel, way), behind = next_to(s, voxel, -way);

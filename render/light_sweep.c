@@ -2,12 +2,12 @@
 
 #include <math.h>
 
-/* Less is taken for nothing. */
+/* Smaller transmittances count as 0. */
 #define DARK 1e-7
 
 enum {
-    BAND_ROWS = 4,  /* of a task */
-    PIECE = 1 << 14 /* columns or nodes of a step */
+    BAND_ROWS = 4,  /* rows per task */
+    PIECE = 1 << 14 /* columns or nodes per step */
 };
 
 static size_t column_bytes(const trip_light_sweep *s)
@@ -15,7 +15,7 @@ static size_t column_bytes(const trip_light_sweep *s)
     return (size_t)s->columns[0] * (size_t)s->columns[1] * sizeof *s->through;
 }
 
-/* Those from a place spread widest where it is half as far from the lattice as that is wide. */
+/* Columns of a point light spread most if its distance is half the lattice's width. */
 size_t trip_light_sweep_max_bytes(const trip_light_grid *out)
 {
     size_t max = 0;
@@ -41,20 +41,21 @@ static int last_layer(const trip_light_sweep *s)
     return s->out->nodes[s->axis] - 1;
 }
 
-/* A layer's node, or a place's between them. */
+/* A value at a node of a layer, or between nodes. */
 static double node_of(const trip_light_sweep *s, double layer)
 {
     return s->descending ? last_layer(s) - layer : layer;
 }
 
-/* Where a ray that is at a node of a layer is at the last one: across (0) or down (1). */
+/* Returns the position at the last layer of a ray through a node of a layer: across (0) or down
+ * (1). */
 static double column_of(const trip_light_sweep *s, int i, double node, int layer)
 {
     const double back = layer - last_layer(s);
     return (node - back * s->slope[i]) / (1 + back * s->spread);
 }
 
-/* Columns from one to another, and one more on either side. */
+/* Returns a range of columns, plus one on each side. */
 static void set_columns(trip_light_sweep *s, int i, double from, double to)
 {
     s->first[i] = (int)floor(from) - 1;
@@ -69,7 +70,7 @@ static bool take_columns(trip_light_sweep *s, trip_budget *budget)
     return s->through != NULL;
 }
 
-/* Of voxel indices in the world. */
+/* Returns the world length of a difference of voxel indices. */
 static double length_of(const trip_light_sweep *s, const double step[3])
 {
     return trip_length(trip_affine_vector(s->index_to_world, trip_v3(step[0], step[1], step[2])));
@@ -93,8 +94,8 @@ bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget
     return take_columns(s, budget);
 }
 
-/* The layers that lie on the region's side of the light: those at it count as above. False where
- * there are none. */
+/* Finds the layers on the region's side of the light; layers at the light count as above it.
+ * Returns false if there are none. */
 static bool set_start(trip_light_sweep *s)
 {
     const double above = ceil(s->light[s->axis]);
@@ -106,7 +107,7 @@ static bool set_start(trip_light_sweep *s)
     return true;
 }
 
-/* Columns that pass nodes of the region; false where there are none. */
+/* Finds the columns that pass nodes of the region. Returns false if there are none. */
 static bool set_spread(trip_light_sweep *s)
 {
     const double far = fabs(node_of(s, last_layer(s)) - s->light[s->axis]);
@@ -142,7 +143,7 @@ void trip_light_sweep_end(trip_light_sweep *s)
     s->through = NULL;
 }
 
-/* Cuts [*t0, *t1] to where from + t step is in [0, last]. */
+/* Narrows [*t0, *t1] to the t with from + t step in [0, last]. */
 static void cut(double from, double step, double last, double *t0, double *t1)
 {
     if (step == 0) {
@@ -154,8 +155,8 @@ static void cut(double from, double step, double last, double *t0, double *t1)
     *t1 = fmin(*t1, fmax(a, b));
 }
 
-/* The optical depth of a column's step: voxel indices. Two points of Gauss: exact for cubics, as
- * extinction is where the column stays in one cell. */
+/* Returns the optical depth of a column's step, in voxel indices. Two-point Gauss quadrature is
+ * exact for cubics, and extinction is cubic within a cell. */
 static double depth_of(const trip_light_sweep *s, const double from[3], const double step[3])
 {
     static const double points[2] = { 0.21132486540518712, 0.78867513459481288 };
@@ -173,14 +174,15 @@ static double depth_of(const trip_light_sweep *s, const double from[3], const do
     return 0.5 * sum * (t1 - t0) * (s->point ? length_of(s, step) : s->length);
 }
 
-/* The rows of a task: from, and to below. */
+/* Computes the rows of a task: `from` to below `to`. */
 static void band_of(const trip_light_sweep *s, unsigned band, int rows[2])
 {
     rows[0] = s->rows[0] + (int)band * BAND_ROWS;
     rows[1] = rows[0] + BAND_ROWS < s->rows[1] ? rows[0] + BAND_ROWS : s->rows[1];
 }
 
-/* Where a column that is at w at the last layer is at the layer before, and its step: voxels. */
+/* Computes the position at the previous layer of a column at w on the last layer, and its step, in
+ * voxels. */
 static void place_column(const trip_light_sweep *s, int i, double w, double passed, double from[3],
                          double step[3])
 {
@@ -190,7 +192,8 @@ static void place_column(const trip_light_sweep *s, int i, double w, double pass
     step[axis] = passed * moved * s->out->spacing;
 }
 
-/* Some rows of columns from the layer before to this one; all light is left before the first. */
+/* Advances some rows of columns from the previous layer to this one. Before the first layer all
+ * light is left. */
 static void attenuate(void *sweep, unsigned band)
 {
     const trip_light_sweep *s = sweep;
@@ -214,18 +217,18 @@ static void attenuate(void *sweep, unsigned band)
     }
 }
 
-/* Of the column before a place, and how far that is behind it: 0 to 1. */
+/* Returns the column before a position, and the remaining fraction, 0 to 1. */
 static int column_before(const trip_light_sweep *s, int i, double at, double *part)
 {
     const double last = s->columns[i] - 2;
     double x = at - s->first[i];
-    x = x > 0 ? x < last ? x : last : 0; /* 0 for what is no number */
+    x = x > 0 ? x < last ? x : last : 0; /* NaN becomes 0 */
     const int before = (int)x;
     *part = x - before;
     return before;
 }
 
-/* Some rows of the layer's nodes from the columns around them. */
+/* Computes some rows of the layer's nodes from the columns around them. */
 static void give(void *sweep, unsigned band)
 {
     const trip_light_sweep *s = sweep;
@@ -249,8 +252,8 @@ static void give(void *sweep, unsigned band)
     }
 }
 
-/* Whether a node of the layer is in the region as far as an axis has a say: where the way to it is
- * as long along two axes, that of the first. */
+/* Returns whether an axis admits a node to the region. If two axes are equally long, the first one
+ * wins. */
 static bool is_in_region(const trip_light_sweep *s, int axis, int node)
 {
     const double along = fabs(node_of(s, s->layer) - s->light[s->axis]);
@@ -258,7 +261,7 @@ static bool is_in_region(const trip_light_sweep *s, int axis, int node)
     return beside < along || (beside == along && s->axis < axis);
 }
 
-/* The nodes of the layer that are the region's. */
+/* Finds the region's nodes in the layer. */
 static void find_nodes(trip_light_sweep *s)
 {
     for (int i = 0; i < 2; i++) {
@@ -273,8 +276,8 @@ static void find_nodes(trip_light_sweep *s)
     }
 }
 
-/* Does the next rows of a layer, of so many columns or nodes each: as many as one thread does in
- * a few milliseconds. Whether none are left then. */
+/* Does the next rows of a layer, as many as one thread does in a few milliseconds. Returns whether
+ * none are left. */
 static bool do_rows(trip_light_sweep *s, const trip_task_runner *runner,
                     void (*task)(void *sweep, unsigned band), int end, int length)
 {

@@ -1,11 +1,12 @@
-/* Transmittance towards a light, at the nodes of a lattice, from a lattice of extinction: sweeps
- * over the layers of nodes, from where light enters on. What is left of the light is kept along
- * columns that follow its rays from layer to layer, so that nothing blurs on the way; at each layer
- * the nodes take theirs from the columns around them, linearly. A light in a direction takes one
- * sweep. About a light at a place the nodes fall into six regions, by the axis that the way to them
- * is longest along and its sign, as the lists of a view do; each has a sweep, outward from the
- * light, with columns that spread. One thread calls; rows of a layer are independent tasks, which
- * others may do: the numbers are the same bits. */
+/* Computes the transmittance towards a light at the nodes of a lattice, from a lattice of
+ * extinction. Sweeps run over the layers of nodes, beginning where light enters. Columns follow the
+ * light's rays from layer to layer and hold the remaining light, so that nothing blurs. At each
+ * layer, the nodes interpolate linearly between the columns around them.
+ *
+ * A directional light needs one sweep. Around a point light the nodes fall into six regions, by the
+ * axis and direction in which they are farthest from the light, like the lists of a view. Each
+ * region has one sweep, outward from the light, with columns that spread. One thread calls. Other
+ * threads may do rows of a layer as independent tasks; the results have the same bits. */
 #ifndef TRIP_LIGHT_SWEEP_H
 #define TRIP_LIGHT_SWEEP_H
 
@@ -17,42 +18,43 @@
 
 typedef struct trip_light_sweep {
     const trip_light_grid *extinction; /* per world unit */
-    trip_light_grid *out;              /* transmittances are added to it, times: */
+    trip_light_grid *out;              /* transmittances are added to it, times `weight` */
     double weight;
-    double last[3]; /* voxels: light passes extinction in [0, last] alone */
+    double last[3]; /* last voxel: only [0, last] attenuates */
     const trip_affine *index_to_world;
 
-    /* Axes of layers, rows and columns; layers go down where the light comes from above. */
+    /* Axes of layers, rows and columns. Layers descend if the light comes from above. */
     int axis, across, down;
     bool descending;
     bool point;
-    double light[3]; /* of a light at a place, where: nodes */
-    /* A column that is at w across, or down, at the last layer, moves by slope + spread w from each
-     * layer to the next, in nodes. */
+    double light[3]; /* position of a point light, in nodes */
+    /* A column at w across or down on the last layer moves by slope + spread w per layer, in nodes.
+     */
     double slope[2], spread;
-    double length;            /* of a step in the world, of a light in a direction */
-    int columns[2], first[2]; /* w of the first, and how many one node apart */
-    int start;                /* the layer that the light comes to first */
-    double before;            /* and layers that it passes before that */
+    double length;            /* world length of a step of a directional light */
+    int columns[2], first[2]; /* w of the first column; the number of columns, one node apart */
+    int start;                /* the first layer that the light meets */
+    double before;            /* layers that the light passes before it */
     int layer;                /* the next */
-    bool attenuated;          /* its columns are done, its nodes are being done */
-    int rows[2];              /* of columns or nodes, those of a step: from, and to below */
-    int nodes[2][2];          /* of the layer, the region's: from, and to below */
-    double *through;          /* NULL: the region has no nodes */
+    bool attenuated;          /* the columns are done; the nodes are in progress */
+    int rows[2];              /* rows of a step: from, to below */
+    int nodes[2][2];          /* the region's nodes in the layer: from, to below */
+    double *through;          /* NULL if the region has no nodes */
     trip_budget *budget;
 } trip_light_sweep;
 
-/* A light in a direction: `to_light` is in index space, not zero; the rest as above. False where
- * the columns' memory is refused. */
+/* Begins the sweep of a directional light. `to_light` is in index space and not zero. Returns false
+ * if the columns exceed the budget. */
 bool trip_light_sweep_begin(trip_light_sweep *s, trip_vec3 to_light, trip_budget *budget);
-/* A light at a place of index space, and one of the regions about it. */
+/* Begins the sweep of one region around a point light at a position in index space. */
 #define TRIP_LIGHT_REGIONS 6
 bool trip_light_sweep_begin_at(trip_light_sweep *s, trip_vec3 light, int region,
                                trip_budget *budget);
-/* Some rows of a layer; false once all are done. `runner` NULL: the caller's thread does them. */
+/* Does some rows of a layer. Returns false once all are done. With `runner` NULL the caller's
+ * thread does them. */
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner);
 void trip_light_sweep_end(trip_light_sweep *s);
-/* The most that the columns of any light take. */
+/* Returns the maximum memory of the columns for any light. */
 size_t trip_light_sweep_max_bytes(const trip_light_grid *out);
 
 #endif

@@ -11,7 +11,7 @@ static bool is_close(double a, double b, double unit)
     return fabs(a - b) <= ROUNDING * unit;
 }
 
-/* Whether a map is a positive scale along each axis and an offset. */
+/* Returns whether a map is a positive scale along each axis plus an offset. */
 static bool is_along_axes(const trip_affine *map)
 {
     for (int i = 0; i < 3; i++) {

@@ -4,8 +4,8 @@
 #include "lod_limit.h"
 #include "report.h"
 
-/* Cubes as small as bricks of level 0 usually are, larger where there would be too many, or where
- * what is in them counts: then the largest tiles do not reach over them. */
+/* Chooses the cube size: about a level 0 brick, larger if there would be too many cubes. If
+ * contents are counted, cubes are at least as large as the largest tiles. */
 enum { CUBE_LOG2 = 6, LIMITED_CUBE_LOG2 = 7, MAX_CUBES = 1 << 22 };
 
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
@@ -49,7 +49,7 @@ unsigned trip_lod_level(double width_px, double px, unsigned levels)
     return level;
 }
 
-/* The least depth of the voxels from `first` to before `past`, and how wide they are there. */
+/* Computes the minimum depth of the voxels from `first` to before `past`, and their width there. */
 static double width_in(const trip_camera *camera, const int64_t first[3], const int64_t past[3])
 {
     double depth = -trip_dot(camera->forward, camera->eye);

@@ -6,14 +6,14 @@
 #include "report.h"
 #include "weight.h"
 
-/* What the levels are chosen from; a cube's numbers are in the order of trip_lod.level. */
+/* Inputs of the choice. Cubes are in the order of trip_lod.level. */
 typedef struct limiting {
     trip_lod *lod;
     const trip_dataset *data;
-    uint32_t *voxels; /* of level 0 in the cube; 0 where it is out of view */
-    float *width;     /* px, of those voxels */
-    double bytes[1 + TRIP_DATASET_LEVELS_MAX]; /* of a voxel of level 0, drawn at a level, in all
-                                                   lists that are read */
+    uint32_t *voxels; /* level 0 voxels in the cube; 0 if it is out of view */
+    float *width;     /* width of its voxels, px */
+    double bytes[1 + TRIP_DATASET_LEVELS_MAX]; /* bytes per level 0 voxel at each level, in all
+                                                  lists read */
 } limiting;
 
 static int lists_read(const trip_camera *camera, const trip_settings *settings)
@@ -31,8 +31,8 @@ static double code_bytes(const trip_dataset *data, const trip_list *list)
     return of->code_bytes && !of->steps ? of->code_bytes : data->header.code_bytes;
 }
 
-/* What is drawn, along one axis of three: by splats voxels or means, where values are interpolated
- * those and their halo. */
+/* Returns whether a list counts, along one of three axes: voxels or means for splats, values and
+ * halo for interpolation. */
 static bool is_drawn(const trip_lod *lod, const trip_list *list)
 {
     if (list->axis != 2 || list->level > lod->levels)
@@ -64,7 +64,7 @@ static uint32_t *cube_at(const limiting *l, int64_t i, int64_t j, int64_t k)
     return &l->voxels[((k >> log2) * lod->cubes[1] + (j >> log2)) * lod->cubes[0] + (i >> log2)];
 }
 
-/* Tiles lie in cubes; slabs need not, sheets do. */
+/* Every tile and sheet lies within cubes; slabs can cross them. */
 static void count_brick(limiting *l, const trip_list *list, uint64_t index, int64_t slab_sheet)
 {
     const trip_file_header *h = &l->data->header;
@@ -90,7 +90,7 @@ static void count_voxels(limiting *l)
     }
 }
 
-/* Widths of the voxels of a cube in view; cubes out of view have no voxels. */
+/* Computes the width of a cube's voxels. Cubes out of view get no voxels. */
 static void place_cube(limiting *l, const trip_cull *cull, const int64_t cube[3], size_t at)
 {
     const trip_lod *lod = l->lod;
@@ -126,7 +126,7 @@ static int place_cubes(limiting *l, const trip_camera *camera, const trip_settin
     return 0;
 }
 
-/* The level of a cube where voxels may be so wide. */
+/* Returns the level of a cube for a maximum voxel width. */
 static unsigned level_at(const limiting *l, size_t cube, double px)
 {
     const unsigned level = trip_lod_level((double)l->width[cube], px, l->lod->levels);
@@ -142,7 +142,8 @@ static double bytes_at(const limiting *l, double px)
     return bytes;
 }
 
-/* The least width, to one part in 64, with which so many bytes suffice; `most` where none does. */
+/* Returns the minimum voxel width, to 1/64, that keeps the bound on bytes, or `max` if none does.
+ */
 static double min_px(const limiting *l, double bytes, double max)
 {
     enum { PARTS = 64, DOUBLINGS = 40 };

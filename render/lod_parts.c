@@ -5,10 +5,10 @@
 #include "dataset_level.h"
 #include "lod_limit.h"
 
-/* Octaves of distance over which a level gives way to the next where all has one. */
+/* Octaves of distance over which one level for the whole volume blends into the next. */
 #define MIXED_OCTAVES 0.25
 
-/* Depths of the whole grid. */
+/* Computes the depth range of the whole grid. */
 typedef struct range {
     double nearest, farthest;
 } range;
@@ -36,12 +36,12 @@ static void add_part(trip_lod_parts *parts, unsigned level)
     parts->level[parts->count++] = level;
 }
 
-/* What a part is chosen from. */
+/* Inputs of the choice. */
 typedef struct choosing {
     const trip_dataset *data;
     const trip_camera *camera;
     const trip_settings *settings;
-    double px;    /* voxels may be so wide; 0: all are of level 0 */
+    double px;    /* maximum voxel width, px; 0 means level 0 everywhere */
     unsigned max; /* levels */
 } choosing;
 
@@ -50,8 +50,8 @@ static double values_bytes(const choosing *c, unsigned level)
     return trip_lod_values_bytes(c->data, c->camera, c->settings, level);
 }
 
-/* What part of the next coarser level's picture is mixed into that of a level whose voxels are so
- * wide at level 0. None where the bound has room for one picture alone. */
+/* Returns the share of the next coarser level's picture, from the width of level 0 voxels. The
+ * share is 0 if the bound on bytes has room for only one picture. */
 static double share_of_next(const choosing *c, double width, unsigned level)
 {
     const double room = c->settings->max_bytes;
@@ -63,8 +63,8 @@ static double share_of_next(const choosing *c, double width, unsigned level)
     return fmin(share, 1);
 }
 
-/* All has one level, but for what is mixed in of the next; `width` is that of voxels of level 0
- * where they are widest. */
+/* Uses one level for the whole volume, plus a share of the next. `width` is the maximum width of
+ * level 0 voxels. */
 static void choose_one(trip_lod_parts *parts, const choosing *c, double width, bool mixes)
 {
     const double room = c->settings->max_bytes;
@@ -81,17 +81,17 @@ static void choose_one(trip_lod_parts *parts, const choosing *c, double width, b
         add_part(parts, level + 1);
 }
 
-/* What lies at least so deep, in the world. */
+/* Returns the half-space of points at least at a depth, in world space. */
 static trip_half_space half_space_from(const trip_camera *camera, double depth)
 {
-    trip_affine to_index; /* the map was checked on opening */
+    trip_affine to_index; /* opening checked the map */
     trip_clip clip = { 0 };
     trip_clip_add(&clip, camera->forward, -trip_dot(camera->forward, camera->eye) - depth);
     trip_affine_invert(&camera->index_to_world, &to_index);
     return trip_clip_before(&clip, &to_index).planes[0];
 }
 
-/* Raises how wide voxels may be until the bound suffices. */
+/* Raises the maximum voxel width until the bound on bytes holds. */
 static int bound(trip_lod_parts *parts, choosing *c, trip_budget *budget)
 {
     trip_lod cubes;
@@ -126,7 +126,7 @@ static void divide(trip_lod_parts *parts, const choosing *c, range depths)
     }
 }
 
-/* Levels with values, and with cells to interpolate them in. */
+/* Returns the number of levels with values and cells to interpolate in. */
 static unsigned count_levels(const trip_dataset *data)
 {
     unsigned levels = trip_dataset_levels(data, TRIP_KIND_VALUES);

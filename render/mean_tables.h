@@ -1,8 +1,8 @@
-/* What the codes of coarse levels look like, as tables of 65536 entries: the value of a mean as the
- * transfer function shows it, with the extinction by which a splat shows the part of its cube that
- * was kept. Lists whose cubes are as long along their axes have one table. The caller may keep them
- * from frame to frame, and releases them where the function or the data set is another. Plain
- * values; one thread. */
+/* The tables of coarse levels: 65536 entries that map a code of means to colour and extinction. The
+ * colour is the transfer function's at the mean. The extinction makes a splat as opaque as the kept
+ * part of its cube. Lists with equally long cubes along their axes share a table. The caller may
+ * keep the tables from frame to frame, and releases them when the transfer function or the data set
+ * changes. Plain values; one thread at a time. */
 #ifndef TRIP_MEAN_TABLES_H
 #define TRIP_MEAN_TABLES_H
 
@@ -10,17 +10,17 @@
 #include "dataset.h"
 #include "transfer_function.h"
 
-enum { TRIP_MEAN_TABLES_MAX = 3 * 32 }; /* an axis and a level each */
+enum { TRIP_MEAN_TABLES_MAX = 3 * 32 }; /* one per axis and level */
 
-/* Zeroed: there are none. */
+/* Zero-initialise it. */
 typedef struct trip_mean_tables {
     unsigned count;
-    double lengths[TRIP_MEAN_TABLES_MAX]; /* of cubes along the axis, in world space */
+    double lengths[TRIP_MEAN_TABLES_MAX]; /* length of cubes along the axis, world units */
     trip_tf_entry *tables[TRIP_MEAN_TABLES_MAX];
 } trip_mean_tables;
 
-/* The table of a list of means where `function` is that of level 0; made where it is not there.
- * Fails, reported, without memory. */
+/* Returns the table of a list of means, and makes it if it is missing. `function` is the table of
+ * level 0. Fails, reported, if memory is exhausted. */
 int trip_mean_tables_get(trip_mean_tables *t, const trip_dataset *data, const trip_list *list,
                          const trip_tf_entry *function, trip_budget *budget,
                          const trip_tf_entry **table);

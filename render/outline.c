@@ -6,17 +6,17 @@
 #include "report.h"
 
 enum {
-    AXIS = 2,         /* the list that is read; all of a level hold the same voxels */
-    MAX_VOXELS = 128, /* along each side of the level */
-    PIXELS = 128,     /* along the longer side */
+    AXIS = 2,         /* the list to read; all lists of a level hold the same voxels */
+    MAX_VOXELS = 128, /* maximum along each side of the level */
+    PIXELS = 128,     /* pixels along the longer side */
     CODES = 65536,
 };
 
-#define UNIT 4294967296.0   /* of optical depth */
-#define MAX_OF_A_VOXEL 16.0 /* so that the sum of all stays within 64 bits */
+#define UNIT 4294967296.0   /* unit of optical depth */
+#define MAX_OF_A_VOXEL 16.0 /* limit per voxel, so that sums stay within 64 bits */
 
 typedef struct pixel {
-    uint64_t depth; /* optical, in 1 / UNIT */
+    uint64_t depth; /* optical depth, in 1 / UNIT */
     float nearest, farthest;
 } pixel;
 
@@ -28,28 +28,28 @@ typedef struct form {
 struct trip_outline {
     trip_budget *budget;
     const trip_affine *map;            /* of level 0 */
-    trip_vec3 middle;                  /* of the box, in level 0's index space */
-    trip_vec3 eye, right, up, forward; /* world directions; the eye from the middle */
+    trip_vec3 middle;                  /* centre of the box, in level 0's index space */
+    trip_vec3 eye, right, up, forward; /* world directions; eye relative to the middle */
     bool parallel;
-    double origin[2], pixel; /* of the picture; tangents, or parallel lengths */
+    double origin[2], pixel; /* of the picture: tangents, or lengths in parallel views */
     int size[2];
     uint64_t splats;
     pixel pixels[PIXELS + 1][PIXELS + 1]; /* [y][x] */
 };
 
-/* What is needed to sum a list. */
+/* State of summing a list. */
 typedef struct summing {
     trip_outline *outline;
     const trip_outline_params *params;
     const trip_list *list;
     form x, y, z;
-    double width[2]; /* of a voxel along right and up */
+    double width[2]; /* size of a voxel along right and up */
     uint32_t voxels[TRIP_RUN_RECORDS_MAX];
-    double mass[CODES]; /* of a code's voxel: opacity times area */
+    double mass[CODES]; /* by code: opacity times area of a voxel */
 } summing;
 
-/* The finest level that is small enough: a matter of the grid alone, since every data set that has
- * coarse levels down to one brick has that one. */
+/* Returns the finest level that is small enough. It depends only on the grid, because data sets
+ * with coarse levels have them down to one brick. */
 static const trip_list *coarse_list(const trip_dataset *data)
 {
     unsigned level = 0;
@@ -82,7 +82,7 @@ static void set_view(trip_outline *o, const trip_outline_params *p)
     o->parallel = view->ortho_height > 0;
 }
 
-/* Where a point, counted from the eye, is in the picture. */
+/* Returns the picture position of a point relative to the eye. */
 static void project(const trip_outline *o, trip_vec3 p, double at[2])
 {
     double scale = o->parallel ? 1 : 1 / trip_dot(o->forward, p);
@@ -90,7 +90,7 @@ static void project(const trip_outline *o, trip_vec3 p, double at[2])
     at[1] = trip_dot(o->up, p) * scale;
 }
 
-/* The picture has room for the box and a voxel of the list around it. */
+/* Sizes the picture for the box plus one voxel of the list around it. */
 static void set_picture(trip_outline *o, const trip_outline_params *p, double voxel)
 {
     double lo[2] = { INFINITY, INFINITY }, hi[2] = { -INFINITY, -INFINITY };
@@ -112,7 +112,7 @@ static void set_picture(trip_outline *o, const trip_outline_params *p, double vo
     }
 }
 
-/* A coordinate of the picture's, counted from the eye. */
+/* Returns a picture coordinate relative to the eye. */
 static form make_form(const summing *s, trip_vec3 axis)
 {
     const trip_affine *m = &s->list->index_to_world;
@@ -159,7 +159,7 @@ static bool some_has_mass(const summing *s, const trip_file_brick *b)
     return false;
 }
 
-/* What of the pixel at `at` is covered by [lo, hi], as a part of its length. */
+/* Returns the share of the pixel at `at` that [lo, hi] covers. */
 static inline double part_in(int at, double lo, double hi)
 {
     const double past = hi < at + 1 ? hi : at + 1, from = lo > at ? lo : at;
@@ -173,7 +173,7 @@ static inline void add_to(pixel *p, double optical, float z)
     p->farthest = z > p->farthest ? z : p->farthest;
 }
 
-/* A voxel is drawn as a rectangle of its size. */
+/* Draws a voxel as a rectangle of its size. */
 static void add_voxel(summing *s, double x, double y, double z, double mass)
 {
     trip_outline *o = s->outline;
@@ -253,7 +253,7 @@ static int sum_list(summing *s)
     return status;
 }
 
-/* Of all data sets that are joined. */
+/* Counts the voxels of all joined data sets. */
 static int sum(summing *s)
 {
     const trip_list *list = s->list;
@@ -330,7 +330,7 @@ void trip_outline_destroy(trip_outline *o)
         trip_budget_release(o->budget, o, sizeof *o);
 }
 
-/* The middle of a pixel at a depth, from the middle of the box. */
+/* Returns the centre of a pixel at a depth, relative to the centre of the box. */
 static trip_vec3 point_at(const trip_outline *o, int u, int v, double z)
 {
     double across = o->parallel ? 1 : z;

@@ -1,10 +1,9 @@
-/* What of an object is not too faint to see in a view of it: a small picture of opacity alone,
- * summed from a coarse level, or of small data sets from the finest. Optical depths add up in any
- * order, and are summed in whole numbers, so that it is the same for any tiles, slots and threads.
- * One thread.
+/* Finds the visible extent of an object: a small picture of opacity only, summed from a coarse
+ * level, or from the finest level of small data sets. Optical depths are added as integers, so that
+ * the result is the same for any tiles, slots and threads. One thread at a time.
  *
- * A pixel shows where its opacity is at least TRIP_OUTLINE_OPACITY. Things narrower than a pixel of
- * it may be missing: voxels that are seen alone are found by visible.h. */
+ * A pixel is visible if its opacity is at least TRIP_OUTLINE_OPACITY. Parts narrower than a pixel
+ * may be missing: visible.h finds single visible voxels. */
 #ifndef TRIP_OUTLINE_H
 #define TRIP_OUTLINE_H
 
@@ -18,23 +17,23 @@ typedef struct trip_outline trip_outline;
 
 typedef struct trip_outline_params {
     const trip_dataset *data;
-    trip_reader *reader; /* of voxels, no pass under way */
+    trip_reader *reader; /* reads voxels; no pass in progress */
     trip_budget *budget;
-    const trip_tf_entry *table;     /* as filled for the data set */
-    double lo[3], hi[3];            /* the box of index space that is looked at */
-    const trip_camera_params *view; /* from outside of the box; its size and angle do not count */
+    const trip_tf_entry *table;     /* filled for the data set */
+    double lo[3], hi[3];            /* index-space box to examine */
+    const trip_camera_params *view; /* from outside the box; size and angle are ignored */
 } trip_outline_params;
 
-/* *out is NULL where nothing shows, or the data set has no level that is small enough. */
+/* Finds the outline. *out is NULL if nothing is visible or no level is small enough. */
 int trip_outline_make(trip_outline **out, const trip_outline_params *params);
 void trip_outline_destroy(trip_outline *o);
 
-/* As trip_camera_framing.reach, over what shows: from the nearest to the farthest of what is in a
- * pixel. */
+/* Computes reaches over the visible pixels, like trip_camera_framing.reach, from the nearest to the
+ * farthest visible depth of each pixel. */
 void trip_outline_reach(const trip_outline *o, const trip_reach_origin *origin,
                         const trip_reach *wanted, int count, double *values);
 
-/* Voxels looked at. */
+/* Returns the number of voxels examined. */
 uint64_t trip_outline_splats(const trip_outline *o);
 
 #endif
