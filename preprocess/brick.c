@@ -20,23 +20,23 @@
 #include "splats.h"
 #include "orientation.h"
 
-/* One run; zeroed at first, so that close_all() undoes any part of it. */
+/* State of a run. It starts zeroed, so that close_all() can undo any part of it. */
 typedef struct brick {
     const trip_brick_params *params;
     trip_brick_summary *summary;
     trip_brick_input in;
     trip_piece_format format;
     trip_brick_codes codes;
-    trip_coordinates coordinates; /* which the writer looks at until it is done */
+    trip_coordinates coordinates; /* read by the writer until it is done */
     trip_memory_plan plan;
     trip_brick_temporary temporary;
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
-    unsigned levels;        /* coarse ones */
-    trip_level_kinds kinds; /* of those */
+    unsigned levels;        /* coarse levels */
+    trip_level_kinds kinds; /* of coarse levels */
     trip_orientation upright;
-    uint64_t written_before; /* up to the end of the last stage */
+    uint64_t written_before; /* until the end of the last stage */
 } brick;
 
 static double now_seconds(void)
@@ -51,7 +51,7 @@ static uint64_t input_bytes(const brick *b)
     return b->in.tally->voxels * trip_scalar_bytes(b->in.info->type);
 }
 
-/* Bytes of the data set and of the spill so far. */
+/* Returns the bytes of the data set and the spill so far. */
 static uint64_t bytes_written(const brick *b)
 {
     return (b->writer ? trip_writer_bytes(b->writer) : 0) + trip_spill_bytes(b->temporary.spill);
@@ -65,7 +65,7 @@ static void end_stage(brick *b, trip_brick_stage stage, double begin)
     b->written_before += c->bytes_written;
 }
 
-/* Scans the volume; a resumed run has the result in its journal. */
+/* Scans the volume. A resumed run reads the result from its journal. */
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->temporary.journal);
@@ -90,10 +90,10 @@ static int plan_memory(brick *b)
                                  b->params->slices);
 }
 
-/* To be called when all but the lists is allocated. A resumed run that has less memory than the
- * interrupted one spills the rest of a list that was written in order: all of it comes after what
- * was written. But once pieces of that list were spilled, later ones cannot be appended before the
- * merge. */
+/* Divides the memory again once all but the lists is allocated. A resumed run with less memory than
+ * the interrupted one spills the rest of a list that was written in order, because the rest follows
+ * the written part. But once pieces of the list were spilled, later ones cannot be appended before
+ * the merge. */
 static int update_memory_plan(brick *b)
 {
     int status = trip_memory_plan_update(&b->plan, b->params->input, b->in.info, &b->format,
@@ -218,7 +218,7 @@ static int on_box(void *user, unsigned thread, const trip_box *box)
     return trip_splatter_box(b->splatter, thread, box);
 }
 
-/* Sums over the boxes so far and over what the interrupted run did before. */
+/* Adds up the boxes so far and the interrupted run's part. */
 static void add_up(const brick *b, trip_tally *tally, uint64_t *kept, uint64_t *halo)
 {
     const trip_checkpoint *before = trip_journal_get_checkpoint(b->temporary.journal);
@@ -267,7 +267,8 @@ static int check_tally(brick *b)
             b->params->input,
             "every voxel there is has the value %g: there is nothing to see but their outline",
             t->value_min);
-    /* What is kept for functions beside the automatic one is drawn by them, which warns of them. */
+    /* Values kept for other transfer functions than the automatic one are drawn by those; drawing
+     * warns about them. */
     for (size_t i = 0; i < b->params->function_count && !b->params->automatic; i++)
         trip_tf_check_range(b->in.functions[i], t->value_min, t->value_max, b->params->input);
     return 0;
@@ -323,7 +324,7 @@ static void on_levels_progress(void *user, uint64_t done, uint64_t total)
     trip_brick_input_progress(&b->in, "levels", done, total);
 }
 
-/* Whether there is more of the volume's range above the envelope than below it. */
+/* Returns whether more of the volume's range lies above the envelope than below it. */
 static bool is_hidden_above(const brick *b)
 {
     const trip_envelope *e = &b->in.envelope;
@@ -332,7 +333,7 @@ static bool is_hidden_above(const brick *b)
                                (double)e->intervals[0].lo - t->value_min;
 }
 
-/* Of what level 0 took memory for nothing is needed any more. */
+/* Releases all memory of level 0. */
 static int make_levels(brick *b)
 {
     double begin = now_seconds();
@@ -370,8 +371,8 @@ static int fail_count(const brick *b, const char *subject, uint64_t counted, uin
                      counted, subject, written);
 }
 
-/* The numbers of records written must be those counted, part of which may be from a journal. The
- * halo of a sparse volume may be counted more than once. */
+/* Checks the number of written records against the counts, part of which may come from a journal.
+ * The halo of a sparse volume may be counted more than once. */
 static int check_records(brick *b)
 {
     trip_brick_summary *s = b->summary;
@@ -396,8 +397,8 @@ static int check_records(brick *b)
     return 0;
 }
 
-/* What is up is guessed where neither the file nor its format's custom says it. The mirror image of
- * voxels is not that of the object where their spacing is uneven. */
+/* Guesses the orientation if neither the file nor its format's custom gives it. With uneven
+ * spacing, mirrored voxels are not a mirrored object, so no symmetry is sought. */
 static bool is_up_unknown(const trip_volume_info *info)
 {
     for (int a = 0; a < 3; a++)
@@ -417,7 +418,7 @@ static int find_orientation(brick *b)
                                 .scale = trip_mean_scale_make(
                                     b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
-    /* A region of an object need not look as the whole does. */
+    /* A region may look unlike the whole object. */
     const bool whole = trip_region_is_whole(&b->params->region);
     return whole && is_up_unknown(b->in.info)
                ? trip_orientation_find(&b->upright, b->writer, &p, b->in.budget)

@@ -5,10 +5,10 @@
 
 #include "gradient.h"
 
-/* So that values keep 4096 codes at least, whatever lies around them. */
+/* Limits the background's distance, so that values keep at least 4096 codes. */
 #define BACKGROUND_SHARE 16
 
-/* The halo of a sparse volume holds its background. */
+/* The halo of a sparse volume contains its background. */
 static void include_background(trip_quantiser *q, const trip_brick_input *in)
 {
     const double background = in->info->background;
@@ -19,8 +19,8 @@ static void include_background(trip_quantiser *q, const trip_brick_input *in)
     }
 }
 
-/* Coarse levels hold values sharpened (sharpen.h), which may leave the range. Integers have the
- * range of their type in 16 bits, each a code or more. */
+/* Sharpened values of coarse levels (sharpen.h) can leave the range. Integers have the range of
+ * their type in 16 bits, at least one code each. */
 static void make_room(trip_quantiser *q, const trip_brick_input *in)
 {
     const double room = (q->hi - q->lo) / 4;

@@ -1,4 +1,4 @@
-/* How `brick` encodes values and normals. One thread. */
+/* Chooses the encoding of values and normals. One thread. */
 #ifndef TRIP_BRICK_CODES_H
 #define TRIP_BRICK_CODES_H
 
@@ -8,21 +8,21 @@
 
 typedef struct trip_brick_codes {
     trip_quantiser quantiser;
-    unsigned code_bytes, normal_bytes; /* as the header has them; normal_bytes 0: no normals */
-    trip_compact_normals compact;      /* the meaning of normals of 3 bytes */
+    unsigned code_bytes, normal_bytes; /* as in the header; normal_bytes 0 means no normals */
+    trip_compact_normals compact;      /* steps of normals of 3 bytes */
 } trip_brick_codes;
 
-/* Chooses how to encode the values and normals of the input, after the scan if there is one. Codes
- * cover the range of types of 8 or 16 bits that are not rounded, else the range of the values, if
- * that was scanned; else it is to be set before values are quantised. There are codes below and
- * above those of values of 8 bits, and of numbers that are no integers of 16. */
+/* Chooses the encoding of the input's values and normals, after the scan if there is one.
+ * - Types of 8 or 16 bits without rounding: codes cover the range of the type.
+ * - Other types: codes cover the scanned range, or the caller sets the range before quantising.
+ * There are codes below and above the values, except for 16-bit integers. */
 void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in);
-/* Codes cover [lo, hi], the values, and the background of a sparse volume where that is not much
- * farther off than values are apart. */
+/* Sets the codes to cover [lo, hi], and the background of a sparse volume if it is near the values.
+ */
 void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in, double lo,
                                 double hi);
 
-/* What the header of the data set says of codes and normals. */
+/* Fills the header's fields for codes and normals. */
 trip_writer_codes trip_brick_codes_header(const trip_brick_codes *c);
 
 #endif

@@ -10,7 +10,7 @@
 #include "normal.h"
 #include "report.h"
 
-/* Saturates: the grid of a sparse volume may have more than 2^64 voxels. */
+/* Saturates, because the grid of a sparse volume may have more than 2^64 voxels. */
 static uint64_t count_voxels(const int64_t dims[3])
 {
     uint64_t voxels = 1;
@@ -47,7 +47,7 @@ int trip_brick_levels(const trip_brick_input *in)
     return in->info->coordinates[0] ? -1 : in->params->levels;
 }
 
-/* What was asked for and cannot be made is not left out. */
+/* Refuses explicit requests that cannot be met. */
 static int check_levels(const trip_brick_input *in)
 {
     if (in->params->levels <= 0 || trip_brick_levels(in) == in->params->levels)
@@ -94,7 +94,7 @@ static int open_volume(trip_brick_input *in)
     return status == 0 ? set_region(in) : status;
 }
 
-/* Of a text as JSON has it, in which an end of a line takes two. */
+/* Returns the length of a text in JSON, where a newline takes two bytes. */
 static uint64_t bytes_of(const trip_tf *tf)
 {
     char *text = trip_tf_to_text(tf);
@@ -105,10 +105,10 @@ static uint64_t bytes_of(const trip_tf *tf)
     return bytes;
 }
 
-/* Whether the text of a data set has room for them; the first stands there twice. */
+/* Checks that the metadata has room for the transfer functions; the first one appears twice. */
 static int check_functions(const trip_brick_input *in)
 {
-    const uint64_t room = TRIP_TEXT_BYTES_MAX - (1 << 20); /* beside the histogram and the rest */
+    const uint64_t room = TRIP_TEXT_BYTES_MAX - (1 << 20); /* besides the histogram and the rest */
     uint64_t bytes = 0;
     for (size_t i = 0; i < in->params->function_count; i++)
         bytes += bytes_of(in->functions[i]) * (i == 0 ? 2 : 1);
@@ -174,7 +174,7 @@ void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi)
     *hi = fmax(a, b);
 }
 
-/* Values are rounded to floats, in which a large offset may leave too few bits for exact codes. */
+/* Values are rounded to floats. A large offset can leave too few bits for exact codes. */
 static bool are_bytes_exact(const trip_brick_input *in)
 {
     trip_quantiser q = { 0 };
@@ -222,7 +222,7 @@ bool trip_brick_choose_compact(const trip_brick_input *in, double full, double s
     return trip_compact_normals_choose(&in->info->index_to_world, full, unit, step);
 }
 
-/* Whether normals of 3 bytes are as good as those of 4: they keep differences of values exactly. */
+/* Returns whether 3-byte normals keep differences of values exactly, as 4-byte normals do. */
 static bool are_compact_exact(const trip_brick_input *in)
 {
     double lo = 0, hi = 0, step[3];
@@ -248,7 +248,7 @@ unsigned trip_brick_normal_bytes(const trip_brick_input *in)
     return are_compact_exact(in) ? 3 : 4;
 }
 
-/* Normals of types of 8 or 16 bits are made before all values are seen, others once they are. */
+/* Normals of 8- and 16-bit types are made before all values are known, others after that. */
 static bool depend_normals_on_range(const trip_brick_input *in)
 {
     if (in->params->normals == TRIP_NORMALS_COMPACT)

@@ -8,21 +8,21 @@
 
 enum { MAX_SLICES = 32 };
 
-/* Allocated by the input before there is a plan. */
+/* Allocated by the input before the plan. */
 #define TAKEN_BYTES ((uint64_t)1 << 20)
-/* Allocated by the writer and the spill. With a halo there are more files, with smaller buffers. */
+/* Allocated by the writer and the spill. A halo needs more files, with smaller buffers. */
 #define OPENED_BYTES ((uint64_t)18 << 20)
 #define HALO_OPENED_BYTES ((uint64_t)16 << 20)
-/* Allocated by the list builder besides its pieces, and by readers. */
+/* Allocated by the list builder, without its pieces, and by readers. */
 #define LATE_BYTES ((uint64_t)2 << 20)
-/* Of the writer's index, for each tile of a sheet. */
+/* Index bytes of the writer per tile of a sheet. */
 #define TILE_BYTES 400
-/* A splat alone in its pieces, in the three lists of its kind. */
+/* Bytes of a lone splat in its pieces, in three lists. */
 #define LONE_SPLAT_BYTES (3 * 48)
 
 typedef struct needs {
-    uint64_t slice_bytes;  /* as stored */
-    uint64_t slice_splats; /* pieces of one slice, in one list, if all of it is kept */
+    uint64_t slice_bytes;  /* bytes of a slice as stored */
+    uint64_t slice_splats; /* pieces of one full slice in one list */
     uint64_t opened_bytes; /* allocated before the lists */
     uint64_t late_bytes;   /* allocated after them */
     uint64_t list_min_bytes, list_max_bytes;
@@ -55,31 +55,31 @@ static needs needs_of(const trip_volume_info *info, const trip_piece_format *f, 
     if (info->sparse)
         return n;
     n.slice_bytes = slice * trip_scalar_bytes(info->type);
-    /* A quarter more, as the ends of chunks remain empty. */
+    /* Adds a quarter, because the ends of chunks stay empty. */
     n.slice_splats = slice / tile * trip_piece_max_bytes(f) / 4 * 5 + slice * 16;
     return n;
 }
 
-/* A portion has a neighbour on each side, and two slices are kept for the next one. */
+/* A portion needs one slice on each side, and keeps two for the next portion. */
 static uint64_t reader_bytes(const needs *n, int64_t slices, bool read_ahead)
 {
     return (uint64_t)(slices + 2 + (read_ahead ? slices + 2 : 0) + 2) * n->slice_bytes;
 }
 
-/* Divides what is left between the reader and the lists; false when it is too little. */
+/* Divides the rest between the reader and the lists. Returns false if it is too little. */
 static bool divide(trip_memory_plan *plan, const needs *n, uint64_t left)
 {
     uint64_t used = n->late_bytes + reader_bytes(n, plan->slices, plan->read_ahead);
     if (used + n->list_min_bytes > left)
         return false;
     plan->list_bytes = left - used < n->list_max_bytes ? left - used : n->list_max_bytes;
-    /* One batch is made while the one before is written. */
+    /* One batch is made while the previous one is written. */
     uint64_t splats = 2 * (uint64_t)plan->slices * n->slice_splats;
     plan->in_order = splats > 0 && n->list_min_bytes + splats <= plan->list_bytes;
     return true;
 }
 
-/* Fills the plan for portions of `slices` slices; false if they do not fit. */
+/* Fills the plan for portions of `slices` slices. Returns false if they do not fit. */
 static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, int64_t slices,
                        bool read_ahead)
 {
@@ -87,8 +87,7 @@ static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, 
     return n->opened_bytes <= memory && divide(plan, n, memory - n->opened_bytes);
 }
 
-/* Large portions need less work at their borders, but most of the memory is better used for splats.
- */
+/* Large portions save work at their borders, but splats make better use of most of the memory. */
 static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_t memory)
 {
     return plan->in_order && reader_bytes(n, plan->slices, plan->read_ahead) <= memory / 4;
@@ -120,7 +119,7 @@ int trip_memory_plan_make(trip_memory_plan *plan, const char *path, const trip_v
                           int64_t slices)
 {
     needs n = needs_of(info, format, threads);
-    if (info->sparse) /* readers of sparse formats took what they need when they were opened */
+    if (info->sparse) /* readers of sparse formats allocated their memory when opened */
         return try_slices(plan, &n, memory_bytes, 1, true) ? 0 : refuse(path, info, &n, threads, 1);
     for (int64_t s = slices ? slices : MAX_SLICES; s >= (slices ? slices : 1); s /= 2)
         if (try_slices(plan, &n, memory_bytes, s, true) && is_comfortable(plan, &n, memory_bytes))

@@ -14,7 +14,7 @@
 #include "report.h"
 #include "text.h"
 
-/* Numbers in their shortest exact form: cJSON's own differs between its versions. */
+/* Prints numbers in their shortest exact form, because cJSON's form differs between versions. */
 static cJSON *number(double value)
 {
     char text[32];
@@ -55,7 +55,8 @@ static void add_histogram(cJSON *root, const trip_histogram *h)
         cJSON_AddItemToArray(counts, number((double)h->counts[i]));
 }
 
-/* For ranges alone: what they hold shows, more the higher the value, and nothing else does. */
+/* A transfer function for ranges only: values inside are visible, with opacity ascending with the
+ * value. */
 static int make_ramp(trip_tf **out, const trip_brick_metadata *t)
 {
     enum { POINTS = 4 };
@@ -85,7 +86,7 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
     return trip_tf_recognise(&origin, h);
 }
 
-/* What is drawn when no function is given. */
+/* Writes the default transfer function. */
 static int add_default_function(cJSON *root, const trip_brick_metadata *t)
 {
     trip_tf *made = NULL;
@@ -115,7 +116,7 @@ static void add_functions(cJSON *root, const trip_brick_metadata *t)
     }
 }
 
-/* One option as the command line takes it, "--name=value". */
+/* Adds one option in the command line's form, "--name=value". */
 __attribute__((format(printf, 2, 3))) static void add_option(cJSON *options, const char *form, ...)
 {
     char *text;
@@ -129,7 +130,7 @@ __attribute__((format(printf, 2, 3))) static void add_option(cJSON *options, con
     free(text);
 }
 
-/* How the input is read. */
+/* Writes the options for reading the input. */
 static void add_volume_options(cJSON *options, const trip_volume_params *v)
 {
     char number[3][32];
@@ -172,7 +173,7 @@ static void add_region(cJSON *options, const trip_region *r)
     add_option(options, "--region=%s,%s,%s", sides[0], sides[1], sides[2]);
 }
 
-/* What `brick` has to be given to make the data set again, but for what is kept. */
+/* Writes the options that make the data set again, except the options for kept values. */
 static void add_source_options(cJSON *root, const trip_brick_params *p)
 {
     cJSON *options = cJSON_AddArrayToObject(root, "source_options");
@@ -203,8 +204,8 @@ static const char *base_name(const char *path)
     return slash && slash[1] ? slash + 1 : path;
 }
 
-/* What drawing (render/dataset_metadata.c) makes of it, where that is not what it takes by default.
- */
+/* Writes the orientation that drawing (render/dataset_metadata.c) derives, if it is not the
+ * default. */
 static void print_guess(const trip_volume_info *info, trip_orientation u,
                         char guess[TRIP_BRICK_NOTE_BYTES / 2])
 {

@@ -1,6 +1,6 @@
-/* The text of a data set, JSON that describes its source and what was kept;
- * render/dataset_metadata.h lists the keys that drawing uses. It does not depend on memory, threads
- * or time. */
+/* Writes the metadata of a data set: JSON that describes its source and the kept values.
+ * render/dataset_metadata.h lists the keys that drawing uses. The text does not depend on memory,
+ * threads or time. */
 #ifndef TRIP_BRICK_METADATA_H
 #define TRIP_BRICK_METADATA_H
 
@@ -12,22 +12,22 @@ typedef struct trip_brick_metadata {
     const trip_brick_params *params;
     const trip_volume_info *info;
     const trip_envelope *envelope;
-    trip_tf *const *functions; /* params->function_count of them, in data units */
+    trip_tf *const *functions; /* params->function_count transfer functions, in data units */
     const trip_histogram *histogram;
-    trip_orientation
-        upright; /* without any, where the file or its format says how the volume lies */
+    trip_orientation upright; /* none if the file or its format gives the orientation */
 } trip_brick_metadata;
 
-/* The kind of a volume, recognised from its header and histogram; never TRIP_TF_AUTOMATIC. */
+/* Returns the kind of a volume, recognised from its header and histogram, never TRIP_TF_AUTOMATIC.
+ */
 trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h);
 
-/* What the user is to be told of how the volume was taken: its reader's note, and what its
- * shape says of how it lies; "" where there is nothing. */
+/* Writes the note for the user: the reader's choices, and the orientation guessed from the shape.
+ * "" if there is none. */
 enum { TRIP_BRICK_NOTE_BYTES = 1024 };
 void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
                               char note[TRIP_BRICK_NOTE_BYTES]);
 
-/* The text, for free(); NULL after a reported failure. */
+/* Returns the metadata, for free(), or NULL after a reported failure. */
 char *trip_brick_metadata_make(const trip_brick_metadata *t);
 
 #endif

@@ -8,7 +8,7 @@
 #include "identity.h"
 #include "report.h"
 
-/* The output's name and a suffix, for free(); NULL after a reported failure. */
+/* Returns the output's name with a suffix, for free(), or NULL after a reported failure. */
 static char *name_beside(const char *output, const char *suffix)
 {
     char *path;

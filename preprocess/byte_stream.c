@@ -15,12 +15,12 @@
 #include "file_pieces.h"
 #include "report.h"
 
-/* The buffer of compressed bytes; plain files are read into the caller's memory. */
+/* Size of the buffer for compressed bytes. Plain files are read into the caller's memory. */
 #define PIECE_BYTES ((size_t)1 << 20)
-/* Plain data from this size on is read by several threads. */
+/* Minimum size of plain data for reading by several threads. */
 #define LARGE_BYTES ((uint64_t)4 << 20)
-/* The most that is read or decompressed between checks for an interruption; the decompressors count
- * in 32 bits. */
+/* Maximum to read or decompress between checks for an interruption. The decompressors count in 32
+ * bits. */
 #define STEP_BYTES ((size_t)4 << 20)
 
 struct trip_byte_stream {
@@ -28,11 +28,11 @@ struct trip_byte_stream {
     char *path;
     int fd;
     uint64_t file_bytes;
-    uint64_t position;        /* in the file, of the next byte to read */
-    uint64_t done;            /* bytes of the source delivered */
-    trip_file_pieces *pieces; /* of a large plain file; or NULL */
+    uint64_t position;        /* file position of the next byte to read */
+    uint64_t done;            /* bytes delivered so far */
+    trip_file_pieces *pieces; /* reader of a large plain file, or NULL */
 
-    unsigned char *piece; /* compressed bytes read but not used yet: */
+    unsigned char *piece; /* compressed bytes not used yet: */
     size_t piece_used, piece_bytes;
     bool ended; /* the compressed stream is complete */
     bool codec_ready;
@@ -54,7 +54,7 @@ trip_byte_encoding trip_byte_encoding_of(const char *path)
 
 static int open_regular(const char *path, int *fd_out, uint64_t *bytes_out)
 {
-    /* Not blocking, so that a FIFO is refused rather than waited for. */
+    /* Non-blocking, so that a FIFO is refused and not waited for. */
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     struct stat st;
     if (fd < 0)
@@ -114,7 +114,7 @@ static int check_interrupt(const trip_byte_stream *s)
     return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "read", s->path, "interrupted") : 0;
 }
 
-/* Reads `bytes` bytes at the present position, fewer only at the end of the file. */
+/* Reads `bytes` bytes at the current position, fewer only at the end of the file. */
 static int read_file(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
 {
     size_t got = 0;
@@ -179,7 +179,7 @@ static int step_bzip2(trip_byte_stream *s, unsigned char *to, size_t bytes, size
     return code == BZ_OK || code == BZ_STREAM_END ? 0 : corrupt(s);
 }
 
-/* Whether another member of the same kind follows a complete one in the buffer. */
+/* Returns whether another member of the same kind follows in the buffer. */
 static bool another_member(const trip_byte_stream *s)
 {
     const unsigned char *next = s->piece + s->piece_used;
@@ -190,7 +190,7 @@ static bool another_member(const trip_byte_stream *s)
     return next[0] == 'B' && next[1] == 'Z';
 }
 
-/* After a completed member: begins the next one, if any. */
+/* Begins the next member after a complete one, if there is any. */
 static int next_member(trip_byte_stream *s)
 {
     size_t left = s->piece_bytes - s->piece_used, more = 0;
@@ -250,7 +250,7 @@ static void warn_left_over(trip_byte_stream *s, const char *count_text)
     s->source.warned = true;
 }
 
-/* Reads to the end of a compressed stream, which checks its checksum. */
+/* Reads to the end of a compressed stream, which verifies its checksum. */
 static int finish(trip_byte_stream *s)
 {
     unsigned char extra;
@@ -341,7 +341,7 @@ int trip_byte_stream_rewind(trip_byte_stream *s)
     return status < 0 ? status : skip_decompressed(s, s->source.skip_bytes);
 }
 
-/* A plain file's length is known before anything is read. */
+/* The length of a plain file is checked before reading. */
 static int check_length(trip_byte_stream *s)
 {
     bool plain = s->source.encoding == TRIP_BYTES_PLAIN;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of a sum over eight; what there is does not become nothing. */
+/* Divides a sum over eight; a positive sum stays positive. */
 static uint16_t eighth(uint32_t sum)
 {
     const uint32_t part = (sum + 4) / 8;
@@ -26,15 +26,15 @@ void trip_coarse_mean_clear(trip_coarse_mean_sum *s)
     memset(s->open, 255, sizeof s->open);
 }
 
-/* Voxels of a column cover one another as if by chance, which is exact where one covers all. */
+/* Assumes that voxels of a column overlap at random. This is exact if one covers everything. */
 static void cover_column(uint8_t *open, unsigned cover)
 {
     *open = (uint8_t)(((unsigned)*open * (TRIP_COARSE_ALL - cover) + TRIP_COARSE_ALL / 2) /
                       TRIP_COARSE_ALL);
 }
 
-/* Gradients count by their length: of a solid the surface is seen, whose voxels have them, not the
- * inside. */
+/* Weights gradients by their length, because the surface of a solid is visible and has gradients,
+ * and the inside is not. */
 static void add_gradient(trip_coarse_mean_sum *s, double part, const double gradient[3])
 {
     double along = 0, length2 = 0;
@@ -48,7 +48,7 @@ static void add_gradient(trip_coarse_mean_sum *s, double part, const double grad
         s->gradient[a] += (float)(copysign(weight, along) * gradient[a]);
 }
 
-/* Of a voxel whose coordinates are odd as the bits of the index say, its column along each axis. */
+/* Column along each axis, by the parity bits of a voxel's coordinates. */
 static const uint8_t columns[8][3] = { { 0, 0, 0 }, { 0, 2, 1 }, { 1, 0, 2 }, { 1, 2, 3 },
                                        { 2, 1, 0 }, { 2, 3, 1 }, { 3, 1, 2 }, { 3, 3, 3 } };
 
@@ -76,7 +76,7 @@ void trip_coarse_mean_add(trip_coarse_mean_sum *s, const trip_coarse_mean *mean,
         add_gradient(s, mean->kept, gradient);
 }
 
-/* As rint() of what is from 0 to 2^51, which many processors have no instruction for. */
+/* Equals rint() for 0 to 2^51; many processors lack an instruction for it. */
 static double nearest(double x)
 {
     const double whole = 0x1p52;

@@ -1,20 +1,21 @@
-/* The voxels of coarse levels, each made of the 2 x 2 x 2 of the level below. Pure functions. */
+/* The voxels of coarse levels. Each one combines 2 x 2 x 2 voxels of the level below. Pure
+ * functions. */
 #ifndef TRIP_COARSE_H
 #define TRIP_COARSE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Parts and shares are in 65535ths. */
+/* Shares are in units of 1 / 65535. */
 enum { TRIP_COARSE_ALL = 65535 };
 
-/* A voxel of any level: where it is, and what is interpolated. */
+/* A voxel of any level: its position and its value for interpolation. */
 typedef struct trip_coarse_value {
-    uint8_t u, v;   /* in its square of the sheet, along x and y */
-    uint16_t known; /* the part of its voxels of level 0 that have a value: kept ones and halo */
-    uint16_t value; /* their mean code */
-    /* Where some of its voxels were kept, the least code of those that were not, turned round
-     * (trip_coarse_turned()), for voxels beside it that have no value; or one of these. */
+    uint8_t u, v;   /* position in its square of the sheet */
+    uint16_t known; /* share of its level 0 voxels with a value: kept or halo */
+    uint16_t value; /* mean code of the voxels with a value */
+    /* If it covers kept voxels: the minimum turned code (trip_coarse_turned()) of its other voxels,
+     * for neighbours without a value. Otherwise one of these constants. */
     uint16_t around;
 } trip_coarse_value;
 
@@ -23,26 +24,26 @@ enum {
     TRIP_COARSE_ALL_KEPT = UINT16_MAX - 1, /* of those known */
 };
 
-/* What its splat needs. */
+/* The data of its splat. */
 typedef struct trip_coarse_mean {
-    uint16_t kept;     /* the part of its voxels of level 0 that were kept; 0: none */
-    uint16_t mean;     /* code of those */
-    uint16_t cover[3]; /* of its columns along an axis, those with kept voxels */
-    uint32_t normal;   /* packed: of those kept, see below */
+    uint16_t kept;     /* share of its level 0 voxels that were kept */
+    uint16_t mean;     /* mean code of the kept ones */
+    uint16_t cover[3]; /* by axis: share of its columns with kept voxels */
+    uint32_t normal;   /* packed mean gradient of the kept ones */
 } trip_coarse_mean;
 
-/* Codes are turned round where what is not kept lies above what is, so that what shows least has
- * the least. */
+/* Reverses codes if dropped values lie above kept ones, so that the least visible value has the
+ * minimum code. */
 static inline uint16_t trip_coarse_turned(uint16_t code, bool round)
 {
     return round ? (uint16_t)(UINT16_MAX - code) : code;
 }
 
-/* Sums over the voxels of one coarse voxel; all zero before the first. */
+/* Sums over the voxels of one coarse voxel. Zero-initialise it. */
 typedef struct trip_coarse_value_sum {
     uint64_t value;
     uint32_t known;
-    uint16_t below; /* how far `around` lies below UINT16_MAX, of what was not kept; 0: nothing */
+    uint16_t below; /* UINT16_MAX minus `around` of dropped voxels; 0 if there are none */
     bool kept;
 } trip_coarse_value_sum;
 
@@ -52,7 +53,7 @@ static inline void trip_coarse_value_add_around(trip_coarse_value_sum *s, uint16
     s->below = below > s->below ? below : s->below;
 }
 
-/* A voxel of the level below. */
+/* Adds a voxel of the level below. */
 static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value,
                                          bool round)
 {
@@ -63,7 +64,7 @@ static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_co
     trip_coarse_value_add_around(s, kept ? value->around : trip_coarse_turned(value->value, round));
 }
 
-/* Some voxels of level 0 at once: the sum of their codes. */
+/* Adds several level 0 voxels at once by the sum of their codes. */
 static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_t count,
                                                uint32_t codes, bool kept)
 {
@@ -72,31 +73,31 @@ static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_
     s->kept |= kept;
 }
 
-/* All but `u` and `v`, of a sum of some. */
+/* Computes all members but `u` and `v`. The sum must not be empty. */
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out);
 
-/* The same of means; cleared before the first. */
+/* Sums for the means of one coarse voxel. Clear it before the first voxel. */
 typedef struct trip_coarse_mean_sum {
     float kept, mean;
-    float gradient[3], steep; /* each times its length; sum of the lengths */
-    uint8_t open[3][4]; /* of the columns along an axis, in 255ths, the part without kept voxels */
+    float gradient[3], steep; /* sum of gradients times their lengths; sum of the lengths */
+    uint8_t open[3][4];       /* by axis and column: share without kept voxels, in 1 / 255 */
 } trip_coarse_mean_sum;
 
 void trip_coarse_mean_clear(trip_coarse_mean_sum *s);
 
-/* Adds a voxel whose coordinates are odd as the bits 0 to 2 of `odd` say; `gradient` NULL: without
- * one. The sign of gradients may be lost (normal.h): they are turned to point the same way. */
+/* Adds a voxel. Bits 0 to 2 of `odd` are the parity of its coordinates. `gradient` may be NULL.
+ * Normals can lose their sign (normal.h), so gradients are turned to agree. */
 void trip_coarse_mean_add(trip_coarse_mean_sum *s, const trip_coarse_mean *mean, unsigned odd,
                           const double gradient[3]);
 
-/* The same of a voxel of level 0 that was kept. */
+/* Adds a kept voxel of level 0. */
 void trip_coarse_mean_add_whole(trip_coarse_mean_sum *s, uint16_t code, unsigned odd,
                                 const double gradient[3]);
 
-/* Without the normal. */
+/* Computes the mean, without the normal. */
 void trip_coarse_mean_get(const trip_coarse_mean_sum *s, trip_coarse_mean *out);
 
-/* The mean gradient of what was kept, each counted by its length. */
+/* Returns the mean gradient of the kept voxels, weighted by length. */
 void trip_coarse_mean_gradient(const trip_coarse_mean_sum *s, double gradient[3]);
 
 #endif

@@ -6,10 +6,10 @@
 #include "report.h"
 
 typedef struct dense_file {
-    trip_byte_source *sources; /* with paths of our own */
+    trip_byte_source *sources; /* with owned paths */
     int64_t count, current;
-    trip_byte_stream *stream; /* of the current source */
-    uint64_t left_bytes;      /* in it */
+    trip_byte_stream *stream; /* stream of the current source */
+    uint64_t left_bytes;      /* position in the current source */
     uint64_t slice_bytes;
     bool swap;
 } dense_file;
@@ -31,8 +31,8 @@ static int open_source(dense_file *d, int64_t index)
     return trip_byte_stream_open(&d->stream, &d->sources[index]);
 }
 
-/* Opens each source once, so that a missing or short one is found before hours of work; the first
- * remains open. */
+/* Opens each source once, so that a missing or short file fails before hours of work. The first one
+ * stays open. */
 static int open_all(dense_file *d)
 {
     for (int64_t i = d->count - 1; i >= 0; i--) {
@@ -103,10 +103,10 @@ int trip_dense_rewind(void *state)
     return trip_byte_stream_rewind(d->stream);
 }
 
-/* An interruption is noticed between reads of this length. */
+/* Bytes between checks for an interruption. */
 #define READ_BYTES_MAX ((uint64_t)32 << 20)
 
-/* Reads the next bytes, from several sources if need be; skips them when `to` is NULL. */
+/* Reads the next bytes, across sources if necessary. Skips them if `to` is NULL. */
 static int take_bytes(dense_file *d, uint64_t bytes, char *to)
 {
     while (bytes > 0) {

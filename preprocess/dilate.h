@@ -1,12 +1,12 @@
-/* Morphological dilation of a set of voxels by their 26 neighbours, which interpolation needs at
- * the border of what is kept. Pure functions. */
+/* Morphological dilation by the 26 neighbours. It finds the halo, which interpolation needs at the
+ * border of the kept voxels. Pure functions. */
 #ifndef TRIP_DILATE_H
 #define TRIP_DILATE_H
 
 #include <stdint.h>
 
-/* Flags of a box, 0 or 1, dense, x fastest: entries of `out` become 1 where the voxel or a
- * neighbour inside the box has its flag set, else 0. `scratch` is as large as they are. */
+/* Dilates the flags (0 or 1) of a dense box, x fastest. `out` is 1 if the voxel or a neighbour
+ * inside the box is set, else 0. `scratch` has the same size. */
 void trip_dilate(const uint8_t *flags, uint8_t *out, uint8_t *scratch, const int64_t size[3]);
 
 #endif

@@ -7,10 +7,11 @@
 
 #include "report.h"
 
-/* With more intervals, each value of a row is searched for instead. */
+/* With more intervals, each value of a row is found by search. */
 enum { MAX_SWEPT_INTERVALS = 4 };
 
-/* Finite floats numbered in ascending order: -0 and +0 are 0, their neighbours -1 and 1. */
+/* Numbers the finite floats in ascending order: -0 and +0 have rank 0, their neighbours -1 and 1.
+ */
 static int64_t rank_of(float f)
 {
     int32_t bits;
@@ -26,7 +27,8 @@ static float float_of(int64_t rank)
     return f;
 }
 
-/* Rank of the smallest float >= value; one above that of FLT_MAX when there is none. */
+/* Returns the rank of the smallest float >= value, or the rank of FLT_MAX plus 1 if there is none.
+ */
 static int64_t rank_at_least(double value)
 {
     if (value > FLT_MAX)
@@ -47,7 +49,7 @@ static int out_of_memory(void)
     return trip_fail(TRIP_ERROR, "brick", "opacity envelope", "out of memory");
 }
 
-/* Adds the ranks [lo, hi] and merges the intervals that they touch. */
+/* Adds the ranks [lo, hi] and merges touching intervals. */
 static int add_ranks(trip_envelope *e, int64_t lo, int64_t hi)
 {
     size_t first = 0, past;
@@ -88,9 +90,9 @@ static bool shows(const trip_tf *tf, int64_t rank)
     return trip_tf_evaluate(tf, float_of(rank)).opacity > 0;
 }
 
-/* Adds the visible ones of the ranks [lo, hi], on which the opacity is monotone: each rounding step
- * of its evaluation (subtract, divide, multiply, add) is monotone, too, so that the visible ranks
- * are one interval at one end, whose border bisection finds exactly. */
+/* Adds the visible ranks of [lo, hi], where opacity is monotone. Every rounding step of its
+ * evaluation (subtract, divide, multiply, add) is monotone too. So the visible ranks are one
+ * interval at one end, and bisection finds its border exactly. */
 static int add_monotone(trip_envelope *e, const trip_tf *tf, int64_t lo, int64_t hi)
 {
     if (lo > hi)

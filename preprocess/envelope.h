@@ -1,7 +1,6 @@
 /* The opacity envelope: the set of values that become splats. It is the union of value ranges and
- * of the values to which transfer functions give opacity above 0, stored exactly for float32 values
- * as closed intervals, disjoint and ascending. One thread builds it; then any thread may read it.
- */
+ * of all values with opacity above 0 in a transfer function. It is exact for float32 values, as
+ * closed, disjoint, ascending intervals. One thread builds it; then any thread may read it. */
 #ifndef TRIP_ENVELOPE_H
 #define TRIP_ENVELOPE_H
 
@@ -19,7 +18,7 @@ typedef struct trip_envelope {
     size_t count;
 } trip_envelope;
 
-/* A zeroed envelope is empty. Each of these adds to it, or reports a failure. */
+/* A zeroed envelope is empty. Each of these functions adds values, or reports a failure. */
 int trip_envelope_add_range(trip_envelope *e, double lo, double hi);
 /* Adds exactly the values v with trip_tf_evaluate(tf, v).opacity > 0; tf is in data units. */
 int trip_envelope_add_tf(trip_envelope *e, const trip_tf *tf);
@@ -27,9 +26,9 @@ int trip_envelope_add_tf(trip_envelope *e, const trip_tf *tf);
 int trip_envelope_add_all(trip_envelope *e);
 void trip_envelope_destroy(trip_envelope *e);
 
-/* False for every value that is not finite. */
+/* Returns whether the envelope contains a value; false for values that are not finite. */
 bool trip_envelope_keeps(const trip_envelope *e, float value);
-/* keep[i] becomes 1 where value i is in the envelope, else 0. */
+/* Sets keep[i] to 1 if value i is in the envelope, else 0. */
 void trip_envelope_keep_row(const trip_envelope *e, const float *values, size_t count,
                             uint8_t *keep);
 

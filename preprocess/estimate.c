@@ -14,21 +14,21 @@
 #include "levels.h"
 #include "report.h"
 
-/* Portions in a sample, and slices of each where memory permits. */
+/* Number of portions in a sample, and slices of each if memory permits. */
 enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
-/* The status with which a scan ends that has taken long enough. */
+/* Status of a scan that reached its time limit. */
 enum { STOPPED = -100 };
-/* Written to measure the disk's speed. */
+/* Bytes written to measure the disk's speed. */
 #define TRIAL_BYTES ((size_t)32 << 20)
-/* How long a sample may take before a run begins: longer for a run that takes hours. */
+/* Time limit of a sample before a run; longer runs allow more. */
 static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
-/* Bytes of masks for each record: those of a halo have fewer bits set. */
+/* Bytes of masks per record; the masks of a halo have fewer bits set. */
 static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
-/* What coarse levels add, of the bytes of level 0: those of a body have an eighth of the voxels of
- * the level below, those of a surface a quarter, and of thin vessels more. Volumes of these kinds
- * took 0.16 to 0.23 for means, their normals among them, and 0.04 to 0.16 for values. */
+/* Bytes of coarse levels relative to level 0. A level has an eighth of the voxels below it for a
+ * body, a quarter for a surface, more for thin vessels. Measured: 0.16 to 0.23 for means with
+ * normals, 0.04 to 0.16 for values. */
 static const double means_part = 0.19, values_part = 0.06;
-/* As estimates are from a sample, a run is refused only if this part of them does not fit. */
+/* Estimates are uncertain: a run is refused only if this share of the estimate does not fit. */
 static const double surely = 0.7;
 
 static double now_seconds(void)
@@ -46,7 +46,7 @@ static int64_t slices_of(const trip_memory_plan *plan)
 static uint64_t stride_of(const trip_brick_input *in, const trip_memory_plan *plan)
 {
     uint64_t portions = (uint64_t)(in->info->dims[2] / slices_of(plan)) + 1;
-    if (in->info->sparse) /* the number of voxels differs too much between portions */
+    if (in->info->sparse) /* the number of voxels varies too much between portions */
         return 1;
     return portions > SAMPLES ? portions / SAMPLES : 1;
 }
@@ -63,7 +63,7 @@ static int on_progress(void *user, uint64_t voxels)
     return now_seconds() > s->until ? STOPPED : 0;
 }
 
-/* The part of the grid that is in the region. */
+/* Returns the share of the grid inside the region. */
 static double part_in_region(const trip_brick_input *in)
 {
     double part = 1;
@@ -72,9 +72,9 @@ static double part_in_region(const trip_brick_input *in)
     return part;
 }
 
-/* Scales the sample up to the volume, and down to the region. A layer of one voxel around a body
- * has three voxels for each pair of neighbours along x across its border, in the mean over
- * directions. */
+/* Scales the sample up to the volume and down to the region. On average over directions, a
+ * one-voxel layer around a body has three voxels per pair of neighbours along x across its border.
+ */
 static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick_estimate *e)
 {
     double all = in->info->sparse ? (double)t->voxels : (double)in->grid_voxels;
@@ -85,8 +85,8 @@ static void scale_up(const trip_brick_input *in, const trip_tally *t, trip_brick
     e->halo = in->params->no_halo ? 0 : (uint64_t)(3 * scale * (double)t->borders);
 }
 
-/* Seconds that all of the volume takes, after a scan from `begin` on into a tally, which took
- * `skipping` of them to get past the rest. */
+/* Estimates the seconds for the whole volume from a scan that began at `begin`. `skipping` of its
+ * seconds were spent skipping data. */
 static double seconds_for_all(const trip_brick_input *in, const trip_tally *t, double begin,
                               double skipping)
 {
@@ -94,9 +94,9 @@ static double seconds_for_all(const trip_brick_input *in, const trip_tally *t, d
     return (now_seconds() - begin - skipping) / part + skipping;
 }
 
-/* Estimates the numbers of voxels from portions at regular distances in the volume, for at most
- * `limit_seconds` (0: no limit), and adds the seconds that all of it takes to the estimate; the
- * input's envelope is made. 1: *e has the numbers; 0: it took too long. */
+/* Estimates the numbers of voxels from portions at regular distances, and the seconds for the whole
+ * volume. Makes the input's envelope. Stops after `limit_seconds` (0 means no limit). Returns 1 if
+ * *e is filled, 0 at the time limit. */
 static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
                          trip_brick_estimate *e)
 {
@@ -123,7 +123,7 @@ static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, dou
     return status < 0 ? status : 1;
 }
 
-/* The folder that the output will be in, for free(). */
+/* Returns the output's folder, for free(). */
 static char *folder_of(const char *path)
 {
     char *copy = strdup(path), *folder = copy ? strdup(dirname(copy)) : NULL;
@@ -140,14 +140,14 @@ static uint64_t free_bytes(const char *output)
     return known ? (uint64_t)v.f_bavail * v.f_frsize : UINT64_MAX;
 }
 
-/* Bytes of a piece for each of its splats, if it has many. */
+/* Returns the bytes per splat of a large piece. */
 static double piece_bytes(const trip_piece_format *f, unsigned list)
 {
     const trip_piece_format own = trip_piece_format_of(f, list);
     return (double)trip_piece_max_bytes(&own) / (double)(1 << 2 * f->tile_log2);
 }
 
-/* Bytes of all levels over those of the finest. */
+/* Returns the bytes of all levels relative to the finest. */
 static double with_levels(const trip_brick_input *in, unsigned tile_voxels)
 {
     const trip_brick_params *p = in->params;
@@ -173,7 +173,7 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     e->free_bytes = free_bytes(in->params->output);
 }
 
-/* Seconds to write a byte on the disk of the output, measured with an unnamed file. */
+/* Measures the seconds per written byte on the output's disk with an unnamed file. */
 static double seconds_per_byte(const char *output)
 {
     char *folder = folder_of(output);
@@ -193,7 +193,7 @@ static double seconds_per_byte(const char *output)
     return seconds;
 }
 
-/* In place of the scan of all values that precedes a run. */
+/* Replaces the full scan before a run. */
 static int scan_sample(trip_brick_input *in, const trip_memory_plan *plan, trip_brick_estimate *e)
 {
     double begin = now_seconds(), skipping = 0;

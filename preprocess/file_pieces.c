@@ -17,20 +17,20 @@ enum { THREADS = 4, PIECE_BYTES = 512 << 10, ALIGNMENT_BYTES = 4096 };
 struct trip_file_pieces {
     int fd, direct_fd;
     uint64_t file_bytes;
-    unsigned char *map;    /* of the file, for mincore(): its bytes are not accessed */
-    unsigned char *memory; /* a piece for every thread */
-    bool failed;           /* a read failed: later ones are refused */
+    unsigned char *map;    /* mapping of the file for mincore(); its bytes are not accessed */
+    unsigned char *memory; /* one piece per thread */
+    bool failed;           /* a read failed; later ones are refused */
 };
 
-/* One read. */
+/* A read in progress. */
 typedef struct job {
     const trip_file_pieces *file;
-    uint64_t begin, end, first; /* first: where pieces start, aligned */
+    uint64_t begin, end, first; /* first: aligned start of the pieces */
     uint64_t pieces;
     unsigned char *to;
     trip_scope *scope;         /* of the calling thread */
     atomic_uint_fast64_t next; /* piece */
-    atomic_uint threads;       /* that have begun, each with its piece of memory */
+    atomic_uint threads;       /* threads started, each with its piece of memory */
     atomic_bool failed;
 } job;
 
@@ -68,7 +68,7 @@ void trip_file_pieces_destroy(trip_file_pieces *p)
     free(p);
 }
 
-/* Whether the page cache holds all of [from, to), which is no longer than a piece. */
+/* Returns whether the page cache holds all of [from, to), at most one piece. */
 static bool is_cached(const trip_file_pieces *p, uint64_t from, uint64_t to)
 {
     unsigned char cached[PIECE_BYTES / ALIGNMENT_BYTES + 1];
@@ -123,7 +123,7 @@ bool trip_file_pieces_read(trip_file_pieces *p, uint64_t offset, void *to, size_
     if (p->failed || bytes == 0 || j.end > p->file_bytes)
         return bytes == 0;
     j.pieces = (j.end - j.first + PIECE_BYTES - 1) / PIECE_BYTES;
-    /* The calling thread is one of them. */
+    /* The calling thread is one of the readers. */
     while (started + 1 < THREADS && started + 1 < j.pieces &&
            pthread_create(&threads[started], NULL, read_pieces, &j) == 0)
         started++;

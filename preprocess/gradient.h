@@ -1,5 +1,5 @@
-/* Gradients of a volume's values by central differences, one-sided where only one neighbour is
- * there. Pure functions. */
+/* Gradients of a volume by central differences, or one-sided ones if a neighbour is missing. Pure
+ * functions. */
 #ifndef TRIP_GRADIENT_H
 #define TRIP_GRADIENT_H
 
@@ -7,20 +7,20 @@
 
 #include "volume.h"
 
-/* What the difference of both neighbours along an axis is multiplied by: 1/2, or 1 at a border,
- * beyond which the voxel itself is repeated, so that the difference is one-sided. */
+/* Returns the factor of the difference of both neighbours along an axis: 1/2, or 1 at a border.
+ * Beyond a border the voxel itself is repeated, which makes the difference one-sided. */
 static inline double trip_gradient_share(bool at_border)
 {
     return at_border ? 1 : 0.5;
 }
 
-/* The second half of trip_gradient_at(), where a difference is not finite. */
+/* Slow path of trip_gradient_at(), for differences that are not finite. */
 void trip_gradient_careful(const float *value, const int64_t step[3], const double share[3],
                            double gradient[3]);
 
-/* The gradient in index space, value units per index, at a voxel whose neighbours along axis a are
- * at value[step[a]] and value[-step[a]], with trip_gradient_share() of each axis. Where one
- * neighbour is not finite the difference is that to the other; without either it is 0. */
+/* Returns the gradient in index space, value units per index. The voxel's neighbours along axis a
+ * are value[step[a]] and value[-step[a]]; share[a] is trip_gradient_share(). If one neighbour is
+ * not finite, the difference is one-sided; if both are not, it is 0. */
 static inline void trip_gradient_at(const float *value, const int64_t step[3],
                                     const double share[3], double gradient[3])
 {
@@ -30,9 +30,9 @@ static inline void trip_gradient_at(const float *value, const int64_t step[3],
         trip_gradient_careful(value, step, share, gradient);
 }
 
-/* A power of two near the length of a voxel. Gradients that are kept as floats until the range of
- * the values is known are in value units per this length, so that no world unit takes them out of
- * the range of a float. */
+/* Returns a power of two near the length of a voxel. Gradients are kept as floats in value units
+ * per this length until the range of values is known. So no world unit exceeds the range of a
+ * float. */
 double trip_gradient_unit(const trip_affine *index_to_world);
 
 #endif

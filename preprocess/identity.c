@@ -11,8 +11,8 @@
 #include "source.h"
 #include "text.h"
 
-/* To be raised with every change after which the same input and parameters give other bytes,
- * whether in a reader, in triptych-images or in the bricker. */
+/* Raise this with every change that makes the same input and parameters give other bytes: in a
+ * reader, in triptych-images or in the bricker. */
 enum { BRICKER_VERSION = 19 };
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
@@ -51,7 +51,7 @@ static int fail_memory(const trip_brick_params *p)
     return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
 }
 
-/* The parameters after the input's name, for free(). */
+/* Returns the parameters after the input's name, for free(). */
 static int make_text(const trip_brick_params *p, const char *input, trip_tf *const *functions,
                      char **out)
 {

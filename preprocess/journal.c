@@ -15,21 +15,21 @@
 #include "read_at.h"
 #include "report.h"
 
-/* A record is never longer: no checkpoint adds that many sequences. */
+/* Maximum length of a record; no checkpoint adds that many sequences. */
 enum { RUN_BUFFER = 4096, RECORD_MAX_BYTES = 4 << 20 };
 
 enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2, RECORD_OUTPUT = 3 };
 
-/* Precedes every record. That of a checkpoint ends with its new sequences. */
+/* Header of a record. The record of a checkpoint ends with its new sequences. */
 typedef struct record_head {
     uint64_t kind;
-    uint64_t bytes;    /* of the record after this */
-    uint64_t checksum; /* XXH64 of them, the kind as seed */
+    uint64_t bytes;    /* bytes of the record after this header */
+    uint64_t checksum; /* XXH64 of those bytes, with the kind as seed */
 } record_head;
 
 struct trip_journal {
     trip_journal_params params;
-    char *path; /* of the journal, for messages */
+    char *path; /* path of the journal, for messages */
     trip_budget *budget;
     int file, runs_file;
     uint64_t offset; /* end of the valid records */
@@ -55,7 +55,7 @@ static int write_at(const trip_journal *j, int file, uint64_t offset, const void
     return errno ? trip_fail_errno("brick", j->path, "cannot write") : 0;
 }
 
-/* False at the end of the file, too. */
+/* Reads bytes. Returns false also at the end of the file. */
 static bool read_at(int file, uint64_t offset, void *data, size_t bytes)
 {
     return trip_read_at(file, data, bytes, bytes, offset) == (ssize_t)bytes;
@@ -71,7 +71,7 @@ static int append_record(trip_journal *j, enum record_kind kind, const void *rec
     return status;
 }
 
-/* Room for the longest record, from the budget; the caller releases it. */
+/* Allocates room for the longest record from the budget. The caller releases it. */
 static void *take_room(const trip_journal *j)
 {
     void *room = trip_budget_take(j->budget, RECORD_MAX_BYTES);
@@ -81,7 +81,7 @@ static void *take_room(const trip_journal *j)
     return room;
 }
 
-/* Reads the record at `offset`; false where there is no sound one. */
+/* Reads the record at `offset`. Returns false if there is no valid one. */
 static bool read_record(const trip_journal *j, uint64_t offset, record_head *head, void *record)
 {
     return read_at(j->file, offset, head, sizeof *head) && head->bytes <= RECORD_MAX_BYTES &&
@@ -89,7 +89,7 @@ static bool read_record(const trip_journal *j, uint64_t offset, record_head *hea
            XXH64(record, head->bytes, head->kind) == head->checksum;
 }
 
-/* For records with a sound checksum that no run writes: they may have been made on purpose. */
+/* Refuses a record with a valid checksum that no run writes. It may be forged. */
 static int fail_false(const trip_journal *j, const char *stage)
 {
     return trip_fail(TRIP_ERROR, "brick", j->path,
@@ -113,7 +113,7 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
     return 0;
 }
 
-/* Whether no count is below that of the checkpoint before, which is clear at first; that of
+/* Returns whether no count is below the previous checkpoint's, which starts at zero. The count of
  * sequences follows from the record. */
 static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
 {
@@ -124,8 +124,7 @@ static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
     return fits;
 }
 
-/* *voxels becomes the number of voxels in the part that was done; for sparse volumes an upper
- * bound.
+/* Sets *voxels to the number of voxels in the finished part, or an upper bound for sparse volumes.
  */
 static bool done_voxels(const trip_journal_params *p, uint64_t done, uint64_t *voxels)
 {
@@ -135,8 +134,8 @@ static bool done_voxels(const trip_journal_params *p, uint64_t done, uint64_t *v
     return *voxels <= p->voxels;
 }
 
-/* Whether the halo can be as large: kept voxels have 26 neighbours each, and in dense volumes the
- * halo is among the voxels that are not kept. */
+/* Returns whether the halo's size is possible. Each kept voxel has 26 neighbours, and in dense
+ * volumes the halo lies among the other voxels. */
 static bool can_have_halo(const trip_journal_params *p, const trip_checkpoint *c, uint64_t voxels)
 {
     uint64_t each = c->kept ? c->halo / c->kept : c->halo;
@@ -179,8 +178,8 @@ static bool has_runs(const trip_journal *j, uint64_t runs)
     return fstat(j->runs_file, &st) == 0 && runs <= (uint64_t)st.st_size / sizeof(trip_run_record);
 }
 
-/* Reads a checkpoint and its new sequences. Returns 1 when it is accepted, 0 when data that it
- * needs are not there any more. */
+/* Reads a checkpoint and its new sequences. Returns 1 if it is accepted, 0 if data that it needs
+ * are missing. */
 static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *record, uint64_t bytes)
 {
     trip_checkpoint *c = malloc(sizeof *c);
@@ -206,7 +205,7 @@ static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *recor
     return taken;
 }
 
-/* It is the last record, and is cut off: a run that goes on has another output. */
+/* Drops the last record, because a resumed run has another output. */
 static int take_output(trip_journal *j, const void *record, uint64_t bytes)
 {
     if (bytes != sizeof j->output)
@@ -225,7 +224,7 @@ static int take_record(trip_journal *j, trip_spill *spill, const record_head *he
                                        : fail_false(j, "a record");
 }
 
-/* Reads checkpoints until one is cut off or needs data that are not there. */
+/* Reads checkpoints until one is truncated or needs missing data. */
 static int read_checkpoints(trip_journal *j, trip_spill *spill, void *record)
 {
     record_head head;

@@ -8,7 +8,7 @@
 
 enum { PROGRESS_MS = 200 };
 
-/* The user of spill_piece(). */
+/* The user data of spill_piece(). */
 typedef struct spilling {
     trip_spill *spill;
     const trip_piece_format *format;
@@ -41,11 +41,11 @@ int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *po
     return spill_sources(spill, list, &pool->formats[list], &source, 1);
 }
 
-/* Used by all workers. */
+/* Shared by all workers. */
 typedef struct merge_job {
     const trip_list_merge *merge;
     unsigned lists[TRIP_MAX_LISTS];
-    pthread_mutex_t lock; /* guards the pool's free chain */
+    pthread_mutex_t lock;
 } merge_job;
 
 static size_t sequences_of(const trip_list_merge *m, unsigned list)
@@ -58,11 +58,11 @@ static size_t sequences_of(const trip_list_merge *m, unsigned list)
     return count;
 }
 
-/* Readers of sequences of one list, each with a chunk as its buffer. */
+/* Readers of several sequences of one list. Each reader has a chunk of the pool as its buffer. */
 typedef struct source_set {
     merge_job *job;
     trip_sequence_reader *readers;
-    size_t *sequences; /* index of each reader's */
+    size_t *sequences; /* index in the spill of each reader's sequence */
     trip_piece_source **sources;
     size_t count;
     trip_chain buffers;
@@ -96,7 +96,7 @@ static int open_sequence(source_set *s, size_t index, unsigned list)
     return status;
 }
 
-/* Opens the first `limit` sequences of a list, with room for one more source. */
+/* Opens the first `limit` sequences of a list. The arrays have room for one more source. */
 static int open_sources(source_set *s, merge_job *job, unsigned list, size_t limit)
 {
     const trip_list_merge *m = job->merge;
@@ -134,7 +134,8 @@ static int merge_list(void *user, unsigned thread, uint64_t item)
     return status;
 }
 
-/* Merges sequences of a list into one, as many as there are free chunks for buffers. */
+/* Merges sequences of a list into one. The number of free chunks limits how many, since each needs
+ * a buffer. */
 static int consolidate(merge_job *job, unsigned list)
 {
     const trip_list_merge *m = job->merge;
@@ -148,8 +149,8 @@ static int consolidate(merge_job *job, unsigned list)
     return status;
 }
 
-/* Ensures that there is a free chunk for every sequence: spills all pieces in memory, then merges
- * sequences until they are few enough. */
+/* Ensures that there is a free chunk for every sequence. If there are too few, spills all pieces in
+ * memory, then merges sequences until the free chunks suffice. */
 static int make_room(merge_job *job)
 {
     const trip_list_merge *m = job->merge;

@@ -1,5 +1,5 @@
-/* The last step of building lists: merges the sorted sequences on disk and the pieces in memory
- * into the lists of the data set. Each list is merged by one worker. */
+/* The last step of building lists. Merges the sorted sequences on disk and the pieces in memory
+ * into the lists of the data set. One worker merges each list. */
 #ifndef TRIP_LIST_MERGE_H
 #define TRIP_LIST_MERGE_H
 
@@ -9,19 +9,20 @@
 #include "workers.h"
 
 typedef struct trip_list_merge {
-    trip_piece_pool *pool; /* its free chunks become the sequences' read buffers */
-    trip_chain *in_memory; /* of each list */
+    trip_piece_pool *pool; /* free chunks become the read buffers of the sequences */
+    trip_chain *in_memory; /* one for each list */
     trip_spill *spill;
-    trip_list_output *outputs;  /* of each list */
-    bool lists[TRIP_MAX_LISTS]; /* to merge */
+    trip_list_output *outputs;  /* one for each list */
+    bool lists[TRIP_MAX_LISTS]; /* true for the lists to merge */
     const trip_quantiser *quantiser;
 } trip_list_merge;
 
-/* `progress` as for trip_list_builder_finish(). */
+/* Merges the selected lists. `progress` may be NULL; it is called on this thread with the number of
+ * splats appended so far. Returns TRIP_INTERRUPTED if the user interrupts. */
 int trip_list_merge_run(const trip_list_merge *m, trip_workers *workers,
                         void (*progress)(void *user, uint64_t splats), void *user);
 
-/* Sorts the pieces of a chain into a sequence of the spill. */
+/* Sorts the pieces of a chain and writes them to the spill as one sequence. */
 int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *pool,
                      const trip_chain *chain);
 

@@ -1,6 +1,6 @@
 #include "merge.h"
 
-/* Restores the heap below `at`: no source has a smaller key than its parent. */
+/* Restores the heap order below `at`: no parent has a greater key than its children. */
 static void sift_down(trip_piece_source **heap, size_t count, size_t at)
 {
     trip_piece_source *s = heap[at];

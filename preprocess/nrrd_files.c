@@ -20,7 +20,7 @@ static int add_file(const trip_nrrd_parser *p, trip_nrrd_header *h, const char *
     if (h->file_count == FILES_MAX)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE], "more than %d data files",
                               FILES_MAX);
-    if ((h->file_count & (h->file_count - 1)) == 0) { /* full at each power of two */
+    if ((h->file_count & (h->file_count - 1)) == 0) { /* the array is full at each power of two */
         size_t room = h->file_count ? 2 * h->file_count : 1;
         char **files = realloc(h->files, room * sizeof *files);
         if (!files)
@@ -48,8 +48,8 @@ static int parse_list(trip_nrrd_parser *p, trip_nrrd_header *h, bool ends)
     return status;
 }
 
-/* Splits "abc%03d.raw" into "abc", width 3 padded with '0', ".raw"; only %d is taken, once, since
- * the pattern comes from outside. */
+/* Splits "abc%03d.raw" into "abc", width 3 padded with '0', and ".raw". Accepts only a single %d,
+ * because the pattern comes from an untrusted file. */
 static bool split_pattern(char *pattern, int *width, bool *zeros, char **tail)
 {
     char *at = strchr(pattern, '%');
@@ -72,7 +72,7 @@ static bool has_32_bits(int64_t n)
     return n >= -INT32_MAX && n <= INT32_MAX;
 }
 
-/* "PATTERN min max step [axes in each file]" */
+/* Parses "PATTERN first last step [axes in each file]". */
 static int parse_pattern(const trip_nrrd_parser *p, trip_nrrd_header *h)
 {
     char *text = p->values[TRIP_NRRD_DATA_FILE], *pattern = trip_nrrd_next_word(&text), *tail,
@@ -91,11 +91,12 @@ static int parse_pattern(const trip_nrrd_parser *p, trip_nrrd_header *h)
                       : snprintf(name, sizeof name, "%s%*" PRId64 "%s", pattern, width, i, tail);
         if (n >= (int)sizeof name)
             return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE],
-                                  "the names of the data files are too long");
+                                  "a name of a data file is longer than 4095 bytes");
         status = add_file(p, h, name);
     }
     if (status == 0 && h->file_count == 0)
-        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE], "\"data file\" counts no files");
+        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE],
+                              "\"data file\" names no file: check first, last and step");
     return status;
 }
 
@@ -111,7 +112,7 @@ static int parse_data_file(trip_nrrd_parser *p, trip_nrrd_header *h, bool ends)
     return strchr(text, '%') ? parse_pattern(p, h) : add_file(p, h, text);
 }
 
-/* Each file holds equally many values. */
+/* Checks that all files can hold equally many values. */
 static int check_sizes(const trip_nrrd_parser *p, const trip_nrrd_header *h)
 {
     int64_t values = 1;
@@ -120,7 +121,7 @@ static int check_sizes(const trip_nrrd_parser *p, const trip_nrrd_header *h)
             return trip_nrrd_fail(p, p->lines[TRIP_NRRD_SIZES], "the sizes are impossibly large");
     if (h->file_count > 1 && values % (int64_t)h->file_count != 0)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE],
-                              "%" PRId64 " values cannot be shared out evenly to %zu data files",
+                              "%" PRId64 " values cannot be divided equally among %zu data files",
                               values, h->file_count);
     return 0;
 }

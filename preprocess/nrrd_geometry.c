@@ -7,12 +7,12 @@
 #include "nrrd_parser.h"
 #include "text.h"
 
-/* A space that headers name: how the axes of world space lie. */
+/* A named space: the directions of the axes of world space. */
 typedef struct space {
-    const char *name;       /* without what separates its words */
-    const char *convention; /* as in anatomy.h, when it is right-handed */
+    const char *name;       /* without blanks and hyphens */
+    const char *convention; /* as in anatomy.h, for a right-handed space */
     bool left_handed;
-    bool has_time; /* vectors have a fourth part */
+    bool has_time; /* vectors have a fourth component, time */
 } space;
 
 static const space spaces[] = {
@@ -27,8 +27,8 @@ static const space spaces[] = {
     { "3Dlefthanded", "", true, false },
 };
 
-/* `text` in one of its spellings: words apart or together, in any case, with "time" or "t" after
- * them. NULL as name where the header has none that is known. */
+/* Finds the space that the header names. The spelling is free: any case, words apart or together,
+ * and "time" or "t" may follow. The result has a NULL name if the header names no known space. */
 static space find_space(const trip_nrrd_parser *p)
 {
     char name[64] = "";
@@ -51,8 +51,8 @@ static space find_space(const trip_nrrd_parser *p)
     return (space){ 0 };
 }
 
-/* A number of `length` bytes. Of those that are not finite "nan" means unknown; a map that has one
- * of them is refused later, or its spacing given. */
+/* Parses a number of `length` bytes. Accepts "nan", which means unknown, and infinities. A later
+ * check refuses a map with a value that is not finite, unless the user gives the spacing. */
 static bool parse_number(const char *text, size_t length, double *v)
 {
     static const struct {
@@ -78,7 +78,7 @@ static bool parse_word(char **text, double *v)
     return parse_number(word, strlen(word), v);
 }
 
-/* "(x,y,z)", or "(x,y,z,t)" where the space has time, into v. */
+/* Parses "(x,y,z)", or "(x,y,z,t)" if the space has time, into v. */
 static bool parse_vector(char **text, const space *s, double v[4])
 {
     char *at = *text + strspn(*text, " \t");
@@ -123,7 +123,7 @@ static int parse_directions(const trip_nrrd_parser *p, const space *s, trip_nrrd
             if (axis == p->kept[a] && v[3] != 0)
                 return trip_nrrd_fail(
                     p, p->lines[TRIP_NRRD_DIRECTIONS],
-                    "axis %d goes through time: only volumes of one time can be read", axis);
+                    "axis %d runs through time: only volumes of a single time can be read", axis);
             for (int row = 0; axis == p->kept[a] && row < 3; row++)
                 h->index_to_world.m[row][a] = v[row];
         }
@@ -131,7 +131,7 @@ static int parse_directions(const trip_nrrd_parser *p, const space *s, trip_nrrd
     return 0;
 }
 
-/* One number for each axis; NaN, which means unknown, where the field is absent. */
+/* Parses one number for each axis. An absent field gives NaN, which means unknown. */
 static int parse_numbers(const trip_nrrd_parser *p, trip_nrrd_field f, const char *name,
                          double v[TRIP_NRRD_AXES_MAX])
 {
@@ -144,8 +144,8 @@ static int parse_numbers(const trip_nrrd_parser *p, trip_nrrd_field f, const cha
     return 0;
 }
 
-/* Whether samples are at the ends of their axis ("node") rather than in the middle of its cells,
- * which is the default. */
+/* Sets `node` for axes with samples at the ends of the axis. The default is samples in the middle
+ * of cells. */
 static void parse_centers(const trip_nrrd_parser *p, bool node[TRIP_NRRD_AXES_MAX])
 {
     char *text = p->values[TRIP_NRRD_CENTERS];
@@ -153,7 +153,7 @@ static void parse_centers(const trip_nrrd_parser *p, bool node[TRIP_NRRD_AXES_MA
         node[axis] = text && strcasecmp(trip_nrrd_next_word(&text), "node") == 0;
 }
 
-/* Spacings, or the extents that stand for them. */
+/* Sets the map from the spacings, or from the extents if spacings are missing. */
 static int parse_spacings(const trip_nrrd_parser *p, trip_nrrd_header *h)
 {
     double spacing[TRIP_NRRD_AXES_MAX], min[TRIP_NRRD_AXES_MAX], max[TRIP_NRRD_AXES_MAX];
@@ -178,12 +178,12 @@ static int parse_spacings(const trip_nrrd_parser *p, trip_nrrd_header *h)
     return 0;
 }
 
-/* As many numbers as the axis has samples. */
+/* Parses one coordinate for each sample of the axis. */
 static int parse_coordinates(const trip_nrrd_parser *p, trip_nrrd_header *h, int a)
 {
     const int axis = p->kept[a];
     char *text = p->coordinates[axis];
-    /* Each has a digit and a blank at least. */
+    /* Each number takes at least a digit and a blank. */
     if (text && (uint64_t)h->dims[a] <= strlen(text))
         h->coordinates[a] = calloc((size_t)h->dims[a], sizeof(double));
     for (int64_t i = 0; h->coordinates[a] && i < h->dims[a]; i++) {
@@ -199,7 +199,7 @@ static int parse_coordinates(const trip_nrrd_parser *p, trip_nrrd_header *h, int
     return 0;
 }
 
-/* World space is right-handed: x of a left-handed one is counted the other way. */
+/* Makes world space right-handed: negates x of a left-handed space. */
 static void set_space(trip_nrrd_header *h, const space *s)
 {
     snprintf(h->space, sizeof h->space, "%s", s->name ? s->convention : "");

@@ -1,4 +1,4 @@
-/* A parser of the project's own, because teem's leaks on malformed headers and keeps its errors in
+/* The project has its own parser because teem leaks on malformed headers and keeps its errors in
  * one global buffer. */
 #include "nrrd_parser.h"
 
@@ -13,7 +13,7 @@
 
 static const struct {
     const char *name;
-    trip_nrrd_field field; /* TRIP_NRRD_FIELDS: known and not used */
+    trip_nrrd_field field; /* TRIP_NRRD_FIELDS marks fields that are known but unused */
 } names[] = {
     { "dimension", TRIP_NRRD_DIMENSION },
     { "sizes", TRIP_NRRD_SIZES },
@@ -52,9 +52,9 @@ static const struct {
     { "labels", TRIP_NRRD_FIELDS },
     { "units", TRIP_NRRD_FIELDS },
     { "space", TRIP_NRRD_SPACE },
-    { "space dimension", TRIP_NRRD_FIELDS }, /* the vectors show it */
+    { "space dimension", TRIP_NRRD_FIELDS }, /* follows from the vectors */
     { "space units", TRIP_NRRD_FIELDS },
-    { "measurement frame", TRIP_NRRD_FIELDS }, /* of vectors and tensors; scalars have none */
+    { "measurement frame", TRIP_NRRD_FIELDS }, /* for vectors and tensors only */
 };
 
 int trip_nrrd_fail(const trip_nrrd_parser *p, int line, const char *why, ...)
@@ -102,8 +102,8 @@ char *trip_nrrd_trim(char *text)
     return text;
 }
 
-/* Of the keys and values of the user's, "coordinates N:=x0 x1 ..." says where the samples of axis N
- * lie, for which there is no field. */
+/* Keeps the key "coordinates N:=x0 x1 ...", which gives the positions of the samples of axis N.
+ * Headers have no field for them. Ignores all other keys. */
 static int keep_key(trip_nrrd_parser *p, char *line, char *colon)
 {
     static const char key[] = "coordinates ";
@@ -114,7 +114,8 @@ static int keep_key(trip_nrrd_parser *p, char *line, char *colon)
     int64_t axis;
     if (!trip_nrrd_parse_integer(&number, &axis) || *number || axis < 0 ||
         axis >= TRIP_NRRD_AXES_MAX)
-        return trip_nrrd_fail(p, p->line, "\"%.40s\" names no axis", line);
+        return trip_nrrd_fail(
+            p, p->line, "\"%.40s\" names no axis: use \"coordinates N\" with N from 0 to 15", line);
     if (p->coordinates[axis])
         return trip_nrrd_fail(p, p->line, "\"%s\" is given twice", line);
     p->coordinates[axis] = trip_nrrd_trim(colon + 2);
@@ -149,7 +150,7 @@ static int keep_field(trip_nrrd_parser *p, char *line)
     return 0;
 }
 
-/* Takes the fields up to the blank line, the end of a detached header, or the names of a LIST. */
+/* Reads the fields up to the blank line, the end of a detached header, or the names of a LIST. */
 static int split_lines(trip_nrrd_parser *p, bool ends)
 {
     char *line;
@@ -168,7 +169,7 @@ static int split_lines(trip_nrrd_parser *p, bool ends)
     return 0;
 }
 
-/* Reports that a field is missing. */
+/* Fails if a field is missing. */
 static int require(const trip_nrrd_parser *p, trip_nrrd_field f, const char *name)
 {
     if (p->values[f])
@@ -201,7 +202,7 @@ char *trip_nrrd_next_word(char **text)
     return word;
 }
 
-/* Axes that carry no position in space cannot be one of the volume's. */
+/* Axes of other kinds carry no position in space and cannot be axes of the volume. */
 static bool is_spatial_kind(const char *kind)
 {
     static const char *const spatial[] = { "domain", "space", "time", "list",
@@ -228,8 +229,8 @@ static int check_kinds(const trip_nrrd_parser *p)
     return 0;
 }
 
-/* Which three axes are the volume's: all, or those left when axes of size 1 are dropped, from the
- * slowest and then from the fastest on. */
+/* Chooses the three axes of the volume. Drops axes of size 1, first from the slowest axis on, then
+ * from the fastest. */
 static int choose_axes(trip_nrrd_parser *p, const int64_t sizes[TRIP_NRRD_AXES_MAX])
 {
     int first = 0, last = p->axes;
@@ -238,8 +239,9 @@ static int choose_axes(trip_nrrd_parser *p, const int64_t sizes[TRIP_NRRD_AXES_M
     while (last - first > 3 && sizes[first] == 1)
         first++;
     if (last - first != 3)
-        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_SIZES],
-                              "%d axes: only scalar volumes of three axes can be read", p->axes);
+        return trip_nrrd_fail(
+            p, p->lines[TRIP_NRRD_SIZES],
+            "the data have %d axes: only scalar volumes of three axes can be read", p->axes);
     for (int a = 0; a < 3; a++)
         p->kept[a] = first + a;
     return 0;
@@ -329,7 +331,7 @@ static int parse_skips(const trip_nrrd_parser *p, trip_nrrd_header *h)
                               "\"byte skip\" must be a number of at least -1");
     if (h->byte_skip < 0 && h->encoding != TRIP_BYTES_PLAIN)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_BYTE_SKIP],
-                              "\"byte skip: -1\" has no meaning for compressed data");
+                              "\"byte skip: -1\" cannot be used with compressed data");
     return 0;
 }
 

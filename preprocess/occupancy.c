@@ -7,16 +7,16 @@
 #include "report.h"
 
 enum {
-    MAX_VOXELS = 128, /* along each axis of the level that is read */
+    MAX_VOXELS = 128, /* along each axis of the level to read */
     ALONG_Z = 2,
-    WHOLE_VOXEL = 1023, /* weight of a voxel of the greatest value */
+    WHOLE_VOXEL = 1023, /* weight of a voxel with the maximum value */
 };
 
 typedef struct summing {
     const trip_occupancy_params *params;
     unsigned level;
-    int shift[3]; /* from a voxel of the level to its bin, as powers of 2 */
-    int dims[3];  /* bins */
+    int shift[3]; /* a voxel of the level lies in bin index >> shift */
+    int dims[3];  /* bins along each axis */
     uint64_t weights[TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE];
 } summing;
 
@@ -34,7 +34,7 @@ static void choose_level(summing *s)
     }
 }
 
-/* Whether the list has means. */
+/* Returns whether the codes of the list are means (mean.h). */
 static bool has_means(const summing *s)
 {
     return s->level > 0 && !s->params->kinds.values;
@@ -48,8 +48,8 @@ static unsigned list_of(const summing *s)
            ALONG_Z;
 }
 
-/* How far its value is from the volume's least, times the part of it that was kept if that is
- * there. */
+/* Returns the distance of the value from the volume's minimum, scaled to WHOLE_VOXEL. For a mean,
+ * multiplies the distance by the kept share of the voxel. */
 static uint64_t weight_of(const summing *s, unsigned code)
 {
     const trip_mean_scale *scale = &s->params->scale;
@@ -108,7 +108,7 @@ static int add_sheets(summing *s, trip_writer *w, bool odd, trip_list_buffer *bu
     return status;
 }
 
-/* As parts of the greatest. */
+/* Scales the weights so that the greatest is UINT16_MAX. */
 static void scale_weights(const summing *s, trip_occupancy *o)
 {
     const size_t count = (size_t)s->dims[0] * (size_t)s->dims[1] * (size_t)s->dims[2];
@@ -125,8 +125,8 @@ int trip_occupancy_read(trip_occupancy *o, trip_writer *w, const trip_occupancy_
 {
     summing *s = trip_budget_take(budget, sizeof *s);
     if (!s)
-        return trip_fail(TRIP_ERROR, "brick", "how the volume lies",
-                         "finding it takes 3 MiB: give more with --memory");
+        return trip_fail(TRIP_ERROR, "brick", "orientation",
+                         "guessing it takes 3 MiB of memory: raise --memory");
     *s = (summing){ .params = params };
     choose_level(s);
     trip_list_buffer *buffer;

@@ -20,8 +20,8 @@ int trip_orientation_find(trip_orientation *u, trip_writer *w, const trip_occupa
 {
     trip_occupancy *o = trip_budget_take(budget, sizeof *o);
     if (!o)
-        return trip_fail(TRIP_ERROR, "brick", "how the volume lies",
-                         "finding it takes 3 MiB: give more with --memory");
+        return trip_fail(TRIP_ERROR, "brick", "orientation",
+                         "guessing it takes 3 MiB of memory: raise --memory");
     int status = trip_occupancy_read(o, w, params, budget);
     if (status == 0)
         *u = look_at(o);

@@ -2,14 +2,17 @@
 
 #include <math.h>
 
-/* A cloud, a statue, a teapot and a man's head score 0.72 to 0.84 on the side on which they stand
- * and 0.14 to 0.36 on their next. Others stay below 0.6, or are alike on two sides, as an engine
- * and a chest are. */
+/* A cloud, a statue, a teapot and a human head score 0.72 to 0.84 on their base, and 0.14 to 0.36
+ * on the next best side. Other volumes score below 0.6, or alike on two sides, such as an engine
+ * and a chest. */
 static const double level = 0.6, times_others = 2;
 
-enum { PARTS_OF_EXTENT = 10, OBJECT = UINT16_MAX / 4 }; /* a bin's weight from which it counts */
+enum {
+    PARTS_OF_EXTENT = 10,
+    OBJECT = UINT16_MAX / 4
+}; /* bins of at least this weight belong to the object */
 
-/* The object's first and last bin of a row; false where the row has none. */
+/* Finds the object's first and last bin of a row. Returns false if the row has none. */
 static bool find_ends(trip_occupancy_row row, int *first, int *last)
 {
     *first = row.bins;

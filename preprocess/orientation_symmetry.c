@@ -2,13 +2,13 @@
 
 #include <math.h>
 
-/* Heads of several scanners and a teapot score 0.93 to 0.97 across their own axis and up to 0.88
- * across the others. What has none, as an engine, a chest, clouds and vessels, stays below 0.88, or
- * scores alike across two, as simulations of atoms do. */
+/* Scans of heads and a teapot score 0.93 to 0.97 across their axis of symmetry, and up to 0.88
+ * across the others. Volumes without symmetry, such as an engine, a chest, clouds and vessels, stay
+ * below 0.88. Simulations of atoms score alike across two axes. */
 static const double strong = 0.9, max_of_others = 0.9, times_weaker = 2;
 
-/* Adds, for each place of the mirror, the products of bins and their images. The mirror at place c
- * takes bin i to bin c - i. */
+/* Adds, for each position of the mirror plane, the products of bins and their mirror images.
+ * Position c maps bin i to bin c - i. */
 static void add_row(trip_occupancy_row r, uint64_t *sums)
 {
     uint64_t w[TRIP_OCCUPANCY_EDGE];
@@ -22,7 +22,7 @@ static void add_row(trip_occupancy_row r, uint64_t *sums)
     }
 }
 
-/* At most 2^18 products of 32 bits are summed. */
+/* A sum has at most 2^18 products of 32 bits, so 64 bits suffice. */
 double trip_orientation_symmetry_score(const trip_occupancy *o, int axis)
 {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-/* 64-bit masks with a bit for each word of the bitmap. */
+/* Returns the number of 64-bit masks with one bit for each word of the bitmap. */
 static unsigned mask_count(const trip_piece_format *f)
 {
     return (trip_tile_words(f) + 63) / 64;

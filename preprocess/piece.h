@@ -1,14 +1,14 @@
-/* A piece: the splats that one box of voxels contributes to one tile of one sheet of a list. Splats
- * are passed between the threads that make them, the spill and the merge as pieces only. Pure
+/* A piece holds the splats that one box of voxels contributes to one tile of one sheet of a list.
+ * The threads that make splats, the spill and the merge exchange splats only as pieces. Pure
  * functions.
  *
- * In memory and in the spill, a piece is a header and then these parts, each padded to 8 bytes:
- *   positions    Morton codes of (u, v) in the tile, ascending: either `words` 64-bit words of the
- *                tile's bitmap after a mask with one bit for each word that is present, or, where
- *                words is 0, one uint16 for each splat; whichever is shorter
- *   values       codes (uint16), or float32 while the range of the values is unknown
- *   normals      packed (uint32), without their magnitude while that range is unknown
- *   magnitudes   float32, of gradients per gradient_unit, while that range is unknown */
+ * In memory and in the spill, a piece is a header followed by these parts, each padded to 8 bytes:
+ *   positions    Morton codes of (u, v) in the tile, ascending, in the shorter of two forms. If
+ *                `words` is 0, one uint16 for each splat. Otherwise a mask with one bit for each
+ *                nonzero word of the tile's bitmap, then these `words` 64-bit words
+ *   values       codes (uint16), or float32 while the range of values is unknown
+ *   normals      packed (uint32), without magnitude while the range of values is unknown
+ *   magnitudes   float32, gradients per gradient_unit; only while the range of values is unknown */
 #ifndef TRIP_PIECE_H
 #define TRIP_PIECE_H
 
@@ -19,7 +19,7 @@
 #include "budget.h"
 #include "format.h"
 
-/* Lists by number: of kept voxels along X, Y and Z, then of their halo. */
+/* Lists 0 to 2 hold kept voxels along X, Y and Z. Lists 3 to 5 hold their halo. */
 enum { TRIP_HALO_LISTS = 3, TRIP_MAX_LISTS = 6 };
 
 static inline int trip_list_axis(unsigned list)
@@ -31,19 +31,18 @@ enum {
     TRIP_TILE_MAX_EDGE = 128,
     TRIP_TILE_MAX_SPLATS = TRIP_TILE_MAX_EDGE * TRIP_TILE_MAX_EDGE,
     TRIP_TILE_MAX_WORDS = TRIP_TILE_MAX_SPLATS / 64,
-    TRIP_TILE_MORTON_BITS = 40, /* tiles of a sheet: up to 2^20 a side */
+    TRIP_TILE_MORTON_BITS = 40, /* a sheet has up to 2^20 by 2^20 tiles */
 };
 
-/* The meaning of codes, value(c) = lo + (hi - lo) * c / 65535, and of the magnitudes of normals. */
+/* The scale of codes, value(c) = lo + (hi - lo) * c / 65535, and of the magnitudes of normals. */
 typedef struct trip_quantiser {
     double lo, hi;
-    double gradient_full; /* of 4-byte normals (normal.h) */
+    double gradient_full; /* greatest magnitude of 4-byte normals (normal.h) */
     double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
-    bool bytes;           /* only those codes that 8 bits stand for (format.h) */
+    bool bytes;           /* use only the codes that 8 bits can express (format.h) */
 } trip_quantiser;
 
-/* From the values of the first and the last code that 8 bits stand for those of codes 0 and 65535.
- */
+/* Sets the values of codes 0 and 65535 from the values of the first and the last 8-bit code. */
 static inline void trip_quantiser_set_bytes(trip_quantiser *q, double first, double last)
 {
     const double below = TRIP_CODE_FIRST * ((last - first) / 255);
@@ -51,7 +50,7 @@ static inline void trip_quantiser_set_bytes(trip_quantiser *q, double first, dou
     q->hi = last + below;
 }
 
-/* The nearest code; of NaN the least. */
+/* Returns the nearest code. NaN gives the minimum code. */
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
 {
     const uint32_t step = q->bytes ? TRIP_CODE_STEP : 1, min = q->bytes ? TRIP_CODE_FIRST : 0,
@@ -60,12 +59,13 @@ static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
     return step * (!(code > min) ? min : code >= max ? max : (uint32_t)code);
 }
 
-/* The format of all pieces that one bricking makes; those of the halo have no normals. */
+/* The format of all pieces of one bricking. Pieces of the halo never have normals. */
 typedef struct trip_piece_format {
     unsigned tile_log2;
-    bool quantised; /* values are codes; otherwise floats, and normals have their magnitude apart */
+    bool quantised; /* values are codes; otherwise values are floats, and normals store magnitudes
+                       separately */
     bool normals;
-    bool halo; /* there are lists of the halo */
+    bool halo; /* the data set has lists of the halo */
 } trip_piece_format;
 
 static inline unsigned trip_piece_list_count(const trip_piece_format *f)
@@ -73,13 +73,13 @@ static inline unsigned trip_piece_list_count(const trip_piece_format *f)
     return f->halo ? TRIP_MAX_LISTS : TRIP_HALO_LISTS;
 }
 
-/* 64-bit words of a tile's bitmap. */
+/* Returns the number of 64-bit words in a tile's bitmap. */
 static inline unsigned trip_tile_words(const trip_piece_format *f)
 {
     return 1u << (2 * f->tile_log2 - 6);
 }
 
-/* The format of the pieces of one list. */
+/* Returns the format of the pieces of one list. */
 static inline trip_piece_format trip_piece_format_of(const trip_piece_format *f, unsigned list)
 {
     trip_piece_format own = *f;
@@ -89,13 +89,13 @@ static inline trip_piece_format trip_piece_format_of(const trip_piece_format *f,
 
 typedef struct trip_piece {
     uint64_t key;  /* sheet << TRIP_TILE_MORTON_BITS | Morton code of the tile */
-    uint32_t next; /* for links between pieces, by the owner of the memory */
+    uint32_t next; /* links pieces; set by the owner of the memory */
     uint16_t last; /* number of splats - 1 */
     uint16_t words;
 } trip_piece;
 
-/* Offsets of a piece's parts in bytes from its start, 0 for those that it does not have; its
- * length. */
+/* Offsets of the parts in bytes from the start of a piece, and its length. Absent parts have offset
+ * 0. */
 typedef struct trip_piece_parts {
     size_t positions, values, normals, magnitudes, bytes;
 } trip_piece_parts;
@@ -107,21 +107,22 @@ static inline trip_piece_parts trip_piece_get_parts(const trip_piece_format *f, 
     return trip_piece_layout(f, p->last + 1u, p->words);
 }
 
-/* The length of the longest possible piece. */
+/* Returns the length of the longest possible piece. */
 size_t trip_piece_max_bytes(const trip_piece_format *f);
 
-/* The header's `words` for the shorter form of `splats` positions in `used` words of the bitmap. */
+/* Returns the header's `words` for the shorter form of positions. The bitmap has `splats` positions
+ * in `used` nonzero words. */
 unsigned trip_piece_choose_words(const trip_piece_format *f, uint32_t splats, unsigned used);
-/* Fills the header and the positions of a piece with the `splats` positions in the tile's bitmap.
- */
+/* Fills the header and the positions of a piece from the tile's bitmap, which has `splats` bits
+ * set. */
 void trip_piece_begin(trip_piece *p, const trip_piece_format *f, uint64_t key, uint32_t splats,
                       unsigned words, const uint64_t *bitmap);
 
-/* Whether `room` bytes hold a sound piece: its header is possible, and its positions are ascending
- * and as many as the header says. */
+/* Returns whether `room` bytes hold a valid piece. Its header must be possible. Its positions must
+ * be ascending, and their number must match the header. */
 bool trip_piece_check(const trip_piece *p, const trip_piece_format *f, size_t room);
 
-/* The positions of the bits set in word `w` of a bitmap; returns their number. */
+/* Writes the positions of the bits set in word `w` of a bitmap. Returns their number. */
 static inline unsigned trip_word_positions(uint64_t bits, unsigned w, uint16_t *to)
 {
     unsigned n = 0;
@@ -130,7 +131,8 @@ static inline unsigned trip_word_positions(uint64_t bits, unsigned w, uint16_t *
     return n;
 }
 
-/* All positions of a piece; returns their number, which in a sound piece is that of the header. */
+/* Writes all positions of a piece. Returns their number, which matches the header if the piece is
+ * valid. */
 uint32_t trip_piece_positions(const trip_piece *p, const trip_piece_format *f, uint16_t *to);
 
 #endif

@@ -8,12 +8,13 @@
 
 enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, MIN_CHUNK_BYTES = 128 << 10 };
 
-/* Pieces are linked by 32-bit counts of 8 bytes, from 1. */
+/* Links are 32-bit offsets in units of 8 bytes, counted from 1. */
 #define MAX_POOL_BYTES ((uint64_t)8 * (UINT32_MAX - 1))
 
 size_t trip_chunk_bytes(const trip_piece_format *f)
 {
-    size_t bytes = f->halo ? MIN_CHUNK_BYTES : 2 * MIN_CHUNK_BYTES; /* more lists, smaller chunks */
+    size_t bytes = f->halo ? MIN_CHUNK_BYTES
+                           : 2 * MIN_CHUNK_BYTES; /* with a halo there are twice as many lists */
     while (bytes < 4 * trip_piece_max_bytes(f))
         bytes *= 2;
     return bytes;
@@ -51,8 +52,8 @@ int trip_piece_pool_create(trip_piece_pool *pool, const trip_piece_format *f, co
     pool->chunks = calloc(pool->chunk_count, sizeof *pool->chunks);
     if (!pool->memory || !pool->chunks)
         return trip_fail(TRIP_ERROR, "brick", "lists",
-                         "the memory allowed cannot be had: try less --memory");
-    /* Memory is filled once, from the front: huge pages would gain nothing. */
+                         "the system refuses the memory that --memory allows: lower --memory");
+    /* The pool fills memory once, from the front, so huge pages gain nothing. */
     madvise(pool->memory, pool->chunk_count * pool->chunk_bytes, MADV_NOHUGEPAGE);
     for (size_t i = pool->chunk_count; i-- > 0;)
         trip_chain_push(pool, &pool->free, (uint32_t)i);
@@ -98,7 +99,7 @@ static uint32_t link_of(const trip_piece_pool *pool, const unsigned char *piece)
     return (uint32_t)((uint64_t)(piece - pool->memory) / 8 + 1);
 }
 
-/* Lists of pieces, link 0 at their ends. */
+/* Linked lists of pieces, one for each digit. Link 0 ends a list. */
 typedef struct buckets {
     uint32_t first[RADIX], last[RADIX];
 } buckets;
@@ -132,8 +133,8 @@ static uint32_t join(const trip_piece_pool *pool, const buckets *from)
     return first;
 }
 
-/* Links the pieces of a chain by ascending key (radix sort, lowest digit first); returns the first.
- */
+/* Links the pieces of a chain by ascending key and returns the first. Uses a radix sort, lowest
+ * digit first. */
 static uint32_t sort_chain(const trip_piece_pool *pool, unsigned list, const trip_chain *c)
 {
     buckets now = { 0 };

@@ -247,7 +247,7 @@ class Drawn(program.ProgramTest):
             held = self.works(*draw, "--max-bytes=1G")
             self.assertEqual("", held.stderr)
             beyond = self.works(*draw, "--max-bytes=1")
-            self.assertRegex(beyond.stderr, "^triptych: warning: tooth.trip: codes and normals of up to .* are read")
+            self.assertRegex(beyond.stderr, "^triptych: warning: tooth.trip: the coarsest level reads up to .* of codes and normals")
 
 
 if __name__ == "__main__":

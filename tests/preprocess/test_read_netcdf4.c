@@ -320,7 +320,7 @@ static void what_does_not_fit_is_refused(void **state)
         assert_int_equal(trip_volume_open(&v, path, NULL, budget), TRIP_ERROR);
         trip_report_redirect(NULL, NULL);
         assert_int_equal(reports, 1);
-        assert_non_null(strstr(reported, "larger --memory"));
+        assert_non_null(strstr(reported, "raise --memory"));
         trip_budget_destroy(budget);
     }
 }

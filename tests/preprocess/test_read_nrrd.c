@@ -412,8 +412,8 @@ static void wrong_fields_are_refused_with_their_line(void **state)
         { "data file: a%d 1 7 0\n", "line 8: \"data file\" with a %" },
         { "data file: a%d 1 7\n", "line 8: \"data file\" with a %" },
         { "data file: a%d -9223372036854775808 1 1\n", "line 8: \"data file\" with a %" },
-        { "data file: a%d 7 1 1\n", "counts no files" },
-        { "data file: a%d 1 9 1\n", "cannot be shared out evenly to 9" },
+        { "data file: a%d 7 1 1\n", "names no file: check first, last and step" },
+        { "data file: a%d 1 9 1\n", "cannot be divided equally among 9" },
         { "data file: a%d 1 2000000000 1\n", "more than 65536 data files" },
         { "data file: LIST\n", "line 8: the list of data files is empty" },
     };
@@ -451,7 +451,7 @@ static void wrong_headers_are_refused(void **state)
         { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: ascii\n\n",
           "line 5: encoding \"ascii\" cannot be read" },
         { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: gzip\nbyte skip: -1\n\n",
-          "no meaning for compressed" },
+          "cannot be used with compressed data" },
         { "NRRD0004\ndimension: 3\nsizes: 9999999999 9999999999 9999999999\ntype: uchar\n"
           "encoding: raw\n\n",
           "impossibly large" },
@@ -635,7 +635,7 @@ static void vectors_with_time_give_their_place_in_space(void **state)
     assert_refused(write_with_lines("time.nrrd",
                                     "space: RAST\n"
                                     "space directions: (1,0,0,0) (0,1,0,0) (0,0,1,1)\n"),
-                   "line 9: axis 2 goes through time");
+                   "line 9: axis 2 runs through time");
     assert_refused(
         write_with_lines("time.nrrd", "space: RAST\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"),
         "line 9: \"space directions\" must be \"(x,y,z,t)\"");
