@@ -7,10 +7,10 @@
 #include "format.h"
 #include "report.h"
 
-/* Squares held. */
+/* Number of squares held. */
 enum { HELD = 64 };
 
-/* By row; TRIP_COARSE_NONE_KEPT where there is no voxel, either. */
+/* By row; TRIP_COARSE_NONE_KEPT also for missing voxels. */
 typedef struct held_square {
     uint64_t key;
     bool held;
@@ -21,16 +21,16 @@ typedef struct adding {
     trip_level_positions positions;
     trip_output *to;
     const int64_t *dims;
-    bool round; /* `around` is turned round */
+    bool round; /* `around` holds turned codes */
     unsigned edge_log2;
     trip_budget *budget;
     unsigned char *memory;
     size_t bytes;
-    trip_coarse_value *read, *values; /* of a square: as in the file; with its halo */
-    /* Of a square and one voxel more on each side the least there; of three in a row. */
+    trip_coarse_value *read, *values; /* voxels of a square: as in the file, and with its halo */
+    /* Minima over a square plus one voxel on each side; minima of three in a row. */
     uint16_t *near, *rows;
     held_square squares[HELD];
-    uint64_t *mortons; /* of the squares of a sheet that may have something, ascending */
+    uint64_t *mortons; /* candidate squares of a sheet, ascending */
     size_t room, count;
 } adding;
 
@@ -39,7 +39,7 @@ static size_t edge_of(const adding *a)
     return (size_t)1 << a->edge_log2;
 }
 
-/* With NULL it computes the bytes only. */
+/* Lays out the memory. With NULL it only computes the bytes. */
 static size_t lay_out(adding *a, unsigned char *memory)
 {
     const size_t plane = edge_of(a) * edge_of(a), more = (edge_of(a) + 2) * (edge_of(a) + 2);
@@ -62,7 +62,7 @@ uint64_t trip_level_halo_bytes(const int64_t dims[3], unsigned edge_log2, uint64
     return positions + lay_out(&a, NULL) + 9 * 3 * squares * sizeof *a.mortons;
 }
 
-/* ---- squares that may have something ---- */
+/* ---- candidate squares ---- */
 
 static int compare(const void *a, const void *b)
 {
@@ -94,7 +94,7 @@ static void add_about(adding *a, uint64_t key)
     }
 }
 
-/* The squares of a sheet and those beside, of all three. */
+/* Collects the squares of three sheets and their neighbours. */
 static int find_squares(adding *a, uint64_t sheet)
 {
     size_t positions = 0, kept = 0;
@@ -146,7 +146,7 @@ static uint16_t lesser(uint16_t a, uint16_t b)
     return a < b ? a : b;
 }
 
-/* Of a square that lies so many further, what is within a voxel of the one at hand. */
+/* Takes the voxels of a neighbouring square within one voxel of the current square. */
 static void take_near(adding *a, const held_square *s, int u, int v)
 {
     const size_t edge = edge_of(a), across = edge + 2;
@@ -161,7 +161,7 @@ static void take_near(adding *a, const held_square *s, int u, int v)
     }
 }
 
-/* From what is near to the least of three by three. */
+/* Computes the minima of 3 x 3 voxels. */
 static void widen(adding *a)
 {
     const size_t edge = edge_of(a), across = edge + 2;
@@ -197,7 +197,7 @@ TRIP_ALSO_V3 static int find_near(adding *a, uint64_t key)
     return status;
 }
 
-/* How many voxels of a square are in the grid, along u or v. */
+/* Returns the number of a square's voxels inside the grid, along u or v. */
 static size_t within(const adding *a, uint64_t key, int axis)
 {
     const int64_t edge = (int64_t)edge_of(a);
@@ -205,7 +205,7 @@ static size_t within(const adding *a, uint64_t key, int axis)
     return (size_t)(left < edge ? left : edge);
 }
 
-/* The square's own voxels and those that are added, by row; how many. */
+/* Collects the square's voxels and the added ones, by row. Returns their number. */
 static uint32_t merge(adding *a, uint64_t key, uint32_t own)
 {
     const size_t edge = edge_of(a), size[2] = { within(a, key, 0), within(a, key, 1) };
@@ -248,7 +248,7 @@ static int add_sheet(adding *a, uint64_t sheet)
                : status;
 }
 
-/* The sheets that have squares, and those beside. */
+/* Processes the sheets with squares and their neighbours. */
 static int add_sheets(adding *a)
 {
     uint64_t sheet = 0, next;
@@ -264,7 +264,8 @@ static int add_sheets(adding *a)
             status = trip_level_positions_next(&a->positions, &next);
             if (next == UINT64_MAX)
                 break;
-            sheet = next - 1; /* at least one further, all up to the one behind being known */
+            sheet =
+                next - 1; /* at least one sheet further, with all sheets up to the next one known */
             continue;
         }
         sheet++;

@@ -38,7 +38,7 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     return used;
 }
 
-/* ---- what is added up ---- */
+/* ---- sums ---- */
 
 static void gradient_of(const trip_level_work *w, uint32_t normal, double gradient[3])
 {
@@ -48,7 +48,7 @@ static void gradient_of(const trip_level_work *w, uint32_t normal, double gradie
         trip_normal_unpack(normal, w->params->quantiser.gradient_full, gradient);
 }
 
-/* Of a gradient in world space. */
+/* Converts a gradient to world space. */
 static uint32_t normal_of(const trip_level_work *w, const double gradient[3])
 {
     const double(*j)[4] = w->params->index_to_world.m;
@@ -60,7 +60,7 @@ static uint32_t normal_of(const trip_level_work *w, const double gradient[3])
     return trip_compact_normal_pack(w->params->compact, index);
 }
 
-/* Clears the sums of a voxel before its first. */
+/* Clears the sums of a voxel before its first contribution. */
 static void touch(trip_level_lane *l, size_t at)
 {
     const uint64_t bit = UINT64_C(1) << at % 64;
@@ -72,7 +72,7 @@ static void touch(trip_level_lane *l, size_t at)
         trip_coarse_mean_clear(&l->mean_sums[at]);
 }
 
-/* Where a voxel of the level below is added up, and how odd its coordinates are. */
+/* The coarse voxel of a voxel of the level below, and the parity of its coordinates. */
 typedef struct position {
     size_t at;
     unsigned odd;
@@ -86,7 +86,7 @@ static position position_of(const trip_level_work *w, const trip_level_source *s
                        (unsigned)((x & 1) | (y & 1) << 1) | square->odd << 2 };
 }
 
-/* In a square four voxels that follow one another are of one coarse voxel; where that lies. */
+/* Returns the coarse voxel of four consecutive voxels of a square; they always share one. */
 #define CELL(n)                                                                                    \
     {                                                                                              \
         ((n)&1) | ((n) >> 1 & 2), ((n) >> 1 & 1) | ((n) >> 2 & 2)                                  \
@@ -94,14 +94,14 @@ static position position_of(const trip_level_work *w, const trip_level_source *s
 #define CELLS4(n) CELL(n), CELL((n) + 1), CELL((n) + 2), CELL((n) + 3)
 static const uint8_t cells[16][2] = { CELLS4(0), CELLS4(4), CELLS4(8), CELLS4(12) };
 
-/* Each four bits of the result count those of the mask that are set. */
+/* Counts the set bits in each group of four bits of the mask. */
 static uint64_t counts_of(uint64_t mask)
 {
     const uint64_t twos = mask - (mask >> 1 & UINT64_C(0x5555555555555555));
     return (twos & UINT64_C(0x3333333333333333)) + (twos >> 2 & UINT64_C(0x3333333333333333));
 }
 
-/* The least code, turned round, of each four. */
+/* Returns the minimum turned code of each group of four. */
 static void find_around(const trip_square *of, const uint16_t *codes, bool round,
                         uint16_t around[16])
 {
@@ -118,7 +118,7 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
 {
     const uint32_t corner = trip_square_corner(of);
     const size_t first = position_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
-    uint32_t sums[65]; /* of the codes before each */
+    uint32_t sums[65]; /* number of codes before each group */
     uint16_t codes[64], around[16];
     trip_square_codes(of, codes);
     sums[0] = 0;
@@ -158,7 +158,7 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
     }
 }
 
-/* Of the first run, and of those of its list right behind it. */
+/* The bytes of the first run and of the runs directly behind it in its list. */
 static uint64_t words_together(const trip_level_source *squares, unsigned count)
 {
     const uint64_t first = squares->run.at[TRIP_PLANE_VOXELS];
@@ -258,8 +258,7 @@ static int reserve(void *user, unsigned thread, unsigned list, size_t bytes, voi
     return trip_list_builder_reserve(user, thread, list, bytes, memory);
 }
 
-/* Begins a box of the voxels of a square, or of some one behind the other, none of which is marked
- * yet. */
+/* Begins a box of voxels for one square or several consecutive ones, with none marked yet. */
 static void begin_squares(trip_level_lane *l, const trip_level_work *w, uint64_t sheet,
                           uint64_t morton, int64_t sheets)
 {
@@ -271,7 +270,7 @@ static void begin_squares(trip_level_lane *l, const trip_level_work *w, uint64_t
     trip_splat_box_begin(&l->box, lo, size);
 }
 
-/* Marks a voxel; where it is in the box. */
+/* Marks a voxel. Returns its index in the box. */
 static size_t mark(trip_level_lane *l, const trip_coarse_value *voxel, int64_t sheet)
 {
     trip_splat_box_mark(&l->box, voxel->v, sheet, &voxel->u, 1);
@@ -293,7 +292,7 @@ static uint32_t shares_of(const trip_coarse_mean *mean, int axis)
                                  mean->kept / (double)mean->cover[axis]);
 }
 
-/* What differs between the lists of means. */
+/* The members that differ between the lists of means. */
 static void put_shares(trip_level_lane *l, uint32_t count, int axis)
 {
     for (uint32_t i = 0; i < count; i++) {
@@ -333,7 +332,7 @@ static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *vo
     return (voxel->value + step / 2) / step * step;
 }
 
-/* Puts the voxels of a square, which are sharpened, into the box. */
+/* Puts the sharpened voxels of a square into the box. */
 static void put_values(trip_level_lane *l, const trip_level_work *w, uint32_t count, int sheet)
 {
     const trip_coarse_value *voxels = l->sharpen.values;

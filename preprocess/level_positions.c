@@ -35,7 +35,7 @@ uint64_t trip_level_positions_squares(const int64_t dims[3], unsigned edge_log2,
     return squares < MIN_ROOM ? MIN_ROOM : squares;
 }
 
-/* Sheets, in arrays that are up to twice as long as what they hold, and one that is copied. */
+/* Number of sheets: arrays can be twice as long as their contents, plus one that is copied. */
 uint64_t trip_level_positions_later_bytes(const int64_t dims[3], unsigned edge_log2,
                                           uint64_t voxels)
 {
@@ -95,7 +95,7 @@ int trip_level_positions_next(const trip_level_positions *p, uint64_t *sheet)
     return status;
 }
 
-/* NULL: it has no voxels. */
+/* Returns a square, or NULL if it has no voxels. */
 static const trip_level_position *find_position(const trip_level_positions *p, uint64_t key)
 {
     const trip_level_sheet *sheet = trip_level_positions_sheet(p, key >> TRIP_TILE_MORTON_BITS);

@@ -1,5 +1,5 @@
-/* Where the squares lie of a file that trip_level_file_append() writes, of a few sheets that follow
- * one another. One thread goes on in the file; meanwhile no other looks a square up. */
+/* The file positions of squares written by trip_level_file_append(), for a few consecutive sheets.
+ * While one thread advances in the file, no other may look up squares. */
 #ifndef TRIP_LEVEL_POSITIONS_H
 #define TRIP_LEVEL_POSITIONS_H
 
@@ -8,7 +8,7 @@
 #include "output.h"
 
 typedef struct trip_level_position {
-    uint64_t key, at; /* in the file: of its voxels */
+    uint64_t key, at; /* file position of its voxels */
     uint32_t count;
 } trip_level_position;
 
@@ -24,31 +24,31 @@ enum { TRIP_LEVEL_SHEETS_HELD = 10 };
 typedef struct trip_level_positions {
     trip_budget *budget;
     const trip_output *file;
-    bool means; /* the file has them */
+    bool means; /* the file contains means */
     unsigned edge_log2;
-    uint64_t ahead; /* in the file: the first square that is not in a sheet below */
-    trip_level_sheet sheets[TRIP_LEVEL_SHEETS_HELD]; /* by number, modulo their number */
+    uint64_t ahead; /* file position of the first square not yet in a sheet */
+    trip_level_sheet sheets[TRIP_LEVEL_SHEETS_HELD]; /* sheets in a ring, by sheet number */
 } trip_level_positions;
 
-/* Of a file with squares of 2^edge_log2 voxels, with means or without. The file is complete and
- * flushed before any is looked for. */
+/* Opens the positions of a file with squares of 2^edge_log2 voxels, with or without means. The file
+ * must be complete and flushed before a lookup. */
 void trip_level_positions_open(trip_level_positions *p, const trip_output *file, bool means,
                                unsigned edge_log2, trip_budget *budget);
 void trip_level_positions_close(trip_level_positions *p);
 
-/* Squares of a sheet, at most, of a level of at most so many voxels; and what these take of the
- * budget later. */
+/* Return the maximum number of squares of a sheet, for a level of at most `voxels` voxels, and the
+ * memory allocated later for them. */
 uint64_t trip_level_positions_squares(const int64_t dims[3], unsigned edge_log2, uint64_t voxels);
 uint64_t trip_level_positions_later_bytes(const int64_t dims[3], unsigned edge_log2,
                                           uint64_t voxels);
 
-/* Goes on in the file until all squares of sheets up to `last` are known, which takes the place of
- * what was known of sheets that many before. */
+/* Advances until all squares of sheets up to `last` are known. They replace the oldest sheets of
+ * the ring. */
 int trip_level_positions_look_ahead(trip_level_positions *p, uint64_t last);
-/* The sheet of the first square behind those; UINT64_MAX: there is none. */
+/* Returns the sheet of the first square after the known ones, or UINT64_MAX. */
 int trip_level_positions_next(const trip_level_positions *p, uint64_t *sheet);
 
-/* NULL: nothing is known of it. */
+/* Returns a sheet, or NULL if it is not known. */
 static inline const trip_level_sheet *trip_level_positions_sheet(const trip_level_positions *p,
                                                                  uint64_t number)
 {
@@ -56,12 +56,12 @@ static inline const trip_level_sheet *trip_level_positions_sheet(const trip_leve
     return sheet->number == number ? sheet : NULL;
 }
 
-/* Of the square that lies so many squares and sheets further than that of the key; where there is
- * none its count is 0. */
+/* Returns the square at an offset in squares and sheets from a key. A missing square has count 0.
+ */
 trip_level_position trip_level_position_beside(const trip_level_positions *p, uint64_t key,
                                                int64_t u, int64_t v, int64_t sheet);
 
-/* Along u (0) or v (1): which square of its sheet it is. */
+/* Returns the square's index in its sheet along u (0) or v (1). */
 int64_t trip_level_key_square(uint64_t key, int axis);
 
 #endif

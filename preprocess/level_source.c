@@ -13,7 +13,7 @@ typedef struct square_header {
 } square_header;
 static_assert(sizeof(square_header) == TRIP_LEVEL_SQUARE_BYTES, "what precedes voxels");
 
-/* Says of the square that it is at, of a sheet and a Morton code, where in the next level it is. */
+/* Computes the position in the next level of the current square, from its sheet and Morton code. */
 static void position(trip_level_source *s, uint64_t sheet, uint64_t morton)
 {
     unsigned up = s->edge_log2 + 1 - s->tile_log2;
@@ -62,7 +62,7 @@ int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_l
     return status;
 }
 
-/* Over the sheets that are not wanted. */
+/* Skips the unwanted sheets. */
 static int next_of_file(trip_level_source *s)
 {
     uint64_t key;

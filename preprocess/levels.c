@@ -11,18 +11,18 @@
 
 enum { SOURCES = TRIP_LEVEL_SOURCES, PROGRESS_MS = 200 };
 
-/* Of the memory left, what the voxels of a level may take before they go to a file: a part, or the
- * least that files are written with. */
+/* Memory for a level's voxels before they go to a file: a share of the rest, or the minimum for
+ * writing files. */
 enum { FILE_PART = 8, FILE_BUFFER_BYTES = 1 << 16 };
-/* Squares that each lane may be ahead of the one whose turn it is. */
+/* Squares that each lane may be ahead of the next one to write. */
 enum { AHEAD = 2 };
 
-/* What a list builder takes besides its pieces. */
+/* Memory of a list builder without its pieces. */
 #define BUILDER_BYTES ((uint64_t)3 << 20)
-/* Of a voxel of the level below, in the pieces of what is made of it. */
+/* Bytes in the pieces per voxel of the level below. */
 #define PIECE_BYTES 64
 
-/* A square that waits for its turn in the file, and memory for its voxels. */
+/* A square that waits to be written, with memory for its voxels. */
 typedef struct made_square {
     bool waits;
     uint64_t key;
@@ -31,32 +31,32 @@ typedef struct made_square {
     trip_coarse_mean *means;
 } made_square;
 
-/* One level being made. Each thread takes the next square and makes it in its lane. Voxels are
- * appended to the file in the order of squares, by whichever thread has made the one whose turn it
- * is, and then those that wait behind it. */
+/* A level in progress. Each thread takes the next square and makes it in its lane. Voxels are
+ * appended to the file in the order of squares. The thread that made the next square appends it and
+ * all consecutive waiting squares. */
 typedef struct making {
-    trip_level_work work; /* lanes read it only */
+    trip_level_work work; /* read-only for lanes */
     trip_budget *budget;
     unsigned level, first_list;
     int64_t dims[3];
     trip_level_source sources[SOURCES];
     unsigned source_count;
-    trip_output *file; /* of its voxels, for its values and the next level; NULL: there is none */
-    trip_output with_halo; /* the same with the level's halo, for its values; above level 1 */
+    trip_output *file;     /* file of its voxels, for its values and the next level; may be NULL */
+    trip_output with_halo; /* file with the level's halo, for its values; above level 1 */
     trip_sharpen sharpen;
-    uint64_t sheets_before, sheets; /* of all levels: progress */
+    uint64_t sheets_before, sheets; /* progress over all levels */
 
     unsigned lane_count;
     trip_level_lane *lanes;
-    size_t lane_bytes; /* of each; the squares that it is at among them */
+    size_t lane_bytes; /* sources of each lane, with their current squares */
     unsigned char *memory;
-    made_square *made; /* `ahead` of them, the one of a square by its number */
+    made_square *made; /* ring of `ahead` squares, by square number */
     unsigned ahead;
 
-    pthread_mutex_t lock; /* guards all below, the sources, and what sharpening goes on from */
+    pthread_mutex_t lock; /* guards all below, the sources, and the state of sharpening */
     pthread_cond_t turned;
     uint64_t taken;    /* squares */
-    uint64_t appended; /* the turn of the square of this number */
+    uint64_t appended; /* number of the next square to write */
     bool appending;    /* a thread uses the file */
     uint64_t sheet;
     bool failed;
@@ -80,7 +80,7 @@ static void level_dims(const int64_t dims[3], unsigned level, int64_t out[3])
         out[a] = ((dims[a] - 1) >> level) + 1;
 }
 
-/* Voxel i of a level has its centre amid those of level 0 that it covers. */
+/* The centre of a coarse voxel is the centre of the level 0 voxels that it covers. */
 static trip_writer_list list_of(const int64_t dims[3], const trip_affine *index_to_world,
                                 unsigned level)
 {
@@ -102,7 +102,7 @@ trip_level_kinds trip_levels_kinds(trip_brick_levels_for wanted, bool halo)
                                .values = halo && wanted != TRIP_LEVELS_FOR_PRE };
 }
 
-/* Three lists of a kind, behind `n` others; returns how many there are then. */
+/* Adds three lists of a kind after `n` others. Returns the new number. */
 static unsigned add_lists(trip_writer_list *lists, unsigned n, trip_writer_list list,
                           trip_kind kind)
 {
@@ -142,25 +142,25 @@ static uint64_t records_below(const making *m)
     return records;
 }
 
-/* That of level 0 reaches all voxels beside most of level 1's; the others would make lists half as
- * long again. */
+/* Level 0's halo reaches most neighbours of level 1's voxels. The others would make lists 1.5 times
+ * as long, so level 1 has no extra halo. */
 static bool has_halo_of_its_own(const making *m)
 {
     return m->work.format.halo && m->level > 1;
 }
 
-/* Taken once the lists are being built. */
+/* Memory allocated while the lists are built. */
 static uint64_t late_bytes(const making *m)
 {
     uint64_t bytes = BUILDER_BYTES;
-    if (has_halo_of_its_own(m)) /* a kept voxel has 26 beside it */
+    if (has_halo_of_its_own(m)) /* a kept voxel has 26 neighbours */
         bytes += trip_level_halo_bytes(m->dims, m->work.edge_log2, 27 * records_below(m));
     else if (m->work.format.halo)
         bytes += trip_level_positions_later_bytes(m->dims, m->work.edge_log2, records_below(m));
     return bytes;
 }
 
-/* With NULL it computes the bytes only. */
+/* Lays out the memory. With NULL it only computes the bytes. */
 static size_t lay_out_made(const making *m, made_square *made, unsigned char *memory)
 {
     const size_t plane = (size_t)1 << 2 * m->work.edge_log2;
@@ -171,7 +171,7 @@ static size_t lay_out_made(const making *m, made_square *made, unsigned char *me
     return used;
 }
 
-/* As many as there are workers, or as there is memory for. */
+/* One lane per worker, or as many as memory allows. */
 static int open_lanes(making *m)
 {
     const trip_levels_params *p = m->work.params;
@@ -239,7 +239,7 @@ static int poll(void)
     return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted") : 0;
 }
 
-/* Ends the work of all lanes where one's has failed, whose status it returns. */
+/* Stops all lanes after one failed. Returns its status. */
 static int end_lane(making *m, int status)
 {
     if (status == 0)
@@ -251,7 +251,8 @@ static int end_lane(making *m, int status)
     return status;
 }
 
-/* Says where the voxels of the next square are; 0: there is none, or another lane has failed. */
+/* Finds the sources of the next square's voxels. Returns 0 if there is none or another lane failed.
+ */
 static int take_square(making *m, trip_level_lane *l)
 {
     int status = 0;
@@ -274,7 +275,8 @@ static int take_square(making *m, trip_level_lane *l)
     return status < 0 ? status : l->key != UINT64_MAX;
 }
 
-/* Under the lock, which is let go while the file is used: as many as it is the turn of. */
+/* Appends all squares that are next. Called under the lock, which is released while the file is
+ * written. */
 static int append_made(making *m)
 {
     int status = 0;
@@ -293,8 +295,8 @@ static int append_made(making *m)
     }
 }
 
-/* Gives the voxels of the square at hand to the file, once no more than `ahead` wait; the lane goes
- * on with other memory. */
+/* Queues the current square's voxels for the file, once at most `ahead` squares wait. The lane
+ * continues with other memory. */
 static int append(making *m, trip_level_lane *l, uint32_t count)
 {
     made_square *to = &m->made[l->number % m->ahead];
@@ -323,7 +325,7 @@ static int make_square(making *m, trip_level_lane *l)
     return status == 0 ? poll() : status;
 }
 
-/* The work of a lane. */
+/* Runs a lane. */
 static int make_squares(void *user, unsigned thread, uint64_t item)
 {
     making *m = user;
@@ -345,7 +347,7 @@ static int take_column(making *m, trip_sharpen_column *column)
     return status;
 }
 
-/* The lists of values, once the file is complete. */
+/* Makes the lists of values, once the file is complete. */
 static int make_values(void *user, unsigned thread, uint64_t item)
 {
     making *m = user;
@@ -428,7 +430,7 @@ static int open_file(making *m, const trip_output *below)
     return status;
 }
 
-/* Of at most so many voxels, for each of which there may be a square. */
+/* Maximum bytes for this many voxels, each possibly in its own square. */
 static size_t file_buffer_bytes(const making *m, uint64_t voxels, bool means)
 {
     const uint64_t grid = (uint64_t)m->dims[0] * (uint64_t)m->dims[1] * (uint64_t)m->dims[2];
@@ -440,7 +442,7 @@ static size_t file_buffer_bytes(const making *m, uint64_t voxels, bool means)
     return bytes < min ? min : bytes;
 }
 
-/* A file without a name, in memory where there is enough. */
+/* Creates an unnamed file, in memory if there is enough. */
 static int create_file(const making *m, trip_output *file, uint64_t voxels, bool means)
 {
     return trip_output_create(
@@ -455,7 +457,7 @@ static int create_file(const making *m, trip_output *file, uint64_t voxels, bool
 static int open_sharpen(making *m)
 {
     const bool own = has_halo_of_its_own(m);
-    /* A kept voxel has 26 beside it. */
+    /* A kept voxel has 26 neighbours. */
     int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
     trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file,
                       m->work.params->kinds.means && !own, m->work.params->hidden_above,
@@ -505,7 +507,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     trip_level_work *w = &m->work;
     w->params = params;
     w->format = params->format;
-    w->format.quantised = true; /* pieces are of codes, whatever those of level 0 were */
+    w->format.quantised = true; /* pieces hold codes, whatever level 0's held */
     w->format.halo = params->kinds.values;
     w->format.normals = params->format.normals && params->kinds.means;
     w->scale = trip_mean_scale_make(params->value_min, params->value_max, params->quantiser.lo,

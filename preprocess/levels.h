@@ -1,9 +1,8 @@
-/* The coarse levels of a data set: each is made of the one below when that is written, from its
- * lists along Z or, above the first, from a file of its voxels, which is in memory where there is
- * enough. Two sheets are read at a time, square by square, so that no more memory is needed where
- * the volume is larger. The pieces go to a list builder, which sorts them as those of level 0.
- * Normals and how much of a voxel was kept, which only lists of means need, are read and added up
- * only where there are lists of these. */
+/* Makes the coarse levels of a data set, each from the finished level below: level 1 from level 0's
+ * Z lists, the others from a file of the level's voxels, which stays in memory if possible. Two
+ * sheets are read at a time, square by square, so that memory does not grow with the volume. A list
+ * builder sorts the pieces. Only lists of means need normals and kept shares; without such lists
+ * they are not read. */
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 
@@ -11,48 +10,48 @@
 #include "list_builder.h"
 #include "normal.h"
 
-/* Levels above 0. */
+/* Maximum number of levels above 0. */
 enum { TRIP_LEVELS_MAX = 24 };
 
-/* What lists a level above 0 has, three each: of means, which are drawn as splats, before those of
+/* The kinds of lists of a coarse level, three lists each: means, drawn as splats, come before
  * values, which are interpolated. */
 typedef struct trip_level_kinds {
-    bool means, values; /* one of them at least */
+    bool means, values; /* at least one */
 } trip_level_kinds;
 
 typedef struct trip_levels_params {
     trip_piece_format format; /* of level 0 */
-    trip_level_kinds kinds;   /* values: where level 0 has a halo */
+    trip_level_kinds kinds;   /* values require a halo in level 0 */
     trip_quantiser quantiser;
-    const trip_compact_normals *compact; /* how normals of 3 bytes are encoded; NULL: they have 4 */
+    const trip_compact_normals *compact; /* encoding of 3-byte normals; NULL means 4 bytes */
     int64_t dims[3];                     /* of level 0 */
     trip_affine index_to_world;
     unsigned levels;
     double value_min, value_max; /* of the volume */
-    bool hidden_above;           /* what is not kept lies mostly above what is, not below */
+    bool hidden_above;           /* dropped values lie mostly above the kept ones */
     const char *folder;          /* for temporary files */
-    trip_writer *writer;         /* with the lists of trip_levels_lists() */
-    trip_spill *spill;           /* whose sequences are not needed any more */
+    trip_writer *writer;         /* has the lists of trip_levels_lists() */
+    trip_spill *spill;           /* its sequences are no longer needed */
     trip_workers *workers;
-    /* Called now and then with how much of the work is done. */
+    /* Called from time to time with the progress. */
     void (*progress)(void *user, uint64_t done, uint64_t total);
     void *progress_user;
 } trip_levels_params;
 
-/* How many levels trip_brick_params.levels comes to. */
+/* Returns the number of levels for trip_brick_params.levels. */
 unsigned trip_levels_count(const int64_t dims[3], int wanted, unsigned tile_voxels);
 
 trip_level_kinds trip_levels_kinds(trip_brick_levels_for wanted, bool halo);
 
-/* The lists of levels 0 to `levels`, as the writer takes them; returns their number. `lists` has
- * room for 6 a level. */
+/* Fills in the lists of levels 0 to `levels` for the writer. Returns their number. `lists` has room
+ * for 6 per level. */
 unsigned trip_levels_lists(const int64_t dims[3], const trip_affine *index_to_world, bool halo,
                            trip_level_kinds kinds, unsigned levels, trip_writer_list *lists);
 
-/* The number of the first of a level's. */
+/* Returns the number of a level's first list. */
 unsigned trip_levels_first_list(bool halo, trip_level_kinds kinds, unsigned level);
 
-/* Makes all levels above 0, once the lists of level 0 are complete. */
+/* Makes all levels above 0. The lists of level 0 must be complete. */
 int trip_levels_make(const trip_levels_params *params, trip_budget *budget);
 
 #endif

@@ -12,38 +12,39 @@
 
 enum { ORDERED_LIST = TRIP_ORDERED_LIST };
 
-/* Work for the background thread: to append chunks of the ordered list, or to spill those of
+/* A job of the background thread: appends chunks of the ordered list, or spills chunks of the
  * others. */
 typedef struct job {
     struct job *next;
     bool ordered;
     trip_chain chains[TRIP_MAX_LISTS];
-    trip_checkpoint *checkpoint; /* to be written once it is done; or NULL */
+    trip_checkpoint *checkpoint; /* written after the job; may be NULL */
 } job;
 
 struct trip_list_builder {
     trip_list_builder_params params;
     unsigned lists;
-    uint32_t (*open)[TRIP_MAX_LISTS]; /* [producer][list], the chunk being filled; the producer's */
-    trip_list_output outputs[TRIP_MAX_LISTS]; /* until the merge only the background thread uses
-                                                  that of the ordered list */
+    uint32_t (
+        *open)[TRIP_MAX_LISTS]; /* [producer][list]: the current chunk, owned by the producer */
+    trip_list_output outputs[TRIP_MAX_LISTS]; /* until the merge only the background thread uses the
+                                                 ordered list's */
     pthread_t thread;
     bool thread_runs;
-    trip_scope *scope; /* of the creator */
+    trip_scope *scope; /* scope of the creator */
 
-    pthread_mutex_t lock; /* guards all below; a chunk is guarded with the chain that it is in */
+    pthread_mutex_t lock; /* guards all below, and the chunks in the chains */
     pthread_cond_t work, freed;
     trip_piece_pool pool;
     bool stopping, has_spilled;
     int status;
     trip_chain filled[TRIP_MAX_LISTS];
     job *first_job, *last_job;
-    unsigned jobs; /* waiting or being done */
+    unsigned jobs; /* queued or in progress */
 };
 
 uint64_t trip_list_builder_min_bytes(const trip_piece_format *f, unsigned producers)
 {
-    /* Every producer fills one chunk of each list while as many wait to be spilled. */
+    /* Every producer fills one chunk of each list while as many chunks wait for spilling. */
     return (uint64_t)trip_chunk_bytes(f) * 2 * trip_piece_list_count(f) * ((uint64_t)producers + 1);
 }
 
@@ -67,7 +68,8 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
     pthread_mutex_unlock(&b->lock);
 }
 
-/* On the thread that appends to the ordered list, whose lengths the checkpoint has. */
+/* Writes the checkpoint on the thread that appends to the ordered list, because it contains that
+ * list's lengths. */
 static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
 {
     for (int plane = 0; plane < TRIP_PLANES; plane++)
@@ -75,7 +77,7 @@ static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
     return trip_journal_write_checkpoint(b->params.journal, c, b->params.spill);
 }
 
-/* Does a job list by list and frees the chunks of each, also on failure. */
+/* Does a job list by list, and frees each list's chunks, also on failure. */
 static int do_chains(trip_list_builder *b, job *j, int status)
 {
     for (unsigned list = 0; list < b->lists; list++) {
@@ -122,8 +124,8 @@ static void *thread_main(void *arg)
     return NULL;
 }
 
-/* Under the lock: queues the filled chunks of the ordered list or of all others. The checkpoint is
- * freed after the job or on failure. */
+/* Under the lock: queues the filled chunks of the ordered list or of all others. Frees the
+ * checkpoint after the job or on failure. */
 static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkpoint)
 {
     job *j = malloc(sizeof *j);
@@ -149,7 +151,7 @@ static int queue_job(trip_list_builder *b, bool ordered, trip_checkpoint *checkp
     return 0;
 }
 
-/* Under the lock: the number of chunks that a spill would free. */
+/* Under the lock: returns the number of chunks that a spill would free. */
 static uint32_t spillable(const trip_list_builder *b)
 {
     uint32_t chunks = 0;
@@ -217,8 +219,9 @@ int trip_list_builder_reserve(trip_list_builder *b, unsigned producer, unsigned 
     return 0;
 }
 
-/* Under the lock. A spill is due when half of the memory is full, so that producers can fill the
- * other half meanwhile; if all splats seem to fit, only when memory is nearly full. */
+/* Under the lock: returns whether a spill is due. It is due when half of the memory is full, so
+ * that producers can fill the other half. If all splats seem to fit, it is due only when memory is
+ * nearly full. */
 static bool is_time_to_spill(const trip_list_builder *b, double done)
 {
     const double max = 0.9 * (double)b->pool.chunk_count, now = spillable(b);
@@ -316,7 +319,7 @@ int trip_list_builder_create(trip_list_builder **out, const trip_list_builder_pa
     return status;
 }
 
-/* Ends the background thread, after the queued jobs or, with `now`, without them. */
+/* Ends the background thread, after the queued jobs or, with `now`, at once. */
 static void stop_thread(trip_list_builder *b, bool now)
 {
     if (!b->thread_runs)

@@ -5,7 +5,7 @@
 #include "format.h"
 #include "report.h"
 
-/* An interruption is noticed after this many pieces. */
+/* Pieces between checks for an interruption. */
 enum { INTERRUPT_PIECES = 512 };
 
 int trip_list_output_create(trip_list_output *o, unsigned list, const trip_piece_format *f,
@@ -32,7 +32,7 @@ int trip_list_output_append(trip_list_output *o, uint64_t key, const uint32_t *v
     return status;
 }
 
-/* The run that is being built. */
+/* The run in progress. */
 typedef struct building {
     trip_list_output *output;
     const trip_quantiser *quantiser;

@@ -77,7 +77,7 @@ void a_missing_number_is_named_with_its_file(void **)
 {
     make_folder("gap", { "s_0015.tif", "s_0016.tif", "s_0018.tif", "s_0019.tif" });
     for (const char *path : { "gap", "gap/", "gap/s_*.tif", "gap/s_%04d.tif" })
-        assert_refused(path, "slice 17 is missing (s_0017.tif); --allow-gaps goes on");
+        assert_refused(path, "slice 17 is missing (s_0017.tif); --allow-gaps lets its neighbours touch");
     unlink("gap/s_0016.tif");
     assert_refused("gap", "slice 16 is missing (s_0016.tif), and 1 more");
     warnings = 0;

@@ -651,7 +651,7 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
         floats[i] = NAN;
     test_write("v.raw", floats, sizeof floats);
     p.keep_all = true;
-    check_refused(p, "holds no finite value");
+    check_refused(p, "has no finite values");
 }
 
 static void an_existing_data_set_stays_unless_it_is_to_be_replaced(void **state)

@@ -130,7 +130,7 @@ static void answers_of_the_image_helper_are_not_trusted(void **state)
     static const char *const names[][2] = {
         { "answer_type", "slices of an unknown type" },
         { "answer_outcome", "an unknown outcome" },
-        { "answer_sizes", "slices of no size" },
+        { "answer_sizes", "slices without a size" },
         { "answer_large_sizes", "has slices of an impossible size" },
         { "answer_data_bytes", "data of the wrong size" },
     };

@@ -113,7 +113,7 @@ static void a_sample_without_values_says_nothing_of_the_volume(void **state)
     test_write("v.raw", floats, sizeof floats);
     test_report[0] = 0;
     assert_int_equal(trip_brick_estimate_make(&p, &e), TRIP_ERROR);
-    assert_non_null(strstr(test_report, "holds no finite value"));
+    assert_non_null(strstr(test_report, "has no finite values"));
 }
 
 int main(void)

@@ -345,7 +345,7 @@ static void false_lengths_of_files_in_order_are_found_when_they_are_read(void **
         ((trip_checkpoint *)(void *)records[i].body)->ordered_bytes[TRIP_PLANE_VOXELS] -= 8;
     write_journal();
     free_records();
-    expect_refused(p, "fewer bytes in order", "what the interrupted run left is damaged");
+    expect_refused(p, "fewer bytes in order", "the data of the interrupted run are damaged");
 }
 
 static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
@@ -359,7 +359,7 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     a_kept_voxel_less();
     write_journal();
     free_records();
-    expect_refused(p, "a kept voxel less", "what the interrupted run left is damaged");
+    expect_refused(p, "a kept voxel less", "the data of the interrupted run are damaged");
     assert_false(test_exists("a.trip.partial"));
 }
 
@@ -414,7 +414,7 @@ static void false_records_of_the_list_in_order_are_refused(void **state)
         trip_brick_params p = params();
         leave_killed_run(p);
         overwrite(attacks[i].file, attacks[i].offset, zeros, attacks[i].bytes);
-        expect_refused(p, attacks[i].name, "what the interrupted run left is damaged");
+        expect_refused(p, attacks[i].name, "the data of the interrupted run are damaged");
     }
 }
 
@@ -428,7 +428,7 @@ static void a_block_that_is_longer_than_any_is_refused(void **state)
     make_volume();
     leave_killed_run(p);
     overwrite("partial/z0.voxels", 8 * 65 + 2, width, sizeof width);
-    expect_refused(p, "a block without end", "what the interrupted run left is damaged");
+    expect_refused(p, "a block without end", "the data of the interrupted run are damaged");
 }
 
 static void links_and_what_is_no_file_are_not_followed(void **state)

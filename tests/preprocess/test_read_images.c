@@ -381,8 +381,8 @@ static void slices_that_do_not_fit_or_are_missing_are_refused(void **state)
 static void wrong_patterns_are_refused(void **state)
 {
     (void)state;
-    assert_refused(path_of("nothing-%03d.tif"), "no file fits");
-    assert_refused(path_of("nothing-*.tif"), "no file fits");
+    assert_refused(path_of("nothing-%03d.tif"), "no file matches");
+    assert_refused(path_of("nothing-*.tif"), "no file matches");
     assert_refused_as(TRIP_USAGE, path_of("a%d-%d.tif"), NULL, "one number");
     assert_refused_as(TRIP_USAGE, path_of("a%s.tif"), NULL, "one number");
     assert_refused_as(TRIP_USAGE, path_of("a%999999d.tif"), NULL, "one number");

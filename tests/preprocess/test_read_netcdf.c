@@ -401,12 +401,12 @@ static void what_the_header_has_no_room_for_is_refused_where_it_is(void **state)
     put_list(&f, 10, 1);
     put_count(&f, 5);
     append(&f.b, "lat_1", 5);
-    assert_refused(write_file("short.nc", &f.b), "byte 24: its header makes no sense");
+    assert_refused(write_file("short.nc", &f.b), "byte 24: the header is invalid");
     f = (file){ .form = 5 };
     append(&f.b, "CDF\5", 4);
     put_count(&f, 0);
     put_list(&f, 10, UINT64_C(1) << 60);
-    assert_refused(write_file("many.nc", &f.b), "byte 24: its header makes no sense");
+    assert_refused(write_file("many.nc", &f.b), "byte 24: the header is invalid");
 }
 
 static void what_is_said_to_have_no_sign_has_none(void **state)
@@ -431,7 +431,7 @@ static void a_variable_is_chosen_by_name(void **state)
     assert_holds_sample(path, &(trip_volume_params){ .grid = "t" }, TRIP_I16);
     assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "u" }, "no variable \"u\"");
     assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "x" },
-                      "not three dimensions");
+                      "is not numeric or has fewer than three dimensions");
 }
 
 /* 60,000 numbers, each a variable of its own. */
@@ -449,7 +449,7 @@ static void a_header_takes_little_memory(void **state)
         type[3] = type[7] = 4;
         type[11] = 100;
     }
-    assert_refused(write_bytes("h.nc", whole, START + EACH * 100), "makes no sense");
+    assert_refused(write_bytes("h.nc", whole, START + EACH * 100), "the header is invalid");
     assert_refused(write_bytes("h.nc", whole, sizeof whole), "longer than 1 MiB");
     whole[30] = 0;
     whole[31] = 100;

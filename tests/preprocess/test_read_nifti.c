@@ -339,7 +339,7 @@ static void hostile_headers_are_refused(void **state)
         for (size_t i = 0; i < sizeof dims / sizeof dims[0]; i++) {
             n = sample_header(version, TRIP_U8, false);
             memcpy(n.dim, dims[i], sizeof dims[i]);
-            assert_refused(write_nifti("dims.nii", &n), i < 3 ? "axes, not 1 to 7" : "has size");
+            assert_refused(write_nifti("dims.nii", &n), i < 3 ? "axes; NIfTI allows 1 to 7" : "has size");
         }
         static const double offsets[] = { -1, 1, 347, -1e30 };
         for (size_t i = 0; i < sizeof offsets / sizeof offsets[0]; i++) {

@@ -111,7 +111,7 @@ static void a_header_without_end_is_refused(void **state)
     bytes b = { .count = 0 };
     for (int i = 0; i < 1000; i++)
         append_text(&b, "X: 5\n");
-    assert_refused(write_file("lines.vol", &b), "has no end");
+    assert_refused(write_file("lines.vol", &b), "the header does not end");
     memset(b.data + 3, '5', 5000);
     assert_refused(write_file("line.vol", &b), "line 1");
 }

@@ -229,7 +229,7 @@ static void a_volume_without_a_finite_value_is_refused(void **state)
         values[i] = i % 2 ? NAN : INFINITY;
     test_write("v.raw", values, sizeof values);
     assert_int_equal(scan_raw(&t, "float", 3, 3, 3, 2), TRIP_ERROR);
-    assert_string_equal(test_report, "triptych: brick: v.raw: holds no finite value\n");
+    assert_string_equal(test_report, "triptych: brick: v.raw: has no finite values\n");
 }
 
 int main(void)
