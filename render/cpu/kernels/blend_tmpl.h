@@ -1,7 +1,6 @@
-/* Kernels that blend projected splats into the pixels of a pane: included by table_tmpl.h after
- * simd_tmpl.h. Splats are gathered in groups of up to TRIP_CPU_LOCAL and sorted by the stamps of
- * pixels that they may touch, in their order; then stamp after stamp takes its splats, its pixels
- * all the while in registers. */
+/* Blends projected splats into the pixels of a pane. Included by table_tmpl.h after simd_tmpl.h.
+ * Splats are gathered in groups of up to TRIP_CPU_LOCAL. A stable sort assigns them to the stamps
+ * that they may touch. Then each stamp blends its splats with its pixels in registers. */
 #ifndef TRIP_CPU_BLEND_H
 #define TRIP_CPU_BLEND_H
 
@@ -18,15 +17,15 @@
 #define STAMPS (STAMPS_ACROSS * STAMPS_DOWN)
 #define CHANNELS (TRIP_CPU_DEPTH ? TRIP_CHANNELS_MAX : TRIP_CHANNEL_DEPTH)
 #define STAMP_FLOATS (CHANNELS * V)
-/* Eight rows of stamps, a bit each. */
+/* A band is eight rows of stamps, a bit each in one word. */
 #define BANDS (STAMPS / 64)
 
 static_assert(STAMPS_ACROSS == 8 && BANDS >= 1 && BANDS <= TRIP_CPU_BANDS, "64 stamps to a band");
 
-/* ---- what a target keeps ---- */
+/* ---- rounding to the target's format ---- */
 
-/* The nearest half float to a, 0 <= a < 65504, ties to even: eleven bits, or below 2^-14 multiples
- * of 2^-24, which is the step of floats between 1/2 and 1. */
+/* Rounds to the nearest half float, ties to even, for 0 <= a < 65504. Half floats have eleven bits.
+ * Below 2^-14 they are multiples of 2^-24, the step of floats between 1/2 and 1. */
 INLINE vf to_half(vf a)
 {
     vi bits = v_bits(a);
@@ -34,7 +33,7 @@ INLINE vf to_half(vf a)
     return v_select(v_gt(v_set(0x1p-14f), a), (a + v_set(0.5f)) - v_set(0.5f), normal);
 }
 
-/* The nearest multiple of 1/255. */
+/* Rounds to the nearest multiple of 1/255. */
 INLINE vf to_unorm8(vf a)
 {
     vf steps = v_fma(v_min(v_set(1), v_max(v_set(0), a)), v_set(255), v_set(0.5f));
@@ -50,9 +49,9 @@ INLINE vf kept(vf a, trip_target target)
     return a;
 }
 
-/* ---- where pixels lie ---- */
+/* ---- pixel positions ---- */
 
-/* Pixel centres of a stamp from the pane's corner. */
+/* Return the pixel centres of a stamp, relative to the pane's corner. */
 INLINE vf stamp_x(unsigned number)
 {
     vf x;
@@ -71,27 +70,27 @@ INLINE vf stamp_y(unsigned number)
 
 /* ---- blending ---- */
 
-/* Where transpose() leaves a word. */
+/* Returns the position of a word after transpose(). */
 INLINE unsigned position_of(unsigned word)
 {
     return word % 8 * 8 + word / 8;
 }
 
-/* A stamp's pixels and where they lie. */
 typedef struct patch {
     vf r, g, b, t;
-    vf depth; /* of layers with depth */
+    vf depth; /* only in layers with depth */
     vf x, y;  /* pixel centres from the pane's corner */
     vf ray;   /* G */
     vf stretch;
-    vf cutoff;                    /* as in trip_cpu_view */
-    const trip_cpu_scratch *pane; /* that the stamp is of */
-    /* Of sums (sum_tmpl.h): those in place of the pixels, their sheet, the stamp's number. */
+    vf cutoff; /* as in trip_cpu_view */
+    const trip_cpu_scratch *pane;
+    /* Summed sheets only (sum_tmpl.h), where r, g, b, t and depth hold sums: their sheet, and the
+     * number of the stamp. */
     int32_t sheet;
     unsigned number;
 } patch;
 
-/* The same of G as given. */
+/* Returns u of trip_cpu_splat with the given G. */
 INLINE vf nearness_by(const patch *p, const trip_cpu_splat *splat, vf g)
 {
     vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
@@ -99,7 +98,7 @@ INLINE vf nearness_by(const patch *p, const trip_cpu_splat *splat, vf g)
     return v_max(v_fnma(g, v_fma(b, b, a * a), v_set(1)), v_set(0));
 }
 
-/* u of trip_cpu_splat; of near splats see rays_of_near(). */
+/* Returns u of trip_cpu_splat. For near splats see rays_of_near(). */
 INLINE vf nearness(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
     vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
@@ -112,12 +111,12 @@ INLINE vf nearness(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays ra
     return v_max(u, v_set(0));
 }
 
-/* Opacity of a thin splat: 0 outside its support.
+/* Returns the opacity of a thin splat, 0 outside its support.
  *
- * Footprints are always evaluated. A table of them with the centre moved to the nearest of n x n
- * places in a pixel, which parallel views alone would allow, is off by up to exp(-1/2) / (sqrt(2) n
- * s) of the peak, s the footprint's standard deviation in pixels: no pixel off by more than 1/255
- * takes n s > 109 and so a table of 2 MB, n^2 footprints of (2 TRIP_CUTOFF s)^2 pixels. */
+ * Footprints are evaluated, not looked up. A table is possible only in parallel views. It would
+ * move the centre to the nearest of n x n positions in a pixel. Its error is up to exp(-1/2) /
+ * (sqrt(2) n s) of the peak, where s is the footprint's standard deviation in pixels. Errors up to
+ * 1/255 need n s > 109, thus a table of 2 MB: n^2 footprints of (2 TRIP_CUTOFF s)^2 pixels. */
 INLINE vf thin_opacity(const trip_cpu_splat *splat, vf u)
 {
     static_assert(TRIP_CPU_TERMS == 5, "the terms below");
@@ -133,7 +132,7 @@ INLINE bool is_near(const trip_cpu_splat *splat)
     return __builtin_expect((splat->panes & TRIP_CPU_PANES_NEAR) != 0, 0);
 }
 
-/* `along` of a near splat, before it is divided by the length of the ray. */
+/* Returns `along` of a near splat, not yet divided by the length of the ray. */
 INLINE vf along_of(const patch *p, const trip_cpu_splat *splat)
 {
     vf x = p->x + v_set((float)p->pane->x), y = p->y + v_set((float)p->pane->y);
@@ -141,7 +140,7 @@ INLINE vf along_of(const patch *p, const trip_cpu_splat *splat)
     return v_fma(y, v_set(splat->c[TRIP_CPU_ALONG_Y]), along);
 }
 
-/* In the index space of the splat (trip_cpu_own_rays()). */
+/* Returns G and the stretch in the index space of the splat (trip_cpu_own_rays()). */
 INLINE ray_lengths own_rays(const patch *p, const trip_cpu_splat *splat, vf x, vf y)
 {
     vf a = v_fma(p->x, v_set(splat->l11), v_fma(p->y, v_set(splat->l21), v_set(splat->l1)));
@@ -151,7 +150,8 @@ INLINE ray_lengths own_rays(const patch *p, const trip_cpu_splat *splat, vf x, v
     return (ray_lengths){ .g = g, .stretch = v_sqrt(form_at(p->pane->view->world2, x, y) * g) };
 }
 
-/* What near splats are blended with: their own G and stretch where others are affine. */
+/* Returns G and the stretch for a near splat. In affine views they differ from the values of other
+ * splats. */
 INLINE ray_lengths rays_of_near(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
     const trip_cpu_scratch *s = p->pane;
@@ -166,8 +166,8 @@ INLINE ray_lengths rays_of_near(const patch *p, const trip_cpu_splat *splat, tri
                           .stretch = rays == TRIP_CPU_STRETCHED ? p->stretch : v_set(1) };
 }
 
-/* front(p) of splat.h of a near splat. The error function is 1 - (a polynomial) exp(-t^2), within
- * 2e-5 (Abramowitz and Stegun 1964, 7.1.25), exp_minus() aside. */
+/* Returns front(p) of splat.h. The error function is 1 - polynomial exp(-t^2), Abramowitz and
+ * Stegun 1964, 7.1.25. Its error is at most 2e-5, plus the error of exp_minus(). */
 INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, vf g)
 {
     vf along = along_of(p, splat);
@@ -184,22 +184,23 @@ INLINE vf front_of(const patch *p, const trip_cpu_splat *splat, vf g)
     return v_select(v_gt(along, -end), front, v_set(0));
 }
 
-/* Optical depth of other splats, likewise, but for the stretch. */
+/* Returns the optical depth from c[MIN] and c[EDGE], without the stretch. */
 INLINE vf long_depth(const patch *p, const trip_cpu_splat *splat, vf u)
 {
     vf y = v_fma(u, p->cutoff, v_set(splat->c[TRIP_CPU_MIN]));
     return exp2_biased_less(y, v_set(splat->c[TRIP_CPU_EDGE]));
 }
 
-/* Of those with rays of their own, whose edge is what the least comes to. */
+/* Returns the optical depth for trip_cpu_own_rays(). The splat does not store its edge, so the
+ * function computes the edge from c[MIN]. */
 INLINE vf own_depth(const patch *p, const trip_cpu_splat *splat, vf u)
 {
     vf min = v_set(splat->c[TRIP_CPU_MIN]);
     return exp2_biased_less(v_fma(u, p->cutoff, min), exp2_biased_less(min, v_set(0)));
 }
 
-/* Near splats are few: not inlined, and by values, so that loops over the others keep their stamp
- * in registers. */
+/* Near splats are rare. This function is not inlined and takes values, so that loops over other
+ * splats keep their stamp in registers. */
 static __attribute__((noinline, cold)) vf near_depth_at(const trip_cpu_scratch *pane,
                                                         const trip_cpu_splat *splat, vf x, vf y,
                                                         vf ray, vf stretch, vf cutoff,
@@ -219,7 +220,6 @@ INLINE vf near_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays 
     return near_depth_at(p->pane, splat, p->x, p->y, p->ray, p->stretch, p->cutoff, rays);
 }
 
-/* Of splats that are not near. */
 INLINE vf far_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays rays)
 {
     vf depth = long_depth(p, splat, nearness(p, splat, rays));
@@ -231,7 +231,7 @@ INLINE vf optical_depth(const patch *p, const trip_cpu_splat *splat, trip_cpu_ra
     return is_near(splat) ? near_depth(p, splat, rays) : far_depth(p, splat, rays);
 }
 
-/* Thin splats are not near. */
+/* Returns the opacity. `thick` must be true for near splats. */
 INLINE vf opacity(const patch *p, const trip_cpu_splat *splat, bool thick, trip_cpu_rays rays)
 {
     if (rays != TRIP_CPU_STRETCHED && !thick)
@@ -243,7 +243,7 @@ INLINE vf opacity(const patch *p, const trip_cpu_splat *splat, bool thick, trip_
     return thick ? v_set(1) - exp_minus(depth) : depth * thin_ratio(depth);
 }
 
-/* put_behind() for splats where every pixel is open and stays so. */
+/* put_behind() for stamps in which every pixel is open and stays open. */
 INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, float depth, vf opacity)
 {
     vf left = v_fnma(p->t, opacity, p->t), taken = p->t - left;
@@ -255,7 +255,7 @@ INLINE void put_behind_open(patch *p, const trip_cpu_splat *splat, float depth, 
     p->t = left;
 }
 
-/* Front to back: `splat` goes behind what the pixels hold. */
+/* Composites a splat behind the pixels' contents, front to back. */
 INLINE void put_behind(patch *p, const trip_cpu_splat *splat, float depth, vf opacity,
                        trip_target target)
 {
@@ -275,7 +275,7 @@ INLINE vf over(vf behind, float colour, vf keep, trip_target target)
     return kept(v_fma(behind - front, keep, front), target);
 }
 
-/* Back to front: `splat` goes over what the pixels hold. */
+/* Composites a splat over the pixels' contents, back to front. */
 INLINE void put_over(patch *p, const trip_cpu_splat *splat, float depth, vf optical_depth,
                      trip_target target)
 {
@@ -303,7 +303,7 @@ INLINE bool all_open(const patch *p)
 
 static void set_rays(trip_cpu_scratch *s, unsigned number);
 
-/* Of the pane's pixels, or of numbers that lie as they do. */
+/* Loads a stamp from a pane's pixels, or from sums with the same layout. */
 INLINE patch load_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays, const float *pane)
 {
     const float *pixels = pane + STAMP_FLOATS * number;
@@ -340,18 +340,18 @@ INLINE void store_stamp(float *pane, unsigned number, const patch *p)
         v_store(pixels + TRIP_CHANNEL_DEPTH * V, p->depth);
 }
 
-/* Which splats of the group may touch a stamp, a bit each. */
+/* The splats of the group that may touch a stamp, a bit each. */
 typedef struct touching {
     const trip_cpu_splat *local;
-    const float *depths; /* of those, in layers with depth */
+    const float *depths; /* of the splats, in layers with depth */
     uint64_t splats[TRIP_CPU_LOCAL / 64];
 } touching;
 
 typedef void blend_one(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays rays,
                        bool front_to_back, trip_target target);
 
-/* Its address is kept in one register: sums of two in every operand would cost the processor an
- * operation each. */
+/* Returns local + number in one register. Without the asm, compilers address each field by two
+ * registers, which costs one more operation per field. */
 INLINE const trip_cpu_splat *splat_at(const trip_cpu_splat *local, unsigned number)
 {
     local += number;
@@ -364,8 +364,8 @@ INLINE float depth_at(const touching *t, unsigned number)
     return TRIP_CPU_DEPTH ? t->depths[number] : 0;
 }
 
-/* In order. Where bits can be packed to a list at once, the processor has to guess but one end of a
- * loop, not one for each word. */
+/* Blends the splats in order. If an instruction can pack bits to a list, a single loop replaces a
+ * loop per word. The processor then mispredicts at most one loop end. */
 INLINE void blend_each(patch *p, const touching *t, blend_one *one, trip_cpu_rays rays,
                        bool front_to_back, trip_target target)
 {
@@ -405,8 +405,8 @@ INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_c
         put_over(p, splat, depth, optical_depth(p, splat, rays), target);
 }
 
-/* The splats where none is thick; false, with nothing done, when a pixel is saturated or would be.
- */
+/* Blends splats of which none is thick. Returns false, without any change, if a pixel is saturated
+ * or would become saturated. */
 INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 {
     patch q = *p;
@@ -419,8 +419,8 @@ INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
     return true;
 }
 
-/* All splats of the group that may touch a stamp, in order; false when its pixels are all
- * saturated. Saturated pixels never change, so that a late test is no error. */
+/* Blends all splats of the group that may touch a stamp, in order. Returns false if all its pixels
+ * are saturated. A late test is no error, since saturated pixels never change. */
 INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
                         bool front_to_back, trip_target target)
 {
@@ -485,8 +485,8 @@ static blend_group_fn *choose_blend(const trip_cpu_view *view)
 
 typedef uint64_t words8 __attribute__((vector_size(64)));
 
-/* Swaps the bits that `low` names in b with those `step` higher in a, so that of each pair of words
- * (a, b) the submatrices of step x step bits off the diagonal change places. */
+/* Swaps the bits `low` of b with the bits `low` << `step` of a. In each pair of words (a, b) the
+ * two off-diagonal submatrices of step x step bits are thereby exchanged. */
 INLINE void exchange(words8 *a, words8 *b, unsigned step, uint64_t low)
 {
     words8 swap = (*a >> step ^ *b) & low;
@@ -504,9 +504,9 @@ INLINE void exchange_all(words8 rows[8], unsigned step, uint64_t low4, uint64_t 
         exchange(&rows[i], &rows[i + 1], step, low1);
 }
 
-/* Bit i of word k becomes bit k of word i, which then lies at position_of(i): steps of 32, 16 and 8
- * words are between vectors of eight, and so are the smaller ones once the vectors are transposed
- * themselves. */
+/* Transposes 64 x 64 bits: bit i of word k becomes bit k of word i, stored at position_of(i). Steps
+ * of 32, 16 and 8 words exchange whole vectors of eight words. After the vectors are transposed, so
+ * do the steps of 4, 2 and 1. */
 static void transpose(uint64_t words[64])
 {
     words8 rows[8], columns[8];
@@ -556,7 +556,8 @@ static bool is_open(const trip_cpu_scratch *s)
     return any != 0;
 }
 
-/* The splat as seen from this pane's corner, which is so far from its first pane's. */
+/* Copies a splat and moves its origin to this pane's corner. `from` is the offset of this corner
+ * from the corner of the splat's first pane, in pixels. */
 INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int4 from)
 {
     float4 f = __builtin_convertvector(from, float4);
@@ -565,8 +566,7 @@ INLINE void make_local(trip_cpu_splat *local, const trip_cpu_splat *splat, int4 
     local->l2 = splat->l2 + splat->l22 * f[1];
 }
 
-/* Bits of the stamps of a band that lie in a column or further right, in every row; none from the
- * eighth on. */
+/* Returns the stamps of a band in `column` or to its right, in every row. Column 8 gives none. */
 INLINE uint64_t from_column(uint32_t column)
 {
 #define FROM(i) UINT64_C(0x0101010101010101) * (0xff << (i)&0xff)
@@ -576,7 +576,7 @@ INLINE uint64_t from_column(uint32_t column)
     return bits[column];
 }
 
-/* Bits of the stamps of a band that lie in a row of the pane's or further down, a byte a row. */
+/* Returns the stamps of a band in the pane's row `row` or below, a byte per row. */
 INLINE uint64_t from_row(unsigned band, uint32_t row)
 {
     static const uint8_t bits[64] = { [32 ... 63] = 0xff };
@@ -593,14 +593,14 @@ static bool meets(const trip_cpu_scratch *s, const trip_cpu_splat *splat)
            splat->y0 < s->y + TRIP_CPU_PANE && splat->y1 >= s->y;
 }
 
-/* What pane_blend() keeps in registers. */
+/* The state that pane_blend() keeps in registers. */
 typedef struct gathering {
     uint32_t splats;
-    uint64_t thick; /* which of the last 64 are, the last one highest */
+    uint64_t thick; /* which of the last 64 splats are thick; the last one is the highest bit */
     int4 corner;    /* of the pane: x, y, x, y */
 } gathering;
 
-/* Splats[i]. Splats whose stamps are all saturated are left out. */
+/* Adds splats[i] to the group, unless all its stamps are saturated. */
 INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
                 const float *depths, uint32_t i)
 {
@@ -638,7 +638,8 @@ INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
     }
 }
 
-/* Splats to fetch ahead: they lie scattered among those of other panes. */
+/* Number of splats to prefetch. The splats of a pane lie scattered in memory among the splats of
+ * other panes. */
 #define AHEAD 32
 
 INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
@@ -655,7 +656,6 @@ INLINE void add_in_order(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat
         add(s, g, splats, depths, order[i]);
 }
 
-/* Blends what is gathered. */
 static void end_group(trip_cpu_scratch *s)
 {
     if (s->splats % 64 != 0)
@@ -663,7 +663,6 @@ static void end_group(trip_cpu_scratch *s)
     empty_group(s);
 }
 
-/* Whether pixels have the same G and stretch in both views. */
 static bool has_same_rays(const trip_cpu_view *a, const trip_cpu_view *b)
 {
     return a->rays == b->rays && a->stretch_varies == b->stretch_varies &&
@@ -671,7 +670,6 @@ static bool has_same_rays(const trip_cpu_view *a, const trip_cpu_view *b)
            memcmp(a->world2, b->world2, sizeof a->world2) == 0;
 }
 
-/* Takes up the view that the next splats were projected with. */
 static void use_view(trip_cpu_scratch *s, const trip_cpu_view *view)
 {
     if (s->view == view)
@@ -714,9 +712,8 @@ static uint64_t pane_end(trip_cpu_scratch *s)
     return open;
 }
 
-/* ---- taking up a pane ---- */
+/* ---- beginning a pane ---- */
 
-/* G and the stretch at a stamp's pixels. */
 static void set_rays(trip_cpu_scratch *s, unsigned number)
 {
     const trip_cpu_view *view = s->view;
@@ -731,7 +728,8 @@ static void set_rays(trip_cpu_scratch *s, unsigned number)
     s->rays_known[number / 64] |= UINT64_C(1) << number % 64;
 }
 
-/* The stamps of the quarters that are ours: the others' pixels may be another thread's. */
+/* Returns the stamps in this thread's quarters of the pane. Another thread may own the pixels of
+ * the other quarters. */
 static uint64_t stamps_of_quarters(unsigned quarters, unsigned band)
 {
     uint64_t stamps = 0;
@@ -743,7 +741,6 @@ static uint64_t stamps_of_quarters(unsigned quarters, unsigned band)
     return stamps;
 }
 
-/* Which stamps are ours and hold an open pixel. */
 static void find_open(trip_cpu_scratch *s, unsigned quarters)
 {
     for (unsigned band = 0; band < BANDS; band++) {

@@ -1,6 +1,6 @@
-/* What the corners of rays' cells have: codes and gradients, interpolated, and rows of the
- * function's integrals: included by sheet_tmpl.h. Reading them is most of what a sample takes; AVX2
- * and AVX-512 read blocks of 16 bytes and turn them round. */
+/* Interpolates codes and gradients from the corners of the rays' cells, and reads rows of the
+ * transfer function's integrals. Included by sheet_tmpl.h. These reads dominate the time of a
+ * sample. AVX2 and AVX-512 therefore read blocks of 16 bytes and transpose them. */
 #ifndef TRIP_CPU_CORNERS_H
 #define TRIP_CPU_CORNERS_H
 
@@ -25,8 +25,8 @@ INLINE __m256i two_blocks(__m128i low, __m128i high)
     return _mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1);
 }
 
-/* A block of 16 bytes each from the places of lanes i, i + 4 and so on; of 128-bit lanes the first
- * is of lane i. */
+/* Reads 16 bytes each at the positions of lanes i, i + 4 and so on. The lowest 128 bits belong to
+ * lane i. */
 INLINE wide blocks_of_lanes(const char *from, const int32_t at[V], ptrdiff_t bytes, int i)
 {
     __m256i low = two_blocks(load_16(from + bytes * at[i]), load_16(from + bytes * at[i + 4]));
@@ -39,7 +39,7 @@ INLINE wide blocks_of_lanes(const char *from, const int32_t at[V], ptrdiff_t byt
 #endif
 }
 
-/* Four numbers of each lane, by lane as blocks_of_lanes() has them, as four vectors. */
+/* Transposes four numbers per lane, in the order of blocks_of_lanes(), to four vectors. */
 INLINE void turn_blocks(const wide of[4], vi out[4])
 {
     wide ab0 = WIDE(unpacklo_epi32)(of[0], of[1]), ab1 = WIDE(unpackhi_epi32)(of[0], of[1]);
@@ -50,8 +50,8 @@ INLINE void turn_blocks(const wide of[4], vi out[4])
     out[3] = (vi)WIDE(unpackhi_epi64)(ab1, cd1);
 }
 
-/* Two corners beside each other of four lanes: with AVX2 faster than the instruction that gathers
- * them, with AVX-512 as fast. */
+/* Reads two neighbouring corners for each of four lanes. This is faster than the gather instruction
+ * with AVX2, and as fast with AVX-512. */
 INLINE __m128i four_codes(const int16_t *pool, const int32_t at[4])
 {
     int32_t two[4];
@@ -60,7 +60,6 @@ INLINE __m128i four_codes(const int16_t *pool, const int32_t at[4])
     return _mm_setr_epi32(two[0], two[1], two[2], two[3]);
 }
 
-/* Of each lane. */
 INLINE wide two_codes(const int16_t *pool, const int32_t at[V])
 {
     __m256i low = two_blocks(four_codes(pool, at), four_codes(pool, at + 4));
@@ -72,7 +71,7 @@ INLINE wide two_codes(const int16_t *pool, const int32_t at[V])
 #endif
 }
 
-/* Corners above and below, two of each lane. */
+/* The four corners of each lane: two above, two below. */
 typedef struct four_corners {
     wide top, bottom;
 } four_corners;
@@ -86,19 +85,20 @@ INLINE four_corners corners_from(const trip_cpu_group *g, vi at)
                            two_codes(pool + TRIP_CPU_RASTER_STRIDE, positions) };
 }
 
-/* The index, and which rays have all corners. */
+/* Stores the interpolated index, and which rays have all four corners. */
 INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
     const halves missing = (halves){ 0 } + TRIP_CPU_CODE_MISSING;
     const four_corners c = corners_from(g, at);
     vi sum =
         (vi)WIDE(madd_epi16)(c.top, (wide)s->top) + (vi)WIDE(madd_epi16)(c.bottom, (wide)s->bottom);
-    wide min = WIDE(min_epi16)(c.top, c.bottom); /* missing ones are the least there are */
+    wide min = WIDE(min_epi16)(c.top, c.bottom); /* TRIP_CPU_CODE_MISSING if any is missing */
     s->there = vi_is_0((vi)((halves)min == missing));
     s->index = index_of(in, sum);
 }
 
-/* Of six numbers, three of a corner and three of the one beside it: along u twice, along v, ... */
+/* Pairs the gradients of two neighbouring corners: both components along u, both along v, both
+ * along the sheets. */
 INLINE wide two_gradients(wide blocks)
 {
     const __m128i order = _mm_setr_epi8(0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, -1, -1, -1, -1);
@@ -135,7 +135,7 @@ INLINE void find_gradients(const trip_cpu_group *g, sample *s)
         s->gradient[k] = turned[k];
 }
 
-/* Rows of four numbers by lane, as four vectors. */
+/* Reads one row of four numbers per lane and transposes the rows to four vectors. */
 INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 {
     int32_t at[V];
@@ -148,7 +148,6 @@ INLINE void find_rows(int32_t (*rows)[4], vi numbers, vi out[4])
 
 #else
 
-/* Two corners' share of a sample. */
 INLINE int32_t of_two(int16_t left, int16_t right, int32_t weights)
 {
     return left * (weights & 0xffff) + right * (weights >> 16);

@@ -1,6 +1,6 @@
-/* Which splats are in view, and which meet a pixel: by the footprints that project() finds and the
- * arithmetic that blends and weighs, so that what is counted is what the kernels do. Included by
- * table_tmpl.h after merge_tmpl.h. */
+/* Counts the splats in view and the splats that meet a pixel. The kernels here use the footprints
+ * of project() and the arithmetic of blending and of the weights, so that the counts match the
+ * drawing. Included by table_tmpl.h after merge_tmpl.h. */
 #ifndef TRIP_CPU_COUNT_TMPL_H
 #define TRIP_CPU_COUNT_TMPL_H
 
@@ -9,8 +9,8 @@
 #include "cpu/kernels/merge_tmpl.h"
 #include "cpu/kernels/project_tmpl.h"
 
-/* Whether some pixel of a stamp of the pane at hand lies in the image, in the support of `splat`,
- * which is local to the pane, and where the view's layer has weight. */
+/* Returns whether a pixel of the stamp lies in the image, in the support of `splat`, and where the
+ * view's layer has weight. `splat` is local to the pane (make_local()). */
 static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsigned number)
 {
     const trip_cpu_view *view = s->view;
@@ -33,7 +33,7 @@ static bool touches_stamp(trip_cpu_scratch *s, const trip_cpu_splat *splat, unsi
            vm_any(vm_and(in, v_gt(layer_weight(view, s->x, s->y, column, row), v_set(0))));
 }
 
-/* Whether some pixel of the pane at (x, y) does. */
+/* Returns whether touches_stamp() holds for a stamp of the pane at (x, y). */
 static bool touches_pane(trip_cpu_scratch *s, const trip_cpu_splat *splat, int x, int y)
 {
     const int mask = ~(TRIP_CPU_PANE - 1), last = TRIP_CPU_PANE - 1;
@@ -74,8 +74,8 @@ static uint32_t drawn(const trip_cpu_view *view, trip_cpu_scratch *s, const trip
     return n;
 }
 
-/* The square of trip_splat.radius over that of the kernel: with u of footprint_of(), the largest
- * eigenvalue of S^-1 is u times that of u S over |u S|. */
+/* Returns the square of trip_splat.radius / (radius of the kernel). With u as in footprint_of(),
+ * the largest eigenvalue of S^-1 is u times the largest eigenvalue of u S, divided by |u S|. */
 INLINE vf growth2(const perspective *p, const trip_splat_frame *f, const trip_cpu_lanes *lanes,
                   uint32_t at)
 {
@@ -90,7 +90,7 @@ INLINE vf growth2(const perspective *p, const trip_splat_frame *f, const trip_cp
     return v_fma(v_set((float)f->low_pass2) * u * u, largest / (p->det * rr), v_set(1));
 }
 
-/* As trip_weight_may_reach(). */
+/* Evaluates trip_weight_may_reach() for V voxels. */
 INLINE vm may_reach(const trip_cpu_view *view, const trip_cpu_reach *reach, const perspective *p,
                     const trip_cpu_staged *staged, const trip_cpu_lanes *lanes, uint32_t at)
 {

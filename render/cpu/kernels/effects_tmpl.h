@@ -1,5 +1,5 @@
-/* Effects on the colours of a vector of places, as effects.h of the renderers has them: included
- * before the kernels that shade. */
+/* Applies the effects of effects.h to the colours at a vector of positions. Included before the
+ * kernels that shade. */
 #ifndef TRIP_CPU_EFFECTS_TMPL_H
 #define TRIP_CPU_EFFECTS_TMPL_H
 
@@ -7,10 +7,10 @@
 #include "cpu/kernels/simd_tmpl.h"
 #include "shade.h"
 
-/* How a surface is lit: as trip_lit, and `gloss` what its highlight adds. */
+/* The lighting of a surface, as in trip_lit. `gloss` is the light that the highlight adds. */
 typedef struct surface {
     vf strength, diffuse, gloss;
-    vf normal[3]; /* world space, unit length; anything where strength is 0 */
+    vf normal[3]; /* world space, unit length; undefined where strength is 0 */
 } surface;
 
 INLINE vf within_01(vf a)
@@ -18,14 +18,14 @@ INLINE vf within_01(vf a)
     return v_min(v_max(a, v_set(0)), v_set(1));
 }
 
-/* At places of level 0. */
+/* Interpolates the lattice at positions in level 0. */
 INLINE vf light_at(const trip_cpu_light *g, const vf position[3])
 {
     vf part[3];
     vi cell = vi_set(0);
     for (int a = 0; a < 3; a++) {
         const vf last = v_set(g->last[a]);
-        vf node = v_max(position[a] * v_set(g->per_voxel), v_set(0)); /* 0 for what is no number */
+        vf node = v_max(position[a] * v_set(g->per_voxel), v_set(0)); /* maps NaN to 0 */
         node = v_min(node, last);
         vi whole = v_truncate(v_min(node, last - v_set(0.5f)));
         part[a] = node - v_from_int(whole);
@@ -51,7 +51,7 @@ INLINE vf phase_of(const trip_cpu_effects *e, const vf light[3], const vf to_eye
     return v_set(e->phase[0]) / (d * v_sqrt(d));
 }
 
-/* Along a unit vector of the world, the bias times `share`. */
+/* Returns one component of the bias along a unit vector in world space, times `share`. */
 INLINE vf aside_of(const trip_cpu_effects *e, int axis, const vf unit[3], vf share)
 {
     return v_fma(unit[0], v_set(e->aside[axis][0]),
@@ -59,7 +59,8 @@ INLINE vf aside_of(const trip_cpu_effects *e, int axis, const vf unit[3], vf sha
            share;
 }
 
-/* Where light that reaches a surface is looked up: towards the light, but not beyond it. */
+/* Computes the position for looking up the light on a surface. It lies towards the light, but not
+ * beyond a point light. */
 INLINE void towards_light(const trip_cpu_effects *e, const vf position[3], const surface *s,
                           const vf light[3], vf out[3])
 {
@@ -101,7 +102,7 @@ INLINE void light_positions(const trip_cpu_effects *e, const vf position[3], con
         rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss * reached));
 }
 
-/* As trip_emission_at(). */
+/* Adds trip_emission_at() for V positions. */
 INLINE void add_emission(const trip_cpu_emission *e, const vf position[3], vf rgb[3])
 {
     vf at[3], share = v_set(1);
@@ -122,8 +123,8 @@ INLINE void add_emission(const trip_cpu_emission *e, const vf position[3], vf rg
     }
 }
 
-/* `at` is a place of the list, `light` and `to_eye` are unit vectors of the world. Not inlined:
- * frames without effects are not to pay for it. */
+/* Applies all effects to `rgb`. `at` is a position in the list; `light` and `to_eye` are unit
+ * vectors in world space. It is not inlined, so that frames without effects do not pay for it. */
 static __attribute__((noinline)) void effects_on(const trip_cpu_effects *e, const vf at[3],
                                                  const surface *s, const vf light[3],
                                                  const vf to_eye[3], vf rgb[3])

@@ -1,5 +1,6 @@
-/* AVX-512 on processors without it, for tests (TRIP_EMULATE_AVX512): SIMDe's functions in place of
- * the compiler's, and here those that it lacks. Included before all else of isa_avx512*.c. */
+/* Emulates AVX-512 in tests on processors without it (TRIP_EMULATE_AVX512). SIMDe's functions
+ * replace the compiler's intrinsics; this file adds the functions that SIMDe lacks. Included before
+ * everything else in isa_avx512*.c. */
 #ifndef TRIP_CPU_EMULATED_AVX512_H
 #define TRIP_CPU_EMULATED_AVX512_H
 
@@ -96,7 +97,7 @@ static inline __attribute__((always_inline)) __m512i emulated_cvttps_epi32(__m51
 #undef _mm512_cvttps_epi32
 #define _mm512_cvttps_epi32 emulated_cvttps_epi32
 
-/* The same numbers of each four. */
+/* Permutes each group of four elements by the same `order`. */
 static inline __m512i emulated_shuffle_epi32(__m512i a, unsigned order)
 {
     emulated_i32 r;

@@ -1,4 +1,4 @@
-/* Exponentials of a vector, as exactly as a footprint needs: included by table_tmpl.h after
+/* Exponentials of a vector with the accuracy that footprints need. Included by table_tmpl.h after
  * simd_tmpl.h. */
 #ifndef TRIP_CPU_EXP_H
 #define TRIP_CPU_EXP_H
@@ -6,8 +6,8 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 
-/* 2^(y / TRIP_CPU_EXP_UNIT - 127) within 7.5e-5 of itself, for y in [0, 254 TRIP_CPU_EXP_UNIT]. The
- * integer part becomes the float's exponent; a cubic does the mantissa. */
+/* Returns 2^(y / TRIP_CPU_EXP_UNIT - 127) with a relative error of at most 7.5e-5, for y in [0, 254
+ * TRIP_CPU_EXP_UNIT]. The integer part becomes the float's exponent; a cubic gives the mantissa. */
 INLINE vf exp2_biased(vf y)
 {
     vi i = v_truncate(y);
@@ -18,7 +18,8 @@ INLINE vf exp2_biased(vf y)
     return v_from_bits(i & 0x7f800000) * p;
 }
 
-/* The same less `edge`, fused: 0 where the edge is that of the same y. */
+/* Returns exp2_biased(y) - edge with one rounding, so that the result is 0 if edge is
+ * exp2_biased(y). */
 INLINE vf exp2_biased_less(vf y, vf edge)
 {
     vi i = v_truncate(y);
@@ -29,8 +30,8 @@ INLINE vf exp2_biased_less(vf y, vf edge)
     return v_fms(v_from_bits(i & 0x7f800000), p, edge);
 }
 
-/* exp(-x), x >= 0, within 1.1e-4 of itself and exact at 0, so that the faint rims of many splats
- * add up to nothing wrong. */
+/* Returns exp(-x) for x >= 0 with a relative error of at most 1.1e-4. It is exact at 0, so that the
+ * faint rims of many splats do not add up to an error. */
 INLINE vf exp_minus(vf x)
 {
     const float unit = (float)(1.44269504088896340736 * TRIP_CPU_EXP_UNIT);
@@ -43,7 +44,7 @@ INLINE vf exp_minus(vf x)
     return v_from_bits(i & 0x7f800000) * p;
 }
 
-/* (1 - exp(-x)) / x within 8e-5 of itself, for 0 <= x <= 0.4. */
+/* Returns (1 - exp(-x)) / x with a relative error of at most 8e-5, for 0 <= x <= 0.4. */
 INLINE vf thin_ratio(vf x)
 {
     vf p = v_fma(v_set(0.143569535f), x, v_set(-0.496570851f));

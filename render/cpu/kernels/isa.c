@@ -5,7 +5,7 @@
 
 #include "report.h"
 
-/* Once, before any thread reads the list below. */
+/* find_runnable() fills the list once, before main() starts any thread. */
 static const trip_cpu_kernels *runnable[5];
 
 __attribute__((constructor)) static void find_runnable(void)

@@ -1,6 +1,6 @@
-/* Which instruction set the CPU renderer runs on: the widest that both this build and the processor
- * have, or the one named by TRIPTYCH_ISA (plain, avx2, avx512,
- * avx512-vbmi2, neon). */
+/* Chooses the instruction set of the CPU renderer. The default is the widest set that both this
+ * build and the processor support. TRIPTYCH_ISA selects another one: plain, avx2, avx512,
+ * avx512-vbmi2 or neon. Any thread may call these functions. */
 #ifndef TRIP_CPU_ISA_H
 #define TRIP_CPU_ISA_H
 
@@ -13,10 +13,11 @@ extern const trip_cpu_kernels trip_cpu_avx2, trip_cpu_avx512, trip_cpu_avx512_vb
 extern const trip_cpu_kernels trip_cpu_neon;
 #endif
 
-/* Those that run here, widest first, NULL-terminated. */
+/* Returns the kernel tables that run on this processor, widest first, NULL-terminated. */
 const trip_cpu_kernels *const *trip_cpu_isas(void);
 
-/* The set named, or the widest for NULL or "". Reports and returns NULL when it cannot run here. */
+/* Returns the table with this name. NULL or "" selects the widest. Reports TRIP_USAGE and returns
+ * NULL if the set cannot run here. */
 const trip_cpu_kernels *trip_cpu_isa_choose(const char *name);
 
 #endif

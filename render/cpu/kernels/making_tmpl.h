@@ -1,7 +1,8 @@
-/* Makes squares of sheets and slices when rays first meet them (trip_cpu_making): included by
- * sheet_tmpl.h. Each square is made by one thread; others that need it wait. Slices wait for
- * sheets, and a square of a sheet for those to the right and below at most, so that none waits for
- * itself. */
+/* Makes squares of sheets and slices when rays first meet them (trip_cpu_making). Included by
+ * sheet_tmpl.h. One thread makes each square; other threads that need it wait.
+ *
+ * Deadlock is impossible: slices wait for sheets only, and a square of a sheet waits only for
+ * squares to its right and below. */
 #ifndef TRIP_CPU_MAKING_H
 #define TRIP_CPU_MAKING_H
 
@@ -15,14 +16,17 @@
 static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients,
                          size_t at, uint64_t squares);
 
-/* The raster in which all is missing where there is no sheet. */
+/* Returns a raster of the pool. If `rasters` is NULL, it is the raster in which every voxel is
+ * missing. */
 INLINE trip_cpu_voxels *raster_of(const trip_cpu_group *g, const int32_t *rasters, size_t at)
 {
     return g->pool + (rasters ? rasters[at] : 0);
 }
 
-/* Of squares at the right edge, the first column of the raster beside; at the lower edge, the first
- * row of that below; of the last, the voxel between. */
+/* Copies gradients from neighbouring rasters into the extra column and row of a raster:
+ * - for squares at the right edge, the first column of the raster to the right;
+ * - for squares at the lower edge, the first row of the raster below;
+ * - for the last square, the first voxel of the raster below and to the right. */
 static void repeat_gradients(const trip_cpu_group *g, const trip_cpu_making *m, size_t at,
                              uint64_t squares)
 {
@@ -52,7 +56,7 @@ static void repeat_gradients(const trip_cpu_group *g, const trip_cpu_making *m, 
     }
 }
 
-/* Of a raster, by one thread. */
+/* Makes squares of a raster. The calling thread has claimed them in `begun`. */
 static void make(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients, size_t at,
                  uint64_t squares)
 {
@@ -88,7 +92,7 @@ static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool
         sched_yield();
 }
 
-/* The squares with voxels from the first column and row to the last. */
+/* Returns the squares that hold voxels of columns u0 to u1 and rows v0 to v1, inclusive. */
 INLINE uint64_t squares_from_to(int32_t u0, int32_t u1, int32_t v0, int32_t v1)
 {
     const uint64_t columns = (2u << (u1 >> 3)) - (1u << (u0 >> 3));
@@ -96,7 +100,8 @@ INLINE uint64_t squares_from_to(int32_t u0, int32_t u1, int32_t v0, int32_t v1)
     return columns * TRIP_CPU_COLUMN_0 & rows;
 }
 
-/* A sheet has its codes from the start. */
+/* Makes the squares of a slice. A sheet has its codes from the start and needs at most gradients.
+ */
 static void make_slice(const trip_cpu_group *g, bool gradients, unsigned slice, size_t at,
                        uint64_t squares, uint64_t needed)
 {
@@ -105,8 +110,8 @@ static void make_slice(const trip_cpu_group *g, bool gradients, unsigned slice, 
         make_squares(g, m, gradients, at, g->leaps && !m->from ? squares : squares & needed);
 }
 
-/* What rays that meet cells of a box take of a segment's ends: of a raster's last cells, what it
- * has of those beside it. */
+/* Makes the voxels at both ends of a segment that rays in a box of cells read. The last cells of a
+ * raster read its copy of the neighbouring rasters' first voxels. */
 static void make_segment(const trip_cpu_group *g, bool gradients, cell_box box, unsigned segment)
 {
     const int log2 = TRIP_CPU_RASTER_LOG2, last = TRIP_CPU_RASTER - 1;

@@ -1,8 +1,9 @@
-/* Kernels that begin and finish the pixels of a pane: weights of the lists, the merge (equation 3
- * of Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
- * The weights are what the operations of weight.c in their order give in double precision, so that
- * a list begins at the same pixel wherever that is computed, and what is near there is exact for
- * any h. */
+/* Clears and finishes the pixels of a pane: the weights of the lists, the merge (equation 3 of
+ * Hofsetz, Max & Bastos 2008) and the picture. Included by table_tmpl.h after blend_tmpl.h.
+ *
+ * The weights equal the results of weight.c in double precision, with the same operations in the
+ * same order. A list therefore begins at the same pixel in all code, and small weights are exact
+ * for any h. */
 #ifndef TRIP_CPU_MERGE_H
 #define TRIP_CPU_MERGE_H
 
@@ -24,7 +25,7 @@ INLINE vd vd_abs(vd a)
 }
 
 typedef struct rays {
-    vd r[3]; /* magnitudes */
+    vd r[3]; /* magnitudes of the components */
 } rays;
 
 INLINE vd component_at(const trip_camera *c, int axis, vd x, vd y)
@@ -43,7 +44,7 @@ INLINE rays rays_at(const trip_camera *c, vd x, vd y)
     return out;
 }
 
-/* As largest_axis() of weight.c: the first of equals. */
+/* Agrees with largest_axis() of weight.c: the first of equal components is the largest. */
 INLINE vl is_largest(const rays *r, int axis)
 {
     vl x = (vl)(r->r[0] >= r->r[1]) & (vl)(r->r[0] >= r->r[2]);
@@ -58,7 +59,7 @@ INLINE vd max_of(const rays *r)
     return vd_max(r->r[0], vd_max(r->r[1], r->r[2]));
 }
 
-/* Not by an index, so that compilers keep vectors in registers. */
+/* Does not index the array, so that compilers keep the vectors in registers. */
 INLINE vd magnitude(const rays *r, int axis)
 {
     return axis == 0 ? r->r[0] : axis == 1 ? r->r[1] : r->r[2];
@@ -80,8 +81,9 @@ INLINE vd_pair centres(int first, const float offsets[V])
     return (vd_pair){ vd_low(f) + vd_set(first), vd_high(f) + vd_set(first) };
 }
 
-/* Rays through the pixels of a stamp, and 1 / the largest of each one's magnitudes: a Newton step
- * from the single-precision quotient, whose error is at most 2^-45 of it where it is `usual`. */
+/* Rays through the pixels of a stamp, and 1 / (largest magnitude) of each ray. The inverse is one
+ * Newton step from the single-precision quotient. Its relative error is at most 2^-45 in lanes of
+ * `defaults`, where the magnitude is in a safe range. */
 typedef struct pixel_rays {
     rays lo, hi;
     vd_pair inverse;
@@ -92,7 +94,6 @@ typedef struct pixel_centres {
     vd_pair x, y;
 } pixel_centres;
 
-/* Of stamp (column, row) of the pane at (x, y). */
 INLINE pixel_centres centres_at(int x, int y, int column, int row)
 {
     float across[V], down[V];
@@ -118,9 +119,9 @@ INLINE pixel_rays pixel_rays_at(const trip_cpu_view *view, int x, int y, int col
     };
 }
 
-/* The list's weight at a stamp's pixels. Products by the inverses give bounds of the quotients,
- * 2^-44 from them at most; where those are one float, so is the weight, and else it is divided for.
- */
+/* Returns the list's weight at a stamp's pixels. The products with the inverses differ from the
+ * exact quotients by at most 2^-44. If both bounds round to one float, the weight is this float.
+ * Otherwise it is computed with divisions. */
 INLINE vf weight(const trip_cpu_view *view, int axis, const pixel_rays *r)
 {
     const trip_settings *s = view->of->settings;
@@ -137,13 +138,14 @@ INLINE vf weight(const trip_cpu_view *view, int axis, const pixel_rays *r)
     return v_narrow(weight_half(view, s, axis, &r->lo), weight_half(view, s, axis, &r->hi));
 }
 
-/* As trip_ray_goes(): 1 where rays go up an axis, else 0. */
+/* Returns 1 for rays that go up an axis by trip_ray_goes(), otherwise 0. */
 INLINE vd is_upwards(const trip_camera *c, int axis, vd x, vd y)
 {
     return vd_select((vl)(component_at(c, axis, x, y) >= vd_set(0)), vd_set(1), vd_set(0));
 }
 
-/* The weight of the view's layer at a stamp's pixels: 0 where rays go the other way. */
+/* Returns the weight of the view's layer at a stamp's pixels. It is 0 for rays in the opposite
+ * direction. */
 INLINE vf layer_weight(const trip_cpu_view *view, int x, int y, int column, int row)
 {
     pixel_rays r = pixel_rays_at(view, x, y, column, row);
@@ -157,7 +159,6 @@ INLINE vf layer_weight(const trip_cpu_view *view, int x, int y, int column, int 
     return w * (view->way == TRIP_WAY_UP ? up : v_set(1) - up);
 }
 
-/* Lanes of a stamp that lie in the image. */
 INLINE vm in_image(const trip_camera *camera, int x, int y, int column, int row)
 {
     vf px, py;
@@ -205,7 +206,8 @@ static void pane_merge(const trip_cpu_view *view, int x, int y, const float *pix
     }
 }
 
-/* 1 / the sum of the squares of the lists' weights at a stamp: 1 unless lists are merged. */
+/* Returns 1 / (sum of the squared weights of the lists) at a stamp's pixels; 1 if lists are not
+ * merged. */
 INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
 {
     vf sum = v_set(0);
@@ -219,7 +221,7 @@ INLINE vf inverse_weight(const trip_cpu_view *view, int x, int y, int b)
     return v_set(1) / sum;
 }
 
-/* Stamp b of the picture before the background. */
+/* Computes stamp b of the picture without the background. */
 INLINE void merged_stamp(const trip_cpu_view *view, int x, int y, int b, trip_cpu_content content,
                          const float *pixels, vf out[CHANNELS])
 {
@@ -234,15 +236,15 @@ INLINE void merged_stamp(const trip_cpu_view *view, int x, int y, int b, trip_cp
         out[c] = out[c] * inverse;
 }
 
-/* The background, premultiplied. */
+/* Returns a channel of the premultiplied background. */
 INLINE float behind(const trip_cpu_view *view, int channel)
 {
     const double *background = view->of->settings->background;
     return (float)(channel == 3 ? background[3] : background[channel] * background[3]);
 }
 
-/* A stamp's pixels, `line_floats` from line to line; the first `count` columns of the first `lines`
- * lines lie in the image. */
+/* Stores a stamp's pixels. Lines are `line_floats` apart. Only the first `count` columns and
+ * `lines` lines lie in the image. */
 INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, const vf out[4])
 {
     uint32_t row[V];
@@ -258,7 +260,7 @@ INLINE void store_pixels(float *rgba, size_t line_floats, int count, int lines, 
                16 * (size_t)(count < 4 ? count : 4));
 }
 
-/* A pane where no list has drawn; `width` pixels from line to line, of which the first `count`
+/* Fills a pane in which no list has drawn. Lines are `width` pixels apart. Only the first `count`
  * columns and `lines` lines lie in the image. */
 static void pane_background(const trip_cpu_view *view, float *rgba, float *depth, size_t width,
                             int count, int lines)
@@ -273,7 +275,7 @@ static void pane_background(const trip_cpu_view *view, float *rgba, float *depth
         }
 }
 
-/* The mean distance of what is seen at a stamp's pixels, as layer.h has it, from the merged
+/* Returns the mean distance of the visible matter (layer.h) at a stamp's pixels, from the merged
  * sums. */
 INLINE vf mean_distance(const trip_cpu_view *view, int x, int y, unsigned b, vf depth, vf alpha)
 {
@@ -285,7 +287,7 @@ INLINE vf mean_distance(const trip_cpu_view *view, int x, int y, unsigned b, vf 
     return v_select(seen, depth / v_select(seen, alpha, v_set(1)) * ray_length, v_set(INFINITY));
 }
 
-/* Distances of a stamp's pixels, as store_pixels(). */
+/* Stores the distances of a stamp's pixels. The arguments are as in store_pixels(), in pixels. */
 INLINE void store_depths(float *depth, size_t width, int count, int lines, vf distances)
 {
     float stamp[V];

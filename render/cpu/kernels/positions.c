@@ -1,6 +1,6 @@
 #include "cpu/kernels/kernels.h"
 
-/* A voxel's place in its square by the low three bits of its Morton number. */
+/* Position of a voxel in its square, from the low three bits of its Morton number. */
 #define PLACE(n) ((uint64_t)(((n)&1) | ((n)&2) << 2 | ((n)&4) >> 1))
 #define BIT(x, n) ((uint64_t)((x) >> (n)&1))
 #define BELOW1(x) BIT(x, 0)
@@ -12,7 +12,7 @@
 #define BELOW7(x) (BELOW6(x) + BIT(x, 6))
 #define NUMBER(n) ((uint64_t)(n))
 #define AT(of, x, n, below) (BIT(x, n) * of(n) << 8 * (below))
-/* Of each bit of x that is set, in order, what `of` says of its number, a byte each. */
+/* Packs of(n) for each set bit n of x into consecutive bytes, lowest bit first. */
 #define EACH(of, x)                                                                                \
     (AT(of, x, 0, 0) | AT(of, x, 1, BELOW1(x)) | AT(of, x, 2, BELOW2(x)) |                         \
      AT(of, x, 3, BELOW3(x)) | AT(of, x, 4, BELOW4(x)) | AT(of, x, 5, BELOW5(x)) |                 \

@@ -1,8 +1,10 @@
-/* Kernels that decode squares of voxels and turn them into projected splats, V at a time: included
- * by table_tmpl.h after simd_tmpl.h. Positions are computed in double precision from the voxel's
- * indices, so that a splat's numbers do not depend on the tile, run or lane it came in; the
- * footprint in single. The few splats for whose numbers single does not do, near the plane of the
- * eye above all, are projected one by one by trip_cpu_project_scalar(). */
+/* Decodes squares of voxels and projects them to splats, V at a time. Included by table_tmpl.h
+ * after simd_tmpl.h.
+ *
+ * Positions are computed in double precision from the voxel's indices, so that a splat's numbers do
+ * not depend on its tile, run or lane. Footprints are computed in single precision. For a few
+ * splats this precision is too low, mostly near the plane of the eye. trip_cpu_project_scalar()
+ * projects them one by one. */
 #ifndef TRIP_CPU_PROJECT_H
 #define TRIP_CPU_PROJECT_H
 
@@ -15,17 +17,17 @@
 #include "cpu/kernels/effects_tmpl.h"
 #include "shade.h"
 
-/* Splats whose largest optical depth is below 2^-60 are left out: 10^18 of them would not show. */
+/* Splats with a smaller maximum optical depth are left out: even 10^18 of them are invisible. */
 #define FAINTEST 0x1p-60f
 
 #define LOG2_E 1.44269504088896340736
 
 /* ---- staging: squares of voxels to lanes ---- */
 
-/* Room for loads and stores that end behind the last byte. */
+/* Includes room for loads and stores that end past the last byte. */
 enum { POSITIONS_ROOM = 64 + V };
 
-/* The places of a mask's voxels in the square, u + 8 v. */
+/* Computes the positions of a mask's voxels in the square, u + 8 v. */
 INLINE void positions_of(uint64_t mask, uint8_t bit_positions[POSITIONS_ROOM])
 {
 #ifdef V_PACKS_BITS
@@ -46,8 +48,8 @@ INLINE void positions_of(uint64_t mask, uint8_t bit_positions[POSITIONS_ROOM])
 #endif
 }
 
-/* The codes of V voxels from number `at` on, a multiple of V. Lanes behind the square's voxels are
- * codes too. */
+/* Loads the codes of V voxels from number `at` on, a multiple of V. Lanes past the square's voxels
+ * also get valid codes. */
 INLINE vi load_codes(const trip_cpu_square *square, unsigned code_bytes, int32_t at)
 {
     if (code_bytes == 1)
@@ -70,8 +72,8 @@ INLINE uint64_t reversed_bits(uint64_t a)
     return __builtin_bswap64(a);
 }
 
-/* Which lanes have codes with extinction; `in_range`: these are those from view->shown.least to
- * view->shown.most, and rows of the table, which lie far apart, are read for what is seen alone. */
+/* Returns the lanes with extinction. `in_range` means that view->shown is the range of all codes
+ * with extinction. Then no row of the table is read here; rows lie far apart in memory. */
 INLINE unsigned lanes_seen(const trip_cpu_view *view, vi code, bool in_range)
 {
     if (in_range) {
@@ -82,8 +84,8 @@ INLINE unsigned lanes_seen(const trip_cpu_view *view, vi code, bool in_range)
     return vm_bits(v_gt(v_gather(&trip_cpu_rows(view)->extinction, code * 4), v_set(0)));
 }
 
-/* `in_range`: as of lanes_seen(); of codes that are bytes what is seen of the square is then known
- * at once. Lanes beyond the square's voxels hold what lies there, and are left out. */
+/* Stages a square. `in_range` is as in lanes_seen(). With codes of one byte it allows testing the
+ * whole square at once. Lanes past the square's voxels hold arbitrary data and are left out. */
 INLINE uint32_t stage_square(const trip_cpu_view *view, const trip_cpu_square *square,
                              unsigned code_bytes, bool in_range, bool reversed,
                              trip_cpu_staged *staged, uint32_t filled)
@@ -158,7 +160,7 @@ INLINE vd_pair widen_int(vi a)
     return (vd_pair){ vd_low_int(a), vd_high_int(a) };
 }
 
-/* 1 / z to double precision: a Newton step from the single-precision quotient. */
+/* Returns 1 / z in double precision: one Newton step from the single-precision quotient. */
 INLINE vd refine(vd z, vd inverse)
 {
     return vd_fma(inverse, vd_fma(-z, inverse, vd_set(1)), inverse);
@@ -170,8 +172,8 @@ INLINE void split(vd_pair p, vf *whole, vf *part)
     *part = v_narrow(p.lo - vd_low(*whole), p.hi - vd_high(*whole));
 }
 
-/* Positions of voxels along an axis of the grid. Lanes beyond the last voxel may hold any number.
- */
+/* Returns the positions of voxels along an axis of the grid. Lanes past the last voxel may hold any
+ * number. */
 INLINE vd_pair positions(const trip_cpu_view *view, int axis, const int32_t *voxels)
 {
     if (!view->coordinates)
@@ -224,7 +226,7 @@ INLINE vf dot(v3 a, v3 b)
     return v_fma(a.x, b.x, v_fma(a.y, b.y, a.z * b.z));
 }
 
-/* Lengths below 1e-15 count as 0. */
+/* Returns the unit vector and the length. Lengths below 1e-15 count as 0. */
 INLINE v3 unit_of(v3 a, vf *length)
 {
     const vf min = v_set(1e-30f);
@@ -244,8 +246,8 @@ INLINE v3 v3_of(trip_vec3 a)
     return (v3){ v_set((float)a.x), v_set((float)a.y), v_set((float)a.z) };
 }
 
-/* The direction of one of two forms of a normal, and its length, which strong ones keep
- * apart. */
+/* Selects one of two forms of a normal, and returns its direction and length. The strong form
+ * stores its length separately. */
 INLINE v3 strong_or_weak(vm is_strong, v3 strong, vf strong_length, v3 weak, vf *length)
 {
     vf weak_length;
@@ -257,7 +259,7 @@ INLINE v3 strong_or_weak(vm is_strong, v3 strong, vf strong_length, v3 weak, vf 
     return direction;
 }
 
-/* As trip_normal_unpack(): the direction, and the length over gradient_full. */
+/* Mirrors trip_normal_unpack(). Returns the direction; `length` is in units of gradient_full. */
 INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
 {
     const vf step = v_set(2.0f / 4095), part = v_set(view->normal_full / 511);
@@ -276,7 +278,8 @@ INLINE v3 unpack_normal(const trip_cpu_view *view, vi normal, vf *length)
     return strong_or_weak(is_strong, strong, root * root * v_set(view->normal_full), weak, length);
 }
 
-/* As trip_compact_normal_unpack(): the direction, and the length over gradient_full. */
+/* Mirrors trip_compact_normal_unpack(). Returns the direction; `length` is in units of
+ * gradient_full. */
 INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length)
 {
     const float(*m)[3] = view->compact;
@@ -292,13 +295,13 @@ INLINE v3 unpack_compact_normal(const trip_cpu_view *view, vi normal, vf *length
     return strong_or_weak(is_strong, strong, v_set(view->normal_full), weak, length);
 }
 
-/* How kernels are flattened: trip_flattening, along the list's own axes. */
+/* trip_flattening for V kernels, along the list's axes. */
 typedef struct flattening {
     v3 normal;
     vf share;
 } flattening;
 
-/* As trip_splat_flattening(). */
+/* Mirrors trip_splat_flattening(). */
 INLINE flattening flattening_of(const trip_cpu_view *view, const trip_cpu_staged *staged,
                                 uint32_t at)
 {
@@ -320,41 +323,40 @@ INLINE flattening flattening_of(const trip_cpu_view *view, const trip_cpu_staged
 
 typedef struct footprint {
     vf l11, l21, l22; /* as in trip_cpu_splat */
-    vf det_ratio;     /* |S| / |S'|; of affine splats times the stretch squared */
+    vf det_ratio;     /* |S| / |S'|; for affine splats, times the squared stretch */
     vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
-    vm defaults;                         /* the numbers are good */
+    vm defaults; /* lanes with sufficient precision; all others are projected one by one */
 } footprint;
 
-/* Constants of a perspective view as floats; rays relative to the image's middle, pixel steps X =
- * rx / step and Y = ry / step of a length about 1, so that no square of theirs leaves a float's
- * range however narrow the view. */
+/* Constants of a perspective view as floats. Rays are relative to the image's middle. The pixel
+ * steps X = rx / step and Y = ry / step have a length near 1, so their squares fit a float however
+ * narrow the view is. */
 typedef struct perspective {
     vf middle_x, middle_y, step;
-    vf rr, rX, rY, XX, XY, YY; /* of r at the middle, X and Y */
+    vf rr, rX, rY, XX, XY, YY; /* dot products of r at the middle, X and Y */
     vf det;                    /* (r . X x Y)^2 */
-    vf inverse_sigma;          /* of a splat at depth 1, in pixels: step (r . X x Y) / sigma */
+    vf inverse_sigma;          /* for a splat at depth 1, in 1 / pixels: step (r . X x Y) / sigma */
     vf reach, inverse_step;    /* cutoff^2 step; 1 / step */
-    vf near;                   /* 2 cutoff^2 step^2; of affine views as splat.h says */
-    v3 middle, X, Y, XxY;      /* r at the middle and so on, along the list's own axes */
-    v3 YxR, RxX;               /* and cross products */
-    bool uneven;               /* not cubes, whose footprints may be any number of times as long as
-                                  wide */
-    bool affine;               /* footprints are, as view->splat has it */
+    vf near;                   /* 2 cutoff^2 step^2; in affine views the bound of splat.h */
+    v3 middle, X, Y, XxY;      /* r at the middle, X, Y and X x Y, along the list's axes */
+    v3 YxR, RxX;
+    bool uneven; /* voxels are not cubes; a footprint may then be much longer than wide */
+    bool affine;
 } perspective;
 
-/* So many pixels, squared, to a voxel's sigma that the products below would leave a float's range.
- */
+/* Bound of u in footprint_of(). Beyond it the products there would leave a float's range. */
 #define FARTHEST 1e12f
 
-/* Components along u, v and the list, which is an even permutation: cross products keep their sign.
- */
+/* Returns the components along u, v and the list's axis. This is an even permutation, so cross
+ * products keep their sign. */
 INLINE v3 in_list_axes(const trip_cpu_view *view, trip_vec3 a)
 {
     return v3_of(trip_v3(trip_component(a, view->u_axis), trip_component(a, view->v_axis),
                          trip_component(a, view->axis)));
 }
 
-/* Floats leave to doubles what lies between affine and near splats. */
+/* Safety factor on the bound of affine splats. Splats close to the bound are projected one by one
+ * in double precision. */
 #define AFFINE_ROOM 1.001
 
 INLINE perspective perspective_of(const trip_cpu_view *view)
@@ -392,8 +394,8 @@ INLINE perspective perspective_of(const trip_cpu_view *view)
     };
 }
 
-/* Bounds of the support, the ellipse of E and l in splat.h over u of footprint_of(), to be widened
- * by the caller; k2 is cutoff^2 / u. */
+/* Computes the bounds of the support: the ellipse of E and l in splat.h, both divided by u of
+ * footprint_of(). k2 is cutoff^2 / u. The caller must widen the bounds for rounding. */
 INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
 {
     vf inverse = v_set(1) / v_fnma(exy, exy, exx * eyy);
@@ -404,7 +406,7 @@ INLINE void bound(footprint *f, vf exx, vf exy, vf eyy, vf lx, vf ly, vf k2)
     f->half_y = v_sqrt(size * exx);
 }
 
-/* Bounds of the support of an affine splat: an ellipse about the centre. */
+/* Computes the bounds of an affine splat's support, an ellipse about the centre. */
 INLINE void bound_affine(footprint *f, vf sxx, vf syy, vf k2)
 {
     f->shift_x = f->shift_y = v_set(0);
@@ -412,20 +414,20 @@ INLINE void bound_affine(footprint *f, vf sxx, vf syy, vf k2)
     f->half_y = v_sqrt(k2 * syy);
 }
 
-/* The square of the stretch over view->stretch, (x, y) pixels from the image's middle. */
+/* Returns (stretch / view->stretch)^2. (x, y) is in pixels from the image's middle. */
 INLINE vf stretch2_at(const trip_cpu_view *view, vf x, vf y)
 {
     vf stretch = ray_lengths_at(view, x, y).stretch;
     return stretch * stretch;
 }
 
-/* Whether a difference from `whole` has kept most of its digits. */
+/* Returns whether little precision was lost in a difference from `whole`. */
 INLINE vm is_exact(vf difference, vf whole)
 {
     return v_ge(difference, whole * v_set(1e-2f));
 }
 
-/* S of a kernel and its determinant. */
+/* S of a kernel (splat.h) and its determinant. */
 typedef struct spread {
     vf xx, xy, yy, det;
 } spread;
@@ -441,9 +443,10 @@ INLINE vf mixed(vf a, vf b, vf share)
     return v_fma(share, b - a, a);
 }
 
-/* S of a flattened kernel from that of the round one: for the gradients gx and gy of x and y, and n
- * the normal, it is the round one's less `share` and that share of (g x n).(g x n), the part at
- * right angles to n. `along2` and `all2` are (n . r)^2 and r . r of the ray. */
+/* Returns S of a flattened kernel from S of the round kernel:
+ *     (1 - share) S + share [(gx x n).(gx x n) ...]
+ * gx and gy are the gradients of x and y, and n is the normal. The second term is the part
+ * perpendicular to n. `along2` is (n . r)^2 and `all2` is r . r for the ray r. */
 INLINE spread flattened(spread s, const flattening *f, v3 gx, v3 gy, vf along2, vf all2)
 {
     v3 x = cross(gx, f->normal), y = cross(gy, f->normal);
@@ -452,7 +455,7 @@ INLINE spread flattened(spread s, const flattening *f, v3 gx, v3 gy, vf along2, 
                      s.det * mixed(v_set(1), along2 / all2, f->share) };
 }
 
-/* Of a splat through (x, y) steps from the image's middle. */
+/* Flattens the S of a splat with its centre (x, y) steps from the image's middle. */
 INLINE spread flattened_at(const perspective *p, spread s, const flattening *f, vf x, vf y, vf rr)
 {
     vf along =
@@ -464,9 +467,10 @@ INLINE spread flattened_at(const perspective *p, spread s, const flattening *f, 
     return flattened(s, f, gx, gy, along * along, rr);
 }
 
-/* With D = r_c . X x Y, constant over the image, and u = (step D z / sigma)^2,
- * u S = adj [X x r_c, Y x r_c] and |u S| = D^2 |r_c|^2: u alone carries the size of a splat in
- * pixels, and all else is about 1. */
+/* Computes the footprints of V splats in perspective. With D = r_c . X x Y, constant over the
+ * image, and u = (step D z / sigma)^2,
+ *     u S = adj [X x r_c, Y x r_c],  |u S| = D^2 |r_c|^2.
+ * Only u depends on the size of a splat in pixels; all other numbers are near 1. */
 INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
                               const trip_cpu_lanes *lanes, const flattening *flat, uint32_t at)
 {
@@ -479,7 +483,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
     vf rr = v_fma(x, p->rX + rx, v_fma(y, p->rY + ry, p->rr)); /* |r_c|^2 */
     vf u = p->inverse_sigma * v_load(lanes->z + at);
     u = u * u;
-    /* From here on S, S' and the low-pass times u. */
+    /* From here on S, S' and the low-pass filter are multiplied by u. */
     vf low_pass = v_set((float)f->low_pass2) * u;
     vf sxx = v_fnma(ry, ry, rr * p->YY), syy = v_fnma(rx, rx, rr * p->XX);
     vf sxy = v_fnma(rr, p->XY, rx * ry);
@@ -506,10 +510,10 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
     out.l22 = v_sqrt(unit * inverse_syy);
     out.det_ratio = det_s * inverse_det;
 
-    /* The trace is of round kernels. E is S'^-1 less a matrix whose product with S' has this trace
-     * times k^2 / |r_c|^2. Where E is positive definite by twice that, |v - eye|^2 also exceeds 4
-     * R^2 and R^2 + radius^2 of splat.h, so that no near splat is usual. What is not a number is
-     * not usual. */
+    /* The trace is computed for round kernels. E is S'^-1 minus a matrix M, and S' M has the trace
+     * k^2 / |r_c|^2 times `trace`. The test requires twice the value that makes E positive
+     * definite. Then |v - eye|^2 exceeds 4 R^2 and R^2 + radius^2 of splat.h, so no near splat
+     * passes. NaN fails the test. */
     out.defaults = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
     if (p->affine) {
         out.defaults = vm_and(out.defaults, exact);
@@ -530,7 +534,7 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
     return out;
 }
 
-/* Of a flattened kernel in a parallel view. */
+/* Computes the footprints of flattened kernels in a parallel view. */
 INLINE footprint footprint_flat_parallel(const trip_cpu_view *view, const flattening *flat)
 {
     const trip_splat_frame *f = &view->splat;
@@ -540,7 +544,7 @@ INLINE footprint footprint_flat_parallel(const trip_cpu_view *view, const flatte
     v3 gx = in_list_axes(view, trip_scale(c->to_x, root));
     v3 gy = in_list_axes(view, trip_scale(c->to_y, root));
     vf along = dot(in_list_axes(view, trip_normalize(c->r0)), flat->normal);
-    /* S, S' and the low-pass over sigma^2 `most`. */
+    /* S, S' and the low-pass filter are divided by sigma^2 max. */
     spread s = { v_set((float)(xx / max)), v_set((float)(trip_dot(c->to_x, c->to_y) / max)),
                  v_set((float)(yy / max)), v_set((float)(area * area)) };
     vf det_s = s.det, low_pass = v_set((float)(f->low_pass2 / (f->sigma * f->sigma * max)));
@@ -584,7 +588,7 @@ INLINE vf offset(vd_pair a, double eye)
     return v_narrow(a.lo - vd_set(eye), a.hi - vd_set(eye));
 }
 
-/* From the voxel to a place, world space, not normalised. */
+/* Returns the vector from the voxel to a position, in world space, not normalised. */
 INLINE v3 towards(const trip_cpu_view *view, const double position[3],
                   const trip_cpu_staged *staged, uint32_t at)
 {
@@ -599,7 +603,7 @@ INLINE v3 towards(const trip_cpu_view *view, const double position[3],
     return (v3){ w[0], w[1], w[2] };
 }
 
-/* To the eye, likewise. */
+/* Returns the vector from the voxel to the eye, in world space, not normalised. */
 INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t at)
 {
     const trip_camera *camera = &view->splat.camera;
@@ -608,7 +612,7 @@ INLINE v3 towards_eye(const trip_cpu_view *view, const trip_cpu_staged *staged, 
     return towards(view, view->eye, staged, at);
 }
 
-/* To the light, of unit length; `eye` is that to the eye. */
+/* Returns the unit vector to the light. `eye` is the unit vector to the eye. */
 INLINE v3 light_of(const trip_cpu_view *view, v3 eye, const trip_cpu_staged *staged, uint32_t at)
 {
     const trip_settings *s = view->of->settings;
@@ -618,8 +622,8 @@ INLINE v3 light_of(const trip_cpu_view *view, v3 eye, const trip_cpu_staged *sta
                           : v3_of(s->light_direction);
 }
 
-/* As trip_light_on(), `eye` and `light` of unit length. With light from the eye `facing` changes
- * nothing that a float keeps. */
+/* Mirrors trip_light_on(). `eye` and `light` have unit length. With a headlight, `facing` is left
+ * out, since it changes no float. */
 INLINE surface surface_of(const trip_cpu_view *view, v3 eye, v3 light, vi packed)
 {
     const trip_settings *s = view->of->settings;
@@ -635,7 +639,7 @@ INLINE surface surface_of(const trip_cpu_view *view, v3 eye, v3 light, vi packed
         shining = strength * v_min(v_set(1), v_max(v_set(0), to_light * to_eye));
     }
     vf diffuse = v_abs(to_light);
-    /* Processors are slow with numbers below 2^-126, as a 24th power soon is. */
+    /* The bound keeps the 24th power above 2^-126. Processors are slow with smaller numbers. */
     vf h2 = v_max(to_half * to_half, v_set(0x1p-8f));
     vf h8 = (h2 * h2) * (h2 * h2);
     static_assert((int)TRIP_SHININESS == 24, "the power below");
@@ -645,8 +649,8 @@ INLINE surface surface_of(const trip_cpu_view *view, v3 eye, v3 light, vi packed
                       .normal = { normal.x, normal.y, normal.z } };
 }
 
-/* As trip_shade(), of colours within [0, 1]; what is flat keeps its own, since its strength is 0.
- */
+/* Mirrors trip_shade() for colours in [0, 1]. Voxels without a surface have strength 0 and keep
+ * their colour. */
 INLINE colour shaded(const surface *s, colour c)
 {
     vf matt = v_fma(s->diffuse, v_set((float)TRIP_DIFFUSE), v_set((float)(TRIP_AMBIENT - 1)));
@@ -664,7 +668,7 @@ INLINE vf position_along(const trip_cpu_view *view, int axis, const int32_t *vox
     return v_narrow(bit_positions.lo, bit_positions.hi);
 }
 
-/* With effects; `s` of strength 0 where nothing is shaded. */
+/* Applies the frame's effects to a colour. `s` has strength 0 without shading. */
 INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, v3 light, const surface *s,
                            const trip_cpu_staged *staged, uint32_t at)
 {
@@ -679,7 +683,8 @@ INLINE colour with_effects(const trip_cpu_view *view, colour c, v3 eye, v3 light
 
 /* ---- putting it together ---- */
 
-/* log2 of a positive number; error below 3e-7. The polynomial is Cephes' logf(). */
+/* Returns log2 of a positive number with an error below 3e-7. The polynomial is from Cephes'
+ * logf(). */
 INLINE vf log2_of(vf a)
 {
     vi t = (vi)((vu)v_bits(a) - 0x3f3504f3u); /* sqrt(1/2); wraps in lanes without a splat */
@@ -699,8 +704,8 @@ INLINE vf log2_of(vf a)
     return v_fma(ln, v_set((float)LOG2_E), e);
 }
 
-/* First and last pixel whose centre lies in shift +- half about whole + part, a little more than
- * less; nothing when first > last. */
+/* Computes the first and last pixel with a centre within `half` of whole + part + shift. The bounds
+ * are slightly enlarged. There is none if first > last. */
 INLINE void pixels(vf whole, vf part, vf shift, vf half, int size, vi *first, vi *last)
 {
     const vf zero = v_set(0), edge = v_set((float)size);
@@ -708,7 +713,7 @@ INLINE void pixels(vf whole, vf part, vf shift, vf half, int size, vi *first, vi
     vf slack = v_fma(half + v_abs(shift), v_set(1e-3f), v_set(1e-3f));
     slack = v_fma(v_abs(middle), v_set(1e-6f), slack);
     vf reach = half + slack - v_set(0.5f);
-    /* v_max gives its second argument where the first is not a number. */
+    /* v_max() returns its second argument if the first is NaN. */
     *first = v_truncate(v_min(v_max(middle - reach, zero), edge));
     *last = v_truncate(v_min(v_max(middle + reach + v_set(1), zero), edge)) - 1;
 }
@@ -718,25 +723,26 @@ INLINE vm less_or_equal(vi a, vi b)
     return v_ge(v_from_int(b), v_from_int(a));
 }
 
-/* As trip_cpu_panes(). */
+/* Mirrors trip_cpu_panes(). */
 INLINE vi panes_of(vi x0, vi y0, vi x1, vi y1, int across)
 {
     const vi one = vi_set(1);
     static_assert(TRIP_CPU_PANE == 32, "the shifts below");
     vi x = x0 >> 5, y = y0 >> 5, right = (x1 >> 5) - x, below = (y1 >> 5) - y;
-    vi more = v_shift_right((one - right) | (one - below), 31); /* the sign: either is above 1 */
+    vi more = v_shift_right((one - right) | (one - below), 31); /* 1 if either exceeds 1 */
     vi any_right = v_shift_right(-right, 31), any_below = v_shift_right(-below, 31);
     return y * across + x + (any_right << TRIP_CPU_PANES_RIGHT_SHIFT) +
            (any_below << TRIP_CPU_PANES_BELOW_SHIFT) + more * (int32_t)TRIP_CPU_PANES_MORE;
 }
 
-/* Where the pane of a pixel begins. */
+/* Returns the first pixel of a pixel's pane along an axis. */
 INLINE vf first_of_pane(vi pixel)
 {
     return v_from_int(pixel & ~(TRIP_CPU_PANE - 1));
 }
 
-/* Everything but colour and opacity; the bits of the lanes that have pixels. */
+/* Computes all fields of the splats except colour and opacity. Returns the lanes that have pixels.
+ */
 INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extinction,
                          trip_cpu_lanes *lanes, uint32_t at)
 {
@@ -763,8 +769,8 @@ INLINE unsigned complete(const trip_cpu_view *view, const footprint *f, vf extin
     return vm_bits(vm_and(seen, vm_and(less_or_equal(x0, x1), less_or_equal(y0, y1))));
 }
 
-/* Offsets in floats of the lanes' records in the output: a lane that is not kept is overwritten by
- * the next. */
+/* Computes the offsets of the lanes' records in the output, in floats, and returns the number of
+ * kept lanes. The next lane overwrites a lane that is not kept. */
 INLINE uint32_t rank(unsigned bits, uint32_t row[V])
 {
     uint32_t n = 0;
@@ -775,8 +781,8 @@ INLINE uint32_t rank(unsigned bits, uint32_t row[V])
     return n;
 }
 
-/* Lanes that are projected one by one; returns those that are drawn. Where sheets are summed
- * `depths` are set to their peaks. */
+/* Projects the given lanes one by one and returns the lanes that are drawn. If sheets are summed,
+ * it sets `depths` to the peaks. */
 static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged *staged,
                                uint32_t at, unsigned lanes, trip_cpu_splat splats[V], float *depths,
                                bool *broken)
@@ -800,7 +806,7 @@ static unsigned project_scalar(const trip_cpu_view *view, const trip_cpu_staged 
     return drawn;
 }
 
-/* Whether the splat's c[] has an edge that long_depth() lowers it by. */
+/* Returns whether the splat's c[] holds an edge that long_depth() subtracts. */
 static bool has_edge(const trip_cpu_view *view, const trip_cpu_splat *s)
 {
     const bool thick = s->panes >> TRIP_CPU_PANES_THICK_SHIFT;
@@ -809,8 +815,9 @@ static bool has_edge(const trip_cpu_view *view, const trip_cpu_splat *s)
     return thick || view->rays == TRIP_CPU_STRETCHED;
 }
 
-/* Puts the geometry of such splats over what the lanes computed; their colours stay. The edge is
- * that of the kernels' exponential, so that nothing is left where it ends. */
+/* Replaces the geometry of splats that were projected one by one, and keeps their colours. The edge
+ * is computed with the kernels' exponential, so that the optical depth is exactly 0 at the edge of
+ * the support. */
 static void replace_scalar(const trip_cpu_view *view, trip_cpu_splat *out, const uint32_t row[V],
                            unsigned lanes, const trip_cpu_splat splats[V])
 {
@@ -845,7 +852,7 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
     return TRIP_CPU_EFFECTS ? with_effects(view, c, eye, light, &s, staged, at) : shaded(&s, c);
 }
 
-/* trip_cpu_splat.c[] of thin splats. */
+/* Computes trip_cpu_splat.c[] for thin splats. */
 INLINE void thin_terms(vf depth, vf c[TRIP_CPU_TERMS])
 {
     vf root = v_sqrt(depth);
@@ -856,7 +863,7 @@ INLINE void thin_terms(vf depth, vf c[TRIP_CPU_TERMS])
     }
 }
 
-/* The same of the others. */
+/* Computes c[MIN] and c[EDGE] for the lanes `which`. */
 INLINE void long_terms(const trip_cpu_view *view, vf depth, vm which, vf c[TRIP_CPU_TERMS])
 {
     vf one = v_set((float)TRIP_CPU_EXP_UNIT), bias = v_set((float)(127 * TRIP_CPU_EXP_UNIT));
@@ -865,12 +872,12 @@ INLINE void long_terms(const trip_cpu_view *view, vf depth, vm which, vf c[TRIP_
     c[TRIP_CPU_EDGE] = v_select(which, exp2_biased(min), c[TRIP_CPU_EDGE]);
 }
 
-/* The lanes that are kept, as splats to be summed. */
+/* Stores the kept lanes as splats for summed sheets. */
 INLINE void store_summed(const trip_cpu_lanes *lanes, const trip_cpu_staged *staged, uint32_t at,
                          const uint32_t row[V], colour light, trip_cpu_splat *out)
 {
     float *base = &out->l11;
-    /* What is opaque anyway stays within what floats hold. */
+    /* The limit avoids overflow, and splats above it are opaque in any case. */
     vf peak = v_min(v_load(lanes->depth + at), v_set(0x1p90f));
     v_store_rows(base, row, v_load(lanes->l11 + at), v_load(lanes->l21 + at),
                  v_load(lanes->l22 + at), v_load(lanes->l1 + at));
@@ -881,7 +888,6 @@ INLINE void store_summed(const trip_cpu_lanes *lanes, const trip_cpu_staged *sta
                  v_load(lanes->panes + at));
 }
 
-/* The lanes that are kept, as splats. */
 INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
                   const uint32_t row[V], colour light, trip_cpu_splat *out)
 {
@@ -906,7 +912,6 @@ INLINE void store(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32
     v_store_rows(base + 12, row, c[4], v_load(lanes->first + at), v_load(lanes->last + at), panes);
 }
 
-/* Depths of the lanes that are kept. */
 INLINE void store_depths_of(const trip_cpu_view *view, const trip_cpu_lanes *lanes, uint32_t at,
                             const uint32_t row[V], float *depths)
 {
@@ -940,10 +945,12 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
     return n;
 }
 
-/* In three loops, each short enough that the processor works on several vectors at a time: one
- * loop's chain of divisions and roots would leave it waiting. What lies over saturated texels is
- * left out before it is coloured, stored, sorted and gathered. `common`: round kernels in
- * perspective, whose footprints are not affine; `uneven` is then view->stretch_varies. */
+/* Projects in three loops. Each is short enough that the processor works on several vectors at
+ * once. In a single loop it would wait for the chain of divisions and roots. Splats over saturated
+ * texels are left out before they are coloured, stored, sorted and gathered.
+ *
+ * `common` means round kernels in perspective with exact footprints; `uneven` is then
+ * view->stretch_varies. */
 INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
                            const _Atomic uint64_t *open, const trip_cpu_staged *staged,
                            uint32_t count, trip_cpu_lanes *lanes, trip_cpu_splat *out,
@@ -987,8 +994,8 @@ INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
     return n;
 }
 
-/* Perspective views by round kernels are compiled by themselves, without what they do not need, of
- * cubes and of others. */
+/* Round kernels in perspective have two specialised variants: for cubic voxels and for all others.
+ */
 static uint32_t project(const trip_cpu_view *view, const _Atomic uint64_t *open,
                         const trip_cpu_staged *staged, uint32_t count, trip_cpu_lanes *lanes,
                         trip_cpu_splat *out, float *depths)

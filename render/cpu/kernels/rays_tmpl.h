@@ -1,11 +1,11 @@
-/* Lengths of the rays of a view, V at a time: included after simd_tmpl.h. */
+/* Computes the lengths of V rays of a view at once. Included after simd_tmpl.h. */
 #ifndef TRIP_CPU_RAYS_H
 #define TRIP_CPU_RAYS_H
 
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
 
-/* ray2 or world2 of trip_cpu_view, (x, y) pixels from the image's middle. */
+/* Evaluates ray2 or world2 of trip_cpu_view. (x, y) is in pixels from the image's middle. */
 INLINE vf form_at(const float form[6], vf x, vf y)
 {
     vf fx = v_fma(x, v_set(form[3]), v_fma(y, v_set(form[4]), v_set(form[1])));
@@ -13,7 +13,7 @@ INLINE vf form_at(const float form[6], vf x, vf y)
     return v_fma(x, fx, v_fma(y, fy, v_set(form[0])));
 }
 
-/* G and the stretch of perspective at such positions, by the formulas of splat.h. */
+/* G (trip_cpu_rays) and the stretch of splat.h, for perspective views. */
 typedef struct ray_lengths {
     vf g, stretch;
 } ray_lengths;

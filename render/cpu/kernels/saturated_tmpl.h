@@ -1,6 +1,6 @@
-/* Which projected splats lie over saturated texels alone (trip_cpu_mask), V at a time: included by
- * project_tmpl.h. Saturated pixels never change, so that those splats can be left out; texels may
- * become saturated meanwhile, and never open again. */
+/* Finds projected splats that lie over saturated texels (trip_cpu_mask) only, V at a time. Included
+ * by project_tmpl.h. The renderer can leave out these splats, because saturated pixels never
+ * change. Texels may become saturated at the same time, but never open again. */
 #ifndef TRIP_CPU_SATURATED_H
 #define TRIP_CPU_SATURATED_H
 
@@ -9,10 +9,11 @@
 
 /* The texels of four panes, two by two, that each lane's support may touch. */
 typedef struct texels {
-    vi pane;              /* the first; in lanes without pixels any, or that beyond the last */
-    vi columns;           /* bits: eight of the first pane, eight of the one to the right */
-    vi top, bottom;       /* rows, counted from the first pane's */
-    vi any_right, across; /* 1 and a row of panes where the support goes there, else 0 */
+    vi pane;    /* the first pane; lanes without pixels may hold any pane, or one past the last */
+    vi columns; /* bit mask: eight columns of the first pane, eight of the pane to its right */
+    vi top, bottom;       /* rows, counted from the top of the first pane */
+    vi any_right, across; /* 1 or 0: the support reaches the pane to the right; panes_across or 0:
+                             the pane below */
 } texels;
 
 INLINE texels texels_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int panes_across)
@@ -34,21 +35,23 @@ INLINE texels texels_of_lanes(const trip_cpu_lanes *lanes, uint32_t at, int pane
     };
 }
 
-/* Rows of a pane's words: of the first pane from `top` to `bottom`, of the one below from its first
- * to `bottom`. */
+/* Returns the bits of rows `top` to min(`bottom`, 7) in the word of the first pane. */
 INLINE vw rows_of_first(vw top, vw bottom)
 {
     vw last = (bottom & 7) | -(bottom >> 3) >> 61; /* at most 7 */
     return vw_set(UINT64_MAX) << 8 * top & vw_set(UINT64_MAX) >> (56 - 8 * last);
 }
 
+/* Returns the bits of rows 8 to `bottom` in the word of the pane below; 0 if `bottom` is at most 7.
+ */
 INLINE vw rows_of_below(vw bottom)
 {
-    vw half = 4 * ((bottom & 7) + 1) & -(bottom >> 3); /* bits, halved: all 64 are too many */
+    /* Half of the bits at a time, because a shift by 64 is undefined. */
+    vw half = 4 * ((bottom & 7) + 1) & -(bottom >> 3);
     return ~(vw_set(UINT64_MAX) << half << half);
 }
 
-/* The lanes, a bit each, with an open texel among those of one of the four panes. */
+/* Returns the lanes, a bit each, with an open texel in one of the four panes. */
 INLINE unsigned open_in(const _Atomic uint64_t *open, vi pane, vi columns, vw rows_low,
                         vw rows_high)
 {
@@ -59,8 +62,8 @@ INLINE unsigned open_in(const _Atomic uint64_t *open, vi pane, vi columns, vw ro
     return vw_not_0(low) | vw_not_0(high) << V / 2;
 }
 
-/* The lanes, a bit each, that may touch an open texel; `open` is a word a pane, as in
- * trip_cpu_mask. Those without pixels give any bit. */
+/* Returns the lanes, a bit each, that may touch an open texel. `open` holds one word per pane, as
+ * in trip_cpu_mask. The bits of lanes without pixels are undefined. */
 INLINE unsigned over_open_texels(const trip_cpu_lanes *lanes, uint32_t at,
                                  const _Atomic uint64_t *open, int panes_across)
 {

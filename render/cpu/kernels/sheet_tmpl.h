@@ -1,9 +1,10 @@
-/* The kernel that draws a group of slices into the pixels of a pane (sheet.h): included by
- * table_tmpl.h after merge_tmpl.h. For each patch of 8 x 8 pixels it finds the segments in which
- * something may show; then each stamp takes those one after the other, its pixels all the while in
- * registers. Positions are worked out from the pane's own corner at each slice, so that they do not
- * depend on how slices are grouped or rasters laid out. With TRIP_CPU_CLOSED segments have a closed
- * form (closed_form.h). */
+/* Draws a group of slices into the pixels of a pane (sheet.h). Included by table_tmpl.h after
+ * merge_tmpl.h. For each patch of 8 x 8 pixels the kernel finds the segments that may be visible.
+ * Each stamp then composites them in order, with its pixels in registers.
+ *
+ * Positions are computed from the pane's corner at each slice, so that they do not depend on the
+ * grouping of slices or the layout of rasters. With TRIP_CPU_CLOSED segments have a closed form
+ * (closed_form.h). */
 #ifndef TRIP_CPU_SHEET_H
 #define TRIP_CPU_SHEET_H
 
@@ -14,14 +15,14 @@
 #include "shade.h"
 #include "sheet.h"
 
-/* Of a group: whole vectors of slices. */
+/* Room for the slices of a group in whole vectors. */
 #define SLICES_ROOM (TRIP_CPU_SEGMENTS + V)
 
-/* Weights of a cell's corners are whole numbers of this sum. */
+/* The weights of a cell's corners are integers with the sum 2^WEIGHT_LOG2. */
 #define WEIGHT_LOG2 14
 static_assert(1 << WEIGHT_LOG2 == TRIP_CPU_CODE_PARTS, "parts of a code that samples are in");
 
-/* exp(-x), x >= 0, within 3e-7 of itself and exact at 0. */
+/* Returns exp(-x) for x >= 0 with a relative error of at most 3e-7. It is exact at 0. */
 INLINE vf exp_of_minus(vf x)
 {
     vf y = v_max(x * v_set(-1.44269504088896340736f), v_set(-126));
@@ -35,48 +36,53 @@ INLINE vf exp_of_minus(vf x)
     return v_from_bits(v_bits(p) + (v_truncate(whole) << 23));
 }
 
-/* ---- where the pane lies in the slices ---- */
+/* ---- the pane's rays at the slices ---- */
 
-/* The rays' positions at the slices, in voxels from the first of the grid of rasters. */
+/* The rays' positions at the slices, in voxels from the corner of the grid of rasters. */
 typedef struct pane_path {
-    /* A lane is at base + first + along * its slope + its shift, `along` from the eye. */
+    /* The ray of a lane is at base + first + along * slope + shift, with slope and shift of
+     * stamp_rays. `along` is counted from the eye, or from sheet 0 in parallel views. */
     int32_t base[2][SLICES_ROOM];
     float first[2][SLICES_ROOM];
     float along[SLICES_ROOM];
-    float middle[TRIP_CPU_SEGMENTS + 1]; /* the same from the grid's middle, however far the eye */
-    float sheets[TRIP_CPU_SEGMENTS];     /* of a segment, how long it is */
-    double slope[2], start[2];           /* of the pane's corner */
-    /* Linear in the place within the pane: at its corner, and a pixel along x and y. */
-    float toward[3];      /* the ray along the list's axis, of length 1 or so at the corner */
-    float aside[2][3];    /* the ray along u and v, less the corner's slope times `toward` */
-    float world[3][3];    /* the ray in world space, of length 1 or so at the corner */
-    float sheet[3];       /* parallel views: of the eye's plane */
-    float world_length;   /* world units over a sheet, where `world` and `toward` are 1 */
-    float depth;          /* z over a sheet where `toward` is 1 */
-    float gradient[3][3]; /* as the view's, of sums of weights 2^WEIGHT_LOG2 */
-    /* How far inside each half-space a ray is at the grid's middle, in perspective times the length
-     * of `toward`, and by how much that grows over a sheet the pass's way, likewise. */
+    float middle[TRIP_CPU_SEGMENTS + 1]; /* sheets from the grid's middle, exact for a far eye */
+    float sheets[TRIP_CPU_SEGMENTS];     /* length of each segment, in sheets */
+    double slope[2], start[2];           /* of the ray at the pane's corner */
+    /* Linear functions of the position in the pane: the value at its corner, and the change per
+     * pixel in x and y. */
+    float toward[3];      /* the ray along the list's axis; length near 1 at the corner */
+    float aside[2][3];    /* the ray along u and v, minus the corner's slope times `toward` */
+    float world[3][3];    /* the ray in world space; length near 1 at the corner */
+    float sheet[3];       /* parallel views: sheet coordinate of the eye's plane */
+    float world_length;   /* world units per sheet if `world` and `toward` are 1 */
+    float depth;          /* z per sheet if `toward` is 1 */
+    float gradient[3][3]; /* the view's map divided by 2^WEIGHT_LOG2 */
+    /* The distance of a ray inside each half-space at the grid's middle, and its growth per sheet
+     * in the direction of the pass. In perspective both are multiplied by `toward`. */
     float clip_at[TRIP_CLIP_MAX][3], clip_toward[TRIP_CLIP_MAX][3];
-    /* Where spacing is uneven positions are places, from the grid's first voxel; else NULL. */
+    /* NULL with even spacing. Otherwise positions are in the units of trip_coordinates, from the
+     * grid's first voxel. */
     const trip_coordinates *coordinates;
-    int axes[2];       /* u and v */
-    int32_t corner[2]; /* voxels: of the grid of rasters */
+    int axes[2];
+    int32_t corner[2]; /* voxel at the corner of the grid of rasters */
 } pane_path;
 
-/* Such grids are drawn by the plain kernels alone, so that even ones take no instruction more. */
+/* Only the plain kernels draw uneven grids, so that even grids cost no extra instruction. */
 INLINE bool is_uneven(const pane_path *path)
 {
     return TRIP_SIMD == TRIP_SIMD_PLAIN && path->coordinates;
 }
 
-/* So are kernels of 64 voxels. */
+/* Only the plain kernels sample with 64 voxels, so that linear sampling costs no extra instruction.
+ */
 INLINE bool is_wide(const trip_cpu_group *g)
 {
     return TRIP_SIMD == TRIP_SIMD_PLAIN && g->about;
 }
 
-/* The ray of a pixel position: where it starts (parallel views), and how far it moves along u and v
- * over a sheet; false where it does not go the pass's way, or is too steep. */
+/* Computes the ray of a pixel position: its start, and its movement along u and v per sheet. In
+ * parallel views the start is at sheet 0. Returns false if the ray does not go in the direction of
+ * the pass. */
 INLINE bool ray_slope(const trip_cpu_sheet_view *view, double x, double y, double start[2],
                       double slope[2])
 {
@@ -87,7 +93,7 @@ INLINE bool ray_slope(const trip_cpu_sheet_view *view, double x, double y, doubl
     for (int i = 0; i < 2; i++) {
         slope[i] = along ? r[i] / r[2] : 0;
         start[i] = view->eye[i];
-        if (view->ortho) { /* from where the ray passes sheet 0 */
+        if (view->ortho) { /* the ray's position at sheet 0 */
             double sheet = view->eye[2] + x * view->rx[2] + y * view->ry[2];
             start[i] += x * view->rx[i] + y * view->ry[i] - sheet * slope[i];
         }
@@ -95,16 +101,17 @@ INLINE bool ray_slope(const trip_cpu_sheet_view *view, double x, double y, doubl
     return along;
 }
 
-/* Along the sheets from where rays start. */
+/* Returns the distance along the sheets from the start of the rays. */
 INLINE double from_start(const trip_cpu_sheet_view *view, double coordinate)
 {
     return view->ortho ? coordinate : coordinate - view->eye[2];
 }
 
-/* The rays of a rectangle of pixel positions: bounds of what ray_slope() gives. */
+/* The rays of a square of pixel positions: results of ray_slope() at its corners, which bound all
+ * its rays. */
 typedef struct beam {
     double start[4][2], slope[4][2];
-    bool whole; /* its rays are all drawn, but for those outside the picture */
+    bool whole; /* all its rays inside the picture are drawn */
 } beam;
 
 static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double size)
@@ -117,7 +124,7 @@ static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double 
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < 2; a++) {
             double s = b.slope[i][a], max = view->steepest;
-            if (!all) /* some rays may go any way */
+            if (!all) /* the directions of the rays are unbounded */
                 s = (a ? i >> 1 : i & 1) ? max : -max;
             b.slope[i][a] = s < -max ? -max : s > max ? max : s;
             b.whole &= b.slope[i][a] == s;
@@ -125,7 +132,7 @@ static beam beam_of(const trip_cpu_sheet_view *view, double x, double y, double 
     return b;
 }
 
-/* Least and greatest position of a beam along u (0) or v (1). */
+/* Computes the minimum and maximum position of a beam along u (a = 0) or v (a = 1). */
 INLINE void beam_bounds(const beam *b, int a, double along, double bounds[2])
 {
     bounds[0] = INFINITY;
@@ -147,7 +154,6 @@ static double greatest_of(const double v[3])
     return fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
 }
 
-/* What is linear in the place within the pane at (x, y). */
 static void find_forms(const trip_cpu_sheet_view *view, int x, int y, pane_path *path)
 {
     double corner[3], world[3][3], turns = view->ortho ? 0 : 1;
@@ -180,7 +186,6 @@ INLINE double dot_list(const double a[4], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Likewise of what is cut away. */
 static void find_clip(const trip_cpu_sheet_view *view, int x, int y, pane_path *path)
 {
     const double along = from_start(view, view->middle);
@@ -248,7 +253,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
     find_clip(view, x, y, path);
 }
 
-/* ---- which segments may show ---- */
+/* ---- segments that may be visible ---- */
 
 #if TRIP_SIMD == TRIP_SIMD_AVX2
 
@@ -296,7 +301,7 @@ INLINE vi vi_within(vi a, int32_t min, int32_t max)
     return vi_lesser(vi_greater(a, zero + min), zero + max);
 }
 
-/* Rounded down; at most 2^28 from 0. */
+/* Rounds down and clamps to +-2^28. */
 INLINE vi v_floor_within(vf a)
 {
     a = v_max(v_min(a, v_set(0x1p28f)), v_set(-0x1p28f));
@@ -304,11 +309,11 @@ INLINE vi v_floor_within(vf a)
     return whole + (vi)(v_from_int(whole) > a);
 }
 
-/* Bounds of rays, from the pane's corner's: least and greatest along u and v. */
+/* Minimum and maximum of slope and shift along u and v, relative to the ray at the pane's corner.
+ */
 typedef struct ray_bounds {
     float slope[2][2], shift[2][2];
-    bool whole; /* all of the rays are drawn, but for those outside the picture, and voxels lie
-                   evenly */
+    bool whole; /* all rays inside the picture are drawn, and spacing is even */
 } ray_bounds;
 
 INLINE void include(float a, bool first, float bounds[2])
@@ -335,13 +340,14 @@ typedef struct cell_box {
     int32_t lo[2], hi[2];
 } cell_box;
 
-/* What rays meet at the slices: of the grid, of which the outermost rasters are absent. */
+/* The boxes of cells that rays meet at each slice, or in each segment, clamped to the grid of
+ * rasters. */
 typedef struct cell_boxes {
     int32_t lo[2][SLICES_ROOM], hi[2][SLICES_ROOM];
 } cell_boxes;
 
-/* In voxels of the grid, and a cell at most beyond that; the place mostly lies about voxel `near`,
- * which is then the one before it. */
+/* Converts a position to voxels from the corner of the grid of rasters, at most a cell outside the
+ * volume. The search starts at voxel *near, and stores the voxel before the position there. */
 static double index_near(const pane_path *path, int a, double position, int32_t *near)
 {
     const trip_coordinates *c = path->coordinates;
@@ -368,7 +374,7 @@ static vi uneven_cells(const pane_path *path, int a, unsigned n, vf at)
     return cells;
 }
 
-/* The cells of a vector of slices, each at a place from pane_path.base. */
+/* Returns the cells at V slices. `at` is relative to pane_path.base. */
 INLINE vi cells_from_base(const pane_path *path, int a, unsigned n, vf at)
 {
     if (is_uneven(path))
@@ -376,8 +382,8 @@ INLINE vi cells_from_base(const pane_path *path, int a, unsigned n, vf at)
     return vi_load(path->base[a] + n) + v_floor_within(at);
 }
 
-/* At the slices from first to last, a vector at a time: a little more for what single precision
- * makes of it. */
+/* Computes the boxes at the slices from `first` to `last`. The boxes are slightly enlarged to cover
+ * the rounding of single precision. */
 static void find_boxes(const trip_cpu_group *g, const pane_path *path, const ray_bounds *r,
                        unsigned first, unsigned last, cell_boxes *out)
 {
@@ -416,13 +422,13 @@ INLINE cell_box both_boxes(const cell_boxes *of, unsigned m, unsigned n)
     return box;
 }
 
-/* What rays meet of a segment. */
 INLINE cell_box box_of_segment(const cell_boxes *of, unsigned n)
 {
     return (cell_box){ { of->lo[0][n], of->lo[1][n] }, { of->hi[0][n], of->hi[1][n] } };
 }
 
-/* From what rays meet at slices to what they meet of segments, of those from first to last. */
+/* Computes the boxes of the segments from `first` to `last`: each is the union of the boxes at its
+ * two slices. */
 static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *samples_per_sheet,
                                cell_boxes *out)
 {
@@ -435,14 +441,13 @@ static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *
         }
 }
 
-/* Whether some square of the box is in a set. */
 INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, cell_box box)
 {
     int32_t u0 = box.lo[0] >> 3, u1 = box.hi[0] >> 3, v1 = box.hi[1] >> 3;
     for (int32_t v = box.lo[1] >> 3; v <= v1; v++) {
         const uint64_t *row = squares + (size_t)(v >> 3) * (size_t)g->across;
         for (int32_t u = u0; u <= u1;) {
-            int32_t end = u | 7; /* of the raster */
+            int32_t end = u | 7; /* last square of the raster */
             end = end > u1 ? u1 : end;
             uint64_t bits = row[u >> 3] >> (v & 7) * 8 & 255;
             if (bits >> (u & 7) & ((2u << (end - u)) - 1))
@@ -453,7 +458,7 @@ INLINE bool some_square_of(const trip_cpu_group *g, const uint64_t *squares, cel
     return false;
 }
 
-/* The cells of a raster that may show in some of the rows from lo to hi. */
+/* Returns the columns of a raster with a cell that may be visible in rows `lo` to `hi`. */
 INLINE uint64_t cells_of_rows(const trip_cpu_cells *raster, int32_t lo, int32_t hi)
 {
     uint64_t some = 0;
@@ -467,7 +472,6 @@ INLINE uint64_t cells_of_rows(const trip_cpu_cells *raster, int32_t lo, int32_t 
     return some | raster->fours[hi - 3];
 }
 
-/* Whether some cell of the box may show. */
 INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 {
     const int log2 = TRIP_CPU_RASTER_LOG2, last = TRIP_CPU_RASTER - 1;
@@ -485,21 +489,22 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
     return false;
 }
 
-/* Numbers of 16 bits in a raster, and where its gradients begin. */
+/* Size of a raster, and offset of its gradients, in numbers of 16 bits. */
 #define RASTER_NUMBERS ((int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 #define GRADIENTS_FROM ((int32_t)(offsetof(trip_cpu_voxels, gradients) / sizeof(int16_t)))
 
 #include "cpu/kernels/making_tmpl.h"
 
-/* What a patch passes. */
 typedef struct patch_path {
-    uint64_t segments; /* in which something may show */
-    /* At each slice of these the raster that all of its rays lie in: from its start in the pool,
-     * where a ray is that is at 0 from pane_path.base; -1: several, or none. */
+    uint64_t segments; /* segments that may be visible */
+    /* For each slice: the raster that contains all rays of the patch, as an offset in the pool. It
+     * is -1 if several rasters or none contain them. `within` is the position of pane_path.base in
+     * this raster. */
     int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
 } patch_path;
 
-/* In outermost rasters there is nothing, and rays may lie anywhere beyond. */
+/* Returns whether a raster is not outermost. Outermost rasters are empty, and clamped rays may lie
+ * anywhere beyond them. */
 INLINE bool is_within(const trip_cpu_group *g, int32_t u, int32_t v)
 {
     return u > 0 && v > 0 && u < g->across - 1 && v < g->down - 1;
@@ -519,11 +524,10 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
         (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
 
-/* What a pane passes. */
 typedef struct pane_segments {
-    uint64_t some;    /* in which a square may show */
-    uint64_t made;    /* of these, those of whose ends all that rays take is made */
-    cell_boxes boxes; /* what rays meet of them */
+    uint64_t some;    /* segments with a square that may be visible */
+    uint64_t made;    /* segments with all voxels made that rays read */
+    cell_boxes boxes; /* cells that rays meet, per segment */
 } pane_segments;
 
 static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
@@ -542,7 +546,7 @@ static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group 
             out->some |= UINT64_C(1) << n;
 }
 
-/* Of the pane's segments, of which there are some. */
+/* Finds the segments of a patch among the pane's `segments`, which must not be empty. */
 static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const pane_path *path, uint64_t segments, int x, int y, patch_path *area)
 {
@@ -569,21 +573,21 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 
 /* ---- rays at a slice ---- */
 
-/* Unit vectors of the world: to the light, and between it and the eye. */
+/* Unit vectors in world space: to the light, and halfway between light and eye. */
 typedef struct light_way {
     vf light[3], half[3];
 } light_way;
 
-/* The rays of a stamp. */
 typedef struct stamp_rays {
-    vf slope[2], shift[2]; /* from the pane's corner's */
-    vf length;             /* world units over a sheet */
-    vf depth;              /* z over a sheet, and at the eye */
+    vf slope[2], shift[2]; /* relative to the ray at the pane's corner */
+    vf length;             /* world units per sheet */
+    vf depth;              /* z per sheet; depth_at_start is z at the start of the ray */
     vf depth_at_start;
-    vm along;    /* they go the pass's way */
-    vf from, to; /* what of them is not cut away: sheets from the middle, the pass's way */
+    vm along;    /* rays in the direction of the pass */
+    vf from, to; /* the part that is not clipped, in sheets from the middle in the direction of the
+                    pass */
     vf to_eye[3];
-    light_way way; /* of a light that is not at a place */
+    light_way way; /* except for a point light */
 } stamp_rays;
 
 INLINE vm vi_is_0(vi a)
@@ -595,10 +599,10 @@ INLINE vm vi_is_0(vi a)
 #endif
 }
 
-/* The cells that rays pass at a slice: from pane_path.base. */
+/* The cells of the rays at a slice, relative to pane_path.base. */
 typedef struct corners {
     vi whole[2];
-    vf part[2]; /* place in the cell */
+    vf part[2]; /* position in the cell, 0 to 1 */
 } corners;
 
 INLINE corners corners_at(const pane_path *path, const stamp_rays *l, unsigned n)
@@ -606,14 +610,15 @@ INLINE corners corners_at(const pane_path *path, const stamp_rays *l, unsigned n
     corners c;
     for (int a = 0; a < 2; a++) {
         vf at = v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
-        at = v_max(at, v_set(0)); /* rays that are not drawn may lie anywhere */
+        at = v_max(at, v_set(0)); /* rays that are not drawn may be negative */
         c.whole[a] = v_truncate(at);
         c.part[a] = at - v_from_int(c.whole[a]);
     }
     return c;
 }
 
-/* The same of a grid with uneven spacing, from where its rays are; `near` as for index_near(). */
+/* Converts the result of corners_at() to cells of a grid with uneven spacing. `near` is as in
+ * index_near(). */
 static corners uneven_corners(const pane_path *path, unsigned n, corners at, int32_t near[2])
 {
     for (int a = 0; a < 2; a++) {
@@ -641,30 +646,30 @@ INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
     return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
-/* With kernels of 64 voxels: the cells that rays are in, voxels of the grid of rasters, and the
- * places in them along u, v and the sheets. */
+/* The cells of the rays in the grid of rasters, for kernels of 64 voxels. The positions in a cell
+ * are `part` along u and v, and `between` along the sheets. */
 typedef struct wide_position {
     const trip_cpu_about *about;
     int32_t cell[2][V];
     float part[2][V], between;
 } wide_position;
 
-/* What rays meet at a slice: the entry of the function's integrals nearest to the code (where
- * segments have a closed form the code itself, biased, times 2^WEIGHT_LOG2), and what the rest is
- * worked out from where it is needed. */
+/* The samples of the rays at a slice. `index` is the entry of the transfer function's integrals
+ * nearest to the code. With TRIP_CPU_CLOSED it is the biased code times 2^WEIGHT_LOG2. Gradients
+ * and sums are computed from the other fields on demand. */
 typedef struct sample {
     vi index;
-    vm there;            /* all corners are */
+    vm there;            /* all corners are present */
     vi top, bottom;      /* weights of two corners, the right one's in the higher 16 bits */
-    vi gradient_at;      /* of the first corner, as 16-bit numbers from the pool's first */
+    vi gradient_at;      /* offset of the first corner's gradient in the pool, in 16-bit numbers */
     vi gradient[3];      /* times 2^WEIGHT_LOG2 */
-    vi sums[4];          /* of the integrals, at the entry */
-    bool lit, summed;    /* gradient is there; sums are */
-    int32_t near[2];     /* with uneven spacing: voxels that rays were near to, at any slice */
-    wide_position *wide; /* with kernels of 64 voxels: where that is */
+    vi sums[4];          /* the integrals at the entry */
+    bool lit, summed;    /* `gradient` is valid; `sums` is valid */
+    int32_t near[2];     /* uneven spacing: start of the search in index_near() */
+    wide_position *wide; /* kernels of 64 voxels: position of the sample */
 } sample;
 
-/* Bilinear weights, 2^WEIGHT_LOG2 in all. */
+/* Computes the bilinear weights. Their sum is 2^WEIGHT_LOG2. */
 INLINE void set_weights(const vf part[2], sample *s)
 {
     vi u = v_truncate(v_fma(part[0], v_set(1 << WEIGHT_LOG2), v_set(0.5f)));
@@ -680,11 +685,11 @@ INLINE void set_weights(const vf part[2], sample *s)
     vi right = (u * v + (1 << 14)) >> 15;
     vi left = (((1 << WEIGHT_LOG2) - u) * v + (1 << 14)) >> 15;
     s->bottom = (right << 16) | left;
-    s->top = across - s->bottom; /* no borrow: each part is the lesser */
+    s->top = across - s->bottom; /* no borrow: no half of `bottom` is larger */
 #endif
 }
 
-/* Cells of the grid; of those beyond it, the nearest. */
+/* Returns the cells in the grid of rasters. Cells beyond it become the nearest cell. */
 INLINE void find_cells(const trip_cpu_group *g, const pane_path *path, unsigned n, const corners *c,
                        vi whole[2])
 {
@@ -693,13 +698,14 @@ INLINE void find_cells(const trip_cpu_group *g, const pane_path *path, unsigned 
         whole[a] = vi_within(c->whole[a] + path->base[a][n], 0, size[a] * TRIP_CPU_RASTER - 1);
 }
 
-/* Where cells lie in their rasters, and where these begin in the pool: 16-bit numbers. */
+/* Returns the positions of cells in their rasters, in 16-bit numbers. */
 INLINE vi position_in_raster(const vi whole[2])
 {
     return (whole[1] & (TRIP_CPU_RASTER - 1)) * TRIP_CPU_RASTER_STRIDE +
            (whole[0] & (TRIP_CPU_RASTER - 1));
 }
 
+/* Returns the offsets of the cells' rasters in the pool, in 16-bit numbers. */
 INLINE vi raster_starts(const trip_cpu_group *g, const int32_t *rasters, const vi whole[2])
 {
     vi raster = (whole[1] >> TRIP_CPU_RASTER_LOG2) * g->across + (whole[0] >> TRIP_CPU_RASTER_LOG2);
@@ -710,8 +716,8 @@ INLINE vi raster_starts(const trip_cpu_group *g, const int32_t *rasters, const v
     return vi_load(starts);
 }
 
-/* Where the first corners lie in the pool: of their codes, as 16-bit numbers from its first, and of
- * their gradients. With uneven spacing weights are set anew. */
+/* Returns the offsets of the first corners' codes in the pool, in 16-bit numbers, and sets
+ * gradient_at. With uneven spacing it also sets the weights. */
 INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
                          unsigned n, const corners *c, sample *s)
 {
@@ -734,8 +740,7 @@ INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const p
     return from + in;
 }
 
-/* Of a biased code times 2^WEIGHT_LOG2: the entry of the function's integrals nearest to it, or
- * where segments have a closed form the same. */
+/* Returns sample.index for a biased code times 2^WEIGHT_LOG2. */
 INLINE vi index_of(const trip_cpu_integrals *in, vi code)
 {
     const int log2 = WEIGHT_LOG2 + in->entry_log2;
@@ -759,13 +764,12 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 
 /* ---- a segment ---- */
 
-/* What the transfer function makes of a segment. */
 typedef struct medium {
-    vf extinction; /* 0: nothing */
+    vf extinction; /* 0 if the segment is transparent */
     vf rgb[3];
 } medium;
 
-/* Where both ends have the same entry, what the function is there. */
+/* Replaces the sums by the transfer function's values where both ends have the same entry. */
 INLINE void use_entries_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
 {
     vi at[4];
@@ -774,7 +778,6 @@ INLINE void use_entries_alone(const trip_cpu_integrals *in, vi index, vm same, v
         sums[k] = (vi)v_select(same, (vf)at[k], (vf)sums[k]);
 }
 
-/* Whether a segment between two entries may show. */
 INLINE vm may_show(const trip_cpu_integrals *in, vi a, vi b)
 {
     vi beyond = (vi)(vi_greater(a, b) < in->first) | (vi)(vi_lesser(a, b) > in->last);
@@ -807,7 +810,7 @@ INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
     if (!vm_any(some))
         return s;
     extinction = v_select(some, extinction, v_set(1));
-    /* Both quotients by one division. */
+    /* One division serves both quotients. */
     vf inverse = v_set(1) / (extinction * over);
     vf per_extinction = inverse * over;
     for (int k = 0; k < 3; k++)
@@ -817,7 +820,7 @@ INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
     return s;
 }
 
-/* The same where it has a closed form, of lanes that are open. */
+/* Classifies a segment in closed form. `open` are the lanes that matter. */
 INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sample *a,
                                 const sample *b)
 {
@@ -834,7 +837,7 @@ INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sa
     if (f->coloured) {
         vf slope = v_fma(v_fma(v_set(3 * f->k[3]), m, v_set(2 * f->k[2])), m, v_set(f->k[1]));
         slope = v_fma(v_set(1.8f * f->k[3]), dd, slope);
-        at = v_fma(dd, slope / v_max(k, v_set(1e-20f)), m); /* finite in any case */
+        at = v_fma(dd, slope / v_max(k, v_set(1e-20f)), m); /* v_max: keeps it finite */
     }
     for (int i = 0; i < 3; i++)
         s.rgb[i] = f->coloured ? v_fma(at, v_set(f->q1[i]), v_set(f->q0[i])) : v_set(f->q0[i]);
@@ -868,8 +871,8 @@ INLINE void set_half(light_way *way, const vf to_eye[3])
     set_unit(way->half);
 }
 
-/* From a voxel of the list to a light that is at a place. Not inlined: frames without are not to
- * pay for it. */
+/* Computes the direction from a position in the list to a point light. It is not inlined, so that
+ * frames without a point light do not pay for it. */
 static __attribute__((noinline)) void find_way(const trip_cpu_sheet_view *view, const vf at[3],
                                                const vf to_eye[3], light_way *way)
 {
@@ -884,13 +887,13 @@ static __attribute__((noinline)) void find_way(const trip_cpu_sheet_view *view, 
     set_half(way, to_eye);
 }
 
-/* As trip_light_on(), with the mean of the gradients of the ends. */
+/* Mirrors trip_light_on() for the mean of the gradients at both ends. */
 INLINE surface surface_between(const trip_cpu_sheet_view *view, const pane_path *path,
                                const stamp_rays *l, const light_way *way, const sample *a,
                                const sample *b)
 {
     vf g[3], n[3];
-    for (int k = 0; k < 3; k++) /* twice their mean */
+    for (int k = 0; k < 3; k++) /* twice the mean */
         g[k] = v_from_int(a->gradient[k] + b->gradient[k]);
     for (int k = 0; k < 3; k++)
         n[k] = v_fma(g[0], v_set(path->gradient[k][0]),
@@ -917,7 +920,7 @@ INLINE surface surface_between(const trip_cpu_sheet_view *view, const pane_path 
     };
 }
 
-/* As trip_shade(). */
+/* Mirrors trip_shade(). */
 INLINE void light_segment(const surface *lit, medium *s)
 {
     vf matt =
@@ -927,7 +930,6 @@ INLINE void light_segment(const surface *lit, medium *s)
         s->rgb[k] = v_min(v_set(1), v_max(v_set(0), v_fma(s->rgb[k], matt, lit->gloss)));
 }
 
-/* z where the rays are so far along. */
 INLINE vf ray_depth(const stamp_rays *l, vf along)
 {
     return v_fma(along, l->depth, l->depth_at_start);
@@ -942,9 +944,9 @@ INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     s->lit = true;
 }
 
-/* What of a segment is not cut away. */
+/* The part of a segment that is not clipped. */
 typedef struct remnant {
-    vf from, to; /* shares of the segment: 0 to 1 */
+    vf from, to; /* positions in the segment, 0 to 1 */
     vm some;
 } remnant;
 
@@ -958,7 +960,7 @@ INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
     return (remnant){ first, last, v_gt(last, first) };
 }
 
-/* The sample at a share of the way, codes running straight. */
+/* Computes the sample at a position between a (0) and b (1), with linear codes. */
 INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
 {
     vf code = v_fma(share, v_from_int(b->index - a->index), v_from_int(a->index));
@@ -966,7 +968,8 @@ INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
     out->summed = false;
 }
 
-/* Where the rays of slice n are `further` along: voxels of the list, or places. */
+/* Computes the rays' positions `further` sheets beyond slice n, in the list's voxels. With uneven
+ * spacing the units are positions of trip_coordinates. */
 INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
                          unsigned n, vf further, vf at[3])
 {
@@ -981,7 +984,8 @@ INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const s
     at[2] = v_set((float)g->samples_per_sheet[n].coordinate) + further;
 }
 
-/* Puts a segment behind what the pixels hold; false where it shows in none of them. */
+/* Composites a segment behind the pixels' contents. Returns false if it is visible in none of the
+ * pixels. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                               const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
                               sample *b, vf pixel[CHANNELS])
@@ -990,7 +994,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     open = vm_and(open, TRIP_CPU_CLOSED
                             ? l->along
                             : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
-    if (view->ortho) /* what begins behind the eye's plane is left out */
+    if (view->ortho) /* leaves out segments that begin behind the eye's plane */
         open = vm_and(open, v_ge(ray_depth(l, v_set(path->along[n])), v_set(0)));
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
@@ -1045,7 +1049,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     return true;
 }
 
-/* A pixel of which this is left is saturated: it takes no more, and its colour counts for all. */
+/* Ends pixels with a transmittance below early_termination. Divides their colour by their opacity
+ * and makes them opaque (sheet.h). */
 INLINE void finish_saturated(const trip_cpu_sheet_view *view, vf pixel[CHANNELS])
 {
     vm saturated = vm_and(v_gt(v_set(view->early_termination), pixel[3]), v_gt(pixel[3], v_set(0)));
@@ -1064,7 +1069,7 @@ INLINE void set_light(const trip_cpu_sheet_view *view, stamp_rays *l)
 {
     for (int k = 0; k < 3; k++)
         l->way.light[k] = view->headlight ? l->to_eye[k] : v_set(view->light[k]);
-    if (!view->headlight) /* else it is that way, too */
+    if (!view->headlight) /* with a headlight, `half` is not used */
         set_half(&l->way, l->to_eye);
 }
 
@@ -1073,7 +1078,6 @@ INLINE vf form_of(const float form[3], vf x, vf y)
     return v_fma(x, v_set(form[1]), v_fma(y, v_set(form[2]), v_set(form[0])));
 }
 
-/* Cuts the rays to the half-spaces. */
 INLINE void clip_rays(const trip_cpu_sheet_view *view, const pane_path *path, vf x, vf y,
                       stamp_rays *l)
 {
@@ -1086,12 +1090,11 @@ INLINE void clip_rays(const trip_cpu_sheet_view *view, const pane_path *path, vf
         vf where = (zero - at) / v_select(in, by, v_select(out, by, v_set(1)));
         l->from = v_select(in, v_max(l->from, where), l->from);
         l->to = v_select(out, v_min(l->to, where), l->to);
-        vf beside = v_select(in, zero, v_select(out, zero, at)); /* of rays along the plane */
+        vf beside = v_select(in, zero, v_select(out, zero, at)); /* rays parallel to the plane */
         l->from = v_select(v_gt(zero, beside), never, l->from);
     }
 }
 
-/* The rays through the pixel centres of a stamp. */
 static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, unsigned number,
                       stamp_rays *l)
 {
@@ -1113,7 +1116,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
         l->to_eye[k] = none - form_of(path->world[k], x, y);
     l->length = v_sqrt(dot3(l->to_eye, l->to_eye)) * v_abs(inverse) * v_set(path->world_length);
     l->depth = inverse * v_set(path->depth);
-    l->depth_at_start = none; /* depth 0 is at the ray's origin */
+    l->depth_at_start = none; /* perspective: rays start at the eye, at depth 0 */
     if (view->ortho) {
         l->depth_at_start = none - form_of(path->sheet, x, y) * l->depth;
         for (int k = 0; k < 3; k++)
@@ -1124,7 +1127,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
     clip_rays(view, path, x, y, l);
 }
 
-/* The rays whose cell at the first slice is in the group's window. */
+/* Returns the rays with a cell in the group's window at the first slice. */
 INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l)
 {
     corners c = cells_at(path, l, 0);
@@ -1145,7 +1148,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     vf pixel[CHANNELS];
     sample ends[2];
     wide_position positions[2];
-    unsigned sampled = UINT32_MAX; /* slice, in ends[sampled % 2] */
+    unsigned sampled = UINT32_MAX; /* the slice sampled in ends[sampled % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
     for (int i = 0; i < 4 && is_uneven(path); i++)
@@ -1178,7 +1181,6 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         v_store(stamp + k * V, pixel[k]);
 }
 
-/* A stamp's pixels take more. */
 INLINE bool stamp_is_open(const float *stamp)
 {
     return vm_any(v_gt(v_load(stamp + 3 * V), v_set(0)));
@@ -1186,7 +1188,7 @@ INLINE bool stamp_is_open(const float *stamp)
 
 enum { PATCH_STAMPS = 2 * 8 / STAMP_ROWS };
 
-/* Of the pane's stamps, one of a patch. */
+/* Returns the pane's number of stamp i of the patch at `position`. */
 INLINE unsigned patch_stamp(unsigned position, unsigned i)
 {
     return (position / 4 * (8 / STAMP_ROWS) + i / 2) * STAMPS_ACROSS + position % 4 * 2 + i % 2;

@@ -1,14 +1,14 @@
-/* Vectors for the kernels of the CPU renderer: one small vocabulary over AVX-512, AVX2 + FMA, NEON
- * and plain C (the compiler's own vectors, four floats at the baseline). Each cpu_isa_*.c defines
- * TRIP_SIMD to one of the numbers below and includes the kernels; nothing else includes this.
+/* Vector types and operations for the CPU renderer's kernels, over AVX-512, AVX2 + FMA, NEON and
+ * plain C (the compiler's vectors with four floats). Each isa_*.c defines TRIP_SIMD as one of the
+ * numbers below and includes the kernels. Nothing else includes this file.
  *
- *   vf, vi   V floats or 32-bit integers; + - * / and comparison-free arithmetic by operator
- *   vd       V / 2 doubles; a pair of them (lo, hi) goes with one vf
- *   vw       V / 2 words of 64 bits; likewise
- *   vm       one truth value a lane
+ *   vf, vi   V floats or 32-bit integers; operators do + - * / and arithmetic without comparisons
+ *   vd       V / 2 doubles; a pair (lo, hi) has the lanes of one vf
+ *   vw       V / 2 words of 64 bits; a pair has the lanes of one vi
+ *   vm       one truth value per lane
  *
- * Products and sums are fused only where v_fma, v_fnma or vd_fma says so, and all other operations
- * are the IEEE ones, so that a kernel's numbers are the same on every processor that runs it. */
+ * Only v_fma, v_fnma, v_fms, v_fnma_where and vd_fma fuse a product and a sum. All other operations
+ * are the IEEE ones. A kernel's results are therefore the same on every processor that runs it. */
 #ifndef TRIP_CPU_SIMD_H
 #define TRIP_CPU_SIMD_H
 
@@ -46,11 +46,10 @@ typedef uint32_t vu __attribute__((vector_size(4 * V)));
 typedef double vd __attribute__((vector_size(4 * V)));
 typedef uint64_t vw __attribute__((vector_size(4 * V)));
 
-/* Four of one splat. */
+/* Vectors of four numbers of one splat, in every instruction set. */
 typedef int32_t int4 __attribute__((vector_size(16)));
 typedef float float4 __attribute__((vector_size(16)));
 
-/* The doubles of one vf's lanes. */
 typedef struct vd_pair {
     vd lo, hi;
 } vd_pair;
@@ -133,7 +132,7 @@ INLINE vf v_copysign(vf a, vf b)
     return (vf)(((vi)a & 0x7fffffff) | ((vi)b & INT32_MIN));
 }
 
-/* Four numbers of 16 bits, the lowest first. */
+/* int4_widened() unpacks four numbers of 16 bits, the lowest first. */
 #if TRIP_SIMD == TRIP_SIMD_AVX512 || TRIP_SIMD == TRIP_SIMD_AVX2
 
 INLINE int4 int4_widened(uint64_t four)
@@ -189,7 +188,7 @@ INLINE vf v_sqrt(vf a)
     return (vf)_mm512_sqrt_ps((__m512)a);
 }
 
-/* b where either is not a number; so in every set. */
+/* v_min() and v_max() return b if either argument is NaN, in every instruction set. */
 INLINE vf v_min(vf a, vf b)
 {
     return (vf)_mm512_min_ps((__m512)a, (__m512)b);
@@ -266,7 +265,7 @@ INLINE vm vm_last(unsigned lanes)
     return (vm)~vm_first(V - lanes);
 }
 
-/* (a & low bits) | bits of b elsewhere */
+/* (a & low) | high */
 INLINE vi vi_low_or(vi a, int32_t low, int32_t high)
 {
     return (vi)_mm512_ternarylogic_epi32((__m512i)a, _mm512_set1_epi32(low),
@@ -310,7 +309,7 @@ INLINE vi vi_reverse(vi a)
     return (vi)_mm512_permutexvar_epi32(order, (__m512i)a);
 }
 
-/* Lanes from 0 on and from V / 2 on, as they are without a sign. */
+/* vw_low() widens the lanes below V / 2, vw_high() all others. Both treat them as unsigned. */
 INLINE vw vw_low(vi a)
 {
     return (vw)_mm512_cvtepu32_epi64(_mm512_castsi512_si256((__m512i)a));
@@ -321,19 +320,19 @@ INLINE vw vw_high(vi a)
     return (vw)_mm512_cvtepu32_epi64(_mm512_extracti32x8_epi32((__m512i)a, 1));
 }
 
-/* Each word as a relaxed load gives it. */
+/* Reads each word like a relaxed atomic load. */
 INLINE vw vw_gather(const _Atomic uint64_t *base, vw index)
 {
     return (vw)_mm512_i64gather_epi64((__m512i)index, (const void *)(uintptr_t)base, 8);
 }
 
-/* A bit each. */
+/* Returns a bit per word: whether it is not 0. */
 INLINE unsigned vw_not_0(vw a)
 {
     return _mm512_test_epi64_mask((__m512i)a, (__m512i)a);
 }
 
-/* Lanes of a whose bits are set, packed to the front of p; V lanes of p may be overwritten. */
+/* Stores the lanes of `a` with a set bit contiguously at p. All V lanes at p may be overwritten. */
 INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 {
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32((__mmask16)bits, (__m512i)a));
@@ -344,15 +343,16 @@ INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 
 typedef uint8_t v_bytes __attribute__((vector_size(64)));
 
-/* Those of 64 bytes whose bits are set to the front of `out`, all of which may be overwritten;
- * returns how many they are. */
+/* Stores the bytes with a set bit contiguously at `out` and returns their number. All 64 bytes at
+ * `out` may be overwritten. */
 INLINE uint32_t v_pack_bytes(uint8_t *out, uint64_t bits, v_bytes from)
 {
     _mm512_storeu_si512(out, _mm512_maskz_compress_epi8(bits, (__m512i)from));
     return (uint32_t)__builtin_popcountll(bits);
 }
 
-/* The places of a word's bits, from `first` on, likewise. */
+/* Stores first + n for each set bit n contiguously at `out` and returns their number. All 64 bytes
+ * at `out` may be overwritten. */
 INLINE uint32_t v_pack_bits(uint8_t *out, uint64_t bits, unsigned first)
 {
     v_bytes position;
@@ -362,7 +362,8 @@ INLINE uint32_t v_pack_bits(uint8_t *out, uint64_t bits, unsigned first)
 }
 #endif
 
-/* Lane i of (a, b, c, d) to the four floats at out + row[i]; later lanes over earlier ones. */
+/* Stores lane i of (a, b, c, d) in the four floats at out + row[i]. Later lanes overwrite earlier
+ * ones. */
 INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf d)
 {
     __m512 ab0 = _mm512_unpacklo_ps((__m512)a, (__m512)b);
@@ -385,7 +386,7 @@ INLINE void v_store_rows(float *out, const uint32_t row[V], vf a, vf b, vf c, vf
 #undef QUARTER
 }
 
-/* The four floats at base + 4 row[i] to lane i of r[0], r[1], r[2] and r[3]. */
+/* Loads the four floats at base + 4 row[i] into lane i of r[0], r[1], r[2] and r[3]. */
 INLINE void v_load_rows(const float *base, const int32_t row[V], vf r[4])
 {
 #define ROW(lane) _mm_loadu_ps(base + 4 * (ptrdiff_t)row[lane])
@@ -709,7 +710,7 @@ INLINE vd vd_max(vd a, vd b)
 }
 
 #if TRIP_SIMD == TRIP_SIMD_PLAIN
-/* Values beyond the integers give some integer, as the vector instructions do. */
+/* The result is undefined outside the range of integers, as with the vector instructions. */
 INLINE vi v_truncate(vf a)
 {
     return __builtin_convertvector(v_max(v_min(a, v_set(2147483520.0f)), v_set(-2147483648.0f)),
@@ -801,8 +802,8 @@ INLINE vf v_fnma_where(vm m, vf a, vf b, vf c)
     return v_select(m, v_fnma(a, b, c), a);
 }
 
-/* Without a branch, which would be taken anew at every vector: the lanes wanted are permuted to the
- * front. */
+/* AVX2 permutes the selected lanes to the front. Branches would be unpredictable here, since the
+ * lanes change with every vector. */
 INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX2
@@ -810,7 +811,7 @@ INLINE void vi_store_packed(void *p, unsigned bits, vi a)
     vi_store(p, (vi)_mm256_permutevar8x32_epi32((__m256i)a, _mm256_cvtepu8_epi32(lanes)));
 #else
     int32_t *out = p;
-    if ((bits & (bits + 1)) == 0) { /* the first ones */
+    if ((bits & (bits + 1)) == 0) { /* the selected lanes come first already */
         vi_store(out, a);
         return;
     }
@@ -821,7 +822,7 @@ INLINE void vi_store_packed(void *p, unsigned bits, vi a)
 
 #endif
 
-/* Of 64 bytes, a bit each: whether they lie from `least` to `most`, which is no less. */
+/* Returns a bit for each of 64 bytes: whether it lies in [min, max]. Requires min <= max. */
 INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t min, uint8_t max)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX512
@@ -846,7 +847,7 @@ INLINE uint64_t v_bytes_within(const uint8_t *from, uint8_t min, uint8_t max)
 
 typedef uint8_t bytes_of_lanes __attribute__((vector_size(V)));
 
-/* A byte a lane. On x86 compilers convert such vectors lane by lane. */
+/* Loads a byte per lane. The intrinsics are needed on x86, where compilers convert lane by lane. */
 INLINE vi vi_load_bytes(const unsigned char *from)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX512
@@ -860,7 +861,7 @@ INLINE vi vi_load_bytes(const unsigned char *from)
 #endif
 }
 
-/* Three bytes a lane; as many as a vector has are read. */
+/* Loads three bytes per lane. Reads as many bytes as a vector has. */
 INLINE vi vi_load_3_bytes(const unsigned char *from)
 {
 #if TRIP_SIMD == TRIP_SIMD_AVX512
@@ -883,8 +884,9 @@ INLINE vi vi_load_3_bytes(const unsigned char *from)
 #endif
 }
 
-/* Of numbers of `width` bits that follow one another, the bytes that each of four begins in and the
- * three behind it, and the bits before it there. */
+/* Tables to unpack contiguous numbers of `width` bits, four at a time. FOUR_BYTES gives the byte in
+ * which number i begins and the three bytes after it. BITS_OF also gives the number's first bit in
+ * that byte. */
 #define FIRST_BYTE(i, width) (uint8_t)((i) * (width) / 8)
 #define FOUR_BYTES(i, width)                                                                       \
     FIRST_BYTE(i, width), FIRST_BYTE(i, width) + 1, FIRST_BYTE(i, width) + 2,                      \
@@ -907,7 +909,8 @@ static const bits_of_width bits_of_widths[9] = { BITS_OF(0),  BITS_OF(2),  BITS_
                                                  BITS_OF(6),  BITS_OF(8),  BITS_OF(10),
                                                  BITS_OF(12), BITS_OF(14), BITS_OF(16) };
 
-/* V numbers of `width` bits, even and at most 16; up to 16 bytes behind them are read. */
+/* Loads V numbers of `width` bits. `width` is even and at most 16. Reads up to 16 bytes past the
+ * numbers. */
 INLINE vi vi_load_bits(const unsigned char *from, uint32_t width)
 {
     const bits_of_width *of = &bits_of_widths[width / 2];

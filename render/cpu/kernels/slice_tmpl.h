@@ -1,7 +1,7 @@
-/* Kernels that prepare the rasters of sheets: ranges of codes, gradients, slices between sheets.
- * Included by table_tmpl.h after simd_tmpl.h. A vector here is of eight numbers of 16 bits, a row
- * of a square; tests/render/test_cpu_sheets.c holds every instruction set to the same numbers. What
- * is called from more places than one is not inlined, so that profilers tell what it takes. */
+/* Prepares the rasters of sheets: ranges of codes, gradients, slices between sheets. Included by
+ * table_tmpl.h after simd_tmpl.h. A vector here has eight numbers of 16 bits, one row of a square.
+ * tests/render/test_cpu_sheets.c checks that all instruction sets give the same numbers. Functions
+ * with several callers are not inlined, so that profilers show their cost. */
 #ifndef TRIP_CPU_SLICE_H
 #define TRIP_CPU_SLICE_H
 
@@ -28,13 +28,13 @@ INLINE vh vh_set(int16_t x)
     return x - (vh){ 0 };
 }
 
-/* b where m is set, else a. */
+/* Returns b where m is set, otherwise a. */
 INLINE vh vh_select(vh m, vh a, vh b)
 {
     return (m & b) | (~m & a);
 }
 
-/* Modulo 2^16. */
+/* Returns a - 1 modulo 2^16. */
 INLINE vh vh_less_1(vh a)
 {
     return (vh)((vhu)a - 1);
@@ -45,7 +45,7 @@ INLINE vh vh_is_missing(vh a)
     return (vh)(a == TRIP_CPU_CODE_MISSING);
 }
 
-/* (a + b) / 2, rounded down. */
+/* Returns (a + b) / 2, rounded down. */
 INLINE vh vh_mean(vh a, vh b)
 {
     return (a & b) + ((a ^ b) >> 1);
@@ -63,20 +63,20 @@ INLINE vh vh_max(vh a, vh b)
     return (vh)_mm_max_epi16((__m128i)a, (__m128i)b);
 }
 
-/* (a - b) / 2, rounded down: the mean, rounded up, of a and -1 - b as the instruction has them. */
+/* Returns (a - b) / 2, rounded down. The instruction computes the mean of a and -1 - b, rounded up.
+ */
 INLINE vh vh_half_difference(vh a, vh b)
 {
     const vh min = vh_set(INT16_MIN);
     return (vh)_mm_avg_epu16((__m128i)(a ^ min), (__m128i)(b ^ ~min)) ^ min;
 }
 
-/* A bit for each number that is set. */
 INLINE unsigned vh_bits(vh m)
 {
     return (unsigned)_mm_movemask_epi8(_mm_packs_epi16((__m128i)m, _mm_setzero_si128()));
 }
 
-/* (a (16384 - w) + b w) / 16384, rounded down; `weights` is w << 16 | 16384 - w. */
+/* Returns (a (16384 - w) + b w) / 16384, rounded down. `weights` is w << 16 | 16384 - w. */
 INLINE vh vh_between(vh a, vh b, int32_t weights)
 {
     const __m128i w = _mm_set1_epi32(weights);
@@ -91,7 +91,7 @@ INLINE int16_t vh_lowest(vh a)
     return (int16_t)(_mm_cvtsi128_si32(m) ^ INT16_MIN);
 }
 
-/* One number of each in turn. */
+/* Interleaves the numbers of a, b and c. */
 INLINE void vh_store_3(int16_t *p, vh a, vh b, vh c)
 {
 #define TURN(a0, a1, a2, a3, a4, a5, a6, a7)                                                       \
@@ -125,7 +125,7 @@ INLINE vh vh_max(vh a, vh b)
     return vh_select((vh)(b > a), a, b);
 }
 
-/* (a - b) / 2, rounded down. */
+/* Returns (a - b) / 2, rounded down. */
 INLINE vh vh_half_difference(vh a, vh b)
 {
     return (vh)((vhu)(a >> 1) - (vhu)(b >> 1) - (vhu)(~a & b & 1));
@@ -168,17 +168,17 @@ INLINE void vh_store_3(int16_t *p, vh a, vh b, vh c)
 
 static_assert(sizeof(trip_cpu_gradient) == 3 * sizeof(int16_t), "three numbers in a row");
 
-/* Where a square's first voxel lies in its raster. */
 INLINE int square_first(int square)
 {
     return square / TRIP_CPU_SQUARES_ACROSS * 8 * TRIP_CPU_RASTER_STRIDE +
            square % TRIP_CPU_SQUARES_ACROSS * 8;
 }
 
-/* The least code that is there of a square some of which is missing; INT16_MAX: none is. */
+/* Returns the minimum code that is not missing in a square, or INT16_MAX if all are missing. The
+ * square must have a missing voxel. */
 static int16_t min_there(const int16_t *at)
 {
-    /* A missing code is the least, and less 1 it is the greatest. */
+    /* A missing code is the minimum of the type, so a missing code - 1 is the maximum. */
     vh min = vh_set(INT16_MAX);
     for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE)
         min = vh_min(min, vh_min(vh_less_1(vh_load(at)), vh_less_1(vh_load(at + 1))));
@@ -209,7 +209,7 @@ static void sheet_ranges(const trip_cpu_voxels *raster, uint64_t squares,
     }
 }
 
-/* The least and greatest of two voxels beside each other at two sheets. */
+/* Minimum and maximum of two neighbouring voxels over two sheets. */
 typedef struct extremes {
     vh min, max;
 } extremes;
@@ -220,8 +220,8 @@ INLINE extremes extremes_at(const int16_t *from, const int16_t *to)
     return (extremes){ vh_min(vh_min(a, b), vh_min(c, d)), vh_max(vh_max(a, b), vh_max(c, d)) };
 }
 
-/* The least code that is there of each of a row of cells, and which of these have all four corners
- * at neither sheet. */
+/* Returns the minimum code that is not missing for each cell of a row. `lack` marks cells that have
+ * all four corners in neither sheet. */
 static __attribute__((noinline)) vh min_of_faces(const int16_t *from, const int16_t *to, vh *lack)
 {
     vh min = vh_set(INT16_MAX), faces = vh_set(0);
@@ -229,7 +229,7 @@ static __attribute__((noinline)) vh min_of_faces(const int16_t *from, const int1
         const int16_t *at = sheet ? to : from;
         vh face = vh_set(INT16_MIN);
         for (int n = 0; n < 4; n++) {
-            /* A missing code is the least, and less 1 it is the greatest. */
+            /* A missing code - 1 is the maximum of the type. */
             vh code = vh_less_1(vh_load(at + n / 2 * TRIP_CPU_RASTER_STRIDE + n % 2));
             min = vh_min(min, code);
             face = vh_max(face, code);
@@ -265,7 +265,7 @@ static void sheet_cells(const trip_cpu_voxels *from, const trip_cpu_voxels *to, 
     }
 }
 
-/* The voxels before and behind eight of them, along u, v and the sheets. */
+/* The voxels before and behind eight voxels, along u, v and the sheets. */
 typedef struct neighbours {
     vh before[3], behind[3];
 } neighbours;
@@ -283,7 +283,8 @@ INLINE bool some_is_missing(const neighbours *n)
     return vh_bits(vh_is_missing(min)) != 0;
 }
 
-/* Half of central differences; where a neighbour is missing, of the difference to the other. */
+/* Returns half of the central differences. If a neighbour is missing, it is half of the difference
+ * to the other one. */
 INLINE vh differences(vh codes, vh below, vh above)
 {
     vh no_below = vh_is_missing(below), no_above = vh_is_missing(above);
@@ -299,7 +300,7 @@ static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, u
                                                       const trip_cpu_voxels *sheet_before,
                                                       const trip_cpu_voxels *sheet_behind)
 {
-    /* The voxels before a row's first and a column's first are those of the neighbours. */
+    /* The voxels before the first column and row come from the neighbouring rasters. */
     int16_t first[8];
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         int square = __builtin_ctzll(rest);
@@ -337,7 +338,7 @@ INLINE vh mean_or_between(vh a, vh b, int32_t weights)
     return weights == (8192 << 16 | 8192) ? vh_mean(a, b) : vh_between(a, b, weights);
 }
 
-/* Of eight voxels from `at` on. */
+/* Interpolates eight voxels from `at` on. */
 INLINE void voxels_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
                            int32_t weights, bool gradients, trip_cpu_voxels *out)
 {
@@ -358,7 +359,6 @@ INLINE int16_t number_between(int16_t a, int16_t b, int32_t weights)
     return (int16_t)((a * (weights & 0xffff) + b * (weights >> 16)) >> 14);
 }
 
-/* Of one. */
 INLINE void voxel_between(const trip_cpu_voxels *from, const trip_cpu_voxels *to, int at,
                           int32_t weights, bool gradients, trip_cpu_voxels *out)
 {

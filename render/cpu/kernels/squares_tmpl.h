@@ -1,5 +1,5 @@
-/* Which squares of a region of voxels may be visible, V at a time: included by table_tmpl.h after
- * project_tmpl.h. */
+/* Finds the squares of a region of voxels that may be visible, V at a time. Included by
+ * table_tmpl.h after project_tmpl.h. */
 #ifndef TRIP_CPU_SQUARES_H
 #define TRIP_CPU_SQUARES_H
 
@@ -7,7 +7,8 @@
 #include "cpu/occlusion.h"
 #include "cpu/kernels/project_tmpl.h"
 
-/* First and last pixel whose centre lies within `reach` of x; nothing when first > last. */
+/* Computes the first and last pixel with a centre within `reach` of x. There is none if first >
+ * last. */
 INLINE void reached(vf x, vf reach, int size, vi *first, vi *last)
 {
     const vf zero = v_set(0), edge = v_set((float)size), half = v_set(0.5f);
@@ -15,8 +16,8 @@ INLINE void reached(vf x, vf reach, int size, vi *first, vi *last)
     *last = v_truncate(v_min(v_max(x + reach + half, zero), edge)) - 1;
 }
 
-/* How far from the region's middle those of squares lie along an axis; their numbers in Morton
- * order are shifted so that the axis' bits are the even ones. */
+/* Returns the distance along an axis from the region's middle to the middles of squares. `shifted`
+ * holds their Morton numbers, shifted so that the axis has the even bits. */
 INLINE vf middles(vi shifted)
 {
     vi square = (shifted & 1) | (shifted >> 1 & 2) | (shifted >> 2 & 4);

@@ -1,9 +1,11 @@
-/* Kernels that sum the splats of a sheet at each pixel and composite the sum (splat.h): included by
- * table_tmpl.h after blend_tmpl.h. A pane has its open sheet beside its pixels: stamp by stamp the
- * sums of optical depth times each channel, in the pixels' order with optical depth in the place of
- * 1 - alpha, and behind all stamps which sheet each stamp's sums are of. The sheet of a stamp is
- * composited when a splat of another one is to be added, so that the picture depends on the order
- * of the splats alone. */
+/* Sums the splats of a sheet at each pixel and composites the sums (splat.h). Included by
+ * table_tmpl.h after blend_tmpl.h.
+ *
+ * A pane has an open sheet next to its pixels. The open sheet holds for each stamp the sums of
+ * optical depth times each channel. Its layout is the layout of the pixels, with the optical depth
+ * instead of 1 - alpha. The sheet of each stamp's sums follows after all stamps. A stamp composites
+ * its sheet when a splat of another sheet arrives, so that the picture depends only on the order of
+ * the splats. */
 #ifndef TRIP_CPU_SUM_H
 #define TRIP_CPU_SUM_H
 
@@ -29,14 +31,14 @@ INLINE void set_sheet_of_stamp(float *sums, unsigned number, uint64_t sheet)
 
 /* ---- compositing a sheet ---- */
 
-/* (1 - exp(-x)) / x, x >= 0. */
+/* Returns (1 - exp(-x)) / x for x >= 0. */
 INLINE vf mean_transmittance(vf x)
 {
     vf thick = (v_set(1) - exp_minus(x)) / v_max(x, v_set(TRIP_CPU_THIN));
     return v_select(v_gt(v_set(TRIP_CPU_THIN), x), thin_ratio(x), thick);
 }
 
-/* A sum of optical depth times a channel, front to back: w of it is seen. */
+/* Adds the visible share `w` of a sum to a channel, front to back. */
 INLINE void add_behind(float *channel, vf w, vf sum, trip_target target)
 {
     v_store(channel, kept(v_fma(w, sum, v_load(channel)), target));
@@ -51,7 +53,8 @@ INLINE void put_sheet_behind(const trip_cpu_view *view, float *pixels, const pat
     add_behind(pixels + V, w, sum->g, target);
     add_behind(pixels + 2 * V, w, sum->b, target);
     vf left = v_max(v_fnma(w, sum->t, t), v_set(0));
-    if (TRIP_CPU_DEPTH) /* of what is taken, as rounded: distances are divided by its sum */
+    if (TRIP_CPU_DEPTH) /* weight by the rounded opacity, because its sum later divides the
+                           distances */
         add_behind(pixels + TRIP_CHANNEL_DEPTH * V, t - left,
                    sum->depth / v_max(sum->t, v_set(0x1p-126f)), TRIP_TARGET_RGBA32F);
     if (target != TRIP_TARGET_RGBA32F)
@@ -59,7 +62,7 @@ INLINE void put_sheet_behind(const trip_cpu_view *view, float *pixels, const pat
     v_store(pixels + 3 * V, left);
 }
 
-/* The same back to front, where there is something of the sheet. */
+/* Composites a sum over a channel, back to front, where the sheet has an optical depth. */
 INLINE void add_over(float *channel, const patch *sum, vf of, vf keep, vf w, trip_target target)
 {
     vf behind = v_load(channel), over = kept(v_fma(w, of, behind * keep), target);
@@ -72,7 +75,7 @@ INLINE void put_sheet_over(float *pixels, const patch *sum, trip_target target)
     add_over(pixels, sum, sum->r, keep, w, target);
     add_over(pixels + V, sum, sum->g, keep, w, target);
     add_over(pixels + 2 * V, sum, sum->b, keep, w, target);
-    if (TRIP_CPU_DEPTH) { /* by what is taken: distances are divided by its sum */
+    if (TRIP_CPU_DEPTH) { /* weight by the opacity, because its sum later divides the distances */
         vf mean = sum->depth / v_max(sum->t, v_set(0x1p-126f));
         add_over(pixels + TRIP_CHANNEL_DEPTH * V, sum, mean, keep, v_set(1) - keep,
                  TRIP_TARGET_RGBA32F);
@@ -99,7 +102,8 @@ INLINE void empty_sums(patch *p)
         p->depth = v_set(0);
 }
 
-/* Composites the open sheet of a patch's stamp. Seldom: some 15 splats of a sheet meet a pixel. */
+/* Composites and clears the open sheet of a patch's stamp. This is rare, since about 15 splats of a
+ * sheet meet a pixel. */
 static void end_sheet(patch *p)
 {
     put_sheet(p->pane->view, p->pane->pixels + STAMP_FLOATS * p->number, p);
@@ -108,8 +112,9 @@ static void end_sheet(patch *p)
 
 /* ---- summing ---- */
 
-/* exp(-m / 2) - edge of splat.h within 1.4e-5, 0 outside the support; its integral over the plane
- * is within 1e-7 of itself. Found by least squares, reweighted to even out the error. */
+/* Returns exp(-m / 2) - edge of splat.h with an error of at most 1.4e-5, and 0 outside the support.
+ * Its integral over the plane has a relative error of at most 1e-7. The polynomial is a
+ * least-squares fit, reweighted to even out the error. */
 INLINE vf falloff(vf u)
 {
     vf sum = v_fma(u, v_set(0.311556676f), v_set(-0.357823259f));
@@ -120,7 +125,7 @@ INLINE vf falloff(vf u)
     return u * sum * sum;
 }
 
-/* Of a splat's peak at the pixels. */
+/* Returns optical depth / `peak` at the pixels. */
 INLINE vf share_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays kind)
 {
     if (is_near(splat)) {
@@ -131,7 +136,7 @@ INLINE vf share_of(const patch *p, const trip_cpu_splat *splat, trip_cpu_rays ki
     return kind == TRIP_CPU_STRETCHED ? share * p->stretch : share;
 }
 
-/* A blend_one: the patch holds the sums of its stamp's open sheet. */
+/* A blend_one function for patches that hold the sums of the open sheet. */
 INLINE void add_to_sheet(patch *p, const trip_cpu_splat *splat, float depth, trip_cpu_rays kind,
                          bool front_to_back, trip_target target)
 {
@@ -150,14 +155,15 @@ INLINE void add_to_sheet(patch *p, const trip_cpu_splat *splat, float depth, tri
         p->depth = v_fma(share, v_set(depth * splat->peak), p->depth);
 }
 
-/* Lists of one level have sheets in common; no level has this many. */
+/* Returns a key of a sheet. Lists of one level share sheets. The key never equals
+ * TRIP_CPU_NO_SHEET. */
 INLINE uint64_t sheet_key(const trip_cpu_view *view, int32_t sheet)
 {
     return (uint64_t)view->list->level << 32 | (uint32_t)sheet;
 }
 
-/* All splats of the group, which are of one list, that may touch a stamp, in order; false when its
- * pixels are all saturated. */
+/* Adds all splats of the group that may touch a stamp, in order. They belong to one list. Returns
+ * false if all its pixels are saturated. */
 INLINE bool sum_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays kind)
 {
     patch p = load_stamp(s, number, kind, s->sums);

@@ -1,4 +1,5 @@
-/* Every kernel for one instruction set: each isa_*.c includes it once TRIP_SIMD is defined. */
+/* Compiles every kernel for one instruction set. Each isa_*.c defines TRIP_SIMD, then includes this
+ * file. */
 #ifndef TRIP_CPU_TABLE_H
 #define TRIP_CPU_TABLE_H
 
@@ -17,9 +18,10 @@
 #include "cpu/kernels/squares_tmpl.h"
 #include "cpu/kernels/sum_tmpl.h"
 
-/* Defines the table `name` of the instruction set called `isa`, or with depth the one that `name`
- * names for layers with depth; with TRIP_CPU_CLOSED or TRIP_CPU_EFFECTS what either has for
- * segments in closed form or for frames with effects. */
+/* TRIP_CPU_TABLE defines the kernel table `name` for the instruction set `isa_name`.
+ * - With TRIP_CPU_DEPTH it defines name##_depth, the table for layers with depth.
+ * - With TRIP_CPU_CLOSED it defines only the kernel for segments in closed form.
+ * - With TRIP_CPU_EFFECTS it defines only the kernels for frames with effects. */
 #if TRIP_CPU_DEPTH
 #define TRIP_CPU_TABLE(name, isa_name) DEFINE(name##_depth, isa_name, NULL)
 #else
@@ -45,7 +47,7 @@
         return project(view, open, staged, count, lanes, out, depths);                             \
     }
 
-/* Each ends as a declaration that a semicolon is to follow. */
+/* Each DEFINE ends in a declaration, so that a semicolon can follow. */
 #if TRIP_CPU_CLOSED
 #define DEFINE(name, isa_name, depth_table)                                                        \
     SHEET_KERNEL(name##_sheet_closed)                                                              \

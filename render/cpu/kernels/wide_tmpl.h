@@ -1,16 +1,17 @@
-/* Samples of sheets by kernels of 64 voxels (kernel.h), one ray after the other: included by
- * sheet_tmpl.h. The ends of every segment are sampled in its own cells, as sheet.h says, so that
- * what is missing counts as the corner of that cell. */
+/* Samples sheets with kernels of 64 voxels (kernel.h), one ray after the other. Included by
+ * sheet_tmpl.h. Both ends of a segment are sampled in the segment's own cells (sheet.h). A missing
+ * voxel has the value of the nearest corner of that cell. */
 #ifndef TRIP_CPU_WIDE_H
 #define TRIP_CPU_WIDE_H
 
-/* A voxel that has weight: where its raster lies, and where it is there. */
+/* A voxel that the kernel weights: its raster, and its position there. */
 typedef struct tap {
     const trip_cpu_voxels *raster;
     int32_t at;
 } tap;
 
-/* Where a voxel's column of rasters, or row of them, and its column or row in the raster begin. */
+/* The position of a column or row of voxels along u or v: `raster` is an offset in the grid of
+ * rasters, `voxel` an offset in the raster. */
 typedef struct tap_line {
     int32_t raster, voxel;
 } tap_line;
@@ -21,7 +22,7 @@ INLINE tap_line line_of(int32_t voxel, int32_t rasters, int32_t voxels)
                        (voxel & (TRIP_CPU_RASTER - 1)) * voxels };
 }
 
-/* False where the voxel is missing. */
+/* Returns false if the voxel is missing. */
 INLINE bool take_tap(const trip_cpu_group *g, const int32_t *rasters, tap_line u, tap_line v,
                      tap *t)
 {
@@ -32,14 +33,14 @@ INLINE bool take_tap(const trip_cpu_group *g, const int32_t *rasters, tap_line u
     return t->raster->codes[t->at] != TRIP_CPU_CODE_MISSING;
 }
 
-/* Those of one ray: u fastest, then v, then the sheets. False where the cell is empty or beyond the
- * grid. Outermost rasters have no voxels. */
+/* Finds the 64 taps of one ray: u fastest, then v, then the sheets. Returns false if the cell lacks
+ * a corner or lies beyond the grid. The outermost rasters have no voxels. */
 static bool take_taps(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                       const wide_position *p, int lane, tap taps[64])
 {
     const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
     const int64_t origin[2] = { g->first_u, g->first_v };
-    tap_line lines[2][TRIP_KERNEL_TAPS]; /* beyond the grid its edge repeats */
+    tap_line lines[2][TRIP_KERNEL_TAPS]; /* the voxels at the edge of the grid repeat beyond it */
     tap eight[8];
     for (int a = 0; a < 2; a++) {
         const int32_t cell = p->cell[a][lane];
@@ -77,8 +78,8 @@ static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_positio
         weights[n] = (float)(w[0][n & 3] * w[1][n >> 2 & 3] * w[2][n >> 4]);
 }
 
-/* Of one ray: by differences from a corner of its cell, so that one value all around is the value
- * there to the last bit, however weights are rounded. */
+/* Interpolates the code for one ray. It sums differences from a corner of the cell. If all codes
+ * are equal, the result is exactly that code, however the weights are rounded. */
 static double interpolated_code(const trip_cpu_sheet_view *view, const wide_position *p, int lane,
                                 const tap taps[64])
 {
@@ -91,7 +92,8 @@ static double interpolated_code(const trip_cpu_sheet_view *view, const wide_posi
     return (double)corner + (double)sum;
 }
 
-/* Where the rays of slice n are, in cells of a segment. The grid's last voxels are within it. */
+/* Computes the positions of the rays at slice n, in cells of a segment. A ray at the last voxels of
+ * the grid counts as inside the last cell. */
 INLINE void find_wide_positions(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                                 const pane_path *path, const stamp_rays *l, unsigned n,
                                 unsigned segment, wide_position *p)
@@ -113,7 +115,7 @@ INLINE void find_wide_positions(const trip_cpu_sheet_view *view, const trip_cpu_
     }
 }
 
-/* As sample_at(), at an end of a segment. */
+/* Does the work of sample_at() at one end of a segment. */
 static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                            const pane_path *path, const stamp_rays *l, unsigned n, unsigned segment,
                            sample *s)
@@ -133,7 +135,6 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
     s->lit = s->summed = false;
 }
 
-/* Whether a sample is of the cells of a segment, too. */
 INLINE bool in_the_same_cells(const trip_cpu_group *g, unsigned segment, const sample *s)
 {
     return s->wide->about->number == g->about[segment].number;
