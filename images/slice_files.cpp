@@ -174,7 +174,7 @@ std::vector<std::string> find_numbered(const std::string &path, const std::strin
     for (const auto &one : found)
         names.push_back(one.second);
     if (names.empty())
-        throw trip_slice_error(path, "no file fits this pattern");
+        throw trip_slice_error(path, "no file matches this pattern");
     return names;
 }
 
@@ -187,7 +187,7 @@ std::vector<std::string> find_glob(const std::string &path)
         names.assign(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
     ::globfree(&matches);
     if (status != 0)
-        throw trip_slice_error(path, status == GLOB_NOMATCH ? "no file fits this pattern"
+        throw trip_slice_error(path, status == GLOB_NOMATCH ? "no file matches this pattern"
                                                             : "cannot be searched for");
     std::sort(names.begin(), names.end(), natural_less);
     return names;

@@ -150,16 +150,16 @@ double trip_check_positions(const std::vector<double> &positions,
         return 1;
     std::vector<double> sorted = steps;
     std::sort(sorted.begin(), sorted.end());
-    const double defaults = sorted[(sorted.size() - 1) / 2];
+    const double typical = sorted[(sorted.size() - 1) / 2];
     for (size_t i = 0; i < steps.size(); i++) {
-        double times = steps[i] / defaults, whole = std::round(times);
+        double times = steps[i] / typical, whole = std::round(times);
         if (!(whole >= 2 && whole < 1e6 && std::fabs(times - whole) <= 0.1))
             continue;
         report_gap(names[i],
                    "a slice is missing after it: the next slice, " + names[i + 1] + ", is " +
                        std::to_string((long)whole) + " steps away",
                    allow_gaps);
-        return defaults * (double)steps.size() / (positions.back() - positions.front());
+        return typical * (double)steps.size() / (positions.back() - positions.front());
     }
     return 1;
 }

@@ -7,7 +7,8 @@
 #include "dataset.h"
 #include "sheet.h"
 
-/* Number of slabs on each side that a voxel can reach; with slabs of one sheet, two. */
+/* Maximum number of slabs that the voxels around a brick lie in. It is reached with slabs of one
+ * sheet. */
 enum { TRIP_BRICK_RANGES_SLABS = 2 * TRIP_SHEET_REACH_MAX + 1 };
 
 /* The tiles of a few consecutive slabs. */
@@ -17,7 +18,7 @@ typedef struct trip_brick_ranges {
     trip_kernel kernel;
     int64_t first_u, first_v, across, down;          /* tiles with bricks, plus one on every side */
     int reach, slabs;                                /* slabs on each side, and in all */
-    trip_code_range *tiles[TRIP_BRICK_RANGES_SLABS]; /* of the slabs from middle - reach on */
+    trip_code_range *tiles[TRIP_BRICK_RANGES_SLABS]; /* [i] is slab middle - reach + i */
     int64_t middle;
     trip_budget *budget;
     size_t bytes;

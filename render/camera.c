@@ -18,13 +18,15 @@ static int check_params(const trip_camera_params *p)
 {
     if (p->width < 1 || p->height < 1 || p->width > TRIP_PICTURE_MAX_PX ||
         p->height > TRIP_PICTURE_MAX_PX)
-        return trip_fail(TRIP_USAGE, "camera", "size", "%d x %d px is not between 1 and %d",
-                         p->width, p->height, TRIP_PICTURE_MAX_PX);
+        return trip_fail(TRIP_USAGE, "camera", "size",
+                         "%d x %d px is out of range; use 1 to %d px along each side", p->width,
+                         p->height, TRIP_PICTURE_MAX_PX);
     if (!finite3(p->eye) || !finite3(p->look) || !finite3(p->up))
-        return trip_fail(TRIP_USAGE, "camera", "eye, look, up", "not finite");
+        return trip_fail(TRIP_USAGE, "camera", "eye, look, up",
+                         "a coordinate is not a finite number");
     if (p->ortho_height != 0 && !(isfinite(p->ortho_height) && p->ortho_height > 0))
-        return trip_fail(TRIP_USAGE, "camera", "ortho height", "%g is not a positive length",
-                         p->ortho_height);
+        return trip_fail(TRIP_USAGE, "camera", "ortho height",
+                         "%g is not a positive length; use a number above 0", p->ortho_height);
     if (p->ortho_height == 0 && !(p->fov_degrees > 0 && p->fov_degrees < 180))
         return trip_fail(TRIP_USAGE, "camera", "fov", "%g is not between 0 and 180 degrees",
                          p->fov_degrees);
@@ -41,13 +43,13 @@ static int make_basis(const trip_camera_params *p, basis *b)
     trip_vec3 right = trip_cross(b->forward, trip_normalize(p->up));
     if (!(trip_length(right) > 1e-9))
         return trip_fail(TRIP_USAGE, "camera", "up",
-                         "is zero or lies along the view; give another");
+                         "is zero or parallel to the view direction; use another up vector");
     b->right = trip_normalize(right);
     b->up = trip_cross(b->right, b->forward);
     return 0;
 }
 
-/* World units per pixel at depth 1 (perspective) or everywhere (parallel). */
+/* Returns the world units per pixel at depth 1 in perspective, and everywhere in parallel views. */
 static double pixel_size(const trip_camera_params *p)
 {
     if (p->ortho_height > 0)
@@ -119,26 +121,27 @@ static int check_voxel(const trip_affine *m)
     for (int a = 0; a < 3; a++) {
         double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
         if (!(length >= TRIP_VOXEL_WORLD_MIN && length <= TRIP_VOXEL_WORLD_MAX))
-            return trip_fail(TRIP_USAGE, "camera", "index to world",
-                             "voxels are %.3g world units long; %g to %g can be computed with",
-                             length, TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
+            return trip_fail(
+                TRIP_USAGE, "camera", "index to world",
+                "voxels are %.3g world units long; scale the volume to lengths of %g to %g", length,
+                TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
     }
     return 0;
 }
 
-/* Checks the range of the renderers' numbers. NaN fails. */
+/* Fails if a number is outside the range that the renderers can compute with. NaN fails too. */
 static int check_range(const trip_camera *c)
 {
     double far = trip_length(c->eye), x = trip_length(c->rx), y = trip_length(c->ry);
     const double max = TRIP_CAMERA_PIXEL_VOXELS;
     if (!(x >= 1 / max && y >= 1 / max && x <= max && y <= max))
         return trip_fail(TRIP_USAGE, "camera", c->ortho ? "ortho height" : "fov",
-                         "a pixel would be %.3g x %.3g voxels; %.3g to %.3g can be computed with",
+                         "a pixel is %.3g x %.3g voxels; change the view to make it %.3g to %.3g",
                          x, y, 1 / max, max);
     if (!(far <= TRIP_CAMERA_FARTHEST_VOXELS))
         return trip_fail(TRIP_USAGE, "camera", "eye",
-                         "lies %.3g voxels from the first voxel; at most %.3g can be computed with",
-                         far, TRIP_CAMERA_FARTHEST_VOXELS);
+                         "lies %.3g voxels from the first voxel; move it within %.3g voxels", far,
+                         TRIP_CAMERA_FARTHEST_VOXELS);
     return 0;
 }
 
@@ -155,7 +158,8 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
     if (status)
         return status;
     if (!trip_affine_invert(index_to_world, &world_to_index))
-        return trip_fail(TRIP_ERROR, "camera", "index to world", "the map is singular");
+        return trip_fail(TRIP_ERROR, "camera", "index to world",
+                         "the map from index space to world space is singular");
 
     double k = pixel_size(params);
     *c = (trip_camera){

@@ -1,18 +1,19 @@
-/* The view in the data's index space, where kernels are round and sheets are planes, whatever the
- * spacing, rotation or shear. Plain values; nothing here changes during a frame.
+/* The view in the data's index space, where kernels are round and sheets are planes for any
+ * spacing, rotation or shear. Plain values; a frame does not change them.
  *
  * Lengths are in voxels, so that no number of a projection depends on the unit of world space. If a
  * volume and the camera are scaled by a power of two, the picture has the same bits.
  *
- * Pixel coordinates are in pixels from the picture's top left corner, x to the right, y down. Pixel
- * centres lie at + 0.5. The ray of pixel position p = (x, y) in index space has
+ * Pixel coordinates are in pixels from the picture's top left corner, x to the right, y down. The
+ * centre of pixel (i, j) lies at (i + 0.5, j + 0.5). The ray of pixel position p = (x, y) has, in
+ * index space,
  *
- *     in perspective   origin eye,                  direction r(p) = r0 + x rx + y ry
- *     in parallel      origin eye + x rx + y ry,    direction r0
+ *     in perspective       origin eye,                  direction r(p) = r0 + x rx + y ry
+ *     in parallel views    origin eye + x rx + y ry,    direction r0
  *
- * The depth z of a point satisfies  point = origin + z * direction.  A power of two scales the
- * directions so that the one at the picture's centre has a length in [sqrt(1/2), sqrt(2)). Depths
- * are therefore about distances in voxels. */
+ * The depth z of a point satisfies point = origin + z * direction. A power of two scales the
+ * directions so that the direction at the picture's centre has a length in [sqrt(1/2), sqrt(2)). A
+ * depth is therefore roughly a distance in voxels. */
 #ifndef TRIP_CAMERA_H
 #define TRIP_CAMERA_H
 
@@ -44,8 +45,8 @@ typedef struct trip_camera {
     trip_vec3 world_forward; /* for lighting; unit length */
 } trip_camera;
 
-/* Maximum distance of the eye from the first voxel, in voxels. There, double precision is off by a
- * hundredth of a voxel. */
+/* Maximum distance of the eye from the first voxel, in voxels. Double precision has an error of a
+ * hundredth of a voxel there. */
 #define TRIP_CAMERA_FARTHEST_VOXELS 0x1p46
 /* Maximum size of a pixel in voxels (at depth 1 in perspective); the minimum is its inverse. */
 #define TRIP_CAMERA_PIXEL_VOXELS 1e15

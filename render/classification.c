@@ -7,7 +7,7 @@
 #include "kind.h"
 #include "geometry.h"
 
-/* Covers all lists that frames of level 0 read. */
+/* Finds the range of codes in all lists that frames of level 0 read. */
 static void find_held(trip_classification *c, const trip_dataset *data)
 {
     unsigned min = UINT16_MAX, max = 0;

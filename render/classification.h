@@ -1,7 +1,7 @@
-/* The view-independent facts that frames need of a data set, a transfer function and a kernel: the
- * visible codes and, for post, the range of all codes and whether segments have a closed form. The
- * caller keeps it from frame to frame. It must forget the transfer function when the table changes,
- * and everything when the data set changes. Plain values. */
+/* Facts that frames need of a data set, a transfer function and a kernel, and that do not depend on
+ * the view. They are the visible codes and, for post, the range of all codes and the closed form of
+ * segments. The caller keeps them from frame to frame. It must forget the transfer function when
+ * the table changes, and everything when the data set changes. Plain values. */
 #ifndef TRIP_CLASSIFICATION_H
 #define TRIP_CLASSIFICATION_H
 
@@ -10,15 +10,15 @@
 #include "dataset.h"
 #include "settings.h"
 
-/* Zero-initialise it: nothing is known then. */
+/* Zero-initialised, it knows nothing yet. */
 typedef struct trip_classification {
-    /* For the last kernel. It covers all bricks, not the frame's, so that a picture does not depend
-     * on the size of bricks. */
+    /* The range of interpolated codes with the last kernel. It covers all bricks of the data set,
+     * not only the frame's, so that a picture does not depend on the size of bricks. */
     unsigned code_min, code_max; /* code_min > code_max if there are none */
     trip_closed_form_fault not_closed;
     trip_closed_form closed; /* valid if not_closed is TRIP_CLOSED_FORM_FOUND */
     trip_code_set shown;     /* codes with extinction */
-    /* The parts that are known. */
+    /* Whether the range of codes, the closed form and the visible codes are known. */
     bool has_codes, has_form, has_shown;
     unsigned held_min, held_max; /* range of codes in the data set */
     trip_kernel kernel;

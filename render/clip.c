@@ -63,7 +63,8 @@ uint64_t trip_clip_square(const trip_clip *clip, int axis, int64_t sheet, int64_
     return mask;
 }
 
-/* No block has voxels beyond the grid. */
+/* Returns whether a voxel lies in the grid and is inside. A square at the edge reaches beyond the
+ * grid. */
 static bool has_voxel(const trip_clip *clip, const trip_coordinates *coordinates,
                       const int64_t voxel[3])
 {

@@ -1,10 +1,10 @@
-/* Clipping by half-spaces: everything outside at least one is cut away. Their intersection is a box
- * or another convex body. Plain values. Settings hold them in world space, renderers in the index
- * space of their data.
+/* Clipping by half-spaces. A point is inside if it lies in all of them, so the remaining part is a
+ * box or another convex body. Plain values. Settings hold them in world space, renderers in the
+ * index space of their data.
  *
  * - Splats (splat.h): a splat is drawn if its centre is inside. The set of splats does not depend
- * on the view, and the picture equals one of a volume without the other voxels. Splats reach beyond
- *   the plane by their radius.
+ *   on the view, and the picture equals one of a volume without the other voxels. Splats reach
+ *   beyond the plane by their radius.
  * - Interpolated values (sheet.h, and the integral): each ray is cut at the planes, also between
  *   voxels. The values along the remaining part do not change. */
 #ifndef TRIP_CLIP_H
@@ -16,7 +16,7 @@
 #include "coordinates.h"
 #include "geometry.h"
 
-/* Six of a box, six planes, and two that bound a level of detail (lod_parts.h). */
+/* A box has six planes, the user gives up to six, and two bound a level of detail (lod_parts.h). */
 enum { TRIP_CLIP_BOX_PLANES = 6, TRIP_CLIP_GIVEN_PLANES = 6, TRIP_CLIP_MAX = 14 };
 
 /* Distance, in index space, within which a voxel counts as on the plane and so as inside, despite

@@ -8,7 +8,8 @@ enum { TRIED = 64 };
 /* With fewer codes, only constant entries are accepted. */
 enum { FEWEST = 16 };
 
-/* Larger optical depths use tables, because single precision does not suffice. */
+/* Limit of the optical depth along the longest ray. A larger one uses tables, because single
+ * precision does not suffice. */
 #define MAX 1e15
 
 /* The visible codes among the codes of the data set. */
@@ -16,7 +17,7 @@ typedef struct span {
     int first, last;
     bool ramp;         /* there are invisible codes at one end */
     int up;            /* 1 or -1: the direction in which extinction grows from that end */
-    bool from_nothing; /* at x = 0 extinction would be 0 */
+    bool from_nothing; /* extinction is 0 at x = 0 */
 } span;
 
 static bool shows(const trip_tf_entry *table, int code)
@@ -124,7 +125,7 @@ static void set_colours(trip_closed_form *form, const trip_tf_entry *table, cons
     }
 }
 
-/* Few codes must be equal to have a polynomial. */
+/* Sets a constant extinction and colour, for transfer functions with few visible codes. */
 static void set_constant(trip_closed_form *form, const trip_tf_entry *table, const span *s)
 {
     *form = (trip_closed_form){ .k = { table[s->first].extinction } };

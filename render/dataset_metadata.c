@@ -61,7 +61,7 @@ static int read_envelope(trip_dataset_metadata *t)
     {
         interval range = { number_of(cJSON_GetArrayItem(item, 0)),
                            number_of(cJSON_GetArrayItem(item, 1)) };
-        if (range.lo <= range.hi) /* both are numbers */
+        if (range.lo <= range.hi) /* false if one is NaN */
             t->envelope[t->envelope_count++] = range;
     }
     t->envelope_count = join(t->envelope, t->envelope_count);
@@ -78,7 +78,8 @@ int trip_dataset_metadata_parse(trip_dataset_metadata **out, const trip_dataset 
     int status = trip_json_parse(&t->json, d->text, d->path, d->budget);
     t->root = t->json.root;
     if (status == 0 && !cJSON_IsObject(t->root))
-        status = trip_fail(TRIP_ERROR, "read", d->path, "its text is not a JSON object");
+        status = trip_fail(TRIP_ERROR, "read", d->path,
+                           "its metadata is not a JSON object; brick the volume again");
     if (status == 0)
         status = read_envelope(t);
     if (status < 0)
@@ -241,8 +242,8 @@ static trip_vec3 direction_at(const trip_dataset_metadata *t, const char *key)
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
 }
 
-/* If the object is mirror-symmetric across z, its slices are views from the side. Such slices run
- * from the top down and, by custom, from the front to the back. The left side is unknown. */
+/* If the object is mirror-symmetric across z, its slices are views from the side. They usually run
+ * from the top down and from the front to the back. The left side is unknown. */
 static bool is_mirrored_across_z(const trip_dataset_metadata *t)
 {
     const char *mirror = string_at(t, "mirror");

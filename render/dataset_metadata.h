@@ -5,18 +5,21 @@
  *   "format"             "openvdb", "nrrd", ...: the format of the volume
  *   "space"              "LPS" or "RAS": the anatomical directions of world space (anatomy.h)
  *   "oriented"           true if the file gave the directions of its axes: nothing is guessed
- *   "mirror"             "x", "y" or "z": the kept voxels are mirror-symmetric across this axis of
- * the grid only; for volumes without orientation "footing"            "-x" ... "+z": the kept
- * voxels are level at this side of the grid only; for volumes without orientation "source",
- * "source_options"  the volume's file, and the options of `brick` that make the data set again,
- * without the options for kept values "note"               a choice that the file left open, for
- * people "function_kind"      "ct", "mr", "fog", "labels" or "simulation": the kind of volume "up",
- * "front"        "+x" ... "-z": the world direction that is up, overriding all else, and the
- *                        direction that the object faces
+ *   "mirror"             "x", "y" or "z": the only axis of the grid across which the kept voxels
+ *                        are mirror-symmetric; for volumes without orientation
+ *   "footing"            "-x" ... "+z": the only side of the grid at which the kept voxels are
+ *                        level; for volumes without orientation
+ *   "source"             the volume's file
+ *   "source_options"     the options of `brick` that make the data set again, without the options
+ *                        for kept values
+ *   "note"               a choice that the file left open, for people
+ *   "function_kind"      "ct", "mr", "fog", "labels" or "simulation": the kind of volume
+ *   "up"                 "+x" ... "-z": the world direction that is up, overriding all else
+ *   "front"              "+x" ... "-z": the world direction that the object faces
  *   "transfer_function"  the default transfer function as `.tf` text in data units
  *   "envelope"           [[lo, hi], ...]: the kept values, closed intervals
  *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: all finite values,
- * kept or not, in at most 65536 equal bins over [a, b] */
+ *                        kept or not, in at most 65536 equal bins over [a, b] */
 #ifndef TRIP_DATASET_METADATA_H
 #define TRIP_DATASET_METADATA_H
 
@@ -26,13 +29,13 @@
 
 typedef struct trip_dataset_metadata trip_dataset_metadata;
 
-/* Parses the metadata. Fails if the text is not a JSON object or exceeds the data set's budget. The
- * time of all these functions is linear in the length of the text. */
+/* Parses the metadata. Fails if the text is not a JSON object or exceeds the data set's budget.
+ * Like all functions below, it takes a time linear in the length of the text. */
 int trip_dataset_metadata_parse(trip_dataset_metadata **out, const trip_dataset *d);
 void trip_dataset_metadata_destroy(trip_dataset_metadata *t);
 
 /* Return the source file's name without its folder, and option number i of `brick` that makes the
- * data set again. NULL if the text has none, or beyond the last option. */
+ * data set again. They return NULL if the text has none, or beyond the last option. */
 const char *trip_dataset_metadata_source(const trip_dataset_metadata *t);
 const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, int i);
 
@@ -51,8 +54,9 @@ int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset 
 /* Reads the histogram. Returns false, with a count of 0, if the text has none. */
 bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histogram *out);
 
-/* Estimates from the histogram how many voxels `tf` shows that bricking dropped, and the range of
- * their values. Bins count in proportion. Returns 0 if the text lacks a histogram or envelope. */
+/* Estimates from the histogram how many dropped voxels `tf` shows, and the range of their values. A
+ * bin that is shown in part counts in proportion. Returns 0 if the text lacks a histogram or
+ * envelope. */
 double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_tf *tf,
                                     double range[2]);
 

@@ -2,7 +2,7 @@
 
 #include "emission.h"
 
-/* A spiral from pole to pole with equal areas (Fibonacci lattice). */
+/* The directions lie on a spiral from pole to pole with equal areas (Fibonacci lattice). */
 trip_vec3 trip_effects_direction(int number)
 {
     const double golden = 2.39996322972865332; /* pi (3 - sqrt(5)) */
@@ -36,7 +36,7 @@ trip_effects_view trip_effects_view_make(const trip_settings *s, const trip_came
         return e;
     const trip_light_grid grid = trip_light_grid_over(dims, s->effects.cells, 1);
     e.bias = TRIP_LIGHT_BIAS * grid.spacing * camera->voxel_world;
-    trip_affine_invert(&camera->index_to_world, &e.to_index); /* opening checked it */
+    trip_affine_invert(&camera->index_to_world, &e.to_index); /* checked when opened */
     e.point_light = s->point_light;
     e.light = s->point_light ? trip_light_position(s, &camera->index_to_world)
                              : trip_affine_vector(&e.to_index, s->light_direction);
@@ -69,7 +69,8 @@ static double openness(const trip_effects_view *e, trip_vec3 voxel, double stren
     return fmin(1, (1 + strength) * fmax(one, other));
 }
 
-/* Returns the offset from a point towards the light, world units. `direction` has unit length. */
+/* Returns a point moved towards the light by `distance` world units, but not past a point light.
+ * `direction` has unit length. */
 static trip_vec3 nearer(const trip_effects_view *e, trip_vec3 voxel, trip_vec3 direction,
                         double distance)
 {

@@ -14,15 +14,16 @@
  * - m is the mean of T over all directions.
  * - phase is Henyey & Greenstein's phase function (1941) times 4 pi. cos is the cosine of the angle
  *   between the light's direction and the direction to the eye.
- * - Fog so has single scattering after Max 1995 (Optical models for direct volume rendering,
- * section 5) plus ambient light. Surfaces have cast shadows.
- * - A surface is lit by the light slightly outside it: the offset b is TRIP_LIGHT_BIAS cells of the
+ * - The offset b lights a surface slightly outside itself. It is TRIP_LIGHT_BIAS cells of the
  *   lattice, but at most the distance to a point light.
- * - The factor 1 + s is there because the body itself fills half of a surface's surroundings.
+ * - The factor 1 + s makes up for the body itself, which fills half of a surface's surroundings.
+ *
+ * Fog therefore has single scattering after Max 1995 (Optical models for direct volume rendering,
+ * section 5) plus ambient light. Surfaces cast shadows.
  *
  * T and m are interpolated in a lattice over the volume (light_grid.h); the lattice of m has cells
- * twice as long. The integral renderer computes them per point, m with the same directions. Clipped
- * parts do not attenuate.
+ * twice as long. The integral renderer computes both at each point, m with the same directions.
+ * Clipped parts do not attenuate light.
  *
  * Emission
  * --------
@@ -68,7 +69,8 @@ typedef struct trip_effects_view {
     bool point_light;
     trip_vec3 light; /* index space: the light's position, or the direction to it per world unit */
     trip_affine to_index;
-    double cue[4]; /* f = the first three . point in index space + the last, clamped to [0, 1] */
+    double cue[4]; /* f = (cue[0], cue[1], cue[2]) . point + cue[3], clamped to [0, 1]; point in
+                      index space */
     double cue_rgb[3];
     const void *user; /* set by the caller: */
     trip_light_reached reached, open;

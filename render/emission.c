@@ -33,7 +33,8 @@ static void set_table(trip_emission *e)
 static int check(const trip_dataset *data, const char *path)
 {
     if (!(data->header.value_max > 0))
-        return trip_fail(TRIP_USAGE, "render", path, "has no heat: no value is above 0");
+        return trip_fail(TRIP_USAGE, "render", path,
+                         "holds no value above 0; choose a data set of temperatures");
     return 0;
 }
 
@@ -81,7 +82,7 @@ void trip_emission_drop(trip_emission *e)
 static trip_affine map_between(const trip_affine *from, const trip_affine *to)
 {
     trip_affine inverse, out;
-    trip_affine_invert(to, &inverse); /* opening checked it */
+    trip_affine_invert(to, &inverse); /* checked when opened */
     for (int k = 0; k < 4; k++) {
         const bool origin = k == 3;
         const trip_vec3 world = trip_v3(from->m[0][k] - (origin ? to->m[0][k] : 0),
@@ -117,7 +118,7 @@ static int voxels_along(const trip_dataset *data)
 
 int trip_emission_begin(trip_emission *e, const trip_emission_params *p)
 {
-    e->settings.classify = TRIP_CLASSIFY_POST; /* includes the halo */
+    e->settings.classify = TRIP_CLASSIFY_POST; /* gathers the halo too */
     e->settings.effects.cells = p->cells ? p->cells : voxels_along(e->data);
     e->to_heat = map_between(p->index_to_world, &e->data->index_to_world);
     if (e->kelvin[0] != p->kelvin[0] || e->kelvin[1] != p->kelvin[1])
@@ -148,7 +149,7 @@ trip_emission_view trip_emission_view_of(const trip_emission *e)
     };
 }
 
-/* 1 inside the data set, falling to 0 at one voxel outside. */
+/* Returns 1 inside the data set, falling to 0 at one voxel outside. */
 static double inside(const trip_emission_view *v, trip_vec3 at)
 {
     double share = 1;

@@ -30,13 +30,13 @@ typedef struct trip_emission_params {
 typedef struct trip_emission_view {
     const trip_light_grid *heat; /* v / V */
     trip_affine to_heat;         /* maps the drawn data set's index space to the heat data set's */
-    double last[3];              /* voxels of the heat data set */
+    double last[3];              /* index of the heat data set's last voxel */
     const float *rgb; /* E for v / V from 0 to 1: TRIP_EMISSION_STEPS + 1 entries of 4 floats */
 } trip_emission_view;
 
 /* Opens the heat data set. Fails, reported, if it holds no values above 0. */
 int trip_emission_create(trip_emission **out, const char *path, trip_budget *budget);
-/* Frees it. Waits for reads in progress. */
+/* Frees the heat data set and its lattice. Waits for reads in progress. */
 void trip_emission_destroy(trip_emission *e);
 /* Begins a frame, like trip_light_map_begin(). */
 int trip_emission_begin(trip_emission *e, const trip_emission_params *params);

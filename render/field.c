@@ -13,7 +13,7 @@ enum {
 struct trip_field {
     trip_budget *budget;
     int64_t dims[3], cubes[3];
-    size_t positions;    /* bytes of the directory */
+    size_t positions;    /* number of cubes in the grid, and of directory entries */
     uint32_t *directory; /* by the cube's position in the grid: 1 + its number, or 0 if it has no
                             voxels */
     trip_field_cube **chunks;
@@ -28,7 +28,7 @@ static size_t chunks_of(size_t cubes)
 static int fail_memory(const char *stage)
 {
     return trip_fail(TRIP_ERROR, "render", "field",
-                     "%s does not fit the memory given: the whole volume is held, 16 bytes a "
+                     "%s does not fit the memory given; the whole volume takes 16 bytes per "
                      "voxel; raise --memory",
                      stage);
 }
@@ -50,7 +50,7 @@ int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budg
         f->positions = 0;
         trip_field_destroy(f);
         *out = NULL;
-        return fail_memory("the directory of so large a grid");
+        return fail_memory("the directory of the large grid");
     }
     f->chunk_room = chunks_of(f->positions);
     f->directory = trip_budget_take(budget, f->positions * sizeof *f->directory);
@@ -227,7 +227,8 @@ int trip_field_finish(trip_field *f, const trip_field_map *map)
 {
     trip_affine to_index;
     if (!trip_affine_invert(&map->index_to_world, &to_index))
-        return trip_fail(TRIP_ERROR, "render", "field", "the map to the world is singular");
+        return trip_fail(TRIP_ERROR, "render", "field",
+                         "the map from index space to world space is singular");
     for (size_t i = 0; i < f->count; i++) {
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "render", "field", "interrupted");

@@ -7,11 +7,13 @@
  * cells: cell (i, j, k) is the cube from voxel (i, j, k) to (i + 1, j + 1, k + 1). A cell is empty
  * unless all eight corners are present.
  * - linear weights the eight corners.
- * - cubic weights the 4 x 4 x 4 voxels around with Catmull-Rom splines. They pass through the
- * values and have central differences as derivatives.
+ * - cubic weights the 4 x 4 x 4 voxels around the cell with Catmull-Rom splines. The splines pass
+ *   through the values and have central differences as derivatives.
  * - gaussian weights the same 64 voxels (kernel.h).
- * Beyond the grid its edge repeats. Any other missing voxel counts as the nearest corner of the
- * cell. The gradient is interpolated in the same way from the gradients at the voxels. */
+ *
+ * Beyond the grid, the values at its edge repeat. Any other missing voxel counts as the nearest
+ * corner of the cell. The gradient is interpolated in the same way from the gradients at the
+ * voxels. */
 #ifndef TRIP_FIELD_H
 #define TRIP_FIELD_H
 
@@ -43,8 +45,8 @@ typedef struct trip_field trip_field;
 int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budget);
 void trip_field_destroy(trip_field *f);
 
-/* Adds a voxel. With gradient NULL, finishing computes it by differences. Fails if memory is
- * exhausted. */
+/* Adds a voxel. If `gradient` is NULL, trip_field_finish() computes it by differences. Fails if
+ * memory is exhausted. */
 int trip_field_put(trip_field *f, const int64_t at[3], double code, const double gradient[3]);
 
 /* Parameters of computed gradients. */
@@ -52,7 +54,8 @@ typedef struct trip_field_map {
     trip_affine index_to_world;
     const trip_coordinates *coordinates; /* NULL for even spacing */
     double value_per_code;
-    bool signless; /* given gradients have arbitrary sign: turn them to ascending values */
+    bool signless; /* given gradients have an arbitrary sign; they are turned towards increasing
+                      values */
 } trip_field_map;
 
 /* Finishes the field after the last voxel. Gradients are central differences, or one-sided if a

@@ -1,5 +1,5 @@
-/* Fills a field from the batches of a frame, from voxels and halo, with normals if they are read
- * and wanted. A voxel may arrive twice with the same value. One thread. */
+/* Fills a field from a frame's batches of voxels and halo. It takes normals if they are read and
+ * wanted. A voxel may arrive twice with the same value. One thread. */
 #ifndef TRIP_FIELD_FILL_H
 #define TRIP_FIELD_FILL_H
 
@@ -11,7 +11,7 @@ typedef struct trip_field_fill {
     trip_field *field;
     bool has_normals;
     const trip_file_header *header;
-    trip_compact_normals compact;                                         /* of 3 bytes */
+    trip_compact_normals compact; /* decodes normals of 3 bytes */
     uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of a run */
 } trip_field_fill;
 

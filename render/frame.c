@@ -51,7 +51,8 @@ static int begin_reading(trip_drawing *d)
     return status;
 }
 
-/* Merges the layers with passes up to `last`, in order, until TRIP_FRAME_DONE. */
+/* Begins the layers with passes, up to axis `last`, in order. Returns TRIP_FRAME_DONE once all have
+ * begun. */
 static int begin_layers(trip_drawing *d, int last)
 {
     int status = 0;
@@ -84,7 +85,7 @@ static const trip_batch *newest_held(const trip_drawing *d)
     return &d->held[(d->held_first + d->held_count - 1) % HELD_MAX];
 }
 
-/* Returns the number of next runs of the batch with at most `max` splats together, at least one. */
+/* Takes the next runs of the batch, with at most `max` splats together, but at least one run. */
 static trip_batch next_piece(trip_drawing *d, const trip_batch *batch, uint64_t max)
 {
     trip_batch piece = *batch;
@@ -141,7 +142,8 @@ static int release_drawn(trip_drawing *d)
     return done < 0 ? done : 0;
 }
 
-/* A renderer may hold up to half of the ring, so that the disk can fill the other half. */
+/* Returns whether the renderer holds as many batches as it may. It may hold half of the ring, so
+ * that the disk can fill the other half. */
 static bool holds_many(const trip_drawing *d)
 {
     unsigned half = trip_reader_slots(d->reader) / 2;
@@ -155,8 +157,8 @@ static int end_passes(trip_drawing *d)
                                                    : d->renderer->ops->end_passes(d->renderer);
 }
 
-/* Takes the next batch after the last one is drawn. Sets in_batch, or all_read at the end, and
- * returns 0. */
+/* Takes the next batch from the reader, once the last one is drawn. Sets in_batch, or all_read at
+ * the end. Returns 0, TRIP_FRAME_WAITS or a failure. */
 static int next_batch(trip_drawing *d)
 {
     trip_batch batch;
@@ -262,11 +264,11 @@ static int check_forms(const trip_settings *s, const trip_renderer *renderer)
         const char *why;
     } forms[] = {
         { s->footprint == TRIP_FOOTPRINT_FIXED, TRIP_DRAWS_FIXED,
-          "draws no footprints of a fixed size: reference and gl do" },
+          "does not draw footprints of a fixed size; use the renderer reference or gl" },
         { s->vertex_weights, TRIP_DRAWS_VERTEX_WEIGHTS,
-          "weighs pixels, not vertices: the reference does that" },
+          "does not weight vertices; use the renderer reference" },
         { s->method == TRIP_METHOD_IMAGE, TRIP_DRAWS_IMAGE_SHEETS,
-          "draws no image-aligned sheets: the reference does" },
+          "does not draw image-aligned sheets; use the renderer reference" },
     };
     for (size_t i = 0; i < sizeof forms / sizeof *forms; i++)
         if (forms[i].wanted && !(renderer->ops->forms & forms[i].form))
@@ -280,11 +282,12 @@ static int check_renderer(const trip_frame *frame, const trip_renderer *renderer
     const trip_settings *s = frame->settings;
     if (s->classify == TRIP_CLASSIFY_POST && !frame->plan->gathers &&
         !renderer->ops->classifies_post)
-        return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                         "does not classify after interpolation");
+        return trip_fail(
+            TRIP_USAGE, "render", renderer->ops->name,
+            "does not classify after interpolation; use another renderer or --classify pre");
     if (trip_effects_some(&s->effects) && !(renderer->ops->effects >> s->classify & 1))
         return trip_fail(TRIP_USAGE, "render", renderer->ops->name,
-                         "draws no effects; choose another renderer, or none: --effects none");
+                         "does not draw effects; use another renderer or --effects none");
     return frame->plan->gathers ? 0 : check_forms(s, renderer);
 }
 
@@ -350,7 +353,8 @@ void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
 }
 
 #ifndef NDEBUG
-/* Debug builds check every picture: components are not NaN, distances are positive. */
+/* Debug builds check every picture with it. Components must not be NaN, and distances must be
+ * positive. */
 static bool is_of_numbers(const trip_camera *camera, const float *rgba, const float *depth)
 {
     size_t pixels = (size_t)camera->width * (size_t)camera->height;

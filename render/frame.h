@@ -34,12 +34,12 @@ typedef struct trip_drawing {
     trip_frame_stats stats; /* complete after the finished frame's picture was taken */
 
     /* Private to frame.c: */
-    trip_scope scope; /* cancelled: the frame is abandoned */
+    trip_scope scope; /* cancelled if the frame is abandoned */
     double begun_ms;
     bool begun, done; /* the renderer has begun; every batch is drawn */
     bool loaded;      /* resident data is loaded; reads have begun */
-    bool all_read;    /* and drawn */
-    int next_axis;    /* number of layers begun */
+    bool all_read;    /* every batch is read and handed to the renderer */
+    int next_axis;    /* first axis with a layer that has not begun */
     uint64_t splats;  /* drawn so far */
     /* The next run of the current batch, held[(held_first + held_count - 1) % TRIP_FRAME_HELD_MAX].
      */

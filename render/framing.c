@@ -2,8 +2,7 @@
 
 #define DEGREE (3.14159265358979323846 / 180)
 #define DEFAULT_FOV_DEGREES 30.0
-#define ISO_ELEVATION_DEGREES                                                                      \
-    35.264389682754654 /* elevation of a cube's diagonal: atan(1 / sqrt(2)) */
+#define ISO_ELEVATION_DEGREES 35.264389682754654 /* of a cube's diagonal: atan(1 / sqrt(2)) */
 
 typedef struct angles {
     double azimuth, elevation; /* degrees; 0, 0 is the front */
@@ -125,9 +124,9 @@ static void roll(fitting *t)
 }
 
 /* The fit along one axis of the picture: the visible centre of the object, and the minimum distance
- * at which it stays within the half angle with tangent `half`. A point at t along the axis and d
- * deeper than the origin satisfies |t - middle| <= half (distance + d). In a parallel view half is
- * 0, and the distance is the needed half height or width. */
+ * at which the object stays within the half angle with tangent `half`. A point at t along the axis
+ * and d deeper than the origin satisfies |t - middle| <= half (distance + d). In a parallel view
+ * half is 0, and the distance is the needed half height or width. */
 typedef struct fit {
     double half, middle, distance;
 } fit;
@@ -144,9 +143,9 @@ static void want_fit(const fitting *t, trip_vec3 axis, double half, trip_reach w
     wanted[1] = (trip_reach){ .along = trip_sub(nearer, axis) };
 }
 
-/* Returns the visible centre from a larger `distance` than this axis needs: the centre for the half
- * angle that would need it. While the same two points are outermost, the distance is linear in 1 /
- * half. */
+/* Moves the visible centre to the one for a larger `distance` than this axis needs. It is the
+ * centre for the narrower half angle that would need this distance. While the same two points are
+ * outermost, the distance is linear in 1 / half. */
 static int fit_from(const fitting *t, trip_vec3 axis, double distance, fit *own)
 {
     enum { STEPS = 8 };
@@ -207,10 +206,12 @@ static int fit_parallel(const fitting *t, trip_vec3 *look, double *distance, dou
     return 0;
 }
 
-/* The worst case of a point on a turning object. Let h be its height above the middle, r its
- * distance from the axis, and a its angle from the eye's side. In direction (qx, qy) of the upright
- * picture it appears at  qx r sin a + qy (h cos e - r cos a sin e),  r cos a cos e + h sin e nearer
- * than the middle, where e is the elevation. It stays within half times its depth for all a if
+/* Returns the worst case of a point on a turning object. Let h be its height above the middle, r
+ * its distance from the axis, and a its angle from the eye's side. Let e be the elevation. In
+ * direction (qx, qy) of the upright picture the point appears at
+ *     qx r sin a + qy (h cos e - r cos a sin e),
+ * and r cos a cos e + h sin e nearer than the middle. It stays within half times its depth for all
+ * a if
  *     distance >= h (sin e + qy cos e / half) + r sqrt((qx / half)^2 + (cos e - qy sin e / half)^2)
  * A parallel view has `half` 1 and no terms from the depth. */
 static trip_reach turning(const fitting *t, trip_vec3 axis, double qx, double qy, double half)

@@ -1,6 +1,6 @@
-/* Finds the default view of an object: from a named side, with everything in the picture, centred,
- * with a margin. The caller gives the object by its reach in given directions, so that the fit is
- * exact for any shape. One thread at a time. */
+/* Finds the default view of an object: from a named side, with the whole object in the picture,
+ * centred, with a margin. The caller describes the object by its maximum reach in given directions,
+ * so that the fit is exact for any shape. One thread at a time. */
 #ifndef TRIP_FRAMING_H
 #define TRIP_FRAMING_H
 
@@ -51,14 +51,14 @@ typedef struct trip_camera_framing {
     /* Relative to the side: azimuth to the viewer's right, elevation upward, roll of the picture
      * clockwise. Degrees. */
     double azimuth_degrees, elevation_degrees, roll_degrees;
-    double fov_degrees; /* 30 */
+    double fov_degrees; /* default 30 */
     bool parallel;
     double ortho_height; /* height of a parallel view; default: fits the whole object */
     bool turntable;      /* fit the object at all angles about up through the centre of the box */
 } trip_camera_framing;
 
-/* Tips the object so that another of its directions is up. Its front keeps facing the viewer. If
- * the front becomes parallel to up, its former bottom or top faces the viewer. */
+/* Tips the object so that another of its directions is up, while its front keeps facing the viewer.
+ * If the front becomes parallel to up, the object's former bottom or top faces the viewer. */
 void trip_framing_set_up(trip_camera_framing *f, trip_vec3 up);
 
 /* Returns the centre of the box in world space. */

@@ -53,14 +53,17 @@ int trip_image_check_path(const char *path, const trip_image_params *params)
     const format *f = find_format(path);
     if (!f)
         return trip_fail(TRIP_USAGE, "write", path,
-                         "pictures are named .png, .jpg, .tif or .exr, which sets their format");
+                         "unknown picture format; use the extension .png, .jpg, .tif or .exr");
     if (params && (params->jpeg_quality < 0 || params->jpeg_quality > 100))
-        return trip_fail(TRIP_USAGE, "write", path, "a JPEG quality is 1 to 100");
+        return trip_fail(TRIP_USAGE, "write", path,
+                         "the JPEG quality is out of range; use 1 to 100");
     if (params && params->distances && !holds(f, TRIP_IMAGE_FLOAT))
-        return trip_fail(TRIP_USAGE, "write", path, "distances are written as .exr or .tif");
+        return trip_fail(TRIP_USAGE, "write", path,
+                         "cannot hold distances; use the extension .exr or .tif");
     if (!params || params->depth == TRIP_IMAGE_DEPTH_DEFAULT || holds(f, params->depth))
         return 0;
-    return trip_fail(TRIP_USAGE, "write", path, "a .%s file cannot hold that kind of number",
+    return trip_fail(TRIP_USAGE, "write", path,
+                     "a .%s file cannot hold this number type; use another type or extension",
                      f->extension);
 }
 
@@ -85,7 +88,7 @@ static size_t channels_of(const trip_image_params *params)
     return params->distances ? 1 : 4;
 }
 
-/* Returns whether a file can hold the value: finite, or +infinity for distances. */
+/* Fails if a value is not finite. Distances may be +infinity. */
 static int check_numbers(const char *path, int width, int height, const float *pixels,
                          const trip_image_params *params)
 {
@@ -150,8 +153,8 @@ int trip_image_write(trip_image_files *files, const char *path, int width, int h
     if (status < 0)
         return status;
     if (width < 1 || height < 1)
-        return trip_fail(TRIP_USAGE, "write", path, "a picture of %d x %d pixels is empty", width,
-                         height);
+        return trip_fail(TRIP_USAGE, "write", path,
+                         "a picture of %d x %d pixels is empty; use 1 x 1 or more", width, height);
     status = check_numbers(path, width, height, pixels, p);
     return status < 0 ? status : write_checked(files, path, width, height, pixels, p);
 }
@@ -177,12 +180,12 @@ static int receive_picture(trip_image_helper *helper, const char *path, trip_ima
     if (status == 0)
         status = trip_image_helper_receive(helper, size, sizeof *size);
     if (status == 0 && !is_size_of(size, bytes))
-        status = trip_image_helper_distrust(helper, "a picture of another size than it says");
+        status = trip_image_helper_distrust(helper, "a picture whose size differs from its data");
     if (status < 0)
         return status;
     float *rgba = malloc(bytes - sizeof *size);
     if (!rgba)
-        return trip_fail(TRIP_ERROR, "read", path, "no memory for its pixels");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory for its pixels");
     status = trip_image_helper_receive(helper, rgba, bytes - sizeof *size);
     if (status < 0)
         free(rgba);

@@ -7,9 +7,9 @@
 
 struct trip_image_sheets {
     trip_budget *budget;
-    int width, height, first, count; /* number of slabs, from `first` on */
+    int width, height, first, count; /* size in pixels; slabs from `first` on */
     unsigned channels;
-    double thickness; /* thickness in depth */
+    double thickness; /* of a slab, as a difference of depths */
     size_t bytes;
     double *sums;
 };
@@ -29,7 +29,8 @@ static void find_depths(const trip_camera *camera, const trip_settings *settings
     depths[1] += reach;
 }
 
-/* Returns the depth of one voxel length along the view direction. Opening checked the map. */
+/* Returns the depth of one voxel length along the view direction. The map is invertible: this was
+ * checked when the data set was opened. */
 static double voxel_depth(const trip_camera *camera)
 {
     trip_affine to_index;

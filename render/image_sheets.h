@@ -1,15 +1,16 @@
 /* Image-aligned sheet buffers (Mueller & Crawfis 1998, "Eliminating popping artifacts in sheet
- * buffer-based splatting"), to compare with the papers' three lists. Slabs lie between planes of
- * equal depth, one voxel apart. Each slab takes the parts of splats inside it. The reference
+ * buffer-based splatting"), to compare with the three lists of the papers. Slabs lie between planes
+ * of equal depth, one voxel apart. Each slab takes the parts of splats inside it. The reference
  * renderer owns them.
  *
  * Slab n covers the depths from n d to (n + 1) d. d is the depth of one voxel length along the view
  * direction. Slab n takes this share of a splat's optical depth at a pixel (splat.h, without
  * front(p)):
  *     F((n + 1) d) - F(n d),   F(z) = 1/2 (1 + erf(s / sqrt 2) / erf(k / sqrt 2)),  |s| <= k.
- * s is the distance along the ray to depth z, in standard deviations, from the point nearest to the
- * voxel. F is 0 for smaller s and 1 for larger s. The parts in a slab are added, like the splats of
- * a sheet (splat.h). Slabs are composited front to back. So the order of splats does not matter. */
+ * s is the distance along the ray from the point nearest to the voxel to depth z, in standard
+ * deviations. F is 0 for smaller s and 1 for larger s. The parts in a slab are added, like the
+ * splats of a sheet (splat.h). Slabs are composited front to back, so the order of splats does not
+ * matter. */
 #ifndef TRIP_IMAGE_SHEETS_H
 #define TRIP_IMAGE_SHEETS_H
 

@@ -26,7 +26,7 @@ struct trip_light_map {
     unsigned level;
     trip_clip clip;
     float extinctions[CODES];  /* per world unit, by code */
-    uint32_t shown[CODES + 1]; /* number of lower codes with extinction */
+    uint32_t shown[CODES + 1]; /* number of codes below this one with extinction */
     bool point_light;
     trip_vec3 light;            /* light of `reached`, as in trip_effects_view */
     bool has_reached, has_open; /* the lattices are complete */
@@ -42,7 +42,7 @@ struct trip_light_map {
     trip_selection *selections; /* while gathering: room for all lists of the data set */
     unsigned list_count;
     trip_pass pass;
-    size_t averaged; /* rows of nodes */
+    size_t averaged; /* number of rows of nodes averaged */
     size_t cleared;  /* next node of the current grid */
     trip_light_sweep sweep;
     bool sweeping;
@@ -145,7 +145,7 @@ static bool is_gathered_for(const trip_light_map *m, const trip_light_source *s)
 static trip_vec3 to_index(const trip_light_source *s, trip_vec3 direction)
 {
     trip_affine map;
-    trip_affine_invert(&s->data->index_to_world, &map); /* opening checked it */
+    trip_affine_invert(&s->data->index_to_world, &map); /* checked when opened */
     return trip_affine_vector(&map, direction);
 }
 
@@ -172,7 +172,7 @@ static int no_memory(const trip_light_grid *g, size_t bytes)
 {
     char text[32];
     return trip_fail(TRIP_ERROR, "render", "light",
-                     "a grid of %d x %d x %d nodes takes %s, which the memory given does not have; "
+                     "a grid of %d x %d x %d nodes takes %s, which does not fit the memory given; "
                      "raise --memory or lower --light-cells",
                      g->nodes[0], g->nodes[1], g->nodes[2], trip_format_bytes(bytes, text));
 }
@@ -222,8 +222,9 @@ static int axis_of(const trip_light_source *s)
     return axis;
 }
 
-/* Halo voxels count if values are interpolated. They do not count if data sets are joined, because
- * the visible halo of one is kept in another. */
+/* Returns whether the list is read. Halo voxels count if values are interpolated. If data sets are
+ * joined, halo voxels do not count, because a visible halo voxel of one is a kept voxel of another.
+ */
 static bool is_read(const trip_light_source *s, const trip_list *list, int axis)
 {
     const trip_kind_info *kind = trip_kind_of(list->kind);
@@ -263,7 +264,7 @@ static int take_shares(trip_light_map *m)
         fits = trip_light_shares_make(&m->shares[a], c, a, g->spacing, g->nodes[a], m->budget);
     return fits ? 0
                 : trip_fail(TRIP_ERROR, "render", "light",
-                            "what voxels count does not fit the memory given; raise --memory");
+                            "the voxels' shares do not fit the memory given; raise --memory");
 }
 
 static int start_gathering(trip_light_map *m, const trip_light_source *s)

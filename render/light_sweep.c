@@ -41,7 +41,7 @@ static int last_layer(const trip_light_sweep *s)
     return s->out->nodes[s->axis] - 1;
 }
 
-/* A value at a node of a layer, or between nodes. */
+/* Converts between layers and nodes along the sweep's axis. A layer may be fractional. */
 static double node_of(const trip_light_sweep *s, double layer)
 {
     return s->descending ? last_layer(s) - layer : layer;

@@ -32,10 +32,10 @@ typedef struct trip_light_sweep {
      */
     double slope[2], spread;
     double length;            /* world length of a step of a directional light */
-    int columns[2], first[2]; /* w of the first column; the number of columns, one node apart */
+    int columns[2], first[2]; /* number of columns, one node apart; w of the first column */
     int start;                /* the first layer that the light meets */
-    double before;            /* layers that the light passes before it */
-    int layer;                /* the next */
+    double before;            /* distance from a point light to the first layer, in layers */
+    int layer;                /* next layer */
     bool attenuated;          /* the columns are done; the nodes are in progress */
     int rows[2];              /* rows of a step: from, to below */
     int nodes[2][2];          /* the region's nodes in the layer: from, to below */
@@ -54,7 +54,7 @@ bool trip_light_sweep_begin_at(trip_light_sweep *s, trip_vec3 light, int region,
  * thread does them. */
 bool trip_light_sweep_step(trip_light_sweep *s, const trip_task_runner *runner);
 void trip_light_sweep_end(trip_light_sweep *s);
-/* Returns the maximum memory of the columns for any light. */
+/* Returns the maximum size of the columns for any light, in bytes. */
 size_t trip_light_sweep_max_bytes(const trip_light_grid *out);
 
 #endif

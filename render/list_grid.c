@@ -39,7 +39,7 @@ int trip_list_grid_make(trip_list_grid *g, const trip_dataset *data, const trip_
             return fail(data, list, "the map of level 0 is singular");
         map = trip_affine_multiply(&inverse, &list->index_to_world);
         if (!is_along_axes(&map))
-            return fail(data, list, "its grid does not lie along that of level 0");
+            return fail(data, list, "its grid is not parallel to the grid of level 0");
         for (int i = 0; i < 3; i++) {
             g->scale[i] = map.m[i][i];
             g->offset[i] = map.m[i][3];
@@ -49,6 +49,6 @@ int trip_list_grid_make(trip_list_grid *g, const trip_dataset *data, const trip_
     if (!is_close(g->scale[list->axis], step, step) ||
         !is_close(g->offset[list->axis], list->sheet_first,
                   step * (double)(list->dims[list->axis] + 1)))
-        return fail(data, list, "its sheets lie elsewhere than its map says");
+        return fail(data, list, "its sheet coordinates contradict its map");
     return TRIP_OK;
 }

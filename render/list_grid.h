@@ -1,5 +1,5 @@
-/* Maps the grid of a list to the grid of level 0, which defines weights and the order of sheets:
- * voxel i along an axis lies at scale * i + offset. Plain values. */
+/* Maps the grid of a list to the grid of level 0, which defines weights and the order of sheets.
+ * Voxel i along an axis lies at scale * i + offset. Plain values. */
 #ifndef TRIP_LIST_GRID_H
 #define TRIP_LIST_GRID_H
 
@@ -9,8 +9,8 @@ typedef struct trip_list_grid {
     double scale[3], offset[3]; /* exactly 1 and 0 for level 0 */
 } trip_list_grid;
 
-/* Fails, reported, if the grid is not parallel to level 0, or its sheets are not at the list's
- * coordinates: they could not be merged with other lists. */
+/* Makes the map of a list. Fails, reported, if the list cannot be merged with others: its grid is
+ * not parallel to level 0, or its sheets are not at the list's coordinates. */
 int trip_list_grid_make(trip_list_grid *g, const trip_dataset *data, const trip_list *list);
 
 /* Converts a difference of positions from the list's grid to level 0. */

@@ -4,8 +4,8 @@
 #include "lod_limit.h"
 #include "report.h"
 
-/* Chooses the cube size: about a level 0 brick, larger if there would be too many cubes. If
- * contents are counted, cubes are at least as large as the largest tiles. */
+/* log2 of the cube size in voxels: about a level 0 brick, and larger if there would be too many
+ * cubes. With a bound on bytes, cubes are at least as large as the largest tiles. */
 enum { CUBE_LOG2 = 6, LIMITED_CUBE_LOG2 = 7, MAX_CUBES = 1 << 22 };
 
 bool trip_lod_concerns(const trip_lod *lod, const trip_list *list)
@@ -49,7 +49,8 @@ unsigned trip_lod_level(double width_px, double px, unsigned levels)
     return level;
 }
 
-/* Computes the minimum depth of the voxels from `first` to before `past`, and their width there. */
+/* Returns the width of level 0 voxels in pixels at the minimum depth of the voxels from `first` to
+ * before `past`. */
 static double width_in(const trip_camera *camera, const int64_t first[3], const int64_t past[3])
 {
     double depth = -trip_dot(camera->forward, camera->eye);
@@ -98,7 +99,8 @@ int trip_lod_make(trip_lod *lod, const trip_dataset *data, trip_kind kind,
     lod->level = trip_budget_take(budget, lod->bytes);
     if (!lod->level)
         return trip_fail(TRIP_ERROR, "render", "levels",
-                         "%zu cubes do not fit the memory given; raise --memory", lod->bytes);
+                         "the levels of %zu cubes do not fit the memory given; raise --memory",
+                         lod->bytes);
     fill_levels(lod, data, camera, settings->lod_px * settings->samples);
     int status = settings->max_bytes > 0 ? trip_lod_bound(lod, data, camera, settings, budget) : 0;
     for (size_t i = 0; i < lod->bytes && !status; i++)

@@ -5,8 +5,8 @@
  * one level.
  *
  * Without a bound on bytes (lod_limit.h), a cube has the coarsest level with voxels at most lod_px
- * pixels wide at the cube's nearest point to the eye, measured along the grid's longest step. Cubes
- * around the eye have level 0. Read-only once made. */
+ * pixels wide. The width is measured at the cube's nearest point to the eye, along the grid's
+ * longest step. Cubes around the eye have level 0. Read-only once made. */
 #ifndef TRIP_LOD_H
 #define TRIP_LOD_H
 
@@ -25,12 +25,12 @@ typedef struct trip_lod_limit {
 
 typedef struct trip_lod {
     trip_kind kind;   /* kind of coarse levels: means or values */
-    unsigned levels;  /* maximum level; the data set has all up to it */
-    int cube_log2;    /* level 0 voxels along a cube's edge */
+    unsigned levels;  /* maximum level; the data set has all levels up to it */
+    int cube_log2;    /* log2 of the level 0 voxels along a cube's edge */
     int64_t cubes[3]; /* along i, j, k */
     uint8_t *level;   /* level by cube, i fastest; NULL means level 0 everywhere */
     size_t bytes;     /* size of `level`, from the budget */
-    uint32_t chosen;  /* bit per level that any cube has */
+    uint32_t chosen;  /* one bit per level, set if any cube has it */
     trip_lod_limit limit;
 } trip_lod;
 

@@ -31,8 +31,8 @@ static double code_bytes(const trip_dataset *data, const trip_list *list)
     return of->code_bytes && !of->steps ? of->code_bytes : data->header.code_bytes;
 }
 
-/* Returns whether a list counts, along one of three axes: voxels or means for splats, values and
- * halo for interpolation. */
+/* Returns whether a list along the third axis counts; the other two axes hold the same number of
+ * voxels. Splats count voxels and means. Interpolation counts voxels, values and halo. */
 static bool is_drawn(const trip_lod *lod, const trip_list *list)
 {
     if (list->axis != 2 || list->level > lod->levels)
@@ -64,7 +64,8 @@ static uint32_t *cube_at(const limiting *l, int64_t i, int64_t j, int64_t k)
     return &l->voxels[((k >> log2) * lod->cubes[1] + (j >> log2)) * lod->cubes[0] + (i >> log2)];
 }
 
-/* Every tile and sheet lies within cubes; slabs can cross them. */
+/* Counts the voxels of a brick in their cubes. A tile lies within one cube, and so does a sheet,
+ * but a slab can cross cubes. */
 static void count_brick(limiting *l, const trip_list *list, uint64_t index, int64_t slab_sheet)
 {
     const trip_file_header *h = &l->data->header;
@@ -181,10 +182,12 @@ int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *c
     limiting l = { .lod = lod, .data = data };
     l.voxels = trip_budget_take(budget, cubes * sizeof *l.voxels);
     l.width = trip_budget_take(budget, cubes * sizeof *l.width);
-    int status = l.voxels && l.width
-                     ? 0
-                     : trip_fail(TRIP_ERROR, "render", "levels",
-                                 "%zu cubes do not fit the memory given; raise --memory", cubes);
+    int status =
+        l.voxels && l.width
+            ? 0
+            : trip_fail(TRIP_ERROR, "render", "levels",
+                        "the widths of %zu cubes do not fit the memory given; raise --memory",
+                        cubes);
     if (!status) {
         count_voxels(&l);
         weigh_levels(&l, camera, settings);

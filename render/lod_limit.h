@@ -1,9 +1,9 @@
-/* Levels of cubes under a bound on bytes. The result is the same as with a larger settings.lod_px,
- * the smallest that keeps the bound. So the cubes that appear widest are drawn finest. Bytes are
+/* Levels of cubes under a bound on bytes. The result is the same as with the smallest
+ * settings.lod_px that keeps the bound. So the cubes that appear widest are drawn finest. Bytes are
  * the codes and normals of the cubes in view, in all lists with weight in the view. They are
  * computed from the number of level 0 voxels in each cube and the relative size of each level's
- * lists. None of this depends on tiles, slabs or earlier reads, and so neither does the picture.
- * Pure functions. */
+ * lists. The bytes, and so the picture, do not depend on tiles, slabs or earlier reads. Pure
+ * functions. */
 #ifndef TRIP_LOD_LIMIT_H
 #define TRIP_LOD_LIMIT_H
 

@@ -8,7 +8,7 @@
 /* Octaves of distance over which one level for the whole volume blends into the next. */
 #define MIXED_OCTAVES 0.25
 
-/* Computes the depth range of the whole grid. */
+/* The depth range of the whole grid. */
 typedef struct range {
     double nearest, farthest;
 } range;
@@ -42,7 +42,7 @@ typedef struct choosing {
     const trip_camera *camera;
     const trip_settings *settings;
     double px;    /* maximum voxel width, px; 0 means level 0 everywhere */
-    unsigned max; /* levels */
+    unsigned max; /* the coarsest level that may be used */
 } choosing;
 
 static double values_bytes(const choosing *c, unsigned level)
@@ -84,7 +84,7 @@ static void choose_one(trip_lod_parts *parts, const choosing *c, double width, b
 /* Returns the half-space of points at least at a depth, in world space. */
 static trip_half_space half_space_from(const trip_camera *camera, double depth)
 {
-    trip_affine to_index; /* opening checked the map */
+    trip_affine to_index; /* the map is invertible: checked when opened */
     trip_clip clip = { 0 };
     trip_clip_add(&clip, camera->forward, -trip_dot(camera->forward, camera->eye) - depth);
     trip_affine_invert(&camera->index_to_world, &to_index);

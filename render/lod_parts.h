@@ -4,16 +4,16 @@
  *
  * - Perspective: planes of equal depth divide the volume into parts. Each part is drawn at the
  *   coarsest level with voxels at most lod_px pixels wide at the part's nearest point. Rays are cut
- * at the planes (clip.h), so that each point of a ray is drawn at exactly one level. The pictures
- * are composited from the eye outward. As the eye moves, the planes move through the volume, and
- * the picture changes gradually.
+ *   at the planes (clip.h), so that each point of a ray is drawn at exactly one level. The pictures
+ *   are composited from the eye outward. As the eye moves, the planes move through the volume, and
+ *   the picture changes gradually.
  * - Parallel views, and volumes too thin to divide: the whole volume has one level, the finest that
- *   any part needs. To avoid popping, a share of the next coarser level's picture is mixed in. It
- * grows from 0 to 1 over the last quarter octave of voxel width before the coarser level takes
- * over.
+ *   any part needs. To avoid popping, a share of the next coarser level's picture is mixed in. The
+ *   share grows from 0 to 1 over the last quarter octave of voxel width before the coarser level
+ *   takes over.
  *
- * A bound on bytes acts like a larger lod_px: for the visible part of each part (lod_limit.h), and
- * for the whole grid if it has one level. Plain values. */
+ * A bound on bytes acts like a larger lod_px. It applies to the visible part of each part
+ * (lod_limit.h), and to the whole grid if it has one level. Plain values. */
 #ifndef TRIP_LOD_PARTS_H
 #define TRIP_LOD_PARTS_H
 
@@ -25,13 +25,13 @@ enum { TRIP_LOD_PARTS_MAX = 1 + TRIP_DATASET_LEVELS_MAX };
 typedef struct trip_lod_parts {
     int count; /* number of pictures, at least 1 */
     unsigned level[TRIP_LOD_PARTS_MAX];
-    /* By part behind another: its half-space in world space, and its first distance along the view.
-     */
+    /* For each part behind another: its half-space in world space, and its first distance along the
+     * view. */
     trip_half_space begin[TRIP_LOD_PARTS_MAX];
     double distance[TRIP_LOD_PARTS_MAX];
     double
         share; /* share of the second of two mixed pictures; 0 if pictures lie behind one another */
-    bool bounded; /* levels are coarser than lod_px calls for */
+    bool bounded; /* levels are coarser than lod_px requires */
     double bytes; /* bytes of the chosen levels, if there is a bound */
 } trip_lod_parts;
 

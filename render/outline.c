@@ -112,7 +112,8 @@ static void set_picture(trip_outline *o, const trip_outline_params *p, double vo
     }
 }
 
-/* Returns a picture coordinate relative to the eye. */
+/* Returns the coordinate along a world direction, relative to the eye, as a function of the list's
+ * indices. */
 static form make_form(const summing *s, trip_vec3 axis)
 {
     const trip_affine *m = &s->list->index_to_world;
@@ -253,7 +254,7 @@ static int sum_list(summing *s)
     return status;
 }
 
-/* Counts the voxels of all joined data sets. */
+/* Adds up the voxels of all joined data sets. */
 static int sum(summing *s)
 {
     const trip_list *list = s->list;
@@ -313,7 +314,7 @@ int trip_outline_make(trip_outline **out, const trip_outline_params *params)
         status = make(o, s, params, list);
     else
         status = trip_fail(TRIP_ERROR, "render", "view",
-                           "the outline of what shows does not fit the memory given; raise "
+                           "the outline of the visible part does not fit the memory given; raise "
                            "--memory");
     if (s)
         trip_budget_release(params->budget, s, sizeof *s);

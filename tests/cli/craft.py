@@ -1,5 +1,5 @@
-"""Data sets with right checksums and wrong contents: change the bytes of one that `brick` made, then
-seal it. Offsets are those of stream/FORMAT.md."""
+"""Makes data sets with valid checksums and wrong contents. A test changes bytes of a data set that
+`brick` made, then seals it. Offsets are as in stream/FORMAT.md."""
 import struct
 
 import xxhash
@@ -12,8 +12,8 @@ def xxh64(data):
 
 
 class Dataset:
-    """The files of a data set, to be changed and written: `index` and `planes["x0.voxels"]` are
-    byte arrays."""
+    """The files of a data set in memory. `index` and `planes["x0.voxels"]` are byte arrays that a
+    test can change."""
 
     def __init__(self, path):
         with open(f"{path}/index.trip", "rb") as f:
@@ -33,7 +33,7 @@ class Dataset:
         struct.pack_into(layout, self.index, at, *values)
 
     def list_at(self, number):
-        """Where the descriptor of a list stands."""
+        """Returns the offset of a list's descriptor."""
         return self.number("<Q", 296) + 320 * number
 
     def plane_names(self, number):
@@ -43,7 +43,7 @@ class Dataset:
         return [f"{'xyz'[axis]}{level}.{name}" for name in names]
 
     def bricks(self, number):
-        """Where the bricks of a list stand."""
+        """Returns the offsets of a list's bricks."""
         at = self.list_at(number)
         first = self.number("<Q", at + 184)
         return [first + 24 * i for i in range(self.number("<Q", at + 176))]
@@ -54,7 +54,8 @@ class Dataset:
         return [first + 32 * i for i in range(self.number("<Q", at + 160))]
 
     def runs(self, number):
-        """Of every run of a list, in file order: where its entry, brick and block stand, records, words."""
+        """Yields for every run of a list, in file order: the offsets of its entry, brick and block,
+        and its records and words."""
         at = self.list_at(number)
         table, sheets = self.number("<Q", at + 192), self.number("<I", 268)
         bricks, first = self.bricks(number), 0
@@ -74,7 +75,7 @@ class Dataset:
         return [xxh64(data[at : at + page]) for at in range(0, len(data), page)]
 
     def seal(self):
-        """Right checksums for what stands there now."""
+        """Writes valid checksums for the current bytes."""
         for number in range(self.lists):
             for plane, name in enumerate(self.names[number]):
                 sums = self.page_sums(self.planes[name])
@@ -88,7 +89,7 @@ class Dataset:
         self.put("<Q", 16, xxh64(self.index[:HEADER_BYTES]))
 
     def write(self, path):
-        """Sealed, into a folder that exists."""
+        """Seals the data set and writes it into an existing folder."""
         self.seal()
         with open(f"{path}/index.trip", "wb") as f:
             f.write(self.index)

@@ -1,8 +1,8 @@
-"""Runs the program as a user does; writes volumes in every format; reads the pictures it draws.
+"""Support for the tests in this folder. Runs the program as a user does, writes volumes in every
+format, and reads the pictures.
 
-For the tests in this folder, which Debian's own Python runs with NumPy. ctest says by the
-environment where the program is.
-"""
+Debian's own Python runs these tests with NumPy. ctest passes the paths of the programs in the
+environment."""
 import json
 import os
 import re
@@ -16,7 +16,7 @@ import time
 import unittest
 import zlib
 
-SKIPPED = 77  # CTest's
+SKIPPED = 77  # CTest's exit status for skipped tests
 
 try:
     import numpy
@@ -25,19 +25,18 @@ except ImportError:
     sys.exit(SKIPPED)
 
 PROGRAM = os.environ["TRIP_PROGRAM"]
-# Writes OpenEXR files by what stands in for triptych-images (tests/quick): for pictures whose pixels
-# are all that counts.
+# The program with a stand-in for triptych-images (tests/quick), for tests that need only pixels.
 QUICK_PROGRAM = os.environ["TRIP_QUICK_PROGRAM"]
 GENERATE = os.environ["TRIP_GENERATE"]
 DATASETS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "datasets")
 SANITIZED = bool(os.environ.get("TRIP_SANITIZE"))
-# Mesa finds the shaders that it has compiled where it always does, whatever cache a test has.
+# Mesa keeps its own shader cache, although each test has another XDG_CACHE_HOME.
 os.environ.setdefault("MESA_SHADER_CACHE_DIR",
                       os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-SWITCHED_OFF = os.environ.get("TRIP_SWITCHED_OFF", "").split()  # "GL", "OPENVDB"
+SWITCHED_OFF = os.environ.get("TRIP_SWITCHED_OFF", "").split()  # for example "GL OPENVDB"
 GL = () if "GL" in SWITCHED_OFF else ("gl",)  # for lists of renderers
 if "OPENVDB" in SWITCHED_OFF:
-    sys.modules["pyopenvdb"] = None  # tests take it for missing
+    sys.modules["pyopenvdb"] = None  # tests find it missing
 
 LINE = re.compile(r"triptych: ([^:\n]+: [^\n]+: [^\n]+|[^:\n]+: interrupted)\n")
 
@@ -50,7 +49,7 @@ def start(*arguments, program=PROGRAM, **options):
 
 
 def await_handler(process):
-    """Until the program has said what Ctrl-C does to it, or has ended."""
+    """Waits until the program handles SIGINT, or has ended."""
     caught = 0
     while process.poll() is None and not caught >> (signal.SIGINT - 1) & 1:
         with open(f"/proc/{process.pid}/status", encoding="ascii") as status:
@@ -60,7 +59,7 @@ def await_handler(process):
 
 
 def processor_seconds(process):
-    """That a process which was not waited for has taken."""
+    """Returns the processor time of a process that was not waited for."""
     with open(f"/proc/{process.pid}/stat", encoding="ascii") as stat:
         fields = stat.read().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -72,8 +71,8 @@ def skip_what_is_switched_off(arguments):
 
 
 def call(*arguments, timeout=60, **options):
-    """What subprocess.run() says of the program; a run that hangs is an error. What takes OpenVDB
-    is skipped where that is switched off."""
+    """Runs the program and returns a CompletedProcess. A run beyond the timeout is an error. Skips
+    the test if an argument needs OpenVDB and the build lacks it."""
     skip_what_is_switched_off(arguments)
     process = start(*arguments, **options)
     try:
@@ -88,7 +87,7 @@ def call(*arguments, timeout=60, **options):
 
 
 class ProgramTest(unittest.TestCase):
-    """Each class works in a folder of its own, the current one, and bricks into a cache of its own."""
+    """Gives each class its own current folder and its own cache for bricked volumes."""
 
     @classmethod
     def setUpClass(cls):
@@ -111,7 +110,7 @@ class ProgramTest(unittest.TestCase):
         return run
 
     def fails(self, status, *arguments, says="", **options):
-        """One line on stderr in the project's form, and this exit status."""
+        """Checks the exit status, and that stderr has one line in the project's form."""
         run = call(*arguments, **options)
         about = f"{arguments}: exit status {run.returncode}, stderr: {run.stderr!r}"
         self.assertEqual(run.returncode, status, about)
@@ -120,7 +119,7 @@ class ProgramTest(unittest.TestCase):
         return run
 
     def leaves_nothing(self, status, *arguments, says="", **options):
-        """It fails, and no file or folder has come."""
+        """Checks that the command fails and creates no file or folder."""
         before = set(os.listdir("."))
         run = self.fails(status, *arguments, says=says, **options)
         self.assertEqual(set(os.listdir(".")), before, arguments)
@@ -130,28 +129,28 @@ class ProgramTest(unittest.TestCase):
         return json.loads(self.works("info", "--json", path).stdout)
 
     def brick(self, source, output, *options):
-        """Bricks anew; what `info --json` says of it."""
+        """Bricks into a new folder. Returns the output of `info --json`."""
         shutil.rmtree(output, ignore_errors=True)
         self.works("brick", source, "-o", output, "-q", *options)
         return self.info(output)
 
     def stats(self, *arguments):
-        """The --stats of drawing a.exr."""
+        """Draws a.exr. Returns its --stats."""
         return json.loads(self.works("render", *arguments, "-o", "a.exr", "--stats", "-").stdout)
 
     def picture(self, *arguments):
-        """What `render` draws, height x width x RGBA, float, premultiplied."""
+        """Draws a picture. Returns height x width x RGBA as floats, with premultiplied alpha."""
         self.works("render", *arguments, "-o", "picture.exr")
         return read_exr("picture.exr")
 
 
 def splats_drawn(stats):
-    """Of a frame drawn with --count."""
+    """Returns the number of splats in a frame drawn with --count."""
     return sum(l["splats_drawn"] for l in stats["frames"][0]["counted"].values())
 
 
 def main():
-    """Runs the module's tests; 77 when one of them was skipped and none failed."""
+    """Runs the module's tests. Exits with 77 if a test was skipped and none failed."""
     test = unittest.main(verbosity=2, exit=False).result
     sys.exit(SKIPPED if test.wasSuccessful() and test.skipped else not test.wasSuccessful())
 
@@ -160,8 +159,8 @@ def main():
 
 
 def read_exr(path):
-    """What read_linear_exr() reads, as display values: by the sRGB curve for colours without their
-    alpha, in double precision."""
+    """Reads like read_linear_exr() and applies the sRGB curve to the colours without their alpha,
+    in double precision."""
     picture = read_linear_exr(path).astype(float)
     alpha = picture[..., 3:]
     straight = picture[..., :3] / numpy.where(alpha > 0, alpha, 1)
@@ -171,15 +170,15 @@ def read_exr(path):
 
 
 def read_linear_exr(path):
-    """The colours of an OpenEXR file: height x width x RGBA."""
+    """Returns the colours of an OpenEXR file as height x width x RGBA."""
     names, picture = read_exr_channels(path)
     assert names == [b"A", b"B", b"G", b"R"], names
     return picture[..., [3, 2, 1, 0]]
 
 
 def read_exr_channels(path):
-    """An OpenEXR file of scan lines, floats by zip: its channels' names, height x width x channels.
-    """
+    """Reads an OpenEXR file of scan lines with ZIP compression and float channels. Returns the
+    names of the channels, and height x width x channels."""
     with open(path, "rb") as f:
         data = f.read()
     at, window, names = 8, None, []
@@ -209,7 +208,8 @@ def read_exr_channels(path):
 
 
 def exr_unpack(packed, size):
-    """zlib, differences, and the bytes' halves in turn; stored as it is where that is shorter."""
+    """Reverses ZIP compression of OpenEXR: zlib, differences, and two interleaved halves of bytes.
+    Data that would not shrink is stored uncompressed."""
     if len(packed) == size:
         return numpy.frombuffer(packed, "<f4")
     steps = numpy.frombuffer(zlib.decompress(packed), numpy.uint8).astype(numpy.int64)
@@ -220,7 +220,7 @@ def exr_unpack(packed, size):
     return plain.view("<f4")
 
 
-# Volumes: arrays have the shape (z, y, x), as the values stand in the file.
+# Volumes. Arrays have the shape (z, y, x), the order of the values in a file.
 
 NRRD_TYPES = {
     "u1": "uint8",
@@ -245,7 +245,8 @@ def write_raw(path, volume):
 
 
 def write_report(folder, data_set, classify="post", levels_for="auto"):
-    """As `triptych accuracy` makes it, of one setting; checksum 0 where no data set is given."""
+    """Writes a report of one setting, like `triptych accuracy`. Its checksum is 0 if `data_set` is
+    None."""
     checksum = 0
     if data_set:
         with open(os.path.join(data_set, "index.trip"), "rb") as f:
@@ -259,7 +260,7 @@ def write_report(folder, data_set, classify="post", levels_for="auto"):
 
 
 def write_nrrd(path, volume, spacing=(1, 1, 1), encoding="raw", endian="little", geometry=None):
-    """`geometry` stands for the line of spacings."""
+    """Writes an NRRD file. `geometry` replaces the line of spacings."""
     data = volume.astype(volume.dtype.newbyteorder("<" if endian == "little" else ">")).tobytes()
     if encoding == "gzip":
         packer = zlib.compressobj(wbits=31)
@@ -306,7 +307,7 @@ def write_vol(path, volume, version=3):
 
 
 def write_tiff(path, image):
-    """One grey strip."""
+    """Writes a grey TIFF with a single strip."""
     height, width = image.shape
     data = image.tobytes()
     tags = [
@@ -352,7 +353,7 @@ def write_png(path, image):
 
 
 def write_exr(path, image):
-    """Of one float channel, Y, not packed; the values as they are."""
+    """Writes an OpenEXR file with one float channel, Y, not compressed."""
     rows, columns = image.shape
     window = struct.pack("<4i", 0, 0, columns - 1, rows - 1)
     attributes = [
@@ -390,7 +391,8 @@ def dicom_element(group, element, kind, value):
 
 
 def dicom_numbers(group, element, numbers):
-    """Texts of at most 16 characters, as the standard wants them."""
+    """Returns an element of decimal strings, each at most 16 characters long, as the DICOM standard
+    demands."""
     text = "\\".join(f"{round(float(v), 9) + 0.0:.10g}" for v in numbers)
     return dicom_element(group, element, b"DS", text.encode())
 
@@ -401,7 +403,7 @@ def dicom_sequence(group, element, items):
 
 
 def dicom_geometry(group, place, rows, spacing):
-    """The elements of one group of those that say where a slice lies: 0x20 or 0x28."""
+    """Returns the elements with group 0x20 or 0x28 that give a slice's geometry."""
     if group == 0x20:
         return dicom_numbers(0x20, 0x0032, place) + dicom_numbers(0x20, 0x0037, rows)
     return dicom_numbers(0x28, 0x0030, spacing[1::-1])
@@ -418,9 +420,11 @@ def write_dicom(
     modality="",
     inter=0,
 ):
-    """Explicit VR little endian, 16 bits. `place` is that of the first pixel, `rows` the directions
-    of rows and columns; `inter` is added to the values. `frames` holds the places of the slices of `image`, of three axes then: a
-    file of several frames that keeps its geometry in sequences."""
+    """Writes a DICOM file in explicit VR little endian with 16 bits per pixel.
+
+    `place` is the position of the first pixel. `rows` holds the directions of rows and columns.
+    `inter` is added to the values. With `frames`, `image` has three axes, `frames` holds the
+    positions of its slices, and the file keeps its geometry in sequences."""
     e, columns = dicom_element, image.shape[-1]
     us = lambda value: struct.pack("<H", value)
     place = (0, 0, z * spacing[2]) if place is None else place
@@ -466,7 +470,8 @@ def write_dicom(
 
 
 def ball(shape, spacing=(1, 1, 1), dtype="u1", radius=0.8):
-    """A soft ball about the middle, its radius a share of half the shortest world side."""
+    """Returns a soft ball at the centre. `radius` is a fraction of half the shortest side in world
+    space."""
     half = [(n - 1) / 2 * s for n, s in zip(shape[::-1], spacing)]
     z, y, x = numpy.meshgrid(
         *((numpy.arange(n) - (n - 1) / 2) * s for n, s in zip(shape, spacing[::-1])), indexing="ij"
@@ -478,7 +483,7 @@ def ball(shape, spacing=(1, 1, 1), dtype="u1", radius=0.8):
 
 
 def noise(shape, dtype="u1", seed=1):
-    """Smooth enough to look like something, with no symmetry at all."""
+    """Returns smooth noise without any symmetry."""
     random = numpy.random.default_rng(seed)
     coarse = random.random([n // 4 + 2 for n in shape])
     for axis, n in enumerate(shape):

@@ -582,7 +582,7 @@ class Cache(program.ProgramTest):
         self.brick("v.nrrd", "v.trip")
         for option in ("--allow-gaps",), ("--grid", "a"), ("--level-set", "band"), ("--spacing", "1,1,1"), ("--axes", "PIR"):
             self.fails(2, "render", "v.trip", "-o", "x.png", *option, says="is a data set")
-        self.fails(2, "render", "v.nrrd", "-o", "x.png", "--grid", "a", says="for OpenVDB")
+        self.fails(2, "render", "v.nrrd", "-o", "x.png", "--grid", "a", says="--level-set requires OpenVDB, --grid OpenVDB or netCDF")
 
 
 if __name__ == "__main__":

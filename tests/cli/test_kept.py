@@ -1,5 +1,5 @@
-"""The voxels that brick keeps are those that NumPy counts, for every included data set and several
-envelopes, read from the files by code that is not the program's."""
+"""Tests that `brick` keeps the voxels that NumPy counts, for every included data set and several
+envelopes. The tests read the files with code of their own."""
 import gzip
 import os
 import unittest
@@ -36,7 +36,7 @@ def read_stent():
 
 
 def read_grid(path, name):
-    """The values of the active voxels, those of active tiles among them."""
+    """Returns the values of the active voxels, including those of active tiles."""
     grid = pyopenvdb.read(path, name)
     low, high = grid.evalActiveVoxelBoundingBox()
     values, active = numpy.zeros((2, *(h - l + 1 for l, h in zip(low, high))), numpy.float32)
@@ -49,8 +49,8 @@ def read_grid(path, name):
 
 
 def opacity_positive(points, values):
-    """Where the piecewise linear function through (value, opacity) is above zero. Values before the
-    first point and after the last have theirs; at a step the later point holds."""
+    """Returns where the piecewise linear function through (value, opacity) is above zero. Values
+    beyond the first or last point have its opacity. At a step the later point holds."""
     at = numpy.array([p[0] for p in points], float)
     opacity = numpy.array([p[1] for p in points], float)
     values = values.astype(float)
@@ -108,24 +108,24 @@ class Counts(program.ProgramTest):
         self.assertEqual(info["kept"], opacity_positive(points, finite).sum())
         self.assertGreater(info["kept"], 0)
 
-    def test_tooth_counts(self):
+    def test_voxels_of_the_tooth_are_counted(self):
         self.check(os.path.join(program.DATASETS, "tooth.nhdr"), read_tooth())
 
-    def test_stent_counts(self):
+    def test_voxels_of_the_stent_are_counted(self):
         self.check(os.path.join(program.DATASETS, "stent.nrrd"), read_stent())
 
     @unittest.skipUnless(pyopenvdb, "python3-openvdb is not installed")
-    def test_cloud_with_active_tiles_counts(self):
+    def test_voxels_of_active_tiles_are_counted(self):
         path = os.path.join(program.DATASETS, "wdas_cloud_sixteenth.vdb")
         self.check(path, read_grid(path, "density"))
 
     @unittest.skipUnless(pyopenvdb, "python3-openvdb is not installed")
-    def test_each_of_two_grids_counts(self):
+    def test_each_of_two_grids_is_counted(self):
         path = os.path.join(program.DATASETS, "densityAndHeat.vdb")
         self.check(path, read_grid(path, "density"), "--grid", "density")
         self.check(path, read_grid(path, "heat"), "--grid", "heat")
 
-    def test_values_that_are_not_finite_do_not_count(self):
+    def test_values_that_are_not_finite_are_not_kept(self):
         values = program.noise((20, 30, 40), "f4")
         values[3:5], values[7, 8], values[9, 10, 11] = numpy.nan, numpy.inf, -numpy.inf
         program.write_nrrd("holes.nrrd", values)
@@ -134,7 +134,7 @@ class Counts(program.ProgramTest):
         self.assertIn(f"{(~numpy.isfinite(values)).sum()} values that are not finite", run.stderr)
         self.assertEqual(self.info("holes.trip")["kept"], numpy.isfinite(values).sum())
 
-    def test_every_type_counts_the_same(self):
+    def test_every_type_keeps_the_same_voxels(self):
         values = program.noise((24, 20, 28), "u1").astype("f8") / 2
         for kind in "u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8":
             typed = values.astype(kind)
@@ -142,7 +142,7 @@ class Counts(program.ProgramTest):
             kept = self.brick("typed.nrrd", "a.trip", "--range=40:90")["kept"]
             self.assertEqual(kept, ((typed >= 40) & (typed <= 90)).sum(), kind)
 
-    def test_tiles_memory_threads_and_codes_do_not_change_the_count(self):
+    def test_options_of_storage_do_not_change_the_count(self):
         source = os.path.join(program.DATASETS, "tooth.nhdr")
         wanted = self.brick(source, "a.trip")["kept"]
         for options in (

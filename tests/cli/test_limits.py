@@ -1,5 +1,5 @@
-"""`brick --limits`: its figures agree with each other and with the files. How fast anything is does not
-matter here."""
+"""Tests that the figures of `brick --limits` agree with each other and with the files. They do not
+test speed."""
 import json
 import os
 
@@ -20,7 +20,7 @@ class Limits(program.ProgramTest):
         self.assertGreater(stages["plain write"]["seconds"], 0)
         return summary, stages
 
-    def test_the_ratio_is_that_of_the_times(self):
+    def test_the_ratio_equals_the_quotient_of_the_times(self):
         source = os.path.join(program.DATASETS, "stent.nrrd")
         with open("block.raw", "wb") as f:
             f.write(bytes(range(256)) * 4096)
@@ -38,14 +38,15 @@ class Limits(program.ProgramTest):
         self.assertEqual(stages["read"]["bytes_read"], 1 << 16)
         return 1 + stages["scan"]["bytes_read"] / (1 << 16)
 
-    def test_only_what_depends_on_all_values_takes_a_second_pass(self):
+    def test_a_second_pass_runs_only_if_needed(self):
         with open("ramp.raw", "wb") as f:
             f.write(b"".join(i.to_bytes(2, "little") for i in range(1 << 15)))
         for type_name in "uint8", "uint16":
             for envelope, passes in ("--range=9:90", 1), ("--keep-all", 1), ("--tf=preset:grey", 2):
                 self.assertEqual(self.passes(type_name, envelope, "--normals=none"), passes, envelope)
             self.assertEqual(self.passes(type_name), 2)
-        # What light is full at is a part of the range of the values, which 16 bits leave open.
+        # The gradient of full shading depends on the range of the values. The type gives this range
+        # for 8 bits, but not for 16 bits.
         self.assertEqual(self.passes("uint8", "--range=9:90"), 1)
         self.assertEqual(self.passes("uint16", "--range=9:90"), 2)
 
@@ -54,7 +55,7 @@ class Limits(program.ProgramTest):
         self.assertNotIn("plain read", stages)
         self.assertNotIn("ratio", summary["limits"])
 
-    def test_a_table_for_people(self):
+    def test_limits_print_a_table(self):
         run = self.works("brick", os.path.join(program.DATASETS, "stent.nrrd"), "-o", "a.trip",
                          "--force", "--limits")
         for word in b"scan", b"read", b"merge", b"finish", b"plain read", b"plain write", b"times":

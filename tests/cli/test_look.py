@@ -1,5 +1,5 @@
-"""The look without a file: presets by name, windows, the scale of opacity, what is made of a volume
-without options, and volumes in which there is nothing to see."""
+"""Tests of transfer functions without a file: presets by name, windows, opacity scales, automatic
+transfer functions, and volumes without visible voxels."""
 import json
 import os
 import re
@@ -20,7 +20,7 @@ FRONT = ["--size", "64x64", "--no-shading", "--renderer", "cpu", "--method", "ax
 
 
 def chest(shape=(24, 40, 40)):
-    """Air, a body of muscle with lungs and a bone, in Hounsfield units."""
+    """Returns a volume in Hounsfield units: air, and a body of muscle with lungs and a bone."""
     z, y, x = numpy.indices(shape)
     volume = numpy.full(shape, -1000, "i2")
     body = ((x - 20) / 17) ** 2 + ((y - 20) / 13) ** 2 < 1
@@ -46,8 +46,9 @@ class Look(program.ProgramTest):
             self.works("brick", path, "--json", "--force", "-o", "k.trip", *options).stdout
         )["function_kind"]
 
-    def test_what_is_lost_is_said(self):
-        """Fog too thin for the format of the layers, and peaks narrower than a code."""
+    def test_lost_precision_is_reported(self):
+        """Warnings name fog that is too thin for the format of the layers, and peaks narrower than
+        a code."""
         program.write("thin.tf", b"0 1 1 1 0.0001\n")
         program.write("thick.tf", b"0 1 1 1 0.1\n")
         program.write("peak.tf", b"0 1 1 1 0\n100.001 1 1 1 0\n100.0015 1 1 1 1\n100.002 1 1 1 0\n")
@@ -59,7 +60,7 @@ class Look(program.ProgramTest):
                 ("thin", ["--classify", "pre", "--opacity-scale", "1e-4"], "layers of rgba32f"),
                 ("thin", ["--target", "rgba16f", "--compositing", "sheet"], "--target rgba32f"),
                 ("thin", ["--compositing", "sheet", "--opacity-scale", "1e-4"], "reference rounds nothing"),
-                ("thin", ["--opacity-scale", "1e-4"], ""), # post
+                ("thin", ["--opacity-scale", "1e-4"], ""),  # by default `post`
                 ("thick", ["--target", "rgba16f"], ""),
                 ("peak", [], "a peak at 100.0015 that is narrower than")):
             run = self.works("render", "ball.trip", "-o", "lost.exr", "--size", "16x16", "--renderer", "cpu",
@@ -88,13 +89,13 @@ class Look(program.ProgramTest):
             for scale in (0.25, 1, 3):
                 scaled = self.picture("ball.trip", *by, "--opacity-scale", scale)[..., 3]
                 expected = 1 - (1 - once) ** scale
-                # What a saturated pixel would have come to nothing says.
+                # The expected opacity of a pixel is unknown after early termination.
                 open_still = (1 - once > saturated) & (1 - expected > saturated)
                 self.assertGreater(open_still.mean(), 0.4, (classify, scale))
                 off = abs(scaled - expected)
                 self.assertLess(off[open_still].max(), 2e-4, (classify, scale))
 
-    def test_saturation_is_set_where_there_is_some(self):
+    def test_early_termination_is_refused_if_it_does_not_apply(self):
         pre = ["--classify", "pre"]
         for options, says in (
             (["--early-termination=0.11"], "0.11 is not between 0 and 0.1"),
@@ -114,7 +115,7 @@ class Look(program.ProgramTest):
                 self.assertEqual(json.load(f)["early_termination"], saturation)
             os.unlink("a.json")
 
-    def test_a_window_is_the_function_moved(self):
+    def test_a_window_moves_the_transfer_function(self):
         shape = [(0, 0.1, 0.2, 0.9, 0), (0.5, 0.2, 0.9, 0.3, 0.1), (1, 1, 0.5, 0.1, 0.6)]
 
         def write(path, scale, offset, head=""):
@@ -132,11 +133,11 @@ class Look(program.ProgramTest):
             self.assertLess(abs(windowed - moved).max(), 1e-5)
         self.assertGreater(abs(moved - self.picture("ball.trip", *FRONT)).max(), 0.1)
 
-    def test_window_and_level_are_given_together(self):
+    def test_window_requires_level(self):
         for option in ("--window=5", "--level=5"):
             self.fails(2, "render", "ball.trip", "-o", "a.png", option, says="together")
 
-    def test_a_presets_bare_name_is_the_preset_and_a_path_is_a_file(self):
+    def test_a_bare_name_is_a_preset_and_a_path_is_a_file(self):
         program.write("bone", b"0 0 1 0 1\n")
         by_name = self.picture("ball.trip", *FRONT, "--tf", "bone")
         self.assertTrue((by_name == self.picture("ball.trip", *FRONT, "--tf", "preset:bone")).all())
@@ -146,14 +147,14 @@ class Look(program.ProgramTest):
         self.assertGreater(by_name[32, 32, 0], 0.3)
         os.unlink("bone")
 
-    def test_a_slip_is_answered_with_the_preset(self):
+    def test_a_mistyped_name_suggests_a_preset(self):
         for slip, preset in (("bnoe", "bone"), ("bone.tf", "bone"), ("ct-bones", "ct-bone")):
             self.fails(
                 1, "render", "ball.trip", "-o", "a.png", "--tf", slip, says=f"preset:{preset}?"
             )
             self.fails(1, "brick", "ball.nrrd", "-o", "b.trip", "--tf", slip, says=f"{preset}?")
 
-    def test_every_name_in_the_help_draws(self):
+    def test_every_preset_in_the_help_draws(self):
         page = self.works("render", "--help").stdout.decode()
         names = [
             *("auto", "ct", "mr", "fog", "labels", "simulation", "ct-bone", "ct-soft", "ct-lung"),
@@ -169,17 +170,17 @@ class Look(program.ProgramTest):
         run = self.works("render", "chest.trip", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
         self.assertEqual(run.stderr, "")
 
-    def test_a_volume_is_warned_of_once(self):
+    def test_a_volume_gets_each_warning_once(self):
         for _ in "bricked", "found":
             run = self.works("render", "ball.nrrd", "-o", "a.png", "--size=20x20", "--tf", "ct-bone")
             self.assertEqual(run.stderr.count("do not look like the Hounsfield units"), 1)
 
-    def test_a_function_that_shows_nothing_says_so(self):
+    def test_a_transparent_transfer_function_is_reported(self):
         program.write("nothing.tf", b"300 1 1 1 0\n400 1 1 1 1\n")
         run = self.works("render", "ball.trip", "-o", "a.png", "--size=20x20", "--tf=nothing.tf")
         self.assertIn("no value from 0 to 200 is visible", run.stderr)
 
-    def test_a_picture_of_nothing_says_so(self):
+    def test_an_empty_picture_is_reported(self):
         ground = ("--size=20x20", "--background=0.5,0.2,0.1,0.5", "-o", "a.png")
         why = "check the view, the clipping and the transfer function"
         for options in (
@@ -199,7 +200,7 @@ class Look(program.ProgramTest):
         run = self.works("render", "ball.trip", *ground, "--path=away.json")
         self.assertIn(f"warning: a.png: 1 of 2 pictures are empty: {why}", run.stderr)
 
-    def test_volumes_are_told_apart(self):
+    def test_kinds_of_volumes_are_recognised(self):
         self.assertEqual(self.kind("chest.nrrd"), "ct")
         self.assertEqual(self.kind("ball.nrrd"), "simulation")
         parts = numpy.zeros((16, 16, 16), "u2")
@@ -216,7 +217,7 @@ class Look(program.ProgramTest):
         )
         self.assertEqual(self.kind(os.path.join(program.DATASETS, "tooth.nhdr")), "simulation")
 
-    def test_auto_when_drawing_is_the_automatic_function_when_bricking(self):
+    def test_auto_is_the_same_for_drawing_and_bricking(self):
         for name in ("chest.nrrd", "ball.nrrd"):
             self.works("brick", name, "-q", "--force", "-o", "auto.trip")
             kept = self.picture("auto.trip", *FRONT)
@@ -231,7 +232,8 @@ class Look(program.ProgramTest):
             run = self.works("brick", "even.nrrd", "-q", "--force")
             self.assertIn(f"every voxel there is has the value {value}", run.stderr)
             alpha = self.picture("even.trip", *FRONT)[..., 3]
-            # Optical depth 1.2 through the cube, seen a little askew: up to sqrt(3) times as long.
+            # The optical depth through the cube is 1.2. Oblique rays are up to sqrt(3) times as
+            # long.
             self.assertGreater(alpha[32, 32], 1 - numpy.exp(-1.1))
             self.assertLess(alpha.max(), 1 - numpy.exp(-1.2 * 3**0.5))
 
@@ -245,7 +247,7 @@ class Look(program.ProgramTest):
         pyopenvdb.write("even.vdb", grids=[grid])
         self.works("brick", "even.vdb", "-q", "--force", "-o", "even_vdb.trip")
         alpha = self.picture("even_vdb.trip", *FRONT)[..., 3]
-        # The ball's diameter is 1.24 times the edge of a cube of as many voxels.
+        # The diameter of the ball is 1.24 times the edge of a cube with as many voxels.
         self.assertGreater(alpha[32, 32], 0.5)
         self.assertLess(alpha.max(), 1 - numpy.exp(-1.2 * 1.24 * 1.1))
 
@@ -256,7 +258,7 @@ class Look(program.ProgramTest):
         self.works("brick", "solid.nrrd", "-q", "--force")
         self.assertGreater(self.picture("solid.trip", *FRONT)[32, 32, 3], 0.99)
 
-    def test_the_command_to_brick_again_works_as_it_stands(self):
+    def test_the_printed_brick_command_works(self):
         name = "it's a ball; $x.raw"
         program.write_raw(name, program.ball((20, 20, 20)))
         brick = ["--size=20,20,20", "--spacing=1,1,2", "-q", "-o", "again.trip", "--force"]
@@ -275,7 +277,8 @@ class Look(program.ProgramTest):
             self.assertEqual(self.info("again.trip")["spacing"], [1, 1, 2])
 
     def again(self, source, *options):
-        """What `info` says of a data set, and of the one by the command that is printed."""
+        """Runs the printed command. Returns the output of `info` for the data set before and
+        after."""
         before = self.brick(source, "again.trip", "--range=150:255", *options)
         run = self.works("render", "again.trip", "-o", "a.png", "--size=20x20", "--tf", "low.tf")
         command = re.search(r"to keep them: triptych (brick .*)\n", run.stderr)
@@ -286,7 +289,7 @@ class Look(program.ProgramTest):
         )
         return before, self.info("again.trip")
 
-    def test_the_command_to_brick_again_has_all_that_the_data_set_depends_on(self):
+    def test_the_printed_brick_command_has_all_options(self):
         program.write("low.tf", b"10 1 1 1 0\n20 1 1 1 0.5\n200 1 1 1 0.5\n")
         program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
         options = "--normals=none", "--tile=16", "--slab-sheets=3"

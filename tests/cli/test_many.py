@@ -1,6 +1,7 @@
-"""More than 2^32 splats in each list, and more than 2^32 bytes before those that are drawn: a solid
-grid in sparse files, written after stream/FORMAT.md. It is nothing but a cube of 64 voxels a side,
-far out, in voxels of value 0. What is never read are holes."""
+"""Tests a data set with more than 2^32 splats in each list, and more than 2^32 bytes before the
+visible ones. The test writes sparse files by stream/FORMAT.md. All voxels of the solid grid have
+value 0, except a cube of 64 voxels a side near the far corner. Pages that no test reads stay
+holes."""
 import os
 import struct
 
@@ -9,12 +10,12 @@ import xxhash
 import program
 
 DIMS = (2048, 2048, 1152)
-EDGE = 64  # of tiles, slabs and the cube
+EDGE = 64  # edge of tiles, slabs and the cube
 CUBE = (1920, 1920, 1024)
 VALUE = 128
 OPACITY = 0.01
 PAGE = 1 << 16
-# A block in which every voxel is there: squares, masks, a code each.
+# Size of a block with all voxels: presence, masks, one byte for each code.
 BLOCK_BYTES = 8 + 64 * 8 + EDGE * EDGE
 VOXELS = DIMS[0] * DIMS[1] * DIMS[2]
 
@@ -32,8 +33,8 @@ def morton(u, v):
 
 
 class Axis:
-    """The list along one axis: its tables, and its file, of which what lies in the cube and in the
-    bricks around it is there."""
+    """The list along one axis, with its tables and its file. The file holds only the blocks of the
+    cube and of the bricks around it."""
 
     def __init__(self, folder, axis):
         self.axis, self.u, self.v = axis, (axis + 1) % 3, (axis + 2) % 3
@@ -46,7 +47,7 @@ class Axis:
         self.write_blocks()
 
     def away(self, slab, tile):
-        """By how many bricks one lies from the cube, along the axis where that is most."""
+        """Returns the distance of a brick from the cube in bricks, as the maximum over the axes."""
         at = {self.axis: slab, self.u: tile[0], self.v: tile[1]}
         return max(abs(at[a] - CUBE[a] // EDGE) for a in range(3))
 
@@ -69,7 +70,7 @@ class Axis:
                 self.checksums[page] = xxh64(f.read(PAGE))
 
     def tables(self):
-        """Slabs, bricks, runs, checksums of pages."""
+        """Returns the tables of slabs, bricks, runs and page checksums."""
         each, slabs, bricks = len(self.tiles), [], []
         for slab in range(self.slab_count):
             first = slab * each
@@ -124,7 +125,7 @@ class Many(program.ProgramTest):
         write_data_set("many.trip")
         program.write("many.tf", f"0 1 .5 .25 0\n{VALUE} 1 .5 .25 {OPACITY}\n".encode())
 
-    def test_they_are_counted(self):
+    def test_more_than_2_to_the_32_splats_are_counted(self):
         self.assertGreater(VOXELS, 2**32)
         info = self.info("many.trip")
         self.assertEqual([info["kept"]] + [l["records"] for l in info["lists"]], 4 * [VOXELS])
@@ -133,8 +134,9 @@ class Many(program.ProgramTest):
             self.assertGreater(size.st_size, 2**32)
             self.assertLess(512 * size.st_blocks, 2**28)
 
-    def test_those_far_out_are_drawn_along_each_axis(self):
-        """Along an axis through 64 voxels; post has half of one more at both ends of 63 cells."""
+    def test_splats_beyond_2_to_the_32_are_drawn_along_each_axis(self):
+        """Each ray passes 64 voxels along an axis. With `post` it passes 63 cells, and half a voxel
+        more at each end."""
         alpha = 1 - (1 - OPACITY) ** EDGE
         middle = [c + (EDGE - 1) / 2 for c in CUBE]
         for axis in range(3):

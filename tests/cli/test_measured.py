@@ -1,6 +1,6 @@
-"""Measuring a frame does not change it: what `render` says of a frame is of the one that is drawn
-without being measured, and exact counts come from a frame of their own. Distances that come with a
-picture are those of the geometry, and leave the picture as it is."""
+"""Tests that measuring a frame does not change it. `render` reports on the frame that it draws, and
+a frame of its own gives exact counts. Distances match the geometry and leave the picture
+unchanged."""
 import json
 import os
 import re
@@ -9,7 +9,7 @@ import numpy
 
 import program
 
-# One thread, so that what lies behind what is opaque is found in the same order in every run.
+# With one thread, occluded bricks are found in the same order in every run.
 VIEW = ["--tf", "solid.tf", "--renderer", "cpu", "--threads", "1", "--size", "256x256", "--fov",
         "60", "--look", "64,64,64", "--eye", "64,-43,64", "--classify", "pre"]
 COUNTS = ("splats_projected", "splats_drawn")
@@ -42,7 +42,7 @@ class Costs(program.ProgramTest):
                                  if one["splats_read"]})
         return stats, costs
 
-    def test_what_is_read_of_lists_is_what_they_hold(self):
+    def test_reported_reads_equal_the_records_of_the_lists(self):
         program.write_nrrd("ball.nrrd", program.ball((24, 28, 32)))
         info = self.brick("ball.nrrd", "ball.trip", "--range", "100:")
         self.assertGreater(info["halo"], 0)
@@ -58,7 +58,7 @@ class Costs(program.ProgramTest):
         self.assertFalse({"classify", "kernel", "method", "compositing"} & set(stats))
         self.assertEqual(costs, {"z": info["kept"], "z halo": info["halo"]})
 
-    def test_of_regions_each_has_its_own(self):
+    def test_each_region_reports_its_own_reads(self):
         program.write_nrrd("whole.nrrd", program.ball((24, 28, 32)))
         kept = []
         for name, first, last in ("a", 0, 10), ("b", 10, 24):
@@ -73,7 +73,7 @@ class Costs(program.ProgramTest):
 
 
 class Levels(program.ProgramTest):
-    def test_lists_of_coarse_levels_count_where_they_are_drawn_from(self):
+    def test_reads_of_coarse_lists_are_counted(self):
         ramp = numpy.add.outer(numpy.add.outer(numpy.arange(64), numpy.arange(64)),
                                numpy.arange(64)).astype("u1")
         program.write_nrrd("ramp.nrrd", ramp)
@@ -87,7 +87,7 @@ class Levels(program.ProgramTest):
             self.assertGreater(splats_read(coarse), 0, classify)
             self.assertGreater(bytes_read({"lists": coarse}), 0, classify)
 
-    def test_the_finest_is_drawn_with_a_warning_where_there_are_none_for_the_classification(self):
+    def test_without_coarse_levels_the_finest_is_drawn_with_a_warning(self):
         values = numpy.arange(96 * 64 * 64, dtype="u4").reshape(64, 64, 96).astype("u1")
         program.write_nrrd("v.nrrd", values)
         drawn = ["--size=32x32", "--renderer=cpu", "--tf=grey"]
@@ -102,7 +102,7 @@ class Levels(program.ProgramTest):
                 self.assertEqual(same, classify == other)
                 warned = f"v.trip: has no coarse levels for {classify}, " in r.stderr
                 self.assertEqual(warned, classify == other)
-        # Of a volume those are made that are called for.
+        # Drawing a volume makes the coarse levels for the requested classification.
         for classify in "pre", "post":
             options = ["v.nrrd", "--size=32x32", "--renderer=cpu", f"--classify={classify}"]
             self.works("render", *options, "-o", "finest.exr")
@@ -112,7 +112,7 @@ class Levels(program.ProgramTest):
 
 
 class Depth(program.ProgramTest):
-    """An opaque plate, one voxel thick, seen from straight ahead and from the side."""
+    """Draws an opaque plate, one voxel thick, from straight ahead and from the side."""
 
     @classmethod
     def setUpClass(cls):
@@ -150,9 +150,9 @@ class Depth(program.ProgramTest):
             z = self.distances(renderer, "--eye=7.5,7.5,46", *straight, "--ortho=64")
             self.assertTrue(numpy.isinf(z[0]).all() and numpy.isfinite(z[16, 16]))
 
-    def test_distances_to_where_interpolated_values_show(self):
-        """Between 0 and 200 values show from 100 on, half a voxel before the plate, and are opaque
-        from 150 on. What is seen of a slice is taken to be in its middle."""
+    def test_distances_to_interpolated_values(self):
+        """Interpolated values between 0 and 200 become visible at 100, half a voxel before the
+        plate, and opaque at 150. A renderer assigns the middle of a segment as the distance."""
         for renderer in self.renderers():
             for slices in 1, 4:
                 z = self.distances(
@@ -162,13 +162,13 @@ class Depth(program.ProgramTest):
                 self.assertGreater(z.min(), 39.5 - 0.5 / slices, (renderer, slices))
                 self.assertLess(z.max(), 39.75 + 0.5 / slices, (renderer, slices))
 
-    def test_an_orbit_s_distances_are_numbered_as_its_pictures(self):
+    def test_distances_of_an_orbit_have_the_numbers_of_its_pictures(self):
         self.works("render", "plate.trip", "-o", "o.png", "--depth=oz.tif", "--orbit=2",
                    "--size=16x16", "--tf", "plate.tf")
         for name in "o-000.png", "o-001.png", "oz-000.tif", "oz-001.tif":
             self.assertTrue(os.path.getsize(name) > 0, name)
 
-    def test_what_has_no_distances_says_so(self):
+    def test_distances_are_refused_where_there_are_none(self):
         for options in (["--renderer=integral"], ["--target=rgba8"]):
             self.fails(2, "render", "plate.trip", "-o", "a.png", "--depth=z.exr", *options,
                        says="--depth")
@@ -176,7 +176,8 @@ class Depth(program.ProgramTest):
 
 
 class Measured(program.ProgramTest):
-    """A nearly opaque cube of 128 voxels a side, from close by: much of it is occluded."""
+    """Draws a nearly opaque cube of 128 voxels a side from close by, so that much of it is
+    occluded."""
 
     @classmethod
     def setUpClass(cls):
@@ -187,7 +188,8 @@ class Measured(program.ProgramTest):
         cls.brick(cls(), "cube.nii", "cube.trip", "--keep-all", "--tf", "solid.tf")
 
     def render(self, *arguments):
-        """What it says of the frame, without the time, and the picture."""
+        """Returns the output, the counts of the summary line without the time, and the bytes of the
+        picture."""
         said = self.works("render", "cube.trip", "-o", "a.exr", *VIEW, *arguments).stdout.decode()
         summary = re.search(r"^a\.exr: .*, (.*) million splats, (.*) read, [\d.]+ s$", said, re.M)
         with open("a.exr", "rb") as f:
@@ -198,7 +200,7 @@ class Measured(program.ProgramTest):
         with open("s.json") as f:
             return json.load(f)["frames"][0]
 
-    def test_a_measured_frame_reads_and_draws_what_one_that_is_not_does(self):
+    def test_measuring_changes_neither_reads_nor_the_picture(self):
         _, plain, picture = self.render()
         for measured in (["--stats", "s.json"], ["--explain"], ["--stats", "s.json", "--count"],
                          ["--explain", "--count"]):
@@ -207,13 +209,13 @@ class Measured(program.ProgramTest):
             self.assertTrue(same == picture, measured)
         self.assertNotEqual(self.render("--occluded", "draw")[1], plain)
 
-    def test_occluded_bricks_are_left_out_of_what_is_measured(self):
+    def test_occluded_bricks_are_not_measured(self):
         frame = self.frame()
         self.assertGreater(frame["bytes_skipped"], 0)
         self.assertEqual(bytes_read(frame), bytes_read(self.frame("--occluded", "skip")))
         self.assertLess(bytes_read(frame), bytes_read(self.frame("--occluded", "draw")))
 
-    def test_what_was_not_counted_is_not_there(self):
+    def test_figures_that_were_not_counted_are_absent(self):
         frame = self.frame()
         self.assertNotIn("counted", frame)
         for axis in frame["lists"].values():
@@ -223,7 +225,7 @@ class Measured(program.ProgramTest):
         self.assertIn("cost y ", said)
         self.assertNotRegex(said, "projected|[0-9] drawn|count ")
 
-    def test_counts_are_of_everything_and_beside_the_frame_that_is_timed(self):
+    def test_counts_include_occluded_bricks_and_leave_the_frame_alone(self):
         plain, counted, whole = self.frame(), self.frame("--count"), self.frame("--occluded", "draw")
         for axis in counted["lists"].values():  # the timed frame did not count
             for key in COUNTS:
@@ -239,8 +241,9 @@ class Measured(program.ProgramTest):
         found = re.findall(r"^count \w +(\d+) splats, \d+ projected, \d+ drawn$", said, re.M)
         self.assertEqual(sum(map(int, found)), splats_read(counted["counted"]))
 
-    def test_counting_an_orbit_leaves_the_timed_frames_as_they_are(self):
-        """The reader keeps bricks for the frames to come; the counting pass fills no such cache."""
+    def test_counting_does_not_change_timed_frames(self):
+        """The reader caches bricks for the following frames. The counting pass does not fill this
+        cache."""
         def frames(*more):
             stats = self.stats("cube.trip", *VIEW[:8], "--classify", "pre", "--orbit", "3",
                                "--occluded", "draw", *more)
@@ -255,14 +258,14 @@ class Measured(program.ProgramTest):
         self.fails(2, "render", "cube.trip", "-o", "b.png", "--count", "--explain",
                    "--classify", "post", says="requires --classify pre")
 
-    def test_count_alone_draws_splats_and_says_so(self):
+    def test_count_alone_selects_pre(self):
         stats = self.stats("cube.trip", *VIEW[:-2], "--count")
         self.assertEqual(stats["classify"], "pre")
         said = self.works("render", "cube.trip", "-o", "a.exr", *VIEW[:-2], "--explain", "--count")
         self.assertIn("classify    pre", said.stdout.decode())
         self.assertEqual(self.stats("cube.trip", *VIEW[:-2])["classify"], "post")
 
-    def test_what_is_of_values_is_called_voxels(self):
+    def test_splats_and_voxels_have_their_names(self):
         integral = "--renderer=integral"
         for *how, what in (["--classify=pre", "splats"], ["--classify=post", "voxels"],
                            [integral, "voxels"], [integral, "--field=splats", "splats"]):

@@ -1,5 +1,5 @@
-"""--memory is a promise: bricking a raw volume larger than it, and drawing the data set, stay within
-it and the program's own size."""
+"""Tests that --memory is a limit. Bricking a larger raw volume, and drawing the data set, stay
+within this limit plus the program's own size."""
 import glob
 import os
 import unittest
@@ -9,11 +9,11 @@ import numpy
 import program
 
 MIB = 1 << 20
-PROGRAM_BYTES = 56 * MIB  # the program, its libraries, its threads' stacks
+PROGRAM_BYTES = 56 * MIB  # the program, its libraries, and the stacks of its threads
 
 
 def peak_rss(*arguments):
-    """Of a run that works, in bytes."""
+    """Runs the program, which must succeed. Returns its maximum resident size in bytes."""
     process = program.start(*arguments)
     err = process.stderr.read().decode()
     process.stdout.read()
@@ -37,7 +37,7 @@ class Memory(program.ProgramTest):
                 f.write(numpy.roll(slice_, (z, 7 * z), (0, 1)).tobytes())
         cls.raw = ("brick", "large.raw", "--size", "512,512,512", "-q", "--force")
 
-    def test_bricking_and_drawing_a_volume_of_128_mib_with_64(self):
+    def test_a_volume_of_128_mib_is_bricked_and_drawn_in_64_mib(self):
         self.assertEqual(os.path.getsize("large.raw"), 128 * MIB)
         for envelope in [], ["--range=250:255", "--normals=none"]:
             rss = peak_rss(*self.raw, "-o", "a.trip", "--memory", "64M", *envelope)
@@ -47,13 +47,13 @@ class Memory(program.ProgramTest):
             self.assertLess(rss, 64 * MIB + PROGRAM_BYTES)
 
     @unittest.skipIf(glob.glob("/dev/dri/*") or os.path.exists("/dev/nvidiactl"), "draws by OpenGL")
-    def test_the_choice_of_a_renderer_takes_no_memory_where_there_is_no_graphics_device(self):
+    def test_choosing_a_renderer_without_a_gpu_takes_no_memory(self):
         program.write_nrrd("small.nrrd", program.noise((30, 40, 50)))
         self.works("brick", "small.nrrd", "-o", "drawn.trip", "-q")
         draw = ["render", "drawn.trip", "-o", "a.png", "--memory=32M", "--size=300x300"]
         self.assertLess(peak_rss(*draw), 32 * MIB + PROGRAM_BYTES)
 
-    def test_a_small_volume_takes_little_however_much_it_may(self):
+    def test_a_small_volume_takes_little_memory(self):
         program.write_nrrd("small.nrrd", program.noise((30, 40, 50)))
         self.assertLess(peak_rss("brick", "small.nrrd", "-o", "small.trip", "-q"), 120 * MIB)
 

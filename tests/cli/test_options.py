@@ -1,5 +1,5 @@
-"""Every option of every command: with nonsense one line and exit status 2, with each of its values
-it works."""
+"""Tests every option of every command. A wrong value gives one line and exit status 2, and each
+valid value works."""
 import concurrent.futures
 import os
 import re
@@ -12,7 +12,7 @@ COUNTS = ["", "0", "-1", "1.5", "x", "99999999999999999999", "1e3x"]
 NAMES = ["", "nonsense", "MERGE", "merge,clip"]
 SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"]
 
-# Option: wrong values; None where it takes none.
+# Wrong values of each option. None marks an option without a value.
 BRICK = {
     "--allow-gaps": None,
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
@@ -147,7 +147,7 @@ class Options(program.ProgramTest):
         assert program.call("brick", cls.source, "-o", "a.trip", "-q").returncode == 0
 
     def all_fail(self, arguments):
-        """Each of these, with exit status 2 and nothing left."""
+        """Checks that each command fails with exit status 2 and leaves no file."""
         before = set(os.listdir("."))
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
             runs = list(pool.map(lambda a: program.call(*a), arguments))
@@ -159,11 +159,11 @@ class Options(program.ProgramTest):
         self.assertEqual(faults, [], "\n".join(faults))
         self.assertEqual(set(os.listdir(".")), before)
 
-    def test_the_tables_here_name_every_option(self):
+    def test_the_tables_name_every_option(self):
         for command, table in ("brick", BRICK), ("render", RENDER), ("info", INFO):
             self.assertEqual(options_of(command) - set(table), set())
 
-    def test_wrong_values(self):
+    def test_wrong_values_are_refused(self):
         wrong = []
         for command, table in ("brick", BRICK), ("render", RENDER), ("info", INFO):
             start = {
@@ -184,21 +184,21 @@ class Options(program.ProgramTest):
                 start + ["second", "third"],
                 [command],
             ]
-        self.all_fail(wrong[::3] if program.SANITIZED else wrong)  # the parsers are the same few
+        self.all_fail(wrong[::3] if program.SANITIZED else wrong)  # few parsers serve all options
 
-    def test_commands(self):
+    def test_wrong_commands_are_refused(self):
         self.all_fail([[], ["nonsense"], ["--nonsense"], ["-x"], ["Brick"]])
         for command in [""], ["brick", ""], ["render", "", "-o", "a.png"], ["info", ""]:
             run = program.call(*command)
             self.assertIn(run.returncode, (1, 2))
             self.assertEqual(run.stderr.count("\n"), 1)
 
-    def test_names_that_a_terminal_would_obey(self):
+    def test_control_characters_in_names_are_not_printed(self):
         for name in ("--fr\x1b[31mob", "--size\x7f=3x3", "-\x1b", "--fr\udcffob"):
             run = self.fails(2, "render", name, says="unknown option")
             self.assertTrue(run.stderr.rstrip("\n").isprintable(), run.stderr)
 
-    def test_wrong_combinations(self):
+    def test_wrong_combinations_are_refused(self):
         brick, render = ["brick", self.source, "-o", "b.trip"], ["render", "a.trip", "-o", "a.png"]
         self.all_fail(
             [
@@ -288,7 +288,7 @@ class Options(program.ProgramTest):
             ]
         )
 
-    def test_what_is_refused_is_named(self):
+    def test_errors_name_the_option(self):
         render = ["render", "a.trip", "-o", "a.png"]
         self.fails(2, *render, "--samples-per-sheet=4", "--renderer=integral", says="--samples-per-sheet: ")
         self.fails(2, *render, "--error=1", "--samples-per-sheet=4", says="excludes --samples-per-sheet")
@@ -380,23 +380,23 @@ class Options(program.ProgramTest):
             self.works("render", "a.trip", "-o", f"e.{extension}", *render)
             self.assertGreater(os.path.getsize(f"e.{extension}"), 100)
 
-    def test_io_uring_reads_where_the_system_allows_it(self):
+    def test_io_uring_reads_if_the_system_allows_it(self):
         run = program.call("render", "a.trip", "-o", "u.png", "--size=24x20", "--engine=io_uring")
         if "the system refuses io_uring" in run.stderr:
             self.skipTest("the system refuses io_uring")
         self.assertEqual((run.returncode, run.stderr), (0, ""))
 
-    def test_help_and_version(self):
+    def test_help_and_version_print(self):
         for command in (), ("brick",), ("info",), ("render",):
             text = self.works(*command, "--help").stdout
             self.assertIn(b"Usage: triptych", text)
         self.assertRegex(self.works("--version").stdout, rb"^triptych \d+\.\d+\.\d+\n$")
 
-    def test_output_is_the_input_name_unless_given(self):
+    def test_the_default_output_has_the_name_of_the_input(self):
         self.works("brick", self.source, "-q")
         self.assertEqual(self.info("densityAndHeat.trip")["voxels"], 6124)
 
-    def test_an_existing_data_set_stays_unless_forced(self):
+    def test_only_force_replaces_a_data_set(self):
         before = os.stat("a.trip/index.trip").st_mtime_ns
         self.fails(1, "brick", self.source, "-o", "a.trip", "-q")
         self.assertEqual(os.stat("a.trip/index.trip").st_mtime_ns, before)
@@ -404,7 +404,7 @@ class Options(program.ProgramTest):
         self.assertNotEqual(os.stat("a.trip/index.trip").st_mtime_ns, before)
         self.works("info", "--verify", "a.trip")
 
-    def test_a_file_or_a_folder_of_others_is_never_replaced(self):
+    def test_a_foreign_file_or_folder_is_never_replaced(self):
         program.write("file.trip", b"precious")
         os.mkdir("folder.trip")
         program.write("folder.trip/diary", b"precious")

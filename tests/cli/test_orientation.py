@@ -1,9 +1,9 @@
-"""One phantom, acquired in several ways and stored in several formats, gives the same picture, and
-left, right, front and head are where a reader of pictures of patients expects them.
+"""Tests that one phantom, acquired in several ways and stored in several formats, gives the same
+picture, and that left, right, front and head are where radiologists expect them.
 
-The phantom is a function of the place in the patient, in millimetres to the left, the back and the
-head: a body, a nose in front, and markers at its left and at its head. It has no symmetry.
-"""
+The phantom is a function of the position in the patient, in millimetres to the left, the back and
+the head. It has a body, a nose in front, a marker at the left and a marker at the head. It has no
+symmetry."""
 import os
 import shutil
 
@@ -19,7 +19,7 @@ SHOWS_ALL = b"values data\n20 0.9 0.6 0.4 0\n60 0.9 0.6 0.4 0.3\n100 0.9 0.6 0.4
 
 
 def phantom(p):
-    """80 in the body, 200 in the markers, with soft edges."""
+    """Returns the values: 80 in the body, 200 in the markers, with soft edges."""
 
     def inside(distance, value):
         return value * numpy.clip(0.5 - distance / 4, 0, 1)
@@ -33,15 +33,16 @@ def phantom(p):
 
 
 def turned(degrees, axis):
-    """The turn about an axis, by Rodrigues' formula."""
+    """Returns the rotation about an axis, by Rodrigues' formula."""
     a, (x, y, z) = numpy.radians(degrees), axis / numpy.linalg.norm(axis)
     k = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return numpy.eye(3) + numpy.sin(a) * k + (1 - numpy.cos(a)) * k @ k
 
 
 def acquisition(i, j, k, half=44, middle=(3, -5, 7), place=(0, 0, 0)):
-    """The affine from (i, j, k) to the patient, by steps from voxel to voxel, and the values: a box
-    of 2 * half across about `middle` of the phantom, which is moved to `place`."""
+    """Returns the affine from (i, j, k) to the patient, and the values. `i`, `j` and `k` are the
+    steps from voxel to voxel. The values fill a box of 2 * half across, centred at `middle` of the
+    phantom. The phantom is moved to `place`."""
     steps = numpy.array([i, j, k], float).T
     sizes = [2 * int(half / n) + 1 for n in numpy.linalg.norm(steps, axis=0)]
     affine = numpy.eye(4)
@@ -55,7 +56,7 @@ def acquisition(i, j, k, half=44, middle=(3, -5, 7), place=(0, 0, 0)):
 
 OBLIQUE = 2 * turned(25, (1, 0.3, 0)) @ turned(15, (0, 0, 1))
 TILT = numpy.radians(20)
-# Steps along i, j and k, and the ends of the body that these point to, by hand.
+# Steps along i, j and k, and the ends of the body that they point to, written by hand.
 ACQUISITIONS = {
     "axial": ((2, 0, 0), (0, 2, 0), (0, 0, 2), ["L", "P", "S"]),
     "coronal": ((2, 0, 0), (0, 0, -2), (0, 2, 0), ["L", "I", "P"]),
@@ -67,7 +68,7 @@ ACQUISITIONS = {
         (0, 0, 2),
         ["L", "PS", "S"],
     ),
-    "mirrored": ((-2, 0, 0), (0, 2, 0), (0, 0, 2), ["R", "P", "S"]),  # no scanner makes these
+    "mirrored": ((-2, 0, 0), (0, 2, 0), (0, 0, 2), ["R", "P", "S"]),  # no scanner makes such files
 }
 
 
@@ -78,7 +79,7 @@ def nrrd_geometry(space, affine):
 
 
 def write_series(folder, affine, values):
-    """A file a slice, whose names say nothing about their order."""
+    """Writes one file for each slice. The order of the names is not the order of the slices."""
     os.makedirs(folder, exist_ok=True)
     spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
     rows = (affine[:3, :2] / spacing[:2]).T.ravel()
@@ -89,7 +90,7 @@ def write_series(folder, affine, values):
 
 
 def write_frames(path, affine, values):
-    """All slices in one file, in a wild order."""
+    """Writes all slices into one file, in mixed order."""
     spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
     rows = (affine[:3, :2] / spacing[:2]).T.ravel()
     order = [k * 7 % len(values) for k in range(len(values))]
@@ -98,8 +99,8 @@ def write_frames(path, affine, values):
 
 
 class Camera:
-    """A view of the patient from the front, from the left and from above, computed here; the
-    options for it in a world whose axes in the patient are the rows of `to_patient`."""
+    """A view of the patient from the front, the left and above, computed in the test. options()
+    gives its options in a world with axes that are the rows of `to_patient` in the patient."""
 
     SIZE, FOV = 128, 30
     EYE, LOOK, UP = (75, -180, 70), (0, 0, 4), (0, 0, 1)
@@ -113,7 +114,7 @@ class Camera:
         self.up = numpy.cross(self.right, self.forward)
 
     def project(self, p):
-        """Pixel position, x to the right and y down."""
+        """Returns a pixel position, with x to the right and y down."""
         way = numpy.subtract(p, self.EYE)
         depth = way @ self.forward
         x, y = way @ self.right / depth, way @ self.up / depth
@@ -128,7 +129,7 @@ class Camera:
 
 
 def blobs(alpha):
-    """Middles (x, y) of what is seen in one piece, from left to right."""
+    """Returns the centres (x, y) of connected visible regions, from left to right."""
     left = {(int(y), int(x)) for y, x in zip(*numpy.nonzero(alpha > 0.3))}
     middles = []
     while left:
@@ -153,7 +154,7 @@ class Orientation(program.ProgramTest):
         program.write("markers.tf", SHOWS_MARKERS)
 
     def brick(self, source, *options):
-        """What info says of it."""
+        """Returns the output of `info --json`."""
         self.works("brick", source, "-o", "a.trip", "-q", "--force", "--tf", "all.tf", *options)
         return self.info("a.trip")
 
@@ -163,8 +164,9 @@ class Orientation(program.ProgramTest):
         self.assertLess(difference.mean(), mean, about)
 
     def check_default_view(self, about):
-        """As a reader of such pictures expects: the patient's left on the right and lowest, the
-        head at the top, the nose on the left, since the view is a little from the patient's left."""
+        """Checks the default view, which is a little from the patient's left. Radiologists expect
+        the patient's left on the right and lowest, the head at the top, and the nose on the
+        left."""
         picture = self.picture("a.trip", "--size=96x96", "--tf=markers.tf", "--no-shading")
         seen = blobs(picture[..., 3])
         self.assertEqual(len(seen), 3, about)
@@ -175,15 +177,17 @@ class Orientation(program.ProgramTest):
         self.assertLess(nose[1] + 4, left[1], about)
 
     def check_same_default(self, about):
-        """As of the first acquisition; what is fitted into the picture are other voxels each time."""
+        """Compares the default view with the one of the first acquisition. The bound is loose,
+        because each acquisition frames other voxels."""
         picture = self.picture("a.trip", "--size=96x96")
         if self.default is None:
             type(self).default = picture
-            self.assertGreater(abs(picture - picture[:, ::-1]).mean(), 0.05)  # has no symmetry
+            self.assertGreater(abs(picture - picture[:, ::-1]).mean(), 0.05)  # the picture has no symmetry
         self.alike(picture, self.default, about, most=0.6, mean=0.02)
 
     def check_markers(self, camera, to_patient, about):
-        """Each is where it is projected, and nothing shows elsewhere."""
+        """Checks that each marker is at its projected position, and that nothing else is
+        visible."""
         options = "a.trip", "--tf", "markers.tf", "--no-shading", *camera.options(to_patient)
         alpha = self.picture(*options)[..., 3].astype(float)
         rows, columns = numpy.indices(alpha.shape)
@@ -198,7 +202,7 @@ class Orientation(program.ProgramTest):
         self.assertLess(alpha.max(), 0.02, about)
 
     def sources(self, affine, values, scanner):
-        """What the world is called, its axes in the patient, and the file."""
+        """Yields the name of the world space, its axes in the patient, and the file."""
         lps, ras = numpy.eye(3), TO_RAS[:3, :3]
         for space, change in (
             ("left-posterior-superior", numpy.eye(4)),
@@ -219,7 +223,8 @@ class Orientation(program.ProgramTest):
             yield "LPS", lps, "frames.dcm"
 
     def check_acquisition(self, name, scanner, first):
-        """Every format of it, and against the picture `first` of another; returns its own."""
+        """Checks every format of an acquisition, also against the picture `first` of another
+        acquisition. Returns a picture of this acquisition."""
         affine, values = acquisition(*ACQUISITIONS[name][:3])
         camera, own = Camera(), None
         for space, to_patient, source in self.sources(affine, values, scanner):
@@ -232,9 +237,10 @@ class Orientation(program.ProgramTest):
                 self.check_markers(camera, to_patient, about)
                 self.check_same_default(about)
             self.check_default_view(about)
-            # The same grid: nothing but gradients along other axes, which are rounded.
+            # All formats have the same grid. Only the rounding of gradients along other axes
+            # differs.
             self.alike(picture, own, about, most=0.005, mean=1e-4)
-            # Another grid: sampled at other places, so that edges differ a little.
+            # Another acquisition samples other positions, so that edges differ a little.
             self.alike(picture, own if first is None else first, about, most=0.5, mean=0.005)
         return own
 
@@ -245,7 +251,7 @@ class Orientation(program.ProgramTest):
             own = self.check_acquisition(name, scanner, first)
             first = own if first is None else first
 
-    def test_every_renderer_draws_what_is_mirrored_or_sheared(self):
+    def test_every_renderer_draws_mirrored_and_sheared_grids(self):
         for name in "mirrored", "gantry tilt":
             affine, values = acquisition(*ACQUISITIONS[name][:3])
             program.write_nifti("a.nii", values, TO_RAS @ affine)
@@ -265,8 +271,8 @@ class Orientation(program.ProgramTest):
                     about = name, renderer, classify
                     self.alike(drawn, expected, about, most=most / 255, mean=mean / 255)
 
-    def test_thick_slices_at_the_origin_are_not_taken_for_a_scan_without_orientation(self):
-        """The map is diagonal then, as it is where a file says nothing."""
+    def test_thick_slices_at_the_origin_keep_their_orientation(self):
+        """The map is then diagonal, like the map of a file without orientation."""
         steps = (2, 0, 0), (0, 2, 0), (0, 0, 5)
         corner, _ = acquisition(*steps)
         affine, values = acquisition(*steps, place=-corner[:3, 3])
@@ -275,11 +281,11 @@ class Orientation(program.ProgramTest):
             self.brick(source)
             self.check_default_view(source)
 
-    def test_axes_that_are_given_are_as_if_the_file_had_said_so(self):
+    def test_given_axes_equal_axes_in_the_file(self):
         given = {"axial": "LPS", "coronal": "LIP", "sagittal": "PIR", "mirrored": "RPS"}
         for name, letters in given.items():
             affine, values = acquisition(*ACQUISITIONS[name][:3])
-            affine[:3, 3] = 0  # as of a file that says nothing
+            affine[:3, 3] = 0  # like a file without orientation
             program.write_nrrd("said.nrrd", values, geometry=nrrd_geometry("LPS", affine))
             program.write_nrrd("silent.nrrd", values, (2, 2, 2))
             program.write_nifti("said.nii", values, TO_RAS @ affine)
@@ -300,14 +306,14 @@ class Orientation(program.ProgramTest):
             program.write_dicom(f"slices/{z}.dcm", image, z)
         for axes, source in ("PIR", "said.nrrd"), ("LIP", "said.nii"), ("LPS", "slices"):
             command = "brick", source, "-o", "b.trip", "-q", "--axes", axes
-            self.fails(2, *command, says="says itself how it lies in the patient")
+            self.fails(2, *command, says="gives its orientation in the patient")
         turned = "space dimension: 3\nspace directions: (0,1,0) (1,0,0) (0,0,1)"
         program.write_nrrd("turned.nrrd", slices, geometry=turned)
         command = "brick", "turned.nrrd", "-o", "b.trip", "--axes", "PIR"
-        self.fails(2, *command, says="directions of their own")
+        self.fails(2, *command, says="gives the directions of its axes")
 
-    def test_axes_are_part_of_what_is_drawn_at_once(self):
-        """And of what the cache knows a data set by."""
+    def test_axes_apply_to_volumes_drawn_directly(self):
+        """--axes is also part of the key in the cache."""
         affine, values = acquisition(*ACQUISITIONS["sagittal"][:3])
         affine[:3, 3] = 0
         program.write_nrrd("silent.nrrd", values, (2, 2, 2))
@@ -318,9 +324,9 @@ class Orientation(program.ProgramTest):
         self.assertTrue(numpy.array_equal(own, self.picture("said.nrrd", size)))
         self.assertGreater(abs(own - other).mean(), 0.02)
 
-    def test_what_is_symmetric_is_shown_upright_and_its_sides_are_not_named(self):
-        """What has a left and a right that are alike, as slices from ear to ear of a file that says
-        nothing; the same file with directions is shown alike by what it says."""
+    def test_symmetric_objects_are_upright_and_sides_have_no_names(self):
+        """The object has equal left and right halves, in slices from ear to ear of a file without
+        orientation. The same file with directions gives the same picture."""
         steps = (0, 2, 0), (0, 0, -2), (-2, 0, 0)
         affine, _ = acquisition(*steps)
         index = numpy.stack(numpy.meshgrid(*[numpy.arange(45)] * 3, indexing="ij"), axis=-1)
@@ -342,7 +348,7 @@ class Orientation(program.ProgramTest):
         for end in "left", "right", "anterior", "superior":
             self.assertNotIn(f"to {end}", text)
         self.alike(self.picture("a.trip", "--size=96x96"), expected, "wedge", most=0.01, mean=5e-4)
-        # What is said is not overruled, not even by 0, 0, 1.
+        # An explicit --up wins over the guess, even if it is 0,0,1.
         upright = self.picture("a.trip", "--size=96x96", "--up=0,0,1")
         self.assertGreater(abs(upright - expected).mean(), 0.02)
         run = self.works("render", "silent.nrrd", "-o", "b.png", "--size=32x32", "--tf", "all.tf")
@@ -351,24 +357,26 @@ class Orientation(program.ProgramTest):
         self.assertNotIn("symmetric", run.stderr)
 
     def bright_from_middle(self, name):
-        """From the middle of what tests/regress/NAME holds to that of its bright part, in pixels."""
+        """Returns the offset in pixels from the centre of tests/regress/NAME to the centre of its
+        bright part."""
         program.write("red.tf", b"values data\n49 0 0 1 0\n50 0 0 1 1\n200 0 0 1 1\n200 1 0 0 1\n")
         source = os.path.join(program.DATASETS, "..", "tests", "regress", name)
         self.works("brick", source, "-o", "a.trip", "-q", "--force", "--tf", "red.tf")
-        # By voxels: values between are blue, and hide what is red.
+        # `pre` draws voxels. Interpolated values would be blue and hide the red ones.
         picture = self.picture("a.trip", "--size=96x96", "--no-shading", "--classify=pre")
         (whole,) = blobs(picture[..., 3])
         (bright,) = blobs(picture[..., 0])
         return numpy.subtract(bright, whole)
 
-    def test_small_files_that_were_drawn_wrongly(self):
-        across, down = self.bright_from_middle("thick_slices_lps.nrrd")  # bright at the head
+    def test_files_once_drawn_with_a_wrong_orientation(self):
+        across, down = self.bright_from_middle("thick_slices_lps.nrrd")  # the head is bright
         self.assertLess(down, -15)
-        across, down = self.bright_from_middle("space_ras.nrrd")  # bright in front, at the left
+        across, down = self.bright_from_middle("space_ras.nrrd")  # the front at the left is bright
         self.assertGreater(across, 8)
 
-    def test_a_frame_missing_among_others_is_refused_unless_allowed(self):
-        """Frames at 0, 2, 4, 8, 10, 12 in a file: 2 apart, and not 2.4, where the gap is allowed."""
+    def test_a_missing_frame_is_refused_unless_allowed(self):
+        """The file has frames at 0, 2, 4, 8, 10 and 12. With the gap allowed, their spacing is 2
+        and not 2.4."""
         values = program.noise((6, 8, 8)).astype("u2")
         places = [(0, 0, z) for z in (0, 2, 4, 8, 10, 12)]
         program.write_dicom("gap.dcm", values, 0, (1, 1, 2), places[0], frames=places)
@@ -382,7 +390,7 @@ class Orientation(program.ProgramTest):
             self.works("brick", "even.dcm", "-o", "e.trip", "-q", "--allow-gaps").stderr, ""
         )
 
-    def test_dicom_says_what_kind_of_images_they_are(self):
+    def test_the_dicom_modality_selects_the_kind(self):
         values = program.noise((8, 16, 16), "u2") % 2000
         for modality, inter, kind in (
             ("MR", 0, "mr"),
@@ -400,7 +408,7 @@ class Orientation(program.ProgramTest):
             source = self.info("s.trip")["source"]
             self.assertEqual(source["function_kind"], kind, (modality, inter))
 
-    def test_info_says_in_words_where_the_axes_point(self):
+    def test_info_prints_the_directions_of_the_axes_in_words(self):
         affine, values = acquisition(*ACQUISITIONS["gantry tilt"][:3])
         program.write_nrrd("a.nrrd", values, geometry=nrrd_geometry("LPS", affine))
         self.brick("a.nrrd")
@@ -410,7 +418,7 @@ class Orientation(program.ProgramTest):
         self.assertIn("j points to  posterior, 20 degrees to superior\n", words)
         self.assertIn("k points to  superior\n", words)
 
-    def test_bounds_are_those_of_the_voxels_where_spacing_is_uneven(self):
+    def test_bounds_of_uneven_grids_enclose_the_voxels(self):
         program.write_nrrd("u.nrrd", program.noise((4, 4, 4)))
         program.write("x.txt", b"0 1 2 6")
         program.write("y.txt", b"0 1 2 3")
@@ -420,18 +428,18 @@ class Orientation(program.ProgramTest):
             numpy.testing.assert_allclose(info["bounds"][end], bounds, atol=1e-6)
             numpy.testing.assert_allclose(info["kept_bounds"][end], bounds, atol=1e-6)
 
-    def test_info_gives_the_bounds_of_the_grid_and_of_what_is_kept(self):
+    def test_info_prints_the_bounds_of_the_grid_and_the_kept_voxels(self):
         values = numpy.zeros((6, 7, 8), "u1")
         values[2:5, 1:3, 4:8] = 9
         affine = numpy.array([[0, -2.0, 0, 10], [3, 0, 0, 20], [0, 0, 0.5, -30], [0, 0, 0, 1]])
         program.write_nifti("a.nii", values, affine)
         self.brick("a.nii", "--range=5:10")
         info = self.info("a.trip")
-        # i is y by 3, j is -x by 2, k is z by a half; half a voxel on each side.
+        # i is y times 3, j is -x times 2, k is z times 1/2. Bounds add half a voxel on each side.
         self.assertEqual(info["bounds"], [[-3, 18.5, -30.25], [11, 42.5, -27.25]])
         self.assertEqual(info["kept_bounds"], [[5, 30.5, -29.25], [9, 42.5, -27.75]])
 
-    def test_a_file_that_names_no_patient_has_no_convention(self):
+    def test_a_file_without_a_patient_has_no_anatomical_space(self):
         values = program.noise((8, 9, 10))
         for geometry in "spacings: 1 1 1", "space: 3D-right-handed\nspacings: 1 1 1":
             program.write_nrrd("plain.nrrd", values, geometry=geometry)

@@ -1,4 +1,5 @@
-"""Regions of a volume, each a data set of its own, are drawn in one picture as the whole is."""
+"""Tests that regions of a volume, each in its own data set, give the same picture together as the
+whole volume."""
 import itertools
 import os
 import resource
@@ -14,7 +15,7 @@ SIZE = ("--size", "60x50")
 
 
 def regions(*cuts):
-    """All boxes between cuts along i, j and k; a cut is where the next box begins."""
+    """Returns all boxes between cuts along i, j and k. A cut is the first index of the next box."""
     sides = [[f"{a}:{b}" for a, b in zip(["", *c], [*c, ""])] for c in cuts]
     return [",".join(box) for box in itertools.product(*sides)]
 
@@ -43,14 +44,15 @@ class Parts(program.ProgramTest):
         return parts
 
     def assert_alike(self, parts, most, *options):
-        """Pictures of the whole and of the parts; components differ by `most` of 255."""
+        """Compares pictures of the whole and of the parts. Components differ by at most `most` of
+        255."""
         whole = self.picture("whole.trip", *SIZE, *options)
         drawn = self.picture(*parts, *SIZE, *options)
         self.assertGreater(whole[..., 3].max(), 0.5)
         difference = 255 * abs(whole - drawn).max()
         self.assertLessEqual(difference, most, (parts, options))
 
-    def test_a_region_keeps_its_own_voxels_and_a_halo_beyond_them(self):
+    def test_a_region_keeps_its_voxels_and_a_halo_beyond_them(self):
         def dilated(flags):
             padded = numpy.pad(flags, 1)
             shifts = itertools.product(range(3), repeat=3)
@@ -74,7 +76,7 @@ class Parts(program.ProgramTest):
         self.assert_alike(self.octants, 0, "--renderer", "cpu")
         self.assert_alike(self.octants[::-1], 0, "--renderer", "cpu", "--samples-per-sheet", 3)
 
-    def test_nor_have_they_inside_the_volume_with_light_distances_and_little_memory(self):
+    def test_seams_do_not_appear_inside_with_light_or_little_memory(self):
         inside = ("--eye", "20.7,19,18", "--look", "40,30,20", "--fov", 100)
         light = ("--effects", "shadows,occlusion", "--light", "1,2,3")
         self.assert_alike(self.octants, 0, "--renderer", "cpu", *inside)
@@ -89,13 +91,13 @@ class Parts(program.ProgramTest):
         for renderer in ("cpu", *program.GL):
             self.assert_alike(self.octants, 1e-3, *BY_SHEETS, "--renderer", renderer)
 
-    def test_splats_one_by_one_differ_by_the_order_within_a_sheet(self):
+    def test_splats_depend_on_the_order_within_a_sheet(self):
         for renderer in ("reference", "cpu", *program.GL):
             self.assert_alike(self.halves, 2, "--classify", "pre", "--renderer", renderer)
         if program.GL:
             self.assert_alike(self.halves, 2, "--submit", "indexed")
 
-    def test_the_integral_is_that_of_the_whole(self):
+    def test_the_integral_equals_the_whole(self):
         self.assert_alike(self.octants, 0, "--renderer", "integral", "--size", "20x16")
 
     def test_frames_in_flight_have_all_regions(self):
@@ -114,7 +116,7 @@ class Parts(program.ProgramTest):
         self.assertGreater(counted[0]["x"]["splats_drawn"], 1000)
         self.assertEqual(counted[0], counted[1])
 
-    def test_the_plan_names_the_data_sets_which_are_drawn_without_levels(self):
+    def test_the_plan_names_all_data_sets_and_levels_are_refused(self):
         text = self.works("render", *self.halves, "-o", "a.exr", *SIZE, "--explain", "--quality",
                           "draft")
         text = text.stdout.decode()
@@ -123,7 +125,7 @@ class Parts(program.ProgramTest):
         for levels in "--lod=4", "--max-bytes=64M", "--max-ms=5":
             self.leaves_nothing(2, "render", *self.halves, "-o", "x.png", levels, says="--lod")
 
-    def test_what_does_not_go_together_is_refused_by_name(self):
+    def test_mismatched_data_sets_are_refused_by_name(self):
         program.write_nrrd("moved.nrrd", self.volume, geometry="space origin: (1,2,3)\n"
                            "space: left-posterior-superior\n"
                            "space directions: (1,0,0) (0,1,0) (0,0,1)")
@@ -158,12 +160,12 @@ class Parts(program.ProgramTest):
                                           classify, says=f"open: {parts[-1]}: overlaps ")
                 self.assertIn("drawn twice", run.stderr)
 
-    def test_as_many_files_are_open_as_the_system_allows(self):
+    def test_many_files_raise_the_soft_limit_of_open_files(self):
         limits = (24, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
         self.works("render", *self.octants, "-o", "a.exr", *SIZE,
                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, limits))
 
-    def test_damage_is_found_in_the_data_set_that_has_it(self):
+    def test_errors_name_the_damaged_data_set(self):
         shutil.rmtree("bad.trip", ignore_errors=True)
         shutil.copytree(self.halves[1], "bad.trip")
         for name in ("index.trip", *(f"{a}0.{kind}" for a in "xyz" for kind in ("voxels", "halo"))):
@@ -177,7 +179,7 @@ class Parts(program.ProgramTest):
             with open(path, "wb") as f:
                 f.write(good)
 
-    def test_values_that_a_region_lacks_are_warned_of_by_its_name(self):
+    def test_warnings_name_the_region_that_lacks_values(self):
         self.works("brick", "v.nrrd", "-o", "less.trip", "-q", "--range", "180:255", "--region",
                    "21:,:,:", "--force")
         run = self.works("render", self.halves[0], "less.trip", "-o", "a.exr", *SIZE)

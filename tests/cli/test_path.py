@@ -1,5 +1,5 @@
-"""Paths of the camera, several frames at once, and videos: by ffmpeg, and by what stands in for it and
-keeps what it is given, or fails."""
+"""Tests of camera paths, of several frames in flight, and of videos. Videos are made by ffmpeg, and
+by a stand-in that keeps its input or fails."""
 import json
 import math
 import os
@@ -27,7 +27,7 @@ SIZE = ("--size", "40x30")
 
 
 def key(seconds, degrees, **more):
-    """A view from so many degrees round the volume's middle."""
+    """Returns a key frame with the eye at an angle around the centre of the volume."""
     x, y = math.sin(math.radians(degrees)), -math.cos(math.radians(degrees))
     eye = [15.5 + 90 * x, 15.5 + 90 * y, 15.5]
     return dict(seconds=seconds, eye=eye, look=[15.5] * 3, up=[0, 0, 1], fov=30) | more
@@ -41,7 +41,7 @@ def options(k):
 
 
 def decoded(video, height, width):
-    """The frames of a video, 8 bits a channel, by ffmpeg's own decoder."""
+    """Returns the frames of a video with 8 bits per channel, decoded by ffmpeg."""
     command = ["ffmpeg", "-loglevel", "error", "-i", video, "-vf", "scale=in_color_matrix=bt709"]
     run = subprocess.run(
         [*command, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True
@@ -58,7 +58,7 @@ def rate_of(video):
 
 
 def blob():
-    """Smooth, off the middle, and longer one way than the others: it looks different from each side."""
+    """Returns a smooth, elongated blob off the centre, which looks different from each side."""
     x, y, z = numpy.mgrid[:32, :32, :32].astype(float)
     there = numpy.exp(-((x - 9) ** 2 / 40 + (y - 16) ** 2 / 90 + (z - 20) ** 2 / 30))
     return (255 * there).astype(numpy.uint8)
@@ -85,7 +85,7 @@ class Paths(program.ProgramTest):
         return "path.json"
 
     def frames(self, *arguments, name="f.exr"):
-        """The files of the frames, in order."""
+        """Renders the frames. Returns the contents of their files in order."""
         stem, extension = os.path.splitext(name)
         for old in [f for f in os.listdir(".") if f.startswith(stem + "-")]:
             os.remove(old)
@@ -99,7 +99,7 @@ class Paths(program.ProgramTest):
         with open("s.exr", "rb") as f:
             return f.read()
 
-    def test_frames_are_single_pictures_however_many_are_drawn_at_once(self):
+    def test_frames_in_flight_equal_single_pictures(self):
         path = self.path(key(0, 0), key(1, 60), key(2, 120))
         one = self.frames("--path", path, "--in-flight", "1")
         self.assertEqual(len(one), 9)
@@ -110,32 +110,32 @@ class Paths(program.ProgramTest):
         for frame, degrees in ((0, 0), (4, 60), (8, 120)):
             self.assertEqual(self.single(*options(key(0, degrees))), one[frame])
         cameras = [f["camera"].split() for f in json.load(open("s.json"))["frames"]]
-        for frame in (1, 6):  # between keys: the view that is printed
+        for frame in (1, 6):  # frames between keys have the printed view
             self.assertEqual(self.single(*cameras[frame]), one[frame])
             eye = [float(x) for x in cameras[frame][1].split(",")]
             expected = key(0, 15 * frame)["eye"]
             numpy.testing.assert_allclose(eye, expected, atol=1e-9)
 
-    def test_an_orbit_is_the_same_however_many_are_drawn_at_once(self):
+    def test_frames_in_flight_do_not_change_an_orbit(self):
         one = self.frames("--orbit", "5", "--in-flight", "1")
         self.assertEqual(len(set(one)), 5)
         self.assertEqual(self.frames("--orbit", "5"), one)
         self.assertEqual(self.frames("--orbit", "5", "--in-flight", "4"), one)
 
-    def test_frames_that_do_not_fit_the_memory_together_are_drawn_one_by_one(self):
+    def test_frames_are_drawn_one_by_one_in_little_memory(self):
         one = self.frames("--orbit", "3", "--in-flight", "1", "--memory", "64M")
         together = ("--orbit", "3", "--in-flight", "16", "--memory", "64M", "--size", "500x500")
         alone = ("--orbit", "3", "--in-flight", "1", "--memory", "64M", "--size", "500x500")
         self.assertEqual(self.frames(*together), self.frames(*alone))
         self.assertEqual(self.frames("--orbit", "3"), one)
 
-    def test_distances_are_those_of_single_pictures(self):
+    def test_distances_equal_single_pictures(self):
         path = self.path(key(0, 0), key(1, 60))
         self.frames("--path", path, "--depth", "z.tif")
         self.single(*options(key(0, 60)), "--depth", "s.tif")
         self.assertEqual(open("z-004.tif", "rb").read(), open("s.tif", "rb").read())
 
-    def test_functions_go_over_into_one_another(self):
+    def test_transfer_functions_are_interpolated(self):
         first, last = "0 1 0 0 0\n255 1 0 0 0.2\n", "0 0 0 1 0\n100 0 1 1 0.1\n255 0 0 1 0.6\n"
         program.write("last.tf", last.encode())
         path = self.path(
@@ -143,7 +143,7 @@ class Paths(program.ProgramTest):
         )
         frames = self.frames("--path", path, "--tf", "last.tf")
         self.assertEqual(len(frames), 7)
-        # Of the first quarter at each of 0, 100 and 255: shares of 1/4 and 3/4.
+        # A quarter of the way, at each of 0, 100 and 255, the weights are 3/4 and 1/4.
         middle = (1 - 0.25) * 0.2 * 100 / 255 + 0.25 * 0.1
         quarter = (
             f"0 0.75 0 0.25 0\n100 0.75 0.25 0.25 {middle!r}\n"
@@ -160,7 +160,7 @@ class Paths(program.ProgramTest):
             )
         self.assertNotEqual(frames[2], frames[3])
 
-    def test_a_volume_is_bricked_for_the_functions_of_a_path(self):
+    def test_a_volume_is_bricked_for_all_transfer_functions_of_a_path(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
         faint, clear = "1 1 0 0 0\n60 1 0 0 0.3\n200 1 0 0 0\n", "0 0 0 0 0\n255 1 1 1 0.5\n"
         program.write("clear.tf", clear.encode())
@@ -205,7 +205,7 @@ class Paths(program.ProgramTest):
                 says="--path",
             )
 
-    def test_a_video_has_the_pixels_of_the_pictures(self):
+    def test_a_video_gets_the_pixels_of_the_pictures(self):
         path = self.path(key(0, 0), key(1, 60))
         for more in (["--path", path], ["--path", path, "--in-flight", "1"]):
             run = self.works(
@@ -231,7 +231,7 @@ class Paths(program.ProgramTest):
         self.assertEqual(os.path.getsize("a.webm"), 3 * 3600)
         os.remove("a.webm")
 
-    def test_more_images_a_second_of_a_path_are_seen_in_the_same_time(self):
+    def test_a_higher_frame_rate_keeps_the_duration(self):
         path = self.path(key(0, 0), key(1, 60))
         videos = []
         for options, rate, frames in ([], "4", 5), (["--fps", "8"], "8", 9):
@@ -266,7 +266,7 @@ class Paths(program.ProgramTest):
                 self.assertLess(apart[i], 2)
             os.remove(video)
 
-    def test_a_video_that_cannot_be_made_leaves_nothing(self):
+    def test_a_failed_video_leaves_nothing(self):
         orbit = ("--orbit", "4", *SIZE)
         self.leaves_nothing(
             *(1, "render", "v.trip", "-o", "b.mp4", *orbit),

@@ -1,4 +1,4 @@
-"""What the other tests rely on: program.py."""
+"""Tests of program.py, on which the other tests rely."""
 import os
 import tempfile
 

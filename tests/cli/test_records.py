@@ -1,5 +1,5 @@
-"""Records that are not what the index says of their brick, under right checksums: no renderer draws
-them, and the one line that says so names the file and the place."""
+"""Tests records that contradict their brick in the index, under valid checksums. No renderer draws
+them, and one error line names the file and the offset."""
 import json
 import os
 import shutil
@@ -25,8 +25,8 @@ class Records(program.ProgramTest):
             print("skipped for gl: " + gl.stderr, end="", flush=True)
 
     def change_block(self, axis, number, change):
-        """Changes the words of a list's block, by its number, and says where it is in which file.
-        `change` has the presence, the masks and the words behind them."""
+        """Changes the words of one block of a list. Returns the file and the offset as in the error
+        line. `change` gets the presence, the masks, and the words behind them."""
         shutil.rmtree("b.trip", ignore_errors=True)
         shutil.copytree("a.trip", "b.trip")
         data = craft.Dataset("a.trip")
@@ -41,7 +41,7 @@ class Records(program.ProgramTest):
 
     def refused(self, where, says):
         for name in self.renderers:
-            # The view sees three lists, some with weight at few pixels alone.
+            # The view uses three lists, some of them at few pixels only.
             self.fails(
                 1, "render", "b.trip", "-o", "b.exr", f"--renderer={name}", "--h=0", *VIEW,
                 says=where,
@@ -50,14 +50,14 @@ class Records(program.ProgramTest):
         self.assertIn(says, self.fails(1, "info", "--verify", "b.trip", says=where).stderr)
 
     def measured(self, name):
-        """What `bench stream` reads and draws."""
+        """Returns the bytes that each stage of `bench stream` reads."""
         run = self.works("bench", "stream", name, "--json", "--renderer=cpu", "--size=40x40",
                          "--repeat=1")
         report = json.loads(run.stdout)
         rows = report["tables"]["stages"]["rows"]
         return {row["key"]: row["bytes_read"] for row in rows if "bytes_read" in row}
 
-    def test_lists_may_stand_in_any_order(self):
+    def test_lists_may_come_in_any_order(self):
         data = craft.Dataset("a.trip")
         first = data.list_at(0)
         lists = [data.index[at : at + 320] for at in map(data.list_at, range(data.lists))]
@@ -78,8 +78,9 @@ class Records(program.ProgramTest):
                 self.assertEqual(pictures[0], pictures[1], (name, classify))
         self.assertEqual(self.measured("a.trip"), self.measured("b.trip"))
 
-    def test_a_place_outside_the_bricks_bounds(self):
-        """The last square of a run moves to the tile's last, which is outside the grid."""
+    def test_a_position_outside_the_bricks_bounds_is_refused(self):
+        """Moves the last square of a run to the last square of the tile, which is outside the
+        grid."""
 
         def move(present, masks, codes):
             last = 1 << present[0].bit_length() - 1
@@ -89,18 +90,18 @@ class Records(program.ProgramTest):
             where = self.change_block(axis, number, move)
             self.refused(where, "a voxel is outside its brick's bounds")
 
-    def test_more_squares_than_masks(self):
+    def test_more_squares_than_masks_are_refused(self):
         change = lambda present, masks, codes: [2**64 - 1, *masks, *codes]
         self.refused(self.change_block("y", 0, change), "more squares than its block has room for")
 
-    def test_masks_that_do_not_hold_as_many_voxels(self):
+    def test_masks_with_fewer_voxels_than_the_run_are_refused(self):
         def drop(present, masks, codes):
             return [*present, masks[0] & masks[0] - 1, *masks[1:], *codes]
 
         self.refused(self.change_block("z", -2, drop), "as many voxels as the index says")
 
-    def test_a_mask_without_voxels(self):
-        """What the first square of a block loses the second gains."""
+    def test_an_empty_mask_is_refused(self):
+        """Moves the voxels of a block's first square to its second."""
 
         def empty(present, masks, codes):
             bits = bin(masks[0]).count("1")
@@ -109,7 +110,7 @@ class Records(program.ProgramTest):
 
         self.refused(self.change_block("x", 0, empty), "a mask is empty")
 
-    def test_the_one_that_was_drawn_once(self):
+    def test_a_record_once_drawn_outside_its_brick_is_refused(self):
         path = os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests/regress/record_outside_brick.trip")
         for name in self.renderers:
             self.fails(
@@ -117,7 +118,7 @@ class Records(program.ProgramTest):
                 says="voxels: byte 0: a voxel is outside its brick's bounds",
             )
 
-    def test_a_code_outside_the_bricks_range(self):
+    def test_a_code_outside_the_bricks_range_is_refused(self):
         for axis in "xz":
             data = craft.Dataset("a.trip")
             for brick in data.bricks("xyz".index(axis)):
@@ -127,8 +128,8 @@ class Records(program.ProgramTest):
             data.write("b.trip")
             self.refused(f"b.trip/{axis}0.voxels: byte ", "a value is outside its brick's range")
 
-    def test_near_the_end_of_the_largest_grid(self):
-        """What lies there is drawn as elsewhere, and a record that would lie beyond is refused."""
+    def test_voxels_near_the_end_of_the_largest_grid_are_drawn(self):
+        """They are drawn as elsewhere, and a record beyond the grid is refused."""
         data = craft.Dataset("a.trip")
         tile_log2, slab_sheets = data.number("<I", 264), data.number("<I", 268)
         offset = FAR >> 7 << 7
@@ -150,12 +151,13 @@ class Records(program.ProgramTest):
         )
         shutil.copytree("a.trip", "far.trip")
         data.write("far.trip")
-        post = ("--classify=post", "--samples-per-sheet=2")  # by the view they depend on the grid
+        # a fixed number, since the automatic number depends on the size of the grid
+        post = ("--classify=post", "--samples-per-sheet=2")
         for name in self.renderers:
             for by in ("--classify=pre",), post:
                 if by == post and name == "reference":
                     self.fails(1, "render", "far.trip", "-o", "b.exr", "--renderer=reference",
-                               *view, says="the whole volume is held")
+                               *view, says="the whole volume takes 16 bytes per voxel")
                     continue
                 near = self.picture("a.trip", f"--renderer={name}", *by, *VIEW)
                 far = self.picture("far.trip", f"--renderer={name}", *by, *view)

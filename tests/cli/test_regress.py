@@ -1,5 +1,4 @@
-"""What the program did wrong with once, with the small files of tests/regress, or what is made of
-them here: scales, temporaries, Ctrl-C."""
+"""Tests of fixed faults, with the small files of tests/regress or files made here."""
 import bz2
 import os
 import signal
@@ -9,7 +8,7 @@ import numpy
 import program
 
 REGRESS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "regress")
-LIMIT_S = 2 * (4 if program.SANITIZED else 1)  # of processors
+LIMIT_S = 2 * (4 if program.SANITIZED else 1)  # seconds of processor time
 VIEW = ("--size=40x40", "--h=0", "--classify=pre")
 
 
@@ -29,7 +28,7 @@ class Regress(program.ProgramTest):
         return process.pid
 
     def test_voxels_of_any_size_are_drawn(self):
-        """Squares of areas overflowed floats, and the picture was empty."""
+        """Squared areas once overflowed floats, and the picture was empty."""
         for spacing, view in (
             *((scale, ()) for scale in (1e-12, 1e-8, 1e4, 1e12)),
             (100, ("--fov=0.1",)),
@@ -40,16 +39,16 @@ class Regress(program.ProgramTest):
             self.assertGreater(expected[..., 3].max(), 0.5, (spacing, view))
             self.assertLessEqual(numpy.abs(drawn - expected).max(), 2 / 255, (spacing, view))
 
-    def test_what_a_killed_process_left_is_in_nobodys_way(self):
-        """Of the number that the process itself has."""
+    def test_a_temporary_of_a_killed_process_does_no_harm(self):
+        """The killed process had the same process number."""
 
         def leave():
             program.write(f".triptych-{os.getpid()}.tmp", b"")
 
         os.remove(f".triptych-{self.draw(preexec_fn=leave)}.tmp")
 
-    def test_ctrl_c_ends_a_skip_through_what_is_compressed(self):
-        """90 GB of zeros in 90 kB; the skip was gone through to its end first."""
+    def test_ctrl_c_ends_a_skip_through_compressed_data(self):
+        """The file holds 90 GB of zeros in 90 kB. Ctrl-C once waited for the end of the skip."""
         program.write("zeros.bz2", bz2.compress(bytes(45 << 20)) * 2000)
         program.write(
             "zeros.nhdr",

@@ -1,4 +1,4 @@
-"""scripts/: packages come from where the machine's own come from."""
+"""Tests of scripts/: packages come from the mirrors that the machine itself uses."""
 import glob
 import os
 import re
@@ -35,7 +35,7 @@ Components: main
 @unittest.skipUnless(shutil.which("apt-get"), "apt-get is missing")
 class Mirror(program.ProgramTest):
     def mirror(self, one_line="", deb822=""):
-        """What mirror.sh says of a machine with these sources alone, which was never updated."""
+        """Runs mirror.sh for a machine that has only these sources and was never updated."""
         for folder in "sources.list.d", "apt.conf.d", "preferences.d":
             os.makedirs(os.path.join("apt", folder), exist_ok=True)
         for name, text in ("sources.list", one_line), ("sources.list.d/a.sources", deb822):
@@ -49,17 +49,17 @@ class Mirror(program.ProgramTest):
             capture_output=True, text=True, check=False,
         )
 
-    def test_sources_of_one_line(self):
+    def test_one_line_sources_are_read(self):
         self.assertEqual(self.mirror(one_line=ONE_LINE).stdout, "http://one.example/some/debian\n")
 
-    def test_sources_in_paragraphs(self):
+    def test_deb822_sources_are_read(self):
         self.assertEqual(self.mirror(deb822=DEB822).stdout, "https://two.example/debian\n")
 
-    def test_sources_that_say_stable(self):
+    def test_sources_with_a_suite_name_are_read(self):
         run = self.mirror(one_line=ONE_LINE.replace(" bookworm ", " oldstable "))
         self.assertEqual(run.stdout, "http://one.example/some/debian\n")
 
-    def test_none(self):
+    def test_a_machine_without_sources_gives_one_error_line(self):
         run = self.mirror()
         self.assertEqual((run.returncode, run.stdout), (1, ""))
         self.assertRegex(run.stderr, r"\Amirror: [^\n]*bookworm\n\Z")

@@ -1,4 +1,5 @@
-"""What was left out of the build is refused with one line that says so, and the rest works."""
+"""Tests of builds without optional parts. A missing part is refused with one line that names it,
+and everything else works."""
 import os
 import subprocess
 
@@ -12,7 +13,7 @@ class SwitchedOff(program.ProgramTest):
         self.assertTrue(program.LINE.fullmatch(run.stderr), run.stderr)
         self.assertIn(says, run.stderr)
 
-    def test_opengl(self):
+    def test_missing_opengl_is_refused(self):
         if "GL" not in program.SWITCHED_OFF:
             self.skipTest("built with OpenGL")
         program.write_nrrd("ball.nrrd", program.ball((20, 20, 20)))
@@ -21,19 +22,19 @@ class SwitchedOff(program.ProgramTest):
         self.refused(*draw, "--renderer=gl", says="built without OpenGL")
         self.works(*draw[1:])
 
-    def test_viewer(self):
+    def test_missing_viewer_is_refused(self):
         if "VIEW" not in program.SWITCHED_OFF:
             self.skipTest("built with the viewer")
         self.refused(program.PROGRAM, "view", says="built without the viewer")
 
-    def test_serve(self):
+    def test_missing_server_is_refused(self):
         if "SERVE" not in program.SWITCHED_OFF:
             self.skipTest("built with the server")
         program.write_nrrd("bowl.nrrd", program.ball((20, 20, 20)))
         self.brick("bowl.nrrd", "bowl.trip")
         self.refused(program.PROGRAM, "serve", "bowl.trip", says="built without the server")
 
-    def test_openvdb(self):
+    def test_missing_openvdb_is_refused(self):
         if "OPENVDB" not in program.SWITCHED_OFF:
             self.skipTest("built with OpenVDB")
         before = sorted(os.listdir("."))
@@ -43,7 +44,7 @@ class SwitchedOff(program.ProgramTest):
         self.refused(program.GENERATE, "marschner-lobb", "--size=8", "-o", "v.vdb", says="built without OpenVDB")
         self.assertEqual(sorted(os.listdir(".")), before)
 
-    def test_netcdf(self):
+    def test_missing_netcdf_is_refused(self):
         if "NETCDF" not in program.SWITCHED_OFF:
             self.skipTest("built with libnetcdf")
         program.write("x.nc", b"\x89HDF\r\n\x1a\n" + bytes(100))

@@ -1,4 +1,4 @@
-"""`triptych tf`: what it lists, shows and converts, and what it refuses."""
+"""Tests of `triptych tf`: list, show, convert, and refused input."""
 import json
 import os
 import stat
@@ -18,7 +18,7 @@ class Tf(program.ProgramTest):
         cls.works(cls(), "brick", "ball.nrrd", "-q")
 
     def shown(self, *arguments):
-        """The points that `tf show` prints."""
+        """Returns the points that `tf show` prints."""
         lines = self.works("tf", "show", *arguments).stdout.decode().splitlines()
         self.assertRegex(lines[0], "^unit ")
         return [tuple(map(float, line.split())) for line in lines[2:]]
@@ -37,7 +37,7 @@ class Tf(program.ProgramTest):
         self.assertEqual(made, 6)
         self.assertGreater(len(lines), 14)
 
-    def test_the_function_of_a_data_set_is_that_of_its_volume_and_can_be_edited(self):
+    def test_the_stored_transfer_function_can_be_shown_and_edited(self):
         points = self.shown("ball.trip")
         self.assertEqual(points, self.shown("ball.nrrd"))
         self.assertEqual(points, self.shown("--tf", "auto", "ball.trip"))
@@ -47,13 +47,13 @@ class Tf(program.ProgramTest):
         as_kept = self.picture(*view)
         self.assertTrue((as_kept == self.picture(*view, "--tf", "edited.tf")).all())
 
-    def test_a_preset_over_the_range_is_shown_for_the_data(self):
+    def test_presets_over_the_range_are_adapted_to_the_data(self):
         self.assertEqual([p[0] for p in self.shown("ball.trip", "--tf", "grey")], [0, 20, 80, 200])
         self.assertEqual([p[0] for p in self.shown("grey", "--range=-100:100")],
                          [-100, -80, -20, 100])
         self.assertEqual([p[0] for p in self.shown("grey")], [0, 0.1, 0.4, 1])
 
-    def test_converts_there_and_back(self):
+    def test_converted_files_can_be_read_back(self):
         for name in ("a.json", "a.vp", "a.vp.json", "a.xml", "a.tf"):
             self.works("tf", "convert", "step.tf", name)
             points = self.shown(name)
@@ -64,8 +64,8 @@ class Tf(program.ProgramTest):
         self.works("tf", "convert", "step.tf", "vtk.xml", "--format", "vtk")
         self.assertEqual(len(self.shown("vtk.xml")), 4)
 
-    def test_others_read_what_is_written(self):
-        """By the parsers of Python's own library."""
+    def test_other_parsers_can_read_converted_files(self):
+        """Uses the JSON and XML parsers of Python's standard library."""
         out = lambda form: self.works("tf", "convert", "step.tf", "-", "--format", form).stdout
         colour_map = json.loads(out("paraview"))[0]
         self.assertEqual(colour_map["RGBPoints"][:4], [-400, 0.6, 0.3, 0.2])
@@ -81,7 +81,7 @@ class Tf(program.ProgramTest):
         numbers = list(map(float, preset["colorTransfer"].split()))
         self.assertEqual(numbers[0], len(numbers) - 1)
         values = numbers[1::4]
-        self.assertEqual(sorted(set(values)), values)  # no value twice
+        self.assertEqual(sorted(set(values)), values)  # no value occurs twice
         root = xml.etree.ElementTree.fromstring(out("vtk"))
         points = root.findall("Component/ScalarOpacity/PiecewiseFunction/Point")
         self.assertEqual([float(p.get("Value")) for p in points], [0, 0.01, 0.3, 0.9])
@@ -89,7 +89,7 @@ class Tf(program.ProgramTest):
         self.assertEqual(len(lines), 9)
         self.assertEqual(len(lines[8].split()), 1 + int(lines[8].split()[0]))
 
-    def test_what_is_there_is_replaced_by_force_only(self):
+    def test_only_force_replaces_an_existing_file(self):
         program.write("there.tf", b"0 0 0 0 0\n")
         os.chmod("there.tf", 0o600)
         self.leaves_nothing(1, "tf", "convert", "ct-bone", "there.tf", says="--force")

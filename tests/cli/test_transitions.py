@@ -1,5 +1,5 @@
-"""Where one list gives way to the next: `merge` shows nothing there, neither in a picture nor from
-one picture of a turn to the next; `clip` shows lines on large kernels, `axis` pops."""
+"""Tests of the transitions from one list to the next. `merge` shows no lines within a picture and
+no jumps while the camera turns. `clip` shows lines with large kernels, and `axis` jumps."""
 import math
 
 import numpy
@@ -11,7 +11,8 @@ EYE, LOOK = (25, -11, 29), (7, 7, 7)
 
 
 def dominant_axes():
-    """For each pixel the axis along which its ray is steepest: whose list alone has weight 1."""
+    """Returns for each pixel the axis along which its ray is steepest. Only the list along this
+    axis has weight 1."""
     forward = numpy.subtract(LOOK, EYE) / numpy.linalg.norm(numpy.subtract(LOOK, EYE))
     right = numpy.cross(forward, (0, 0, 1))
     right /= numpy.linalg.norm(right)
@@ -31,8 +32,8 @@ class Transitions(program.ProgramTest):
         cls.brick(cls(), "a.nrrd", "a.trip", "--tf", "a.tf")
 
     def bends_at_borders(self, *method):
-        """How much sharper it bends from pixel to pixel where the dominant axis changes than beside
-        that."""
+        """Returns the ratio of second differences along rows at borders between dominant axes to
+        second differences beside the borders."""
         axes = dominant_axes()
         self.assertEqual(len(numpy.unique(axes)), 3)
         picture = self.picture(
@@ -56,15 +57,17 @@ class Transitions(program.ProgramTest):
         beside = numpy.roll(border, 5, 1) | numpy.roll(border, -5, 1)
         return bends[border].mean() / bends[beside & ~border].mean()
 
-    def test_clip_shows_lines_where_merge_shows_none(self):
+    def test_clip_shows_lines_and_merge_does_not(self):
         self.assertGreater(self.bends_at_borders("--classify", "pre", "--method", "clip"), 10)
-        # Noise at 20 pixels a voxel: where slices are few their own pattern shows.
+        # The volume is noise at 20 pixels per voxel. With few samples per sheet, the sheets
+        # themselves would be visible.
         for by in ("--classify", "pre"), ("--classify", "post", "--samples-per-sheet", "8"):
             self.assertLess(self.bends_at_borders(*by), 1.5)
             self.assertLess(self.bends_at_borders(*by, "--h", "0.5"), 1.5)
 
     def change_at_45_degrees(self, *method):
-        """How much more a picture changes over a small turn past 45 degrees than by one before."""
+        """Returns the ratio of the picture's change in a small turn across 45 degrees to the change
+        in an equal turn just before."""
         pictures = []
         for degrees in 44.85, 44.95, 45.05:
             a = math.radians(degrees)
@@ -86,7 +89,7 @@ class Transitions(program.ProgramTest):
         before, past = (abs(pictures[i + 1] - pictures[i]).mean() for i in (0, 1))
         return past / before
 
-    def test_axis_pops_where_merge_does_not(self):
+    def test_axis_jumps_and_merge_does_not(self):
         pre = "--classify", "pre"
         self.assertGreater(self.change_at_45_degrees(*pre, "--method", "axis"), 3)
         for h in "0", "0.5", "0.85":

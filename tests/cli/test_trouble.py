@@ -1,5 +1,6 @@
-"""A machine in the way: no rights, a full disk, too little memory, Ctrl-C, a closed standard output.
-One line, exit status 1, and nothing under the final name."""
+"""Tests of faults of the machine: missing rights, a full disk, too little memory, Ctrl-C, a closed
+standard output. Each gives one error line and exit status 1, and leaves no file under the final
+name."""
 import json
 import os
 import pathlib
@@ -35,7 +36,7 @@ class Trouble(program.ProgramTest):
     # Rights
 
     def as_nobody(self, *arguments):
-        """Like fails(1, ...), by a user who may not."""
+        """Like fails(1, ...), as a user without rights."""
         identity = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if ROOT else {}
         try:
             run = program.call("--version", **identity)
@@ -45,7 +46,7 @@ class Trouble(program.ProgramTest):
             self.skipTest("another user cannot run the program where it lies")
         self.fails(1, *arguments, **identity)
 
-    def test_unreadable_input(self):
+    def test_unreadable_input_is_refused(self):
         shutil.copy("small.nrrd", "secret.nrrd")
         shutil.copytree("small.trip", "secret.trip")
         shutil.copytree("small.trip", "part.trip")
@@ -64,14 +65,14 @@ class Trouble(program.ProgramTest):
             os.chmod("secret.trip", 0o755)
             shutil.rmtree(folder)
 
-    def test_folder_that_may_not_be_written(self):
+    def test_a_folder_without_write_permission_is_refused(self):
         os.makedirs("locked", exist_ok=True)
         os.chmod("locked", 0o555)
         self.as_nobody("brick", "small.nrrd", "-o", "locked/out.trip", "-q")
         self.as_nobody("render", "small.trip", "-o", "locked/out.png", "--size", "20x20")
         self.assertEqual(os.listdir("locked"), [])
 
-    def test_messages_name_what_to_do(self):
+    def test_messages_name_the_remedy(self):
         for command in ["brick", "-o", "out.trip"], ["render", "-o", "out.png"], ["serve"]:
             says = "folder, or by a pattern in quotes"
             self.fails(2, *command, "small.nrrd", "cloud.nrrd", says=says)
@@ -81,7 +82,7 @@ class Trouble(program.ProgramTest):
         self.fails(1, "render", "small.trip", "-o", "out.png", "--tf", "bonee", says=says)
         self.assertEqual(leftovers(), [])
 
-    def test_outputs_that_cannot_be(self):
+    def test_impossible_output_paths_are_refused(self):
         for output in (
             "missing/out.trip",
             "small.nrrd/out.trip",
@@ -110,7 +111,7 @@ class Trouble(program.ProgramTest):
     # Disk
 
     def refused(self, *arguments, says):
-        """render, which leaves all files as they are."""
+        """Checks that `render` fails with status 2 and changes no file."""
         def files():
             found = [os.path.join(f, n) for f, _, names in os.walk(".") for n in names]
             return {n: pathlib.Path(n).read_bytes() for n in found
@@ -120,7 +121,7 @@ class Trouble(program.ProgramTest):
         self.fails(2, "render", *arguments, says=says)
         self.assertEqual(files(), before, arguments)
 
-    def test_what_is_read_is_not_replaced(self):
+    def test_input_files_are_not_replaced(self):
         os.makedirs("slices", exist_ok=True)
         volume = program.noise((4, 20, 20))
         for k, image in enumerate(volume):
@@ -159,7 +160,7 @@ class Trouble(program.ProgramTest):
                    says=read)
         self.works("tf", "convert", "grey.tf", "grey.tf", "--force")
 
-    def test_no_two_results_have_one_name(self):
+    def test_two_results_cannot_have_the_same_name(self):
         for arguments in (
             ["-o", "a.exr", "--depth", "a.exr"],
             ["-o", "a.exr", "--depth", "./a.exr"],
@@ -172,7 +173,7 @@ class Trouble(program.ProgramTest):
         self.works("render", "small.trip", "--size", "9x9", "-o", "a.png", "--orbit", "2",
                    "--stats", "a.png")
 
-    def test_full_disk(self):
+    def test_a_full_disk_leaves_no_output(self):
         if not ROOT:
             self.skipTest("only root can mount a small file system")
         os.makedirs("disk", exist_ok=True)
@@ -204,7 +205,7 @@ class Trouble(program.ProgramTest):
         finally:
             subprocess.run(["umount", "disk"], check=True)
 
-    def test_limit_on_file_sizes(self):
+    def test_a_limit_on_file_sizes_leaves_no_output(self):
         def limited():
             resource.setrlimit(resource.RLIMIT_FSIZE, (200000, 200000))
 
@@ -217,7 +218,7 @@ class Trouble(program.ProgramTest):
         self.fails(1, *picture, "--background", "0.3,0.5,0.7", preexec_fn=limited, says="ulimit -f")
         self.assertEqual(leftovers(), [])
 
-    def test_links_and_modes_where_stats_go(self):
+    def test_stats_follow_no_link_and_keep_the_file_mode(self):
         draw = ("render", "small.trip", "-o", "s.png", "--size", "20x20", "--stats", "s.json")
         with open("victim", "w") as f:
             f.write("not to be touched")
@@ -232,7 +233,7 @@ class Trouble(program.ProgramTest):
         self.assertEqual(os.stat("s.json").st_mode & 0o777, 0o600)
         self.assertTrue(os.path.islink("s.json.partial"))
 
-    def test_foreign_file_in_a_data_set_that_is_to_be_replaced(self):
+    def test_a_data_set_with_a_foreign_file_is_not_replaced(self):
         shutil.copytree("small.trip", "out.trip")
         with open("out.trip/notes.txt", "w") as f:
             f.write("mine")
@@ -244,9 +245,9 @@ class Trouble(program.ProgramTest):
         self.assertEqual(leftovers(), ["out.trip"])
         shutil.rmtree("out.trip")
 
-    # Ctrl-C
+    # Pipes and standard output
 
-    def test_a_pipe_that_nobody_writes_to_can_be_interrupted(self):
+    def test_waiting_for_a_pipe_can_be_interrupted(self):
         os.mkfifo("f.tf")
         for arguments in ("brick", "small.nrrd"), ("render", "small.trip"):
             output = "out.trip" if arguments[0] == "brick" else "out.png"
@@ -258,7 +259,7 @@ class Trouble(program.ProgramTest):
             self.assertRegex(err.decode(), r"\Atriptych: [^\n]*interrupted\n\Z")
             self.assertEqual(leftovers(), [])
 
-    def test_a_pipe_is_read_when_it_is_written_to(self):
+    def test_a_pipe_is_read_to_its_end(self):
         os.mkfifo("g.tf")
         process = program.start(
             "render", "small.trip", "-o", "s.png", "--size", "20x20", "--tf", "g.tf"
@@ -271,7 +272,7 @@ class Trouble(program.ProgramTest):
         out, err = process.communicate(timeout=60)
         self.assertEqual((process.returncode, err), (0, b""))
 
-    def test_standard_output_full_or_closed(self):
+    def test_a_full_or_closed_standard_output_is_an_error(self):
         for arguments in (
             ("info", "small.trip"),
             ("info", "--json", "small.trip"),
@@ -286,7 +287,7 @@ class Trouble(program.ProgramTest):
             )
         self.works("info", "--verify", "small2.trip")
 
-    def test_closed_standard_error_does_not_end_in_the_data(self):
+    def test_closed_streams_write_nothing_into_the_data_set(self):
         run = subprocess.run(
             [program.PROGRAM, "brick", "small.nrrd", "-o", "quiet.trip"],
             check=False,
@@ -297,7 +298,7 @@ class Trouble(program.ProgramTest):
 
     # Memory
 
-    def test_too_little_memory(self):
+    def test_too_little_memory_is_one_line(self):
         for size in "1", "1K", "1M", "4M":
             self.fails(1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", size)
         for renderer in "cpu", "reference":
@@ -309,8 +310,8 @@ class Trouble(program.ProgramTest):
         )
         self.assertEqual(leftovers(), [])
 
-    def test_the_memory_that_is_asked_for_is_enough(self):
-        """The message says how much; with that it goes."""
+    def test_the_memory_named_in_the_message_is_enough(self):
+        """The error line names an amount of memory, with which the same command works."""
         run = self.fails(
             1, "brick", "cloud.nrrd", "-o", "out.trip", "-q", "--memory", "5M", "--threads", "2"
         )
@@ -333,7 +334,8 @@ class Trouble(program.ProgramTest):
     # Ctrl-C
 
     def interrupt(self, seconds, signals, *arguments):
-        """As soon as it has taken so many seconds of processors, however long that lasts."""
+        """Sends the signals once the process has used `seconds` of processor time. Returns its exit
+        status and stderr."""
         process = program.start(*arguments)
         program.await_handler(process)
         while process.poll() is None and program.processor_seconds(process) < seconds:
@@ -349,7 +351,8 @@ class Trouble(program.ProgramTest):
         return process.returncode, err.decode()
 
     def check_interrupted(self, signals, *arguments):
-        """At several moments; at least once it must have come before the end."""
+        """Interrupts the command after several amounts of processor time. At least one signal must
+        arrive before the command ends."""
         met = 0
         for seconds in 0, 0.1, 0.2, 0.4, 0.8, 1.6:
             status, err = self.interrupt(seconds, signals, *arguments)
@@ -361,7 +364,7 @@ class Trouble(program.ProgramTest):
             met += 1
         self.assertGreater(met, 0)
 
-    def test_interrupted_bricking(self):
+    def test_interrupted_bricking_leaves_nothing(self):
         for number in signal.SIGINT, signal.SIGTERM:
             self.check_interrupted(
                 [number], "brick", "cloud.nrrd", "-o", "out.trip", "--keep-all", "--threads", "1"
@@ -372,7 +375,7 @@ class Trouble(program.ProgramTest):
         self.assertEqual(leftovers(), ["out.trip"])
         shutil.rmtree("out.trip")
 
-    def test_interrupted_drawing(self):
+    def test_interrupted_drawing_leaves_nothing(self):
         self.check_interrupted(
             [signal.SIGINT],
             "render",

@@ -1,5 +1,6 @@
-"""What a scene or view does not call for is not there: no shader is compiled for it, no byte read,
-no pass run, no instruction taken. Where all effects are on and none matters the picture is the same."""
+"""Tests that a scene pays only for features that it uses. For an unused feature the program
+compiles no shader, reads no byte, runs no pass and executes no instruction. If all effects are on
+but have no effect on the scene, the picture stays the same."""
 import itertools
 import json
 import os
@@ -17,9 +18,9 @@ import instructions
 
 SHADERS = os.path.join(os.environ["TRIP_SOURCE_DIR"], "shaders")
 SIZE = ["--size", "40x40", "--threads", "1"]
-# By define of the shaders: what calls for it, with --classify post and pre where that is another
-# shader. Light is there where nothing is said; "uneven.trip" in the place of options is drawn instead
-# of the even grid.
+# For each define of the shaders: options that need it, with --classify post and also with pre if it
+# uses another shader. Shading is on by default. "uneven.trip" stands for a data set to draw instead
+# of ball.trip.
 CALLED_FOR = {
     "SHADED": [[]],
     "PARALLEL": [["--ortho", "20"], ["--ortho", "20", "--classify", "pre"]],
@@ -45,7 +46,7 @@ class Uncalled(program.ProgramTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        # One voxel of 4096 is hot, and that hardly.
+        # One voxel of 4096 has heat.
         heat = numpy.zeros((16, 16, 16), "u1")
         heat[0, 0, 0] = 255
         program.write_nrrd("ball.nrrd", program.ball((16, 16, 16)))
@@ -57,18 +58,19 @@ class Uncalled(program.ProgramTest):
         cls.brick(cls(), "ball.nrrd", "uneven.trip", "--coordinates", "x.txt,y.txt,z.txt")
         for name, opacity in ("clear", 1e-5), ("solid", 0.5):
             program.write(f"{name}.tf", f"0 .6 .3 .1 {opacity}\n255 .6 .3 .1 {opacity}\n".encode())
-        # Linear in the value, and a little less so.
+        # A transfer function that is linear in the value, and one that is not quite linear.
         program.write("line.tf", b"0 .6 .3 .1 0\n255 .6 .3 .1 .1\n")
         program.write("bent.tf", b"0 .6 .3 .1 0\n128 .61 .3 .1 .0502\n255 .6 .3 .1 .1\n")
 
     def draw(self, *arguments, **options):
-        """The picture's bytes and what is said of it."""
+        """Returns the bytes of the picture and the text on standard output."""
         run = self.works("render", "ball.trip", "-o", "a.exr", *SIZE, *arguments, **options)
         with open("a.exr", "rb") as f:
             return f.read(), run.stdout.decode()
 
     def shaders_without(self, define):
-        """A folder of shaders of which none may be compiled with it."""
+        """Copies the shaders so that any shader compiled with `define` fails. Returns the
+        environment that selects the copy."""
         shutil.rmtree("shaders", ignore_errors=True)
         shutil.copytree(SHADERS, "shaders")
         for name in os.listdir("shaders"):
@@ -79,7 +81,7 @@ class Uncalled(program.ProgramTest):
         return dict(os.environ, TRIPTYCH_SHADER_DIR=os.path.abspath("shaders"))
 
     @unittest.skipIf("GL" in program.SWITCHED_OFF, "built without OpenGL")
-    def test_no_shader_is_compiled_for_it(self):
+    def test_shaders_are_compiled_only_for_features_in_use(self):
         for define, scenes in CALLED_FOR.items():
             environment = self.shaders_without(define)
             for scene in scenes:
@@ -91,8 +93,9 @@ class Uncalled(program.ProgramTest):
                                    env=environment)
                 self.assertIn("uncalled for", run.stderr, (define, scene))
 
-    def test_no_byte_is_read_and_no_pass_is_run_for_it(self):
-        """A measured volume calls for no effect; each that is on reads and runs."""
+    def test_unused_effects_read_nothing_and_run_no_pass(self):
+        """`--effects auto` turns no effect on for a measured volume. Each effect that is on changes
+        the picture; shadows and occlusion read data for a light pass."""
         for renderer, classify in itertools.product(("cpu", *program.GL), ("pre", "post")):
             options = ["--tf", "solid.tf", "--renderer", renderer, "--explain", "--classify", classify]
             plain, said = self.draw(*options)
@@ -107,15 +110,15 @@ class Uncalled(program.ProgramTest):
                 self.assertEqual(bool(re.search(r"(?m)^light .* read in ", said)),
                                  on[0] in ("shadows", "occlusion"), on)
 
-    def test_a_function_is_looked_up_only_where_it_is_not_linear(self):
+    def test_only_nonlinear_transfer_functions_are_looked_up(self):
         for renderer in "cpu", "reference", *program.GL:
             for function, closed in ("line.tf", renderer != "reference"), ("bent.tf", False):
                 run = self.works("render", "ball.trip", "-o", "a.exr", *SIZE, "--renderer", renderer,
                                  "--tf", function, "--classify", "post", "--stats", "-")
                 self.assertEqual(json.loads(run.stdout)["closed_form"], closed, (renderer, function))
 
-    def test_the_kernels_that_draw_are_named(self):
-        """Of grids with uneven spacing those of sheets are plain ones, those of splats the processor's."""
+    def test_the_output_names_the_kernels(self):
+        """For uneven grids, `post` uses plain kernels, and `pre` uses kernels for the processor."""
         def device(data, *options):
             run = self.works("render", data, "-o", "a.exr", *SIZE, "--renderer", "cpu", *options,
                              "--stats", "-")
@@ -126,8 +129,9 @@ class Uncalled(program.ProgramTest):
         _, said = self.draw("--renderer", "cpu", "--kernel", "cubic", "--explain")
         self.assertRegex(said, "(?m)^drawn by    cpu: CPU, plain, 1 thread$")
 
-    def test_where_effects_do_not_matter_all_of_them_change_nothing(self):
-        """Nothing is dense enough to shade or to glow, and what is far has the colour it fades to."""
+    def test_effects_change_nothing_in_faint_fog(self):
+        """The fog is too faint to cast shadows or to glow, and depth cueing fades to its own
+        colour."""
         for renderer in "cpu", "reference", *program.GL:
             for classify in "pre", "post":
                 options = [*SIZE, "--renderer", renderer, "--classify", classify, "--no-shading",
@@ -143,7 +147,7 @@ class Uncalled(program.ProgramTest):
 
     @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
     @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
-    def test_what_a_function_comes_to_is_worked_out_once(self):
+    def test_the_closed_form_is_computed_once_for_all_frames(self):
         found = []
         for frames in 1, 3:
             self.works("--tool=callgrind", "--callgrind-out-file=cost", program.PROGRAM, "render",
@@ -155,8 +159,9 @@ class Uncalled(program.ProgramTest):
 
     @unittest.skipIf(os.environ.get("TRIP_SANITIZE"), "a sanitized program does not run in valgrind")
     @unittest.skipUnless(shutil.which("valgrind"), "no valgrind")
-    def test_no_instruction_is_taken_for_it(self):
-        """Of what draws, exactly; of the whole run little, for the decision."""
+    def test_unused_effects_execute_no_instruction(self):
+        """The drawing functions execute exactly the same instructions. The decision adds less than
+        1 % to the whole run."""
         def cost(effects, *look):
             self.works("--tool=callgrind", "--callgrind-out-file=cost", program.PROGRAM, "render",
                        "ball.trip", "-o", "a.tif", *SIZE, "--renderer", "cpu", "--engine", "pread",

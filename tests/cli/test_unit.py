@@ -1,5 +1,5 @@
-"""The unit of the world changes nothing: a volume with voxels of 2^k and values times 2^m gives the
-same records and the same picture, bit for bit, from brick to image."""
+"""Tests that the unit of world space has no influence. A volume with voxels of 2^k and values times
+2^m gives the same records and the same picture, bit for bit."""
 import numpy
 import program
 
@@ -9,7 +9,7 @@ VOLUME = program.ball((14, 16, 18), dtype="f4")
 
 class Scale(program.ProgramTest):
     def records(self, spacing, factor, *options):
-        """The plane files of a data set, a.trip."""
+        """Bricks the scaled volume. Returns the contents of its plane files."""
         program.write_nrrd("a.nrrd", VOLUME * numpy.float32(factor), spacing=(spacing,) * 3)
         self.brick("a.nrrd", "a.trip", *options)
         contents = []
@@ -19,7 +19,7 @@ class Scale(program.ProgramTest):
         return contents
 
     def test_the_records_are_the_same(self):
-        for given in (False, True):  # a range that is known lets the values be read once
+        for given in (False, True):  # with a given range, the program reads the values once
 
             def records(spacing, factor):
                 limits = f"--range={0.1 * factor!r}:{2.0 * factor!r}"

@@ -1,5 +1,5 @@
-"""Which side is seen, how it is framed, and that the view that is printed is the view that was
-drawn. The volumes are made here, so that what has to be seen where is known."""
+"""Tests of the view options: which side is visible, how it is framed, and that the printed view
+equals the drawn view. The tests make the volumes, so that the expected positions are known."""
 import json
 import math
 import os
@@ -9,12 +9,13 @@ import numpy
 
 import program
 
-# Opaque from 100 on; what is below is not there.
+# Values from 100 on are opaque, all others are transparent.
 FUNCTION = "unit voxel\n99 1 1 1 0\n100 1 1 1 0.9\n255 1 1 1 0.9\n"
 
 
 def ball(size, radius, middle=None):
-    """A solid ball of 200 in a cube of nothing; of its own middle, in voxels."""
+    """Returns a solid ball of value 200 in a cube of zeros. `middle` is its centre in voxels; None
+    selects the centre of the cube."""
     middle = middle or ((size - 1) / 2,) * 3
     k, j, i = numpy.indices((size, size, size))
     r2 = (i - middle[0]) ** 2 + (j - middle[1]) ** 2 + (k - middle[2]) ** 2
@@ -26,7 +27,8 @@ def shown(picture):
 
 
 def spans(picture):
-    """First and last row and column of what shows, as shares of the picture's height and width."""
+    """Returns the first and last visible row and column, as fractions of the picture's height and
+    width."""
     rows, columns = numpy.nonzero(shown(picture))
     height, width = picture.shape[:2]
     return (
@@ -53,7 +55,7 @@ class Views(program.ProgramTest):
         return self.picture(name, "--size", "160x160", "--background", "none", *options)
 
     def camera(self, *options, name="v.trip", size="160x160"):
-        """The options that --stats prints, of the one image or each of an orbit."""
+        """Returns the camera options that --stats prints for each image."""
         run = self.works(
             *("render", name, "-o", "c.exr", "--size", size, "--stats", "-", *options)
         )
@@ -67,32 +69,32 @@ class Views(program.ProgramTest):
                 max(high - low for low, high in spans(picture)), fill, delta=0.05
             )
 
-    def test_what_is_visible_fills_nine_tenths_and_is_in_the_middle(self):
-        # Far from the middle of the volume, among values that the function does not show.
+    def test_the_visible_part_is_centred_and_fills_nine_tenths(self):
+        # The ball is far from the centre of the volume, among values that are transparent.
         volume = ball(64, 14, (44, 18, 40))
         volume[volume == 0] = 50
         self.volume(volume, "--keep-all")
         for options in [], ["--ortho=fit"], ["--view=left"], ["--fov=60"], ["--up=1,2,3"]:
             self.assert_centred(self.draw("--tf=f.tf", *options), 0.9)
 
-    def test_a_wide_picture_is_filled_in_height_and_a_tall_one_in_width(self):
+    def test_the_smaller_side_of_a_picture_is_filled(self):
         self.volume(ball(48, 20))
         for size in "320x100", "100x320":
             picture = self.picture("v.trip", "--size", size, "--background", "none")
             self.assert_centred(picture, 0.9)
 
-    def test_parallel_views_of_a_given_height_look_at_the_middle(self):
+    def test_parallel_views_of_given_height_look_at_the_centre(self):
         self.volume(ball(41, 18))
         picture = self.draw("--ortho=41")
         self.assert_centred(picture, 38 / 41)
         alpha = picture[..., 3]
         for side in alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]:
             self.assertEqual(side.max(), 0)
-        # A ball of radius 1.5 in a volume like those of level sets.
+        # A ball of radius 1.5 world units, with small voxels as in level sets.
         self.volume(ball(64, 30), spacing="0.05,0.05,0.05")
         self.assert_centred(self.draw("--ortho=6"), 0.5)
 
-    def test_from_a_given_eye_the_middle_of_what_is_visible_is_looked_at(self):
+    def test_a_given_eye_looks_at_the_centre_of_the_visible_part(self):
         self.volume(ball(64, 8, (44, 18, 40)))
         camera = self.camera("--eye=200,150,-90")[0]
         look = [float(x) for x in camera[camera.index("--look") + 1].split(",")]
@@ -100,8 +102,8 @@ class Views(program.ProgramTest):
             self.assertAlmostEqual(got, expected, delta=1e-6)
         self.assert_centred(self.draw("--eye=200,150,-90"))
 
-    def test_up_moves_the_eye_too(self):
-        """A stick, whichever way it lies, stands upright for the --up along it."""
+    def test_up_also_moves_the_eye(self):
+        """A stick along any axis stands upright if --up points along it."""
         for axis, up in enumerate(("1,0,0", "0,1,0", "0,0,1")):
             volume = numpy.zeros((48, 48, 48), numpy.uint8)
             place = [slice(20, 28)] * 3
@@ -109,7 +111,7 @@ class Views(program.ProgramTest):
             volume[tuple(place)] = 200
             thick = [slice(16, 32)] * 3
             thick[2 - axis] = slice(34, 44)
-            volume[tuple(thick)] = 200  # the thick end is where the axis points to
+            volume[tuple(thick)] = 200  # the stick is thick at the end to which the axis points
             self.volume(volume)
             for sign in "", "-":
                 picture = self.draw(f"--up={','.join(sign + x for x in up.split(','))}")
@@ -121,15 +123,15 @@ class Views(program.ProgramTest):
                     upper, lower = lower, upper
                 self.assertGreater(upper.sum(), 1.2 * lower.sum(), up)
 
-    def test_views_show_the_side_they_name(self):
-        """A cross of three arms of different lengths about a ball; the front is at low y."""
+    def test_views_show_the_named_side(self):
+        """Draws a ball with three arms of different lengths. The front is at low y."""
         volume = ball(64, 9)
-        volume[30:34, 30:34, 32:62] = 200  # the left: +x
-        volume[30:34, 12:32, 30:34] = 200  # the front
-        volume[32:50, 30:34, 30:34] = 200  # the top
+        volume[30:34, 30:34, 32:62] = 200  # left is +x
+        volume[30:34, 12:32, 30:34] = 200  # front
+        volume[32:50, 30:34, 30:34] = 200  # top
         self.volume(volume)
         left, front, top = 30, 20, 18
-        expected = {  # arms to the right, left, top, bottom of the ball's middle
+        expected = {  # lengths of the arms to the right, left, top and bottom of the ball's centre
             "front": (left, 9, top, 9),
             "back": (9, left, top, 9),
             "left": (9, front, top, 9),
@@ -154,7 +156,7 @@ class Views(program.ProgramTest):
             for have, want in zip(got, arms):
                 self.assertAlmostEqual(have / voxel, want, delta=2.5, msg=f"{view}: {got}")
 
-    def test_the_view_printed_gives_the_same_picture(self):
+    def test_the_printed_view_gives_the_same_picture(self):
         volume = ball(40, 9, (25, 12, 20))
         volume[18:22, 10:14, 2:25] = 150
         self.volume(volume, spacing="0.7,1.1,0.3")
@@ -184,7 +186,7 @@ class Views(program.ProgramTest):
         line = [l for l in run.stdout.decode().splitlines() if l.startswith("camera ")]
         self.assertEqual(line[0].split()[1:], self.camera(size="33x44")[0])
 
-    def test_the_view_depends_on_the_data_and_the_function_only(self):
+    def test_the_view_depends_only_on_data_and_transfer_function(self):
         volume = ball(70, 17, (31, 40, 22))
         volume[volume == 0] = (numpy.arange(volume.size) * 2654435761 % 99)[
             (volume == 0).ravel()
@@ -203,7 +205,7 @@ class Views(program.ProgramTest):
             cameras.add(str(self.camera("--tf=f.tf", "--view=iso", *render)))
         self.assertEqual(len(cameras), 1)
 
-    def test_so_does_that_of_faint_things_framed_by_a_coarse_level(self):
+    def test_a_coarse_level_frames_fog_alike_for_every_layout(self):
         k, j, i = numpy.indices((90, 90, 140))
         r2 = ((i - 69.5) / 69) ** 2 + ((j - 44.5) / 44) ** 2 + ((k - 44.5) / 44) ** 2
         volume = (200 * numpy.clip(1 - r2, 0, 1)).astype(numpy.uint8)
@@ -217,15 +219,15 @@ class Views(program.ProgramTest):
             self.volume(volume, "--tf=fog.tf", *brick)
             cameras.add(str(self.camera("--view=front", *render)))
         self.assertEqual(len(cameras), 1)
-        # Wider than the voxels that a ray loses 1/255 by, and the picture is of what is seen.
+        # The visible part of the fog fills nine tenths of the width.
         alpha = self.draw("--view=front")[..., 3]
         columns = numpy.nonzero((alpha >= 8 / 255).any(axis=0))[0]
         self.assertAlmostEqual((columns.max() + 1 - columns.min()) / 160, 0.9, delta=0.03)
-        # Without coarse levels there is a view too.
+        # A data set without coarse levels also has a default view.
         self.volume(volume, "--tf=fog.tf", "--levels=0")
         self.assertGreater(self.draw("--view=front")[..., 3].max(), 0.1)
 
-    def test_zoom_magnifies_about_the_middle(self):
+    def test_zoom_magnifies_about_the_centre(self):
         self.volume(ball(40, 19))
         for options in [], ["--ortho=fit"]:
             for zoom in 0.5, 0.25:
@@ -237,11 +239,11 @@ class Views(program.ProgramTest):
         self.assertEqual(camera, self.camera("--view=left", "--ortho=50")[0])
         camera = self.camera("--view=front", "--elevation=90", "--ortho=50")[0]
         self.assertEqual(camera, self.camera("--view=top", "--ortho=50")[0])
-        # The default is 30 degrees to the right and 20 up.
+        # The default azimuth is 30 degrees, and the default elevation is 20 degrees.
         camera = self.camera("--view=front", "--azimuth=30", "--elevation=20")[0]
         self.assertEqual(camera, self.camera()[0])
 
-    def test_no_image_of_an_orbit_is_cut_off_and_the_middle_stays(self):
+    def test_no_image_of_an_orbit_is_cut_off_and_the_centre_stays(self):
         volume = numpy.zeros((30, 60, 20), numpy.uint8)
         volume[3:27, 2:58, 2:18] = 200
         self.volume(volume)
@@ -258,7 +260,7 @@ class Views(program.ProgramTest):
                 most = max(most, *(high - low for low, high in spans(picture)))
         self.assertGreater(most, 0.85)
 
-    def test_what_cannot_go_together_is_refused(self):
+    def test_contradictory_options_are_refused(self):
         self.volume(ball(16, 5))
         render = ["render", "v.trip", "-o", "no.png"]
         for options, says in (
@@ -273,7 +275,7 @@ class Views(program.ProgramTest):
         ):
             self.leaves_nothing(2, *render, *options, says=says)
 
-    def test_a_damaged_list_is_found_while_the_view_is_fitted(self):
+    def test_fitting_the_view_finds_a_damaged_list(self):
         self.volume(ball(16, 5), name="d.trip")
         with open("d.trip/z0.voxels", "r+b") as f:
             f.write(b"\xff\xff\xff\xff")

@@ -204,7 +204,7 @@ static void a_cut_file_is_refused_wherever_it_is_cut(void **state)
             assert_fails(&(trip_byte_source){ .path = path,
                                               .encoding = (trip_byte_encoding)e,
                                               .size_bytes = VOXELS },
-                         e == TRIP_BYTES_PLAIN ? "are promised" : "c");
+                         e == TRIP_BYTES_PLAIN ? "are expected" : "c");
         }
     }
 }
@@ -251,9 +251,9 @@ static void bytes_left_over_are_warned_of_once(void **state)
                         0, 5000);
         trip_report_redirect(NULL, NULL);
         assert_int_equal(reports, 1);
-        assert_non_null(strstr(reported, "left over"));
+        assert_non_null(strstr(reported, "after the expected"));
         if (e == TRIP_BYTES_PLAIN)
-            assert_non_null(strstr(reported, "3 bytes are left over"));
+            assert_non_null(strstr(reported, "3 bytes are after the expected"));
     }
 }
 
@@ -266,7 +266,7 @@ static void impossible_offsets_and_sizes_are_refused(void **state)
                  "beyond its end");
     assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, UINT64_MAX, UINT64_MAX, 1, false },
                  "beyond its end");
-    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, COUNT, 0, 1, false }, "are promised");
+    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, COUNT, 0, 1, false }, "are expected");
     trip_byte_stream *s;
     catch_reports();
     assert_int_equal(trip_byte_stream_open(&s, &(trip_byte_source){ .path = path,

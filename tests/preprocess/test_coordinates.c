@@ -130,18 +130,18 @@ static void bad_coordinates_are_refused(void **state)
         { "0 1 2 3", "fewer" },
         { "", "fewer" },
         { "0 1 2 3 5 6", "more" },
-        { "0 1 2 3 3", "neither ascend nor descend" },
-        { "0 1 3 2 5", "neither ascend nor descend" },
-        { "1 1 1 1 1", "neither ascend nor descend" },
-        { "0 1 nan 3 5", "number 3 is none" },
-        { "0 1 inf 3 5", "number 3 is none" },
-        { "-1e308 1 2 3 1.7e308", "neither ascend nor descend" },
+        { "0 1 2 3 3", "they must ascend or descend throughout" },
+        { "0 1 3 2 5", "they must ascend or descend throughout" },
+        { "1 1 1 1 1", "they must ascend or descend throughout" },
+        { "0 1 nan 3 5", "item 3 is not a number" },
+        { "0 1 inf 3 5", "item 3 is not a number" },
+        { "-1e308 1 2 3 1.7e308", "they must ascend or descend throughout" },
         { "0 1e-9 2 3 5", "millionth" },
-        { "0 1 two 3 5", "number 3 is none" },
-        { "0 1 2x 3 5", "number 3 is none" },
+        { "0 1 two 3 5", "item 3 is not a number" },
+        { "0 1 2x 3 5", "item 3 is not a number" },
         { "0 1 2 3 "
           "5000000000000000000000000000000000000000000000000000000000000000000000000",
-          "number 5 is none" },
+          "item 5 is not a number" },
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         refuse(TRIP_ERROR, write_text('x', bad[i].text), "", "", bad[i].why);

@@ -295,7 +295,7 @@ static void numbers_that_no_run_writes_are_refused(void **state)
         { "start cut short", start_cut_short },
         { "checkpoint cut short", checkpoint_cut_short },
     };
-    CHECK_ATTACKS(attacks, "is not what such a run writes", false);
+    CHECK_ATTACKS(attacks, "is invalid; run again", false);
 }
 
 static void sequences_that_no_run_writes_are_refused(void **state)
@@ -322,7 +322,7 @@ static void a_false_tally_of_all_values_is_refused(void **state)
         { "done beyond the end", done_beyond_the_end },
         { "more kept than was read", more_kept_than_read },
     };
-    CHECK_ATTACKS(attacks, "is not what such a run writes", true);
+    CHECK_ATTACKS(attacks, "is invalid; run again", true);
 }
 
 static void another_identity_is_refused(void **state)

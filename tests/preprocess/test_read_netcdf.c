@@ -280,7 +280,7 @@ static void a_scale_that_loses_the_values_is_refused(void **state)
 {
     (void)state;
     const contents c = { .form = 1, .scaled = true, .lost = true, .type = 3 };
-    assert_refused(write_contents("c.nc", &c), "which loses them");
+    assert_refused(write_contents("c.nc", &c), "cannot scale its values by");
 }
 
 /* Four records of 3 x 3 bytes, and of a byte of another variable, if there is one: each part is

@@ -339,7 +339,8 @@ static void hostile_headers_are_refused(void **state)
         for (size_t i = 0; i < sizeof dims / sizeof dims[0]; i++) {
             n = sample_header(version, TRIP_U8, false);
             memcpy(n.dim, dims[i], sizeof dims[i]);
-            assert_refused(write_nifti("dims.nii", &n), i < 3 ? "axes; NIfTI allows 1 to 7" : "has size");
+            assert_refused(write_nifti("dims.nii", &n),
+                           i < 3 ? "axes; NIfTI allows 1 to 7" : "has size");
         }
         static const double offsets[] = { -1, 1, 347, -1e30 };
         for (size_t i = 0; i < sizeof offsets / sizeof offsets[0]; i++) {
@@ -362,7 +363,7 @@ static void hostile_headers_are_refused(void **state)
     assert_refused(write_nifti("huge.nii", &n), "impossible size");
     n.dim[1] = n.dim[2] = INT64_C(1) << 20;
     n.dim[3] = 1;
-    assert_refused(write_nifti("huge.nii", &n), "are promised");
+    assert_refused(write_nifti("huge.nii", &n), "are expected");
     n = sample_header(1, TRIP_U8, false);
     n.slope = 1, n.inter = INFINITY;
     assert_holds_sample(write_nifti("inter.nii", &n), NULL, TRIP_U8);

@@ -264,7 +264,7 @@ static void lengths_that_are_none_can_be_given(void **state)
         float values[VOXELS];
         trip_volume_info info = { .type = TRIP_U8 };
         const char *path = write_with_lines("none.nrrd", none[i].line);
-        assert_refused(path, "; --spacing X,Y,Z gives");
+        assert_refused(path, ": set other lengths with --spacing X,Y,Z");
         assert_int_equal(read_volume(path, &p, 3, values, VOXELS, &info), 0);
         assert_map(&info.index_to_world,
                    (const double[3][4]){ { none[i].x, 0, 0, 0 }, { 0, 3, 0, 0 }, { 0, 0, 4, 0 } });
@@ -288,8 +288,8 @@ static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
     const size_t header = b.count;
     append_volume(&b, TRIP_U16, false);
     assert_holds_sample(write_file("whole.nrrd", &b), NULL, TRIP_U16);
-    assert_refused(write_bytes("cut.nrrd", b.data, b.count - 1), "are promised");
-    assert_refused(write_bytes("cut.nrrd", b.data, header), "are promised");
+    assert_refused(write_bytes("cut.nrrd", b.data, b.count - 1), "are expected");
+    assert_refused(write_bytes("cut.nrrd", b.data, header), "are expected");
     b.count = 0;
     append_text(&b, "a line\n");
     append_volume(&b, TRIP_U16, false);
@@ -297,7 +297,7 @@ static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
     b.count = 0;
     append_header(&b, TRIP_U16, false, "raw",
                   "line skip: 1\nbyte skip: -1\ndata file: lines.raw\n");
-    assert_refused(write_file("lines.nhdr", &b), "are promised");
+    assert_refused(write_file("lines.nhdr", &b), "are expected");
 }
 
 static void spacings_and_directions_become_the_map(void **state)
@@ -401,7 +401,7 @@ static void wrong_fields_are_refused_with_their_line(void **state)
         { "line skip: -1\n", "line 8: \"line skip\"" },
         { "line skip: 1000\n", "lines to skip" },
         { "byte skip: -2\n", "line 8: \"byte skip\"" },
-        { "byte skip: 1\n", "are promised" },
+        { "byte skip: 1\n", "are expected" },
         { "byte skip: 9223372036854775807\n", "beyond its end" },
         { "no colon\n", "line 8: \"no colon\" is neither" },
         { "data file:\n", "line 8: \"data file\" is empty" },
@@ -456,7 +456,7 @@ static void wrong_headers_are_refused(void **state)
           "encoding: raw\n\n",
           "impossibly large" },
         { "NRRD0004\ndimension: 3\nsizes: 99999999999999999999 1 1\ntype: uchar\nencoding: raw\n\n",
-          "are promised" },
+          "are expected" },
         { "NRRD0004\ndimension: 3\nsizes: 4000000000 1000000000 1\ntype: double\nendian: big\n"
           "encoding: raw\n\n",
           "impossible size" },
@@ -667,7 +667,7 @@ static void coordinates_of_axes_are_a_key_and_value(void **state)
                    "must be 5 numbers");
     assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 x 5\n"), "must be 5 numbers");
     assert_refused(write_with_lines("bad.nrrd", "coordinates 0:=1 2 3 4 2\n"),
-                   "neither ascend nor descend");
+                   "they must ascend or descend throughout");
     assert_refused(write_with_lines("bad.nrrd", "coordinates z:=1\n"), "names no axis");
     static const char *const of_tilted[] = { "coordinates 0:=1 2 3 4 9\n",
                                              "coordinates 1:=1 2 3 9\n" };
@@ -675,7 +675,8 @@ static void coordinates_of_axes_are_a_key_and_value(void **state)
         char lines[200];
         snprintf(lines, sizeof lines, "space: RAS\nspace directions: (1,1,0) (0,1,0) (0,0,1)\n%s",
                  of_tilted[i]);
-        assert_refused(write_with_lines("bad.nrrd", lines), "does not lie along that of the world");
+        assert_refused(write_with_lines("bad.nrrd", lines),
+                       "is not parallel to the axis of world space");
     }
 }
 

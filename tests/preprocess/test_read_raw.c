@@ -135,7 +135,7 @@ static void a_file_too_long_is_read_with_a_warning(void **state)
     assert_int_equal(read_volume(path, &sample_size, 3, values, VOXELS, NULL), 0);
     trip_report_redirect(NULL, NULL);
     assert_int_equal(reports, 1);
-    assert_non_null(strstr(reported, "9 bytes are left over"));
+    assert_non_null(strstr(reported, "9 bytes are after the expected"));
 }
 
 static void impossible_sizes_are_refused(void **state)
@@ -156,7 +156,7 @@ static void impossible_sizes_are_refused(void **state)
         assert_refused_as(TRIP_ERROR, path, &p, "impossible size");
     }
     assert_refused_as(TRIP_ERROR, path,
-                      &(trip_volume_params){ .raw_dims = { 1 << 20, 1 << 20, 1 } }, "are promised");
+                      &(trip_volume_params){ .raw_dims = { 1 << 20, 1 << 20, 1 } }, "are expected");
 }
 
 static void a_wrong_type_or_offset_is_refused(void **state)
@@ -172,7 +172,7 @@ static void a_wrong_type_or_offset_is_refused(void **state)
     p.raw_offset_bytes = UINT64_MAX;
     assert_refused_as(TRIP_ERROR, path, &p, "beyond its end");
     p.raw_offset_bytes = 1;
-    assert_refused_as(TRIP_ERROR, path, &p, "are promised");
+    assert_refused_as(TRIP_ERROR, path, &p, "are expected");
 }
 
 int main(void)

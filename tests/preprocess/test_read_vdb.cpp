@@ -378,7 +378,7 @@ void a_grid_is_chosen_by_name_or_is_the_first_scalar_one(void **)
     params.grid = "v";
     expect_line();
     assert_int_equal(Volume(file, params).status, TRIP_ERROR);
-    assert_one_line("no scalar");
+    assert_one_line("not scalars");
 }
 
 openvdb::FloatGrid::Ptr fog_voxel(const char *name, float value)
@@ -405,7 +405,7 @@ void a_choice_among_grids_is_said(void **)
 {
     File file({ fog_voxel("flame", 1), one_voxel("density", 3), one_voxel("heat", 3) });
     Volume v(file);
-    assert_non_null(std::strstr(v.info.note, "\"density\" is taken"));
+    assert_non_null(std::strstr(v.info.note, "\"density\" is used"));
     assert_non_null(std::strstr(v.info.note, ": flame, heat"));
     trip_volume_params params = {};
     params.grid = "heat";
@@ -539,7 +539,7 @@ void what_cannot_be_drawn_is_refused(void **)
     openvdb::FloatGrid::Ptr empty = openvdb::FloatGrid::create(0);
     expect_line();
     assert_int_equal(Volume(File({ empty })).status, TRIP_ERROR);
-    assert_one_line("without any active voxel");
+    assert_one_line("without active voxels");
     openvdb::FloatGrid::Ptr far = one_voxel("far", 1);
     far->tree().setValueOn(Coord(2000000000, 0, 0), 1);
     expect_line();
@@ -547,7 +547,7 @@ void what_cannot_be_drawn_is_refused(void **)
     assert_one_line("2^30");
     expect_line();
     assert_int_equal(Volume(File(openvdb::GridCPtrVec{})).status, TRIP_ERROR);
-    assert_one_line("holds no grid");
+    assert_one_line("contains no grid");
 }
 
 void memory_that_does_not_suffice_is_refused_first(void **)

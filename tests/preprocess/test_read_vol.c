@@ -93,7 +93,7 @@ static void wrong_headers_are_refused(void **state)
         { "X: 5\nY: 4\nVersion: 3\n.\n", "impossible size" },
         { "X: -5\nY: 4\nZ: 7\nVersion: 3\n.\n", "impossible size" },
         { "X: 5\nY: 4\nZ: 99999999999999999999\nVersion: 3\n.\n", "impossible size" },
-        { "X: 5\nY: 4\nZ: 8\nVersion: 3\n.\n", "are promised" },
+        { "X: 5\nY: 4\nZ: 8\nVersion: 3\n.\n", "are expected" },
         { "X: 5x\nY: 4\nZ: 7\nVersion: 3\n.\n", "line 1" },
         { "X: 5\nY: four\nZ: 7\nVersion: 3\n.\n", "line 2" },
         { "X: 5\nY\nZ: 7\nVersion: 3\n.\n", "line 2" },

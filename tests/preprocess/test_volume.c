@@ -291,7 +291,8 @@ static void axes_turn_files_that_lie_along_their_own(void **state)
     append_text(&down, head);
     append_text(&down, "spacings: 1 -2 3\n\n");
     append_volume(&down, TRIP_U8, false);
-    assert_refused_as(TRIP_USAGE, write_file("down.nrrd", &down), &p, "directions of their own");
+    assert_refused_as(TRIP_USAGE, write_file("down.nrrd", &down), &p,
+                      "gives the directions of its axes");
 }
 
 static void options_of_another_format_are_wrong_usage(void **state)
@@ -320,7 +321,7 @@ static void what_cannot_be_opened_is_named(void **state)
     (void)state;
     assert_refused(path_of("missing.nrrd"), "missing.nrrd: cannot open: No such file");
     assert_refused(write_bytes("empty.nrrd", "", 0), "is empty");
-    assert_refused(write_bytes("text.txt", "hello", 5), "neither its content nor its name");
+    assert_refused(write_bytes("text.txt", "hello", 5), "is of no known format");
     assert_refused("/dev/null", "not a regular file");
 }
 

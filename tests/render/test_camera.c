@@ -123,15 +123,15 @@ static void views_that_are_none_are_refused_as_wrong_usage(void **state)
     bad[9].look.y = INFINITY;
     static const char *const why[10] = {
         "look: the point looked at must differ from the eye",
-        "up: is zero or lies along the view",
-        "up: is zero or lies along the view",
+        "up: is zero or parallel to the view direction",
+        "up: is zero or parallel to the view direction",
         "fov: 180 is not between 0 and 180",
         "fov: 0 is not between 0 and 180",
         "size: 0 x ",
-        " x 100000 px is not between",
-        "eye, look, up: not finite",
+        " x 100000 px is out of range",
+        "eye, look, up: a coordinate is not a finite number",
         "ortho height: -1 is not a positive length",
-        "eye, look, up: not finite",
+        "eye, look, up: a coordinate is not a finite number",
     };
     for (int i = 0; i < 10; i++) {
         trip_camera c;

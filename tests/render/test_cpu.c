@@ -219,7 +219,7 @@ static void too_little_memory_is_refused(void **state)
     assert_int_equal(trip_budget_create(&budget, 100000), 0);
     test_catch_reports();
     assert_int_equal(trip_cpu_create(&r, budget, 2), TRIP_ERROR);
-    assert_one_report("does not suffice for 2 threads; raise --memory");
+    assert_one_report("2 threads do not fit the memory given; raise --memory");
     assert_null(r);
     assert_int_equal(trip_budget_left_bytes(budget), 100000);
     trip_budget_destroy(budget);

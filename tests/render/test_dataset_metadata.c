@@ -46,7 +46,7 @@ static void text_that_is_no_object_is_refused(void **state)
         trip_dataset_metadata *t;
         test_catch_reports();
         assert_int_equal(trip_dataset_metadata_parse(&t, &d), TRIP_ERROR);
-        assert_one_report("its text is not a JSON object");
+        assert_one_report("its metadata is not a JSON object");
         assert_null(t);
     }
 }

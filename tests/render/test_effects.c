@@ -1165,7 +1165,7 @@ static void a_renderer_without_effects_refuses_them(void **state)
         settings.effects.cells = TRIP_LIGHT_CELLS;
         test_catch_reports();
         assert_true(trip_frame_begin(&drawing, &plain, reader, &frame) < 0);
-        assert_one_report("draws no effects");
+        assert_one_report("does not draw effects");
         trip_frame_end(&drawing);
     }
     trip_reader_destroy(reader);

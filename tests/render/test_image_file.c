@@ -280,15 +280,16 @@ static void expect_refusal(const char *path, trip_image_depth depth, int status,
 static void wrong_names_and_depths_are_wrong_usage(void **state)
 {
     (void)state;
-    expect_refusal(path_of("a.gif"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "are named .png");
-    expect_refusal(path_of("png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "are named .png");
-    expect_refusal(path_of(".png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "are named .png");
+    expect_refusal(path_of("a.gif"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE,
+                   "unknown picture format");
+    expect_refusal(path_of("png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "unknown picture format");
+    expect_refusal(path_of(".png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_USAGE, "unknown picture format");
     expect_refusal(path_of("a.png"), TRIP_IMAGE_FLOAT, TRIP_USAGE,
-                   "a.png: a .png file cannot hold that kind of number");
+                   "a.png: a .png file cannot hold this number type");
     expect_refusal(path_of("a.jpg"), TRIP_IMAGE_U16, TRIP_USAGE,
-                   "a.jpg: a .jpg file cannot hold that kind of number");
+                   "a.jpg: a .jpg file cannot hold this number type");
     expect_refusal(path_of("a.exr"), TRIP_IMAGE_U8, TRIP_USAGE,
-                   "a.exr: a .exr file cannot hold that kind of number");
+                   "a.exr: a .exr file cannot hold this number type");
 }
 
 static void a_place_that_cannot_be_written_is_a_failure(void **state)

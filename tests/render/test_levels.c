@@ -447,7 +447,7 @@ static void lists_that_do_not_lie_along_level_0_are_refused(void **state)
     assert_int_equal(
         trip_plan_make(&plan, l.drawn.data, &c, &settings, l.drawn.table, l.drawn.budget),
         TRIP_ERROR);
-    assert_one_report("does not lie along that of level 0");
+    assert_one_report("is not parallel to the grid of level 0");
     list->index_to_world = straight;
     list->sheet_first += 1;
     test_catch_reports();

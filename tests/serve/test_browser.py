@@ -1,5 +1,6 @@
-"""The page of `triptych serve` in a browser without a window: Chromium, where there is one. It is
-driven by its protocol for developers, messages of JSON through a pair of pipes."""
+"""Tests of the page of `triptych serve` in Chromium without a window. The tests drive the browser
+by its DevTools protocol: JSON messages through a pair of pipes. Without Chromium they are
+skipped."""
 import json
 import os
 import shutil
@@ -12,7 +13,7 @@ import program
 
 
 class Browser:
-    """One page. Calls wait for their answers."""
+    """A browser with one page. Each call waits for its answer."""
 
     def __init__(self, executable, folder):
         to_browser, commands = os.pipe()
@@ -93,7 +94,7 @@ class InBrowser(program.ProgramTest):
         super().tearDownClass()
 
     def exact(self, than=None):
-        """The picture at rest, as the address of its bytes, another than that one."""
+        """Waits for a full picture at an address other than `than`. Returns the address."""
         fits = "p.complete && p.naturalWidth === innerWidth && p.naturalHeight === innerHeight"
         for _ in range(6000):
             now = self.browser.value(
@@ -117,7 +118,7 @@ class InBrowser(program.ProgramTest):
             returnByValue=True,
         )["result"]["value"]
 
-    def test_each_control_brings_a_picture(self):
+    def test_each_control_changes_the_picture(self):
         before = self.exact()
         self.browser.value("document.getElementById('panel').open = true")
         for query, value in (
@@ -142,7 +143,7 @@ class InBrowser(program.ProgramTest):
         self.browser.value("document.getElementById('panel').open = false")
 
     def ready(self, query):
-        """The control is there, and can be used by now."""
+        """Waits until the control exists, is enabled and is visible."""
         for _ in range(1000):
             if self.browser.value(f"(c => !!c && !c.disabled && !c.parentNode.hidden)"
                                   f"(document.querySelector('{query}'))"):
@@ -151,7 +152,7 @@ class InBrowser(program.ProgramTest):
         raise AssertionError(query)
 
     def shown_effects(self):
-        """Those that are on, and numbers that are to be seen, once the page has been told."""
+        """Returns the checked boxes and the visible numbers of the effects, once there are two."""
         shown = {}
         for _ in range(1000):
             shown = self.browser.value(
@@ -163,7 +164,7 @@ class InBrowser(program.ProgramTest):
             time.sleep(0.01)
         return shown
 
-    def test_drags_wheels_keys_and_functions_change_the_picture(self):
+    def test_each_input_changes_the_picture(self):
         before = self.exact()
         cameras = [self.status()["camera"]]
 
@@ -194,14 +195,14 @@ class InBrowser(program.ProgramTest):
                           modifiers=modifiers)
 
     def sent(self):
-        """The lines of events since the last call, once they have all gone."""
+        """Waits until the page has sent all events. Returns the lines since the last call."""
         for _ in range(1000):
             if self.browser.value("!sending && !events.length"):
                 return self.browser.value("log.splice(0)")
             time.sleep(0.01)
         raise AssertionError("events do not go")
 
-    def test_what_is_held_is_let_go(self):
+    def test_held_keys_and_buttons_are_released(self):
         self.exact()
         self.browser.value("log = []; kept = put; put = line => { log.push(line); kept(line); };")
         self.key("keyDown", "w", "KeyW")
@@ -222,7 +223,7 @@ class InBrowser(program.ProgramTest):
         self.browser.value("put = kept")
         self.exact()
 
-    def test_a_page_that_is_loaded_anew_shows_what_is_drawn_and_warnings(self):
+    def test_a_reloaded_page_shows_current_settings_and_warnings(self):
         before = self.exact()
         chosen = "[document.getElementById('function').value, " \
                  "+document.querySelector('[data-set=opacity]').value]"
@@ -246,7 +247,8 @@ class InBrowser(program.ProgramTest):
                     break
                 time.sleep(0.01)
             self.assertIn("Hounsfield", said)
-        self.browser.value("noted = -NOTE_MS; say('exact')")  # which covers what others point at
+        # the note covers parts of the page that other tests click on
+        self.browser.value("noted = -NOTE_MS; say('exact')")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The viewer in a browser, by requests of HTTP as a browser makes them."""
+"""Tests of `triptych serve` by HTTP requests like those of a browser."""
 import http.client
 import json
 import os
@@ -15,7 +15,7 @@ import program
 
 
 def read_png(data):
-    """Height x width x channels, 8 bits, not interlaced."""
+    """Decodes a PNG with 8 bits per channel, not interlaced, as height x width x channels."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     at, packed = 8, b""
     while at < len(data):
@@ -39,7 +39,7 @@ def read_png(data):
 
 
 def unfilter(kind, line, above):
-    """A row as PNG's filters of these numbers left it."""
+    """Reverses PNG filter `kind` of a row."""
     if kind == 0:
         return line
     if kind == 2:
@@ -87,7 +87,7 @@ class Serve(program.ProgramTest):
         self.server.communicate()
 
     def ask(self, path, method="GET", body=None, headers=None, **arguments):
-        """Status, headers, body."""
+        """Sends a request. Returns status, headers and body."""
         arguments.setdefault("token", self.token)
         query = urllib.parse.urlencode({k: v for k, v in arguments.items() if v is not None})
         connection = http.client.HTTPConnection(self.host, self.port, timeout=60)
@@ -105,7 +105,8 @@ class Serve(program.ProgramTest):
         return json.loads(self.ask("/status")[2])
 
     def whole_picture(self, after=0):
-        """The next one that is whole, its number and the camera it was seen from."""
+        """Waits for the next full picture. Returns the picture, its number and its camera
+        options."""
         while True:
             status, headers, data = self.ask("/picture", after=after)
             self.assertIn(status, (200, 204))
@@ -123,7 +124,7 @@ class Serve(program.ProgramTest):
             expected = read_png(f.read())
         numpy.testing.assert_array_equal(picture[..., :3], expected[..., :3])
 
-    def test_at_rest_the_picture_is_that_of_render(self):
+    def test_the_picture_at_rest_equals_render(self):
         picture, number, camera = self.whole_picture()
         self.assertEqual(picture.shape[:2], (768, 1024))
         self.do("resize 120 90")
@@ -142,7 +143,7 @@ class Serve(program.ProgramTest):
         self.assert_rendered(bone, shown)
         self.assertTrue(self.status()["exact"])
 
-    def test_what_is_set_is_drawn(self):
+    def test_each_setting_is_drawn(self):
         self.do("resize 60 50")
         picture, number, camera = self.whole_picture()
         pre = ["--classify=pre"]
@@ -184,7 +185,7 @@ class Serve(program.ProgramTest):
             "classify": "pre", "method": "merge", "show": "picture", "shading": 0, "h": 0.2, "early_termination": -1})
         self.assertIn("bone", json.loads(self.ask("/presets")[2]))
 
-    def test_a_light_at_a_place_is_drawn_as_the_options_have_it(self):
+    def test_a_point_light_equals_render(self):
         self.do("resize 60 50")
         before, number, camera = self.whole_picture()
         for value in ("30,45,0.7", "30,45,1.2", "30,45,10"):
@@ -195,7 +196,7 @@ class Serve(program.ProgramTest):
             self.assertTrue((picture != before).any(), value)
             before = picture
 
-    def test_effects_are_switched_and_drawn_as_the_options_have_them(self):
+    def test_effects_can_be_switched_and_equal_render(self):
         self.tearDown()
         self.serve("v.trip", "--effects", "auto", "--emission", "heat.trip")
         self.do("resize 60 50")
@@ -226,7 +227,7 @@ class Serve(program.ProgramTest):
         lacking = {e["name"]: e["lacks"] for e in self.status()["switches"] if e["lacks"]}
         self.assertEqual(lacking, {"shadows": "the light is the headlight"})
 
-    def test_heat_glows_as_render_draws_it(self):
+    def test_emission_equals_render(self):
         for renderer in "cpu", *program.GL:
             self.tearDown()
             self.serve("v.trip", "--effects", "emission", "--emission", "heat.trip", "--temperature",
@@ -257,7 +258,7 @@ class Serve(program.ProgramTest):
             time.sleep(0.02)
         self.assertIn("to keep them: triptych brick --tf grey v.nhdr", self.status()["message"])
 
-    def test_nothing_new_is_waited_for(self):
+    def test_a_request_waits_for_a_new_picture(self):
         self.do("resize 40 30")
         while not self.status()["exact"]:
             time.sleep(0.01)
@@ -273,18 +274,18 @@ class Serve(program.ProgramTest):
         answer.read()
         waiting.close()
 
-    def test_the_page_needs_nothing_from_elsewhere(self):
+    def test_the_page_loads_nothing_from_other_hosts(self):
         status, headers, page = self.ask("/")
         self.assertEqual(status, 200)
         self.assertTrue(headers["Content-Type"].startswith("text/html"))
         self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
         self.assertNotIn(b"http", page.replace(b"<!doctype html>", b""))
 
-    def test_what_is_automatic_is_called_so_as_on_the_command_line(self):
+    def test_the_automatic_choice_has_the_name_of_the_option(self):
         _, _, page = self.ask("/")
         self.assertIn(b'<option value="auto">Automatic</option>', page)
 
-    def test_only_this_machine_with_the_token_is_answered(self):
+    def test_only_local_requests_with_the_token_are_answered(self):
         for path in ("/", "/picture", "/status", "/presets", "/nothing"):
             for token in (None, "", "0" * 32, self.token[:-1], self.token.upper() + "x"):
                 self.assertEqual(self.ask(path, token=token)[0], 403, (path, token))
@@ -298,7 +299,7 @@ class Serve(program.ProgramTest):
         self.assertIn(f"0100007F:{self.port:04X}", places)
         self.assertNotIn(f"00000000:{self.port:04X}", places)
 
-    def test_bad_requests_are_refused_and_the_server_goes_on(self):
+    def test_the_server_survives_bad_requests(self):
         before = set(os.listdir("."))
         for body in (
             "screenshot x.png", "picture x.png", "status x.json", "drop v.trip", "close", "wait",
@@ -326,7 +327,7 @@ class Serve(program.ProgramTest):
         self.assertEqual(set(os.listdir(".")), before)
         self.assertIsNone(self.server.poll())
 
-    def test_the_status_has_the_function_and_the_opacity_that_are_drawn(self):
+    def test_the_status_has_the_current_transfer_function_and_opacity(self):
         self.tearDown()
         program.write("own.tf", b"0 0 0 0 0\n255 1 1 1 1\n")
         self.serve("v.trip", "--tf", "own.tf")
@@ -342,7 +343,7 @@ class Serve(program.ProgramTest):
         self.assertEqual(self.ask("/set", "POST", name="opacity", value="0.25")[0], 204)
         self.assertEqual(drawn(), ("own.tf", 0.25))
 
-    def test_what_fails_later_is_a_line_on_stderr(self):
+    def test_a_later_fault_is_a_line_on_stderr(self):
         self.tearDown()
         program.write("short.nrrd", b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\n"
                                     b"encoding: raw\n\nshort")
@@ -354,12 +355,12 @@ class Serve(program.ProgramTest):
         self.assertIn("short.nrrd", line)
         self.assertIsNone(self.server.poll())
 
-    def test_an_interruption_is_its_end(self):
+    def test_an_interrupt_ends_the_server(self):
         self.ask("/picture", after=0)
         self.server.send_signal(signal.SIGINT)
         self.assertEqual(self.server.wait(60), 0)
 
-    def test_a_volume_s_report_is_of_its_data_set(self):
+    def test_a_report_must_measure_the_data_set_of_the_volume(self):
         self.works("brick", "v.nhdr", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
         program.write_report("splats", "usual.trip", classify="pre")
@@ -375,7 +376,7 @@ class Serve(program.ProgramTest):
             if status["failed"]:
                 self.assertIn("the report measured another data set", status["message"])
 
-    def test_what_cannot_be_served_is_said(self):
+    def test_invalid_input_is_refused(self):
         self.fails(1, "serve", "no.trip")
         self.fails(2, "serve")
         self.fails(2, "serve", "v.trip", "--port", "65536")

@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
 """A second, plain reader of NAME.trip, written from stream/FORMAT.md alone.
 
-Checks every checksum and prints one line for every record of every list, in the order of the lists:
+Checks every checksum and prints one line for each record of each list, in the order of the lists:
 
     LIST i j k code [normal gx gy gz]
 
-with the list's axis and, but for voxels of level 0, its level and kind ("x", "z0.halo", "y1.voxels"),
-the code as 16 bits (of means as it stands, with depth and cover), the normal's record in hexadecimal and its gradient in world space (of those
-whose direction alone is kept, of length gradient_full). Everything is read at once: it is for tests
-and for understanding the format, not for large data.
+LIST        the axis ("x") for voxels of level 0, else axis, level and kind ("z0.halo", "y1.means")
+code        the 16-bit code; a code of means includes depth and cover
+normal      the record of the normal, in hexadecimal
+gx gy gz    the gradient in world space; if the record stores the direction only, its length is
+            gradient_full
+
+The reader loads whole files. It serves tests and explains the format; it is not for large data.
 """
 import struct
 import sys
@@ -21,7 +24,7 @@ except ImportError as missing:
     sys.exit(77)
 
 KINDS = (("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values",))
-PACKED = (2, 3)  # kinds whose codes are packed, whatever the header says
+PACKED = (2, 3)  # kinds with packed codes for every value of code_bytes
 VALUES = 3
 
 
@@ -43,7 +46,7 @@ def check_pages(name, data, page_bytes, checksums, start=0):
 
 
 def unpack(layout, data, at):
-    """Named fields, one after the other, and where they end."""
+    """Returns the named fields of a layout, and the offset of their end."""
     fields = {}
     for item in layout.split():
         code, _, name = item.partition(":")
@@ -122,7 +125,7 @@ def morton(u, v):
 
 
 def place(code):
-    """(u, v) of a Morton code."""
+    """Returns (u, v) of a Morton code."""
     u = sum((code >> 2 * bit & 1) << bit for bit in range(8))
     return u, sum((code >> 2 * bit + 1 & 1) << bit for bit in range(8))
 
@@ -175,7 +178,7 @@ def read_plane(folder, index, header, a_list, plane):
 
 
 def group_forms(masks, data):
-    """Of each square, the form of its group; and how many bytes the forms take."""
+    """Returns the form of each square's group, and the number of bytes of all forms."""
     group_of, count, records = [], 0, 32
     for mask in masks:
         if records >= 32:
@@ -187,7 +190,7 @@ def group_forms(masks, data):
 
 
 def packed_codes(name, at, masks, data):
-    """Codes of 16 bits, and where they end."""
+    """Returns the 16-bit codes, and the offset of their end."""
     forms, start = group_forms(masks, data)
     codes = []
     for mask, form in zip(masks, forms):
@@ -202,7 +205,7 @@ def packed_codes(name, at, masks, data):
 
 
 def decode_block(header, kind, name, at, block, count):
-    """(u, v, code) of the records of a block."""
+    """Returns (u, v, code) of each record of a block."""
     words = 4 if header["tile_log2"] == 7 else 1
     present = int.from_bytes(block[: 8 * words], "little")
     squares = [n for n in range(64 * words) if present >> n & 1]
@@ -227,7 +230,7 @@ def decode_block(header, kind, name, at, block, count):
 
 
 def wide_gradients(normals, full):
-    """Rows (gx, gy, gz) of 4-byte normals."""
+    """Returns rows (gx, gy, gz) of 4-byte normals."""
     signed = lambda n: numpy.where(n > 511, n - 1024, n)
     parts = [signed(normals >> 10 * n & 1023) + (normals >> 30 & 1) / 2 for n in range(3)]
     small = numpy.stack(parts, 1) * (full / 511)
@@ -243,7 +246,7 @@ def wide_gradients(normals, full):
 
 
 def narrow_gradients(normals, header):
-    """Rows (gx, gy, gz) of 3-byte normals."""
+    """Returns rows (gx, gy, gz) of 3-byte normals."""
     signed = lambda n: numpy.where(n > 127, n - 256, n)
     step = numpy.array(header["gradient_step"])
     index = numpy.stack(
@@ -260,7 +263,7 @@ def narrow_gradients(normals, header):
 
 
 def read_normals(folder, index, header, a_list):
-    """Records and gradients, or nothing."""
+    """Returns records and gradients, or None twice if the list has no normals."""
     if not a_list["planes"] & 2:
         return None, None
     size = header["normal_bytes"]

@@ -1,5 +1,6 @@
-"""The viewer in a window of a virtual screen (Xvfb), by scripts: what each control does, what it
-survives, and that its picture at rest is that of `triptych render`."""
+"""Tests of `triptych view` on a virtual screen (Xvfb), driven by scripts. They check the effect of
+each control, the faults that the viewer survives, and that its picture at rest equals the picture
+of `triptych render`."""
 import glob
 import json
 import os
@@ -29,7 +30,7 @@ def skip_what_is_missing():
 
 
 class Screen:
-    """A virtual one; Xvfb chooses its number."""
+    """A virtual screen. Xvfb chooses its number."""
 
     def __init__(self):
         read, write = os.pipe()
@@ -57,7 +58,7 @@ class View(program.ProgramTest):
     def setUpClass(cls):
         super().setUpClass()
         cls.screen = Screen()
-        # Without symmetry, so that no two views look the same.
+        # The volume has no symmetry, so that no two views look the same.
         volume = program.noise((24, 20, 28))
         program.write_nrrd("noise.nrrd", volume)
         program.write_nrrd("ball.nrrd", program.ball((24, 24, 24)))
@@ -74,7 +75,7 @@ class View(program.ProgramTest):
         super().tearDownClass()
 
     def view(self, script, *arguments, status=0, fresh=True, size=f"{WIDTH}x{HEIGHT}"):
-        """Plays the script; the lines on stderr."""
+        """Plays the script and returns the lines on stderr."""
         with open("script", "w") as f:
             f.write(script)
         fresh = ["--fresh"] if fresh else []
@@ -92,7 +93,7 @@ class View(program.ProgramTest):
         with open(name) as f:
             return json.load(f)
 
-    def test_at_rest_it_is_the_picture_of_render(self):
+    def test_the_picture_at_rest_equals_render(self):
         for settings in [], ["--classify=pre"]:
             self.view("wait\ndrag left 100 100 160 130 5\nwheel 2\nwait\npicture seen.exr\n"
                       "status status.json\n", "noise.trip", *settings)
@@ -105,7 +106,7 @@ class View(program.ProgramTest):
     GLOWS = ["noise.trip", "--effects=emission,cueing", "--emission=heat.trip",
              "--temperature=500:3000"]
 
-    def test_heat_glows_as_render_draws_it(self):
+    def test_emission_equals_render(self):
         for renderer in "cpu", *program.GL:
             self.view("wait\npicture seen.exr\nstatus status.json\n", *self.GLOWS,
                       f"--renderer={renderer}")
@@ -118,7 +119,7 @@ class View(program.ProgramTest):
             with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
                 self.assertEqual(seen.read(), drawn.read())
 
-    def test_heat_has_controls_and_is_of_its_data_set_alone(self):
+    def test_emission_has_controls_and_belongs_to_one_data_set(self):
         shutil.rmtree("state", ignore_errors=True)
         script = ("wait\npicture 0.exr\nclick 0.5 Emission\nwait\npicture 1.exr\n"
                   "click 0.5 Emission\nclick 0.9 Maximum temperature\nwait\npicture 2.exr\n"
@@ -131,14 +132,14 @@ class View(program.ProgramTest):
         numpy.testing.assert_array_equal(program.read_exr("cold.exr"), cold)
         self.view("wait\npicture ball.exr\n", "ball.trip", "--effects=cueing")
         numpy.testing.assert_array_equal(program.read_exr("ball.exr"), ball)
-        # Kept with the rest, as it was left; and the other has none.
+        # The saved state has the emission of the first data set, and none of the second.
         again, = self.pictures("wait\npicture again.exr\n", ["again"], "noise.trip", fresh=False)
         numpy.testing.assert_array_equal(again, warmer)
         again, = self.pictures("wait\npicture again.exr\n", ["again"], "ball.trip", fresh=False)
         numpy.testing.assert_array_equal(again, ball)
         shutil.rmtree("state")
 
-    def test_heat_that_cannot_be_had_is_said_and_the_rest_is_as_it_was_left(self):
+    def test_unreadable_heat_is_reported_and_other_state_is_restored(self):
         shutil.rmtree("state", ignore_errors=True)
         script = "wait\ndrag left 100 100 160 130 5\nwait\npicture hot.exr\nstatus status.json\n"
         hot, = self.pictures(script, ["hot"], *self.GLOWS, fresh=False)
@@ -170,11 +171,11 @@ class View(program.ProgramTest):
             numpy.testing.assert_array_equal(again, hot)
         shutil.rmtree("state")
 
-    def test_effects_have_controls_that_draw_as_render_does(self):
+    def test_controls_of_effects_draw_the_picture_of_render(self):
         script = "wait\npicture 0.exr\nclick 0.1 Effects\n"
         for i, control in enumerate(("Occlusion", "Depth cueing", "Cueing strength", "Light from the eye",
                                      "Light elevation", "Shadows", "Anisotropy", "Light cells"), 1):
-            at = 0.01 if control == "Light cells" else 0.3  # the volume has few
+            at = 0.01 if control == "Light cells" else 0.3  # the volume has few cells
             script += f"click {at} {control}\nwait\npicture {i}.exr\nstatus {i}.json\n"
         pictures = self.pictures(script, range(9), "noise.trip")
         for i in range(1, 9):
@@ -184,7 +185,7 @@ class View(program.ProgramTest):
             numpy.testing.assert_array_equal(program.read_exr("drawn.exr"), pictures[i])
         self.assertEqual(camera[camera.index("--effects") + 1], "shadows,occlusion,cueing")
 
-    def test_marked_views_are_the_keys_of_a_path(self):
+    def test_marked_views_are_key_frames_of_a_path(self):
         if os.path.exists("noise-001.json"):
             os.remove("noise-001.json")
         self.view("wait\npicture first.exr\nwait\nkey m\ndrag left 100 100 160 130 5\nkey m\n"
@@ -200,7 +201,7 @@ class View(program.ProgramTest):
             with open(f"flown-{frame}.exr", "rb") as a, open(f"{seen}.exr", "rb") as b:
                 self.assertEqual(a.read(), b.read())
 
-    def test_the_window_shows_that_picture(self):
+    def test_the_window_shows_the_picture(self):
         seen, shown = self.pictures("wait\nscreenshot shown.exr\npicture seen.exr\n",
                                     ["seen", "shown"], "noise.trip")
         self.assertEqual(seen.shape, (HEIGHT, WIDTH - PANEL, 4))
@@ -246,7 +247,7 @@ class View(program.ProgramTest):
             f"{text}\nwait\npicture {i + 1}.exr\n" for i, text in enumerate(controls))
         self.each_changes(script, controls, "noise.trip", unchanged=unchanged)
 
-    def test_what_is_cut_is_copied_kept_and_marked(self):
+    def test_clipping_is_copied_restored_and_marked(self):
         self.view("wait\nclick 0.5 Clipping\nclick 0.5 Clip the data\nclick 0.5 Clip box\n"
                   "click 0.4 i min\nclick 0.6 k max\nclick 0.5 Add plane\nclick 0.55 Plane 1\n"
                   "drag left 100 100 160 130 5\nwait\npicture cut.exr\nstatus status.json\n",
@@ -274,7 +275,7 @@ class View(program.ProgramTest):
             changes = before.shape != after.shape or (before != after).any()
             self.assertEqual(changes, name not in unchanged, name)
 
-    def test_what_the_command_line_cuts_is_cut(self):
+    def test_clipping_options_apply(self):
         cut = ["--clip-box=voxels:4,4,4,20,15,20", "--clip-plane=1,0.5,0,-6"]
         self.view("wait\npicture whole.exr\nwait\n", "noise.trip")
         self.view("wait\npicture cut.exr\nstatus status.json\n", "noise.trip", *cut)
@@ -288,7 +289,7 @@ class View(program.ProgramTest):
         self.assertEqual(pictures[0], pictures[1])
         self.assertNotEqual(pictures[0], pictures[2])
 
-    def test_marks_change_the_window_and_not_the_picture(self):
+    def test_annotations_change_the_window_but_not_the_picture(self):
         marks = ["Box", "Axes", "Scale bar", "Keys"]
         script = "wait\nclick 0.5 Fit\nmove 10 10\nwait\npicture p.exr\nscreenshot 0.exr\n" + "".join(
             f"click 0.5 {name}\nmove 10 10\nsleep 50\nscreenshot {i + 1}.exr\n"
@@ -299,13 +300,13 @@ class View(program.ProgramTest):
             self.assertTrue((before[left] != after[left]).any(), name)
         self.assertTrue((program.read_exr("p.exr") == program.read_exr("q.exr")).all())
 
-    def test_the_panel_comes_and_goes(self):
+    def test_a_key_hides_the_panel(self):
         with_panel, without = self.pictures(
             "wait\npicture with.exr\nkey t\nwait\npicture without.exr\n", ["with", "without"],
             "ball.trip")
         self.assertEqual(with_panel.shape[1] + PANEL, without.shape[1])
 
-    def test_resized_minimised_and_at_twice_the_scale(self):
+    def test_windows_can_be_resized_minimised_and_scaled(self):
         sizes = [(500, 300), (90, 60), (900, 500)]
         script = "wait\n" + "".join(
             f"resize {w} {h}\nwait\nscreenshot {w}.exr\n" for w, h in sizes)
@@ -316,7 +317,7 @@ class View(program.ProgramTest):
         self.view("wait\npicture large.exr\n", "ball.trip", "--scale=2", size="1350x300")
         self.assertEqual(program.read_exr("large.exr").shape[1], 1350 - 2 * PANEL)
 
-    def test_what_was_seen_last_is_seen_again(self):
+    def test_the_last_view_is_restored(self):
         self.view("wait\nkey 2\nwait\nclick 0.5 Preset\nclick 0.5 bone\nwait\npicture last.exr\n",
                   "noise.trip", fresh=False)
         self.view("wait\npicture again.exr\n", "noise.trip", fresh=False)
@@ -325,7 +326,7 @@ class View(program.ProgramTest):
         self.assertTrue((last == again).all())
         self.assertTrue((last != anew).any())
 
-    def test_several_data_sets(self):
+    def test_tab_switches_between_data_sets(self):
         script = ("wait\npicture a.exr\nkey tab\nwait\npicture b.exr\nkey tab\nwait\npicture c.exr\n"
                   f"drop {os.path.abspath('ball.trip')}\nwait\nstatus status.json\n")
         a, b, c = self.pictures(script, "abc", "noise.trip", "ball.trip")
@@ -340,7 +341,7 @@ class View(program.ProgramTest):
                    "--background=0,0,0")
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
-    def test_a_volume_s_report_is_of_its_data_set(self):
+    def test_a_report_must_measure_the_data_set_of_the_volume(self):
         self.works("brick", "ball.nrrd", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
         program.write_report("splats", "usual.trip", classify="pre")
@@ -350,12 +351,12 @@ class View(program.ProgramTest):
                       "key tab\nwait\nstatus status.json\n",
                       "ball.nrrd", "--error=255", f"--report={report}")
             status = self.status()
-            self.assertTrue(self.status(report + ".json")["exact"])  # the report is not for it
+            self.assertTrue(self.status(report + ".json")["exact"])  # the report is not of this data set
             self.assertEqual(status["failed"], report == "other", status)
             if status["failed"]:
                 self.assertIn("the report measured another data set", status["message"])
 
-    def test_a_large_volume_is_shown_by_samples_until_it_is_bricked(self):
+    def test_a_large_volume_is_previewed_while_it_is_bricked(self):
         program.write_nrrd("large.nrrd", program.ball((204, 204, 204), radius=0.5))
         self.view("wait\npicture seen.exr\nwait\nstatus status.json\n", "large.nrrd")
         self.works("render", "large.nrrd", *shlex.split(self.status()["camera"]), "-o", "drawn.exr",
@@ -363,10 +364,10 @@ class View(program.ProgramTest):
         with open("seen.exr", "rb") as a, open("drawn.exr", "rb") as b:
             self.assertEqual(a.read(), b.read())
         self.assertEqual(self.status()["dims"], [204, 204, 204])
-        # The samples are in the cache, too.
+        # The cache also holds the preview.
         self.assertEqual(self.works("cache", "list").stdout.count(b"large"), 2)
 
-    def test_values_that_were_not_kept_are_bricked_again(self):
+    def test_a_button_bricks_again_with_all_voxels(self):
         self.works("brick", "noise.nrrd", "-o", "part.trip", "--range=200:255")
         self.view("wait\npicture before.exr\nclick 0.5 Brick again with all voxels\nwait\n"
                   "picture after.exr\nstatus status.json\n", "part.trip", "--tf=grey")
@@ -376,14 +377,14 @@ class View(program.ProgramTest):
         before, after, everything = (program.read_exr(f"{n}.exr") for n in ("before", "after", "all"))
         self.assertTrue((before != after).any())
         self.assertTrue((after == everything).all())
-        # Its volume is no longer beside it.
+        # The volume is not beside a copy of the data set.
         os.mkdir("elsewhere")
         shutil.copytree("part.trip", "elsewhere/part.trip")
         self.view("wait\nclick 0.5 Brick again with all voxels\nwait\nscreenshot alone.exr\n"
                   "status status.json\n", "elsewhere/part.trip", "--tf=grey")
         self.assertTrue(self.status()["exact"], self.status())
 
-    def test_trouble_is_a_message_in_the_window(self):
+    def test_faults_appear_as_a_message_in_the_window(self):
         shutil.copytree("noise.trip", "damaged.trip")
         for name in os.listdir("damaged.trip"):
             if name.endswith(".voxels"):
@@ -402,8 +403,8 @@ class View(program.ProgramTest):
         self.assertTrue(missing["failed"] and "/nowhere/at-all.trip" in missing["message"], missing)
         self.assertTrue(good["exact"] and not good["failed"], good)
 
-    def test_a_data_set_that_goes_away(self):
-        # The viewer waits where it opens a pipe until this does, too.
+    def test_a_data_set_can_be_removed_while_it_is_open(self):
+        # The viewer waits at each pipe until this test opens it.
         shutil.copytree("noise.trip", "gone.trip")
         for pipe in "shown", "go":
             os.mkfifo(pipe)
@@ -420,14 +421,14 @@ class View(program.ProgramTest):
         after = self.status("after.json")
         self.assertTrue(after["failed"] and "gone.trip" in after["message"], after)
 
-    def test_random_events_leave_it_alive(self):
+    def test_the_viewer_survives_random_events(self):
         count = 150 * ROUNDS
         self.view(f"wait\nrandom {count} 1\nwait\nresize 600 400\nwait\nstatus status.json\n"
                   "key 0\nwait\nscreenshot s.exr\n", "noise.trip", "ball.trip", size="500x300")
         status = self.status()
         self.assertTrue(status["exact"] or status["documents"] == 0, status)
 
-    def test_command_lines_that_are_refused(self):
+    def test_invalid_command_lines_are_refused(self):
         no_display = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
         self.fails(1, "view", "noise.trip", says="display", env=no_display)
         self.fails(1, "view", "missing.trip", says="missing.trip", env=self.screen.environment)
@@ -456,7 +457,7 @@ class View(program.ProgramTest):
                        says="nope" if "--tf=nope" in arguments else "README.md",
                        env=self.screen.environment)
 
-    def test_a_script_replaces_nothing_that_is_shown(self):
+    def test_a_script_cannot_replace_an_open_file(self):
         with open("noise.nrrd", "rb") as f:
             before = f.read()
         for inputs, output in (["noise.nrrd"], "noise.nrrd"), (["noise.trip"], "noise.trip/x.png"):
@@ -468,7 +469,7 @@ class View(program.ProgramTest):
             self.assertEqual(f.read(), before)
         self.assertFalse(os.path.exists("noise.trip/x.png"))
 
-    def test_files_that_cannot_be_written_end_a_script_with_a_line(self):
+    def test_a_file_that_cannot_be_written_ends_a_script(self):
         for event in "screenshot", "picture", "status":
             said = self.view(f"wait\n{event} missing/x.png\nstatus never.json\n", "noise.trip",
                              status=1)
@@ -476,7 +477,7 @@ class View(program.ProgramTest):
             self.assertIn("missing/x.png", said)
             self.assertFalse(os.path.exists("never.json"))
 
-    def test_a_signal_ends_it(self):
+    def test_a_signal_ends_the_viewer(self):
         os.mkfifo("here")
         with open("script", "w") as f:
             f.write("wait\nstatus here\nsleep 600000\n")

@@ -111,12 +111,12 @@ static void reaching(const trip_cpu_view *view, const trip_cpu_reach *reach,
     perspective persp = perspective_of(view);
     for (uint32_t i = 0; i < count; i += V) {
         position(view, staged, i, lanes);
-        vm defaults = view->splat.camera.ortho
+        vm precise = view->splat.camera.ortho
                           ? v_ge(v_load(lanes->z + i), v_set(view->near))
-                          : footprint_of(&persp, view, lanes, NULL, i).defaults;
+                          : footprint_of(&persp, view, lanes, NULL, i).precise;
         unsigned front = vm_bits(vm_first(count - i)) &
                          ~vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
-        unsigned by_lanes = view->coordinates ? 0 : vm_bits(defaults);
+        unsigned by_lanes = view->coordinates ? 0 : vm_bits(precise);
         lanes->kept[i / V] = front & by_lanes;
         lanes->scalar[i / V] = front & ~by_lanes;
         if (reach->bounded)

@@ -83,11 +83,11 @@ INLINE vd_pair centres(int first, const float offsets[V])
 
 /* Rays through the pixels of a stamp, and 1 / (largest magnitude) of each ray. The inverse is one
  * Newton step from the single-precision quotient. Its relative error is at most 2^-45 in lanes of
- * `defaults`, where the magnitude is in a safe range. */
+ * `safe`, where the magnitude is in a safe range. */
 typedef struct pixel_rays {
     rays lo, hi;
     vd_pair inverse;
-    vm defaults;
+    vm safe;
 } pixel_rays;
 
 typedef struct pixel_centres {
@@ -132,7 +132,7 @@ INLINE vf weight(const trip_cpu_view *view, int axis, const pixel_rays *r)
         const vd off = vd_set(slack);
         vf below = v_max(v_narrow(lo - off, hi - off), v_set(0));
         vf above = v_max(v_narrow(lo + off, hi + off), v_set(0));
-        if (vm_all(vm_and(r->defaults, v_ge(below, above))))
+        if (vm_all(vm_and(r->safe, v_ge(below, above))))
             return below;
     }
     return v_narrow(weight_half(view, s, axis, &r->lo), weight_half(view, s, axis, &r->hi));

@@ -325,7 +325,7 @@ typedef struct footprint {
     vf l11, l21, l22; /* as in trip_cpu_splat */
     vf det_ratio;     /* |S| / |S'|; for affine splats, times the squared stretch */
     vf shift_x, shift_y, half_x, half_y; /* bounds of the support about the centre */
-    vm defaults; /* lanes with sufficient precision; all others are projected one by one */
+    vm precise; /* lanes with sufficient precision; all others are projected one by one */
 } footprint;
 
 /* Constants of a perspective view as floats. Rays are relative to the image's middle. The pixel
@@ -514,9 +514,9 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
      * k^2 / |r_c|^2 times `trace`. The test requires twice the value that makes E positive
      * definite. Then |v - eye|^2 exceeds 4 R^2 and R^2 + radius^2 of splat.h, so no near splat
      * passes. NaN fails the test. */
-    out.defaults = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
+    out.precise = vm_and(v_ge(rr_u, trace * p->near), v_ge(v_set(FARTHEST), u));
     if (p->affine) {
-        out.defaults = vm_and(out.defaults, exact);
+        out.precise = vm_and(out.precise, exact);
         bound_affine(&out, sxx, syy, v_set((float)f->cutoff2) / u);
         if (p->uneven)
             out.det_ratio =
@@ -528,8 +528,8 @@ INLINE footprint footprint_of(const perspective *p, const trip_cpu_view *view,
        eyy = v_fnma(t_step, p->YY, sxx * inverse_det);
     vf exy = v_fnma(t_step, p->XY, -sxy * inverse_det);
     if (p->uneven)
-        out.defaults =
-            vm_and(vm_and(out.defaults, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
+        out.precise =
+            vm_and(vm_and(out.precise, exact), is_exact(v_fnma(exy, exy, exx * eyy), exx * eyy));
     bound(&out, exx, exy, eyy, t * rx, t * ry, t * rr * p->inverse_step);
     return out;
 }
@@ -976,11 +976,11 @@ INLINE uint32_t project_as(bool common, bool uneven, const trip_cpu_view *view,
         if (!ortho)
             f = footprint_of(&persp, view, lanes, flattens ? &flat : NULL, i);
         else
-            f.defaults = v_ge(v_load(lanes->z + i), v_set(view->near));
+            f.precise = v_ge(v_load(lanes->z + i), v_set(view->near));
         unsigned valid = vm_bits(vm_first(count - i));
         unsigned behind = vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
-        unsigned defaults = view->coordinates ? 0 : vm_bits(f.defaults);
-        unsigned scalar = valid & ~behind & ~defaults;
+        unsigned precise = view->coordinates ? 0 : vm_bits(f.precise);
+        unsigned scalar = valid & ~behind & ~precise;
         vf entry[4];
         v_load_rows(&trip_cpu_rows(view)->r, staged->code + i, entry);
         unsigned kept = complete(view, &f, entry[3], lanes, i) & valid & ~scalar;
