@@ -1,5 +1,5 @@
 #!/bin/sh
-# Sets up, builds everything with warnings as errors, and passes the tests.
+# Installs missing packages, builds everything with warnings as errors, and runs the tests.
 set -eu
 cd "$(dirname "$0")"
 

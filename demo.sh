@@ -1,5 +1,5 @@
 #!/bin/sh
-# Sets up, builds, draws an included volume, and says where the picture is.
+# Installs missing packages, builds, draws an included volume, and prints the path of the picture.
 set -eu
 cd "$(dirname "$0")"
 

@@ -1,5 +1,5 @@
-# Builds for 64-bit ARM on another machine, against the packages that scripts/arm64.sh unpacks, and
-# lets ctest run what was built in qemu.
+# Cross-compiles for 64-bit ARM with the packages that scripts/arm64.sh unpacks. ctest runs the
+# programs in qemu.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)

@@ -1,4 +1,4 @@
-# Libraries, all from Debian; scripts/install-dependencies.sh installs them.
+# Finds the libraries. All come from Debian; scripts/install-dependencies.sh installs them.
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
 find_package(ZLIB REQUIRED)
@@ -24,12 +24,12 @@ endif()
 pkg_check_modules(URING REQUIRED IMPORTED_TARGET liburing)
 pkg_check_modules(SECCOMP REQUIRED IMPORTED_TARGET libseccomp)
 pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
-# Not find_package: its CMake files want OpenCV headers that nothing here uses.
+# find_package() is not used, since OpenImageIO's CMake files require unneeded OpenCV headers.
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 if(TRIP_NETCDF)
     pkg_check_modules(NETCDF IMPORTED_TARGET netcdf)
     if(NOT NETCDF_FOUND)
-        message(STATUS "libnetcdf is not there: netCDF-4 is not read")
+        message(STATUS "libnetcdf is missing: building without netCDF-4")
         set(TRIP_NETCDF OFF)
     endif()
 endif()
@@ -37,7 +37,7 @@ if(TRIP_OPENVDB)
     list(APPEND CMAKE_MODULE_PATH /usr/lib/x86_64-linux-gnu/cmake/OpenVDB /usr/lib/aarch64-linux-gnu/cmake/OpenVDB)
     find_package(OpenVDB REQUIRED)
 endif()
-# Debian's own Python, for the plain second reader and the independent counts used by the tests.
+# Debian's own Python runs the plain second reader and the independent counts of the tests.
 find_program(TRIP_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)
 # Debian's libnifti2-dev has neither pkg-config nor CMake files.
 find_path(NIFTI_INCLUDE_DIR nifti2_io.h PATH_SUFFIXES nifti REQUIRED)
@@ -45,7 +45,7 @@ find_library(NIFTI_LIBRARY nifti2 REQUIRED)
 add_library(trip_nifti INTERFACE)
 target_include_directories(trip_nifti SYSTEM INTERFACE ${NIFTI_INCLUDE_DIR})
 target_link_libraries(trip_nifti INTERFACE ${NIFTI_LIBRARY})
-# Only what reads files; Debian's dcmtk.pc names every library of the toolkit.
+# Links only the libraries that read files; Debian's dcmtk.pc names every library of the toolkit.
 find_path(DCMTK_INCLUDE_DIR dcmtk/dcmdata/dctk.h REQUIRED)
 add_library(trip_dcmtk INTERFACE)
 target_include_directories(trip_dcmtk SYSTEM INTERFACE ${DCMTK_INCLUDE_DIR})

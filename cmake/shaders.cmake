@@ -1,6 +1,6 @@
-# Embeds shaders, and headers that C and GLSL share, into the binary: generates shader_text.c, an
-# array of names and texts, which the folder's shader_text.h declares. Included by its
-# CMakeLists.txt; runs itself as a script at build time when a shader has changed.
+# Embeds shaders, and headers shared by C and GLSL, into the binary. Generates shader_text.c, an
+# array of names and texts that HEADER declares. A CMakeLists.txt includes this file. At build time,
+# this file runs as a script when a shader has changed.
 if(CMAKE_SCRIPT_MODE_FILE)
     set(code "#include \"${TRIP_SHADER_HEADER}\"\n\n")
     set(table "")
@@ -18,8 +18,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
     return()
 endif()
 
-# trip_embed_shaders(TARGET PREFIX HEADER FILES...): adds the generated source to the target;
-# PREFIX_shader_texts is the array, which HEADER declares.
+# trip_embed_shaders(TARGET PREFIX HEADER FILES...): adds the generated source to the target. HEADER
+# declares the array PREFIX_shader_texts.
 function(trip_embed_shaders target prefix header)
     set(files ${ARGN})
     set(output ${CMAKE_CURRENT_BINARY_DIR}/shader_text.c)

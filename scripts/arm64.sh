@@ -1,14 +1,15 @@
 #!/bin/sh
-# Builds for 64-bit ARM on another machine and passes the CPU renderer's tests in qemu, NEON's
-# kernels among them: minutes. Options go to ctest in place of the choice of those tests; where a
-# test starts a program, the kernel has to start qemu for it (binfmt_misc) and QEMU_LD_PREFIX name the
-# unpacked packages, build/arm64-sysroot.
+# Cross-compiles for 64-bit ARM and runs the CPU renderer's tests in qemu, including the NEON
+# kernels. This takes minutes. Options replace the default choice of tests and go to ctest. Tests
+# that start a program need binfmt_misc, so that Linux starts qemu for the program, and
+# QEMU_LD_PREFIX with the path of build/arm64-sysroot.
 set -eu
 cd "$(dirname "$0")/.."
 
 scripts/install-dependencies.sh --tests --arm64
 
-# ARM's libraries, unpacked and not installed, so that this machine's packages stay as they are.
+# Unpacks ARM's libraries instead of installing them, so that this machine's packages stay
+# unchanged.
 libraries=$(scripts/install-dependencies.sh --libraries)
 release=$(. /etc/os-release && echo "$VERSION_CODENAME")
 root=$(pwd)/build/arm64-sysroot
@@ -20,7 +21,7 @@ if [ "$(cat "$root/packages" 2>/dev/null)" != "$release $libraries" ]; then
     mmdebstrap --quiet --mode=chrootless --variant=extract --arch=arm64 --include="libc6-dev $libraries" \
         --setup-hook='mkdir -p "$1/usr/lib" && ln -s usr/lib "$1/lib"' \
         "$release" "$root" "$mirror"
-    # What would be installed with them: links that do not leave the folder, and the alternatives.
+    # Makes the links that an installation would make: relative links, and the alternatives.
     find "$root/usr/lib" -lname '/*' | while read -r link; do
         ln -sfnr "$root$(readlink "$link")" "$link"
     done

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Passes the tests of the CPU renderer's kernels, those for AVX-512 among them, on a processor
-# without it: SIMDe's functions do what the instructions would. Minutes. Options go to ctest in
-# place of the choice of those tests.
+# Runs the tests of the CPU renderer's kernels, including the AVX-512 kernels, on a processor
+# without AVX-512. SIMDe emulates the instructions. This takes minutes. Options replace the default
+# choice of tests and go to ctest.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -1,13 +1,15 @@
 #!/bin/sh
-# Installs the Debian packages Triptych is built from, when any is missing. Works as root or with
-# sudo; needs no input and uses no network when everything is there already.
+# Installs missing Debian packages that Triptych's build needs. Works as root or with sudo. Needs no
+# input, and no network if all packages are installed.
 #
 #   scripts/install-dependencies.sh [--tests] [--compare] [--arm64] [--avx512]
 #   scripts/install-dependencies.sh --libraries
 #
-# --tests adds what the tests use, --compare the programs that the benchmark compares with, --arm64
-# and --avx512 what scripts/arm64.sh and avx512.sh need. --libraries installs nothing and names the libraries that the program
-# and its tests are linked with.
+#   --tests      adds the packages of the tests
+#   --compare    adds the programs that the benchmark compares with
+#   --arm64      adds the packages of scripts/arm64.sh
+#   --avx512     adds the packages of scripts/avx512.sh
+#   --libraries  installs nothing; prints the libraries that the program and its tests link with
 set -eu
 
 libraries="libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev libglfw3-dev

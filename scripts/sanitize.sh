@@ -1,11 +1,14 @@
 #!/bin/sh
-# The tests, and every fuzzer over its corpus for a few seconds (TRIP_FUZZ_SECONDS each, default 5),
-# under AddressSanitizer with UBSan, and those in which threads meet under ThreadSanitizer. What is
-# left out of the first, and why, is in tests/CMakeLists.txt; of the second, OpenVDB and GL, which
-# none of its tests use. The first runs with intercept_tls_get_addr=0 (CMakePresets.json): otherwise
-# the search for leaks takes the place of a library's thread-local data from a header that glibc no
-# longer writes, and now and then reads at a wild address. The second runs with die_after_fork=0:
-# some tests start the bricker's threads in a forked child, to kill it.
+# Runs the tests and the fuzzers with sanitizers, in two builds.
+#
+# AddressSanitizer with UBSan: the tests, and each fuzzer for TRIP_FUZZ_SECONDS (default 5) from its
+# corpus. tests/CMakeLists.txt lists the tests left out, with reasons. intercept_tls_get_addr=0
+# (CMakePresets.json) avoids crashes: the leak search would read the address of a library's
+# thread-local data from a header that glibc no longer writes.
+#
+# ThreadSanitizer: the tests with several threads, without OpenVDB and GL, which these tests do not
+# use. die_after_fork=0 is needed, since some tests start the bricker's threads in a forked child to
+# kill it.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -1,14 +1,14 @@
 #!/bin/sh
-# Builds the program without the GL renderer, without OpenVDB and libnetcdf, and without all, and sees that each
-# says its version, describes a data set and draws it, and that each refuses what it lacks with a
-# line. Takes as long as three builds.
+# Builds the program three times: without the GL renderer, without OpenVDB and libnetcdf, and
+# without all of them. Checks that each build prints its version, bricks a volume, and describes and
+# draws the data set. Checks that each build refuses requests for missing parts with one line.
 set -eu
 cd "$(dirname "$0")/.."
 mkdir -p build
 
 fail() { echo "without: $*" >&2; exit 1; }
 
-# Ends with a status, not a signal, and says what is missing.
+# Checks that a command fails with an exit status, not a signal, and names the missing part.
 refuses() { # LINE COMMAND...
     line=$1
     shift

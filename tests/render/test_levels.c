@@ -454,7 +454,7 @@ static void lists_that_do_not_lie_along_level_0_are_refused(void **state)
     assert_int_equal(
         trip_plan_make(&plan, l.drawn.data, &c, &settings, l.drawn.table, l.drawn.budget),
         TRIP_ERROR);
-    assert_one_report("its sheets lie elsewhere");
+    assert_one_report("its sheet coordinates contradict");
     destroy(&l);
 }
 
