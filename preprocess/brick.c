@@ -252,21 +252,19 @@ static int check_tally(brick *b)
     if (t->voxels == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input, "has no active voxels");
     if (t->finite == 0)
-        return trip_fail(TRIP_ERROR, "brick", b->params->input, "holds no finite value");
+        return trip_fail(TRIP_ERROR, "brick", b->params->input, "has no finite values");
     if (t->finite < t->voxels)
-        trip_warn(b->params->input, "%llu values that are not finite are taken as not there",
+        trip_warn(b->params->input, "%llu values are not finite and count as absent",
                   (unsigned long long)(t->voxels - t->finite));
     if (b->summary->kept == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input,
                          "no voxel is visible: the values are from %g to %g, and the transfer "
-                         "functions and ranges show none of them%s",
+                         "functions and ranges show none of these%s",
                          t->value_min, t->value_max,
                          trip_region_is_whole(&b->params->region) ? "" : " in the region");
     if (t->value_min == t->value_max)
-        trip_warn(
-            b->params->input,
-            "every voxel there is has the value %g: there is nothing to see but their outline",
-            t->value_min);
+        trip_warn(b->params->input, "every voxel has the value %g, so only the outline is visible",
+                  t->value_min);
     /* Values kept for other transfer functions than the automatic one are drawn by those; drawing
      * warns about them. */
     for (size_t i = 0; i < b->params->function_count && !b->params->automatic; i++)
@@ -366,8 +364,8 @@ static int fail_count(const brick *b, const char *subject, uint64_t counted, uin
 {
     return trip_fail(TRIP_ERROR, "brick", b->params->output,
                      "%" PRIu64 " %s were counted and %" PRIu64
-                     " written: what the interrupted run left is damaged, without --resume it "
-                     "starts again",
+                     " written: the files of the interrupted run are damaged; run again without "
+                     "--resume",
                      counted, subject, written);
 }
 

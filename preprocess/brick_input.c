@@ -29,7 +29,7 @@ static int set_region(trip_brick_input *in)
         if (in->region.first[a] < 0 || in->region.first[a] >= *past || *past > voxels)
             return trip_fail(TRIP_USAGE, "brick", in->params->input,
                              "the region is empty or leaves the grid along %c, where voxels are "
-                             "numbered from 0 to before %" PRId64,
+                             "numbered from 0 to below %" PRId64,
                              "ijk"[a], voxels);
     }
     return 0;
@@ -53,7 +53,7 @@ static int check_levels(const trip_brick_input *in)
     if (in->params->levels <= 0 || trip_brick_levels(in) == in->params->levels)
         return 0;
     return trip_fail(TRIP_USAGE, "brick", in->params->input,
-                     "its voxels lie at uneven distances, and such grids have no coarse levels: "
+                     "grids with uneven spacing have no coarse levels; "
                      "leave out --levels");
 }
 
@@ -85,7 +85,7 @@ static int open_volume(trip_brick_input *in)
     in->grid_voxels = count_voxels(in->info->dims);
     in->tally = trip_budget_take(in->budget, sizeof *in->tally);
     if (!in->tally)
-        return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too little");
+        return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too small");
     trip_tally_clear(in->tally);
     in->memory_bytes = trip_budget_left_bytes(in->budget);
     status = trip_volume_check_axes(p->input, in->info);
@@ -115,8 +115,8 @@ static int check_functions(const trip_brick_input *in)
     return bytes <= room ? 0
                          : trip_fail(TRIP_USAGE, "brick", in->params->input,
                                      "the transfer functions take %" PRIu64
-                                     " bytes, and a data set has room for %" PRIu64
-                                     ": give fewer, or simpler ones",
+                                     " bytes, but a data set has room for %" PRIu64
+                                     "; give fewer or simpler ones",
                                      bytes, room);
 }
 

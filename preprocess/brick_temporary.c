@@ -81,7 +81,7 @@ int trip_brick_temporary_note_output(trip_brick_temporary *t, const trip_brick_i
 {
     struct stat st;
     if (fstat(folder, &st) < 0)
-        return trip_fail_errno("brick", in->params->output, "cannot look at its folder");
+        return trip_fail_errno("brick", in->params->output, "cannot examine its folder");
     return trip_journal_write_output(t->journal, &(trip_journal_output){ st.st_dev, st.st_ino });
 }
 

@@ -60,7 +60,7 @@ static int open_regular(const char *path, int *fd_out, uint64_t *bytes_out)
     if (fd < 0)
         return trip_fail_errno("read", path, "cannot open");
     if (fstat(fd, &st) != 0) {
-        int status = trip_fail_errno("read", path, "cannot look at");
+        int status = trip_fail_errno("read", path, "cannot examine");
         close(fd);
         return status;
     }
@@ -99,7 +99,7 @@ static int codec_begin(trip_byte_stream *s)
                      ? inflateInit2(&s->codec.zlib, 15 + 32) != Z_OK /* gzip or zlib */
                      : BZ2_bzDecompressInit(&s->codec.bzip2, 0, 0) != BZ_OK;
     if (failed)
-        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress");
+        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress it");
     s->codec_ready = true;
     return 0;
 }
@@ -237,15 +237,15 @@ static int decompress(trip_byte_stream *s, unsigned char *to, size_t bytes, size
 static int too_short(const trip_byte_stream *s, uint64_t bytes)
 {
     return trip_fail(TRIP_ERROR, "read", s->path,
-                     "holds %" PRIu64 " bytes of data where %" PRIu64
-                     " are promised: is it cut off?",
+                     "holds %" PRIu64 " bytes of data, but %" PRIu64
+                     " are expected; is it truncated?",
                      bytes, s->source.size_bytes);
 }
 
 static void warn_left_over(trip_byte_stream *s, const char *count_text)
 {
     if (!s->source.warned)
-        trip_warn(s->path, "%s left over after the %" PRIu64 " bytes of data", count_text,
+        trip_warn(s->path, "%s after the expected %" PRIu64 " bytes of data", count_text,
                   s->source.size_bytes);
     s->source.warned = true;
 }
@@ -259,7 +259,7 @@ static int finish(trip_byte_stream *s)
     if (status < 0)
         return status;
     if (!s->ended && got == 0)
-        return trip_fail(TRIP_ERROR, "read", s->path, "compressed data is cut off at its very end");
+        return trip_fail(TRIP_ERROR, "read", s->path, "compressed data is truncated at its end");
     if (!s->ended)
         warn_left_over(s, "compressed bytes are");
     return 0;
@@ -349,7 +349,7 @@ static int check_length(trip_byte_stream *s)
     if ((plain && __builtin_add_overflow(start, s->source.skip_bytes, &start)) ||
         start > s->file_bytes)
         return trip_fail(TRIP_ERROR, "read", s->path,
-                         "data should start beyond its end, %" PRIu64 " bytes", s->file_bytes);
+                         "the data offset lies beyond its end, %" PRIu64 " bytes", s->file_bytes);
     if (!plain)
         return 0;
     if (__builtin_add_overflow(start, s->source.size_bytes, &end) || end > s->file_bytes)
@@ -371,7 +371,7 @@ static int prepare(trip_byte_stream *s)
     if (status < 0)
         return status;
     if (s->source.encoding != TRIP_BYTES_PLAIN && !(s->piece = malloc(PIECE_BYTES)))
-        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress");
+        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress it");
     posix_fadvise(s->fd, 0, 0, POSIX_FADV_SEQUENTIAL);
     if (s->source.encoding == TRIP_BYTES_PLAIN && s->source.size_bytes >= LARGE_BYTES)
         s->pieces = trip_file_pieces_create(s->path, s->fd, s->file_bytes);
@@ -385,7 +385,7 @@ int trip_byte_stream_open(trip_byte_stream **out, const trip_byte_source *source
     if (!s || !path) {
         free(s);
         free(path);
-        return trip_fail(TRIP_ERROR, "read", source->path, "no memory to open");
+        return trip_fail(TRIP_ERROR, "read", source->path, "no memory to open it");
     }
     s->source = *source;
     s->source.path = s->path = path;

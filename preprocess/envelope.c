@@ -76,7 +76,7 @@ int trip_envelope_add_range(trip_envelope *e, double lo, double hi)
 {
     if (!(lo <= hi))
         return trip_fail(TRIP_USAGE, "brick", "opacity envelope",
-                         "the range %g to %g is empty or not a range", lo, hi);
+                         "the range %g to %g is empty or invalid", lo, hi);
     return add_ranks(e, rank_at_least(lo), rank_at_most(hi));
 }
 

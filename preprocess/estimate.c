@@ -111,7 +111,8 @@ static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, dou
                                     .skip_seconds = &skipping };
     trip_tally *t = trip_budget_take(in->budget, sizeof *t);
     if (!t)
-        return trip_fail(TRIP_ERROR, "brick", in->params->input, "needs more --memory");
+        return trip_fail(TRIP_ERROR, "brick", in->params->input,
+                         "is too large for the memory allowed; raise --memory");
     int status = trip_scan_volume(t, in->volume, in->params->input, in->workers, &scan, in->budget);
     if (status == 0) {
         scale_up(in, t, e);
@@ -255,15 +256,16 @@ int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *form
         return status;
     estimate_sizes(in, format, plan, &e);
     if (surely * (double)e.bytes > (double)max)
-        return trip_fail(TRIP_ERROR, "cache", in->params->input,
-                         "its data set would take about %s of a cache of %s: TRIPTYCH_CACHE_SIZE "
-                         "gives it more, `triptych brick` writes the data set elsewhere",
-                         trip_format_bytes(e.bytes, needed), trip_format_bytes(max, there));
+        return trip_fail(
+            TRIP_ERROR, "cache", in->params->input,
+            "its data set needs about %s, but the cache has %s; raise "
+            "TRIPTYCH_CACHE_SIZE, or write the data set elsewhere with `triptych brick`",
+            trip_format_bytes(e.bytes, needed), trip_format_bytes(max, there));
     if (surely * (double)(e.bytes + e.temporary_bytes) <= (double)e.free_bytes)
         return 0;
     return trip_fail(TRIP_ERROR, "brick", in->params->output,
-                     "about %s are needed, temporary data included, and the disk has %s: free "
-                     "some, write elsewhere, or keep less",
+                     "needs about %s with temporary data, but the disk has %s free; free "
+                     "space, write elsewhere, or keep fewer voxels",
                      trip_format_bytes(e.bytes + e.temporary_bytes, needed),
                      trip_format_bytes(e.free_bytes, there));
 }

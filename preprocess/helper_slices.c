@@ -32,9 +32,7 @@ int trip_helper_slices_reserve(trip_helper_slices *s, const int64_t dims[3], tri
     trip_format_bytes(s->reserved_bytes, needed);
     trip_format_bytes(trip_budget_left_bytes(s->budget), left);
     return trip_fail(TRIP_ERROR, "read", s->path,
-                     "its slices need %s, but %s are left of the memory allowed; a larger --memory "
-                     "would do",
-                     needed, left);
+                     "its slices need %s, but %s are left; raise --memory", needed, left);
 }
 
 void trip_helper_slices_close(void *slices)

@@ -76,8 +76,7 @@ static void *take_room(const trip_journal *j)
 {
     void *room = trip_budget_take(j->budget, RECORD_MAX_BYTES);
     if (!room)
-        trip_fail(TRIP_ERROR, "brick", j->path,
-                  "needs more memory than is allowed: give more with --memory");
+        trip_fail(TRIP_ERROR, "brick", j->path, "needs more memory than allowed; raise --memory");
     return room;
 }
 
@@ -92,17 +91,18 @@ static bool read_record(const trip_journal *j, uint64_t offset, record_head *hea
 /* Refuses a record with a valid checksum that no run writes. It may be forged. */
 static int fail_false(const trip_journal *j, const char *stage)
 {
-    return trip_fail(TRIP_ERROR, "brick", j->path,
-                     "%s is not what such a run writes: without --resume it starts again", stage);
+    return trip_fail(TRIP_ERROR, "brick", j->path, "%s is invalid; run again without --resume",
+                     stage);
 }
 
 static int check_start(const trip_journal *j, const trip_journal_start *s)
 {
     const trip_journal_params *p = &j->params;
     if (s->identity != p->identity)
-        return trip_fail(TRIP_ERROR, "brick", j->path,
-                         "the interrupted run had another input or other options: without --resume "
-                         "it starts again");
+        return trip_fail(
+            TRIP_ERROR, "brick", j->path,
+            "the interrupted run had another input or other options; run again without "
+            "--resume");
     if (s->scanned != p->scanned)
         return fail_false(j, "its kind");
     if (!s->scanned)
@@ -269,7 +269,7 @@ static int open_file(const trip_journal *j, const trip_spill *spill, const char 
     int status = trip_folder_open_file(fd, trip_spill_folder(spill), trip_spill_path(spill), name,
                                        O_RDWR | O_CREAT, "brick");
     if (status == 0 && !j->params.resume && ftruncate(*fd, 0) < 0)
-        status = trip_fail_errno("brick", j->path, "cannot shorten");
+        status = trip_fail_errno("brick", j->path, "cannot truncate");
     return status;
 }
 
@@ -296,7 +296,7 @@ int trip_journal_open(trip_journal **out, trip_spill *spill, const trip_journal_
     if (status == 0 && params->resume)
         status = read_journal(j, spill);
     if (status == 0 && ftruncate(j->file, (off_t)j->offset) < 0)
-        status = trip_fail_errno("brick", j->path, "cannot shorten");
+        status = trip_fail_errno("brick", j->path, "cannot truncate");
     return status;
 }
 
@@ -333,7 +333,7 @@ int trip_journal_read_runs(const trip_journal *j, uint64_t index, trip_run_recor
     if (read_at(j->runs_file, index * sizeof *runs, runs, count * sizeof *runs))
         return 0;
     return trip_fail(TRIP_ERROR, "brick", j->path,
-                     "its list of runs is cut off: without --resume it starts again");
+                     "its list of runs is truncated; run again without --resume");
 }
 
 int trip_journal_write_start(trip_journal *j, const trip_journal_start *start)

@@ -58,7 +58,7 @@ int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_l
     *key = h.key;
     *count = h.count;
     if (status == 0 && h.count > UINT32_C(1) << 2 * edge_log2)
-        status = trip_fail(TRIP_ERROR, "brick", file->path, "is not what was written");
+        status = trip_fail(TRIP_ERROR, "brick", file->path, "differs from the data written");
     return status;
 }
 
@@ -93,9 +93,8 @@ int trip_level_source_next(trip_level_source *s)
 
 int trip_level_fail_memory(void)
 {
-    return trip_fail(
-        TRIP_ERROR, "brick", "levels",
-        "need more memory: give more with --memory, or leave them out with --levels 0");
+    return trip_fail(TRIP_ERROR, "brick", "levels",
+                     "need more memory; raise --memory, or skip them with --levels 0");
 }
 
 int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_value *values,

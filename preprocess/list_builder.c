@@ -165,8 +165,9 @@ static int take_chunk(trip_list_builder *b, uint32_t *chunk)
 {
     while (b->pool.free.first == TRIP_NO_CHUNK && b->status == 0) {
         if (b->jobs == 0 && spillable(b) == 0)
-            b->status = trip_fail(TRIP_ERROR, "brick", "lists",
-                                  "one slice of splats does not fit: give more with --memory");
+            b->status =
+                trip_fail(TRIP_ERROR, "brick", "lists",
+                          "the splats of one slice exceed the memory allowed; raise --memory");
         else if (b->jobs == 0)
             queue_job(b, false, NULL);
         else

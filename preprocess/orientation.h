@@ -6,8 +6,7 @@
 
 typedef struct trip_orientation {
     int mirror;  /* the only axis across which the volume is mirror-symmetric; -1 if none */
-    int footing; /* side on which the volume stands, numbered as in orientation_base.h; -1 if none
-                  */
+    int footing; /* side on which it stands, as in orientation_base.h; -1 if none */
 } trip_orientation;
 
 /* Guesses the orientation from the lists of the data set, which must be complete. Takes its working

@@ -7,10 +7,7 @@
  * and a chest. */
 static const double level = 0.6, times_others = 2;
 
-enum {
-    PARTS_OF_EXTENT = 10,
-    OBJECT = UINT16_MAX / 4
-}; /* bins of at least this weight belong to the object */
+enum { PARTS_OF_EXTENT = 10, OBJECT = UINT16_MAX / 4 }; /* minimum weight of a bin of the object */
 
 /* Finds the object's first and last bin of a row. Returns false if the row has none. */
 static bool find_ends(trip_occupancy_row row, int *first, int *last)

@@ -2,13 +2,15 @@
  * The threads that make splats, the spill and the merge exchange splats only as pieces. Pure
  * functions.
  *
- * In memory and in the spill, a piece is a header followed by these parts, each padded to 8 bytes:
+ * In memory and in the spill, a piece is a header followed by these parts. Each part is padded to 8
+ * bytes.
  *   positions    Morton codes of (u, v) in the tile, ascending, in the shorter of two forms. If
  *                `words` is 0, one uint16 for each splat. Otherwise a mask with one bit for each
- *                nonzero word of the tile's bitmap, then these `words` 64-bit words
- *   values       codes (uint16), or float32 while the range of values is unknown
- *   normals      packed (uint32), without magnitude while the range of values is unknown
- *   magnitudes   float32, gradients per gradient_unit; only while the range of values is unknown */
+ *                nonzero word of the tile's bitmap, then these `words` 64-bit words.
+ *   values       codes (uint16), or float32 while the range of values is unknown.
+ *   normals      packed (uint32), without magnitude while the range of values is unknown.
+ *   magnitudes   float32, gradients per gradient_unit; only while the range of values is unknown.
+ */
 #ifndef TRIP_PIECE_H
 #define TRIP_PIECE_H
 
@@ -37,7 +39,7 @@ enum {
 /* The scale of codes, value(c) = lo + (hi - lo) * c / 65535, and of the magnitudes of normals. */
 typedef struct trip_quantiser {
     double lo, hi;
-    double gradient_full; /* greatest magnitude of 4-byte normals (normal.h) */
+    double gradient_full; /* `full` of 4-byte normals (normal.h) */
     double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
     bool bytes;           /* use only the codes that 8 bits can express (format.h) */
 } trip_quantiser;

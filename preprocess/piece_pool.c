@@ -13,8 +13,7 @@ enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, MIN_CHUNK_BYTES = 128 << 10 };
 
 size_t trip_chunk_bytes(const trip_piece_format *f)
 {
-    size_t bytes = f->halo ? MIN_CHUNK_BYTES
-                           : 2 * MIN_CHUNK_BYTES; /* with a halo there are twice as many lists */
+    size_t bytes = f->halo ? MIN_CHUNK_BYTES : 2 * MIN_CHUNK_BYTES; /* a halo doubles the lists */
     while (bytes < 4 * trip_piece_max_bytes(f))
         bytes *= 2;
     return bytes;

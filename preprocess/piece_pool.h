@@ -58,8 +58,8 @@ typedef struct trip_pool_source {
     const trip_piece_pool *pool;
 } trip_pool_source;
 
-/* Sorts the pieces in place by linking them. The chain must not change while the source is in
- * use. */
+/* Sorts the pieces in place by linking them. The chain must not change while the source is in use.
+ */
 trip_pool_source trip_pool_source_make(const trip_piece_pool *pool, unsigned list,
                                        const trip_chain *c);
 

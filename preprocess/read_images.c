@@ -1,8 +1,8 @@
-/* Stacks of pictures, as a slice reader: a folder, a pattern or one file with several slices. The
- * helper program (image_helper.h) reads them, one slice at a time.
+/* Reads stacks of pictures as slices: a folder, a pattern, or one file with several slices. The
+ * helper program (image_helper.h) reads the files, one slice at a time.
  *
- * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. The
- * distance of voxels and their place are those of DICOM; without metadata the distance is 1. */
+ * Voxel (i, j, k) is pixel i from the left in row j from the top of slice k. DICOM metadata give
+ * the spacing and the position of the voxels. Without metadata the spacing is 1. */
 #include <dirent.h>
 #include <glob.h>
 #include <math.h>
@@ -36,7 +36,7 @@ static int open_stack(trip_helper_slices *s, bool allow_gaps, trip_image_stack *
     return status;
 }
 
-/* Whether it is a code string as the DICOM standard defines it. */
+/* Returns whether the text is a code string as the DICOM standard defines it. */
 static bool is_modality(const char *text, size_t room)
 {
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _";
@@ -44,7 +44,8 @@ static bool is_modality(const char *text, size_t room)
     return length <= 16 && strspn(text, letters) == length;
 }
 
-/* What is impossible in the helper's answer, or NULL; sizes beyond the memory are refused later. */
+/* Returns the fault in the helper's answer, or NULL. A later check refuses sizes that exceed the
+ * memory. */
 static const char *fault_of(const trip_image_stack *stack)
 {
     bool finite = isfinite(stack->slope) && isfinite(stack->inter);
@@ -53,12 +54,12 @@ static const char *fault_of(const trip_image_stack *stack)
     if (stack->type < 0 || stack->type >= TRIP_SCALARS)
         return "slices of an unknown type";
     if (stack->dims[0] < 1 || stack->dims[1] < 1 || stack->dims[2] < 1)
-        return "slices of no size";
+        return "slices without a size";
     if (!memchr(stack->space, '\0', sizeof stack->space) || (stack->oriented & ~1) ||
         (stack->space[0] && !trip_anatomy_known(stack->space)))
-        return "a space of no known kind";
+        return "an unknown space";
     if (!is_modality(stack->modality, sizeof stack->modality))
-        return "a modality of no known form";
+        return "an invalid modality";
     return finite ? NULL : "a map that is not finite";
 }
 
@@ -103,8 +104,8 @@ static int by_name(const void *a, const void *b)
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Visits the files of a folder but for hidden ones; only their content would show which are slices.
- */
+/* Visits the files of a folder except hidden ones. Files that are no slices are included, since
+ * only their content tells. */
 static int list_folder(const char *path, visit_file *visit, void *user)
 {
     struct dirent **names;
@@ -115,7 +116,8 @@ static int list_folder(const char *path, visit_file *visit, void *user)
     for (int i = 0; i < count; i++) {
         if (asprintf(&files[i], "%s/%s", path, names[i]->d_name) < 0)
             files[i] = NULL;
-        status = files[i] ? status : trip_fail(TRIP_ERROR, "read", path, "no memory to list");
+        status = files[i] ? status
+                          : trip_fail(TRIP_ERROR, "read", path, "out of memory while listing it");
     }
     if (status == 0)
         qsort(files, (size_t)count, sizeof *files, by_name);
@@ -133,7 +135,8 @@ static int list_folder(const char *path, visit_file *visit, void *user)
     return status;
 }
 
-/* "s%03d.tif" as the glob pattern "s*.tif", for free(); others as they are. */
+/* Turns "s%03d.tif" into the glob pattern "s*.tif", and copies other paths. The caller frees the
+ * result. */
 static char *glob_pattern(const char *path)
 {
     const char *percent = strrchr(path, '%');
@@ -163,9 +166,9 @@ static int list_pattern(const char *path, visit_file *visit, void *user)
     char *pattern = glob_pattern(path);
     int status = 0, failed = pattern ? glob(pattern, 0, NULL, &found) : GLOB_NOSPACE;
     if (failed == GLOB_NOMATCH)
-        status = trip_fail(TRIP_ERROR, "read", path, "no file fits this pattern");
+        status = trip_fail(TRIP_ERROR, "read", path, "no file matches this pattern");
     else if (failed)
-        status = trip_fail(TRIP_ERROR, "read", path, "cannot be searched for");
+        status = trip_fail(TRIP_ERROR, "read", path, "cannot search for files of this pattern");
     for (size_t i = 0; i < found.gl_pathc && status == 0; i++)
         status = visit(user, found.gl_pathv[i]);
     globfree(&found);

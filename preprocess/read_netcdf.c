@@ -1,11 +1,14 @@
-/* NetCDF in its classic forms (CDF-1, CDF-2 and CDF-5): a variable of three dimensions or more, the
- * last of which are k, j and i; of those before, the first place. A dimension with a variable of
- * its own name has that for coordinates. What an attribute names as fill or missing is no value.
- * Whole numbers have no sign where the attribute _Unsigned is "true": two of the forms have no type
- * for such numbers.
- * Those of netCDF-4 are read_netcdf4.c's. Not by libnetcdf as these: nc_open() of 4.9.0 writes
- * beyond its memory and takes gigabytes for damaged files, and reads shortened ones as if they were
- * whole. */
+/* Reads netCDF files in the classic formats (CDF-1, CDF-2 and CDF-5); read_netcdf4.c reads
+ * netCDF-4.
+ * - A volume is a variable with at least three dimensions. The last three are k, j and i. All
+ *   earlier dimensions use index 0.
+ * - A variable with the name of a dimension gives the coordinates along this dimension.
+ * - Values equal to a fill value or missing value become NaN.
+ * - Integers are unsigned if the attribute _Unsigned is "true". CDF-1 and CDF-2 have no unsigned
+ *   types.
+ *
+ * This reader does not use libnetcdf. For damaged files, nc_open() of version 4.9.0 writes beyond
+ * its memory and allocates gigabytes. It also reads truncated files without an error. */
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -22,7 +25,7 @@
 #include "volume_reader.h"
 
 enum {
-    HEADER_MAX = 1 << 20, /* with what is made of it, some 14 MB */
+    HEADER_MAX = 1 << 20, /* the header and its parsed form then take some 14 MB */
     DIMS_MAX = 32,        /* of a variable */
     TAG_DIMENSION = 10,
     TAG_VARIABLE = 11,
@@ -32,44 +35,42 @@ enum {
     PIECE_BYTES = 1 << 16,
 };
 
-/* By the number of a type; of 0 and of characters there are no volumes. */
+/* Index: type number of the file. Entries without a volume type are -1. */
 static const int scalar_of[TYPES] = { -1,       TRIP_I8, -1,       TRIP_I16, TRIP_I32, TRIP_F32,
                                       TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64 };
 
 typedef struct text {
-    const char *at; /* in the header, not terminated */
+    const char *at; /* points into the header; not terminated */
     size_t length;
 } text;
 
 typedef struct dimension {
     text name;
-    uint64_t size; /* 0: as many as there are records */
+    uint64_t size; /* 0 for the dimension of records */
 } dimension;
 
 typedef struct variable {
     text name;
     unsigned dims;
     uint64_t dim[DIMS_MAX];
-    int scalar;       /* trip_scalar; -1: characters */
-    bool is_unsigned; /* whatever the type is that the file says */
+    int scalar;       /* trip_scalar; -1 for characters */
+    bool is_unsigned; /* overrides the type in the file */
     uint64_t begin;
-    double slope, inter, missing[2]; /* NaN: none */
+    double slope, inter, missing[2]; /* NaN if absent */
 } variable;
 
 typedef struct header {
     const char *path;
     unsigned char *bytes;
     size_t count, at;
-    bool broken;    /* what was taken was not there */
-    bool wide, far; /* numbers, places in the file have 8 bytes */
+    bool broken;    /* a read went beyond the header, or a number is invalid */
+    bool wide, far; /* counts (wide) and file offsets (far) have 8 bytes */
     uint64_t file_bytes, records, record_bytes;
     dimension *dims;
     uint64_t dim_count;
     variable *variables;
     uint64_t variable_count;
 } header;
-
-/* ---- the header ---- */
 
 static uint64_t take_number(header *h, unsigned bytes)
 {
@@ -88,7 +89,7 @@ static uint64_t take_count(header *h)
     return take_number(h, h->wide ? 8 : 4);
 }
 
-/* So many bytes, and what pads them to a multiple of 4. */
+/* Takes so many bytes and the padding to a multiple of 4. */
 static const unsigned char *take_bytes(header *h, uint64_t bytes)
 {
     uint64_t left = h->count - h->at, padded = (bytes + 3) & ~UINT64_C(3);
@@ -110,7 +111,7 @@ static text take_text(header *h)
     return t;
 }
 
-/* How many items a list announced by a tag has, of at least `least` bytes each. */
+/* Returns the number of items of a list with this tag. Each item takes at least `min` bytes. */
 static uint64_t take_list(header *h, unsigned tag, unsigned min)
 {
     uint64_t is = take_number(h, 4), count = take_count(h);
@@ -129,7 +130,7 @@ static bool same_text(text a, text b)
     return a.length == b.length && memcmp(a.at, b.at, a.length) == 0;
 }
 
-/* A stored number. */
+/* Converts a stored number. */
 static double number_at(const unsigned char *at, int scalar)
 {
     const unsigned bytes = trip_scalar_bytes((trip_scalar)scalar);
@@ -203,7 +204,7 @@ static void take_dimension(header *h, dimension *d)
     d->size = take_count(h);
 }
 
-/* What unwritten numbers of floats are filled with, where no attribute says another. */
+/* Default fill value of unwritten floating-point values. */
 #define FILL_FLOAT 9.9692099683868690e+36
 
 static void take_type(header *h, variable *v)
@@ -238,7 +239,7 @@ static void take_variable(header *h, variable *v)
     v->missing[0] = v->missing[1] = NAN;
     take_attributes(h, v);
     take_type(h, v);
-    take_count(h); /* of bytes, which follow from the rest */
+    take_count(h); /* size in bytes, which follows from the other fields */
     v->begin = take_number(h, h->far ? 8 : 4);
 }
 
@@ -257,7 +258,7 @@ static unsigned bytes_of(const variable *v)
     return v->scalar < 0 ? 1 : trip_scalar_bytes((trip_scalar)v->scalar);
 }
 
-/* Of a record of a variable. */
+/* Returns the size of one record of a variable in bytes. */
 static uint64_t record_bytes_of(header *h, const variable *v)
 {
     uint64_t bytes = bytes_of(v);
@@ -266,7 +267,8 @@ static uint64_t record_bytes_of(header *h, const variable *v)
     return bytes;
 }
 
-/* Records of all variables lie one after the other; each padded, but where there is one alone. */
+/* Computes the size of a record of all variables. Records of the variables follow each other. Each
+ * is padded to 4 bytes, except if only one variable has records. */
 static void measure_records(header *h)
 {
     uint64_t alone = 0, sum = 0;
@@ -334,32 +336,29 @@ static int read_header(header *h, int fd, const char *path)
     h->count = h->file_bytes < HEADER_MAX ? (size_t)h->file_bytes : HEADER_MAX;
     h->bytes = malloc(h->count + 1);
     if (!h->bytes)
-        return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory for its header");
     int status = read_at(fd, path, 0, h->bytes, h->count);
     if (status)
         return status;
     if (h->count >= 4)
         parse(h);
     if (!h->broken && (!h->dims || !h->variables))
-        return trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory for its header");
     if (!h->broken)
         return 0;
-    const char *stage = h->file_bytes > HEADER_MAX
-                            ? "its header makes no sense, or is longer than 1 MiB"
-                            : "its header makes no sense";
+    const char *stage = h->file_bytes > HEADER_MAX ? "the header is invalid, or longer than 1 MiB"
+                                                   : "the header is invalid";
     return trip_fail(TRIP_ERROR, "read", path, "byte %zu: %s", h->at, stage);
 }
-
-/* ---- the volume ---- */
 
 typedef struct netcdf {
     int fd;
     char *path;
-    uint64_t begin, stride; /* of slices in the file */
-    uint64_t values;        /* of one */
+    uint64_t begin, stride; /* of slices in the file, in bytes */
+    uint64_t values;        /* per slice */
     int64_t next;
     trip_scalar stored;
-    bool decoded; /* slices are given as floats, in which what is missing is not a number */
+    bool decoded; /* slices are returned as floats, with NaN for missing values */
     float missing[2];
 } netcdf;
 
@@ -372,7 +371,7 @@ static bool netcdf_probe(const char *path, const unsigned char *head, size_t byt
            (head[3] == 1 || head[3] == 2 || head[3] == 5);
 }
 
-/* Values of the last three dimensions; 0: it is no volume. */
+/* Returns the number of values of the last three dimensions, or 0 if the variable is no volume. */
 static double volume_of(const header *h, const variable *v)
 {
     double values = 1;
@@ -383,7 +382,7 @@ static double volume_of(const header *h, const variable *v)
     return values;
 }
 
-/* The one named, else that with the most values. */
+/* Chooses the named variable, or else the variable with the most values. */
 static int choose_variable(const header *h, const char *name, const variable **out)
 {
     *out = NULL;
@@ -395,11 +394,11 @@ static int choose_variable(const header *h, const char *name, const variable **o
     }
     if (!*out)
         return trip_fail(TRIP_ERROR, "read", h->path, name ? "has no variable \"%s\"" : "%s",
-                         name ? name : "has no variable of numbers with three dimensions");
+                         name ? name : "has no numeric variable with three dimensions");
     return volume_of(h, *out) > 0
                ? 0
                : trip_fail(TRIP_ERROR, "read", h->path,
-                           "its variable \"%.*s\" has not three dimensions of numbers",
+                           "variable \"%.*s\" is not numeric or has fewer than three dimensions",
                            (int)((*out)->name.length < 99 ? (*out)->name.length : 99),
                            (*out)->name.at);
 }
@@ -415,7 +414,7 @@ static const variable *coordinates_of(const header *h, uint64_t dim)
     return NULL;
 }
 
-/* In pieces, between which an interruption is noticed. */
+/* Reads in pieces and checks for an interruption between them. */
 static int read_coordinates(const header *h, int fd, const variable *v, double *values,
                             uint64_t count)
 {
@@ -450,7 +449,7 @@ static int place_axis(const header *h, int fd, uint64_t dim, int axis, trip_volu
         return status;
     double *values = calloc((size_t)count, sizeof *values);
     status = values ? read_coordinates(h, fd, v, values, count)
-                    : trip_fail(TRIP_ERROR, "read", h->path, "no memory for coordinates");
+                    : trip_fail(TRIP_ERROR, "read", h->path, "out of memory for its coordinates");
     if (!status)
         status = trip_volume_set_coordinates(info, axis, values, h->path);
     free(values);
@@ -466,8 +465,8 @@ static void describe(const header *h, const variable *v, trip_volume_info *info)
         others += &h->variables[i] != v && volume_of(h, &h->variables[i]) > 0;
     if (others || v->dims > 3)
         snprintf(info->note, sizeof info->note, "variable \"%.*s\"%s%s", length, v->name.at,
-                 others ? ", one of several (--grid NAME takes another)" : "",
-                 v->dims > 3 ? ", at the first place of its other dimensions" : "");
+                 others ? ", one of several (--grid NAME selects another)" : "",
+                 v->dims > 3 ? ", at the first index of its other dimensions" : "");
 }
 
 static int lay_out(const header *h, const variable *v, trip_volume_info *info, netcdf *n)
@@ -531,7 +530,7 @@ static int netcdf_open(const char *path, const trip_volume_params *params, trip_
     netcdf *n = calloc(1, sizeof *n);
     if (!n || !(n->path = strdup(path))) {
         free(n);
-        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
     }
     n->fd = open(path, O_RDONLY | O_CLOEXEC);
     int status =
@@ -549,7 +548,7 @@ static int netcdf_rewind(void *state)
     return 0;
 }
 
-/* So many values as floats. */
+/* Reads `count` values as floats. */
 static int decode_values(const netcdf *n, uint64_t at, uint64_t count, float *to)
 {
     unsigned char piece[PIECE_BYTES];

@@ -1,6 +1,7 @@
-/* NetCDF-4, which is HDF5: what read_netcdf.c says of variables, coordinates and values that are
- * none holds here, too. The helper program triptych-netcdf (image_helper.h) reads them, one slice
- * at a time, by libnetcdf, which damaged files bring down: what it answers is checked. */
+/* Reads netCDF-4 files, which are HDF5 files. The rules for variables, coordinates and missing
+ * values are the same as in read_netcdf.c. The helper program triptych-netcdf (image_helper.h)
+ * reads the files with libnetcdf, one slice at a time. libnetcdf crashes on damaged files, so all
+ * replies of the helper are checked. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +20,7 @@ static bool probe(const char *path, const unsigned char *head, size_t bytes,
 
 #ifdef TRIP_NETCDF_READ
 
-/* Whether a name is that of a variable as netCDF allows them: no control characters. */
+/* Returns whether a name is valid for a netCDF variable: no control characters. */
 static bool is_name(const char *name, size_t room)
 {
     const size_t length = strnlen(name, room);
@@ -29,21 +30,22 @@ static bool is_name(const char *name, size_t room)
     return good;
 }
 
-/* What is impossible in the helper's answer, or NULL; sizes beyond the memory are refused later. */
+/* Returns the fault in the helper's answer, or NULL. A later check refuses sizes that exceed the
+ * memory. */
 static const char *fault_of(const trip_image_netcdf *v)
 {
     if (v->type < 0 || v->type >= TRIP_SCALARS)
         return "slices of an unknown type";
     if (v->dims[0] < 1 || v->dims[1] < 1 || v->dims[2] < 1)
-        return "slices of no size";
+        return "slices without a size";
     if (!is_name(v->name, sizeof v->name))
         return "a variable without a name";
     if ((v->placed & ~7) || (v->others & ~1) || (v->deeper & ~1))
-        return "coordinates of no known axis";
+        return "coordinates of an unknown axis";
     return isfinite(v->slope) && isfinite(v->inter) ? NULL : "values that are not finite";
 }
 
-/* Of all axes that are placed. */
+/* Computes the size of the coordinates of all axes that have some. Returns false on overflow. */
 static bool coordinate_bytes(const trip_image_netcdf *v, uint64_t *out)
 {
     uint64_t count = 0;
@@ -53,7 +55,7 @@ static bool coordinate_bytes(const trip_image_netcdf *v, uint64_t *out)
     return !__builtin_mul_overflow(count, sizeof(double), out);
 }
 
-/* The variable, and how many bytes follow it. */
+/* Receives the description of the variable. `left` gets the number of bytes that follow it. */
 static int open_variable(trip_helper_slices *s, const char *name, trip_image_netcdf *v,
                          uint64_t *left)
 {
@@ -70,14 +72,14 @@ static int open_variable(trip_helper_slices *s, const char *name, trip_image_net
     if (status < 0)
         return status;
     if (bytes < sizeof *v)
-        return trip_image_helper_distrust(s->helper, "data of another size than it has to be");
+        return trip_image_helper_distrust(s->helper, "data of a wrong size");
     status = trip_image_helper_receive(s->helper, v, sizeof *v);
     if (status < 0)
         return status;
     *left = bytes - sizeof *v;
     const char *fault = fault_of(v);
     if (!fault && (!coordinate_bytes(v, &expected) || expected != *left))
-        fault = "coordinates of another size than they have to be";
+        fault = "coordinates of a wrong size";
     return fault ? trip_image_helper_distrust(s->helper, fault) : 0;
 }
 
@@ -90,7 +92,7 @@ static int take_coordinates(trip_helper_slices *s, int axis, trip_volume_info *i
     double *values = trip_budget_take(s->budget, bytes);
     if (!values)
         return trip_fail(TRIP_ERROR, "read", s->path,
-                         "its coordinates do not fit the memory given; raise --memory");
+                         "its coordinates do not fit in memory: raise --memory");
     status = trip_image_helper_receive(s->helper, values, bytes);
     if (status == 0)
         status = trip_volume_set_coordinates(info, axis, values, s->path);
@@ -103,8 +105,8 @@ static void describe(const trip_image_netcdf *v, trip_volume_info *info)
     snprintf(info->name, sizeof info->name, "%s", v->name);
     if (v->others || v->deeper)
         snprintf(info->note, sizeof info->note, "variable \"%s\"%s%s", v->name,
-                 v->others ? ", one of several (--grid NAME takes another)" : "",
-                 v->deeper ? ", at the first place of its other dimensions" : "");
+                 v->others ? ", one of several (--grid NAME selects another)" : "",
+                 v->deeper ? ", at the first index of its other dimensions" : "");
 }
 
 static int open_file(trip_helper_slices *s, const trip_volume_params *params,
@@ -163,7 +165,7 @@ static int refuse(const char *path, const trip_volume_params *params, trip_budge
     (void)params, (void)budget, (void)info, (void)state;
     return trip_fail(TRIP_ERROR, "read", path,
                      "is netCDF-4 or another HDF5 file, and this program was built without "
-                     "libnetcdf: `nccopy -k cdf5` makes a classic one of it");
+                     "libnetcdf: convert it with `nccopy -k cdf5`");
 }
 
 const trip_volume_reader trip_read_netcdf4 = { .format = "netcdf", .probe = probe, .open = refuse };

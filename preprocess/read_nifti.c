@@ -1,6 +1,6 @@
-/* NIfTI-1 and -2, .nii or a pair .hdr/.img, gzipped or not, in either byte order. libnifti provides
- * the header's layout, its byte swapping and the conversion of the quaternion; the values are
- * streamed here, since libnifti reads whole images. */
+/* Reads NIfTI-1 and NIfTI-2 files, .nii or a pair .hdr/.img, gzipped or not, in either byte order.
+ * The library libnifti provides the header's layout, byte swapping and the conversion of the
+ * quaternion. This reader streams the values itself, since libnifti reads whole images. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -22,11 +22,11 @@
 _Static_assert(sizeof(nifti_1_header) == 348, "as on disk");
 _Static_assert(sizeof(nifti_2_header) == 540, "as on disk");
 
-/* A header of either version, widened to that of version 2, in the machine's byte order. */
+/* A header of either version, widened to version 2, in the machine's byte order. */
 typedef struct header {
     nifti_2_header n;
     bool swapped;  /* the file's byte order differs from the machine's */
-    bool own_file; /* the values are in an .img beside it */
+    bool own_file; /* the values are in an .img file */
 } header;
 
 static bool has_magic(const unsigned char *head, size_t bytes)
@@ -37,7 +37,7 @@ static bool has_magic(const unsigned char *head, size_t bytes)
     return bytes >= sizeof(nifti_2_header) && (!memcmp(m2, "n+2", 4) || !memcmp(m2, "ni2", 4));
 }
 
-/* Whether the path ends in `suffix`, with or without ".gz" after it. */
+/* Returns whether the path ends in `suffix` or in `suffix` and ".gz". */
 static bool ends_in(const char *path, const char *suffix)
 {
     size_t length = strlen(path), n = strlen(suffix);
@@ -56,8 +56,8 @@ static bool nifti_probe(const char *path, const unsigned char *head, size_t byte
            ends_in(path, ".img");
 }
 
-/* The other file of a pair: ".hdr" and ".img" exchanged, a ".gz" kept, and the case of each letter,
- * or small letters where there is no such file. */
+/* Returns the other path of a pair: exchanges ".hdr" and ".img" and keeps ".gz". Keeps the case of
+ * each letter, or uses lower case if no such file exists. The caller frees the path. */
 static char *partner(const char *path, const char *from, const char *to)
 {
     char *copy = strdup(path);
@@ -90,7 +90,7 @@ static int read_head(const char *path, unsigned char *head, size_t bytes)
     return status;
 }
 
-/* The fields of version 1 that are used here. */
+/* Copies the used fields of version 1. */
 static nifti_2_header widen(const nifti_1_header *h)
 {
     nifti_2_header n = { 0 };
@@ -105,7 +105,8 @@ static nifti_2_header widen(const nifti_1_header *h)
         n.srow_z[i] = h->srow_z[i];
     }
     n.datatype = h->datatype;
-    /* A float on disk; an impossible one becomes a negative offset, which is refused later. */
+    /* The offset is a float on disk. An impossible one becomes negative, which a later check
+     * refuses. */
     n.vox_offset = h->vox_offset >= 0 && h->vox_offset < 0x1p62f ? (int64_t)h->vox_offset : -1;
     n.scl_slope = h->scl_slope;
     n.scl_inter = h->scl_inter;
@@ -148,7 +149,7 @@ static int read_version_2(const char *path, header *h)
         return status;
     if (memcmp(h->n.magic + 4, "\r\n\032\n", 4) != 0)
         return trip_fail(TRIP_ERROR, "read", path,
-                         "its NIfTI-2 magic is damaged, as by a transfer in text mode");
+                         "its NIfTI-2 magic is damaged, perhaps by a transfer in text mode");
     h->swapped = h->n.sizeof_hdr != (int)sizeof h->n;
     if (h->swapped)
         swap_nifti_header(&h->n, 2);
@@ -170,7 +171,8 @@ static int read_header(const char *path, header *h)
 static int set_dims(const char *path, const nifti_2_header *n, trip_volume_info *info)
 {
     if (n->dim[0] < 1 || n->dim[0] > 7)
-        return trip_fail(TRIP_ERROR, "read", path, "has %" PRId64 " axes, not 1 to 7", n->dim[0]);
+        return trip_fail(TRIP_ERROR, "read", path, "has %" PRId64 " axes; NIfTI allows 1 to 7",
+                         n->dim[0]);
     for (int i = 1; i <= n->dim[0]; i++) {
         if (n->dim[i] < 1)
             return trip_fail(TRIP_ERROR, "read", path, "axis %d has size %" PRId64, i, n->dim[i]);
@@ -220,7 +222,7 @@ static int set_type(const char *path, const nifti_2_header *n, trip_volume_info 
         return 0;
     default:
         return trip_fail(TRIP_ERROR, "read", path,
-                         "datatype %d (%s) cannot be read: only integers, float and double can",
+                         "cannot read datatype %d (%s): convert it to integers, float or double",
                          n->datatype, nifti_datatype_string(n->datatype));
     }
 }
@@ -236,14 +238,14 @@ static trip_affine from_sform(const nifti_2_header *n)
     return a;
 }
 
-/* The quaternion if there is one, else the voxel sizes alone. */
+/* Uses the quaternion if there is one, else the voxel sizes alone. */
 static trip_affine from_qform(const nifti_2_header *n)
 {
     double size[3];
     for (int i = 0; i < 3; i++) {
         size[i] = fabs(n->pixdim[i + 1]);
         if (!(size[i] > 0 && isfinite(size[i])))
-            size[i] = 1; /* unknown */
+            size[i] = 1; /* an unknown size */
     }
     trip_affine a = trip_affine_identity();
     if (n->qform_code <= 0) {
@@ -260,7 +262,7 @@ static trip_affine from_qform(const nifti_2_header *n)
     return a;
 }
 
-/* Prefers the sform; without sform and qform the orientation in the patient is unknown. */
+/* Prefers the sform. Without sform and qform the orientation in the patient is unknown. */
 static void set_map(const char *path, const nifti_2_header *n, trip_volume_info *info)
 {
     trip_affine sform = from_sform(n), inverse;
@@ -278,7 +280,7 @@ static void set_map(const char *path, const nifti_2_header *n, trip_volume_info 
 static void set_scaling(const nifti_2_header *n, trip_volume_info *info)
 {
     if (n->scl_slope == 0 || !isfinite(n->scl_slope))
-        return; /* by the standard, no scaling */
+        return; /* the standard defines this as no scaling */
     info->slope = n->scl_slope;
     info->inter = isfinite(n->scl_inter) ? n->scl_inter : 0;
 }
@@ -289,13 +291,13 @@ static int open_values(const char *path, const header *h, const trip_volume_info
     int64_t min = h->own_file ? 0 : h->n.magic[2] == '2' ? 544 : 352;
     if (h->n.vox_offset < min)
         return trip_fail(TRIP_ERROR, "read", path,
-                         "its values should start inside its header or nowhere (vox_offset)");
+                         "vox_offset is invalid: the values would start inside the header");
     int64_t beyond = 1;
     for (int i = 4; i <= h->n.dim[0]; i++)
         beyond = h->n.dim[i] > 1 ? 2 : beyond;
     char *data_path = h->own_file ? partner(path, ".hdr", ".img") : strdup(path);
     if (!data_path)
-        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
     trip_byte_source source = { .path = data_path,
                                 .encoding = trip_byte_encoding_of(data_path),
                                 .skip_bytes = (uint64_t)h->n.vox_offset,
@@ -313,8 +315,8 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
     header h = { 0 };
     char *header_path = partner(path, ".img", ".hdr");
     if (!header_path)
-        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
-    nifti_set_debug_level(0); /* else it prints messages */
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    nifti_set_debug_level(0); /* disables libnifti's own messages */
     int status = read_header(header_path, &h);
     if (status == 0 && (status = set_dims(header_path, &h.n, info)) == 0)
         status = set_type(header_path, &h.n, info);
@@ -327,12 +329,12 @@ static int nifti_open(const char *path, const trip_volume_params *params, trip_b
     return status;
 }
 
-/* The files of a pair, one of which is `path`; both are the same for a single file. */
+/* Visits both files of a pair that contains `path`, or a single file once. */
 static int nifti_list(const char *path, int (*visit)(void *user, const char *file), void *user)
 {
     char *head = partner(path, ".img", ".hdr"), *values = partner(path, ".hdr", ".img");
-    int status = head && values ? visit(user, head)
-                                : trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+    int status =
+        head && values ? visit(user, head) : trip_fail(TRIP_ERROR, "read", path, "out of memory");
     if (status == 0 && strcmp(head, values))
         status = visit(user, values);
     free(head);

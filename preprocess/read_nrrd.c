@@ -1,5 +1,5 @@
-/* NRRD: attached (.nrrd) and detached (.nhdr) headers; raw, gzip and bzip2; one data file or many.
- */
+/* Reads NRRD files with attached (.nrrd) and detached (.nhdr) headers, raw, gzip or bzip2, with one
+ * data file or many. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,7 +26,7 @@ static int read_header(const char *path, trip_nrrd_header *h)
     FILE *file = fopen(path, "rbe");
     int status = 0;
     if (!text)
-        status = trip_fail(TRIP_ERROR, "read", path, "no memory for its header");
+        status = trip_fail(TRIP_ERROR, "read", path, "out of memory for its header");
     else if (!file)
         status = trip_fail_errno("read", path, "cannot open");
     size_t bytes = status == 0 ? fread(text, 1, TRIP_NRRD_HEADER_BYTES_MAX, file) : 0;
@@ -43,11 +43,11 @@ static int read_header(const char *path, trip_nrrd_header *h)
 /* Bytes between checks for an interruption. */
 #define PATIENCE_BYTES (1 << 20)
 
-/* *offset becomes the byte after the next `lines` lines from byte `start` on. */
+/* Sets *offset to the end of the next `lines` lines from byte `start` on. */
 static int skip_lines(const char *path, uint64_t start, int64_t lines, uint64_t *offset)
 {
     uint64_t bytes;
-    int status = trip_file_size(path, &bytes); /* what has no end is refused */
+    int status = trip_file_size(path, &bytes); /* refuses files without a size, such as pipes */
     if (status < 0)
         return status;
     FILE *file = fopen(path, "rbe");
@@ -72,7 +72,7 @@ static int skip_lines(const char *path, uint64_t start, int64_t lines, uint64_t 
     return 0;
 }
 
-/* A name in the header is relative to the folder that the header is in. */
+/* Joins a name in the header to the header's folder. */
 static char *join(const char *header_path, const char *name)
 {
     const char *slash = strrchr(header_path, '/');
@@ -83,7 +83,8 @@ static char *join(const char *header_path, const char *name)
                                                                                          : path;
 }
 
-/* Lines are skipped in the file, bytes after decompression, as the format defines it. */
+/* Finds the start of the values. The format skips lines in the file, and bytes after decompression.
+ */
 static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t part_bytes)
 {
     int status = 0;
@@ -97,9 +98,9 @@ static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t 
     }
     status = trip_file_size(source->path, &file_bytes);
     if (status == 0 && file_bytes >= part_bytes &&
-        file_bytes - part_bytes >= source->offset_bytes) /* behind the header and skipped lines */
+        file_bytes - part_bytes >= source->offset_bytes) /* after header and skipped lines */
         source->offset_bytes = file_bytes - part_bytes;
-    return status; /* a file too short is reported when it is opened */
+    return status; /* opening reports a file that is too short */
 }
 
 static int open_sources(const char *path, const trip_nrrd_header *h, const trip_volume_info *info,
@@ -111,7 +112,7 @@ static int open_sources(const char *path, const trip_nrrd_header *h, const trip_
     for (size_t i = 0; i < count; i++) {
         char *name = h->file_count ? join(path, h->files[i]) : strdup(path);
         if (!name)
-            return trip_fail(TRIP_ERROR, "read", path, "no memory for its data files");
+            return trip_fail(TRIP_ERROR, "read", path, "out of memory for its data files");
         sources[i] = (trip_byte_source){ .path = name,
                                          .encoding = h->encoding,
                                          .offset_bytes = h->file_count ? 0 : h->header_bytes };
@@ -132,7 +133,7 @@ static int open_data(const char *path, const trip_nrrd_header *h, const trip_vol
         return status;
     trip_byte_source *sources = calloc(count, sizeof *sources);
     if (!sources)
-        return trip_fail(TRIP_ERROR, "read", path, "no memory for its data files");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory for its data files");
     status = open_sources(path, h, info, sources, state);
     for (size_t i = 0; i < count; i++)
         free((char *)(uintptr_t)sources[i].path);
@@ -171,7 +172,7 @@ static int nrrd_list(const char *path, int (*visit)(void *user, const char *file
     for (size_t i = 0; i < h.file_count && status == 0; i++) {
         char *name = join(path, h.files[i]);
         status = name ? visit(user, name)
-                      : trip_fail(TRIP_ERROR, "read", path, "no memory for its data files");
+                      : trip_fail(TRIP_ERROR, "read", path, "out of memory for its data files");
         free(name);
     }
     trip_nrrd_header_free(&h);

@@ -1,5 +1,5 @@
-/* Values without a header. Options describe them, or a file name such as
- * engine_256x256x128_uint8.raw, the naming of the Open SciVis Datasets. */
+/* Reads values without a header. Options describe them, or a file name such as
+ * engine_256x256x128_uint8.raw, as the Open SciVis Datasets use them. */
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 #include "report.h"
 #include "volume_reader.h"
 
-/* Length of the path without ".gz" or ".bz2". */
+/* Returns the length of the path without ".gz" or ".bz2". */
 static size_t uncompressed_length(const char *path)
 {
     size_t length = strlen(path);
@@ -27,8 +27,8 @@ static bool is_raw_name(const char *path)
     return length >= 4 && strncasecmp(path + length - 4, ".raw", 4) == 0;
 }
 
-/* "WxHxD" between underscores, then the type: from the end of the name backwards, since the rest
- * of it is free. */
+/* Parses "WxHxD" and the type after the last two underscores. Starts from the end, since the rest
+ * of the name is free. */
 static bool parse_name(const char *path, int64_t dims[3], int *type)
 {
     char name[256];
@@ -73,11 +73,11 @@ static int no_size(const char *path)
                              header);
     }
     return trip_fail(TRIP_USAGE, "read", path,
-                     "has no header: `triptych brick FILE --size X,Y,Z --type uint8` says what it "
-                     "holds (also --spacing, --endian and --offset)");
+                     "has no header: describe it with `triptych brick FILE --size X,Y,Z --type "
+                     "uint8` (also --spacing, --endian and --offset)");
 }
 
-/* From the options; what they leave open, from the file's name. */
+/* Takes the layout from the options, and missing parts from the file's name. */
 static int find_layout(const char *path, const trip_volume_params *params, trip_volume_info *info)
 {
     int64_t dims[3] = { 0 };
@@ -93,7 +93,7 @@ static int find_layout(const char *path, const trip_volume_params *params, trip_
     if (type < 0)
         return trip_fail(
             TRIP_USAGE, "read", path,
-            "unknown --type \"%s\": uint8, int8, uint16, int16, uint32, int32, uint64, "
+            "unknown --type \"%s\"; use uint8, int8, uint16, int16, uint32, int32, uint64, "
             "int64, half, float or double",
             params->raw_type);
     memcpy(info->dims, dims, sizeof dims);

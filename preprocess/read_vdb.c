@@ -1,5 +1,5 @@
-/* OpenVDB grids: recognised here, read by the module in vdb/, which is loaded for the first of them
- * and stays. */
+/* Recognises OpenVDB files. The module in vdb/ reads them; it is loaded for the first file and
+ * stays loaded. */
 #include <dlfcn.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,7 +29,7 @@ typedef struct state {
     void *of_module;
 } state;
 
-/* Loads the module, or finds it loaded. It is never closed. */
+/* Loads the module unless it is loaded already. It is never closed. */
 static int load_module(const trip_volume_reader **out)
 {
     static const trip_vdb_host host = { TRIP_VERSION,           (trip_fail),
@@ -38,14 +38,15 @@ static int load_module(const trip_volume_reader **out)
                                         trip_interrupted };
     char path[PATH_MAX];
     if (!trip_companion_find(path, MODULE, TRIP_VDB_MODULE_BUILT, R_OK))
-        return trip_fail(TRIP_ERROR, "read", MODULE,
-                         "is not beside this program nor in ../libexec/triptych; it reads OpenVDB");
+        return trip_fail(
+            TRIP_ERROR, "read", MODULE,
+            "OpenVDB files need this module beside this program or in ../libexec/triptych");
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!library)
         return trip_fail(TRIP_ERROR, "read", path, "cannot load: %s", dlerror());
     void *symbol = dlsym(library, TRIP_VDB_ENTRY);
     trip_vdb_entry_point entry;
-    memcpy(&entry, &symbol, sizeof entry); /* ISO C converts no void * into a function */
+    memcpy(&entry, &symbol, sizeof entry); /* ISO C cannot convert void * to a function pointer */
     *out = symbol ? entry(&host) : NULL;
     if (*out)
         return 0;
@@ -120,7 +121,8 @@ static int refuse(const char *path, const trip_volume_params *params, trip_budge
                   trip_volume_info *info, void **state)
 {
     (void)params, (void)budget, (void)info, (void)state;
-    return trip_fail(TRIP_ERROR, "read", path, "this program was built without OpenVDB");
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "cannot read OpenVDB files: this program was built without OpenVDB");
 }
 
 const trip_volume_reader trip_read_vdb = { .format = "openvdb", .probe = probe, .open = refuse };

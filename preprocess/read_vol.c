@@ -1,8 +1,10 @@
-/* .vol of the DGtal and VolGallery projects: header lines "Name: value" up to a line with a single
- * ".", then one zlib stream of X * Y * Z bytes (version 3), or the bytes themselves (version 2).
- * Where no line says the version, the sizes come once more before the bytes, as integers of four
- * bytes in the order of the machine that wrote them, and a line feed. Voxel-Size is the bytes of a
- * voxel, of which there may be one; nothing says how far apart voxels are. */
+/* Reads .vol files of the DGtal and VolGallery projects. Header lines are "Name: value" up to a
+ * line with a single ".". X * Y * Z bytes follow, plain in version 2, as one zlib stream in version
+ * 3.
+ * - If no line gives the version, the sizes follow the header again before the values. They are
+ *   three 4-byte integers in the byte order of the machine that wrote them, then a line feed.
+ * - Voxel-Size is the number of bytes per voxel; only 1 is supported.
+ * - The format stores no spacing. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,16 +19,16 @@
 #define LINE_BYTES 256
 #define LINES_MAX 200
 
-/* What comes before the voxels where no version is said. */
+/* Length of the repeated sizes in files without a version. */
 enum { REPEATED_BYTES = 3 * 4 + 1 };
 
 typedef struct vol_header {
     int64_t dims[3], version;
     bool has_version;
-    uint64_t bytes; /* of all that is before the voxels */
+    uint64_t bytes; /* before the voxels */
 } vol_header;
 
-/* Whether the file begins with one of the lines that headers begin with. */
+/* Returns whether the file begins with a line that is the first of known headers. */
 static bool vol_probe(const char *path, const unsigned char *head, size_t bytes,
                       const trip_volume_params *params)
 {
@@ -39,7 +41,7 @@ static bool vol_probe(const char *path, const unsigned char *head, size_t bytes,
     return false;
 }
 
-/* Takes one "Name: value" line; other names are ignored. */
+/* Parses one "Name: value" line; ignores other names. */
 static int take_field(vol_header *h, const char *path, int number, const char *line)
 {
     static const char *const axes[3] = { "X", "Y", "Z" };
@@ -58,13 +60,13 @@ static int take_field(vol_header *h, const char *path, int number, const char *l
     const bool is_long = strcmp(name, "Lvoxel-Size") == 0;
     if (is_long || (strcmp(name, "Voxel-Size") == 0 && strcmp(value, "1") != 0))
         return trip_fail_line("read", path, number,
-                              "\"%s: %s\", its bytes a voxel: only .vol files of one byte a voxel "
+                              "\"%s: %s\" bytes per voxel: only .vol files with one byte per voxel "
                               "can be read",
                               name, value);
     return 0;
 }
 
-/* Whether the three integers, of one byte order or the other, are the sizes. */
+/* Returns whether the three integers are the sizes, in either byte order. */
 static bool are_sizes(const unsigned char *at, const int64_t dims[3])
 {
     bool little = true, big = true;
@@ -81,8 +83,8 @@ static int take_repeated_sizes(vol_header *h, const char *path, FILE *file)
     if (fread(repeated, 1, sizeof repeated, file) != sizeof repeated ||
         !are_sizes(repeated, h->dims) || repeated[REPEATED_BYTES - 1] != '\n')
         return trip_fail(TRIP_ERROR, "read", path,
-                         "has no \"Version\", so that its sizes and a line feed would have to "
-                         "follow its header, which they do not");
+                         "its header has no \"Version\" line, and the sizes are not repeated "
+                         "after it");
     h->bytes += REPEATED_BYTES;
     return 0;
 }
@@ -106,8 +108,7 @@ static int read_header(const char *path, FILE *file, vol_header *h)
         if (status < 0)
             return status;
     }
-    return trip_fail_line("read", path, LINES_MAX,
-                          "the header has no end, a line with a single \".\"");
+    return trip_fail_line("read", path, LINES_MAX, "the header does not end with a line \".\"");
 }
 
 static int vol_open(const char *path, const trip_volume_params *params, trip_budget *budget,
@@ -125,7 +126,8 @@ static int vol_open(const char *path, const trip_volume_params *params, trip_bud
         return status;
     if (h.version != 2 && h.version != 3)
         return trip_fail(TRIP_ERROR, "read", path,
-                         ".vol version %" PRId64 " is not known, only 2 and 3 are", h.version);
+                         ".vol version %" PRId64 " is unknown; only versions 2 and 3 can be read",
+                         h.version);
     memcpy(info->dims, h.dims, sizeof info->dims);
     info->type = TRIP_U8;
     trip_byte_source source = { .path = path,

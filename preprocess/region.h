@@ -1,11 +1,12 @@
-/* A box of a grid's voxels, by index. Plain values. */
+/* A box of voxels of a grid, in index space. */
 #ifndef TRIP_REGION_H
 #define TRIP_REGION_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* From `first` to before `past` along i, j, k; past 0: to the end of the grid. */
+/* The voxels from `first` up to, but not including, `past` along i, j, k. past 0 stands for the end
+ * of the grid. */
 typedef struct trip_region {
     int64_t first[3], past[3];
 } trip_region;

@@ -21,8 +21,8 @@ static off_t size_in(int folder, const char *name)
     return found ? st.st_size : -1;
 }
 
-/* Opens the longer of the two files of a plane, which begin with the same bytes, under its name in
- * the spill. */
+/* Opens the longer of the two files of a plane, under its name in the spill. Both files begin with
+ * the same bytes. */
 static int take_plane(const trip_spill *spill, int partial, int plane, int *fd)
 {
     char name[32];
@@ -62,15 +62,15 @@ void trip_leftover_close(trip_leftover *l)
 static int fail_damaged(void)
 {
     return trip_fail(TRIP_ERROR, "brick", "--resume",
-                     "what the interrupted run left is damaged: without --resume it starts again");
+                     "the data of the interrupted run are damaged: run again without --resume");
 }
 
-/* The state of appending the runs again. */
+/* The state while runs are appended again. */
 typedef struct replay {
     const trip_leftover *leftover;
     const trip_block_form *form;
     trip_list_output *output;
-    uint64_t at[TRIP_PLANES]; /* bytes */
+    uint64_t at[TRIP_PLANES]; /* bytes read of each plane */
     uint64_t splats;
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
@@ -86,7 +86,7 @@ static int read_next(replay *r, int plane, void *data, size_t bytes)
     return 0;
 }
 
-/* Reads the next block, part after part, each of which determines the length of the next. */
+/* Reads the next block in parts. Each part determines the length of the next. */
 static int read_block(replay *r, uint32_t *words)
 {
     uint32_t end;
@@ -107,7 +107,7 @@ static int read_normals(replay *r, uint32_t splats)
                : 0;
 }
 
-/* The bounds of a brick that admit every record inside the tile. */
+/* Returns brick bounds that admit every record inside the tile. */
 static trip_file_brick whole_tile(const trip_block_form *f)
 {
     const uint8_t last = (uint8_t)((1u << f->tile_log2) - 1);
@@ -149,8 +149,8 @@ static int replay_run(replay *r, const trip_run_record *run)
                : status;
 }
 
-/* Whether all was read, and as many bytes written: blocks packed less tightly than the writer packs
- * them are none that it left. */
+/* Returns whether all runs were read and as many bytes were written. If a block was packed less
+ * tightly than the writer packs it, this writer did not write the file. */
 static bool is_all(const replay *r, const trip_checkpoint *c)
 {
     const trip_list_output *o = r->output;
@@ -180,7 +180,7 @@ int trip_leftover_replay(const trip_leftover *l, trip_journal *j, trip_list_buil
 {
     replay *r = trip_budget_take(budget, sizeof *r);
     if (!r)
-        return trip_fail(TRIP_ERROR, "brick", "--resume", "needs more --memory");
+        return trip_fail(TRIP_ERROR, "brick", "--resume", "not enough memory: raise --memory");
     r->leftover = l;
     r->form = form;
     r->output = trip_list_builder_ordered(builder);

@@ -7,18 +7,18 @@
 #include "normal.h"
 #include "report.h"
 
-/* Arrays have one entry for each position in the tile, valid where a piece has a splat. The first
- * piece is not scattered into them before a second one comes: most runs have no other, and its
- * splats are in list order already. */
+/* Arrays have one entry for each position in the tile, valid if a piece has a splat there. The
+ * first piece stays in its own order until a second piece comes. Most runs have only one piece,
+ * which is in list order already. */
 struct trip_run_builder {
     trip_piece_format format;
     trip_budget *budget;
     bool started;         /* a piece was added */
-    uint32_t first_count; /* splats of the first piece while it is the only one, else 0 */
+    uint32_t first_count; /* splats of the first piece while there is no other, else 0 */
     uint16_t first_positions[TRIP_TILE_MAX_SPLATS];
     uint64_t bits[TRIP_TILE_MAX_WORDS];
     uint16_t positions[TRIP_TILE_MAX_SPLATS];
-    uint16_t uv[TRIP_TILE_MAX_SPLATS]; /* u and v of a position, a byte each */
+    uint16_t uv[TRIP_TILE_MAX_SPLATS]; /* u and v of a position, one byte each */
     uint32_t values[TRIP_TILE_MAX_SPLATS];
     uint32_t normals[TRIP_TILE_MAX_SPLATS];
     float magnitudes[TRIP_TILE_MAX_SPLATS];
@@ -31,7 +31,7 @@ int trip_run_builder_create(trip_run_builder **out, const trip_piece_format *f, 
     trip_run_builder *b = *out = trip_budget_take(budget, sizeof *b);
     if (!b)
         return trip_fail(TRIP_ERROR, "brick", "merge",
-                         "needs more memory than is allowed: give more with --memory");
+                         "needs more memory than --memory allows: raise --memory");
     b->format = *f;
     b->budget = budget;
     for (unsigned v = 0; v < 1u << f->tile_log2; v++)
@@ -58,7 +58,7 @@ static void add_first(trip_run_builder *b, const trip_piece *p)
         memcpy(b->normal_records, base + parts.normals, b->first_count * sizeof *b->normal_records);
 }
 
-/* Moves the splats of the first piece to where those of the others go. */
+/* Moves the splats of the first piece to their positions in the tile. */
 static void scatter_first(trip_run_builder *b)
 {
     for (uint32_t i = 0; i < b->first_count; i++) {

@@ -7,14 +7,14 @@
 
 typedef struct sampled {
     const trip_volume_reader *of;
-    void *state; /* of that */
+    void *state; /* of the wrapped reader */
     trip_budget *budget;
     int64_t step;
-    /* Of slice readers: */
-    int64_t dims[2]; /* of the other's slices */
+    /* Only for slice readers: */
+    int64_t dims[2]; /* of the slices of the wrapped reader */
     size_t value_bytes;
-    unsigned char *slice; /* one of them */
-    int64_t skip;         /* slices to get past before the next one is read */
+    unsigned char *slice; /* buffer for one slice of the wrapped reader */
+    int64_t skip;         /* slices to skip before the next read */
 } sampled;
 
 static size_t slice_bytes(const sampled *s)
@@ -38,8 +38,6 @@ static int rewind_sampled(void *opaque)
     return s->of->rewind(s->state);
 }
 
-/* ---- slices ---- */
-
 static int get_past(sampled *s)
 {
     int status = 0;
@@ -52,7 +50,7 @@ static int get_past(sampled *s)
     return status;
 }
 
-/* Every step-th value of every step-th row; returns where they end. */
+/* Copies every step-th value of every step-th row. Returns the end of the copied values. */
 static unsigned char *pick(const sampled *s, unsigned char *to)
 {
     const size_t row = (size_t)s->dims[0] * s->value_bytes;
@@ -90,15 +88,14 @@ static bool swap_sampled(const void *opaque)
     return s->of->swap(s->state);
 }
 
-/* ---- portions ---- */
-
-/* The other's, with what of it is sampled. */
+/* Takes the next portion of the wrapped reader that contains samples, with its bounds in samples.
+ */
 static int next_sampled(void *opaque, trip_volume_portion *portion)
 {
     sampled *s = opaque;
     trip_volume_portion *of = trip_budget_take(s->budget, sizeof *of);
     if (!of)
-        return trip_fail(TRIP_ERROR, "read", "portion", "does not fit the memory given");
+        return trip_fail(TRIP_ERROR, "read", "portion", "does not fit in memory: raise --memory");
     for (;;) {
         bool some = true;
         int status = s->of->next(s->state, of);
@@ -128,14 +125,15 @@ static void release_sampled(void *opaque, trip_volume_portion *portion)
     portion->data = NULL;
 }
 
-/* Where decoded samples go: arrays of the box [lo, lo + size). */
+/* The destination of decoded samples: arrays of the box [lo, lo + size). */
 typedef struct sample_box {
     const int64_t *lo, *size;
     float *values;
     uint8_t *active;
 } sample_box;
 
-/* Of all voxels from the first to the last of samples [lo, lo + size). */
+/* Copies the samples [lo, lo + size) out of an array of all voxels from the first sample to the
+ * last. */
 static void pick_box(const sampled *s, const int64_t lo[3], const int64_t size[3],
                      const int64_t voxels[3], const float *values, const uint8_t *active,
                      const sample_box *to)
@@ -165,9 +163,9 @@ static int decode_part(const sampled *s, const trip_volume_portion *of, const in
     }
     float *values = trip_budget_take(s->budget, count * sizeof *values);
     uint8_t *active = trip_budget_take(s->budget, count);
-    int status = values && active
-                     ? s->of->decode(s->state, of, first, voxels, values, active)
-                     : trip_fail(TRIP_ERROR, "read", "portion", "does not fit the memory given");
+    int status = values && active ? s->of->decode(s->state, of, first, voxels, values, active)
+                                  : trip_fail(TRIP_ERROR, "read", "portion",
+                                              "does not fit in memory: raise --memory");
     if (!status)
         pick_box(s, lo, size, voxels, values, active, to);
     if (values)
@@ -177,8 +175,8 @@ static int decode_part(const sampled *s, const trip_volume_portion *of, const in
     return status;
 }
 
-/* Those beside the portion first, side by side, so that little of what is between them and it is
- * decoded: they may lie far away. */
+/* Decodes samples beside the portion first, side by side. They may lie far from the portion, and
+ * this way the voxels in between are not decoded. */
 static int decode_sampled(const void *opaque, const trip_volume_portion *portion,
                           const int64_t lo[3], const int64_t size[3], float *values,
                           uint8_t *active)
@@ -203,8 +201,6 @@ static int decode_sampled(const void *opaque, const trip_volume_portion *portion
     const bool some = left[0] > 0 && left[1] > 0 && left[2] > 0;
     return !status && some ? decode_part(s, portion->data, from, left, &to) : status;
 }
-
-/* ---- opening ---- */
 
 static const trip_volume_reader sampled_slices = {
     .close = close_sampled,
@@ -245,7 +241,7 @@ int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volu
         return 0;
     sampled *s = trip_budget_take(budget, sizeof *s);
     if (!s)
-        return trip_fail(TRIP_ERROR, "read", "samples", "do not fit the memory given");
+        return trip_fail(TRIP_ERROR, "read", "samples", "do not fit in memory: raise --memory");
     *s = (sampled){ .of = *reader,
                     .state = *state,
                     .budget = budget,
@@ -254,7 +250,7 @@ int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volu
                     .value_bytes = trip_scalar_bytes(info->type) };
     if ((*reader)->read_slices && !(s->slice = trip_budget_take(budget, slice_bytes(s)))) {
         trip_budget_release(budget, s, sizeof *s);
-        return trip_fail(TRIP_ERROR, "read", "samples", "do not fit the memory given");
+        return trip_fail(TRIP_ERROR, "read", "samples", "do not fit in memory: raise --memory");
     }
     *reader = (*reader)->read_slices ? &sampled_slices : &sampled_portions;
     *state = s;

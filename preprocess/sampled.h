@@ -1,13 +1,14 @@
-/* A reader of every n-th voxel of another reader's volume along each axis, from the first one on: a
- * small volume of the same thing, soon read. As volume_reader.h says of threads. */
+/* A reader of every n-th voxel of another reader's volume along each axis, starting with the first
+ * voxel. It gives a small preview of a volume in little time. The thread rules of volume_reader.h
+ * hold. */
 #ifndef TRIP_SAMPLED_H
 #define TRIP_SAMPLED_H
 
 #include "volume_reader.h"
 
-/* Puts itself before an opened reader, so that the volume has at most so many voxels: *reader,
- * *state and *info are its own from then on; where it has no more anyway all stays as it is. A
- * reported failure leaves them as they are. */
+/* Wraps an opened reader so that the volume has at most `max_voxels` voxels. Replaces *reader,
+ * *state and *info. Changes nothing if the volume is small enough, or on failure. Reports failures.
+ */
 int trip_sampled_wrap(const trip_volume_reader **reader, void **state, trip_volume_info *info,
                       uint64_t max_voxels, trip_budget *budget);
 

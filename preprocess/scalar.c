@@ -13,7 +13,7 @@ static const struct {
     [TRIP_F32] = { 4, "float" },  [TRIP_F64] = { 8, "double" },
 };
 
-/* Spellings of NRRD, of the Open SciVis file names, and of NumPy. */
+/* Type names of NRRD, of the Open SciVis file names, and of NumPy. */
 static const struct {
     const char *name;
     trip_scalar type;
@@ -127,8 +127,8 @@ static inline uint64_t swap_64(uint64_t v)
     return __builtin_bswap64(v);
 }
 
-/* IEEE half to single, exact: the exponent is rebiased by a multiplication, which also normalises
- * subnormals. */
+/* Converts an IEEE half to a single, exactly. A multiplication rebiases the exponent, which also
+ * normalises subnormals. */
 static inline float half_to_float(uint16_t half)
 {
     uint32_t magnitude = half & 0x7fffu, bits = magnitude << 13;
@@ -143,8 +143,8 @@ static inline float half_to_float(uint16_t half)
     return value;
 }
 
-/* One row of values of one type. The branches are outside the loops, so that each loop vectorises;
- * memcpy because rows of a file need not be aligned. */
+/* Decodes one row of values of one type. The branches are outside the loops, so that each loop
+ * vectorises. memcpy() is needed because rows of a file may be unaligned. */
 #define DEFINE_DECODE(NAME, TYPE, BITS, VALUE)                                                     \
     static inline TYPE load_##NAME(const unsigned char *from, bool swap)                           \
     {                                                                                              \

@@ -15,11 +15,11 @@ void trip_tally_clear(trip_tally *t)
     t->value_max = -INFINITY;
 }
 
-/* Vectors of four: compilers do not vectorise these loops. */
+/* Explicit vectors of four, because compilers do not vectorise these loops. */
 typedef float four_floats __attribute__((vector_size(16)));
 typedef int32_t four_ints __attribute__((vector_size(16)));
 
-/* Whether all values lie within the range so far, which most rows do; NaN lies in none. */
+/* Returns whether all values lie within the range so far, as in most rows. NaN lies outside. */
 static bool are_known(const trip_tally *t, const float *values, size_t count)
 {
     const float lo = (float)t->value_min, hi = (float)t->value_max;
@@ -44,7 +44,7 @@ void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active,
         return;
     }
     for (size_t i = 0; i < count; i++) {
-        double value = values[i] + 0.0; /* -0 and 0 are one */
+        double value = values[i] + 0.0; /* turns -0 into 0 */
         if (active && !active[i])
             continue;
         t->voxels++;
@@ -56,7 +56,8 @@ void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active,
     }
 }
 
-/* Exponent of the last bit of a float of this magnitude: a finer bin would hold nothing more. */
+/* Returns the exponent of the last bit of a float of this magnitude. Finer bins would separate
+ * nothing more. */
 static int last_bit(double magnitude)
 {
     int e = magnitude > 0 ? ilogb(magnitude) - 23 : -149;
@@ -68,8 +69,9 @@ static int64_t bin_of(double value, int exponent)
     return (int64_t)floor(ldexp(value, -exponent));
 }
 
-/* The narrowest bins that hold the range. As a range grows this never falls, so that bins only ever
- * have to be merged and the last state depends on the last range only. */
+/* Returns the exponent of the narrowest bins that hold the range. The exponent never falls while
+ * the range grows. Bins are therefore only merged, and the final state depends on the final range
+ * only. */
 static int exponent_for(double lo, double hi)
 {
     int e = last_bit(fmax(fabs(lo), fabs(hi)));
@@ -90,7 +92,7 @@ static void merge_bins(trip_tally *t, int exponent)
             continue;
         int64_t to = (int64_t)floor(ldexp((double)(t->first + b), t->exponent - exponent)) - first;
         t->counts[b] = 0;
-        t->counts[to] += n; /* to <= b: not to be met again */
+        t->counts[to] += n; /* to <= b, so the loop does not visit these counts again */
     }
     t->first = first;
     t->exponent = exponent;
@@ -98,7 +100,7 @@ static void merge_bins(trip_tally *t, int exponent)
 
 static void move_bins(trip_tally *t, int64_t first)
 {
-    int64_t by = t->first - first; /* upwards */
+    int64_t by = t->first - first; /* upwards if positive */
     if (by > 0)
         memmove(t->counts + by, t->counts, (size_t)(TRIP_TALLY_BINS - by) * sizeof *t->counts);
     if (by > 0)
@@ -110,7 +112,7 @@ static void move_bins(trip_tally *t, int64_t first)
     t->first = first;
 }
 
-/* Makes the bins hold the tally's range. */
+/* Changes the bins so that they hold the tally's range. */
 static void fit(trip_tally *t)
 {
     int exponent = exponent_for(t->value_min, t->value_max);
@@ -133,8 +135,8 @@ static bool is_fitted(const trip_tally *t)
     return t->counted > 0 && t->fit_min == t->value_min && t->fit_max == t->value_max;
 }
 
-/* Bins of finite values, from the first one. Scaling by a power of two is exact, and what comes out
- * is within 2^24, see last_bit(). The count is a multiple of 4. */
+/* Computes the bins of finite values, relative to the first bin. Scaling by a power of two is
+ * exact, and the results are below 2^24 (see last_bit()). `count` must be a multiple of 4. */
 static void find_bins(const trip_tally *t, const float *values, size_t count, int32_t *bins)
 {
     const float per_value = ldexpf(1, -t->exponent);
@@ -149,8 +151,8 @@ static void find_bins(const trip_tally *t, const float *values, size_t count, in
     }
 }
 
-/* Neighbours are often alike, and additions to one bin have to wait for each other. The count is a
- * multiple of 4. */
+/* Counts equal neighbours together, since additions to one bin wait for each other. `count` must be
+ * a multiple of 4. */
 static void add_bins(trip_tally *t, const int32_t *bins, size_t count)
 {
     for (size_t i = 0; i < count; i += 4) {
@@ -218,15 +220,15 @@ void trip_tally_add(trip_tally *t, const trip_tally *other)
     t->counted += other->counted;
 }
 
-/* Values are floats. */
+/* Checks that the bounds are ordered and fit in floats. */
 static bool check_range(double lo, double hi)
 {
     return fabs(lo) <= FLT_MAX && fabs(hi) <= FLT_MAX && lo <= hi && (double)(float)lo == lo &&
            (double)(float)hi == hi;
 }
 
-/* Bins of values in [lo, hi] only, none wider than such a range needs: adding to a tally of a wider
- * range then stays within its bins. */
+/* Checks that only bins within the range have counts, and that no bin is wider than the range
+ * needs. Adding to a tally with a wider range then stays within its bins. */
 static bool check_bins(const trip_tally *t)
 {
     const int64_t max = INT64_C(1) << 26; /* see last_bit() */
@@ -267,7 +269,7 @@ void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
     for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
         if (t->counts[b] == 0)
             continue;
-        /* A fine bin counts as its lower edge, which is exact for integers of up to 14 bits. */
+        /* A fine bin counts at its lower edge, which is exact for integers of up to 14 bits. */
         double value = fmax(ldexp((double)(t->first + b), t->exponent), t->value_min);
         int to = range > 0 ? (int)((value - t->value_min) / range * bins) : 0;
         histogram->counts[to < bins ? to : bins - 1] += t->counts[b];
@@ -276,8 +278,8 @@ void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
 
 typedef struct scan {
     bool sparse;
-    trip_tally *tallies; /* one a thread */
-    float *values;       /* SCAN_VOXELS a thread */
+    trip_tally *tallies; /* one for each thread */
+    float *values;       /* SCAN_VOXELS for each thread */
     uint8_t *active;
     const trip_scan_params *params;
 } scan;
@@ -293,7 +295,7 @@ static void count_kept(trip_tally *t, const trip_envelope *e, const float *value
         t->kept += keep[i];
     for (size_t i = 1; i < count; i++)
         t->borders += keep[i] != keep[i - 1];
-    if (active) /* rows of sparse volumes end where voxels do */
+    if (active) /* rows of sparse volumes end where voxels end */
         t->borders += (uint64_t)keep[0] + keep[count - 1];
 }
 
@@ -329,7 +331,7 @@ static int check_tally(const trip_tally *t, const char *path)
     if (t->voxels == 0)
         return trip_fail(TRIP_ERROR, "brick", path, "has no active voxels");
     if (t->finite == 0)
-        return trip_fail(TRIP_ERROR, "brick", path, "holds no finite value");
+        return trip_fail(TRIP_ERROR, "brick", path, "has no finite values");
     return 0;
 }
 
@@ -379,8 +381,8 @@ int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, tri
         status = scan_with(&s, out, volume, path, workers);
     else
         status = trip_fail(TRIP_ERROR, "brick", path,
-                           "%zu threads need more memory than is allowed: give more with --memory, "
-                           "or take fewer --threads",
+                           "%zu threads need more memory than --memory allows: raise --memory or "
+                           "lower --threads",
                            threads);
     trip_budget_release(budget, s.tallies, tallies);
     trip_budget_release(budget, s.values, values);

@@ -6,16 +6,16 @@
 #include "format.h"
 #include "report.h"
 
-/* Squares held besides the one at hand. */
+/* Squares in a lane besides the current one. */
 enum { HELD = 32 };
 
 static const uint64_t TILE_MASK = (UINT64_C(1) << TRIP_TILE_MORTON_BITS) - 1;
 
-/* By row. */
+/* The arrays are in row order. */
 struct trip_sharpen_square {
     uint64_t key;
     bool held;
-    uint16_t *known; /* all bits, or none where there is no voxel */
+    uint16_t *known; /* all bits set if the voxel exists, else 0 */
     uint16_t *values;
 };
 
@@ -50,9 +50,7 @@ void trip_sharpen_close(trip_sharpen *s)
     *s = (trip_sharpen){ 0 };
 }
 
-/* ---- squares ---- */
-
-/* `values`: of the lane, for what is read. */
+/* Reads a square. `values` is a buffer of the lane. */
 static int read_square(const trip_sharpen *s, const trip_level_position *position,
                        trip_coarse_value *values, trip_sharpen_square *to)
 {
@@ -79,7 +77,7 @@ static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l,
                : read_square(s, position, l->beside, square);
 }
 
-/* Where the others are there. */
+/* Adds differences to the neighbours that exist. */
 static void add_differences(int32_t *restrict sums, const uint16_t *here, const uint16_t *others,
                             const uint16_t *known, size_t count)
 {
@@ -87,8 +85,8 @@ static void add_differences(int32_t *restrict sums, const uint16_t *here, const 
         sums[i] += (here[i] & known[i]) - (others[i] & known[i]);
 }
 
-/* Of the square at hand the voxels of `count` rows from `row` on and of `width` columns from
- * `column` on, with those of another that are `shift` further. */
+/* Adds differences for a part of the current square: `count` rows from `row` on and `width` columns
+ * from `column` on. The neighbours are `shift` entries further in the other square. */
 static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
                        const trip_sharpen_square *other, size_t row, size_t count, size_t column,
                        size_t width, ptrdiff_t shift)
@@ -112,8 +110,8 @@ static int add_square(const trip_sharpen *s, trip_sharpen_lane *l,
     return status;
 }
 
-/* Along u and v, within the square at hand and from those around it; and from the sheets before and
- * behind. */
+/* Adds the differences along u and v, within the current square and to the squares around it. Then
+ * adds the differences to the previous and the next sheet. */
 static int add_around(const trip_sharpen *s, trip_sharpen_lane *l,
                       const trip_level_position beside[6])
 {
@@ -136,7 +134,7 @@ static int add_around(const trip_sharpen *s, trip_sharpen_lane *l,
     return status;
 }
 
-/* value + sum / TRIP_SHARPEN_PART, the nearest. */
+/* Returns value + sum / TRIP_SHARPEN_PART, rounded and clamped. */
 static uint16_t sharpened(uint16_t value, int32_t sum)
 {
     const int32_t half = sum < 0 ? -TRIP_SHARPEN_PART / 2 : TRIP_SHARPEN_PART / 2;
@@ -144,8 +142,8 @@ static uint16_t sharpened(uint16_t value, int32_t sum)
     return (uint16_t)(to < 0 ? 0 : to > UINT16_MAX ? UINT16_MAX : to);
 }
 
-/* What covers nothing known has a value that does not show, and is moved away from what does alone.
- */
+/* Returns the sharpened value of a voxel. A voxel that covers no known value is invisible, and only
+ * moves away from visible values. */
 static uint16_t sharpened_value(const trip_sharpen *s, const trip_coarse_value *voxel, int32_t sum)
 {
     const bool towards = s->round ? sum < 0 : sum > 0;
@@ -168,9 +166,7 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
     return status;
 }
 
-/* ---- one after the other ---- */
-
-/* The first sheet of the next columns, UINT64_MAX when there are none. */
+/* Finds the first sheet of the next columns; UINT64_MAX if there are none. */
 static int next_sheet(trip_sharpen *s, uint64_t *first)
 {
     const uint64_t behind = s->sheet + TRIP_SHARPEN_SHEETS;
@@ -194,14 +190,15 @@ static void find_beside(const trip_sharpen *s, trip_sharpen_neighbourhood *of)
     }
 }
 
-/* Of a sheet of the columns at hand the square that is next; NULL: there is none. */
+/* Returns the next square of sheet `i` of the current columns, or NULL after its last one. */
 static const trip_level_position *next_position(const trip_sharpen *s, unsigned i)
 {
     const trip_level_sheet *sheet = trip_level_positions_sheet(&s->positions, s->sheet + i);
     return sheet && s->next[i] < sheet->count ? &sheet->positions[s->next[i]] : NULL;
 }
 
-/* Where the next column lies in its sheets; UINT64_MAX: there is none in those at hand. */
+/* Returns the Morton code of the next column in the current sheets, or UINT64_MAX after the last
+ * one. */
 static uint64_t next_morton(const trip_sharpen *s)
 {
     uint64_t min = UINT64_MAX;

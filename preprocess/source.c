@@ -16,12 +16,12 @@
 #include "volume_reader.h"
 
 #define PIECE_BYTES ((size_t)1 << 20)
-/* The coarsest file times are those of FAT: steps of two seconds. */
+/* FAT has the coarsest file times, with steps of two seconds. */
 static const int64_t stable_ns = INT64_C(2000000000);
 
 static int fail_memory(const char *path)
 {
-    return trip_fail(TRIP_ERROR, "read", path, "no memory to note its files");
+    return trip_fail(TRIP_ERROR, "read", path, "out of memory for its list of files");
 }
 
 static int64_t nanoseconds(struct timespec t)
@@ -29,7 +29,8 @@ static int64_t nanoseconds(struct timespec t)
     return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
-/* What is missing or no regular file counts as empty; the reader will report it. */
+/* Adds a file. Missing files and files that are not regular count as empty; the reader will report
+ * them. */
 static int add_file(void *user, const char *path)
 {
     trip_source *s = user;
@@ -133,8 +134,8 @@ int trip_source_digest_state(const trip_source *s, const char *text, trip_digest
     return status;
 }
 
-/* The names of raw files have their size and type, those of stacks their order; of other names only
- * the encoding matters. */
+/* Adds a name as far as readers use it. Names of raw files give size and type, and names in stacks
+ * give the order. Other names matter only for the encoding. */
 static void add_name(XXH3_state_t *hash, const trip_source *s, const trip_source_file *f)
 {
     bool matters = !strcmp(s->format, "raw") || !strcmp(s->format, "images");
@@ -166,7 +167,7 @@ static int add_bytes(reading *r, const trip_source_file *f, int fd)
         if (n < 0)
             return trip_fail_errno("read", f->path, "cannot read");
         if (n == 0)
-            return trip_fail(TRIP_ERROR, "read", f->path, "became shorter while it was read");
+            return trip_fail(TRIP_ERROR, "read", f->path, "became shorter during reading");
         XXH3_128bits_update(r->hash, r->piece, (size_t)n);
         at += (uint64_t)n;
         r->done += (uint64_t)n;

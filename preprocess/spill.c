@@ -25,7 +25,7 @@ struct trip_spill {
     int folder; /* holds the lock */
     int file;
     bool keep;
-    bool cut; /* the file ends at `offset`: what an interrupted run wrote after it is gone */
+    bool cut; /* the file was cut at `offset`, after the data of an interrupted run */
     unsigned char *buffer;
     size_t used;
     _Atomic uint64_t offset; /* in the file, of the buffer; any thread may read it */
@@ -37,10 +37,11 @@ struct trip_spill {
 static int fail_memory(const trip_spill *s)
 {
     return trip_fail(TRIP_ERROR, "brick", s->path,
-                     "needs more memory than is allowed: give more with --memory");
+                     "needs more memory than --memory allows: raise --memory");
 }
 
-/* What this program makes in the folder, the files of journal.c and resume.c included. */
+/* Returns whether this program makes such a file in the folder, including the files of journal.c
+ * and resume.c. */
 static bool is_own_file(const char *name)
 {
     static const char *const names[] = { DATA_NAME, "journal", "runs", "z0.voxels", "z0.normals" };
@@ -119,7 +120,7 @@ static int open_file(trip_spill *s)
     int status =
         trip_folder_open_file(&s->file, s->folder, s->path, DATA_NAME, O_RDWR | O_CREAT, "brick");
     if (status == 0)
-        fcntl(s->file, F_SETFL, O_DIRECT); /* where refused, through the page cache */
+        fcntl(s->file, F_SETFL, O_DIRECT); /* if refused, I/O uses the page cache */
     return status;
 }
 
@@ -135,7 +136,7 @@ static int make_room(trip_spill *s, size_t count)
     return 0;
 }
 
-/* The aligned end of a sequence; 0 if it is not sound or does not begin at `offset`. */
+/* Returns the aligned end of a sequence, or 0 if it is invalid or does not begin at `offset`. */
 static uint64_t end_of_sequence(const trip_sequence *t, uint64_t offset)
 {
     uint64_t end;
@@ -155,15 +156,15 @@ int trip_spill_restore(trip_spill *s, const trip_sequence *sequences, size_t cou
         offset = end_of_sequence(&sequences[i], offset);
         if (offset == 0)
             status = trip_fail(TRIP_ERROR, "brick", s->path,
-                               "its journal describes temporary data that no run writes: without "
-                               "--resume it starts again");
+                               "the journal describes temporary data that no run writes: run again "
+                               "without --resume");
     }
     if (status == 0 && count && fstat(s->file, &st) < 0)
-        status = trip_fail_errno("brick", s->path, "cannot look at " DATA_NAME);
+        status = trip_fail_errno("brick", s->path, "cannot examine " DATA_NAME);
     if (status == 0 && count && offset > (uint64_t)st.st_size)
         return 0;
     if (status == 0 && count > trip_budget_left_bytes(s->budget) / (4 * sizeof *sequences))
-        status = fail_memory(s); /* a damaged journal may have any number */
+        status = fail_memory(s); /* a damaged journal may give any number */
     if (status == 0)
         status = make_room(s, s->count + count);
     if (status < 0)
@@ -181,7 +182,7 @@ static int write_buffer(trip_spill *s, size_t bytes)
     if (error == ENOSPC || error == EDQUOT)
         return trip_fail(TRIP_ERROR, "brick", s->path,
                          "no space left on the disk after %llu bytes of temporary data: free "
-                         "some, write elsewhere, or allow more --memory",
+                         "some space, write elsewhere, or raise --memory",
                          (unsigned long long)s->offset);
     errno = error;
     if (error)
@@ -196,7 +197,7 @@ int trip_spill_begin(trip_spill *s, unsigned list)
     if (s->file < 0 && open_file(s) < 0)
         return TRIP_ERROR;
     if (!s->cut && ftruncate(s->file, (off_t)s->offset) < 0)
-        return trip_fail_errno("brick", s->path, "cannot cut " DATA_NAME);
+        return trip_fail_errno("brick", s->path, "cannot truncate " DATA_NAME);
     s->cut = true;
     if (make_room(s, s->count + 1) < 0)
         return TRIP_ERROR;
@@ -257,13 +258,12 @@ uint64_t trip_spill_bytes(const trip_spill *s)
 static int fail_damaged(const trip_sequence_reader *r)
 {
     return trip_fail(TRIP_ERROR, "brick", r->spill->path,
-                     "temporary data at byte %llu is not what was written: the disk or another "
-                     "program changed it",
+                     "temporary data at byte %llu have changed since writing: the disk or another "
+                     "program changed them",
                      (unsigned long long)r->sequence.offset);
 }
 
-/* Moves the unused bytes to the end of the head and reads behind them, so that reads are aligned.
- */
+/* Moves the unused bytes to the end of the head and reads after them, so that reads are aligned. */
 static int refill(trip_sequence_reader *r)
 {
     size_t left = r->end - r->begin;

@@ -36,8 +36,8 @@ void trip_splat_box_begin(trip_splat_box *c, const int64_t lo[3], const int64_t 
     }
 }
 
-/* In the sheets along X and Y the second coordinate of z counts from a multiple of the edge, as
- * tiles do. */
+/* In the sheets along X and Y, the coordinate from z counts from a multiple of the edge, as tiles
+ * do. */
 void trip_splat_box_mark(trip_splat_box *c, int64_t y, int64_t z, const uint8_t *x, unsigned count)
 {
     const uint16_t *even = c->tables->even_bits;
@@ -56,13 +56,13 @@ void trip_splat_box_mark(trip_splat_box *c, int64_t y, int64_t z, const uint8_t 
     }
 }
 
-/* The splats of one tile of one sheet: a piece to be. */
+/* The splats of one tile of one sheet, which become a piece. */
 typedef struct tile_splats {
     int axis;
-    int64_t sheet; /* local */
-    unsigned
-        first_position;     /* Morton code of the tile's first voxel, from a multiple of the edge */
-    const uint64_t *bitmap; /* of the tile */
+    int64_t sheet;           /* local */
+    unsigned first_position; /* Morton code of the tile's first voxel, relative to a multiple of the
+                                edge */
+    const uint64_t *bitmap;  /* of the tile */
 } tile_splats;
 
 static uint64_t key_of(const trip_splat_box *c, unsigned tile_log2, const tile_splats *t)
@@ -76,13 +76,13 @@ static uint64_t key_of(const trip_splat_box *c, unsigned tile_log2, const tile_s
            trip_morton(tile_u, tile_v);
 }
 
-/* Indices of the splats in the arrays, in list order; returns their number. */
+/* Writes the array indices of the splats in list order and returns their number. */
 static uint32_t gather_indices(const trip_splat_box *c, unsigned words, const tile_splats *t,
                                uint32_t *indices)
 {
     const int64_t edge = c->tables->edge, stride[3] = { 1, edge, edge * edge };
     const int64_t su = stride[(t->axis + 1) % 3], sv = stride[(t->axis + 2) % 3];
-    /* In the bitmaps z counts from a multiple of the edge, in the arrays from the box's start. */
+    /* z counts from a multiple of the edge in bitmaps, and from the box's start in arrays. */
     int64_t base = t->sheet * stride[t->axis];
     if (t->axis != 2)
         base -= (c->origin[2] & (edge - 1)) * stride[2];

@@ -10,37 +10,37 @@
 #include "report.h"
 #include "splat_box.h"
 
-/* One thread's memory. The window is the box with one voxel around it where gradients or a halo are
- * made; its arrays are dense, x fastest. */
+/* One thread's memory. The window is the box, plus one voxel around it if there are gradients or a
+ * halo. Its arrays are dense, x fastest. */
 typedef struct workspace {
-    float *decoded;   /* of the window, as are the next four */
+    float *decoded;   /* arrays of the window */
     uint8_t *active;  /* which voxels exist, in sparse volumes */
     uint8_t *kept;    /* flags */
     uint8_t *halo;    /* flags */
     uint8_t *scratch; /* for trip_dilate() */
     trip_splat_box box;
-    uint64_t kept_count, halo_count; /* in all boxes so far, see trip_splatter_halo() */
+    uint64_t kept_count, halo_count; /* sums over all boxes so far; see trip_splatter_halo() */
     trip_tally tally;
 } workspace;
 
 struct trip_splatter {
     trip_splat_params params;
     trip_budget *budget;
-    double to_world[3][3]; /* of gradients: the inverse transpose of index_to_world */
+    double to_world[3][3]; /* maps gradients: inverse transpose of index_to_world */
     double gradient_unit;
     trip_splat_box_tables tables;
     size_t thread_bytes, bytes;
-    unsigned char *memory; /* of all threads; each begins with its workspace */
+    unsigned char *memory; /* of all threads; each part begins with a workspace */
 };
 
-/* A box on its way through a thread. */
+/* A box in processing by one thread. */
 typedef struct work {
     const trip_splatter *s;
     const trip_box *box;
     unsigned thread;
     workspace *w;
     int64_t lo[3], size[3]; /* of the window */
-    int64_t step[3];        /* between entries of neighbouring voxels in it */
+    int64_t step[3];        /* between entries of neighbouring voxels in the window */
 } work;
 
 int64_t trip_splat_edge(const trip_piece_format *f)
@@ -48,7 +48,7 @@ int64_t trip_splat_edge(const trip_piece_format *f)
     return trip_splat_box_edge(f);
 }
 
-/* The next `bytes` of a thread's memory; NULL while only the size is computed. */
+/* Returns the next `bytes` of a thread's memory. With a NULL base it only counts the size. */
 static void *carve(unsigned char *base, size_t *used, size_t bytes)
 {
     size_t at = *used;
@@ -56,7 +56,8 @@ static void *carve(unsigned char *base, size_t *used, size_t bytes)
     return base ? base + at : NULL;
 }
 
-/* Lays a workspace out from `base` and returns its bytes; NULL as base computes these only. */
+/* Lays out a workspace at `base` and returns its size in bytes. With a NULL base it only computes
+ * the size. */
 static size_t lay_out(const trip_piece_format *f, bool sparse, unsigned char *base, workspace *w)
 {
     size_t edge = (size_t)trip_splat_box_edge(f), plane = edge * edge, used = 0;
@@ -118,8 +119,8 @@ int trip_splatter_create(trip_splatter **out, const trip_splat_params *params, t
     trip_splatter *s = *out = trip_budget_take(budget, bytes);
     if (!s)
         return trip_fail(TRIP_ERROR, "brick", "splats",
-                         "%u threads need %zu bytes, which is more than is allowed: give more with "
-                         "--memory, or take fewer --threads",
+                         "%u threads need %zu bytes, more than --memory allows: raise --memory or "
+                         "lower --threads",
                          params->threads, bytes);
     s->params = *params;
     s->budget = budget;
@@ -150,7 +151,7 @@ static work work_on(const trip_splatter *s, unsigned thread, const trip_box *box
     return k;
 }
 
-/* Entry of a voxel in the window's arrays. */
+/* Returns the entry of a voxel in the window's arrays. */
 static size_t entry_of(const work *k, const int64_t voxel[3])
 {
     int64_t at = 0;
@@ -161,7 +162,7 @@ static size_t entry_of(const work *k, const int64_t voxel[3])
 
 /* The voxels of a row that become splats. */
 typedef struct splat_row {
-    const float *values; /* decoded, of the voxel at local x `first` */
+    const float *values; /* decoded; starts at the voxel with local x `first` */
     unsigned first;
     size_t index; /* in the box's arrays, of local x 0 */
     unsigned count;
@@ -180,8 +181,8 @@ static void put_values(const work *k, const splat_row *r)
             memcpy(&to[r->x[i]], &r->values[r->x[i] - r->first], sizeof *to);
 }
 
-/* The world-space normal of an index-space gradient, in 4 bytes; where values are not quantised its
- * direction, and its magnitude goes to *magnitude. */
+/* Returns the 4-byte world-space normal of an index-space gradient. For formats that are not
+ * quantised, returns its direction and sets *magnitude. */
 static uint32_t full_normal(const trip_splatter *s, const double index[3], float *magnitude)
 {
     const double(*m)[3] = s->to_world;
@@ -195,8 +196,9 @@ static uint32_t full_normal(const trip_splatter *s, const double index[3], float
     return trip_direction_pack(g);
 }
 
-/* trip_gradient_share() of a voxel along an axis: beyond a sparse volume lies its background. With
- * uneven spacing the same of places, for gradients a place. */
+/* Returns trip_gradient_share() of a voxel along an axis. Sparse volumes have no border, since
+ * their background continues. With uneven spacing, returns the reciprocal distance of the
+ * neighbours in the table of coordinates. */
 static double share_of(const work *k, int axis, int64_t at)
 {
     const trip_volume_info *info = k->s->params.info;
@@ -208,7 +210,7 @@ static double share_of(const work *k, int axis, int64_t at)
     return trip_gradient_share(!info->sparse && (at == 0 || at == info->dims[axis] - 1));
 }
 
-/* `voxel`: the one at local x `first`. */
+/* `voxel` is the voxel at local x `first`. */
 static void put_normals(const work *k, const splat_row *r, const int64_t voxel[3])
 {
     const trip_splat_box *c = &k->w->box;
@@ -225,8 +227,8 @@ static void put_normals(const work *k, const splat_row *r, const int64_t voxel[3
     }
 }
 
-/* Bit i is flag i of eight. The product adds up shifted copies of the flags, which meet in no bit;
- * in its highest byte the flags stand side by side. */
+/* Packs eight flags into eight bits: bit i is flag i. The product adds shifted copies of the flags
+ * without overlap. Its highest byte holds the flags side by side. */
 static unsigned bits_of(uint64_t eight_flags)
 {
 #if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
@@ -235,8 +237,8 @@ static unsigned bits_of(uint64_t eight_flags)
     return (unsigned)(eight_flags * UINT64_C(0x0102040810204080) >> 56);
 }
 
-/* Positions of the ones in `flags`, each counted from `first`; returns their number. Reads flags in
- * eights: up to 7 beyond `count`. */
+/* Writes the positions of the ones in `flags`, counted from `first`, and returns their number.
+ * Reads eight flags at a time, up to 7 beyond `count`. */
 static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, uint8_t *positions)
 {
     unsigned n = 0;
@@ -252,8 +254,8 @@ static unsigned find_flags(const uint8_t *flags, int64_t count, int64_t first, u
     return n;
 }
 
-/* Makes splats of the voxels of a row of the box that have a flag; returns their number. `y` and
- * `z` count from its first voxel. */
+/* Makes splats of the flagged voxels in a row of the box and returns their number. `y` and `z`
+ * count from the first voxel of the box. */
 static unsigned put_row(const work *k, const uint8_t *flags, int64_t y, int64_t z, bool normals)
 {
     trip_splat_box *c = &k->w->box;
@@ -274,8 +276,8 @@ static unsigned put_row(const work *k, const uint8_t *flags, int64_t y, int64_t 
     return r.count;
 }
 
-/* Makes the pieces of all voxels of [lo, lo + size) that have a flag, for three lists from `list`
- * on; adds their number to *count. */
+/* Makes the pieces of all flagged voxels of [lo, lo + size), for three lists from `list` on. Adds
+ * the number of voxels to *count. */
 static int make_pieces(const work *k, const int64_t lo[3], const int64_t size[3],
                        const uint8_t *flags, unsigned list, uint64_t *count)
 {
@@ -304,7 +306,7 @@ static void find_kept(const work *k)
         w->kept[i] &= w->active[i];
 }
 
-/* Clears the flags of the window's voxels outside of the region. */
+/* Clears the flags of the window's voxels outside the region. */
 static void keep_region(const work *k)
 {
     const trip_region *r = k->s->params.region;
@@ -324,7 +326,8 @@ static void keep_region(const work *k)
         }
 }
 
-/* Clears the flags of voxels without a finite value; few voxels have a flag. */
+/* Clears the flags of voxels without a finite value. Few voxels have a flag, so it skips eight zero
+ * flags at once. */
 static void drop_not_finite(const float *values, uint8_t *flags, size_t count)
 {
     for (size_t i = 0; i < count; i += 8) {
@@ -335,8 +338,8 @@ static void drop_not_finite(const float *values, uint8_t *flags, size_t count)
     }
 }
 
-/* Marks the voxels of the window that are not kept, have a finite value, and a neighbour that is
- * kept. False when there are none. */
+/* Flags the halo: voxels of the window that are not kept, have a finite value, and have a kept
+ * neighbour. Returns false if there are none. */
 static bool find_halo(const work *k)
 {
     const workspace *w = k->w;
@@ -352,9 +355,9 @@ static bool find_halo(const work *k)
     return true;
 }
 
-/* The voxels along an axis whose halo this box makes: its own and, where a portion of a sparse
- * volume ends, those next to it, which may be in no portion. A voxel may be made by several boxes;
- * the merge makes one record of it. */
+/* Sets the range along an axis in which this box makes the halo. It covers the box, and one voxel
+ * beyond each end of a portion of a sparse volume, since such voxels may lie in no portion. Several
+ * boxes may make one voxel; the merge turns them into one record. */
 static void halo_range(const work *k, int axis, int64_t *begin, int64_t *end)
 {
     const trip_box *box = k->box;
@@ -368,14 +371,15 @@ static void halo_range(const work *k, int axis, int64_t *begin, int64_t *end)
         ++*end;
 }
 
-/* How far of [at, end) a box of splats that begins at `at` may reach. */
+/* Returns the end of the splat box that begins at `at`, at most `end`. */
 static int64_t box_end(const trip_splatter *s, int64_t at, int64_t end)
 {
     int64_t past = (at & ~(s->tables.edge - 1)) + s->tables.edge;
     return past < end ? past : end;
 }
 
-/* In several boxes of splats, as voxels around one may lie beyond a multiple of their edge. */
+/* Makes the halo in several splat boxes, since halo voxels may lie beyond a multiple of their edge.
+ */
 static int make_halo(const work *k)
 {
     const trip_splatter *s = k->s;

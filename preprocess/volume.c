@@ -20,13 +20,13 @@
 /* The default size of a portion. */
 #define PORTION_BYTES ((int64_t)16 << 20)
 
-/* In the order of their probing: formats with a magic number first. */
+/* In the order of probing: formats with a magic number first. */
 static const trip_volume_reader *const readers[] = {
     &trip_read_vdb,     &trip_read_nrrd, &trip_read_nifti,  &trip_read_netcdf,
     &trip_read_netcdf4, &trip_read_vol,  &trip_read_images, &trip_read_raw,
 };
 
-/* The stored slices [first, first + count) of a portion: its own and one neighbour on each side. */
+/* The stored slices [first, first + count) of a portion, including one neighbour on each side. */
 typedef struct stored_slices {
     int64_t first, count;
     unsigned char *slices;
@@ -40,15 +40,15 @@ struct trip_volume {
     trip_budget *budget;
     char *path;
 
-    /* The rest is for slice readers. */
+    /* All further fields are for slice readers. */
     size_t slice_bytes;
     bool swap;
     int64_t next_slice;   /* first slice of the next portion */
-    int64_t read_slices;  /* slices read so far: up to two more than next_slice - 1 */
-    unsigned char *carry; /* [next_slice - 1, read_slices), for the next portion */
-    int broken;           /* the status of a failed read, after which every portion fails */
-    /* The memory of one released portion, for the next one: fresh pages cost about as much as
-     * reading into them. Exchanged atomically, as any thread may release portions. */
+    int64_t read_slices;  /* slices read so far: at most next_slice + 1 */
+    unsigned char *carry; /* slices [next_slice - 1, read_slices), for the next portion */
+    int broken;           /* status of a failed read, after which every portion fails */
+    /* The memory of one released portion, reused for the next, since fresh pages cost about as much
+     * as reading into them. Exchanged atomically, as any thread may release portions. */
     _Atomic(stored_slices *) spare;
 };
 
@@ -58,26 +58,26 @@ static bool is_raw_option_given(const trip_volume_params *p)
            p->raw_offset_bytes;
 }
 
-/* An option that does not apply to the format is an error. */
+/* Refuses options that do not apply to the format. */
 static int check_options(const char *path, const char *format, const trip_volume_params *p)
 {
     if (strcmp(format, "raw") != 0 && is_raw_option_given(p))
         return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is %s: --size, --type, --endian and --offset are for raw data",
+                         "its format is %s; --size, --type, --endian and --offset require raw data",
                          format);
     if (strcmp(format, "openvdb") != 0 &&
         ((p->grid && strcmp(format, "netcdf") != 0) || p->level_set))
         return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is %s: --grid and --level-set are for OpenVDB, --grid for "
-                         "netCDF too",
+                         "its format is %s; --level-set requires OpenVDB, --grid OpenVDB or "
+                         "netCDF",
                          format);
     if (strcmp(format, "openvdb") == 0 && p->coordinates)
         return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is openvdb, whose voxels lie evenly: --coordinates is for "
-                         "others");
+                         "its format is openvdb, which has even spacing; --coordinates requires "
+                         "another format");
     if (strcmp(format, "images") != 0 && p->allow_gaps)
         return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is %s: --allow-gaps is for stacks of slices", format);
+                         "its format is %s; --allow-gaps requires a stack of slices", format);
     for (int a = 0; a < 3; a++)
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))
@@ -87,7 +87,7 @@ static int check_options(const char *path, const char *format, const trip_volume
     return 0;
 }
 
-/* The first bytes of a regular file; none for a folder or a pattern. */
+/* Reads the first bytes of a regular file. A folder or a pattern has none. */
 static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
 {
     *bytes_out = 0;
@@ -128,19 +128,19 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
         return check_options(path, readers[i]->format, params);
     }
     return trip_fail(TRIP_ERROR, "read", path,
-                     "neither its content nor its name is of a known format (VDB, NRRD, NIfTI, "
-                     "netCDF, .vol, images); for raw data, `triptych brick FILE --size X,Y,Z "
-                     "--type uint8` says what it is");
+                     "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe "
+                     "raw data with `triptych brick FILE --size X,Y,Z "
+                     "--type uint8`");
 }
 
-/* Of an index axis in world space; 0: it has no direction. */
+/* Returns the length of an index axis in world space, or 0 if the axis has no direction. */
 static double axis_length(const trip_affine *m, int a)
 {
     const double length = trip_length(trip_v3(m->m[0][a], m->m[1][a], m->m[2][a]));
     return isfinite(length) ? length : 0;
 }
 
-/* Whether every index axis that has a direction lies along the same axis of the world. */
+/* Returns whether every index axis with a direction is parallel to the same axis of world space. */
 static bool lies_straight(const trip_affine *m)
 {
     for (int a = 0; a < 3; a++)
@@ -150,8 +150,8 @@ static bool lies_straight(const trip_affine *m)
     return true;
 }
 
-/* Sets the lengths of the index axes in world space and keeps their directions. One that has none
- * lies along the same axis of the world if the others do. */
+/* Sets the lengths of the index axes in world space and keeps their directions. If all axes with a
+ * direction are parallel to their axes of world space, so become axes without one. */
 static void override_spacing(trip_affine *m, const double spacing[3])
 {
     const bool straight = lies_straight(m);
@@ -164,7 +164,7 @@ static void override_spacing(trip_affine *m, const double spacing[3])
     }
 }
 
-/* Whether a map would have an inverse if its axes had other lengths. */
+/* Returns whether a map is invertible once its axes have other lengths. */
 static bool lacks_lengths_alone(trip_affine m)
 {
     trip_affine inverse;
@@ -172,7 +172,7 @@ static bool lacks_lengths_alone(trip_affine m)
     return trip_affine_invert(&m, &inverse);
 }
 
-/* Whether world space is the grid's own but for the lengths of its axes and its origin. */
+/* Returns whether world space differs from index space only by origin and positive axis lengths. */
 static bool is_upright(const trip_affine *m)
 {
     for (int row = 0; row < 3; row++)
@@ -182,19 +182,20 @@ static bool is_upright(const trip_affine *m)
     return true;
 }
 
-/* World space becomes that of the patient, as if the file had said how it lies. */
+/* Turns world space into the patient's, as if the file gave the orientation. */
 static int set_axes(trip_volume *v, const char *axes)
 {
     trip_volume_info *info = &v->info;
     trip_affine turn = trip_affine_identity();
     if (info->space[0])
-        return trip_fail(TRIP_USAGE, "read", v->path,
-                         "says itself how it lies in the patient, in %s: --axes is for files that "
-                         "do not",
-                         info->space);
+        return trip_fail(
+            TRIP_USAGE, "read", v->path,
+            "gives its orientation in the patient (%s); --axes requires a file without "
+            "one",
+            info->space);
     if (!is_upright(&info->index_to_world))
         return trip_fail(TRIP_USAGE, "read", v->path,
-                         "gives its axes directions of their own: --axes is for files that do not");
+                         "gives the directions of its axes; --axes requires a file without them");
     snprintf(info->space, sizeof info->space, "%s",
              strcmp(info->format, "nifti") == 0 ? "RAS" : "LPS");
     info->oriented = true;
@@ -225,7 +226,8 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info)
 {
     for (int a = 0; a < 3; a++)
         if (info->dims[a] > TRIP_VOLUME_AXIS_MAX)
-            return trip_fail(TRIP_ERROR, "read", path, "more than %" PRId64 " voxels along an axis",
+            return trip_fail(TRIP_ERROR, "read", path,
+                             "has more than %" PRId64 " voxels along an axis",
                              TRIP_VOLUME_AXIS_MAX);
     return 0;
 }
@@ -237,8 +239,8 @@ static int check_lengths(const trip_volume *v)
         double length = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
         if (!(length >= TRIP_VOXEL_WORLD_MIN && length <= TRIP_VOXEL_WORLD_MAX))
             return trip_fail(TRIP_ERROR, "read", v->path,
-                             "its voxels are %.3g world units long along %c, and %g to %g can be "
-                             "drawn; --spacing X,Y,Z may give the axes other lengths",
+                             "its voxels are %.3g world units long along %c; %g to %g can be "
+                             "drawn: set other lengths with --spacing X,Y,Z",
                              length, "ijk"[a], TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
     }
     return 0;
@@ -253,14 +255,14 @@ static int check_info(const trip_volume *v)
         return status;
     if (!trip_affine_invert(&info->index_to_world, &inverse))
         return trip_fail(TRIP_ERROR, "read", v->path,
-                         "its map from voxels to space is singular or not finite%s",
+                         "its map from index space to world space is singular or not finite%s",
                          lacks_lengths_alone(info->index_to_world)
-                             ? "; --spacing X,Y,Z gives the axes other lengths"
+                             ? ": set other lengths with --spacing X,Y,Z"
                              : "");
     if (!isfinite(info->slope) || info->slope == 0 || !isfinite(info->inter))
         return trip_fail(TRIP_ERROR, "read", v->path,
-                         "scales its values by %g and offsets them by %g, which loses them",
-                         info->slope, info->inter);
+                         "cannot scale its values by %g and offset them by %g", info->slope,
+                         info->inter);
     return check_lengths(v);
 }
 
@@ -301,7 +303,7 @@ int trip_volume_open(trip_volume **out, const char *path, const trip_volume_para
     trip_volume *v = calloc(1, sizeof *v);
     if (!v || !(v->path = strdup(path))) {
         free(v);
-        return trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+        return trip_fail(TRIP_ERROR, "read", path, "out of memory");
     }
     v->budget = budget;
     int status = open_with_reader(v, params ? params : &defaults);
@@ -331,7 +333,7 @@ static void drop_spare(trip_volume *v)
     slices_free(v, atomic_exchange(&v->spare, NULL));
 }
 
-/* Releases what is kept from one portion to the next. */
+/* Releases the memory that is kept between portions. */
 static void drop_memory(trip_volume *v)
 {
     drop_spare(v);
@@ -371,8 +373,8 @@ static int refused(const trip_volume *v, int64_t slices)
     trip_format_bytes((uint64_t)slices * v->slice_bytes, needed);
     trip_format_bytes(trip_budget_left_bytes(v->budget), left);
     return trip_fail(TRIP_ERROR, "read", v->path,
-                     "%" PRId64 " slices at a time need %s, but %s are left of the memory allowed; "
-                     "a larger --memory would do",
+                     "%" PRId64 " slices at a time need %s, but only %s of memory are left: "
+                     "raise --memory",
                      slices, needed, left);
 }
 
@@ -396,7 +398,7 @@ int trip_volume_rewind(trip_volume *v)
     return v->reader->rewind(v->state);
 }
 
-/* Fills *s with the slices that the last portion ended with and with new ones from the reader. */
+/* Fills *s with the last slices of the previous portion and with new slices from the reader. */
 static int fill_slices(trip_volume *v, stored_slices *s, int64_t next_slice)
 {
     int64_t kept = v->read_slices - s->first;
@@ -478,8 +480,8 @@ static int64_t clamp(int64_t v, int64_t lo, int64_t hi)
     return v < lo ? lo : v > hi ? hi : v;
 }
 
-/* Values [lo, lo + count) of a stored row of `width` values; beyond its ends the end ones repeat.
- */
+/* Decodes values [lo, lo + count) of a stored row of `width` values. Repeats the end values beyond
+ * the ends. */
 static void decode_row(const trip_volume *v, const unsigned char *row, int64_t width, int64_t lo,
                        int64_t count, float *values)
 {

@@ -40,12 +40,12 @@ static const char *fault_of_values(const double *values, int64_t count)
 {
     for (int64_t i = 0; i < count; i++) {
         if (!isfinite(values[i]))
-            return "some are not finite";
+            return "not all are finite";
         if (i > 1 && !((values[i] - values[i - 1]) * (values[1] - values[0]) > 0))
-            return "they neither ascend nor descend throughout";
+            return "they must ascend or descend throughout";
     }
     if (count > 1 && !(isfinite(values[count - 1] - values[0]) && values[1] != values[0]))
-        return "they neither ascend nor descend throughout";
+        return "they must ascend or descend throughout";
     return NULL;
 }
 
@@ -56,7 +56,7 @@ int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *
     const char *fault = fault_of_values(values, count);
     double *column = info->index_to_world.m[axis], *table = NULL;
     if (!fault && !lies_along_axis(&info->index_to_world, axis))
-        fault = "the axis of the volume does not lie along that of the world";
+        fault = "the axis of the volume is not parallel to the axis of world space";
     if (fault)
         return fail_axis(path, axis, fault);
     column[3] = values[0];
@@ -79,9 +79,7 @@ int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *
     return fault ? fail_axis(path, axis, fault) : 0;
 }
 
-/* ---- text files ---- */
-
-/* The name between two commas of the option; false when there are more or less than three. */
+/* Splits the option into three names at its commas. Returns false unless there are three. */
 static bool split_names(const char *files, const char *begin[3], size_t length[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -103,11 +101,11 @@ static bool is_between(int c)
 typedef struct text_file {
     int fd;
     size_t used, count;
-    bool failed; /* errno says why */
+    bool failed; /* errno tells why */
     char bytes[1 << 14];
 } text_file;
 
-/* EOF at the end, or after a failure. */
+/* Returns EOF at the end or after a failure. */
 static int next_byte(text_file *f)
 {
     if (f->used == f->count) {
@@ -119,7 +117,8 @@ static int next_byte(text_file *f)
     return f->used < f->count ? (unsigned char)f->bytes[f->used++] : EOF;
 }
 
-/* The next number of a file; 0: there is none, -1: what is there is none. */
+/* Parses the next number of a file. Returns 1, 0 at the end, or -1 if the next word is no number.
+ */
 static int next_number(text_file *f, double *value)
 {
     char word[64];
@@ -151,10 +150,10 @@ static int read_numbers(text_file *f, const char *file, double *values, int64_t 
         if (f->failed)
             return fail_to_read(file);
         if (got < 0)
-            return trip_fail(TRIP_ERROR, "read", file, "number %" PRId64 " is none", i + 1);
+            return trip_fail(TRIP_ERROR, "read", file, "item %" PRId64 " is not a number", i + 1);
         if (got != (i < count))
             return trip_fail(TRIP_ERROR, "read", file,
-                             "has %s than the %" PRId64 " coordinates of its axis",
+                             "has %s numbers than the %" PRId64 " voxels along its axis",
                              got ? "more" : "fewer", count);
     }
     return 0;
@@ -230,8 +229,6 @@ int trip_volume_list_coordinates(const char *files, int (*visit)(void *user, con
 {
     return each_file(files, list_one, &(listing){ visit, user });
 }
-
-/* ---- tables ---- */
 
 void trip_volume_sample_coordinates(trip_volume_info *info, int axis, int64_t step, int64_t count)
 {

@@ -21,7 +21,7 @@ static int scan(trip_brick_input *in)
 int trip_volume_tf(const trip_brick_params *params, trip_tf **out)
 {
     trip_brick_input in = { 0 };
-    trip_brick_params alone = *params; /* without normals, for which a scan may be needed */
+    trip_brick_params alone = *params; /* without normals, which may need a scan */
     alone.normals = TRIP_NORMALS_NONE;
     *out = NULL;
     int status = trip_brick_input_open(&in, &alone);

@@ -1,12 +1,13 @@
-/* The transfer function that a volume would be bricked with, without bricking it. One thread. */
+/* Returns the transfer function that bricking a volume would use, without bricking it. One thread.
+ */
 #ifndef TRIP_VOLUME_TF_H
 #define TRIP_VOLUME_TF_H
 
 #include "brick.h"
 
-/* *out, for trip_tf_destroy(), is in data units: the first function that the parameters name, or
- * the automatic one where they name none. Reads the whole volume where that depends on its values.
- */
+/* Sets *out to the first transfer function in the parameters, or to an automatic one if there is
+ * none. It is in data units; free it with trip_tf_destroy(). Reads the whole volume if the transfer
+ * function depends on the values. */
 int trip_volume_tf(const trip_brick_params *params, trip_tf **out);
 
 #endif

@@ -6,14 +6,14 @@
 
 #include "report.h"
 
-/* Portions of sparse formats are small; a batch of them has work for all threads. */
+/* Portions of sparse formats are small; a batch has work for all threads. */
 enum { BATCH_PORTIONS = 512 };
 #define BATCH_VOXELS (UINT64_C(1) << 21)
 
 typedef struct batch {
     trip_volume_portion portions[BATCH_PORTIONS];
-    uint64_t
-        first_box[BATCH_PORTIONS + 1]; /* number of each portion's first box, and of all boxes */
+    uint64_t first_box[BATCH_PORTIONS +
+                       1]; /* number of each portion's first box, then the number of all boxes */
     size_t count;
     uint64_t voxels;
 } batch;
@@ -22,10 +22,10 @@ typedef struct walk {
     const trip_walk_params *params;
     trip_volume *volume;
     const batch *current;
-    uint64_t done, voxels; /* up to where the volume was read */
+    uint64_t done, voxels; /* position up to which the volume was read */
 } walk;
 
-/* The number of parts that a grid of distance `step` cuts [lo, lo + size) into. */
+/* Returns the number of parts into which a grid with distance `step` cuts [lo, lo + size). */
 static int64_t cuts(int64_t lo, int64_t size, int64_t step)
 {
     return (lo + size - 1) / step - lo / step + 1;
@@ -59,7 +59,7 @@ static int do_box(void *user, unsigned thread, uint64_t item)
 {
     const walk *w = user;
     const batch *b = w->current;
-    size_t low = 0, high = b->count; /* the portion with first_box <= item < next first_box */
+    size_t low = 0, high = b->count; /* find the portion with first_box <= item < next first_box */
     while (high - low > 1) {
         size_t middle = (low + high) / 2;
         if (b->first_box[middle] <= item)
@@ -90,7 +90,8 @@ static bool has_slices(const walk *w)
     return !trip_volume_get_info(w->volume)->sparse;
 }
 
-/* Reads a batch; it is empty at the end. In dense volumes it is one portion of at most `slices`. */
+/* Reads a batch, which is empty at the end of the volume. In dense volumes it is one portion of at
+ * most `slices`. */
 static int read_batch(walk *w, batch *b, int64_t slices)
 {
     bool dense = has_slices(w);
@@ -126,7 +127,7 @@ static void start(walk *w, trip_workers *workers, const batch *b)
     trip_workers_start(workers, do_box, w, b->first_box[b->count]);
 }
 
-/* Skips slices without reading them, where the format allows it; *count becomes what is left. */
+/* Skips slices without reading them if the format allows it. Then sets *count to 0. */
 static int skip_slices(walk *w, uint64_t *count)
 {
     const int64_t *dims = trip_volume_get_info(w->volume)->dims;
@@ -139,7 +140,7 @@ static int skip_slices(walk *w, uint64_t *count)
     return 0;
 }
 
-/* Skips `count` slices, or batches of sparse volumes. */
+/* Skips `count` slices of a dense volume or batches of a sparse volume. */
 static int skip_batches(walk *w, batch *b, uint64_t count)
 {
     int64_t slices = w->params->slices < 1 ? 1 : w->params->slices;
@@ -157,7 +158,7 @@ static int skip_batches(walk *w, batch *b, uint64_t count)
     return status;
 }
 
-/* Skips the batches between two that are processed. */
+/* Skips the batches between two processed ones. */
 static int skip_stride(walk *w, batch *b)
 {
     uint64_t count = w->params->stride > 1 ? w->params->stride - 1 : 0;
@@ -183,7 +184,7 @@ static int read_next(walk *w, batch *b)
     return status == 0 ? read_batch(w, b, w->params->slices) : status;
 }
 
-/* The workers process one batch while the next is read. */
+/* Processes one batch on the workers while reading the next. */
 static int walk_batches(walk *w, trip_workers *workers, batch *now, batch *ahead)
 {
     const trip_walk_params *p = w->params;

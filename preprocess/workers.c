@@ -15,17 +15,17 @@ struct trip_workers {
     unsigned count;
     pthread_t threads[MAX_THREADS];
 
-    pthread_mutex_t lock; /* guards all below */
+    pthread_mutex_t lock; /* guards all further fields */
     pthread_cond_t started, finished;
     bool stopping;
-    uint64_t loop;     /* counts loops, by which threads notice a new one */
-    trip_scope *scope; /* of the thread that started it */
+    uint64_t loop;     /* number of the loop, by which threads notice a new one */
+    trip_scope *scope; /* of the thread that started the loop */
     trip_work work;
     void *user;
     uint64_t items, next_item;
     unsigned busy; /* threads that have not yet left the loop */
     int status;
-    bool reported; /* a failure of this loop */
+    bool reported; /* a failure of this loop was reported */
 };
 
 typedef struct seat {
@@ -54,8 +54,8 @@ static bool take_item(trip_workers *w, uint64_t *item)
     return some;
 }
 
-/* True for the first report of a loop. A failure may have none: that of another thread has it,
- * which need not end first. */
+/* Notes a failure. Returns true for the first report of a loop. A failure may come without a
+ * report, if another thread has the report and has not ended yet. */
 static bool note_failure(trip_workers *w, int status, const trip_held_report *report)
 {
     pthread_mutex_lock(&w->lock);
@@ -80,7 +80,7 @@ static void run_loop(trip_workers *w, unsigned thread)
     }
 }
 
-/* Waits for a loop later than `seen`; false when the pool is being destroyed. */
+/* Waits for a loop later than `seen`. Returns false when the pool is being destroyed. */
 static bool await_loop(trip_workers *w, uint64_t *seen)
 {
     pthread_mutex_lock(&w->lock);

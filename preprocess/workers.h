@@ -1,6 +1,6 @@
 /* A pool of threads that runs one parallel loop at a time. The thread that starts a loop may do
  * other work until it waits for the end. Items begin in ascending order and may finish in any
- * order. One thread owns the pool; the work functions run on the pool's threads, in the owner's
+ * order. One thread owns the pool. The work functions run on the pool's threads, in the owner's
  * scope. */
 #ifndef TRIP_WORKERS_H
 #define TRIP_WORKERS_H
@@ -10,24 +10,23 @@
 
 typedef struct trip_workers trip_workers;
 
-/* Does one item; `thread` is 0 .. count - 1. A negative status ends the loop: items that have not
- * begun are left out. Only the first failure is reported. An interruption ends the loop as a
- * failure does. */
+/* Processes one item; `thread` is 0 .. count - 1. A negative status or an interruption ends the
+ * loop; items that have not begun are left out. Only the first failure is reported. */
 typedef int (*trip_work)(void *user, unsigned thread, uint64_t item);
 
-/* Number of processors that the process may run on. */
+/* Returns the number of processors that the process may run on. */
 unsigned trip_workers_processors(void);
 
-/* threads 0: one for every processor. */
+/* Creates a pool. `threads` 0 selects one thread for each processor. */
 int trip_workers_create(trip_workers **out, unsigned threads);
 void trip_workers_destroy(trip_workers *w);
 unsigned trip_workers_count(const trip_workers *w);
 
 void trip_workers_start(trip_workers *w, trip_work work, void *user, uint64_t items);
-/* Waits for the loop: true when it has ended, *status being the first failure or 0; false when
- * timeout_ms (0: no limit) have gone by. */
+/* Waits for the loop. Returns true after its end and sets *status to the first failure or 0.
+ * Returns false after timeout_ms; 0 waits without limit. */
 bool trip_workers_wait(trip_workers *w, unsigned timeout_ms, int *status);
-/* Starts a loop and waits for its end; returns its status. */
+/* Starts a loop, waits for its end and returns its status. */
 int trip_workers_run(trip_workers *w, trip_work work, void *user, uint64_t items);
 
 #endif

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The same each time that the program hands it over. */
+/* The program passes the same table each time. */
 static const trip_vdb_host *_Atomic host;
 
 __attribute__((visibility("default"))) const trip_volume_reader *
@@ -16,7 +16,7 @@ trip_vdb_module(const trip_vdb_host *program)
     return &trip_vdb_reader;
 }
 
-/* The functions of the program that the module calls, under their names. */
+/* The program's functions under the names that the module calls. */
 
 int(trip_fail)(int status, const char *stage, const char *where, const char *why, ...)
 {

@@ -1,7 +1,8 @@
-/* The module triptych-openvdb.so: all that is linked with OpenVDB, which takes longer to load than
- * most commands take to run. read_vdb.c loads it when the first such file is opened. What it calls
- * of the program comes in a table, so that it works with the program and the library alike, which
- * show no symbols of their own. */
+/* The interface of the module triptych-openvdb.so, the only part that is linked with OpenVDB.
+ * Loading OpenVDB takes longer than most commands take to run. read_vdb.c therefore loads the
+ * module when the first OpenVDB file is opened. The program passes its functions to the module in a
+ * table. Thus the module works with both the program and the library, which export no such symbols.
+ */
 #ifndef TRIP_VDB_MODULE_H
 #define TRIP_VDB_MODULE_H
 
@@ -24,12 +25,13 @@ typedef struct trip_vdb_host {
     int (*interrupted)(void);
 } trip_vdb_host;
 
-/* The module's one symbol, TRIP_VDB_ENTRY. NULL: of another version. The table is kept. */
+/* The module's only symbol, TRIP_VDB_ENTRY. Returns NULL for another version. The module keeps the
+ * pointer to the table. */
 typedef const trip_volume_reader *(*trip_vdb_entry_point)(const trip_vdb_host *host);
 #define TRIP_VDB_ENTRY "trip_vdb_module"
 const trip_volume_reader *trip_vdb_module(const trip_vdb_host *host);
 
-/* Within the module. */
+/* Only within the module. */
 extern const trip_volume_reader trip_vdb_reader; /* read_vdb.cpp */
 
 #ifdef __cplusplus

@@ -1,9 +1,13 @@
-/* OpenVDB grids, as a portion reader. Opening reads the grid's tree and checks its leaves without
- * reading their values; those are read whenever a portion is decoded.
+/* Reads OpenVDB grids, as a portion reader. Opening reads the grid's tree and checks its leaves
+ * without reading their values. Decoding a portion reads the values.
  *
- * Memory: per leaf (up to 512 voxels) about 130 bytes, per 128-voxel cube in use 32 KiB, per
- * 4096-voxel cube 256 KiB, 16 bytes a portion, all counted against the budget before they are
- * allocated; and per decoding thread a leaf and a 16 KiB buffer. */
+ * Memory counted against the budget before it is allocated:
+ * - about 130 bytes for each leaf of up to 512 voxels,
+ * - 32 KiB for each 128-voxel cube in use,
+ * - 256 KiB for each 4096-voxel cube,
+ * - 16 bytes for each portion.
+ *
+ * Each decoding thread also holds one leaf and a 16 KiB buffer. */
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -26,17 +30,17 @@ struct State {
     std::string path;
     trip_vdb_fd fd;
     std::unique_ptr<trip_vdb_grid> grid;
-    size_t next = 0; /* box */
+    size_t next = 0; /* index of the next box */
 };
 
-/* Runs body(); every exception becomes a reported failure. */
+/* Runs body(). Reports every exception as a failure. */
 template <typename Body> int guard(const std::string &path, const Body &body)
 try {
     return body();
 } catch (const trip_vdb_error &e) {
     return trip_fail(e.status, "read", path.c_str(), "%s", e.what());
 } catch (const std::bad_alloc &) {
-    return trip_fail(TRIP_ERROR, "read", path.c_str(), "no memory for its tree");
+    return trip_fail(TRIP_ERROR, "read", path.c_str(), "out of memory for its tree");
 } catch (const std::exception &e) {
     return trip_fail(TRIP_ERROR, "read", path.c_str(), "is corrupt or unsupported: %s", e.what());
 }
@@ -56,16 +60,16 @@ const trip_vdb_entry &find_grid(const trip_vdb_contents &contents, const char *w
             continue;
         if (!trip_vdb_is_scalar(entry))
             throw trip_vdb_error("grid \"" + entry.name + "\" holds " + entry.type +
-                                 ", which is no scalar; it holds: " + list_grids(contents));
+                                 ", not scalars; the file contains: " + list_grids(contents));
         return entry;
     }
     throw trip_vdb_error(std::string("has no grid \"") + wanted +
-                             "\"; it holds: " + list_grids(contents) +
-                             (contents.has_offsets ? "" : " and, as a stream, perhaps more"),
+                             "\"; the file contains: " + list_grids(contents) +
+                             (contents.has_offsets ? "" : " and perhaps more, as it is a stream"),
                          TRIP_USAGE);
 }
 
-/* False for a damaged grid, too, which is reported if it is opened. */
+/* Also returns false for a damaged grid; opening that grid will report the damage. */
 bool is_fog(trip_vdb_stream &is, const trip_vdb_contents &contents, const trip_vdb_entry &entry)
 try {
     return trip_vdb_read_head(is, contents, entry).grid_class == "fog volume";
@@ -74,8 +78,8 @@ try {
     return false;
 }
 
-/* Chooses "density", the usual name of what is visible in smoke and clouds; else the first fog
- * volume; else the first scalar grid. */
+/* Chooses "density", the usual name in smoke and clouds; else the first fog volume; else the first
+ * scalar grid. */
 const trip_vdb_entry &choose_grid(trip_vdb_stream &is, const trip_vdb_contents &contents)
 {
     const trip_vdb_entry *first = nullptr, *fog = nullptr;
@@ -90,24 +94,25 @@ const trip_vdb_entry &choose_grid(trip_vdb_stream &is, const trip_vdb_contents &
             first = &entry;
     }
     if (!first)
-        throw trip_vdb_error("has no scalar grid; it holds: " + list_grids(contents));
+        throw trip_vdb_error("has no scalar grid; it contains: " + list_grids(contents));
     return fog ? *fog : *first;
 }
 
 openvdb::math::Transform::Ptr read_transform(trip_vdb_stream &is)
 {
     int64_t start = is.tellg();
-    is.get_string(1024); /* its name, whose length the library does not check */
+    is.get_string(1024); /* the transform's name; the library does not check its length */
     is.seekg(start);
     auto transform = openvdb::math::Transform::createLinearTransform();
     transform->read(is);
     if (!transform->isLinear())
-        throw trip_vdb_error("its voxels lie in a frustum; only affine maps are drawn (resample "
-                             "the grid)");
+        throw trip_vdb_error("its voxels lie in a frustum, which cannot be drawn: resample "
+                             "the grid");
     return transform;
 }
 
-/* From (i, j, k), counted from `lo`, to world space. OpenVDB's matrices act on row vectors. */
+/* Returns the map from (i, j, k), counted from `lo`, to world space. OpenVDB's matrices act on row
+ * vectors. */
 trip_affine index_to_world(const openvdb::math::Transform &transform, const int32_t lo[3])
 {
     openvdb::Mat4d m = transform.baseMap()->getAffineMap()->getMat4();
@@ -133,18 +138,18 @@ trip_vdb_conversion choose_conversion(const trip_vdb_head &head, const trip_vdb_
         wanted = TRIP_LEVEL_SET_FILLED;
     if (wanted != TRIP_LEVEL_SET_UNSET && is_set && !real)
         throw trip_vdb_error(grid + "is a level set of " + entry.type +
-                             "; only those of float and double are read");
+                             "; only level sets of float and double can be read");
     if (wanted != TRIP_LEVEL_SET_UNSET && (head.grid_class == "fog volume" || !real))
-        throw trip_vdb_error(grid + "is no level set, so that --level-set does not apply",
+        throw trip_vdb_error(grid + "is not a level set, so --level-set does not apply",
                              TRIP_USAGE);
     double volume = std::fabs(transform.baseMap()->getAffineMap()->determinant());
     if (wanted == TRIP_LEVEL_SET_FILLED && !(volume > 0 && std::isfinite(volume)))
-        throw trip_vdb_error(grid + "has a map from voxels to space that is singular");
+        throw trip_vdb_error(grid + "has a singular map from index space to world space");
     return { wanted, std::cbrt(volume) };
 }
 
-/* Moves the stream to the tree of a grid that has only metadata and a transform of its own and uses
- * the tree of another grid. */
+/* Moves the stream to the grid's tree. A grid with a parent has its own metadata and transform, but
+ * uses the parent's tree. */
 void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const trip_vdb_entry &entry,
                trip_vdb_head &head)
 {
@@ -158,10 +163,10 @@ void seek_tree(trip_vdb_stream &is, const trip_vdb_contents &contents, const tri
             return;
         }
     throw trip_vdb_error("is corrupt: grid \"" + entry.name +
-                         "\" shares the tree of a grid that is not there");
+                         "\" shares the tree of a missing grid");
 }
 
-/* Describes what was chosen where neither the file nor the options decide. */
+/* Describes the choices that neither the file nor the options decide. */
 void write_note(const trip_vdb_contents &contents, const trip_vdb_entry &entry,
                 const trip_vdb_conversion &conversion, const trip_volume_params &params,
                 trip_volume_info *info)
@@ -174,11 +179,11 @@ void write_note(const trip_vdb_contents &contents, const trip_vdb_entry &entry,
         if (others.size() > 200)
             others.replace(200, std::string::npos, "...");
         if (!others.empty())
-            note = "grid \"" + entry.name + "\" is taken; --grid takes another: " + others;
+            note = "grid \"" + entry.name + "\" is used; --grid selects another: " + others;
     }
     if (params.level_set == TRIP_LEVEL_SET_UNSET && conversion.mode == TRIP_LEVEL_SET_FILLED)
         note += (note.empty() ? "grid \"" + entry.name + "\"" : "; it") +
-                " is a level set, filled inside; --level-set band makes it a shell";
+                " is a level set, drawn filled; --level-set band draws a shell";
     snprintf(info->note, sizeof info->note, "%s", note.c_str());
 }
 
@@ -244,7 +249,7 @@ int next_box(void *opaque, trip_volume_portion *portion)
         portion->origin[a] = (int64_t)box.lo[a] - grid.lo[a];
         portion->size[a] = box.size[a];
     }
-    portion->data = &state; /* not NULL; boxes have no memory of their own */
+    portion->data = &state; /* must not be NULL; boxes own no memory */
     return 1;
 }
 

@@ -19,7 +19,8 @@ constexpr uint32_t oldest_version = openvdb::OPENVDB_FILE_VERSION_SELECTIVE_COMP
 constexpr uint32_t name_limit = 65536; /* bytes */
 constexpr const char *half_suffix = "_HalfFloat";
 
-/* Name, type and value of each item; calls item(name, type, value bytes) at the value. */
+/* Reads name, type and value of each item. Calls item(name, type, value bytes) with the stream at
+ * the value. */
 template <typename Item> void read_metadata(trip_vdb_stream &is, const Item &item)
 {
     uint32_t count = is.get_value<uint32_t>();
@@ -38,7 +39,7 @@ void skip_metadata(trip_vdb_stream &is)
     read_metadata(is, [](const std::string &, const std::string &, uint32_t) {});
 }
 
-/* "Tree_float_5_4_3" or "Tree_float_5_4_3_HalfFloat". */
+/* Parses "Tree_float_5_4_3" or "Tree_float_5_4_3_HalfFloat". */
 void split_type(std::string type, trip_vdb_entry &entry)
 {
     size_t suffix = type.rfind(half_suffix);
@@ -62,7 +63,7 @@ trip_vdb_entry read_entry(trip_vdb_stream &is)
     split_type(is.get_string(name_limit), entry);
     entry.parent = is.get_string(name_limit);
     entry.offset = is.get_value<int64_t>();
-    is.get_value<int64_t>(); /* of its leaves, which is not needed */
+    is.get_value<int64_t>(); /* position of the leaves, unused */
     entry.end = is.get_value<int64_t>();
     return entry;
 }
@@ -71,7 +72,7 @@ void read_entries(trip_vdb_stream &is, int64_t size, trip_vdb_contents &contents
 {
     int32_t count = is.get_value<int32_t>();
     if (count < 1)
-        throw trip_vdb_error("holds no grid");
+        throw trip_vdb_error("contains no grid");
     for (int32_t i = 0; i < count; i++) {
         trip_vdb_entry entry = read_entry(is);
         if (!contents.has_offsets) {
@@ -81,11 +82,12 @@ void read_entries(trip_vdb_stream &is, int64_t size, trip_vdb_contents &contents
             return;
         }
         if (entry.end > size)
-            throw trip_vdb_error("is cut short: grid \"" + entry.name + "\" ends at byte " +
+            throw trip_vdb_error("is truncated: grid \"" + entry.name + "\" ends at byte " +
                                  std::to_string(entry.end) + ", the file at " +
                                  std::to_string(size));
         if (entry.offset < is.tellg() || entry.end < entry.offset)
-            throw trip_vdb_error("is corrupt: grid \"" + entry.name + "\" has an impossible place");
+            throw trip_vdb_error("is corrupt: grid \"" + entry.name +
+                                 "\" has an impossible position");
         contents.grids.push_back(entry);
         is.seekg(entry.end);
     }
@@ -119,8 +121,8 @@ size_t trip_vdb_fd::read_some(void *to, size_t bytes, int64_t offset) const
         if (n > 0)
             return (size_t)n;
         if (n == 0)
-            throw trip_vdb_error("ends at byte " + std::to_string(offset) +
-                                 ", before its data does: truncated or corrupt");
+            throw trip_vdb_error("ends early, at byte " + std::to_string(offset) +
+                                 ": truncated or corrupt");
         if (errno != EINTR)
             throw trip_vdb_error("cannot read at byte " + std::to_string(offset) + ": " +
                                  std::strerror(errno));
@@ -154,8 +156,8 @@ trip_vdb_buffer::pos_type trip_vdb_buffer::seekoff(off_type offset, std::ios_bas
                                                 : fd_.size();
     int64_t to;
     if (__builtin_add_overflow(base, (int64_t)offset, &to) || to < 0 || to > fd_.size())
-        throw trip_vdb_error("is corrupt or truncated: something said to begin at byte " +
-                             std::to_string(base) + " does not fit the file");
+        throw trip_vdb_error("is corrupt or truncated: data at byte " + std::to_string(base) +
+                             " do not fit in the file");
     if (to >= start_ && to <= start_ + (egptr() - eback())) {
         setg(eback(), eback() + (to - start_), egptr());
     } else {

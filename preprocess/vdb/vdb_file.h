@@ -1,6 +1,6 @@
-/* Reads the outer layers of an OpenVDB file with checks that the library does not make: it
- * allocates what a length field says and ignores short reads. Everything in this header may throw;
- * nothing above read_vdb.cpp includes it. */
+/* Reads the outer layers of an OpenVDB file with checks that the library lacks: the library
+ * allocates any length that the file gives, and ignores short reads. Everything in this header may
+ * throw. Nothing above read_vdb.cpp includes it. */
 #ifndef TRIP_VDB_FILE_H
 #define TRIP_VDB_FILE_H
 
@@ -22,7 +22,7 @@ struct trip_vdb_error : std::runtime_error {
     int status;
 };
 
-/* An open file. Immutable once open; any thread may read from it. */
+/* An open file. It is immutable; any thread may read from it. */
 class trip_vdb_fd
 {
   public:
@@ -30,8 +30,8 @@ class trip_vdb_fd
     trip_vdb_fd(const trip_vdb_fd &) = delete;
     trip_vdb_fd &operator=(const trip_vdb_fd &) = delete;
     ~trip_vdb_fd();
-    /* As pread(2), but throws on errors, on the end of the file, and where the work of the thread
-     * is interrupted: reading is what opening and decoding take their time for. */
+    /* Like pread(2), but throws on errors, at the end of the file, and on an interruption. Opening
+     * and decoding mainly read, so they need no other check. */
     size_t read_some(void *to, size_t bytes, int64_t offset) const;
     int64_t size() const
     {
@@ -43,17 +43,17 @@ class trip_vdb_fd
     int64_t size_;
 };
 
-/* A buffered view of the file. A seek within the buffer costs nothing; one beyond the file's end
- * throws. The file is not mapped, so that its pages do not count as this process's memory, and a
- * file that shrinks meanwhile is an error, not a signal. */
+/* A buffered view of the file. A seek within the buffer costs nothing; a seek beyond the file's end
+ * throws. The file is not mapped, for two reasons. Mapped pages would count as this process's
+ * memory, and a shrinking file would cause a signal instead of an error. */
 class trip_vdb_buffer : public std::streambuf
 {
   public:
     explicit trip_vdb_buffer(const trip_vdb_fd &fd) : fd_(fd)
     {
     }
-    /* The value and end of the last read of exactly eight bytes: after a compressed chunk was
-     * skipped, these are the chunk's size and start. */
+    /* The value and end of the last read of exactly eight bytes. After the library skips a
+     * compressed chunk, they are the chunk's size and start. */
     int64_t last_word = 0, last_word_end = -1;
 
   protected:
@@ -69,12 +69,12 @@ class trip_vdb_buffer : public std::streambuf
         return start_ + (gptr() - eback());
     }
     const trip_vdb_fd &fd_;
-    int64_t start_ = 0; /* in the file, of the buffer's first byte */
+    int64_t start_ = 0; /* position in the file of the buffer's first byte */
     char bytes_[16384];
 };
 
-/* A stream for the library's readers and for those here. One thread at a time; streams of several
- * threads may read one file. Any short read throws. */
+/* A stream for the readers of the library and of this module. One thread at a time; streams of
+ * several threads may read one file. Any short read throws. */
 class trip_vdb_stream : private trip_vdb_buffer, public std::istream
 {
   public:
@@ -85,7 +85,7 @@ class trip_vdb_stream : private trip_vdb_buffer, public std::istream
         read(reinterpret_cast<char *>(&value), sizeof value);
         return value;
     }
-    /* A string with a 32-bit length, which may be `limit` at most. */
+    /* Reads a string with a 32-bit length. Throws if the length exceeds `limit`. */
     std::string get_string(uint32_t limit);
     void skip(int64_t bytes)
     {
@@ -103,32 +103,33 @@ class trip_vdb_stream : private trip_vdb_buffer, public std::istream
 
 /* A grid's entry in the file's table of contents. */
 struct trip_vdb_entry {
-    std::string unique_name; /* with the library's separator and number where a name repeats */
+    std::string unique_name; /* with the library's separator and number if a name repeats */
     std::string name;        /* as shown to users: "density", or "density[1]" */
     std::string type;        /* "float", "vec3s", ... */
-    std::string parent;      /* unique name of the grid whose tree this one uses, or empty */
-    bool default_tree;       /* of the 5-4-3 layout that all writers use */
-    bool half;               /* floats are stored as 16 bits */
-    int64_t offset;          /* of the grid in the file */
-    int64_t end;             /* of its data in the file; 0: unknown */
+    std::string parent; /* unique name of the grid with the tree that this grid shares, or empty */
+    bool default_tree;  /* tree of the 5-4-3 layout, which all writers use */
+    bool half;          /* floats are stored as 16 bits */
+    int64_t offset;     /* of the grid in the file */
+    int64_t end;        /* of the grid's data in the file; 0 if unknown */
 };
 
 struct trip_vdb_contents {
-    uint32_t version;     /* of the file format: 220 and later are read */
-    uint32_t library[2];  /* version of the library that wrote it */
-    uint32_t compression; /* of formats before 222; since then each grid has its own */
-    bool has_offsets;     /* false: written as a stream, only the first grid can be found */
+    uint32_t version;     /* of the file format; at least 220 */
+    uint32_t library[2];  /* version of the library that wrote the file */
+    uint32_t compression; /* for formats before 222; later, each grid has its own */
+    bool has_offsets; /* false for a file written as a stream, in which only the first grid can be
+                         found */
     std::vector<trip_vdb_entry> grids;
 };
 
 trip_vdb_contents trip_vdb_read_contents(const trip_vdb_fd &fd);
 
-/* What precedes a grid's transform. */
+/* The part of a grid before its transform. */
 struct trip_vdb_head {
     uint32_t compression;
-    std::string grid_class; /* "level set", "fog volume", ...; empty: unknown */
+    std::string grid_class; /* "level set", "fog volume", ...; empty if unknown */
 };
-/* Reads it, and leaves the stream at the transform. */
+/* Reads the head of a grid and leaves the stream at the transform. */
 trip_vdb_head trip_vdb_read_head(trip_vdb_stream &is, const trip_vdb_contents &contents,
                                  const trip_vdb_entry &entry);
 

@@ -54,7 +54,7 @@ class Converter
     double scale_ = 1;
 };
 
-/* The part of a decoded box that is in one node, and the arrays of the box. */
+/* The part of a decoded box in one node, and the arrays of the box. */
 struct Part {
     CoordBBox box;
     const int64_t *lo, *size;
@@ -85,7 +85,7 @@ class BoxList
     BoxList(trip_vdb_grid &grid, trip_budget *budget) : grid_(grid), budget_(budget)
     {
     }
-    /* Adds the boxes of a node or tile that is full. */
+    /* Adds the boxes of a full node or tile. */
     void add_full(const CoordBBox &box)
     {
         include(box);
@@ -98,10 +98,10 @@ class BoxList
     void add(const CoordBBox &box)
     {
         if ((grid_.boxes.size() + 1) * 2 * sizeof(trip_vdb_box) > trip_budget_left_bytes(budget_))
-            throw trip_vdb_error("has so many voxels that their " +
+            throw trip_vdb_error("has too many voxels: more than " +
                                  std::to_string(grid_.boxes.size()) +
-                                 " and more boxes do not fit the memory allowed; a larger --memory "
-                                 "would do");
+                                 " boxes do not fit in memory: raise "
+                                 "--memory");
         trip_vdb_box b;
         for (int a = 0; a < 3; a++) {
             b.lo[a] = box.min()[a];
@@ -139,7 +139,7 @@ void BoxList::finish()
     };
     boxes.erase(std::remove_if(boxes.begin(), boxes.end(), clip), boxes.end());
     if (boxes.empty())
-        throw trip_vdb_error("holds a grid without any active voxel");
+        throw trip_vdb_error("contains a grid without active voxels");
     std::sort(boxes.begin(), boxes.end(), [](const trip_vdb_box &a, const trip_vdb_box &b) {
         for (int axis = 2; axis > 0; axis--)
             if (a.lo[axis] != b.lo[axis])
@@ -152,7 +152,7 @@ void BoxList::finish()
     }
 }
 
-/* First and last set bit of a byte that is not 0. */
+/* Return the first and the last set bit of a byte that is not 0. */
 int32_t first_bit(unsigned byte)
 {
     return __builtin_ctz(byte);
@@ -163,8 +163,8 @@ int32_t last_bit(unsigned byte)
     return 31 - __builtin_clz(byte);
 }
 
-/* Bounds of the set bits of a leaf's mask, relative to the leaf. Bit z + 8 y + 64 x: a word of 64
- * bits for each x, in it a byte for each y. */
+/* Returns the bounds of the set bits of a leaf's mask, relative to the leaf. Voxel (x, y, z) is bit
+ * z + 8 y + 64 x: each x has a word of 64 bits, with a byte for each y. */
 template <typename MaskT> CoordBBox mask_bounds(const MaskT &mask)
 {
     uint64_t any = 0;
@@ -232,10 +232,11 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
     /* Leaves of truth values are bits and stay in memory with the tree. */
     static constexpr bool in_memory = std::is_same<ValueT, bool>::value;
 
-    /* Reads the root here: the library's function leaks a node that turns out to be corrupt. */
+    /* Reads the root here, since the library's function leaks a node that turns out to be corrupt.
+     */
     void read_tree(trip_vdb_stream &is)
     {
-        is.get_value<int32_t>(); /* number of buffers, as checked */
+        is.get_value<int32_t>(); /* number of buffers, already checked */
         root_.setBackground(is.get_value<ValueT>(), false);
         io::setGridBackgroundValuePtr(is, &root_.background());
         openvdb::Index tiles = is.get_value<openvdb::Index>();
@@ -253,7 +254,8 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         }
     }
 
-    /* Stores the place of each leaf and checks that it can be read; or reads it. */
+    /* Stores the offset of each leaf and checks that it can be read. Reads leaves that stay in
+     * memory. */
     void read_leaves(trip_vdb_stream &is)
     {
         if constexpr (in_memory) {
@@ -278,7 +280,8 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         if (io::getFormatVersion(is) < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) {
             is.skip(3 * sizeof(int32_t)); /* its origin, repeated */
             if (is.get_value<int8_t>() != 1)
-                throw trip_vdb_error("has several buffers a leaf, which is an obsolete form");
+                throw trip_vdb_error(
+                    "has several buffers per leaf, an obsolete format that cannot be read");
         }
         trip_vdb_tree_check<TreeT>::skip_values(is, LeafT::SIZE, mask, half_);
     }
@@ -288,7 +291,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         double stored = (double)root_.background();
         bool converts = conversion.mode != TRIP_LEVEL_SET_UNSET;
         if (converts && !(stored > 0 && std::isfinite(stored)))
-            throw trip_vdb_error("is a level set whose band has no width");
+            throw trip_vdb_error("is a level set with a band of zero width");
         convert_ = Converter(conversion, stored);
         background = !converts && std::isfinite((float)stored) ? stored : 0;
     }
@@ -314,8 +317,8 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         return convert_((double)value, active).exists;
     }
 
-    /* Adds the boxes of a node of 128 voxels a side, one for each octant, around the leaves
-     * and leaf-sized tiles in it. */
+    /* Adds the boxes of a node with sides of 128 voxels: one for each octant, around its leaves and
+     * leaf-sized tiles. */
     void collect_boxes(const MiddleT &node, BoxList &list) const
     {
         CoordBBox octants[8];
@@ -353,7 +356,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
         io::setStreamMetadataPtr(is, metadata);
         LeafT scratch;
         Coord first = whole.box.min() & ~(int32_t)(LeafT::DIM - 1);
-        /* z innermost: the order of the leaves in the file. */
+        /* z is innermost, as in the order of leaves in the file */
         for (int32_t x = first.x(); x <= whole.box.max().x(); x += LeafT::DIM)
             for (int32_t y = first.y(); y <= whole.box.max().y(); y += LeafT::DIM)
                 for (int32_t z = first.z(); z <= whole.box.max().z(); z += LeafT::DIM) {
@@ -390,7 +393,7 @@ template <typename TreeT> class TypedGrid : public trip_vdb_grid
     const trip_vdb_fd &fd_;
     bool half_;
     trip_vdb_reservation reserved_tree_, reserved_boxes_;
-    /* The root is enough: a Tree would add code that is not used. */
+    /* The root suffices; a Tree would add unused code. */
     typename TreeT::RootNodeType root_;
     std::vector<int64_t> leaf_offsets_; /* by the leaf's transient data */
     io::StreamMetadata stream_;         /* for a stream that reads a leaf's values */
@@ -446,8 +449,9 @@ void trip_vdb_reservation::take(trip_budget *budget, uint64_t bytes, const char 
     memory_ = trip_budget_take(budget, bytes);
     if (!memory_)
         throw trip_vdb_error(std::string(stage) + " needs " + trip_format_bytes(bytes, needed) +
-                             ", but " + trip_format_bytes(trip_budget_left_bytes(budget), left) +
-                             " are left of the memory allowed; a larger --memory would do");
+                             ", but only " +
+                             trip_format_bytes(trip_budget_left_bytes(budget), left) +
+                             " of memory are left: raise --memory");
     budget_ = budget;
     bytes_ = bytes;
 }

@@ -1,7 +1,6 @@
 /* One scalar grid of an OpenVDB file as boxes of existing voxels. Memory holds the grid's tree
- * without the values of its leaves, the place of each leaf in the file, and the boxes. The values
- * of a box are read from the file when it is decoded. Everything here may throw; only read_vdb.cpp
- * includes it. */
+ * without the values of its leaves, the file offset of each leaf, and the boxes. Decoding a box
+ * reads its values from the file. Everything here may throw. Only read_vdb.cpp includes it. */
 #ifndef TRIP_VDB_GRID_H
 #define TRIP_VDB_GRID_H
 
@@ -11,14 +10,14 @@
 #include "vdb_file.h"
 #include "volume.h"
 
-/* A box of at most 64 voxels a side around existing voxels, in the grid's own coordinates. It
- * crosses no multiple of 64, so boxes do not overlap. */
+/* A box around existing voxels with at most 64 voxels on each side, in the grid's own coordinates.
+ * It crosses no multiple of 64, so boxes do not overlap. */
 struct trip_vdb_box {
     int32_t lo[3];
     uint8_t size[3];
 };
 
-/* Memory taken from the budget but never touched, in place of the memory that the library
+/* Memory taken from the budget but never touched. It accounts for memory that the library
  * allocates. */
 class trip_vdb_reservation
 {
@@ -27,7 +26,8 @@ class trip_vdb_reservation
     trip_vdb_reservation(const trip_vdb_reservation &) = delete;
     trip_vdb_reservation &operator=(const trip_vdb_reservation &) = delete;
     ~trip_vdb_reservation();
-    /* Throws when it does not fit; `what` names the purpose in the message. Called once only. */
+    /* Throws if the bytes do not fit in the budget; `stage` names their purpose in the message.
+     * Call it only once. */
     void take(trip_budget *budget, uint64_t bytes, const char *stage);
 
   private:
@@ -36,33 +36,33 @@ class trip_vdb_reservation
     size_t bytes_ = 0;
 };
 
-/* How stored values become densities. */
+/* The conversion of stored values to densities. */
 struct trip_vdb_conversion {
-    trip_level_set_mode mode; /* TRIP_LEVEL_SET_UNSET: values remain as they are */
-    double voxel_world;       /* a voxel's side; distances are in world units */
+    trip_level_set_mode mode; /* TRIP_LEVEL_SET_UNSET keeps the values */
+    double voxel_world;       /* side of a voxel in world units, the units of distances */
 };
 
 class trip_vdb_grid
 {
   public:
     virtual ~trip_vdb_grid() = default;
-    /* Fills the values and, where not NULL, `active` of a box in the grid's coordinates; any
-     * thread. */
+    /* Fills the values and, if not NULL, `active` of a box in the grid's coordinates. Any thread
+     * may call it. */
     virtual void decode(const int64_t lo[3], const int64_t size[3], float *values,
                         uint8_t *active) const = 0;
 
     trip_scalar type;      /* as stored */
     double background = 0; /* after conversion */
-    /* Of all existing voxels and one of the background around them, so that values interpolated
-     * between voxels end there as they do in the library; inclusive. */
+    /* Inclusive bounds of all existing voxels and one voxel of background around them. Interpolated
+     * values then end at the background, as in the library. */
     int32_t lo[3], hi[3];
-    std::vector<trip_vdb_box> boxes; /* sorted by their corner's k, then j, then i */
+    std::vector<trip_vdb_box> boxes; /* sorted by k, then j, then i of their corner */
 };
 
-/* Whether a grid of this type ("float", "vec3s", ...) can be loaded. */
+/* Returns whether a grid of this type ("float", "vec3s", ...) can be loaded. */
 bool trip_vdb_is_scalar(const trip_vdb_entry &entry);
 
-/* Loads the tree of `entry` from `is`, a stream of `fd` that is positioned there; `fd` must outlive
+/* Loads the tree of `entry` from `is`, a stream of `fd` positioned at the tree. `fd` must outlive
  * the grid. */
 std::unique_ptr<trip_vdb_grid> trip_vdb_load(const trip_vdb_fd &fd, trip_vdb_stream &is,
                                              const trip_vdb_contents &contents,

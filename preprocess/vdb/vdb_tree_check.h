@@ -1,7 +1,7 @@
-/* Checks a grid's tree in its file and computes its memory before the library builds it: the
- * library writes beyond its buffers when a chunk claims another size than it should have, and
- * allocates the nodes of a tree of any size. The check reads with the library's own functions, in
- * the mode in which they skip values. Only vdb_grid.cpp includes this. */
+/* Checks a grid's tree in its file and computes its memory before the library builds it. The
+ * library allocates the nodes of a tree of any size, and writes beyond its buffers if a chunk gives
+ * a wrong size. The check reads with the library's own functions, in the mode that skips values.
+ * Only vdb_grid.cpp includes this. */
 #ifndef TRIP_VDB_TREE_CHECK_H
 #define TRIP_VDB_TREE_CHECK_H
 
@@ -13,22 +13,23 @@
 
 #include "vdb_file.h"
 
-/* Coordinates beyond this would make a box span more than 32 bits. */
+/* Coordinates beyond this limit would make a box span more than 32 bits. */
 constexpr int32_t trip_vdb_far = 1 << 30;
 
 template <typename TreeT> class trip_vdb_tree_check
 {
   public:
-    /* `is` is positioned at the tree and has the file's version and compression as metadata; it is
-     * moved past the tree's nodes, to the leaves' values. */
+    /* `is` must be positioned at the tree and have the file's version and compression as metadata.
+     * The check moves it past the tree's nodes, to the leaves' values. */
     trip_vdb_tree_check(trip_vdb_stream &is, bool as_half) : is_(is), half_(as_half)
     {
         if (is_.get_value<int32_t>() != 1)
-            throw trip_vdb_error("has several buffers a leaf, which is an obsolete form");
+            throw trip_vdb_error(
+                "has several buffers per leaf, an obsolete format that cannot be read");
         check_root();
     }
 
-    /* Memory that the tree will take without its leaves' values. */
+    /* Memory of the tree without its leaves' values. */
     uint64_t bytes = 0;
     uint64_t leaves = 0;
 
@@ -70,14 +71,14 @@ template <typename TreeT> class trip_vdb_tree_check
         for (int a = 0; a < 3; a++) {
             origin[a] = is_.get_value<int32_t>();
             if (origin[a] < -trip_vdb_far || origin[a] >= trip_vdb_far)
-                throw trip_vdb_error("reaches voxel coordinate " + std::to_string(origin[a]) +
-                                     "; those beyond 2^30 are not drawn");
+                throw trip_vdb_error("has voxels at coordinate " + std::to_string(origin[a]) +
+                                     "; the limit is 2^30");
             if (origin[a] % (int32_t)TopT::DIM != 0)
                 throw trip_vdb_error("is corrupt: a node begins at coordinate " +
                                      std::to_string(origin[a]));
         }
         if (!origins_.insert(origin).second)
-            throw trip_vdb_error("is corrupt: a part of the tree is there twice");
+            throw trip_vdb_error("is corrupt: a part of the tree occurs twice");
         bytes += sizeof(openvdb::Coord) + 64; /* an entry of the root's table */
     }
 
@@ -86,7 +87,7 @@ template <typename TreeT> class trip_vdb_tree_check
         bytes += sizeof(NodeT) + heap_bytes;
         if constexpr (NodeT::LEVEL == 0) {
             leaves++;
-            is_.skip(NodeT::SIZE / 8); /* its mask */
+            is_.skip(NodeT::SIZE / 8); /* the leaf's mask */
         } else {
             typename NodeT::NodeMaskType children, values;
             children.load(is_);
@@ -100,7 +101,7 @@ template <typename TreeT> class trip_vdb_tree_check
     }
 
   public:
-    /* Skips `count` stored values; throws if the size of their chunk is impossible. */
+    /* Skips `count` stored values. Throws if the size of their chunk is impossible. */
     template <typename MaskT>
     static void skip_values(trip_vdb_stream &is, openvdb::Index count, const MaskT &mask,
                             bool as_half)
@@ -109,7 +110,7 @@ template <typename TreeT> class trip_vdb_tree_check
         check_chunk(is, count * sizeof(ValueT));
     }
 
-    /* Checks the size of the chunk that was just skipped, of at most `bytes` uncompressed bytes. */
+    /* Checks the size of the chunk just skipped, which holds at most `bytes` uncompressed bytes. */
     static void check_chunk(trip_vdb_stream &is, uint64_t bytes)
     {
         namespace io = openvdb::io;
@@ -127,8 +128,8 @@ template <typename TreeT> class trip_vdb_tree_check
     }
 
   private:
-    /* Whether the size in the Blosc header, which the library does not check, is that of the chunk.
-     */
+    /* Returns whether the size in the Blosc header matches the chunk. The library does not check
+     * it. */
     static bool is_blosc_chunk(trip_vdb_stream &is, int64_t start, int64_t stored)
     {
         if (stored < 16)
