@@ -9,7 +9,7 @@ static const trip_list_grid *grid_of(const trip_cpu_view *view)
     return &view->of->plan->lists[view->list->index].grid;
 }
 
-/* The bound by which splats of a list are culled, for the kernels. */
+/* Returns the bound by which the kernel `reaching` culls splats of the list. */
 static trip_cpu_reach reach_of(const trip_cpu_view *view)
 {
     const trip_settings *s = view->of->settings;
@@ -25,7 +25,7 @@ static trip_cpu_reach reach_of(const trip_cpu_view *view)
     return reach;
 }
 
-/* Of a splat that the kernels leave to trip_splat_project(). */
+/* Tests one splat that the kernels leave to trip_splat_project(). */
 static bool is_reaching(const trip_cpu_view *view, const trip_cpu_staged *staged, uint32_t i)
 {
     double p[3];
@@ -46,7 +46,8 @@ static bool is_reaching(const trip_cpu_view *view, const trip_cpu_staged *staged
                                  growth * s.radius * trip_list_grid_growth(grid_of(view)));
 }
 
-/* Lists whose weight is 0 everywhere are not drawn, and so not counted. */
+/* Counts the staged splats that may reach a ray on which the list has weight. The renderer does not
+ * draw other splats. */
 static uint32_t count_reaching(const trip_cpu *r, const trip_cpu_view *view, trip_cpu_worker *w,
                                uint32_t n)
 {
@@ -91,8 +92,8 @@ int trip_cpu_begin_counting(trip_cpu *r)
         r->visible = trip_budget_take(r->budget, TRIP_CPU_COUNT_TABLE_BYTES);
     if (!r->visible)
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                         "the memory given does not suffice for counting; raise --memory");
-    /* Any extinction will do that the kernels do not take for nothing. */
+                         "exact counts do not fit the memory given; raise --memory");
+    /* Any extinction works that the kernels do not treat as 0. */
     for (int i = 0; i < 65536; i++)
         r->visible[i] = (trip_tf_entry){ .extinction = (float)(0x1p20 / camera->voxel_world) };
     r->counted_frame = *r->frame;

@@ -7,15 +7,15 @@
 #include "cpu/cull.h"
 #include "cpu/panes.h"
 
-/* Fewer voxels are not worth a chunk. */
+/* A chunk of fewer voxels costs more than it gains. */
 enum { MIN_CHUNK = 512 };
 
-/* Much is occluded where fewer voxels than this share are visible. */
+/* If a smaller share of the voxels is visible, the frame counts as much occluded. */
 #define MUCH_OCCLUDED 0.75
 
 /* ---- projecting a chunk ---- */
 
-/* Whether TRIP_CPU_READABLE bytes behind those of a plane lie in the batch too. */
+/* Returns whether the batch also holds TRIP_CPU_READABLE bytes after `bytes` bytes of the plane. */
 static bool may_read_behind(const trip_batch *batch, int plane, const unsigned char *at,
                             size_t bytes)
 {
@@ -23,8 +23,8 @@ static bool may_read_behind(const trip_batch *batch, int plane, const unsigned c
            batch->plane_bytes[plane];
 }
 
-/* Copies what of the square's records is drawn: the codes, unpacked where they are not bytes, and
- * normals of some of its voxels. */
+/* Copies the codes and normals of the square's drawn voxels to the worker. Codes of two bytes are
+ * unpacked first. */
 static void keep_drawn(trip_cpu_worker *w, const trip_block *b, const trip_square *at,
                        uint64_t drawn, trip_cpu_square *s)
 {
@@ -101,7 +101,7 @@ trip_cpu_square trip_cpu_make_square(const trip_cpu_part_squares *of, trip_cpu_w
     return s;
 }
 
-/* What of a chunk may be visible: the number of its parts. */
+/* Fills w->parts with the parts of the chunk that may be visible. Returns the number of parts. */
 static uint32_t cull_chunk(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk)
 {
     const trip_cpu_culling culling = { r->kernels, &r->views[chunk->list], &r->mask,
@@ -127,7 +127,7 @@ static bool much_is_occluded(const trip_cpu *r)
     return r->visible_per_voxel < MUCH_OCCLUDED;
 }
 
-/* Projects what is staged to the end of the chunk. */
+/* Appends the splats of the staged voxels to the chunk and empties the stage. */
 static void empty_staged(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *chunk,
                          uint32_t *staged)
 {
@@ -180,15 +180,15 @@ static void project_chunk(void *context, unsigned task, unsigned thread)
 
 /* ---- cutting a batch into chunks ---- */
 
-/* A place in a batch's runs. */
+/* A position in a batch's runs. */
 typedef struct cursor {
     size_t run;
-    uint32_t skip, skipped; /* squares of it, in draw order, and their voxels */
+    uint32_t skip, skipped; /* squares before it in draw order, and their voxels */
 } cursor;
 
-/* Voxels that the buffer will still take, by how many of them were visible of late; some when it is
- * empty. Where much is occluded it counts as full sooner: the sooner splats are blended, the sooner
- * they occlude what lies behind them. */
+/* Estimates how many more voxels fit the buffer, from the recent share of visible voxels. An empty
+ * buffer always takes at least one chunk. A much occluded frame fills only a quarter of the buffer,
+ * because splats that are blended earlier occlude later ones. */
 static uint64_t room(const trip_cpu *r)
 {
     const trip_cpu_buffer *f = r->filling;
@@ -208,15 +208,16 @@ static uint64_t voxels_from(const trip_batch *batch, const cursor *at)
     return voxels - at->skipped;
 }
 
-/* Of a chunk, when so many are left: fewer towards the end, so that the threads end together. */
+/* Returns the size of the next chunk if `left` voxels remain. Chunks shrink towards the end, so
+ * that the threads finish together. */
 static uint32_t chunk_voxels(const trip_cpu *r, uint64_t left)
 {
     uint64_t each = left / trip_cpu_pool_threads(r->pool) / 2;
     return each < MIN_CHUNK ? MIN_CHUNK : each > TRIP_CPU_CHUNK ? TRIP_CPU_CHUNK : (uint32_t)each;
 }
 
-/* Moves on within a run by as many squares as hold at most `most` voxels; returns how many those
- * hold. */
+/* Advances within a run over squares that hold at most `max` voxels together. Returns the number of
+ * voxels. */
 static uint32_t take_squares(const trip_batch *batch, uint32_t max, cursor *at)
 {
     const trip_block block = trip_block_of(batch, &batch->runs[at->run]);
@@ -232,8 +233,8 @@ static uint32_t take_squares(const trip_batch *batch, uint32_t max, cursor *at)
     return voxels;
 }
 
-/* Reserves the next chunk, of about `most` voxels of one list; false when the batch is through or
- * there are no more chunks. */
+/* Reserves the next chunk, of at most `max` voxels of one list. Returns false at the end of the
+ * batch, or if no chunk is left. */
 static bool reserve_chunk(trip_cpu *r, const trip_batch *batch, uint32_t max, cursor *at)
 {
     trip_cpu_chunk *chunk = at->run < batch->run_count ? trip_cpu_buffer_reserve(r->filling) : NULL;
@@ -258,7 +259,7 @@ static bool reserve_chunk(trip_cpu *r, const trip_batch *batch, uint32_t max, cu
     return true;
 }
 
-/* Fails when some splat's numbers were not finite. */
+/* Fails if the projection of a splat was not finite. */
 static int check_splats(const trip_cpu *r)
 {
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
@@ -267,7 +268,8 @@ static int check_splats(const trip_cpu *r)
     return 0;
 }
 
-/* Goes back to the first of the chunks that the buffer had no room for. */
+/* Moves the cursor back to the first chunk that did not fit the buffer. Adds the kept chunks to the
+ * lists' counts. */
 static void keep_chunks(trip_cpu *r, cursor *at)
 {
     trip_cpu_buffer *f = r->filling;
@@ -283,8 +285,8 @@ static void keep_chunks(trip_cpu *r, cursor *at)
     }
 }
 
-/* How many voxels are visible, by which room() estimates how many more will fit: an average in
- * which a chunk of earlier ones has its part, since few voxels say little. */
+/* Updates the share of visible voxels, which room() uses. A few voxels alone say little, so earlier
+ * voxels enter the average with the weight of one chunk. */
 static void update_visible_per_voxel(trip_cpu *r, uint64_t visible, uint64_t voxels)
 {
     double earlier = TRIP_CPU_CHUNK;
@@ -292,7 +294,7 @@ static void update_visible_per_voxel(trip_cpu *r, uint64_t visible, uint64_t vox
     r->visible_per_voxel = fmax(0.02, now);
 }
 
-/* As much of the batch as the buffer takes. */
+/* Projects as much of the batch as fits the buffer. */
 static int project_batch(trip_cpu *r, const trip_batch *batch, cursor *at)
 {
     trip_cpu_buffer *f = r->filling;

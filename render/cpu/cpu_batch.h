@@ -1,24 +1,25 @@
-/* From a batch to splats: cuts it into chunks, which the workers cull, project and sort by pane
- * while the splats before them are blended. Called by the renderer's thread. */
+/* Turns a batch into splats. The renderer's thread cuts the batch into chunks. The workers cull,
+ * project and sort the chunks by pane while earlier splats are blended. */
 #ifndef TRIP_CPU_BATCH_H
 #define TRIP_CPU_BATCH_H
 
 #include "cpu/cpu_state.h"
 
-/* All splats of a batch, with the views of the layer's lists; ends with its bytes no longer needed.
- */
+/* Draws all splats of a batch with the views of the layer's lists. The batch's bytes are not needed
+ * after the return. Called by the renderer's thread. */
 int trip_cpu_draw_batch(trip_cpu *r, const trip_batch *batch);
 
-/* What holds for all squares of a part of the batch at hand. */
+/* Facts about all squares of a part of the current batch. */
 typedef struct trip_cpu_part_squares {
     const trip_cpu *of;
     const trip_cpu_part *part;
-    bool as_they_are; /* all of their voxels are drawn, and there is room behind their bytes */
+    bool as_they_are; /* all voxels are drawn, and readable bytes follow */
 } trip_cpu_part_squares;
 
 trip_cpu_part_squares trip_cpu_part_squares_of(const trip_cpu *r, const trip_cpu_part *part);
 
-/* One of them, with room to be read behind its bytes. Called by workers. */
+/* Returns one square of the part, with its drawn voxels only; the mask is 0 if there are none.
+ * TRIP_CPU_READABLE bytes after its codes and normals may be read. Called by workers. */
 trip_cpu_square trip_cpu_make_square(const trip_cpu_part_squares *of, trip_cpu_worker *w,
                                      const trip_square *at);
 

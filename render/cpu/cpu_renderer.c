@@ -1,8 +1,11 @@
-/* The CPU renderer: its threads project the voxels of a batch into splats, sort them by pane
- * and blend each pane's splats in list order, while the next batch is projected. What a pixel gets
- * depends on the order of the splats alone, never on where a batch, chunk or splat buffer ends, so
- * that the picture is the same bit for bit for any number of threads, memory, tile and batch size.
- * Once the program is interrupted no task does anything, and waiting for them ends at once. */
+/* The CPU renderer. Its threads project the voxels of a batch into splats and sort the splats by
+ * pane. They blend each pane's splats in list order while the next batch is projected.
+ *
+ * A pixel depends only on the order of the splats, never on where a batch, chunk or splat buffer
+ * ends. So the picture is the same, bit for bit, for any number of threads, memory, tile size and
+ * batch size.
+ *
+ * After an interrupt the tasks return without work, so waiting for them ends at once. */
 #include "cpu/cpu_renderer.h"
 
 #include <stdio.h>
@@ -28,7 +31,6 @@ static bool classifies_post(const trip_cpu *r)
     return r->frame->settings->classify == TRIP_CLASSIFY_POST;
 }
 
-/* The views of the layer's lists. */
 static void make_views(trip_cpu *r, bool front_to_back, bool normals)
 {
     const trip_dataset *data = r->frame->data;
@@ -57,7 +59,8 @@ static void make_views(trip_cpu *r, bool front_to_back, bool normals)
     }
 }
 
-/* The layer of an axis, or what of it is of rays of one way, starts empty. */
+/* Starts an empty layer of an axis. If the axis has a layer for each direction of rays, `way`
+ * selects it. */
 static void start_layer(trip_cpu *r, int axis, trip_way way)
 {
     r->view.axis = axis;
@@ -67,7 +70,7 @@ static void start_layer(trip_cpu *r, int axis, trip_way way)
     r->visible_per_voxel = 1;
 }
 
-/* Takes up the way of the rays that a batch's pass is of. */
+/* If the batch's pass draws rays in another direction, merges the layer and starts the next one. */
 static void use_way(trip_cpu *r, const trip_batch *batch)
 {
     const trip_way way = trip_plan_way(r->frame->plan, r->view.axis, batch->pass->descending);
@@ -136,7 +139,7 @@ static void release_lists(trip_cpu *r)
     r->list_room = 0;
 }
 
-/* Ends with room for the data set's lists and their counts at 0. */
+/* Makes room for the data set's lists and sets their counts to 0. */
 static int fit_lists(trip_cpu *r)
 {
     unsigned wanted = r->frame->data->list_count;
@@ -158,10 +161,10 @@ static int fit_lists(trip_cpu *r)
                      "%u lists do not fit the memory given; raise --memory", wanted);
 }
 
-/* An eighth of the memory given goes to the two buffers of splats. */
+/* Returns the capacity of each splat buffer. Both together take about an eighth of the memory. */
 static uint32_t buffer_capacity(const trip_budget *budget)
 {
-    uint64_t each = trip_budget_limit_bytes(budget) / 16 / 100; /* bytes a splat, roughly */
+    uint64_t each = trip_budget_limit_bytes(budget) / 16 / 100; /* about 100 bytes per splat */
     return each < MIN_SPLATS ? MIN_SPLATS : each > MAX_SPLATS ? MAX_SPLATS : (uint32_t)each;
 }
 
@@ -183,7 +186,7 @@ static int create_buffers(trip_cpu *r)
     return status;
 }
 
-/* Ends with empty buffers of splats for the frame's panes, or without any where it has no splats.
+/* Fits empty splat buffers to the frame's panes. Releases the buffers if the frame draws no splats.
  */
 static int fit_buffers(trip_cpu *r)
 {
@@ -212,8 +215,9 @@ static int begin_sheets(trip_cpu *r)
     return status ? status : trip_cpu_sheets_begin_frame(r->sheets, r);
 }
 
-/* With uneven spacing rays are as long in no two kernels' index spaces, but affine ones need none,
- * and splats that are summed have no room for their own. */
+/* Refuses summed sheets of exact kernels on grids with uneven spacing. There each kernel has its
+ * own index space, and rays differ in length between these spaces. A summed splat has no room for
+ * the lengths of its own rays; affine kernels need none. */
 static int check_kernels(const trip_frame *frame)
 {
     const trip_settings *s = frame->settings;
@@ -223,12 +227,12 @@ static int check_kernels(const trip_frame *frame)
         return 0;
     return trip_fail(
         TRIP_USAGE, "render", "cpu",
-        "exact kernels of grids with uneven spacing are not summed by sheets: --kernel "
-        "ewa are, and --compositing splat draws these");
+        "--compositing sheet cannot sum exact kernels on a grid with uneven spacing; use "
+        "--kernel ewa or --compositing splat");
 }
 
-/* Sheets with uneven spacing, and those interpolated from 64 voxels, are drawn by the plain kernels
- * (kernels/sheet_tmpl.h). */
+/* The plain kernels (kernels/sheet_tmpl.h) draw sheets with uneven spacing and sheets interpolated
+ * from 64 voxels. */
 static void choose_kernels(trip_cpu *r)
 {
     const trip_settings *s = r->frame->settings;
@@ -275,7 +279,7 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
     return trip_frame_poll();
 }
 
-/* The last splat buffer may still be blended. */
+/* Waits, because the threads may still blend the last splat buffer. */
 static void end_frame(trip_renderer *base)
 {
     trip_cpu *r = (trip_cpu *)base;
@@ -323,7 +327,7 @@ static void run_tasks(void *renderer, void (*task)(void *context, unsigned numbe
                       unsigned count)
 {
     trip_cpu *r = renderer;
-    if (r->blend_job.active) { /* the threads are at work, and it would have to wait for them */
+    if (r->blend_job.active) { /* the pool is busy, so the caller runs the tasks */
         trip_run_tasks(NULL, task, context, count);
         return;
     }
@@ -382,8 +386,7 @@ static int create_parts(trip_cpu *r, unsigned threads)
     if (!r->workers) {
         r->workers_bytes = 0;
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                         "the memory given does not suffice for %u threads; raise --memory",
-                         threads);
+                         "%u threads do not fit the memory given; raise --memory", threads);
     }
     status = create_buffers(r);
     describe(r->device, r->isa, threads);

@@ -14,8 +14,8 @@ uint32_t trip_cpu_panes(const trip_cpu_splat *s, int panes_across)
            (uint32_t)(below > 0) << TRIP_CPU_PANES_BELOW_SHIFT;
 }
 
-/* Of a near splat, whose forms are of the image's corner. Turned so that b does not change with x,
- * which a^2 + b^2 does not show. */
+/* Sets the forms a and b of a near splat. The input forms start at the image's corner, the output
+ * forms at the pane's corner. Rotating (a, b) makes b independent of x and keeps a^2 + b^2. */
 static void set_near(const trip_splat *s, trip_cpu_splat *out)
 {
     double length = hypot(s->a[1], s->b[1]), c = length > 0 ? s->a[1] / length : 1;
@@ -42,7 +42,7 @@ void trip_cpu_set_conic(const trip_splat *s, trip_cpu_splat *out)
     out->l22 = (float)sqrt(fmax(0, yy - l21 * l21));
 }
 
-/* Of any other, by its centre. */
+/* Sets the forms of a splat that is not near, from its conic and centre. */
 static void set_centre(const trip_splat *s, trip_cpu_splat *out)
 {
     trip_cpu_set_conic(s, out);
@@ -52,10 +52,10 @@ static void set_centre(const trip_splat *s, trip_cpu_splat *out)
     out->l2 = (float)-((double)out->l22 * y);
 }
 
-/* Room for the rounding of a support's bounds. */
+/* Slack for rounding in the bounds of a support. */
 #define SLACK 1e-3
 
-/* False when there are no pixels. */
+/* Returns false if no pixel lies within the bounds. */
 static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *last)
 {
     double slack = SLACK * (1 + 0.5 * (hi - lo)) + 1e-6 * fmax(fabs(lo), fabs(hi));
@@ -65,11 +65,13 @@ static bool pixels(double lo, double hi, int size, uint16_t *first, uint16_t *la
     return p.first <= p.last;
 }
 
-/* The opacity is within 4e-4 A of 1 - exp(-A (exp(-m / 2) - edge)), within 1.5e-4 A for A up to
- * 0.1, and so within 1.2e-4. Its integral over the plane, where area is in proportion to m, is
- * within 1e-6 of itself, so that many faint splats add up to nothing wrong. Found by least squares
- * over u and A together, reweighted to even out the error at each A, with that integral as a
- * condition. */
+/* The polynomial approximates the opacity 1 - exp(-A (exp(-m / 2) - edge)). Its error is at most
+ * 4e-4 A, and at most 1.5e-4 A for A up to 0.1; so it is at most 1.2e-4. The relative error of the
+ * integral over the plane, where area is proportional to m, is at most 1e-6. So the errors of many
+ * faint splats do not add up.
+ *
+ * The coefficients come from least squares over u and A together, with this integral as a
+ * condition. Reweighting evened out the error at each A. */
 const float trip_cpu_thin[TRIP_CPU_TERMS][4] = {
     { 0.159756631f, -0.168852314f, -0.0508883893f, 0.346433312f },
     { 0.0594277196f, 1.73690438f, 0.0941105708f, -2.60230803f },
@@ -102,7 +104,7 @@ static void set_opacity(const trip_cpu_view *view, double depth, int sheet, trip
     }
 }
 
-/* By X, Y and Z. */
+/* Returns a vector in the order X, Y, Z. */
 static trip_vec3 in_data_axes(const trip_cpu_view *view, double u, double v, double sheet)
 {
     double p[3];
@@ -112,11 +114,13 @@ static trip_vec3 in_data_axes(const trip_cpu_view *view, double u, double v, dou
     return trip_v3(p[0], p[1], p[2]);
 }
 
-/* The index space in which a voxel's kernel is round: the view's where spacing is even. */
+/* The index space in which a voxel's kernel is round. With even spacing it is the view's index
+ * space. */
 typedef struct splat_space {
     trip_splat_frame frame;
     trip_vec3 centre, width;
-    double ray; /* how many times as long the ray through the voxel is in it */
+    double
+        ray; /* factor of the length of the ray through the voxel, against the view's index space */
 } splat_space;
 
 static splat_space space_of(const trip_cpu_view *view, trip_vec3 voxel)
@@ -136,8 +140,8 @@ static splat_space space_of(const trip_cpu_view *view, trip_vec3 voxel)
     return s;
 }
 
-/* Of a near splat that is summed, by rays in the view's index space: their lengths in its own are
- * taken to be as much longer as that through its centre is. */
+/* Divides the forms of a near, summed splat, so that they take rays in the view's index space. `by`
+ * is the ray's factor at the centre of the splat; all rays of the splat use this factor. */
 static void divide_forms(trip_splat *s, double by)
 {
     for (int i = 0; i < 3; i++) {
@@ -147,9 +151,9 @@ static void divide_forms(trip_splat *s, double by)
     }
 }
 
-/* |c|^2 / sigma^2 of a near splat. Of those that lie in front as a whole, `along` serves the ray's
- * length alone: that the low-pass has made the others narrower, on the mean of the two, is made up
- * for there. */
+/* Returns |c|^2 / sigma^2 of a near splat. If the whole splat lies in front of the eye, `along`
+ * serves only for the length of the ray. The low-pass filter has scaled a and b down, on average by
+ * sqrt(wider); `along` and the result are scaled to match. */
 static double set_own_rays(const splat_space *space, trip_splat *s)
 {
     const trip_vec3 away = trip_sub(space->centre, space->frame.camera.eye);
@@ -189,7 +193,7 @@ bool trip_cpu_project_scalar(const trip_cpu_view *view, int u, int v, int sheet,
     if (!drawn || !pixels(s.x0, s.x1, camera->width, &out->x0, &out->x1) ||
         !pixels(s.y0, s.y1, camera->height, &out->y0, &out->y1))
         return false;
-    /* What is opaque anyway stays within what exponents of floats hold. */
+    /* Keeps the depth within the exponents of floats. A splat at the limit is opaque. */
     double stretch = s.affine ? 1 : view->stretch / (own ? 1 : space.ray);
     double depth = fmin(0x1p90, extinction * s.amplitude * stretch);
     out->panes = trip_cpu_panes(out, view->panes_across);

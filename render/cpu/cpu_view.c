@@ -8,8 +8,8 @@
 
 #define LOG2_E 1.44269504088896340736
 
-/* Squared length of the longest column of a matrix bounds what it can stretch from below, their sum
- * from above. */
+/* Returns an upper bound of the stretch of a matrix: the root of the sum of its squared column
+ * lengths. */
 static double max_stretch(const trip_affine *a)
 {
     double sum = 0;
@@ -19,7 +19,8 @@ static double max_stretch(const trip_affine *a)
     return sqrt(sum);
 }
 
-/* X = to_x . (voxel - eye) and so on as a function of the list's own coordinates. */
+/* Sets the coefficients of to . (voxel - eye) for the list's coordinates: u, v, sheet and a
+ * constant. */
 static void set_along(double out[4], const trip_cpu_view *view, trip_vec3 to)
 {
     const trip_camera *camera = &view->splat.camera;
@@ -29,7 +30,7 @@ static void set_along(double out[4], const trip_cpu_view *view, trip_vec3 to)
     out[3] = -trip_dot(to, camera->eye);
 }
 
-/* |a + x b + y c|^2, as ray2 in trip_cpu_view. */
+/* Sets the coefficients of |a + x b + y c|^2 in the order of trip_cpu_view.ray2. */
 static void set_form(float out[6], trip_vec3 a, trip_vec3 b, trip_vec3 c)
 {
     out[0] = (float)trip_dot(a, a);
@@ -53,7 +54,7 @@ static void set_forms(trip_cpu_view *view)
              trip_scale(trip_affine_vector(world, ry), unit));
 }
 
-/* Tables of G and stretch where they vary, and always in the rarer ways of blending splats. */
+/* Chooses the tables of G and stretch. The rarer ways of blending always use both tables. */
 static void set_rays(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
@@ -71,7 +72,7 @@ static void set_rays(trip_cpu_view *view)
         view->rays = TRIP_CPU_PERSPECTIVE;
 }
 
-/* How much longer than one of mean size a voxel may be. */
+/* Returns the length of the longest voxel, divided by the mean length. */
 static double widest(const trip_cpu_view *view)
 {
     return view->coordinates ? view->coordinates->widest : 1;
@@ -90,7 +91,8 @@ static void set_limits(trip_cpu_view *view)
     view->panes_across = (camera->width + TRIP_CPU_PANE - 1) / TRIP_CPU_PANE;
 }
 
-/* Every splat's footprint in a parallel view: that of any voxel in front of the eye. */
+/* Sets the footprint of a parallel view. All splats share the footprint of a voxel in front of the
+ * eye. */
 static void set_parallel(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
@@ -137,7 +139,7 @@ void trip_cpu_view_set_table(trip_cpu_view *view, const trip_tf_entry *table, tr
         set_byte_rows(view);
 }
 
-/* `code_bytes`: of the codes that the view's voxels have. */
+/* `code_bytes` is the size of the voxels' codes. */
 static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_camera *camera,
                       int axis, unsigned code_bytes, bool front_to_back)
 {

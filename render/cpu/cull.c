@@ -1,12 +1,13 @@
 #include "cpu/cull.h"
 
-/* The fewest voxels whose region is worth a test, which costs about as much as so many splats. */
+/* Minimum number of voxels for a test of regions. The test costs about as much as this many splats.
+ */
 enum { FEWEST = 16 };
 
-/* Squares of a word of a block are those of a region. */
+/* One word of a block's squares covers one region. */
 static_assert(TRIP_CPU_REGION_SQUARES == 64 && TRIP_CPU_SQUARE == 8, "as in a block");
 
-/* Which squares of a region of the run's tile of the sheet may be visible. */
+/* Returns the squares that may be visible in a region of the run's tile, as a mask. */
 static uint64_t visible_squares(const trip_cpu_culling *c, const trip_run *run, unsigned word)
 {
     trip_cpu_region where;

@@ -1,20 +1,20 @@
-/* Occlusion culling of the voxels of a batch's runs: squares all of whose pixels are saturated are
- * left out. Any thread may call it while others blend. */
+/* Occlusion culling of the runs of a batch. Leaves out a square if all its pixels are saturated.
+ * Any thread may call it while others blend. */
 #ifndef TRIP_CPU_CULL_H
 #define TRIP_CPU_CULL_H
 
 #include "cpu/occlusion.h"
 #include "cpu/squares.h"
 
-/* What a thread culls by. */
+/* The inputs of one thread's culling. */
 typedef struct trip_cpu_culling {
     const trip_cpu_kernels *kernels;
-    const trip_cpu_view *view; /* of the runs' list */
+    const trip_cpu_view *view; /* view of the runs' list */
     const trip_cpu_mask *mask;
-    trip_cpu_lanes *lanes; /* to work in */
+    trip_cpu_lanes *lanes; /* scratch of the thread */
 } trip_cpu_culling;
 
-/* Leaves in `part` only squares that may be visible, and counts their voxels. */
+/* Removes squares from `part` that cannot be visible, and updates its voxel count. */
 void trip_cpu_cull(const trip_cpu_culling *culling, trip_cpu_part *part);
 
 #endif

@@ -1,11 +1,12 @@
-/* Arrays that lie one behind the other in one piece of memory. */
+/* Lays out several arrays in one piece of memory. */
 #ifndef TRIP_CPU_LAYOUT_H
 #define TRIP_CPU_LAYOUT_H
 
 #include <stddef.h>
 
-/* The next array, aligned for vectors; *at goes on behind it. NULL where `memory` is, which counts
- * the bytes alone. */
+/* Returns the next array, at offset *at of `memory`, and moves *at behind it. The size is rounded
+ * up to 64 bytes, so that each array is aligned for vectors. If `memory` is NULL, returns NULL and
+ * only counts bytes. */
 static inline void *trip_cpu_take_array(char *memory, size_t *at, size_t bytes)
 {
     void *array = memory ? memory + *at : NULL;

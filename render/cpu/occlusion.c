@@ -3,10 +3,11 @@
 #include "brick_box.h"
 #include "pixels.h"
 
-/* With b the half-size of a support at its centre's G, and |r(p)| within |p - c| |rx| of |r_c|, the
- * support reaches b / (1 - b |rx| / |r_c|): that is worked out where it is less than 1.3 b, and
- * where kernels are at least eight radii of depth away. The splats are computed in floats, which is
- * what the slack is for. */
+/* Let b be the half-size of a support at the G of its centre. |r(p)| differs from |r_c| by at most
+ * |p - c| |rx|. So the support reaches at most b / (1 - b |rx| / |r_c|).
+ *
+ * The test uses this bound only if it is below 1.3 b and the kernels lie at least eight radii of
+ * depth away. The kernels compute splats in floats; SLACK_PX covers their rounding. */
 #define SLACK_PX 0.05
 #define NEAREST_RADII 8.0
 #define MAX_GROWTH 0.23
@@ -28,15 +29,16 @@ static trip_pixels pixels(double middle, double reach, int size)
     return trip_pixels_within(middle - reach - SLACK_PX, middle + reach + SLACK_PX, size);
 }
 
-/* Of the splats of a box: where the centre of the middle one lies, how far from there the others'
- * centres, and how far their supports reach from their centres at the centres' G. */
+/* Extent of a box's splats along one screen axis, in pixels. `middle` is the centre of the middle
+ * splat. `centres` bounds the distance of the other centres from `middle`. `support` bounds the
+ * half-size of a support at the G of its centre. */
 typedef struct projection {
     double middle, centres, support;
 } projection;
 
-/* Of x = X / z over a box, given 1 / z at its middle and at its nearest point: with x0 that of the
- * middle, x - x0 = (X - x0 z) / z, and the numerator is 0 at the middle. S is sigma^2 times the
- * square of x's gradient (X - x z)' / z. */
+/* Bounds x = X / z over a box, given 1 / z at its middle and at its nearest point. With x0 at the
+ * middle, x - x0 = (X - x0 z) / z; the numerator is 0 at the middle. The variance of a footprint is
+ * sigma^2 times the square of the gradient (X - x z)' / z of x. */
 static projection projection_of(const trip_cpu_view *view, const double along_x[4],
                                 const double along_z[4], const trip_cpu_box *box, double inverse,
                                 double inverse_nearest)
@@ -58,7 +60,8 @@ static uint64_t bits_of(int left, int right, int top, int bottom)
     return columns & UINT64_MAX << 8 * top & UINT64_MAX >> (56 - 8 * bottom);
 }
 
-/* What of the texels [first, last] lies in a pane, counted from its first. */
+/* Returns the part of the texels [first, last] inside a pane, relative to the pane's first texel.
+ */
 static trip_pixels in_pane(trip_pixels texels, int pane)
 {
     int first = texels.first - pane * TEXELS, last = texels.last - pane * TEXELS;
@@ -89,16 +92,16 @@ static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px
     return open ? TRIP_CPU_VISIBLE : TRIP_CPU_OCCLUDED;
 }
 
-/* |rx| / |r_c|, or |ry| where that is more, is at most this. */
+/* Returns an upper bound of |rx| / |r_c| and |ry| / |r_c|. */
 static double max_turn(const trip_cpu_view *view)
 {
     return sqrt(fmax(view->splat.rxrx, view->splat.ryry)) * view->forward_length;
 }
 
-/* A box on the screen. */
+/* The outline of a box on the screen. */
 typedef struct outline {
     projection x, y;
-    double grown; /* supports, at most */
+    double grown; /* maximum growth of supports, a factor */
     double z, inverse_nearest;
 } outline;
 
@@ -108,7 +111,8 @@ static const double *depth_along(const trip_cpu_view *view)
     return view->splat.camera.ortho ? none : view->along_z;
 }
 
-/* TRIP_CPU_VISIBLE, or what is to be said of the box where nothing can be worked out. */
+/* Computes the outline and returns TRIP_CPU_VISIBLE. If no outline can be computed, returns the
+ * result for the whole box instead. */
 static trip_cpu_occlusion find_outline(const trip_cpu_view *view, const trip_cpu_box *box,
                                        outline *out)
 {
@@ -147,8 +151,8 @@ trip_cpu_occlusion trip_cpu_box_occlusion(const trip_cpu_view *view, const trip_
                         pixels(o.y.middle, o.y.centres + o.y.support * o.grown, camera->height));
 }
 
-/* With x that of a square's own middle, x - x0 is at most `centres` of the region, by which a slope
- * (X - x z)' may differ. */
+/* Makes the line of a region. x at a square's middle differs from x0 by at most the region's
+ * `centres`. This bounds the change of the slope (X - x z)' between squares. */
 static trip_cpu_line line_of(const double along[4], const double along_z[4], const projection *s,
                              const outline *o)
 {

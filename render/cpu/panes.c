@@ -24,7 +24,7 @@ static size_t lay_out(trip_cpu *r, char *memory)
     r->layers = trip_cpu_take_array(memory, &at, panes);
     r->mask.panes = trip_cpu_take_array(memory, &at, (panes + 1) * sizeof *r->mask.panes);
     r->portions = trip_cpu_take_array(memory, &at, 4 * panes * sizeof *r->portions);
-    /* Splats are also counted for the pane beyond the last, diagonally. */
+    /* The sort also counts splats in the pane diagonally behind the last one. */
     for (unsigned i = 0; i < trip_cpu_pool_threads(r->pool); i++)
         r->workers[i].sorting.counts = trip_cpu_take_array(
             memory, &at, (panes + r->mask.grid.across + 2) * sizeof *r->workers[i].sorting.counts);
@@ -53,7 +53,7 @@ int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
     r->has_open_sheets = sums;
     size_t bytes = lay_out(r, NULL);
     char *memory = trip_budget_take(r->budget, bytes);
-    if (!memory && r->sheets) { /* which took what the picture before left */
+    if (!memory && r->sheets) { /* the sheets may hold memory from the last picture */
         trip_cpu_sheets_destroy(r->sheets);
         r->sheets = NULL;
         memory = trip_budget_take(r->budget, bytes);
@@ -72,7 +72,7 @@ int trip_cpu_fit_panes(trip_cpu *r, int width, int height)
 
 /* ---- frames and layers ---- */
 
-/* The layers of an axis that rays within the bounds may take part in. */
+/* Returns the layers of an axis that rays within the bounds may belong to. */
 static unsigned layers_of_axis(const trip_frame *frame, const trip_ray_bounds *bounds, int axis)
 {
     unsigned layers = 0;
@@ -84,8 +84,8 @@ static unsigned layers_of_axis(const trip_frame *frame, const trip_ray_bounds *b
     return layers;
 }
 
-/* The layers, a bit each, that may have weight in the pane at (x, y). Where there is but one, its
- * weight is 1 all over the pane. */
+/* Returns the layers, one bit each, that may have weight in the pane at (x, y). If there is only
+ * one, its weight is 1 in the whole pane. */
 static uint8_t layers_of_pane(const trip_frame *frame, int x, int y)
 {
     const double from[2] = { x, y }, to[2] = { x + TRIP_CPU_PANE, y + TRIP_CPU_PANE };
@@ -133,7 +133,7 @@ static void blend_some(void *user, const trip_cpu_chunk *chunk, const trip_cpu_s
                                trip_cpu_depths_from(c->of->blending, chunk->splat), order, count);
 }
 
-/* The mask's bits of some quarters of a pane. */
+/* Returns the mask's bits for some quarters of a pane. */
 static uint64_t bits_of_quarters(unsigned quarters)
 {
     static const uint64_t quarter = 0x0f0f0f0f;
@@ -169,10 +169,10 @@ static int max_first(const void *a, const void *b)
     return p->splats < q->splats ? 1 : p->splats > q->splats ? -1 : 0;
 }
 
-/* Panes with work, those with most of it first. One that holds so much that a thread would still be
- * at it when the others are done, with the next splats to project too, is given out in quarters,
- * though each goes through all of its splats; not when it is new, since then one thread has to
- * clear it. */
+/* Lists the panes with work, largest first. A pane with more than twice a thread's share of the
+ * splats would keep one thread busy after all others had finished. The function splits such a pane
+ * into quarters, although each quarter goes through all splats of the pane. A new pane is not
+ * split, because one thread has to clear it. */
 static void make_portions(trip_cpu *r, const trip_cpu_buffer *f)
 {
     uint64_t all = 0;
@@ -222,20 +222,20 @@ static float *pane_sum(const trip_cpu *r, uint32_t pane)
     return r->sums + pane * trip_cpu_pane_floats(r);
 }
 
-/* What is alone in its pane stays as it is. */
+/* Returns whether the pane's sum needs the layer. The only layer of a pane needs no sum. */
 static bool is_to_merge(const trip_cpu *r, uint32_t pane)
 {
     return r->states[pane] & TRIP_CPU_PANE_BEGUN && !trip_cpu_is_alone(r, pane);
 }
 
-/* Of what is alone, whether it has sheets that the layer's view is to end: with the layer. */
+/* Returns whether the pane's only layer has an open sheet to composite at the layer's end. */
 static bool is_to_end(const trip_cpu *r, uint32_t pane)
 {
     return r->open_sheets && r->states[pane] & TRIP_CPU_PANE_BEGUN && trip_cpu_is_alone(r, pane) &&
            is_of_layer(r, pane);
 }
 
-/* The layer's pixels, with the open sheet. */
+/* Returns the layer's pixels with the open sheet composited. */
 static const float *layer_of_pane(const trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
     const float *pixels = trip_cpu_pane_pixels(r, pane);
@@ -260,7 +260,7 @@ static void end_sheets(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
     r->kernels->sheet_clear(trip_cpu_pane_sheet(r, pane));
 }
 
-/* The sum with the layer being drawn in it. */
+/* Returns the pane's sum with the current layer merged in. The pane stays unchanged. */
 static const float *sum_so_far(const trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
     if (!is_to_merge(r, pane))
@@ -273,7 +273,7 @@ static const float *sum_so_far(const trip_cpu *r, trip_cpu_worker *w, uint32_t p
     return w->sum;
 }
 
-/* The frame's pane stays as it is. */
+/* Writes the pane to the picture. The pane stays unchanged. */
 static void finish_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
 {
     trip_cpu_content content = TRIP_CPU_NOTHING;
@@ -289,7 +289,7 @@ static void finish_pane(trip_cpu *r, trip_cpu_worker *w, uint32_t pane)
                             pixels, r->rgba, r->depth);
 }
 
-/* Tasks of whole rows of panes. */
+/* Each task handles one row of panes. */
 static void merge_row(void *context, unsigned task, unsigned thread)
 {
     trip_cpu *r = context;

@@ -1,33 +1,33 @@
-/* The panes of a frame: their memory, the blending of splat buffers into them, and the merge
- * of their layers. Called by the renderer's thread. */
+/* Memory of a frame's panes, blending of splat buffers into panes, and the merge of layers. The
+ * panes belong to the renderer; its thread calls all functions. */
 #ifndef TRIP_CPU_PANES_H
 #define TRIP_CPU_PANES_H
 
 #include "cpu/cpu_state.h"
 
-/* Memory for the frame's panes, and for their lists in the splat buffers. */
+/* Takes memory for the frame's panes. Fails with TRIP_ERROR if the budget has too little left. */
 int trip_cpu_fit_panes(trip_cpu *r, int width, int height);
 void trip_cpu_release_panes(trip_cpu *r);
 
-/* Every pane of a frame is empty. */
+/* Empties all panes at the start of a frame. */
 void trip_cpu_begin_panes(trip_cpu *r);
-/* Every pane of the layer that is the view's is open where that may have weight. */
+/* Opens every pane in which the current layer may have weight; marks the others as saturated. */
 void trip_cpu_begin_pane_layer(trip_cpu *r);
 
-/* Depths of a buffer's splats from one on; NULL where it has none. */
+/* Returns the depths of the buffer's splats from `splat` on, or NULL if the buffer has none. */
 static inline float *trip_cpu_depths_from(const trip_cpu_buffer *f, uint32_t splat)
 {
     return f->depths ? f->depths + splat : NULL;
 }
 
-/* Hands what is projected to the blending threads, once they are done with what came before. */
+/* Starts blending the filled buffer, after waiting for the previous one. */
 void trip_cpu_blend_filled(trip_cpu *r);
-/* The same, and ends with everything drawn so far in the pixels. */
+/* Blends the filled buffer and waits until all splats so far are in the pixels. */
 void trip_cpu_finish_blending(trip_cpu *r);
 
-/* Adds the layer, all of which was handed in, to the sum of layers. */
+/* Adds the current layer, with all its batches drawn, to the sum of layers. */
 void trip_cpu_merge_layer(trip_cpu *r);
-/* The picture of what is drawn so far; `depth` NULL without depth. */
+/* Writes the picture of everything drawn so far. `depth` may be NULL. */
 void trip_cpu_finish_picture(trip_cpu *r, float *rgba, float *depth);
 
 #endif

@@ -14,26 +14,27 @@
 
 enum { SLOTS = 2, MAX_THREADS = 256 };
 
-/* How often a thread looks for work before it sleeps: 10 to 50 microseconds with the processor to
- * itself, then some 200 in which any other thread that wants it goes first. Between frames of a
- * small data set planning takes nearly as long. */
+/* How often a thread looks for work before it sleeps. LOOKS take 10 to 50 microseconds of busy
+ * waiting. YIELDS take about 200 more and let other threads run first. Planning between two frames
+ * of a small data set takes nearly as long. */
 enum { LOOKS = 1000, YIELDS = 1500 };
 
-/* A job's tickets in one word, so that taking a task and knowing that its job is still the same are
- * one step: tasks, tasks given out, and a number that differs from one job in the slot to the next.
- */
+/* One word holds a job's tickets: the number of tasks, the number of tasks given out, and a number
+ * that differs between consecutive jobs of a slot. So one atomic step takes a task and checks that
+ * the job is still the same. */
 #define TICKET_BITS 24
 #define TICKET_MASK ((UINT64_C(1) << TICKET_BITS) - 1)
 #define NUMBER_ONE (UINT64_C(1) << 2 * TICKET_BITS)
 
 typedef struct slot {
-    _Atomic uint64_t tickets; /* tasks << TICKET_BITS | given out; release by the starter */
-    /* Written before `tickets` is released, read by threads that took a ticket. */
+    _Atomic uint64_t tickets; /* tasks << TICKET_BITS | given out; the starter releases it */
+    /* The starter writes these fields before it releases `tickets`. A thread reads them after
+     * taking a ticket. */
     void (*run)(void *context, unsigned task, unsigned thread);
     void *context;
-    trip_scope *scope;         /* of the starter */
-    _Atomic uint32_t finished; /* each task's release, the waiter's acquire */
-    bool taken;                /* the starter's */
+    trip_scope *scope;         /* scope of the starter */
+    _Atomic uint32_t finished; /* each task releases it, the waiter acquires it */
+    bool taken;                /* used by the starter only */
 } slot;
 
 struct trip_cpu_pool {
@@ -41,9 +42,9 @@ struct trip_cpu_pool {
     pthread_t *workers;
     unsigned started, looks;
     slot slots[SLOTS];
-    _Atomic unsigned oldest; /* slot to look at first */
+    _Atomic unsigned oldest; /* the slot that threads look at first */
     /* Words that threads sleep on. */
-    _Atomic uint32_t version; /* counts starts: a thread that has seen them all may sleep */
+    _Atomic uint32_t version; /* number of starts; a thread sleeps only if it has seen all */
     _Atomic uint32_t sleepers;
     _Atomic bool waiting; /* the starter sleeps */
     _Atomic bool stop;
@@ -54,7 +55,7 @@ typedef struct worker {
     unsigned thread;
 } worker;
 
-/* Sleeps if the word is still `seen`: until woken, or a little less. */
+/* Sleeps until woken if the word still equals `seen`. May return early. */
 static void sleep_on(_Atomic uint32_t *word, uint32_t seen)
 {
     syscall(SYS_futex, word, FUTEX_WAIT_PRIVATE, seen, NULL, NULL, 0);
@@ -79,7 +80,7 @@ static unsigned tasks_of(uint64_t tickets)
     return (unsigned)(tickets >> TICKET_BITS & TICKET_MASK);
 }
 
-/* Runs a task of a slot's job, if it has one left. */
+/* Runs one task of the slot's job. Returns false if none is left. */
 static bool run_task(trip_cpu_pool *pool, slot *s, unsigned thread)
 {
     uint64_t tickets = atomic_load_explicit(&s->tickets, memory_order_acquire);
@@ -105,7 +106,7 @@ static bool run_any(trip_cpu_pool *pool, unsigned thread)
     return false;
 }
 
-/* Between two looks, of which `looks` were in vain. */
+/* Passes the time between two looks for work, after `looks` looks without success. */
 static void pass_time(unsigned looks)
 {
     if (looks < LOOKS)
@@ -114,8 +115,8 @@ static void pass_time(unsigned looks)
         sched_yield();
 }
 
-/* Until something is started after `seen`. Who wakes wakes the next, so that the starter does not
- * have to wake them all. */
+/* Waits until a job starts after version `seen`. Each woken thread wakes the next one, so the
+ * starter wakes only one. */
 static void await_start(trip_cpu_pool *pool, uint32_t seen)
 {
     for (unsigned i = 0; i < pool->looks; i++) {
@@ -144,7 +145,7 @@ static void *work(void *argument)
     }
 }
 
-/* Wakes all threads for something new. */
+/* Announces new work and wakes one sleeping thread. await_start() wakes the others. */
 static void announce(trip_cpu_pool *pool)
 {
     atomic_fetch_add(&pool->version, 1);
@@ -191,7 +192,7 @@ int trip_cpu_pool_create(trip_cpu_pool **out, unsigned threads)
             threads = pool->threads;
             trip_cpu_pool_destroy(pool);
             return trip_fail(TRIP_ERROR, "render", "threads",
-                             "cannot start %u threads; take fewer with --threads", threads);
+                             "cannot start %u threads; use a smaller --threads", threads);
         }
     }
     *out = pool;
@@ -234,7 +235,7 @@ void trip_cpu_pool_start(trip_cpu_pool *pool, trip_cpu_job *job)
     announce(pool);
 }
 
-/* Until every task of a slot's job is done. */
+/* Waits until all tasks of the slot's job are done. */
 static void await_finish(trip_cpu_pool *pool, slot *s, uint32_t tasks)
 {
     uint32_t finished;
@@ -256,7 +257,7 @@ void trip_cpu_pool_wait(trip_cpu_pool *pool, trip_cpu_job *job)
     slot *s = &pool->slots[job->slot];
     while (run_task(pool, s, 0))
         continue;
-    /* The last tasks run elsewhere: what the other job has is done meanwhile. */
+    /* While other threads run the last tasks, this thread runs tasks of the other job. */
     while (atomic_load_explicit(&s->finished, memory_order_acquire) != job->tasks &&
            run_any(pool, 0))
         continue;

@@ -5,14 +5,14 @@
 #include "cpu/layout.h"
 #include "report.h"
 
-/* Room for a splat's places in the panes' orders, on average; chunks whose splats are so wide that
- * they need more are left unsorted. */
+/* ORDERS_PER_SPLAT is the average room for a splat's positions in the panes' orders. A chunk that
+ * needs more room stays unsorted. */
 enum { ORDERS_PER_SPLAT = 12, SPLATS_PER_BUCKET = 4, SMALLEST_CHUNK = 64 };
 
-/* Places that are written together. */
+/* Number of positions that put() writes at a time. */
 enum { AT_A_TIME = 16 };
 
-/* Lays the arrays out in `memory`, or only counts when it is NULL. */
+/* Lays out the arrays in `memory` and returns the number of bytes. NULL only counts. */
 static size_t lay_out(trip_cpu_buffer *f, char *memory)
 {
     size_t at = 0;
@@ -35,7 +35,7 @@ int trip_cpu_buffer_create(trip_cpu_buffer *f, uint32_t capacity, trip_budget *b
     if (!memory) {
         f->bytes = 0;
         return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                         "its buffers do not fit the memory given; raise --memory");
+                         "splat buffers do not fit the memory given; raise --memory");
     }
     lay_out(f, memory);
     return 0;
@@ -119,9 +119,9 @@ uint32_t trip_cpu_buffer_cut(trip_cpu_buffer *f)
     return first;
 }
 
-/* A counting sort goes over what it sorts twice, to count and to place, and a chunk's splats are
- * many: so they are read once, and both passes go over series of them. Splats come in the order
- * of squares of voxels, five to ten to a series. */
+/* Finds the series of a chunk's splats. A counting sort passes over its input twice, to count and
+ * to place. Both passes go over the series, so memory is read only once for the many splats. Splats
+ * come in the order of squares of voxels, so a series has five to ten splats. */
 static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_series *series)
 {
     uint32_t found = 0, before = splats[0].panes;
@@ -136,11 +136,11 @@ static uint32_t find_series(const trip_cpu_splat *splats, uint32_t n, trip_cpu_s
 }
 
 typedef struct span {
-    uint32_t first, last; /* panes counted, inclusive */
+    uint32_t first, last; /* range of counted panes, inclusive */
     uint64_t positions;
 } span;
 
-/* Panes of a splat that lies in many. */
+/* The panes of a splat with TRIP_CPU_PANES_MORE. */
 typedef struct reach {
     uint32_t first, across, down;
 } reach;
@@ -163,7 +163,7 @@ static void count_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *c
     s->positions += (uint64_t)r.across * r.down;
 }
 
-/* Whether it also lies in the pane to the right, and in the one below: 0 or 1. */
+/* right_of() and below_of() return 1 if the splat also lies in the pane to the right, or below. */
 static uint32_t right_of(uint32_t panes)
 {
     return panes >> TRIP_CPU_PANES_RIGHT_SHIFT & 1;
@@ -174,8 +174,8 @@ static uint32_t below_of(uint32_t panes)
     return panes >> TRIP_CPU_PANES_BELOW_SHIFT & 1;
 }
 
-/* Few lie in more than 2 x 2, so four counts without a branch are cheaper than a loop whose length
- * the processor cannot guess. */
+/* Counts the splats of each pane. Few splats lie in more than 2 x 2 panes. So four counts without a
+ * branch are faster than a loop with an unpredictable length. */
 static span count(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
                   uint32_t across, uint32_t *counts)
 {
@@ -213,7 +213,7 @@ static void place_wide(const trip_cpu_splat *splat, uint32_t across, uint32_t *n
             order[next[r.first + y * across + x]++] = index;
 }
 
-/* Consecutive splats, in vectors that every processor of the target has. */
+/* Consecutive splat numbers, in vectors of a size that all target processors support. */
 typedef uint16_t eight __attribute__((vector_size(AT_A_TIME / 2 * sizeof(uint16_t))));
 typedef struct positions {
     eight low, high;
@@ -226,7 +226,8 @@ static inline positions positions_from(uint32_t first)
     return (positions){ low, low + AT_A_TIME / 2 };
 }
 
-/* `count` splats from `first` on to the next places of a pane; more may be written behind them. */
+/* Writes `count` splat numbers from `first` on to a pane's next positions. May overwrite positions
+ * behind them. */
 static inline void put(uint16_t *order, uint32_t *next, positions first, uint32_t count)
 {
     memcpy(order + *next, &first.low, sizeof first.low);
@@ -234,7 +235,7 @@ static inline void put(uint16_t *order, uint32_t *next, positions first, uint32_
     *next += count;
 }
 
-/* The next `count` places, of all panes that the splats lie in. */
+/* Writes the splat numbers to the next positions of all panes of the series. */
 static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uint32_t panes,
                            positions first, uint32_t count)
 {
@@ -249,7 +250,7 @@ static inline void put_all(uint16_t *order, uint32_t *next, uint32_t across, uin
         put(order, c + across + 1, first, count);
 }
 
-/* `next` holds where each pane's next place is. */
+/* Places all splats. `next` holds the next position of each pane. */
 static void position(const trip_cpu_splat *splats, const trip_cpu_series *series, uint32_t n,
                      uint32_t across, uint32_t *next, uint16_t *order)
 {
@@ -268,8 +269,8 @@ static void position(const trip_cpu_splat *splats, const trip_cpu_series *series
     }
 }
 
-/* Turns counts into places and makes a bucket of every pane that has some. Behind each is room for
- * what put() writes too much. */
+/* Turns counts into first positions and makes a bucket for each pane with splats. Each bucket has
+ * spare room at its end for the excess that put() writes. */
 static uint32_t make_buckets(trip_cpu_buffer *f, const trip_cpu_chunk *chunk, const span *s,
                              uint32_t position_at, uint32_t *counts)
 {

@@ -1,22 +1,23 @@
-/* The squares of a run's block one after the other, and a run's part of a chunk. Plain values;
- * blocks are those of a batch, checked. */
+/* Walks over the squares of a run's block, and selects a run's part of a chunk. Plain values
+ * without an owner; any thread may use its own. Blocks come from a batch, so they are already
+ * checked. */
 #ifndef TRIP_CPU_SQUARES_H
 #define TRIP_CPU_SQUARES_H
 
 #include "block.h"
 #include "reader.h"
 
-/* Walks over the squares that are present, in draw order. */
+/* A walk over the present squares of a block, in draw order. */
 typedef struct trip_cpu_walk {
     const trip_block *block;
     bool reversed;
     unsigned word;
-    uint64_t rest; /* of the word's bits */
-    uint32_t left; /* squares */
-    /* The square at hand. */
+    uint64_t rest; /* remaining bits of the word */
+    uint32_t left; /* remaining squares */
+    /* The current square. */
     unsigned number; /* Morton number in the tile */
     uint64_t mask;
-    uint32_t first, count; /* records of the run */
+    uint32_t first, count; /* range of records in the run */
 } trip_cpu_walk;
 
 static inline trip_cpu_walk trip_cpu_walk_begin(const trip_block *b, bool reversed)
@@ -30,7 +31,7 @@ static inline trip_cpu_walk trip_cpu_walk_begin(const trip_block *b, bool revers
                             .first = reversed ? b->count : 0 };
 }
 
-/* False at the end. */
+/* Moves to the next square. Returns false at the end. */
 static inline bool trip_cpu_walk_next(trip_cpu_walk *w)
 {
     const trip_block *b = w->block;
@@ -50,7 +51,7 @@ static inline bool trip_cpu_walk_next(trip_cpu_walk *w)
     return true;
 }
 
-/* Where a square lies in its tile, in squares, by its Morton number. */
+/* Return a square's position in its tile, in squares, from its Morton number. */
 static inline int trip_cpu_square_u(unsigned number)
 {
     return (int)trip_morton_even(number);
@@ -61,10 +62,10 @@ static inline int trip_cpu_square_v(unsigned number)
     return trip_cpu_square_u(number >> 1);
 }
 
-/* What of a run is in a chunk: some of its squares, a bit each by Morton number. */
+/* The part of a run that is in a chunk. `squares` has one bit for each square, by Morton number. */
 typedef struct trip_cpu_part {
     const trip_run *run;
-    trip_block block; /* the run's */
+    trip_block block;
     uint64_t squares[TRIP_BLOCK_PRESENT_MAX];
     uint32_t voxels;
 } trip_cpu_part;
@@ -74,8 +75,8 @@ static inline bool trip_cpu_part_has(const trip_cpu_part *p, unsigned square)
     return p->squares[square / 64] >> square % 64 & 1;
 }
 
-/* All squares of a run after the first `skip` in draw order, as long as their voxels are at most
- * `most`. */
+/* Makes the part with the squares of a run after the first `skip`, in draw order, up to `max`
+ * voxels. */
 void trip_cpu_part_make(trip_cpu_part *part, const trip_run *run, const trip_block *block,
                         bool reversed, uint32_t skip, uint32_t max);
 

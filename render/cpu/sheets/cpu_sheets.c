@@ -12,10 +12,10 @@
 #include "report.h"
 #include "sheet.h"
 
-/* Of the memory that is left, what the frame goes on with besides. */
+/* One part in so many of the free memory stays free for the rest of the frame. */
 enum { LEFT_OVER = 4, LEFT_OVER_OF_WINDOWS = 16 };
 
-/* What a processor's last cache holds at least. */
+/* Minimum size of a processor's last-level cache. */
 enum { CACHE_BYTES = 8 << 20 };
 
 static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
@@ -23,7 +23,7 @@ static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
     return &s->store.sheets[s->held[i]];
 }
 
-/* For the function's integrals. */
+/* Reports that the transfer function's integrals do not fit. */
 static int no_memory(const trip_budget *budget)
 {
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
@@ -32,11 +32,11 @@ static int no_memory(const trip_budget *budget)
                      trip_cpu_memory_mib(budget, trip_cpu_tf_bytes()));
 }
 
-/* What is set aside holds all that the index says. */
+/* Reports that the sheets need more memory than the index of the data set called for. */
 static int too_many_voxels(void)
 {
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
-                     "sheets have more voxels than the index says");
+                     "the sheets hold more voxels than the index says; brick the volume again");
 }
 
 /* ---- creation, frames ---- */
@@ -89,7 +89,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
 
 /* ---- layers and passes ---- */
 
-/* Begins empty: first > last. */
+/* Widens *b to the selected bricks. first > last stands for an empty rectangle. */
 static void add_bricks(trip_cpu_rasters *b, const trip_selection *selection)
 {
     unsigned tile_log2 = selection->data->header.tile_log2;
@@ -122,15 +122,17 @@ static uint64_t rasters_in(const trip_cpu_rasters *all)
     return (uint64_t)((all->last[0] - all->first[0] + 1) * (all->last[1] - all->first[1] + 1));
 }
 
-/* Sheets in a row when an interval is drawn: one before it, it, what it depends on behind it, and
- * one that has begun. */
+/* Returns how many consecutive sheets are in memory while an interval is drawn. They are the sheet
+ * before it, its own two, the sheets behind it on which it depends, and one sheet that has begun.
+ */
 static int in_a_row(const trip_frame *frame)
 {
     static_assert(4 + TRIP_SHEET_REACH_MAX - 1 == (int)TRIP_CPU_AT_HAND_MAX, "need.h");
     return 4 + trip_cpu_sheets_about(frame);
 }
 
-/* As many sheets at a time as fit beside twice the rasters that are needed. */
+/* Makes room for as many sheets as fit beside twice the needed number of rasters. Returns false if
+ * there is too little room. */
 static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const trip_cpu_need *need,
                        uint64_t room)
 {
@@ -156,14 +158,14 @@ int trip_cpu_sheets_at_hand(const trip_frame *frame)
     return 2 + 2 * trip_cpu_sheets_about(frame);
 }
 
-/* With kernels of 64 voxels. */
+/* Returns whether interpolation reads 64 voxels. */
 static bool is_wide(const trip_cpu_sheets *s)
 {
     return s->of->frame->settings->kernel != TRIP_KERNEL_LINEAR;
 }
 
-/* How far, in rasters, rays go along a sheet to the next; sheets are at most twice as far apart as
- * a voxel is wide. */
+/* Returns how far rays move along u or v between two sheets, in rasters. The distance of two sheets
+ * is at most twice the width of a voxel. */
 static int64_t reach_of(const trip_frame *frame)
 {
     const trip_coordinates *c = &frame->data->coordinates;
@@ -173,7 +175,7 @@ static int64_t reach_of(const trip_frame *frame)
     return ((int64_t)voxels + 4) / TRIP_CPU_RASTER + 1;
 }
 
-/* What the smallest windows of any layer of the frame take. */
+/* Finds the bytes that the smallest windows need in any layer of the frame. */
 static int find_min(const trip_cpu_sheets *s, uint64_t *bytes)
 {
     const trip_frame *frame = s->of->frame;
@@ -202,14 +204,14 @@ static int refuse(const trip_cpu_sheets *s, const trip_cpu_rasters *all)
         return status;
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                      "sheets of %lld x %lld voxels do not fit the memory given; raise --memory to "
-                     "%llu MiB, or draw splats: --classify pre",
+                     "%llu MiB or use --classify pre",
                      (long long)(all->last[0] - all->first[0] + 1) * TRIP_CPU_RASTER,
                      (long long)(all->last[1] - all->first[1] + 1) * TRIP_CPU_RASTER,
                      trip_cpu_memory_mib(s->store.budget, needed / (LEFT_OVER_OF_WINDOWS - 1) *
                                                               LEFT_OVER_OF_WINDOWS));
 }
 
-/* Whole sheets where they fit for certain, else windows of them. */
+/* Makes room for whole sheets if they certainly fit, otherwise for windows. */
 static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
 {
     const trip_cpu_rasters all = rasters_of_layer(layer);
@@ -266,7 +268,8 @@ bool trip_cpu_sheets_at_once(const trip_cpu_sheets *s)
     return s->view.coordinates || is_wide(s);
 }
 
-/* Of complete sheets: ranges, and what may show between them. */
+/* Finds the ranges of the complete sheets, and the squares and cells that may be visible between
+ * them. */
 static void find_visible(trip_cpu_sheets *s, int complete)
 {
     trip_cpu_sheet_work work[TRIP_CPU_SHEETS_MAX] = { 0 };
@@ -289,8 +292,8 @@ static void find_visible(trip_cpu_sheets *s, int complete)
     trip_cpu_store_find_visible(&s->store, work, count, s->function);
 }
 
-/* Gradients of the first sheets to held[last], or what they will be made of; those of some may be
- * there from before. */
+/* Finds the gradients of the sheets up to held[last], or sets up making them on demand. Some sheets
+ * may already have gradients. */
 static void find_gradients(trip_cpu_sheets *s, int last, int complete)
 {
     trip_cpu_sheet_work work[TRIP_CPU_SHEETS_MAX] = { 0 };
@@ -319,7 +322,8 @@ void trip_cpu_sheets_find_gradients(trip_cpu_sheets *s, const trip_cpu_sheet_wor
     }
 }
 
-/* Those of the sheet at a number, which is next to held[i]; beyond the grid its own. */
+/* Returns the rasters of sheet `number`, a neighbour of held[i]. Beyond the grid, returns the
+ * rasters of held[i] itself. Returns NULL if the sheet is absent. */
 static const int32_t *rasters_beside(const trip_cpu_sheets *s, int i, int64_t number)
 {
     const int64_t voxels = (int64_t)s->of->frame->data->header.dims[s->axis];
@@ -331,7 +335,7 @@ static const int32_t *rasters_beside(const trip_cpu_sheets *s, int i, int64_t nu
     return NULL;
 }
 
-/* Those about held[i] and held[i + 1]. */
+/* Returns the four sheets about the segments between held[i] and held[i + 1]. */
 static trip_cpu_about about_of(const trip_cpu_sheets *s, int i)
 {
     const bool up = s->way > 0;
@@ -345,8 +349,8 @@ static trip_cpu_about about_of(const trip_cpu_sheets *s, int i)
     };
 }
 
-/* The slice lies at an index of the axis, the segment before it between held[i] and held[i + 1];
- * `first`: the slice is the group's first, before which there is none. */
+/* Adds a slice at `index` of the axis to the group. Unless it is the group's first slice, this ends
+ * a segment between held[i] and held[i + 1]. */
 static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index, int i, bool first)
 {
     const double coordinate = trip_coordinates_position(s->store.coordinates, s->axis, index);
@@ -365,14 +369,14 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index
                           trip_cpu_sheets_at_once(s) ? NULL : &at->making };
 }
 
-/* Slices of a group, which are cleared or cut once all of them have rasters. */
+/* The slices of a group. They are cleared or cut after all of them have rasters. */
 typedef struct cutting {
     trip_cpu_sheet_work work[TRIP_CPU_SLICES_MAX];
     unsigned count;
 } cutting;
 
-/* A slice at weight `part` of held[i + 1]; false when memory is full. Kernels of 64 voxels take
- * values of the sheets themselves. */
+/* Adds a slice between held[i] and held[i + 1], with weight `part` for held[i + 1]. Returns false
+ * if the pool is full. Kernels of 64 voxels read the sheets, so they need no rasters for slices. */
 static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
@@ -394,9 +398,9 @@ static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutti
     return true;
 }
 
-/* Slices between held[i] and held[i + 1], and that sheet itself; `first` of the group, which starts
- * at held[i] or where the eye is between both. False when memory is full: then none of
- * them is there. */
+/* Adds the slices between held[i] and held[i + 1], and held[i + 1] itself. The first interval of a
+ * group starts at held[i], or at the eye if it lies between both sheets. Returns false and adds
+ * nothing if the pool is full. */
 static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
@@ -449,7 +453,7 @@ static void draw_pane(void *context, unsigned task, unsigned thread)
     atomic_store_explicit(&r->mask.panes[task], open, memory_order_relaxed);
 }
 
-/* Gathers the squares that are visible in some segment; false when there are none. */
+/* Collects the squares that are visible in any segment. Returns false if there are none. */
 static bool find_some(trip_cpu_sheets *s)
 {
     size_t grid = trip_cpu_store_grid(&s->store);
@@ -472,7 +476,6 @@ static void draw_panes(trip_cpu_sheets *s)
     run_tasks(s, draw_pane, trip_cpu_pane_count(s->of));
 }
 
-/* Lets go of the first sheets. */
 static void drop_first(trip_cpu_sheets *s, int count)
 {
     for (int i = 0; i < count; i++)
@@ -516,8 +519,8 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
         trip_cpu_store_drop(&s->store, &s->store.samples_per_sheet[--cut.count]);
 }
 
-/* Draws what the complete sheets held allow: to the last one that depends on none behind them, or
- * to the last of all when none follows it. */
+/* Draws the intervals that depend only on the complete sheets. If `all`, no sheet follows and all
+ * intervals are drawn. */
 static int draw_complete(trip_cpu_sheets *s, int complete, bool all)
 {
     const int kept = trip_cpu_sheets_about(s->of->frame) - 1;
@@ -561,7 +564,8 @@ static void decode_run(void *context, unsigned task, unsigned thread)
     trip_cpu_store_decode(&s->store, s->runs[task].sheet, &block, run);
 }
 
-/* Before the store's open squares change, the batch ends, or sheets are drawn. */
+/* Decodes the collected runs. Must be called before the store's open squares change, before the
+ * batch ends, and before sheets are drawn. */
 static void decode_runs(trip_cpu_sheets *s)
 {
     run_tasks(s, clear_taken, s->taken_count);
@@ -569,7 +573,7 @@ static void decode_runs(trip_cpu_sheets *s)
     s->run_count = s->taken_count = 0;
 }
 
-/* All sheets held are complete. */
+/* Draws and drops all held sheets, which are complete. */
 static int finish_row(trip_cpu_sheets *s)
 {
     if (s->windows.used)
@@ -580,9 +584,9 @@ static int finish_row(trip_cpu_sheets *s)
     return status;
 }
 
-/* Whether the sheets held are drawn before another begins: all that there is room for, or as many
- * as stay in a processor's cache with their slices. Of large ones these are few, so that what they
- * hide of the next is known early. */
+/* Returns whether to draw the held sheets before another begins. This is so if there is no room for
+ * more, or if the sheets and their slices exceed the cache. Large sheets are then drawn a few at a
+ * time, and the sheets behind are culled earlier. */
 static bool are_enough(const trip_cpu_sheets *s)
 {
     const int fewest = in_a_row(s->of->frame) + 2;
@@ -592,7 +596,7 @@ static bool are_enough(const trip_cpu_sheets *s)
     return s->count >= s->max || (s->count >= fewest && bytes > CACHE_BYTES);
 }
 
-/* The sheet that the next runs are of: those held are complete. */
+/* Begins the sheet of the next runs. All held sheets are complete. */
 static int begin_sheet(trip_cpu_sheets *s, int64_t number)
 {
     const bool ends_row = s->count > 0 && sheet_of(s, s->count - 1)->number + s->way != number;
@@ -617,7 +621,8 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
     return 0;
 }
 
-/* A raster of the last sheet; false where none is left but for slices. */
+/* Takes a raster for the last sheet. Returns false if only the rasters set aside for slices are
+ * left. */
 static bool take_raster(trip_cpu_sheets *s, size_t at)
 {
     trip_cpu_sheet *sheet = sheet_of(s, s->count - 1);
@@ -629,7 +634,7 @@ static bool take_raster(trip_cpu_sheets *s, size_t at)
     return true;
 }
 
-/* Rasters of the last sheet for a run's voxels. */
+/* Takes rasters of the last sheet for a run's voxels. */
 static int take_rasters(trip_cpu_sheets *s, const trip_run *run)
 {
     int edge = 1 << s->of->frame->data->header.tile_log2;
@@ -659,7 +664,8 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
 
-/* Runs that are decoded at once have no voxel in common: those of one data set. */
+/* Returns whether the run belongs to another data set than the collected runs. Runs decoded in one
+ * job must not share a voxel; only runs of one data set never do. */
 static bool is_of_another_part(const trip_cpu_sheets *s, const trip_run *run)
 {
     return s->run_count > 0 &&

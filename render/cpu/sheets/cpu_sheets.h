@@ -1,7 +1,7 @@
-/* Frames that classify after interpolation (sheet.h): the runs of a pass become sheets, and as soon
- * as some sheets in a row are complete they are cut into slices and drawn into the panes, and let
- * go of. What a pixel gets depends on the slices alone, never on how many were drawn at a time.
- * Called by the renderer's thread. */
+/* Draws frames in `post` (sheet.h). The runs of a pass become sheets. As soon as some consecutive
+ * sheets are complete, they are cut into slices, drawn into the panes and dropped. A pixel depends
+ * only on the slices, never on how many are drawn at a time. The renderer owns the object; its
+ * thread calls all functions. */
 #ifndef TRIP_CPU_SHEETS_SHEETS_H
 #define TRIP_CPU_SHEETS_SHEETS_H
 
@@ -13,7 +13,7 @@ void trip_cpu_sheets_destroy(trip_cpu_sheets *s);
 int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r);
 int trip_cpu_sheets_begin_layer(trip_cpu_sheets *s, int axis);
 int trip_cpu_sheets_draw(trip_cpu_sheets *s, const trip_batch *batch);
-/* Every batch of the layer was drawn: so are its last sheets. */
+/* Draws the last sheets of the layer. Call it after the layer's last batch. */
 int trip_cpu_sheets_end_layer(trip_cpu_sheets *s);
 
 #endif

@@ -7,7 +7,7 @@
 
 enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MAX, LOG2_MAX = 2 };
 
-/* The greatest of the integrals, so that differences fit 32 bits with a sign. */
+/* The largest integral. Differences of integrals then fit a signed 32-bit integer. */
 #define GREATEST 0x1p30
 
 uint64_t trip_cpu_tf_bytes(void)
@@ -45,7 +45,8 @@ static trip_tf_entry between(const trip_tf_entry *a, const trip_tf_entry *b, flo
                             .extinction = a->extinction + part * (b->extinction - a->extinction) };
 }
 
-/* The function is linear between the codes of the data set. */
+/* Returns the transfer function at a stretched code. It is linear between the codes of the data
+ * set. */
 static trip_tf_entry entry_at(const trip_tf_entry *table, trip_cpu_codes codes, int code)
 {
     const int whole = codes.first + (code >> codes.shift);
@@ -61,7 +62,8 @@ static double component(const trip_tf_entry *e, int i)
     return i == 0 ? e->r : i == 1 ? e->g : e->b;
 }
 
-/* From one code to the next: of extinction, and of extinction times each component of colour. */
+/* Computes the integrals between two neighbouring codes: of extinction, and of extinction times
+ * each colour component. */
 static void step(const trip_tf_entry *a, const trip_tf_entry *b, double out[4])
 {
     out[0] = 0.5 * ((double)a->extinction + b->extinction);
@@ -70,14 +72,14 @@ static void step(const trip_tf_entry *a, const trip_tf_entry *b, double out[4])
             trip_segment_product(a->extinction, b->extinction, component(a, i), component(b, i));
 }
 
-/* The nearest whole number of one that is not negative. */
+/* Rounds a number x >= 0 to the nearest integer. */
 static int32_t rounded(double x)
 {
     return (int32_t)(x + 0.5);
 }
 
-/* An entry stands for codes as far as half of one to the next away, and the function's line between
- * two for all of them. */
+/* Widens the set of visible codes by `entry_codes` on both sides. An entry stands for codes up to
+ * half an entry away, and the line between two entries for all codes between. */
 static void widen_visible(uint32_t *next, uint32_t entry_codes)
 {
     for (uint32_t code = CODES; code-- > 0;) {
@@ -113,7 +115,7 @@ static void set_next_visible(trip_cpu_tf *f, const trip_tf_entry *table)
     f->last_visible = (int16_t)((int)last - TRIP_CPU_CODE_BIAS);
 }
 
-/* Of extinction, over all codes. */
+/* Returns the integral of extinction over all codes. */
 static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes)
 {
     double all = 0, before = entry_at(table, codes, 0).extinction;
@@ -125,12 +127,12 @@ static double whole_integral(const trip_tf_entry *table, trip_cpu_codes codes)
     return all;
 }
 
-/* Of opacity or colour through a voxel's length. Between the values of a source of 8 bits there are
- * 256 codes, so that whatever its function does, it changes by less from an entry to the codes that
- * are nearest to it. */
+/* Tolerance of opacity and colour along a voxel's length. Neighbouring values of an 8-bit source
+ * are 256 codes apart. So any transfer function of such a source changes by less than this between
+ * an entry and the codes nearest to it. */
 #define ENTRY_TOLERANCE (1.0 / 127)
 
-/* Whether two media are much alike, in what a voxel's length of them adds to a picture. */
+/* Returns whether a voxel's length of two media adds about the same to a picture. */
 static bool are_alike(const trip_tf_entry *a, const trip_tf_entry *b, double voxel_world)
 {
     double colour = 0, max = 0;
@@ -145,7 +147,7 @@ static bool are_alike(const trip_tf_entry *a, const trip_tf_entry *b, double vox
     return fmax(max, fabs(of_a - of_b)) <= ENTRY_TOLERANCE;
 }
 
-/* Whether entries so far apart stand for the codes that are nearest to them. */
+/* Returns whether entries 2^log2 codes apart can stand for the codes nearest to them. */
 static bool suffices(const trip_tf_entry *table, trip_cpu_codes codes, int log2, double voxel_world)
 {
     const int step = 1 << log2, max = CODES - 1;
@@ -196,17 +198,17 @@ static void set_sums(trip_cpu_integrals *in, const trip_tf_entry *table, trip_cp
 static void set_integrals(trip_cpu_tf *f, const trip_tf_entry *table)
 {
     const double all = whole_integral(table, f->codes);
-    /* A function of one code alone still has what at[] is in units of. */
+    /* If the integral is 0, at[] still needs a unit. */
     const double factor = all > 0 ? GREATEST / all : 1;
     f->integrals.entry_log2 = LOG2_MAX;
     while (!suffices(table, f->codes, f->integrals.entry_log2, f->voxel_world))
         f->integrals.entry_log2--;
     set_sums(&f->integrals, table, f->codes, factor);
     f->integrals.extinction = (float)fmin(
-        1e25, f->voxel_world / ldexp(factor, f->integrals.entry_log2)); /* opaque anyway */
+        1e25, f->voxel_world / ldexp(factor, f->integrals.entry_log2)); /* opaque at this limit */
 }
 
-/* Of codes as samples have them, and of voxels in place of world units. */
+/* Converts a closed form to the codes of samples, and from world units to voxels. */
 static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cpu_codes codes,
                                            double voxel_world)
 {
@@ -214,7 +216,8 @@ static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cp
     const double scale = ldexp(form->scale, -(int)codes.shift);
     f.scale = (float)(scale / TRIP_CPU_CODE_PARTS);
     f.offset = (float)(form->offset + form->scale * codes.first + scale * TRIP_CPU_CODE_BIAS);
-    /* Code 0 is taken for 1, where a ramp has begun: by half a code more, for what floats round. */
+    /* Rasters store code 0 as 1, where a ramp has already begun. Half a code more covers the
+     * rounding of floats. */
     f.min = (float)fmax(0, form->scale > 0 ? form->offset + form->scale * codes.first + 1.5 * scale
                                            : 0);
     for (int i = 0; i < 4; i++)
@@ -237,7 +240,7 @@ static bool is_of(const trip_cpu_tf *f, XXH128_hash_t table, const trip_closed_f
 static void set(trip_cpu_tf *f, const trip_tf_entry *table, XXH128_hash_t hash,
                 const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
 {
-    if (closed) /* goes by more than what is compared below */
+    if (closed) /* depends on more than is_of() compares */
         f->integrals.closed = closed_form_of(closed, codes, voxel_world);
     if (is_of(f, hash, closed, codes, voxel_world))
         return;
@@ -263,7 +266,7 @@ void trip_cpu_tf_set(trip_cpu_tf *f, const trip_tf_entry *table, const trip_clos
     set(f, table, hash_of(table), closed, codes, voxel_world);
 }
 
-/* ---- those that are kept ---- */
+/* ---- kept functions ---- */
 
 bool trip_cpu_tfs_create(trip_cpu_tfs *f, trip_budget *budget)
 {
@@ -278,7 +281,8 @@ void trip_cpu_tfs_destroy(trip_cpu_tfs *f, trip_budget *budget)
             trip_cpu_tf_destroy(&f->kept[i], budget);
 }
 
-/* Where the next is set. */
+/* Returns the index for the next function. Takes an unused entry if it needs only a small part of
+ * the free memory, otherwise the entry taken longest ago. */
 static int position_of_next(trip_cpu_tfs *f, trip_budget *budget)
 {
     enum { SMALL_PART = 32 };

@@ -1,6 +1,7 @@
-/* The transfer function's integrals over codes, as the kernels take them (kernels/sheets.h). Set
- * for every frame, read-only then; those of frames before are kept where nothing they depend on
- * has changed: of several, since the parts of a picture may have levels of their own. */
+/* The transfer function's integrals over codes, in the form of kernel_sheets.h. The renderer's
+ * thread sets them for every frame; while drawing they are read-only. Integrals of earlier frames
+ * are kept and used again for the same inputs. Several are kept, because parts of a picture may
+ * have different levels of detail. */
 #ifndef TRIP_CPU_SHEETS_INTEGRALS_H
 #define TRIP_CPU_SHEETS_INTEGRALS_H
 
@@ -12,44 +13,47 @@
 
 typedef struct trip_cpu_tf {
     trip_cpu_integrals integrals;
-    trip_cpu_codes codes; /* whose integrals they are, and so below */
-    /* Codes that may show: those with extinction, and as many beside as an entry reaches. */
-    bool in_a_row; /* they are first_visible to last_visible, biased */
+    trip_cpu_codes codes; /* the codes of `integrals` and of the fields below */
+    /* Codes that may be visible: codes with extinction, and the codes beside them within an entry's
+     * reach. */
+    bool in_a_row; /* exactly the biased codes from first_visible to last_visible */
     int16_t first_visible, last_visible;
-    uint32_t *next_visible; /* 65536: the first such code from here on, or 65536 */
-    /* What all of this was made of, with the codes above. */
+    uint32_t *next_visible; /* 65536 entries: the first visible code from here on, or 65536 */
+    /* With `codes`, the inputs from which everything was made. */
     uint64_t table_hash[2];
-    double voxel_world; /* 0: nothing was made yet */
+    double voxel_world; /* 0 if nothing was made yet */
 } trip_cpu_tf;
 
-/* What it takes. */
+/* Returns the bytes that trip_cpu_tf_create() takes. */
 uint64_t trip_cpu_tf_bytes(void);
-/* Memory from the budget; false where it does not suffice. */
+/* Takes memory from the budget. Returns false if the budget has too little left. */
 bool trip_cpu_tf_create(trip_cpu_tf *f, trip_budget *budget);
 void trip_cpu_tf_destroy(trip_cpu_tf *f, trip_budget *budget);
 
-/* Of a table of 65536 entries of the data set's codes, whose extinction is per world unit; with
- * `closed`, its form, no integrals are made. */
+/* Sets everything from a table of 65536 entries, one for each code of the data set. Extinction is
+ * per world unit. With a closed form `closed`, no integrals are made; NULL stands for no closed
+ * form. */
 void trip_cpu_tf_set(trip_cpu_tf *f, const trip_tf_entry *table, const trip_closed_form *closed,
                      trip_cpu_codes codes, double voxel_world);
 
 enum { TRIP_CPU_TFS = 6 };
 
 typedef struct trip_cpu_tfs {
-    trip_cpu_tf kept[TRIP_CPU_TFS];     /* of the first there is memory from the start */
-    uint64_t turn, turns[TRIP_CPU_TFS]; /* when each was last taken */
+    trip_cpu_tf kept[TRIP_CPU_TFS];     /* kept[0] has memory from the start */
+    uint64_t turn, turns[TRIP_CPU_TFS]; /* turns[i]: the turn at which kept[i] was last taken */
 } trip_cpu_tfs;
 
-/* Memory for one; false where the budget does not suffice. */
+/* Takes memory for one function. Returns false if the budget has too little left. */
 bool trip_cpu_tfs_create(trip_cpu_tfs *f, trip_budget *budget);
 void trip_cpu_tfs_destroy(trip_cpu_tfs *f, trip_budget *budget);
-/* As set by trip_cpu_tf_set(): one that is kept, else in the place of the one that was not
- * taken for longest, or in memory of its own where that is a small part of what is left. */
+/* Returns a function as set by trip_cpu_tf_set(), if possible one that is kept. Otherwise sets a
+ * new one: in new memory if that is a small part of the free memory, else over the one taken
+ * longest ago. */
 const trip_cpu_tf *trip_cpu_tfs_take(trip_cpu_tfs *f, trip_budget *budget,
                                      const trip_tf_entry *table, const trip_closed_form *closed,
                                      trip_cpu_codes codes, double voxel_world);
 
-/* Whether some code of [least, most] may show; biased codes. */
+/* Returns whether a code in [min, max] may be visible. Both are biased codes. */
 static inline bool trip_cpu_tf_shows(const trip_cpu_tf *f, int16_t min, int16_t max)
 {
     return min <= max &&

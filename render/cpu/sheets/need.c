@@ -7,7 +7,7 @@ typedef struct sheet {
     uint64_t rasters, runs, words;
 } sheet;
 
-/* The last sheets, the latest last. */
+/* The latest sheets, in order. */
 typedef struct row {
     sheet sheets[TRIP_CPU_AT_HAND_MAX];
     int count;
@@ -18,7 +18,7 @@ static uint64_t greater(uint64_t a, uint64_t b)
     return a > b ? a : b;
 }
 
-/* The sheet after those at hand, which it joins. */
+/* Appends a sheet to the row, drops the oldest one, and updates the maxima. */
 static void add_sheet(trip_cpu_need *need, row *at_hand, sheet next)
 {
     uint64_t rasters = 0;

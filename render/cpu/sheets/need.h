@@ -1,5 +1,5 @@
-/* What a layer's sheets take at most, by its plan, so that what does not suffice is known before
- * anything is drawn. Pure functions. */
+/* Finds from a plan how much memory a layer's sheets need at most. So too little memory is reported
+ * before anything is drawn. Any thread may call it with its own budget. */
 #ifndef TRIP_CPU_SHEETS_NEED_H
 #define TRIP_CPU_SHEETS_NEED_H
 
@@ -7,15 +7,15 @@
 #include "plan.h"
 
 typedef struct trip_cpu_need {
-    uint64_t rasters;               /* of the sheets at hand when an interval is drawn */
-    uint64_t of_sheet, runs, words; /* rasters and so on of the sheet that has most */
+    uint64_t rasters; /* maximum over consecutive sheets that are in memory together */
+    uint64_t of_sheet, runs, words; /* maximum over single sheets */
 } trip_cpu_need;
 
-/* The most of `at_hand` of trip_cpu_need_find(). */
+/* Maximum of `at_hand` in trip_cpu_need_find(). */
 enum { TRIP_CPU_AT_HAND_MAX = 6 };
 
-/* Of sheets of so many rasters each at most, so many at hand at a time; TRIP_ERROR without the
- * memory to find it. */
+/* Finds the need of a layer. A sheet has at most `rasters` rasters, and `at_hand` sheets are in
+ * memory at a time. Returns TRIP_ERROR if the budget has too little left for the search. */
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
                        int at_hand, trip_budget *budget);
 

@@ -5,24 +5,24 @@
 
 #include "sheet.h"
 
-/* Sheets that squares are found for at once: rays move along as they pass them, and more squares
- * are open then. */
+/* Number of sheets for which open squares are found at once. Rays move sideways between sheets, so
+ * more sheets open more squares. */
 enum { SHEETS = 8 };
 
-/* Pixels of a patch along a side, and patches along that of a pane. */
+/* Edge of a patch in pixels, and of a pane in patches. */
 enum { PATCH = 8, ACROSS = TRIP_CPU_PANE / PATCH };
 
-/* More than what single precision makes of where rays are. */
+/* A bound of the error of ray positions in single precision. */
 #define SLACK_VOXELS 0.125
 
-/* What rays pass from the first to the last of some sheets, and all that voxels about these change:
- * distances along the list's axis from where rays start, in no order. */
+/* A range of sheets along the list's axis, with the sheets about them that interpolation reads.
+ * `ends` holds the distances of both ends from the start of the rays, in any order. */
 typedef struct extent {
     double ends[2];
-    int reach; /* trip_sheet_reach() */
+    int reach;
 } extent;
 
-/* Positions along u and v. */
+/* A rectangle of positions along u and v. */
 typedef struct bounds {
     double min[2], max[2];
 } bounds;
@@ -33,14 +33,15 @@ static void include(bounds *b, int a, double at)
     b->max[a] = at > b->max[a] ? at : b->max[a];
 }
 
-/* The rays of a pane's pixel positions at the corners of its patches. */
+/* The rays at the corners of a pane's patches. */
 enum { CORNERS = ACROSS + 1 };
 typedef struct pane_rays {
-    bool along[CORNERS * CORNERS];      /* they go the pass's way */
-    double at[2][2][CORNERS * CORNERS]; /* positions along u and v, at both ends */
+    bool along[CORNERS * CORNERS];      /* the ray goes in the direction of the pass */
+    double at[2][2][CORNERS * CORNERS]; /* [end][u, v]: positions at both ends */
 } pane_rays;
 
-/* Of those that are drawn: steeper rays are taken for the steepest of these. */
+/* Finds the ray of corner i, at pixel position (x, y). Slopes are limited to view->steepest,
+ * because steeper rays are not drawn. */
 static void find_ray(const trip_cpu_sheet_view *view, const extent *e, double x, double y, int i,
                      pane_rays *rays)
 {
@@ -56,7 +57,7 @@ static void find_ray(const trip_cpu_sheet_view *view, const extent *e, double x,
     for (int a = 0; a < 2; a++) {
         double start = view->eye[a], slope = r[a] * inverse;
         slope = slope < -max ? -max : slope > max ? max : slope;
-        if (view->ortho) /* where the ray passes sheet 0 */
+        if (view->ortho) /* position at sheet 0 */
             start += beside[a] - (view->eye[2] + beside[2]) * slope;
         for (int end = 0; end < 2; end++)
             rays->at[end][a][i] = start + e->ends[end] * slope;
@@ -67,13 +68,13 @@ static void open_row(trip_cpu_store *s, int64_t v, int64_t first, int64_t last)
 {
     uint64_t *row = s->open + (v >> 3) * s->across;
     for (int64_t u = first; u <= last;) {
-        const int64_t end = last < (u | 7) ? last : u | 7; /* of the raster */
+        const int64_t end = last < (u | 7) ? last : u | 7; /* last square of the raster */
         row[u >> 3] |= ((UINT64_C(2) << (end - u)) - 1) << ((v & 7) * 8 + (u & 7));
         u = end + 1;
     }
 }
 
-/* Every square with voxels that rays within the bounds may take. */
+/* Opens all squares with voxels that rays within the bounds may read. */
 static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
 {
     const int64_t origin[2] = { s->first_u * TRIP_CPU_RASTER, s->first_v * TRIP_CPU_RASTER };
@@ -92,8 +93,9 @@ static void open_squares(trip_cpu_store *s, const bounds *b, int reach)
         open_row(s, v, first[0], last[0]);
 }
 
-/* Between four corners, the first of which is `first`, each `step` patches from the next. Where
- * some go another way than the pass, rays between them may go any way. */
+/* Opens the squares for rays between four corners. `first` is the first corner; the corners are
+ * `step` patches apart. If only some of the four rays go in the pass's direction, rays between them
+ * may have any slope. */
 static void open_rectangle(trip_cpu_sheets *s, const extent *e, const pane_rays *rays, int first,
                            int step)
 {
@@ -114,7 +116,7 @@ static void open_rectangle(trip_cpu_sheets *s, const extent *e, const pane_rays 
         open_squares(&s->store, &b, e->reach);
 }
 
-/* Of the texels of a pane, those of one of its patches. */
+/* Returns whether a texel in patch i of the pane is open. */
 static bool patch_is_open(uint64_t texels, int i)
 {
     static_assert(PATCH == 8 && ACROSS == 4, "two by two texels of 4 x 4 pixels");
@@ -141,7 +143,8 @@ static uint64_t open_texels(const trip_cpu *r, uint32_t pane)
     return atomic_load_explicit(&r->mask.panes[pane], memory_order_relaxed);
 }
 
-/* Of the panes that the layer may show in; the others are all saturated. */
+/* Returns whether a pixel is saturated in a pane of the layer. Panes without the layer do not
+ * count. */
 static bool some_is_saturated(const trip_cpu *r, int axis)
 {
     for (uint32_t i = 0; i < trip_cpu_pane_count(r); i++)
@@ -160,12 +163,12 @@ static extent extent_from(const trip_cpu_sheets *s, int64_t number)
     for (int i = 0; i < 2; i++) {
         const double at = (double)(i ? last : first) - (view->ortho ? 0 : view->eye[2]);
         const bool before_eye = view->ortho || at * view->direction > 0;
-        e.ends[i] = before_eye ? at : 0; /* rays start there */
+        e.ends[i] = before_eye ? at : 0; /* rays start at the eye */
     }
     return e;
 }
 
-/* From a sheet on. */
+/* Finds the open squares for SHEETS sheets from `number` on. */
 static void find_open_squares(trip_cpu_sheets *s, int64_t number)
 {
     const extent e = extent_from(s, number);

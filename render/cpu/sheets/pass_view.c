@@ -8,9 +8,9 @@
 #include "debug_view.h"
 #include "weight.h"
 
-/* Rays that move farther along u or v from sheet to sheet are not drawn where several lists are:
- * their weight in the list is below 1 / STEEPEST, by w^2 less than a tenth of 1/255 of the picture.
- */
+/* If several lists are drawn, rays that move farther along u or v between two sheets are left out.
+ * Their weight w in the list is below 1 / STEEPEST. So w^2 is below a tenth of 1/255 of the
+ * picture. */
 #define STEEPEST 64.0
 
 static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
@@ -19,9 +19,9 @@ static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
         out[i] = trip_component(v, (view->axis + 1 + i) % 3);
 }
 
-/* World-space gradients from those of index space: the inverse transpose of the map. Differences
- * are of codes, by the store's unit, lengths over that of full shading; half of it, for what takes
- * the sum of two. */
+/* Sets the map of gradients from index space to world space: the inverse transpose of view->world.
+ * It also converts code differences in the store's unit to lengths relative to full shading. The
+ * factor 0.5 is there because the kernels pass the sum of two gradients. */
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, trip_cpu_codes codes)
 {
     const trip_file_header *h = &frame->data->header;
@@ -71,7 +71,8 @@ static void set_debug_view(trip_cpu_sheet_view *view, const trip_frame *frame)
         view->tint[k] = (float)tint[k];
 }
 
-/* Of the view's rays along its axis; none crosses more than the grid. */
+/* Returns the largest slope of the view's rays against the view's axis, at most the extent of the
+ * grid. */
 static double steepest_of_view(const trip_frame *frame)
 {
     const trip_camera *c = frame->camera;

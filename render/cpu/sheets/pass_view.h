@@ -1,5 +1,4 @@
-/* The constants of a pass over sheets, as the kernels take them (kernels/sheets.h). Pure functions.
- */
+/* Computes the constants of a pass over sheets, in the form of kernel_sheets.h. Pure functions. */
 #ifndef TRIP_CPU_SHEETS_PASS_VIEW_H
 #define TRIP_CPU_SHEETS_PASS_VIEW_H
 
@@ -7,7 +6,7 @@
 #include "cpu/sheets/integrals.h"
 #include "renderer.h"
 
-/* How far along u or v rays that are drawn move at most from one sheet to the next. */
+/* Returns how far drawn rays move at most along u or v between two sheets, in index lengths. */
 double trip_cpu_pass_steepest(const trip_frame *frame);
 
 void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,

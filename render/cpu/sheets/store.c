@@ -37,7 +37,8 @@ static void release_voxels(trip_cpu_store *s)
     s->rasters = 0;
 }
 
-/* Ends with so many rasters, or as many as there are where that is not far less. */
+/* Takes `wanted` rasters. Keeps the present pool if it has at least `min` rasters and half of
+ * `wanted`. Returns false without memory. */
 static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
 {
     if (s->rasters >= min && s->rasters >= wanted / 2)
@@ -52,7 +53,7 @@ static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
     return s->voxels != NULL;
 }
 
-/* Returns where it ends. */
+/* Lays out a sheet's arrays for making on demand. Returns the offset behind them. */
 static size_t lay_out_making(trip_cpu_sheet *sheet, char *memory, size_t at, size_t grid)
 {
     trip_cpu_making *m = &sheet->making;
@@ -201,7 +202,7 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 /* ---- from a run to voxels ---- */
 
-/* Where a square's voxels lie in a raster from its first, by Morton number. */
+/* Offset of a square's voxel in a raster from the square's first voxel, by Morton number n. */
 #define PLACE(n)                                                                                   \
     ((((n) >> 1 & 1) | ((n) >> 2 & 2) | ((n) >> 3 & 4)) * TRIP_CPU_RASTER_STRIDE +                 \
      (((n)&1) | ((n) >> 1 & 2) | ((n) >> 2 & 4)))
@@ -210,8 +211,8 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 static const uint16_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
-/* The codes of a square's records, stretched and biased; by copies, which overlap nothing, so that
- * the loops become vectors. */
+/* Writes the codes of a square's records, stretched and biased. The local arrays cannot alias, so
+ * the compiler vectorises the loops. */
 static void square_codes(const trip_square *at, trip_cpu_codes stretch, int16_t out[64])
 {
     uint16_t codes[64];
@@ -231,7 +232,7 @@ static void decode_square(int16_t *to, const trip_square *at, trip_cpu_codes str
     int16_t codes[64];
     const int16_t *next = codes;
     square_codes(at, stretch, codes);
-    if (at->mask == UINT64_MAX) { /* two voxels in a row follow one another */
+    if (at->mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
         for (unsigned i = 0; i < 64; i += 2)
             memcpy(to + positions[i], codes + i, 2 * sizeof *codes);
         return;
@@ -269,14 +270,14 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
     }
 }
 
-/* ---- what lies beside ---- */
+/* ---- neighbours and visibility ---- */
 
-/* A job over sheets, and the rows of the grid but the outermost. */
+/* A job with one task for each sheet and row of the grid, except the outermost rows. */
 typedef struct work_job {
     trip_cpu_store *store;
     const trip_cpu_sheet_work *work;
     const trip_cpu_tf *function;
-    /* Of the rasters that are there. */
+    /* Called for each present raster. */
     void (*each)(const struct work_job *job, const trip_cpu_sheet_work *w, size_t at);
 } work_job;
 
@@ -312,8 +313,8 @@ static trip_cpu_voxels *raster_at(const trip_cpu_store *s, const trip_cpu_sheet 
     return s->voxels + (sheet ? sheet->rasters[at] : 0);
 }
 
-/* The first column of the raster to the right, the first row of the one below, the voxel between.
- */
+/* Copies the first column of the raster to the right, the first row of the raster below, and the
+ * first voxel of the raster diagonally behind. */
 static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
@@ -357,7 +358,8 @@ void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, 
         work[i].sheet->prepared = true;
 }
 
-/* Whether the cell may show whose first voxel is `first`: of functions that show here and there. */
+/* Returns whether the cell with first voxel `first` may be visible. Used for transfer functions
+ * with gaps. */
 static bool cell_shows(const trip_cpu_tf *f, const int16_t *from, const int16_t *to, int first)
 {
     int16_t min = INT16_MAX, max = INT16_MIN;
@@ -386,7 +388,7 @@ static void find_cells_one_by_one(const trip_cpu_tf *f, const trip_cpu_voxels *f
     }
 }
 
-/* Finds the cells that may show, of squares that do. */
+/* Finds the cells that may be visible in the given squares. */
 static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
                        uint64_t squares)
 {
@@ -408,7 +410,7 @@ static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t
             cells->fours[v] |= rows[v + n];
 }
 
-/* The squares of a row of them that have some of the given cells, those of a row of cells. */
+/* Returns a byte with one bit for each square that contains a cell of the given row of cells. */
 static uint64_t squares_with(uint64_t cells)
 {
     cells |= cells >> 4;
@@ -417,8 +419,10 @@ static uint64_t squares_with(uint64_t cells)
     return ((cells & TRIP_CPU_COLUMN_0) * UINT64_C(0x0102040810204080)) >> 56;
 }
 
-/* A segment moves less than a voxel along u and v: both of its ends lie in cells that touch the one
- * that it meets, or in that, and their corners from one voxel before it to two behind. */
+/* Finds the squares with visible cells, and the subsets with such cells near an edge. A segment
+ * moves less than a voxel along u and v. So both ends lie in the cell that it meets, or in a cell
+ * that touches it. Segments of a cell therefore read voxels from one before the cell to two behind
+ * it. */
 static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells)
 {
     for (int i = 0; i < TRIP_CPU_RASTER; i += 8) {
@@ -433,7 +437,7 @@ static void find_edges(trip_cpu_edges edges, const trip_cpu_cells *cells)
     }
 }
 
-/* Widens the range by what is there of a sheet in a square and those beside it. */
+/* Widens the range by the present voxels of a sheet in a square and its eight neighbours. */
 static void add_ranges_about(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at,
                              int square, int16_t range[2])
 {
@@ -451,7 +455,7 @@ static void add_ranges_about(const trip_cpu_store *s, const trip_cpu_sheet *shee
     }
 }
 
-/* Whether kernels of 64 voxels may make something of a square that shows. */
+/* Returns whether kernels of 64 voxels may interpolate a visible value in the square. */
 static bool shows_about(const work_job *job, const trip_cpu_sheet_work *w, size_t at, int square)
 {
     const trip_cpu_sheet *about[] = { w->before, w->sheet, w->other, w->behind };
@@ -487,7 +491,8 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
         edges[k] = edges[TRIP_CPU_ALL];
 }
 
-/* Some squares of a raster, by an edge, and those beside them along u. */
+/* Returns a raster's squares with the given edge, and the squares beside them along u that their
+ * segments need. */
 static uint64_t beside(const trip_cpu_edges *e, int edge)
 {
     const uint64_t *here = e[0], *before = e[-1], *behind = e[1];
@@ -497,8 +502,9 @@ static uint64_t beside(const trip_cpu_edges *e, int edge)
            ((behind[edge] & behind[TRIP_CPU_LEFT]) << 7 & TRIP_CPU_COLUMN_7);
 }
 
-/* Outermost rasters have no squares that may show. With uneven spacing a segment may reach across
- * any number of squares. */
+/* Finds the squares from which visible segments read voxels. Outermost rasters have no visible
+ * squares, so their edges are empty. With uneven spacing a segment may cross any number of squares,
+ * so all are needed. */
 static void find_needed(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_edges *e = &w->sheet->edges[at];

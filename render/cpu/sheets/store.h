@@ -1,6 +1,6 @@
-/* The sheets and slices at hand: rasters of voxels from a pool of fixed size, decoded from runs,
- * completed with what lies beside them. Owned by the renderer's thread, which no job runs beside;
- * those that the functions here start end before they return. */
+/* The store holds sheets and slices as rasters of voxels from a pool of fixed size. Rasters are
+ * decoded from runs, and repeat the first voxels of their neighbours. The renderer's thread owns
+ * the store. A function that starts a job returns after the job has ended. */
 #ifndef TRIP_CPU_SHEETS_STORE_H
 #define TRIP_CPU_SHEETS_STORE_H
 
@@ -10,8 +10,9 @@
 #include "cpu/sheets/integrals.h"
 #include "reader.h"
 
-/* Squares of a raster in which cells may show: all, and those with such cells so near to an edge
- * that both ends of a segment that meets these depend on voxels of the square beyond it. */
+/* Sets of squares of a raster. ALL holds the squares with cells that may be visible. LEFT, RIGHT,
+ * ABOVE and BELOW hold the squares with such cells near that edge: segments that meet them may read
+ * voxels beyond the edge. */
 enum {
     TRIP_CPU_ALL,
     TRIP_CPU_LEFT,
@@ -22,23 +23,24 @@ enum {
 };
 typedef uint64_t trip_cpu_edges[TRIP_CPU_EDGES];
 
-/* A sheet, or a slice between two. */
+/* A sheet, or a slice between two sheets. A slice has only `rasters` and `making`. Arrays have one
+ * entry for each raster of the grid. */
 typedef struct trip_cpu_sheet {
-    int64_t number;                 /* of the sheet */
-    int32_t *rasters;               /* the number of each in the pool; 0: absent */
-    trip_cpu_square_ranges *ranges; /* of sheets; of rasters that are there */
-    _Atomic uint64_t *filled;       /* squares with voxels; of rasters that are there */
-    uint64_t *visible;              /* squares in which cells may show from here to the next */
-    trip_cpu_cells *cells;          /* those cells, of rasters with visible squares */
-    trip_cpu_edges *edges;          /* these squares by edges */
-    uint64_t *needed;               /* squares of which segments that may show take voxels */
-    trip_cpu_making making;         /* but for frames whose sheets and slices are made at once */
-    bool prepared, shaded;          /* ranges are there; all gradients are */
+    int64_t number;                 /* index of the sheet in its list */
+    int32_t *rasters;               /* numbers in the pool; 0 stands for absent */
+    trip_cpu_square_ranges *ranges; /* defined for present rasters */
+    _Atomic uint64_t *filled;       /* squares with voxels; defined for present rasters */
+    uint64_t *visible;      /* squares with cells that may be visible up to the next sheet */
+    trip_cpu_cells *cells;  /* these cells; defined for rasters with visible squares */
+    trip_cpu_edges *edges;  /* `visible`, split by edges */
+    uint64_t *needed;       /* squares from which visible segments read voxels */
+    trip_cpu_making making; /* unused if trip_cpu_sheets_at_once() */
+    bool prepared, shaded;  /* all ranges are found; all gradients are found */
 } trip_cpu_sheet;
 
 enum {
-    TRIP_CPU_SHEETS_MAX = 20,                /* at hand at once */
-    TRIP_CPU_SLICES_MAX = TRIP_CPU_SEGMENTS, /* between sheets */
+    TRIP_CPU_SHEETS_MAX = 20,                /* sheets in memory at a time */
+    TRIP_CPU_SLICES_MAX = TRIP_CPU_SEGMENTS, /* slices in memory at a time */
 };
 
 /* A rectangle of rasters along u and v, inclusive. */
@@ -50,35 +52,36 @@ typedef struct trip_cpu_store {
     trip_budget *budget;
     const trip_cpu_kernels *kernels;
     trip_cpu_pool *pool;
-    trip_cpu_codes codes; /* of the frame's data set */
+    trip_cpu_codes codes; /* stretch of the frame's codes */
     const trip_coordinates *coordinates;
-    int axis; /* of the layer's lists */
+    int axis; /* axis of the layer's lists */
 
-    trip_cpu_voxels *voxels; /* rasters */
+    trip_cpu_voxels *voxels; /* the pool of rasters; raster 0 has only missing voxels */
     size_t voxels_bytes;
     int32_t *free; /* numbers of free rasters */
     uint32_t rasters, free_count;
 
-    /* The grid of rasters, the outermost of which are absent; in rasters. */
+    /* The grid of rasters, in rasters. The outermost rasters of the grid are absent. */
     int64_t first_u, first_v;
     int32_t across, down;
-    char *grids; /* of the sheets and slices below */
+    char *grids; /* memory of the arrays below */
     size_t grids_bytes;
-    unsigned sheet_room; /* sheets that there is room for */
+    unsigned sheet_room; /* number of sheets with memory */
     trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], samples_per_sheet[TRIP_CPU_SLICES_MAX];
-    uint64_t *some; /* squares visible in any of the segments drawn at a time */
-    uint64_t *open; /* squares of a sheet that voxels are decoded of; at first all */
+    uint64_t *some; /* squares visible in any segment of the group */
+    uint64_t *open; /* squares to decode in the current sheet; at first all */
 } trip_cpu_store;
 
-/* What so many sheets of a rectangle take, with a pool of so many rasters. */
+/* Returns the bytes of `sheets` sheets of a rectangle, with a pool of `rasters` rasters. */
 uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters);
-/* What is taken of the budget. */
+/* Returns the bytes that the store holds from the budget. */
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
-/* Room for so many sheets of a rectangle, and for `least` to `most` rasters in at most `room`
- * bytes; every sheet is absent then. False where that is too little. */
+/* Makes room for `sheets` sheets of a rectangle and for `min` to `max` rasters, in at most `room`
+ * bytes. All sheets are empty afterwards. Returns false if `room` is too small. */
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
                         uint64_t min, uint64_t max, uint64_t room);
-/* Moves to a rectangle that is no larger than the one there is room for; every sheet is absent. */
+/* Moves the grid to a rectangle that is no larger than the one of trip_cpu_store_fit(). Empties all
+ * sheets. */
 void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to);
 void trip_cpu_store_release(trip_cpu_store *s);
 
@@ -87,7 +90,7 @@ static inline bool trip_cpu_rasters_have(const trip_cpu_rasters *b, int64_t u, i
     return u >= b->first[0] && u <= b->last[0] && v >= b->first[1] && v <= b->last[1];
 }
 
-/* Where raster (u, v), in rasters, is in the grid's tables. */
+/* Returns the index of raster (u, v) in the arrays of the grid. */
 static inline size_t trip_cpu_store_at(const trip_cpu_store *s, int64_t u, int64_t v)
 {
     return (size_t)((v - s->first_v) * s->across + (u - s->first_u));
@@ -98,45 +101,46 @@ static inline size_t trip_cpu_store_grid(const trip_cpu_store *s)
     return (size_t)s->across * (size_t)s->down;
 }
 
-/* A raster, which is to be cleared; false when none is free. */
+/* Takes a raster for position `at`; the caller must clear it. Returns false if none is free. */
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at);
-/* All of a raster is missing. Any thread may clear one. */
+/* Marks all voxels of a raster as missing. Any thread may call it. */
 void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster);
-/* Every raster of a sheet or slice is free again. */
+/* Returns all rasters of a sheet or slice to the pool. */
 void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 
-/* A run's voxels into open squares of rasters of a sheet that are there. May run beside those of
- * other runs. */
+/* Decodes a run's voxels into the open squares of a sheet's present rasters. Several threads may
+ * decode runs at a time if the runs share no voxel. */
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run);
 
-/* What is done with a sheet or slice: several of them at a time, raster by raster. */
+/* One sheet or slice of a job, with its neighbours. A job handles several, raster by raster. */
 typedef struct trip_cpu_sheet_work {
     trip_cpu_sheet *sheet;
-    /* Cells and slices: the sheets on both sides. Gradients: those before and after in index order,
-     * NULL where there is none. */
+    /* For cells, `other` is the next sheet. For slices, these are the sheets on both sides. For
+     * gradients, these are the sheets before and after in index order; NULL stands for none. */
     const trip_cpu_sheet *other, *third;
-    /* Cells, with kernels of 64 voxels: the sheets beyond, in draw order; NULL where there is none.
-     */
+    /* For cells and kernels of 64 voxels: the sheets before `sheet` and behind `other`, in draw
+     * order; NULL stands for none. */
     const trip_cpu_sheet *before, *behind;
     trip_kernel kernel;
-    bool everywhere; /* cells: all squares about those that may show are needed */
+    bool everywhere; /* for cells: all squares about visible ones are needed */
 } trip_cpu_sheet_work;
 
-/* Complete sheets' rasters get the first voxels of those beside them, and ranges. */
+/* Prepares complete sheets: copies the first voxels of neighbouring rasters and finds the ranges.
+ */
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
-/* Which squares and cells may show from prepared sheets to the next, `other`, and which squares are
- * needed then. With kernels of 64 voxels all cells may that have four corners at a sheet, of
- * squares about which the function shows something. */
+/* Finds the squares and cells that may be visible between prepared sheets and the next sheet,
+ * `other`. Also finds the squares needed for drawing them. With kernels of 64 voxels, a cell may be
+ * visible if it has four corners on a sheet and a value about its square is visible. */
 void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count,
                                  const trip_cpu_tf *f);
-/* All gradients of prepared sheets' voxels. */
+/* Finds all gradients of prepared sheets. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
-/* Rasters for a slice between two sheets, where they are needed. False when the pool is full; then
- * it is empty. */
+/* Takes the needed rasters for a slice between two sheets. Returns false and takes none if the pool
+ * is full. */
 bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
-/* All voxels of slices are missing; or are made. */
+/* The first function marks all voxels of slices as missing, the second one interpolates them. */
 void trip_cpu_store_clear_samples_per_sheet(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                             unsigned count);
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);

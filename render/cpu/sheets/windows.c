@@ -22,7 +22,7 @@ static size_t sheet_bytes(const trip_cpu_need *need)
     return (size_t)(need->runs * sizeof(trip_cpu_kept_run) + need->words * 8);
 }
 
-/* What is at hand of windows of a size, as a rectangle at 0. */
+/* Returns the rasters that a window of the given size keeps in memory, as a rectangle at 0. */
 static trip_cpu_rasters at_hand(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach)
 {
     trip_cpu_rasters b = { .first = { 0, 0 } };
@@ -108,11 +108,11 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
 
 /* ---- a window ---- */
 
-/* Runs of a kept sheet, decoded into a sheet of the store. */
+/* A job that decodes runs of a kept sheet into a sheet of the store. */
 typedef struct decoding {
     const trip_cpu_sheets *s;
     const trip_cpu_kept_run *runs;
-    const uint64_t *words; /* of all the sheet's runs */
+    const uint64_t *words; /* words of all runs of the sheet */
     const trip_cpu_sheet *to;
 } decoding;
 
@@ -133,7 +133,7 @@ static void decode_run(void *context, unsigned task, unsigned thread)
     trip_cpu_store_decode(&d->s->store, d->to, &block, &(trip_run){ .u = kept->u, .v = kept->v });
 }
 
-/* Rasters for a run's voxels, where they are at hand. */
+/* Takes rasters for a run's voxels inside the rectangle `hand`. */
 static void take_rasters(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_cpu_kept_run *run,
                          const trip_cpu_rasters *hand)
 {
@@ -147,7 +147,7 @@ static void take_rasters(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_c
             }
 }
 
-/* Whether some run of a kept sheet has voxels at hand. */
+/* Returns whether a run of a kept sheet may have voxels inside the rectangle `hand`. */
 static bool is_at_hand(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *sheet,
                        const trip_cpu_rasters *hand)
 {
@@ -161,7 +161,8 @@ static bool is_at_hand(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *shee
     return false;
 }
 
-/* Runs from `first` on of one data set, which have no voxel in common; returns where those end. */
+/* Decodes the runs from `first` on that belong to one data set, because such runs share no voxel.
+ * Returns the index behind the last of them. */
 static size_t decode_part(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *from, size_t first,
                           const trip_cpu_sheet *to)
 {
@@ -186,7 +187,8 @@ static void load_sheet(trip_cpu_sheets *s, int i, const trip_cpu_rasters *hand)
         n = decode_part(s, from, n, to);
 }
 
-/* The sheets at hand that are at most so many beyond the interval. */
+/* first_about() and last_about() return the first and last kept sheet that is at most `beyond`
+ * sheets outside the interval. */
 static int first_about(const trip_cpu_windows *w, int beyond)
 {
     return (int)greater(0, w->from - beyond);
@@ -197,7 +199,8 @@ static int last_about(const trip_cpu_windows *w, int beyond)
     return (int)lesser(w->count - 1, w->from + 1 + beyond);
 }
 
-/* What may show between the interval's two sheets, and gradients of those that it takes them of. */
+/* Finds the squares and cells that may be visible in the interval, and the gradients that the
+ * interval needs. */
 static void find_interval(trip_cpu_sheets *s)
 {
     const trip_cpu_windows *w = &s->windows;
@@ -228,7 +231,8 @@ static void find_interval(trip_cpu_sheets *s)
     trip_cpu_sheets_find_gradients(s, work, count);
 }
 
-/* Rays that start beside all windows are of the outermost. */
+/* Sets the window of the group. Rays that start outside all windows belong to the nearest outer
+ * window. */
 static void set_window(trip_cpu_sheets *s, const trip_cpu_rasters *inner)
 {
     const trip_cpu_rasters *all = &s->windows.all;
@@ -268,7 +272,8 @@ static int draw_window(trip_cpu_sheets *s, const trip_cpu_rasters *inner)
 
 /* ---- sheets ---- */
 
-/* The interval that begins at `from`, of which that behind is complete, too. */
+/* Draws the interval that begins at `from`. The sheets behind it on which it depends are complete.
+ */
 static int draw_interval(trip_cpu_sheets *s)
 {
     trip_cpu_windows *w = &s->windows;
@@ -302,7 +307,7 @@ int trip_cpu_windows_finish_row(trip_cpu_sheets *s)
     return status;
 }
 
-/* A sheet for runs that are of none at hand: those are complete. */
+/* Begins a kept sheet for the next runs. All sheets before it are complete. */
 static int begin_sheet(trip_cpu_sheets *s, int64_t number)
 {
     trip_cpu_windows *w = &s->windows;
