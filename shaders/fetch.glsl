@@ -105,19 +105,25 @@ uint normal_at(uint at)
 #endif
 
 #ifdef UNEVEN
-// Returns the difference in position between a voxel and the voxel at an offset from it (list
-// axes). Also sets the width of the second voxel.
+// Returns the difference in position between a voxel and the voxel at an offset from it along one
+// of the data's axes, and the width of the second voxel.
+real2 position_along(int axis, int origin, int offset)
+{
+    vec4 from = voxel_positions[3 * origin + axis], to = voxel_positions[3 * (origin + offset) + axis];
+    return real2((real(to.x) - real(from.x)) + (real(to.y) - real(from.y)), real(to.z) + real(to.w));
+}
+
+// Returns the difference in position along the list's axes, and sets the width of the second voxel.
+// There is no loop, because NVIDIA's linker (580.159) cannot write a component of a dvec3 by a
+// variable index.
 real3 position_offset(ivec3 origin, ivec3 offset, out real3 width)
 {
-    real3 apart;
-    for (int i = 0; i < 3; i++) {
-        int axis = (int(weight.z) + i) % 3;
-        vec4 from = voxel_positions[3 * origin[i] + axis];
-        vec4 to = voxel_positions[3 * (origin[i] + offset[i]) + axis];
-        apart[i] = (real(to.x) - real(from.x)) + (real(to.y) - real(from.y));
-        width[i] = real(to.z) + real(to.w);
-    }
-    return apart;
+    int axis = int(weight.z);
+    real2 x = position_along(axis, origin.x, offset.x);
+    real2 u = position_along((axis + 1) % 3, origin.y, offset.y);
+    real2 v = position_along((axis + 2) % 3, origin.z, offset.z);
+    width = real3(x.y, u.y, v.y);
+    return real3(x.x, u.x, v.x);
 }
 #endif
 

@@ -130,14 +130,23 @@ static long line_number_in(const char *line)
     return -1;
 }
 
-/* Reports the first error of a compiler's log with the original file and line. */
-static int fail_compile(const stage_text *t, const char *name, char *log)
+/* Returns the line of a log with the first error, or else the first line that is not empty, and
+ * ends it there. NVIDIA's linker begins its logs with a title. */
+static char *error_line(char *log)
 {
-    char *error = strstr(log, "error");
-    char *line = error ? error : log;
+    char *line = strstr(log, "error");
+    if (!line)
+        line = log + strspn(log, "\n");
     while (line > log && line[-1] != '\n')
         line--;
     line[strcspn(line, "\n")] = 0;
+    return line;
+}
+
+/* Reports the first error of a compiler's log with the original file and line. */
+static int fail_compile(const stage_text *t, const char *name, char *log)
+{
+    char *line = error_line(log), *error = strstr(line, "error");
     long number = line_number_in(line), file = number / LINES_PER_FILE;
     if (number < 0 || file >= t->files)
         return trip_fail(TRIP_ERROR, "gl", name, "the shader does not compile: %s", line);
@@ -179,8 +188,7 @@ static int link_program(GLuint program, const char *name)
         return TRIP_OK;
     char log[4096] = "";
     glGetProgramInfoLog(program, sizeof log, NULL, log);
-    log[strcspn(log, "\n")] = 0;
-    return trip_fail(TRIP_ERROR, "gl", name, "the shaders do not link: %s", log);
+    return trip_fail(TRIP_ERROR, "gl", name, "the shaders do not link: %s", error_line(log));
 }
 
 int trip_gl_program_build(GLuint *out, const trip_gl_program_source *source)
