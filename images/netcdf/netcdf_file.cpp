@@ -242,7 +242,7 @@ void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_by
                                              : "has no variable \"" + name + "\"");
     if (!(found.values > 0))
         throw trip_netcdf_error("its variable \"" + found.name +
-                                "\" has not three dimensions of numbers");
+                                "\" does not have three dimensions of numbers");
     group_ = found.group;
     variable_ = found.number;
     const std::vector<int> dimensions = dimensions_of(group_, variable_);

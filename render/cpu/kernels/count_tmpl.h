@@ -111,9 +111,8 @@ static void reaching(const trip_cpu_view *view, const trip_cpu_reach *reach,
     perspective persp = perspective_of(view);
     for (uint32_t i = 0; i < count; i += V) {
         position(view, staged, i, lanes);
-        vm precise = view->splat.camera.ortho
-                          ? v_ge(v_load(lanes->z + i), v_set(view->near))
-                          : footprint_of(&persp, view, lanes, NULL, i).precise;
+        vm precise = view->splat.camera.ortho ? v_ge(v_load(lanes->z + i), v_set(view->near))
+                                              : footprint_of(&persp, view, lanes, NULL, i).precise;
         unsigned front = vm_bits(vm_first(count - i)) &
                          ~vm_bits(v_ge(v_set(view->behind), v_load(lanes->z + i)));
         unsigned by_lanes = view->coordinates ? 0 : vm_bits(precise);

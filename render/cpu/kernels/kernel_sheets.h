@@ -1,5 +1,5 @@
-/* Data of the kernels for `post` (sheet.h): rasters of sheets, slices between sheets, the transfer
- * function's integrals, and the constants of a pass. */
+/* Data of the kernels for `post` (sheet.h): rasters of sheets, sample planes between sheets, the
+ * transfer function's integrals, and the constants of a pass. */
 #ifndef TRIP_CPU_SHEETS_H
 #define TRIP_CPU_SHEETS_H
 
@@ -36,9 +36,9 @@ typedef struct trip_cpu_gradient {
     int16_t along[3];
 } trip_cpu_gradient;
 
-/* A raster holds an aligned square of 64 x 64 voxels of a sheet or slice. It repeats the first
- * column and row of the rasters to the right and below, so that it holds all corners of its cells.
- * Kernels read and write vectors up to TRIP_CPU_RASTER_ROOM voxels past the last. */
+/* A raster holds an aligned square of 64 x 64 voxels of a sheet or sample plane. It repeats the
+ * first column and row of the rasters to the right and below, so that it holds all corners of its
+ * cells. Kernels read and write vectors up to TRIP_CPU_RASTER_ROOM voxels past the last. */
 #define TRIP_CPU_RASTER 64
 #define TRIP_CPU_RASTER_LOG2 6
 #define TRIP_CPU_RASTER_STRIDE (TRIP_CPU_RASTER + 2)
@@ -72,26 +72,27 @@ typedef struct trip_cpu_cells {
     uint64_t fours[TRIP_CPU_RASTER]; /* bitwise or of a row and the three below it */
 } trip_cpu_cells;
 
-/* A sheet or slice as a grid of `across` x `down` rasters (trip_cpu_group). `rasters` holds their
- * numbers in the pool. Number 0 is the raster in which every voxel is missing. The outermost
+/* A sheet or sample plane as a grid of `across` x `down` rasters (trip_cpu_group). `rasters` holds
+ * their numbers in the pool. Number 0 is the raster in which every voxel is missing. The outermost
  * rasters of the grid always have number 0. */
-typedef struct trip_cpu_slice {
+typedef struct trip_cpu_sample {
     const int32_t *rasters;
     double coordinate; /* along the list's axis, in voxels; with uneven spacing, a position
                           (coordinates.h) */
-    const struct trip_cpu_making *making; /* NULL if the whole slice is made */
-} trip_cpu_slice;
+    const struct trip_cpu_making *making; /* NULL if the whole sample plane is made */
+} trip_cpu_sample;
 
-/* State for making a sheet or slice on demand. Gradients of a sheet, and all voxels of a slice
- * between two sheets, are made square by square. The first thread that draws a ray through a square
- * makes it. Hidden and transparent squares are thus never made, and new data is in the cache of its
- * reader. */
+/* State for making a sheet or sample plane on demand. Gradients of a sheet, and all voxels of a
+ * sample plane between two sheets, are made square by square. The first thread that draws a ray
+ * through a square makes it. Hidden and transparent squares are thus never made, and new data is in
+ * the cache of its reader. */
 typedef struct trip_cpu_making {
     const int32_t *rasters;
     _Atomic uint64_t *begun, *made; /* bit masks of squares, one word per raster of the grid */
     /* For a sheet: the sheets before and behind it in index order, or NULL. */
     const int32_t *before, *behind;
-    /* For a slice: the sheets on both sides, and weights as in sheet_between(). NULL for a sheet.
+    /* For a sample plane: the sheets on both sides, and weights as in sheet_between(). NULL for a
+     * sheet.
      */
     const struct trip_cpu_making *from, *to;
     int32_t weights;
@@ -131,7 +132,7 @@ typedef struct trip_cpu_integrals {
     trip_cpu_closed_form closed;
 } trip_cpu_integrals;
 
-/* Maximum number of segments in a group. A group has one slice more than segments. */
+/* Maximum number of segments in a group. A group has one sample plane more than segments. */
 #define TRIP_CPU_SEGMENTS 64
 
 typedef struct trip_cpu_group {
@@ -139,7 +140,7 @@ typedef struct trip_cpu_group {
     int64_t first_u, first_v; /* voxel at the corner of the grid of rasters */
     int32_t across, down;
     unsigned segments;
-    trip_cpu_slice samples_per_sheet[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
+    trip_cpu_sample samples[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
     /* For each segment and raster of the grid: squares with a cell that may be visible, and these
      * cells. Cells are undefined for rasters without such squares. */
     const uint64_t *visible[TRIP_CPU_SEGMENTS];
@@ -148,8 +149,8 @@ typedef struct trip_cpu_group {
     bool leaps;                  /* at a sheet, rays may read gradients outside `needed` */
     const trip_cpu_about *about; /* for each segment; NULL selects the linear kernel */
     const uint64_t *some;        /* squares visible in any segment */
-    /* If set, only rays with a cell in [lo, hi) at the first slice are drawn. Units: voxels of the
-     * grid of rasters. */
+    /* If set, only rays with a cell in [lo, hi) at the first sample plane are drawn. Units: voxels
+     * of the grid of rasters. */
     bool windowed;
     int32_t lo[2], hi[2];
 } trip_cpu_group;

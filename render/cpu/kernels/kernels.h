@@ -265,8 +265,8 @@ typedef uint32_t trip_cpu_project_kernel(const trip_cpu_view *view, const _Atomi
                                          const trip_cpu_staged *staged, uint32_t count,
                                          trip_cpu_lanes *lanes, trip_cpu_splat *out, float *depths);
 
-/* Composites the segments of a group of slices into a pane's pixels. Returns the pane's open texels
- * as a word of trip_cpu_mask. */
+/* Composites the segments of a group of sample planes into a pane's pixels. Returns the pane's open
+ * texels as a word of trip_cpu_mask. */
 typedef uint64_t trip_cpu_sheet_kernel(const trip_cpu_sheet_view *view, const trip_cpu_group *group,
                                        int x, int y, float *pixels);
 

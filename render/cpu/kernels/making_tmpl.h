@@ -1,8 +1,8 @@
-/* Makes squares of sheets and slices when rays first meet them (trip_cpu_making). Included by
- * sheet_tmpl.h. One thread makes each square; other threads that need it wait.
+/* Makes squares of sheets and sample planes when rays first meet them (trip_cpu_making). Included
+ * by sheet_tmpl.h. One thread makes each square; other threads that need it wait.
  *
- * Deadlock is impossible: slices wait for sheets only, and a square of a sheet waits only for
- * squares to its right and below. */
+ * Deadlock is impossible: sample planes wait for sheets only, and a square of a sheet waits only
+ * for squares to its right and below. */
 #ifndef TRIP_CPU_MAKING_H
 #define TRIP_CPU_MAKING_H
 
@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "cpu/kernels/kernel_sheets.h"
-#include "cpu/kernels/slice_tmpl.h"
+#include "cpu/kernels/sample_tmpl.h"
 
 static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients,
                          size_t at, uint64_t squares);
@@ -100,12 +100,13 @@ INLINE uint64_t squares_from_to(int32_t u0, int32_t u1, int32_t v0, int32_t v1)
     return columns * TRIP_CPU_COLUMN_0 & rows;
 }
 
-/* Makes the squares of a slice. A sheet has its codes from the start and needs at most gradients.
+/* Makes the squares of a sample plane. A sheet has its codes from the start and needs at most
+ * gradients.
  */
-static void make_slice(const trip_cpu_group *g, bool gradients, unsigned slice, size_t at,
-                       uint64_t squares, uint64_t needed)
+static void make_sample(const trip_cpu_group *g, bool gradients, unsigned sample, size_t at,
+                        uint64_t squares, uint64_t needed)
 {
-    const trip_cpu_making *m = g->samples_per_sheet[slice].making;
+    const trip_cpu_making *m = g->samples[sample].making;
     if (m->rasters[at] && (gradients || m->from))
         make_squares(g, m, gradients, at, g->leaps && !m->from ? squares : squares & needed);
 }
@@ -123,7 +124,7 @@ static void make_segment(const trip_cpu_group *g, bool gradients, cell_box box, 
             const uint64_t squares =
                 squares_from_to(u & last, end_u & last, v & last, end_v & last);
             for (unsigned n = segment; n <= segment + 1; n++)
-                make_slice(g, gradients, n, at, squares, g->needed[segment][at]);
+                make_sample(g, gradients, n, at, squares, g->needed[segment][at]);
         }
     }
 }

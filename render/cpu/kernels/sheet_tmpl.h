@@ -1,10 +1,10 @@
-/* Draws a group of slices into the pixels of a pane (sheet.h). Included by table_tmpl.h after
- * merge_tmpl.h. For each patch of 8 x 8 pixels the kernel finds the segments that may be visible.
- * Each stamp then composites them in order, with its pixels in registers.
+/* Draws a group of sample planes into the pixels of a pane (sheet.h). Included by table_tmpl.h
+ * after merge_tmpl.h. For each patch of 8 x 8 pixels the kernel finds the segments that may be
+ * visible. Each stamp then composites them in order, with its pixels in registers.
  *
- * Positions are computed from the pane's corner at each slice, so that they do not depend on the
- * grouping of slices or the layout of rasters. With TRIP_CPU_CLOSED segments have a closed form
- * (closed_form.h). */
+ * Positions are computed from the pane's corner at each sample plane, so that they do not depend on
+ * the grouping of sample planes or the layout of rasters. With TRIP_CPU_CLOSED segments have a
+ * closed form (closed_form.h). */
 #ifndef TRIP_CPU_SHEET_H
 #define TRIP_CPU_SHEET_H
 
@@ -15,8 +15,8 @@
 #include "shade.h"
 #include "sheet.h"
 
-/* Room for the slices of a group in whole vectors. */
-#define SLICES_ROOM (TRIP_CPU_SEGMENTS + V)
+/* Room for the sample planes of a group in whole vectors. */
+#define SAMPLES_ROOM (TRIP_CPU_SEGMENTS + V)
 
 /* The weights of a cell's corners are integers with the sum 2^WEIGHT_LOG2. */
 #define WEIGHT_LOG2 14
@@ -36,15 +36,15 @@ INLINE vf exp_of_minus(vf x)
     return v_from_bits(v_bits(p) + (v_truncate(whole) << 23));
 }
 
-/* ---- the pane's rays at the slices ---- */
+/* ---- the pane's rays at the sample planes ---- */
 
-/* The rays' positions at the slices, in voxels from the corner of the grid of rasters. */
+/* The rays' positions at the sample planes, in voxels from the corner of the grid of rasters. */
 typedef struct pane_path {
     /* The ray of a lane is at base + first + along * slope + shift, with slope and shift of
      * stamp_rays. `along` is counted from the eye, or from sheet 0 in parallel views. */
-    int32_t base[2][SLICES_ROOM];
-    float first[2][SLICES_ROOM];
-    float along[SLICES_ROOM];
+    int32_t base[2][SAMPLES_ROOM];
+    float first[2][SAMPLES_ROOM];
+    float along[SAMPLES_ROOM];
     float middle[TRIP_CPU_SEGMENTS + 1]; /* sheets from the grid's middle, exact for a far eye */
     float sheets[TRIP_CPU_SEGMENTS];     /* length of each segment, in sheets */
     double slope[2], start[2];           /* of the ray at the pane's corner */
@@ -232,12 +232,12 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
         path->start[a] = b.start[0][a];
     }
     for (unsigned n = 0; n <= g->segments; n++) {
-        double along = from_start(view, g->samples_per_sheet[n].coordinate);
+        double along = from_start(view, g->samples[n].coordinate);
         path->along[n] = (float)along;
-        path->middle[n] = (float)(g->samples_per_sheet[n].coordinate - view->middle);
+        path->middle[n] = (float)(g->samples[n].coordinate - view->middle);
         if (n > 0)
-            path->sheets[n - 1] = (float)fabs(g->samples_per_sheet[n].coordinate -
-                                              g->samples_per_sheet[n - 1].coordinate);
+            path->sheets[n - 1] =
+                (float)fabs(g->samples[n].coordinate - g->samples[n - 1].coordinate);
         for (int a = 0; a < 2; a++) {
             double bounds[2];
             beam_bounds(&b, a, along, bounds);
@@ -340,10 +340,10 @@ typedef struct cell_box {
     int32_t lo[2], hi[2];
 } cell_box;
 
-/* The boxes of cells that rays meet at each slice, or in each segment, clamped to the grid of
- * rasters. */
+/* The boxes of cells that rays meet at each sample plane, or in each segment, clamped to the grid
+ * of rasters. */
 typedef struct cell_boxes {
-    int32_t lo[2][SLICES_ROOM], hi[2][SLICES_ROOM];
+    int32_t lo[2][SAMPLES_ROOM], hi[2][SAMPLES_ROOM];
 } cell_boxes;
 
 /* Converts a position to voxels from the corner of the grid of rasters, at most a cell outside the
@@ -374,7 +374,7 @@ static vi uneven_cells(const pane_path *path, int a, unsigned n, vf at)
     return cells;
 }
 
-/* Returns the cells at V slices. `at` is relative to pane_path.base. */
+/* Returns the cells at V sample planes. `at` is relative to pane_path.base. */
 INLINE vi cells_from_base(const pane_path *path, int a, unsigned n, vf at)
 {
     if (is_uneven(path))
@@ -382,8 +382,8 @@ INLINE vi cells_from_base(const pane_path *path, int a, unsigned n, vf at)
     return vi_load(path->base[a] + n) + v_floor_within(at);
 }
 
-/* Computes the boxes at the slices from `first` to `last`. The boxes are slightly enlarged to cover
- * the rounding of single precision. */
+/* Computes the boxes at the sample planes from `first` to `last`. The boxes are slightly enlarged
+ * to cover the rounding of single precision. */
 static void find_boxes(const trip_cpu_group *g, const pane_path *path, const ray_bounds *r,
                        unsigned first, unsigned last, cell_boxes *out)
 {
@@ -428,16 +428,16 @@ INLINE cell_box box_of_segment(const cell_boxes *of, unsigned n)
 }
 
 /* Computes the boxes of the segments from `first` to `last`: each is the union of the boxes at its
- * two slices. */
-static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *samples_per_sheet,
+ * two sample planes. */
+static void find_segment_boxes(unsigned first, unsigned last, const cell_boxes *samples,
                                cell_boxes *out)
 {
     for (unsigned n = first / V * V; n <= last; n += V)
         for (int a = 0; a < 2; a++) {
-            vi_store(out->lo[a] + n, vi_lesser(vi_load(samples_per_sheet->lo[a] + n),
-                                               vi_load(samples_per_sheet->lo[a] + n + 1)));
-            vi_store(out->hi[a] + n, vi_greater(vi_load(samples_per_sheet->hi[a] + n),
-                                                vi_load(samples_per_sheet->hi[a] + n + 1)));
+            vi_store(out->lo[a] + n,
+                     vi_lesser(vi_load(samples->lo[a] + n), vi_load(samples->lo[a] + n + 1)));
+            vi_store(out->hi[a] + n,
+                     vi_greater(vi_load(samples->hi[a] + n), vi_load(samples->hi[a] + n + 1)));
         }
 }
 
@@ -497,9 +497,9 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 
 typedef struct patch_path {
     uint64_t segments; /* segments that may be visible */
-    /* For each slice: the raster that contains all rays of the patch, as an offset in the pool. It
-     * is -1 if several rasters or none contain them. `within` is the position of pane_path.base in
-     * this raster. */
+    /* For each sample plane: the raster that contains all rays of the patch, as an offset in the
+     * pool. It is -1 if several rasters or none contain them. `within` is the position of
+     * pane_path.base in this raster. */
     int32_t raster[TRIP_CPU_SEGMENTS + 1], within[TRIP_CPU_SEGMENTS + 1];
 } patch_path;
 
@@ -519,7 +519,7 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
     if (!whole || u != boxes->hi[0][n] >> log2 || v != boxes->hi[1][n] >> log2 ||
         !is_within(g, u, v))
         return;
-    area->raster[n] = g->samples_per_sheet[n].rasters[v * g->across + u] * RASTER_NUMBERS;
+    area->raster[n] = g->samples[n].rasters[v * g->across + u] * RASTER_NUMBERS;
     area->within[n] =
         (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
@@ -534,13 +534,13 @@ static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group 
                           const pane_path *path, int x, int y, pane_segments *out)
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
-    cell_boxes samples_per_sheet;
+    cell_boxes samples;
     out->some = 0;
-    out->made = g->samples_per_sheet[0].making ? 0 : UINT64_MAX;
-    find_boxes(g, path, &r, 0, g->segments, &samples_per_sheet);
-    if (!some_square_of(g, g->some, both_boxes(&samples_per_sheet, 0, g->segments)))
+    out->made = g->samples[0].making ? 0 : UINT64_MAX;
+    find_boxes(g, path, &r, 0, g->segments, &samples);
+    if (!some_square_of(g, g->some, both_boxes(&samples, 0, g->segments)))
         return;
-    find_segment_boxes(0, g->segments - 1, &samples_per_sheet, &out->boxes);
+    find_segment_boxes(0, g->segments - 1, &samples, &out->boxes);
     for (unsigned n = 0; n < g->segments; n++)
         if (some_square_of(g, g->visible[n], box_of_segment(&out->boxes, n)))
             out->some |= UINT64_C(1) << n;
@@ -552,11 +552,11 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, 8);
     unsigned placed = UINT32_MAX;
-    cell_boxes samples_per_sheet, boxes;
+    cell_boxes samples, boxes;
     const unsigned first = (unsigned)__builtin_ctzll(segments);
     const unsigned last = 63 - (unsigned)__builtin_clzll(segments);
-    find_boxes(g, path, &r, first, last + 1, &samples_per_sheet);
-    find_segment_boxes(first, last, &samples_per_sheet, &boxes);
+    find_boxes(g, path, &r, first, last + 1, &samples);
+    find_segment_boxes(first, last, &samples, &boxes);
     area->segments = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
@@ -565,13 +565,13 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             continue;
         area->segments |= UINT64_C(1) << n;
         if (placed != n)
-            find_raster(g, path, n, r.whole, &samples_per_sheet, area);
-        find_raster(g, path, n + 1, r.whole, &samples_per_sheet, area);
+            find_raster(g, path, n, r.whole, &samples, area);
+        find_raster(g, path, n + 1, r.whole, &samples, area);
         placed = n + 1;
     }
 }
 
-/* ---- rays at a slice ---- */
+/* ---- rays at a sample plane ---- */
 
 /* Unit vectors in world space: to the light, and halfway between light and eye. */
 typedef struct light_way {
@@ -599,7 +599,7 @@ INLINE vm vi_is_0(vi a)
 #endif
 }
 
-/* The cells of the rays at a slice, relative to pane_path.base. */
+/* The cells of the rays at a sample plane, relative to pane_path.base. */
 typedef struct corners {
     vi whole[2];
     vf part[2]; /* position in the cell, 0 to 1 */
@@ -654,9 +654,9 @@ typedef struct wide_position {
     float part[2][V], between;
 } wide_position;
 
-/* The samples of the rays at a slice. `index` is the entry of the transfer function's integrals
- * nearest to the code. With TRIP_CPU_CLOSED it is the biased code times 2^WEIGHT_LOG2. Gradients
- * and sums are computed from the other fields on demand. */
+/* The samples of the rays at a sample plane. `index` is the entry of the transfer function's
+ * integrals nearest to the code. With TRIP_CPU_CLOSED it is the biased code times 2^WEIGHT_LOG2.
+ * Gradients and sums are computed from the other fields on demand. */
 typedef struct sample {
     vi index;
     vm there;            /* all corners are present */
@@ -734,8 +734,7 @@ INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const p
     } else {
         find_cells(g, path, n, c, whole);
     }
-    vi in = position_in_raster(whole),
-       from = raster_starts(g, g->samples_per_sheet[n].rasters, whole);
+    vi in = position_in_raster(whole), from = raster_starts(g, g->samples[n].rasters, whole);
     s->gradient_at = from + (in * 3 + GRADIENTS_FROM);
     return from + in;
 }
@@ -968,8 +967,8 @@ INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
     out->summed = false;
 }
 
-/* Computes the rays' positions `further` sheets beyond slice n, in the list's voxels. With uneven
- * spacing the units are positions of trip_coordinates. */
+/* Computes the rays' positions `further` sheets beyond sample plane n, in the list's voxels. With
+ * uneven spacing the units are positions of trip_coordinates. */
 INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
                          unsigned n, vf further, vf at[3])
 {
@@ -981,7 +980,7 @@ INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const s
         at[a] = v_fma(l->slope[a], v_set(path->along[n]), v_set(first) + l->shift[a]);
         at[a] = v_fma(slope, further, at[a]);
     }
-    at[2] = v_set((float)g->samples_per_sheet[n].coordinate) + further;
+    at[2] = v_set((float)g->samples[n].coordinate) + further;
 }
 
 /* Composites a segment behind the pixels' contents. Returns false if it is visible in none of the
@@ -1127,7 +1126,7 @@ static void find_rays(const trip_cpu_sheet_view *view, const pane_path *path, un
     clip_rays(view, path, x, y, l);
 }
 
-/* Returns the rays with a cell in the group's window at the first slice. */
+/* Returns the rays with a cell in the group's window at the first sample plane. */
 INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l)
 {
     corners c = cells_at(path, l, 0);
@@ -1148,7 +1147,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     vf pixel[CHANNELS];
     sample ends[2];
     wide_position positions[2];
-    unsigned sampled = UINT32_MAX; /* the slice sampled in ends[sampled % 2] */
+    unsigned sampled = UINT32_MAX; /* the sample plane sampled in ends[sampled % 2] */
     for (int k = 0; k < CHANNELS; k++)
         pixel[k] = v_load(stamp + k * V);
     for (int i = 0; i < 4 && is_uneven(path); i++)

@@ -14,7 +14,7 @@
 #include "cpu/kernels/project_tmpl.h"
 #include "cpu/kernels/sheet_tmpl.h"
 #include "cpu/kernels/simd_tmpl.h"
-#include "cpu/kernels/slice_tmpl.h"
+#include "cpu/kernels/sample_tmpl.h"
 #include "cpu/kernels/squares_tmpl.h"
 #include "cpu/kernels/sum_tmpl.h"
 

@@ -92,8 +92,8 @@ static double interpolated_code(const trip_cpu_sheet_view *view, const wide_posi
     return (double)corner + (double)sum;
 }
 
-/* Computes the positions of the rays at slice n, in cells of a segment. A ray at the last voxels of
- * the grid counts as inside the last cell. */
+/* Computes the positions of the rays at sample plane n, in cells of a segment. A ray at the last
+ * voxels of the grid counts as inside the last cell. */
 INLINE void find_wide_positions(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                                 const pane_path *path, const stamp_rays *l, unsigned n,
                                 unsigned segment, wide_position *p)
@@ -103,7 +103,7 @@ INLINE void find_wide_positions(const trip_cpu_sheet_view *view, const trip_cpu_
     vi whole[2];
     find_cells(g, path, n, &c, whole);
     p->about = &g->about[segment];
-    p->between = (float)(g->samples_per_sheet[n].coordinate - (double)p->about->number);
+    p->between = (float)(g->samples[n].coordinate - (double)p->about->number);
     for (int a = 0; a < 2; a++) {
         vi_store(p->cell[a], whole[a]);
         v_store(p->part[a], c.part[a]);

@@ -1,7 +1,7 @@
-/* Codes of sheets. Sheets and slices store integer codes. If a data set uses few of the 65536
- * codes, a power of two stretches them. So rounding changes a value by at most 1/32768 of the range
- * of values. Samples that use every fourth code (TRIP_CPU_ENTRIES) change by at most 1/16384. Pure
- * functions. */
+/* Codes of sheets. Sheets and sample planes store integer codes. If a data set uses few of the
+ * 65536 codes, a power of two stretches them. So rounding changes a value by at most 1/32768 of the
+ * range of values. Samples that use every fourth code (TRIP_CPU_ENTRIES) change by at most 1/16384.
+ * Pure functions. */
 #ifndef TRIP_CPU_SHEETS_CODES_H
 #define TRIP_CPU_SHEETS_CODES_H
 

@@ -137,9 +137,9 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const tr
                        uint64_t room)
 {
     const unsigned fewest = (unsigned)in_a_row(s->of->frame) + 1;
-    s->slice_rasters = need->of_sheet * (uint64_t)s->of->frame->settings->samples_per_sheet;
-    const uint64_t min = need->rasters + s->slice_rasters;
-    const uint64_t max = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SLICES_MAX);
+    s->sample_rasters = need->of_sheet * (uint64_t)s->of->frame->settings->samples_per_sheet;
+    const uint64_t min = need->rasters + s->sample_rasters;
+    const uint64_t max = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SAMPLES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
     while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * min) > room)
         sheets--;
@@ -349,9 +349,10 @@ static trip_cpu_about about_of(const trip_cpu_sheets *s, int i)
     };
 }
 
-/* Adds a slice at `index` of the axis to the group. Unless it is the group's first slice, this ends
- * a segment between held[i] and held[i + 1]. */
-static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index, int i, bool first)
+/* Adds a sample plane at `index` of the axis to the group. Unless it is the group's first sample
+ * plane, this ends a segment between held[i] and held[i + 1]. */
+static void add_sample(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index, int i,
+                       bool first)
 {
     const double coordinate = trip_coordinates_position(s->store.coordinates, s->axis, index);
     trip_cpu_group *g = &s->group;
@@ -364,43 +365,43 @@ static void add_slice(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index
             s->about[g->segments] = about_of(s, i);
         g->segments++;
     }
-    g->samples_per_sheet[g->segments] =
-        (trip_cpu_slice){ at->rasters, coordinate,
-                          trip_cpu_sheets_at_once(s) ? NULL : &at->making };
+    g->samples[g->segments] = (trip_cpu_sample){ at->rasters, coordinate,
+                                                 trip_cpu_sheets_at_once(s) ? NULL : &at->making };
 }
 
-/* The slices of a group. They are cleared or cut after all of them have rasters. */
+/* The sample planes of a group. They are cleared or cut after all of them have rasters. */
 typedef struct cutting {
-    trip_cpu_sheet_work work[TRIP_CPU_SLICES_MAX];
+    trip_cpu_sheet_work work[TRIP_CPU_SAMPLES_MAX];
     unsigned count;
 } cutting;
 
-/* Adds a slice between held[i] and held[i + 1], with weight `part` for held[i + 1]. Returns false
- * if the pool is full. Kernels of 64 voxels read the sheets, so they need no rasters for slices. */
-static bool take_slice(trip_cpu_sheets *s, int i, double part, bool first, cutting *cut)
+/* Adds a sample plane between held[i] and held[i + 1], with weight `part` for held[i + 1]. Returns
+ * false if the pool is full. Kernels of 64 voxels read the sheets, so they need no rasters for
+ * sample planes. */
+static bool take_sample(trip_cpu_sheets *s, int i, double part, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
-    trip_cpu_sheet *slice = &s->store.samples_per_sheet[cut->count];
+    trip_cpu_sheet *sample = &s->store.samples[cut->count];
     const double index = (double)from->number + part * (double)s->way;
     if (is_wide(s)) {
-        add_slice(s, from, index, i, first);
+        add_sample(s, from, index, i, first);
         return true;
     }
     const int32_t weight = (int32_t)lrint(part * 16384);
-    const trip_cpu_sheet_work w = { .sheet = slice, .other = from, .third = to };
-    if (!trip_cpu_store_take_slice(&s->store, &w))
+    const trip_cpu_sheet_work w = { .sheet = sample, .other = from, .third = to };
+    if (!trip_cpu_store_take_sample(&s->store, &w))
         return false;
-    slice->making.from = &from->making;
-    slice->making.to = &to->making;
-    slice->making.weights = weight << 16 | (16384 - weight);
+    sample->making.from = &from->making;
+    sample->making.to = &to->making;
+    sample->making.weights = weight << 16 | (16384 - weight);
     cut->work[cut->count++] = w;
-    add_slice(s, slice, index, i, first);
+    add_sample(s, sample, index, i, first);
     return true;
 }
 
-/* Adds the slices between held[i] and held[i + 1], and held[i + 1] itself. The first interval of a
- * group starts at held[i], or at the eye if it lies between both sheets. Returns false and adds
- * nothing if the pool is full. */
+/* Adds the sample planes between held[i] and held[i + 1], and held[i + 1] itself. The first
+ * interval of a group starts at held[i], or at the eye if it lies between both sheets. Returns
+ * false and adds nothing if the pool is full. */
 static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
@@ -410,18 +411,18 @@ static bool take_interval(trip_cpu_sheets *s, int i, bool first, cutting *cut)
     double eye = s->view.ortho ? 0 : (s->eye - (double)from->number) * (double)s->way;
     bool fits = true;
     if (first && eye <= 0)
-        add_slice(s, from, (double)from->number, i, true);
+        add_sample(s, from, (double)from->number, i, true);
     else if (first)
-        fits = take_slice(s, i, eye, true, cut);
+        fits = take_sample(s, i, eye, true, cut);
     for (int n = 1; n < samples_per_sheet && fits; n++)
         if (n > eye * samples_per_sheet)
-            fits = take_slice(s, i, (double)n / samples_per_sheet, false, cut);
+            fits = take_sample(s, i, (double)n / samples_per_sheet, false, cut);
     if (fits) {
-        add_slice(s, to, (double)to->number, i, false);
+        add_sample(s, to, (double)to->number, i, false);
         return true;
     }
     while (cut->count > count_before)
-        trip_cpu_store_drop(&s->store, &s->store.samples_per_sheet[--cut->count]);
+        trip_cpu_store_drop(&s->store, &s->store.samples[--cut->count]);
     s->group = before;
     return false;
 }
@@ -512,11 +513,11 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     if (trip_cpu_sheets_at_once(s))
         trip_cpu_store_cut(&s->store, cut.work, cut.count);
     else
-        trip_cpu_store_clear_samples_per_sheet(&s->store, cut.work, cut.count);
+        trip_cpu_store_clear_samples(&s->store, cut.work, cut.count);
     draw_panes(s);
     trip_cpu_open_squares_forget(s);
     while (cut.count > 0)
-        trip_cpu_store_drop(&s->store, &s->store.samples_per_sheet[--cut.count]);
+        trip_cpu_store_drop(&s->store, &s->store.samples[--cut.count]);
 }
 
 /* Draws the intervals that depend only on the complete sheets. If `all`, no sheet follows and all
@@ -585,8 +586,8 @@ static int finish_row(trip_cpu_sheets *s)
 }
 
 /* Returns whether to draw the held sheets before another begins. This is so if there is no room for
- * more, or if the sheets and their slices exceed the cache. Large sheets are then drawn a few at a
- * time, and the sheets behind are culled earlier. */
+ * more, or if the sheets and their sample planes exceed the cache. Large sheets are then drawn a
+ * few at a time, and the sheets behind are culled earlier. */
 static bool are_enough(const trip_cpu_sheets *s)
 {
     const int fewest = in_a_row(s->of->frame) + 2;
@@ -621,14 +622,14 @@ static int begin_sheet(trip_cpu_sheets *s, int64_t number)
     return 0;
 }
 
-/* Takes a raster for the last sheet. Returns false if only the rasters set aside for slices are
- * left. */
+/* Takes a raster for the last sheet. Returns false if only the rasters set aside for sample planes
+ * are left. */
 static bool take_raster(trip_cpu_sheets *s, size_t at)
 {
     trip_cpu_sheet *sheet = sheet_of(s, s->count - 1);
     if (s->taken_count == TRIP_CPU_SHEETS_TAKEN)
         decode_runs(s);
-    if (s->store.free_count <= s->slice_rasters || !trip_cpu_store_take(&s->store, sheet, at))
+    if (s->store.free_count <= s->sample_rasters || !trip_cpu_store_take(&s->store, sheet, at))
         return false;
     s->taken[s->taken_count++] = sheet->rasters[at];
     return true;

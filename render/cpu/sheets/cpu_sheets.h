@@ -1,7 +1,7 @@
 /* Draws frames in `post` (sheet.h). The runs of a pass become sheets. As soon as some consecutive
- * sheets are complete, they are cut into slices, drawn into the panes and dropped. A pixel depends
- * only on the slices, never on how many are drawn at a time. The renderer owns the object; its
- * thread calls all functions. */
+ * sheets are complete, they are cut into sample planes, drawn into the panes and dropped. A pixel
+ * depends only on the sample planes, never on how many are drawn at a time. The renderer owns the
+ * object; its thread calls all functions. */
 #ifndef TRIP_CPU_SHEETS_SHEETS_H
 #define TRIP_CPU_SHEETS_SHEETS_H
 

@@ -33,8 +33,8 @@ struct trip_cpu_sheets {
      * up to held[front] is drawn. Interpolation still reads the sheets before held[front]. */
     int held[TRIP_CPU_SHEETS_MAX];
     int front;
-    int count, max;         /* number of held sheets, and its maximum */
-    uint64_t slice_rasters; /* rasters set aside for slices */
+    int count, max;          /* number of held sheets, and its maximum */
+    uint64_t sample_rasters; /* rasters set aside for sample planes */
     const trip_batch *batch;
     trip_cpu_sheet_run runs[TRIP_CPU_SHEETS_RUNS]; /* runs to decode */
     unsigned run_count;
@@ -58,8 +58,8 @@ bool trip_cpu_sheets_are_ahead(const trip_cpu_sheets *s, int64_t to);
 /* Returns whether the ends of a segment may lie in cells that do not touch. Then a segment may be
  * visible although neither of its two cells is. */
 bool trip_cpu_sheets_leap(const trip_cpu_sheets *s);
-/* Returns whether sheets and slices are made completely before drawing, instead of on demand. True
- * for uneven spacing and for kernels of 64 voxels. */
+/* Returns whether sheets and sample planes are made completely before drawing, instead of on
+ * demand. True for uneven spacing and for kernels of 64 voxels. */
 bool trip_cpu_sheets_at_once(const trip_cpu_sheets *s);
 /* Finds the gradients of sheets, or sets up making them on demand. work[i].other and .third are the
  * neighbours. */

@@ -77,10 +77,10 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->needed = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->needed);
         at = lay_out_making(sheet, memory, at, grid);
     }
-    for (int i = 0; i < TRIP_CPU_SLICES_MAX; i++) {
-        trip_cpu_sheet *slice = &s->samples_per_sheet[i];
-        slice->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *slice->rasters);
-        at = lay_out_making(slice, memory, at, grid);
+    for (int i = 0; i < TRIP_CPU_SAMPLES_MAX; i++) {
+        trip_cpu_sheet *sample = &s->samples[i];
+        sample->rasters = trip_cpu_take_array(memory, &at, grid * sizeof *sample->rasters);
+        at = lay_out_making(sample, memory, at, grid);
     }
     s->some = trip_cpu_take_array(memory, &at, grid * sizeof *s->some);
     s->open = trip_cpu_take_array(memory, &at, grid * sizeof *s->open);
@@ -553,7 +553,7 @@ void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work 
         work[i].sheet->shaded = true;
 }
 
-bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *w)
+bool trip_cpu_store_take_sample(trip_cpu_store *s, const trip_cpu_sheet_work *w)
 {
     for (int32_t v = 1; v < s->down - 1; v++)
         for (int32_t u = 1; u < s->across - 1; u++) {
@@ -573,8 +573,8 @@ static void clear_raster(const work_job *job, const trip_cpu_sheet_work *w, size
     trip_cpu_store_clear(job->store, w->sheet->rasters[at]);
 }
 
-void trip_cpu_store_clear_samples_per_sheet(trip_cpu_store *s, const trip_cpu_sheet_work *work,
-                                            unsigned count)
+void trip_cpu_store_clear_samples(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                  unsigned count)
 {
     run_work(&(work_job){ .store = s, .work = work, .each = clear_raster }, count);
 }

@@ -1,6 +1,6 @@
-/* The store holds sheets and slices as rasters of voxels from a pool of fixed size. Rasters are
- * decoded from runs, and repeat the first voxels of their neighbours. The renderer's thread owns
- * the store. A function that starts a job returns after the job has ended. */
+/* The store holds sheets and sample planes as rasters of voxels from a pool of fixed size. Rasters
+ * are decoded from runs, and repeat the first voxels of their neighbours. The renderer's thread
+ * owns the store. A function that starts a job returns after the job has ended. */
 #ifndef TRIP_CPU_SHEETS_STORE_H
 #define TRIP_CPU_SHEETS_STORE_H
 
@@ -23,8 +23,8 @@ enum {
 };
 typedef uint64_t trip_cpu_edges[TRIP_CPU_EDGES];
 
-/* A sheet, or a slice between two sheets. A slice has only `rasters` and `making`. Arrays have one
- * entry for each raster of the grid. */
+/* A sheet, or a sample plane between two sheets. A sample plane has only `rasters` and `making`.
+ * Arrays have one entry for each raster of the grid. */
 typedef struct trip_cpu_sheet {
     int64_t number;                 /* index of the sheet in its list */
     int32_t *rasters;               /* numbers in the pool; 0 stands for absent */
@@ -39,8 +39,8 @@ typedef struct trip_cpu_sheet {
 } trip_cpu_sheet;
 
 enum {
-    TRIP_CPU_SHEETS_MAX = 20,                /* sheets in memory at a time */
-    TRIP_CPU_SLICES_MAX = TRIP_CPU_SEGMENTS, /* slices in memory at a time */
+    TRIP_CPU_SHEETS_MAX = 20,                 /* sheets in memory at a time */
+    TRIP_CPU_SAMPLES_MAX = TRIP_CPU_SEGMENTS, /* sample planes in memory at a time */
 };
 
 /* A rectangle of rasters along u and v, inclusive. */
@@ -67,7 +67,7 @@ typedef struct trip_cpu_store {
     char *grids; /* memory of the arrays below */
     size_t grids_bytes;
     unsigned sheet_room; /* number of sheets with memory */
-    trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], samples_per_sheet[TRIP_CPU_SLICES_MAX];
+    trip_cpu_sheet sheets[TRIP_CPU_SHEETS_MAX], samples[TRIP_CPU_SAMPLES_MAX];
     uint64_t *some; /* squares visible in any segment of the group */
     uint64_t *open; /* squares to decode in the current sheet; at first all */
 } trip_cpu_store;
@@ -105,7 +105,7 @@ static inline size_t trip_cpu_store_grid(const trip_cpu_store *s)
 bool trip_cpu_store_take(trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at);
 /* Marks all voxels of a raster as missing. Any thread may call it. */
 void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster);
-/* Returns all rasters of a sheet or slice to the pool. */
+/* Returns all rasters of a sheet or sample plane to the pool. */
 void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 
 /* Decodes a run's voxels into the open squares of a sheet's present rasters. Several threads may
@@ -113,11 +113,12 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet);
 void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
                            const trip_block *block, const trip_run *run);
 
-/* One sheet or slice of a job, with its neighbours. A job handles several, raster by raster. */
+/* One sheet or sample plane of a job, with its neighbours. A job handles several, raster by raster.
+ */
 typedef struct trip_cpu_sheet_work {
     trip_cpu_sheet *sheet;
-    /* For cells, `other` is the next sheet. For slices, these are the sheets on both sides. For
-     * gradients, these are the sheets before and after in index order; NULL stands for none. */
+    /* For cells, `other` is the next sheet. For sample planes, these are the sheets on both sides.
+     * For gradients, these are the sheets before and after in index order; NULL stands for none. */
     const trip_cpu_sheet *other, *third;
     /* For cells and kernels of 64 voxels: the sheets before `sheet` and behind `other`, in draw
      * order; NULL stands for none. */
@@ -137,12 +138,13 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
 /* Finds all gradients of prepared sheets. */
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,
                                    unsigned count);
-/* Takes the needed rasters for a slice between two sheets. Returns false and takes none if the pool
- * is full. */
-bool trip_cpu_store_take_slice(trip_cpu_store *s, const trip_cpu_sheet_work *work);
-/* The first function marks all voxels of slices as missing, the second one interpolates them. */
-void trip_cpu_store_clear_samples_per_sheet(trip_cpu_store *s, const trip_cpu_sheet_work *work,
-                                            unsigned count);
+/* Takes the needed rasters for a sample plane between two sheets. Returns false and takes none if
+ * the pool is full. */
+bool trip_cpu_store_take_sample(trip_cpu_store *s, const trip_cpu_sheet_work *work);
+/* The first function marks all voxels of sample planes as missing, the second one interpolates
+ * them. */
+void trip_cpu_store_clear_samples(trip_cpu_store *s, const trip_cpu_sheet_work *work,
+                                  unsigned count);
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count);
 
 #endif

@@ -31,10 +31,10 @@ static trip_cpu_rasters at_hand(const trip_cpu_rasters *all, const int64_t size[
     return b;
 }
 
-static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_samples_per_sheet)
+static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_samples)
 {
     return (uint64_t)((b->last[0] - b->first[0] + 1) * (b->last[1] - b->first[1] + 1)) *
-           (uint64_t)sheets_and_samples_per_sheet;
+           (uint64_t)sheets_and_samples;
 }
 
 static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,

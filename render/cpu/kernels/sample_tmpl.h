@@ -1,9 +1,9 @@
-/* Prepares the rasters of sheets: ranges of codes, gradients, slices between sheets. Included by
- * table_tmpl.h after simd_tmpl.h. A vector here has eight numbers of 16 bits, one row of a square.
- * tests/render/test_cpu_sheets.c checks that all instruction sets give the same numbers. Functions
- * with several callers are not inlined, so that profilers show their cost. */
-#ifndef TRIP_CPU_SLICE_H
-#define TRIP_CPU_SLICE_H
+/* Prepares the rasters of sheets: ranges of codes, gradients, sample planes between sheets.
+ * Included by table_tmpl.h after simd_tmpl.h. A vector here has eight numbers of 16 bits, one row
+ * of a square. tests/render/test_cpu_sheets.c checks that all instruction sets give the same
+ * numbers. Functions with several callers are not inlined, so that profilers show their cost. */
+#ifndef TRIP_CPU_SAMPLE_H
+#define TRIP_CPU_SAMPLE_H
 
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"
