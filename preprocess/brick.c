@@ -33,10 +33,10 @@ typedef struct brick {
     trip_writer *writer;
     trip_list_builder *builder;
     trip_splatter *splatter;
-    unsigned levels;        /* coarse levels */
-    trip_level_kinds kinds; /* of coarse levels */
+    unsigned levels;        /* number of coarse levels */
+    trip_level_kinds kinds; /* kinds of lists of the coarse levels */
     trip_orientation upright;
-    uint64_t written_before; /* until the end of the last stage */
+    uint64_t written_before; /* bytes written until the end of the last stage */
 } brick;
 
 static double now_seconds(void)
@@ -218,7 +218,7 @@ static int on_box(void *user, unsigned thread, const trip_box *box)
     return trip_splatter_box(b->splatter, thread, box);
 }
 
-/* Adds up the boxes so far and the interrupted run's part. */
+/* Sums the counts of the boxes so far and of the part that an interrupted run finished. */
 static void add_up(const brick *b, trip_tally *tally, uint64_t *kept, uint64_t *halo)
 {
     const trip_checkpoint *before = trip_journal_get_checkpoint(b->temporary.journal);
@@ -265,8 +265,8 @@ static int check_tally(brick *b)
     if (t->value_min == t->value_max)
         trip_warn(b->params->input, "every voxel has the value %g, so only the outline is visible",
                   t->value_min);
-    /* Values kept for other transfer functions than the automatic one are drawn by those; drawing
-     * warns about them. */
+    /* With the automatic transfer function as the default, drawing checks the others when it uses
+     * them. */
     for (size_t i = 0; i < b->params->function_count && !b->params->automatic; i++)
         trip_tf_check_range(b->in.functions[i], t->value_min, t->value_max, b->params->input);
     return 0;
@@ -331,7 +331,7 @@ static bool is_hidden_above(const brick *b)
                                (double)e->intervals[0].lo - t->value_min;
 }
 
-/* Releases all memory of level 0. */
+/* Makes the coarse levels. First releases the memory of level 0, which is no longer needed. */
 static int make_levels(brick *b)
 {
     double begin = now_seconds();
@@ -364,7 +364,7 @@ static int fail_count(const brick *b, const char *subject, uint64_t counted, uin
 {
     return trip_fail(TRIP_ERROR, "brick", b->params->output,
                      "%" PRIu64 " %s were counted and %" PRIu64
-                     " written: the files of the interrupted run are damaged; run again without "
+                     " written: the data of the interrupted run are damaged; run again without "
                      "--resume",
                      counted, subject, written);
 }
@@ -379,7 +379,7 @@ static int check_records(brick *b)
     if (kept != s->kept)
         return fail_count(b, "kept voxels", s->kept, kept);
     if (b->in.info->sparse ? halo > s->halo : halo != s->halo)
-        return fail_count(b, "voxels around them", s->halo, halo);
+        return fail_count(b, "halo voxels", s->halo, halo);
     s->halo = halo;
     s->code_bytes = b->codes.code_bytes;
     s->normal_bytes = b->codes.normal_bytes;
@@ -395,8 +395,9 @@ static int check_records(brick *b)
     return 0;
 }
 
-/* Guesses the orientation if neither the file nor its format's custom gives it. With uneven
- * spacing, mirrored voxels are not a mirrored object, so no symmetry is sought. */
+/* Returns whether the orientation must be guessed: neither the file nor its format gives it. With
+ * uneven spacing, a mirror image of the voxels is not a mirror image of the object, so nothing is
+ * guessed. */
 static bool is_up_unknown(const trip_volume_info *info)
 {
     for (int a = 0; a < 3; a++)

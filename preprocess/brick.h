@@ -25,12 +25,12 @@ typedef enum trip_brick_normals {
     TRIP_NORMALS_NONE,
 } trip_brick_normals;
 
-/* The classifications that coarse levels serve: post (values) or pre (splats). */
+/* The classification that coarse levels serve: post interpolates values, pre draws splats. */
 typedef enum trip_brick_levels_for {
     TRIP_LEVELS_FOR_AUTO, /* post, or pre without a halo */
-    TRIP_LEVELS_FOR_POST, /* not without a halo */
+    TRIP_LEVELS_FOR_POST, /* requires a halo */
     TRIP_LEVELS_FOR_PRE,
-    TRIP_LEVELS_FOR_BOTH, /* not without a halo */
+    TRIP_LEVELS_FOR_BOTH, /* requires a halo */
 } trip_brick_levels_for;
 
 /* Zero means the default. */
@@ -38,24 +38,25 @@ typedef struct trip_brick_params {
     const char *input, *output;
     trip_volume_params volume;
 
-    /* The opacity envelope is the union of these. If none is given, it comes from the automatic
-     * transfer function. */
+    /* The opacity envelope is the union of the functions, the ranges and `keep_all`. Without any,
+     * the automatic transfer function defines it. */
     const char *const *functions; /* as trip_tf_load() takes them */
     size_t function_count;
     const trip_value_range *ranges;
     size_t range_count;
-    bool keep_all;      /* every finite voxel */
+    bool keep_all;      /* keeps every finite voxel */
     trip_region region; /* keeps only voxels in this region; the halo reaches beyond it */
-    bool automatic;     /* adds the automatic transfer function, which becomes the default */
+    bool automatic;     /* adds the envelope of the automatic transfer function, which becomes the
+                           default for drawing */
 
     trip_brick_code_bits code_bits;
     trip_brick_normals normals;
-    /* Number of coarse levels. 0: until one is a single brick. Below 0: none. Otherwise at most
-     * this many, down to one voxel. */
+    /* Number of coarse levels. 0 adds levels until one is a single brick. A negative number
+     * disables them. A positive number is a maximum: levels end at a single voxel. */
     int levels;
     trip_brick_levels_for levels_for;
-    bool no_halo; /* leave out the transparent neighbours of kept voxels */
-    bool replace; /* replaces an existing data set, otherwise a reported failure */
+    bool no_halo; /* leaves out the transparent neighbours of kept voxels */
+    bool replace; /* replaces an existing data set, which is otherwise a reported failure */
     /* Resumes an interrupted run with the same input and parameters, if there is one. */
     bool resume;
     unsigned tile_voxels, slab_sheets;
@@ -73,8 +74,9 @@ typedef struct trip_brick_params {
 /* The stages of a run, in order. */
 typedef enum trip_brick_stage {
     TRIP_BRICK_SCAN,   /* reads all values, if the envelope or the normals depend on them */
-    TRIP_BRICK_READ,   /* makes splats, writes the ordered list, spills the rest */
-    TRIP_BRICK_MERGE,  /* merges spilled and held splats into the other lists */
+    TRIP_BRICK_READ,   /* makes splats, writes the ordered list, spills pieces that do not fit in
+                          memory */
+    TRIP_BRICK_MERGE,  /* merges the splats on disk and in memory into the other lists */
     TRIP_BRICK_LEVELS, /* makes the coarse levels from the written lists */
     TRIP_BRICK_FINISH, /* writes the index and syncs all files */
     TRIP_BRICK_STAGES
@@ -93,13 +95,13 @@ typedef struct trip_brick_summary {
     uint64_t halo;                     /* halo voxels */
     unsigned code_bytes, normal_bytes; /* bytes per splat in one list */
     double value_min, value_max;
-    trip_tf_kind kind;        /* kind of the volume */
+    trip_tf_kind kind;        /* recognised kind of the volume */
     uint64_t input_bytes;     /* bytes of values, decompressed */
     uint64_t bytes;           /* bytes of all lists */
     uint64_t halo_bytes;      /* bytes of the halo's lists */
     unsigned levels;          /* coarse levels */
     uint64_t level_bytes;     /* bytes of the coarse levels' lists */
-    uint64_t temporary_bytes; /* spilled */
+    uint64_t temporary_bytes; /* bytes spilled */
     bool resumed;             /* an interrupted run was resumed */
     char note[1024];          /* choices that the file left open, or "" */
     trip_brick_cost stages[TRIP_BRICK_STAGES];

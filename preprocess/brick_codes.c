@@ -5,10 +5,12 @@
 
 #include "gradient.h"
 
-/* Limits the background's distance, so that values keep at least 4096 codes. */
+/* Maximum factor by which the background may widen the range of codes. The values then keep at
+ * least 4096 of 65536 codes. */
 #define BACKGROUND_SHARE 16
 
-/* The halo of a sparse volume contains its background. */
+/* Widens the range to the background of a sparse volume, because its halo contains the background.
+ */
 static void include_background(trip_quantiser *q, const trip_brick_input *in)
 {
     const double background = in->info->background;
@@ -19,8 +21,8 @@ static void include_background(trip_quantiser *q, const trip_brick_input *in)
     }
 }
 
-/* Sharpened values of coarse levels (sharpen.h) can leave the range. Integers have the range of
- * their type in 16 bits, at least one code each. */
+/* Widens the range, because sharpened values of coarse levels (sharpen.h) can leave it. Integers of
+ * 8 or 16 bits in 16-bit codes keep the range of their type, at least one code per value. */
 static void make_room(trip_quantiser *q, const trip_brick_input *in)
 {
     const double room = (q->hi - q->lo) / 4;

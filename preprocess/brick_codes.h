@@ -9,7 +9,7 @@
 typedef struct trip_brick_codes {
     trip_quantiser quantiser;
     unsigned code_bytes, normal_bytes; /* as in the header; normal_bytes 0 means no normals */
-    trip_compact_normals compact;      /* steps of normals of 3 bytes */
+    trip_compact_normals compact;      /* encoding of 3-byte normals */
 } trip_brick_codes;
 
 /* Chooses the encoding of the input's values and normals, after the scan if there is one.
@@ -17,8 +17,8 @@ typedef struct trip_brick_codes {
  * - Other types: codes cover the scanned range, or the caller sets the range before quantising.
  * There are codes below and above the values, except for 16-bit integers. */
 void trip_brick_codes_choose(trip_brick_codes *c, const trip_brick_input *in);
-/* Sets the codes to cover [lo, hi], and the background of a sparse volume if it is near the values.
- */
+/* Sets the codes to cover [lo, hi]. The codes also cover the background of a sparse volume if it is
+ * near the values. */
 void trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in, double lo,
                                 double hi);
 

@@ -28,8 +28,8 @@ static int set_region(trip_brick_input *in)
         *past = *past ? *past : voxels;
         if (in->region.first[a] < 0 || in->region.first[a] >= *past || *past > voxels)
             return trip_fail(TRIP_USAGE, "brick", in->params->input,
-                             "the region is empty or leaves the grid along %c, where voxels are "
-                             "numbered from 0 to below %" PRId64,
+                             "the region is empty or leaves the grid along %c, where the grid "
+                             "has voxels 0 to below %" PRId64,
                              "ijk"[a], voxels);
     }
     return 0;
@@ -47,7 +47,7 @@ int trip_brick_levels(const trip_brick_input *in)
     return in->info->coordinates[0] ? -1 : in->params->levels;
 }
 
-/* Refuses explicit requests that cannot be met. */
+/* Refuses an explicit number of coarse levels that the grid cannot have. */
 static int check_levels(const trip_brick_input *in)
 {
     if (in->params->levels <= 0 || trip_brick_levels(in) == in->params->levels)
@@ -108,7 +108,7 @@ static uint64_t bytes_of(const trip_tf *tf)
 /* Checks that the metadata has room for the transfer functions; the first one appears twice. */
 static int check_functions(const trip_brick_input *in)
 {
-    const uint64_t room = TRIP_TEXT_BYTES_MAX - (1 << 20); /* besides the histogram and the rest */
+    const uint64_t room = TRIP_TEXT_BYTES_MAX - (1 << 20); /* 1 MiB for other metadata */
     uint64_t bytes = 0;
     for (size_t i = 0; i < in->params->function_count; i++)
         bytes += bytes_of(in->functions[i]) * (i == 0 ? 2 : 1);

@@ -18,7 +18,7 @@ typedef struct trip_brick_input {
     const trip_volume_info *info;
     uint64_t grid_voxels;  /* product of the dims, the unit of progress */
     trip_region region;    /* params->region, with open ends set to the grid's */
-    uint64_t memory_bytes; /* budget left after opening the input */
+    uint64_t memory_bytes; /* bytes of the budget left after opening the input */
     trip_tf **functions;   /* params->function_count transfer functions */
     bool scanned;          /* the volume was scanned, and the tally is complete */
     trip_tally *tally;
@@ -27,7 +27,7 @@ typedef struct trip_brick_input {
 } trip_brick_input;
 
 trip_coordinates trip_brick_coordinates(const trip_brick_input *in);
-/* Returns the parameter, or no coarse levels for grids with uneven spacing. */
+/* Returns params->levels, or -1 (no coarse levels) for a grid with uneven spacing. */
 int trip_brick_levels(const trip_brick_input *in);
 
 /* Returns the format of pieces, without `quantised`. */

@@ -21,10 +21,10 @@ enum { MAX_SLICES = 32 };
 #define LONE_SPLAT_BYTES (3 * 48)
 
 typedef struct needs {
-    uint64_t slice_bytes;  /* bytes of a slice as stored */
-    uint64_t slice_splats; /* pieces of one full slice in one list */
+    uint64_t slice_bytes;  /* bytes of a slice in the type of the file */
+    uint64_t slice_splats; /* bytes of the pieces of one fully kept slice, in one list */
     uint64_t opened_bytes; /* allocated before the lists */
-    uint64_t late_bytes;   /* allocated after them */
+    uint64_t late_bytes;   /* allocated after the lists */
     uint64_t list_min_bytes, list_max_bytes;
 } needs;
 
@@ -87,7 +87,9 @@ static bool try_slices(trip_memory_plan *plan, const needs *n, uint64_t memory, 
     return n->opened_bytes <= memory && divide(plan, n, memory - n->opened_bytes);
 }
 
-/* Large portions save work at their borders, but splats make better use of most of the memory. */
+/* Returns whether the ordered list can be written in order and the reader takes at most a quarter
+ * of the memory. Large portions reduce repeated work at their borders, but the rest of the memory
+ * serves splats better. */
 static bool is_comfortable(const trip_memory_plan *plan, const needs *n, uint64_t memory)
 {
     return plan->in_order && reader_bytes(n, plan->slices, plan->read_ahead) <= memory / 4;
@@ -100,7 +102,7 @@ static int refuse(const char *path, const trip_volume_info *info, const needs *n
                    n->list_min_bytes;
     return trip_fail(TRIP_ERROR, "brick", path,
                      "slices of %" PRId64 " x %" PRId64 " and %u threads need --memory %" PRIu64
-                     "M at least%s",
+                     "M or more%s",
                      info->dims[0], info->dims[1], threads, (min >> 20) + 1,
                      threads > 1 ? "; fewer --threads need less" : "");
 }

@@ -9,12 +9,12 @@
 typedef struct trip_memory_plan {
     int64_t slices;      /* slices read at once, for dense volumes */
     bool read_ahead;     /* reads the next slices during processing */
-    bool in_order;       /* the ordered list is written as it arrives */
+    bool in_order;       /* the ordered list can be written as it arrives */
     uint64_t list_bytes; /* memory for pieces */
 } trip_memory_plan;
 
-/* Returns the default number of threads: one per processor, but at most half of the memory for all.
- */
+/* Returns the default number of threads: one per processor, but no more than fit in half of the
+ * memory. */
 unsigned trip_memory_plan_threads(const trip_piece_format *format, uint64_t memory_bytes);
 
 /* Makes a plan for `memory_bytes`. Too little memory is a reported failure that names the minimum.

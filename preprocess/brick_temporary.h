@@ -10,7 +10,7 @@ typedef struct trip_brick_temporary {
     trip_spill *spill;
     trip_journal *journal;
     trip_leftover leftover;
-    uint64_t identity;  /* of the run */
+    uint64_t identity;  /* identity of the run (identity.h) */
     char *partial_path; /* path of the data set while it is written */
     bool begun;         /* set by the run: an interrupted run's files were used or discarded */
 } trip_brick_temporary;

@@ -17,10 +17,10 @@
 
 /* Size of the buffer for compressed bytes. Plain files are read into the caller's memory. */
 #define PIECE_BYTES ((size_t)1 << 20)
-/* Minimum size of plain data for reading by several threads. */
+/* Minimum size of plain data that several threads read. */
 #define LARGE_BYTES ((uint64_t)4 << 20)
-/* Maximum to read or decompress between checks for an interruption. The decompressors count in 32
- * bits. */
+/* Maximum bytes to read or decompress between checks for an interruption. The decompressors count
+ * in 32 bits. */
 #define STEP_BYTES ((size_t)4 << 20)
 
 struct trip_byte_stream {
@@ -32,7 +32,7 @@ struct trip_byte_stream {
     uint64_t done;            /* bytes delivered so far */
     trip_file_pieces *pieces; /* reader of a large plain file, or NULL */
 
-    unsigned char *piece; /* compressed bytes not used yet: */
+    unsigned char *piece; /* buffer of compressed bytes; piece_used of piece_bytes are consumed */
     size_t piece_used, piece_bytes;
     bool ended; /* the compressed stream is complete */
     bool codec_ready;

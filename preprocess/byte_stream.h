@@ -20,7 +20,7 @@ typedef struct trip_byte_source {
     uint64_t offset_bytes; /* start of the data in the file */
     uint64_t skip_bytes;   /* skipped at the start, after decompression */
     uint64_t size_bytes;   /* bytes of data after skip_bytes */
-    bool warned;           /* does not warn about bytes after the data */
+    bool warned;           /* suppresses the warning about bytes after the data */
 } trip_byte_source;
 
 typedef struct trip_byte_stream trip_byte_stream;
@@ -30,15 +30,15 @@ typedef struct trip_byte_stream trip_byte_stream;
 int trip_byte_stream_open(trip_byte_stream **out, const trip_byte_source *source);
 void trip_byte_stream_close(trip_byte_stream *s);
 
-/* Returns to the first byte of the source. */
+/* Rewinds to the first byte of the source. */
 int trip_byte_stream_rewind(trip_byte_stream *s);
 
 /* Reads the next `bytes` bytes, within the source's size. Short, corrupt or unreadable data is a
  * reported failure. The read that reaches the end also verifies the checksum. */
 int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes);
 
-/* Skips the next `bytes` bytes, which must end before the source's size. Compressed data must be
- * decompressed to skip it. */
+/* Skips the next `bytes` bytes, which must end before the source's size. Skipping is free in a
+ * plain file; compressed data is decompressed. */
 int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes);
 
 /* Returns the length of a regular file. Any other file is a reported failure. */

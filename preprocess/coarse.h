@@ -11,25 +11,26 @@ enum { TRIP_COARSE_ALL = 65535 };
 
 /* A voxel of any level: its position and its value for interpolation. */
 typedef struct trip_coarse_value {
-    uint8_t u, v;   /* position in its square of the sheet */
+    uint8_t u, v;   /* position in its square of the sheet, along x and y */
     uint16_t known; /* share of its level 0 voxels with a value: kept or halo */
     uint16_t value; /* mean code of the voxels with a value */
-    /* If it covers kept voxels: the minimum turned code (trip_coarse_turned()) of its other voxels,
-     * for neighbours without a value. Otherwise one of these constants. */
+    /* For a voxel that covers kept and dropped voxels of level 0: the minimum turned code
+     * (trip_coarse_turned()) of the dropped ones. Neighbours without a value take it. Otherwise
+     * TRIP_COARSE_NONE_KEPT or TRIP_COARSE_ALL_KEPT. */
     uint16_t around;
 } trip_coarse_value;
 
 enum {
     TRIP_COARSE_NONE_KEPT = UINT16_MAX,
-    TRIP_COARSE_ALL_KEPT = UINT16_MAX - 1, /* of those known */
+    TRIP_COARSE_ALL_KEPT = UINT16_MAX - 1, /* all voxels with a value were kept */
 };
 
-/* The data of its splat. */
+/* The data of a coarse voxel's splat. */
 typedef struct trip_coarse_mean {
     uint16_t kept;     /* share of its level 0 voxels that were kept */
-    uint16_t mean;     /* mean code of the kept ones */
+    uint16_t mean;     /* mean code of the kept voxels */
     uint16_t cover[3]; /* by axis: share of its columns with kept voxels */
-    uint32_t normal;   /* packed mean gradient of the kept ones */
+    uint32_t normal;   /* packed mean gradient of the kept voxels */
 } trip_coarse_mean;
 
 /* Reverses codes if dropped values lie above kept ones, so that the least visible value has the
@@ -76,7 +77,7 @@ static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_
 /* Computes all members but `u` and `v`. The sum must not be empty. */
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out);
 
-/* Sums for the means of one coarse voxel. Clear it before the first voxel. */
+/* Sums for the means of one coarse voxel. Call trip_coarse_mean_clear() before adding voxels. */
 typedef struct trip_coarse_mean_sum {
     float kept, mean;
     float gradient[3], steep; /* sum of gradients times their lengths; sum of the lengths */

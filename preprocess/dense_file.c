@@ -6,10 +6,10 @@
 #include "report.h"
 
 typedef struct dense_file {
-    trip_byte_source *sources; /* with owned paths */
+    trip_byte_source *sources; /* owns the copied paths */
     int64_t count, current;
     trip_byte_stream *stream; /* stream of the current source */
-    uint64_t left_bytes;      /* position in the current source */
+    uint64_t left_bytes;      /* bytes not read yet of the current source */
     uint64_t slice_bytes;
     bool swap;
 } dense_file;
@@ -49,13 +49,13 @@ static int copy_sources(dense_file *d, const trip_byte_source *sources, int64_t 
 {
     d->sources = calloc((size_t)count, sizeof *d->sources);
     if (!d->sources)
-        return trip_fail(TRIP_ERROR, "read", sources[0].path, "no memory to open");
+        return trip_fail(TRIP_ERROR, "read", sources[0].path, "no memory to open it");
     d->count = count;
     for (int64_t i = 0; i < count; i++) {
         d->sources[i] = sources[i];
         d->sources[i].size_bytes = size_bytes;
         if (!(d->sources[i].path = strdup(sources[i].path)))
-            return trip_fail(TRIP_ERROR, "read", sources[i].path, "no memory to open");
+            return trip_fail(TRIP_ERROR, "read", sources[i].path, "no memory to open it");
     }
     return 0;
 }
@@ -68,7 +68,7 @@ int trip_dense_open(void **state, const trip_byte_source *sources, int64_t count
         return status;
     dense_file *d = calloc(1, sizeof *d);
     if (!d)
-        return trip_fail(TRIP_ERROR, "read", sources[0].path, "no memory to open");
+        return trip_fail(TRIP_ERROR, "read", sources[0].path, "no memory to open it");
     d->swap = swap;
     d->slice_bytes =
         (uint64_t)info->dims[0] * (uint64_t)info->dims[1] * trip_scalar_bytes(info->type);

@@ -1,6 +1,6 @@
 #include "dilate.h"
 
-/* Dilates a row along itself. */
+/* Dilates a row along x. */
 static void dilate_row(const uint8_t *restrict from, uint8_t *restrict to, int64_t count)
 {
     if (count == 1) {

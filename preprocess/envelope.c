@@ -7,7 +7,8 @@
 
 #include "report.h"
 
-/* With more intervals, each value of a row is found by search. */
+/* Maximum number of intervals for sweeping a row once per interval. With more, each value is looked
+ * up. */
 enum { MAX_SWEPT_INTERVALS = 4 };
 
 /* Numbers the finite floats in ascending order: -0 and +0 have rank 0, their neighbours -1 and 1.
@@ -76,7 +77,8 @@ int trip_envelope_add_range(trip_envelope *e, double lo, double hi)
 {
     if (!(lo <= hi))
         return trip_fail(TRIP_USAGE, "brick", "opacity envelope",
-                         "the range %g to %g is empty or invalid", lo, hi);
+                         "the range %g to %g is empty or invalid; give the lower value first", lo,
+                         hi);
     return add_ranks(e, rank_at_least(lo), rank_at_most(hi));
 }
 

@@ -18,7 +18,8 @@ typedef struct trip_envelope {
     size_t count;
 } trip_envelope;
 
-/* A zeroed envelope is empty. Each of these functions adds values, or reports a failure. */
+/* A zeroed envelope is empty. The trip_envelope_add_*() functions add values and report failures.
+ */
 int trip_envelope_add_range(trip_envelope *e, double lo, double hi);
 /* Adds exactly the values v with trip_tf_evaluate(tf, v).opacity > 0; tf is in data units. */
 int trip_envelope_add_tf(trip_envelope *e, const trip_tf *tf);

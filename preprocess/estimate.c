@@ -16,17 +16,17 @@
 
 /* Number of portions in a sample, and slices of each if memory permits. */
 enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
-/* Status of a scan that reached its time limit. */
+/* Status that ends a scan at its time limit. */
 enum { STOPPED = -100 };
 /* Bytes written to measure the disk's speed. */
 #define TRIAL_BYTES ((size_t)32 << 20)
-/* Time limit of a sample before a run; longer runs allow more. */
+/* Time limit in seconds of the sample before a run, and the addition per voxel of the grid. */
 static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
 /* Bytes of masks per record; the masks of a halo have fewer bits set. */
 static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
-/* Bytes of coarse levels relative to level 0. A level has an eighth of the voxels below it for a
- * body, a quarter for a surface, more for thin vessels. Measured: 0.16 to 0.23 for means with
- * normals, 0.04 to 0.16 for values. */
+/* Bytes of coarse levels relative to level 0. A level has an eighth of the voxels of the level
+ * below for a body, a quarter for a surface, and more for thin vessels. Measured: 0.16 to 0.23 for
+ * means with normals, 0.04 to 0.16 for values. */
 static const double means_part = 0.19, values_part = 0.06;
 /* Estimates are uncertain: a run is refused only if this share of the estimate does not fit. */
 static const double surely = 0.7;
@@ -148,7 +148,7 @@ static double piece_bytes(const trip_piece_format *f, unsigned list)
     return (double)trip_piece_max_bytes(&own) / (double)(1 << 2 * f->tile_log2);
 }
 
-/* Returns the bytes of all levels relative to the finest. */
+/* Returns the bytes of all levels as a multiple of the bytes of level 0. */
 static double with_levels(const trip_brick_input *in, unsigned tile_voxels)
 {
     const trip_brick_params *p = in->params;
@@ -194,7 +194,7 @@ static double seconds_per_byte(const char *output)
     return seconds;
 }
 
-/* Replaces the full scan before a run. */
+/* Estimates from a sample. Replaces the scan that a run makes first. */
 static int scan_sample(trip_brick_input *in, const trip_memory_plan *plan, trip_brick_estimate *e)
 {
     double begin = now_seconds(), skipping = 0;

@@ -6,8 +6,8 @@
 #include "brick_input.h"
 #include "brick_memory.h"
 
-/* Fails, reported, if the disk or the cache clearly cannot hold the data set. Reads a sample of the
- * volume only if the maximum possible size does not fit. */
+/* Checks that the disk and the cache can hold the data set. A clear lack of space is a reported
+ * failure. Reads a sample of the volume only if the maximum possible size does not fit. */
 int trip_estimate_check_disk(trip_brick_input *in, const trip_piece_format *format,
                              const trip_memory_plan *plan);
 

@@ -18,7 +18,7 @@ struct trip_file_pieces {
     int fd, direct_fd;
     uint64_t file_bytes;
     unsigned char *map;    /* mapping of the file for mincore(); its bytes are not accessed */
-    unsigned char *memory; /* one piece per thread */
+    unsigned char *memory; /* room for one piece per thread */
     bool failed;           /* a read failed; later ones are refused */
 };
 
@@ -28,8 +28,8 @@ typedef struct job {
     uint64_t begin, end, first; /* first: aligned start of the pieces */
     uint64_t pieces;
     unsigned char *to;
-    trip_scope *scope;         /* of the calling thread */
-    atomic_uint_fast64_t next; /* piece */
+    trip_scope *scope;         /* scope of the calling thread */
+    atomic_uint_fast64_t next; /* number of the next piece to read */
     atomic_uint threads;       /* threads started, each with its piece of memory */
     atomic_bool failed;
 } job;

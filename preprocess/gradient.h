@@ -30,9 +30,9 @@ static inline void trip_gradient_at(const float *value, const int64_t step[3],
         trip_gradient_careful(value, step, share, gradient);
 }
 
-/* Returns a power of two near the length of a voxel. Gradients are kept as floats in value units
- * per this length until the range of values is known. So no world unit exceeds the range of a
- * float. */
+/* Returns a power of two near the length of a voxel. Until the range of values is known, gradients
+ * are floats in value units per this length. This keeps them in the range of a float, whatever the
+ * world unit. */
 double trip_gradient_unit(const trip_affine *index_to_world);
 
 #endif

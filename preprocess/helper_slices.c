@@ -10,7 +10,7 @@ trip_helper_slices *trip_helper_slices_create(const char *path, trip_budget *bud
     const size_t path_bytes = strlen(path) + 1;
     trip_helper_slices *s = calloc(1, sizeof *s + path_bytes);
     if (!s) {
-        trip_fail(TRIP_ERROR, "read", path, "no memory to open");
+        trip_fail(TRIP_ERROR, "read", path, "no memory to open it");
         return NULL;
     }
     memcpy(s->path, path, path_bytes);

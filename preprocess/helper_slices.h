@@ -1,6 +1,6 @@
-/* Slices from a helper program (image_helper.h), one at a time. Readers use it once the helper has
- * opened the file. Functions without a comment fit into trip_volume_reader. One thread at a time.
- */
+/* Reads slices through a helper program (image_helper.h), one at a time. Readers use it once the
+ * helper has opened the file. Functions without a comment fit into trip_volume_reader. One thread
+ * at a time. */
 #ifndef TRIP_HELPER_SLICES_H
 #define TRIP_HELPER_SLICES_H
 
@@ -12,7 +12,7 @@ typedef struct trip_helper_slices {
     trip_budget *budget;
     void *reserved; /* budget reserved for the helper's memory, never touched */
     size_t reserved_bytes;
-    int64_t next; /* slice */
+    int64_t next; /* index of the next slice */
     size_t slice_bytes;
     char path[];
 } trip_helper_slices;

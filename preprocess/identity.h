@@ -1,6 +1,6 @@
-/* A hash of everything that determines the bytes of a data set: names and state of all input files,
- * and all parameters except memory and threads. A run can resume an interrupted one with the same
- * identity. One thread. */
+/* Computes the identity of a run: a hash of everything that determines the bytes of its data set.
+ * These are the names and state of all input files, and all parameters except memory and threads. A
+ * run can resume an interrupted run with the same identity. One thread. */
 #ifndef TRIP_IDENTITY_H
 #define TRIP_IDENTITY_H
 

@@ -23,8 +23,8 @@ enum record_kind { RECORD_START = 1, RECORD_CHECKPOINT = 2, RECORD_OUTPUT = 3 };
 /* Header of a record. The record of a checkpoint ends with its new sequences. */
 typedef struct record_head {
     uint64_t kind;
-    uint64_t bytes;    /* bytes of the record after this header */
-    uint64_t checksum; /* XXH64 of those bytes, with the kind as seed */
+    uint64_t bytes;    /* bytes of the record after the header */
+    uint64_t checksum; /* XXH64 of the record after the header, with the kind as seed */
 } record_head;
 
 struct trip_journal {
@@ -113,8 +113,8 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
     return 0;
 }
 
-/* Returns whether no count is below the previous checkpoint's, which starts at zero. The count of
- * sequences follows from the record. */
+/* Returns whether no count is below the same count of the previous checkpoint. Before the first
+ * checkpoint, all counts are zero. The record itself determines the count of sequences. */
 static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
 {
     bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
@@ -151,14 +151,14 @@ static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
     if (!is_later(&j->checkpoint, c))
         return fail_false(j, "the order of its checkpoints");
     if (!done_voxels(p, c->done, &voxels))
-        return fail_false(j, "how far it came");
+        return fail_false(j, "its progress");
     if (!p->scanned &&
         (!trip_tally_check(t) || t->voxels > voxels || (p->slice_voxels && t->voxels != voxels)))
         return fail_false(j, "its count of values");
     if (c->kept > t->finite || c->kept > voxels)
         return fail_false(j, "its count of kept voxels");
     if (!can_have_halo(p, c, voxels))
-        return fail_false(j, "its count of voxels around them");
+        return fail_false(j, "its count of halo voxels");
     if (c->ordered_splats > c->kept || c->runs > c->ordered_splats)
         return fail_false(j, "its count of runs");
     return 0;
@@ -205,7 +205,8 @@ static int take_checkpoint(trip_journal *j, trip_spill *spill, const void *recor
     return taken;
 }
 
-/* Drops the last record, because a resumed run has another output. */
+/* Reads the output record, which is the last one. Returns 0, so that the journal is truncated
+ * before it: a resumed run has another output. */
 static int take_output(trip_journal *j, const void *record, uint64_t bytes)
 {
     if (bytes != sizeof j->output)

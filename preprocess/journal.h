@@ -17,18 +17,18 @@ typedef struct trip_journal_start {
     trip_tally tally;
 } trip_journal_start;
 
-/* A checkpoint: all pieces of the first part of the volume are in sequences or in the ordered list.
- */
+/* A checkpoint: all pieces of the first part of the volume are on disk, in sequences or in the
+ * ordered list. */
 typedef struct trip_checkpoint {
     uint64_t done;                       /* length of the first part, as trip_walk() counts */
     uint64_t kept, halo;                 /* splats of the first part */
-    uint64_t sequences;                  /* bytes of the spill */
-    uint64_t runs, ordered_splats;       /* runs appended to the ordered list */
+    uint64_t sequences;                  /* number of sequences in the spill */
+    uint64_t runs, ordered_splats;       /* runs and splats appended to the ordered list */
     uint64_t ordered_bytes[TRIP_PLANES]; /* bytes of the ordered list's planes */
     trip_tally tally;                    /* tally of the first part's values, unless scanned */
 } trip_checkpoint;
 
-/* Written before the data set is renamed: identifies the folder. */
+/* Identifies the folder of the output. Written before the data set gets its final name. */
 typedef struct trip_journal_output {
     uint64_t device, inode;
 } trip_journal_output;
@@ -48,10 +48,11 @@ typedef struct trip_journal_params {
     bool resume;
     uint64_t identity;
     bool scanned;                        /* a run with these parameters scans the volume first */
-    uint64_t voxels;                     /* of the grid */
+    uint64_t voxels;                     /* voxels in the grid */
     uint64_t slice_voxels;               /* voxels in a slice; 0 for a sparse volume */
     bool halo;                           /* the data set has a halo */
-    uint64_t ordered_bytes[TRIP_PLANES]; /* remaining bytes of the ordered list's planes */
+    uint64_t ordered_bytes[TRIP_PLANES]; /* bytes of the ordered list's planes that the interrupted
+                                            run left */
 } trip_journal_params;
 
 /* Opens the journal in the folder of `spill`. With `resume`, reads an existing journal up to the
@@ -62,8 +63,8 @@ int trip_journal_open(trip_journal **out, trip_spill *spill, const trip_journal_
                       trip_budget *budget);
 void trip_journal_close(trip_journal *j);
 
-/* Return the records read back or written, or NULL. The checkpoint is the last one read back, and
- * the output is one read back. */
+/* Each function returns a record, or NULL if there is none. The start was read back or written; the
+ * last checkpoint and the output were read back. */
 const trip_journal_start *trip_journal_get_start(const trip_journal *j);
 const trip_checkpoint *trip_journal_get_checkpoint(const trip_journal *j);
 const trip_journal_output *trip_journal_get_output(const trip_journal *j);

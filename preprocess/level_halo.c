@@ -10,7 +10,8 @@
 /* Number of squares held. */
 enum { HELD = 64 };
 
-/* By row; TRIP_COARSE_NONE_KEPT also for missing voxels. */
+/* A square of the file. `around` has a value for each voxel, by row; for a missing voxel it is
+ * TRIP_COARSE_NONE_KEPT. */
 typedef struct held_square {
     uint64_t key;
     bool held;
@@ -27,10 +28,11 @@ typedef struct adding {
     unsigned char *memory;
     size_t bytes;
     trip_coarse_value *read, *values; /* voxels of a square: as in the file, and with its halo */
-    /* Minima over a square plus one voxel on each side; minima of three in a row. */
+    /* Minima of `around`. `near` covers a square plus one voxel on each side, `rows` three voxels
+     * of a row. */
     uint16_t *near, *rows;
     held_square squares[HELD];
-    uint64_t *mortons; /* candidate squares of a sheet, ascending */
+    uint64_t *mortons; /* Morton codes of the candidate squares of a sheet, ascending */
     size_t room, count;
 } adding;
 
@@ -94,7 +96,8 @@ static void add_about(adding *a, uint64_t key)
     }
 }
 
-/* Collects the squares of three sheets and their neighbours. */
+/* Collects the candidate squares of a sheet: squares of this sheet and of the sheets beside it,
+ * each with its eight neighbours. */
 static int find_squares(adding *a, uint64_t sheet)
 {
     size_t positions = 0, kept = 0;
@@ -146,7 +149,8 @@ static uint16_t lesser(uint16_t a, uint16_t b)
     return a < b ? a : b;
 }
 
-/* Takes the voxels of a neighbouring square within one voxel of the current square. */
+/* Lowers `near` by the square at offset (u, v), as far as its voxels lie within one voxel of the
+ * current square. */
 static void take_near(adding *a, const held_square *s, int u, int v)
 {
     const size_t edge = edge_of(a), across = edge + 2;
@@ -205,7 +209,8 @@ static size_t within(const adding *a, uint64_t key, int axis)
     return (size_t)(left < edge ? left : edge);
 }
 
-/* Collects the square's voxels and the added ones, by row. Returns their number. */
+/* Merges the square's own voxels and the added voxels into `values`, by row. Returns their number.
+ */
 static uint32_t merge(adding *a, uint64_t key, uint32_t own)
 {
     const size_t edge = edge_of(a), size[2] = { within(a, key, 0), within(a, key, 1) };
@@ -248,7 +253,7 @@ static int add_sheet(adding *a, uint64_t sheet)
                : status;
 }
 
-/* Processes the sheets with squares and their neighbours. */
+/* Processes every sheet that has squares, and the sheets beside it. */
 static int add_sheets(adding *a)
 {
     uint64_t sheet = 0, next;
@@ -264,8 +269,7 @@ static int add_sheets(adding *a)
             status = trip_level_positions_next(&a->positions, &next);
             if (next == UINT64_MAX)
                 break;
-            sheet =
-                next - 1; /* at least one sheet further, with all sheets up to the next one known */
+            sheet = next - 1; /* at least one sheet further; the next one is known */
             continue;
         }
         sheet++;

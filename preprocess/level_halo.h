@@ -1,8 +1,8 @@
-/* The halo of a coarse level's values. Interpolation around a coarse voxel that covers kept voxels
- * needs all 26 neighbours. Some of them cover no voxel of level 0's halo, which is one voxel wide.
- * These are added with an invisible value: the minimum of `around` (coarse.h) of their neighbours
- * that cover kept voxels. The next level does not include them, because their true values are
- * unknown. */
+/* Adds the halo of a coarse level's values. Interpolation around a coarse voxel that covers kept
+ * voxels needs all 26 neighbours. Some neighbours have no value, because the halo of level 0 is
+ * only one voxel wide. Each gets an invisible value: the minimum of `around` (coarse.h) over its
+ * own neighbours that cover kept voxels. The next level leaves them out, because their true values
+ * are unknown. */
 #ifndef TRIP_LEVEL_HALO_H
 #define TRIP_LEVEL_HALO_H
 

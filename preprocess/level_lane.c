@@ -48,7 +48,7 @@ static void gradient_of(const trip_level_work *w, uint32_t normal, double gradie
         trip_normal_unpack(normal, w->params->quantiser.gradient_full, gradient);
 }
 
-/* Converts a gradient to world space. */
+/* Packs the normal of a gradient in world space. */
 static uint32_t normal_of(const trip_level_work *w, const double gradient[3])
 {
     const double(*j)[4] = w->params->index_to_world.m;
@@ -72,7 +72,8 @@ static void touch(trip_level_lane *l, size_t at)
         trip_coarse_mean_clear(&l->mean_sums[at]);
 }
 
-/* The coarse voxel of a voxel of the level below, and the parity of its coordinates. */
+/* Maps a voxel of the level below: index of its coarse voxel in the sums, and parity of its
+ * coordinates. */
 typedef struct position {
     size_t at;
     unsigned odd;
@@ -86,7 +87,8 @@ static position position_of(const trip_level_work *w, const trip_level_source *s
                        (unsigned)((x & 1) | (y & 1) << 1) | square->odd << 2 };
 }
 
-/* Returns the coarse voxel of four consecutive voxels of a square; they always share one. */
+/* Offset (u, v) of the coarse voxel for each four consecutive voxels of a square. All four belong
+ * to the same coarse voxel. */
 #define CELL(n)                                                                                    \
     {                                                                                              \
         ((n)&1) | ((n) >> 1 & 2), ((n) >> 1 & 1) | ((n) >> 2 & 2)                                  \
@@ -94,14 +96,14 @@ static position position_of(const trip_level_work *w, const trip_level_source *s
 #define CELLS4(n) CELL(n), CELL((n) + 1), CELL((n) + 2), CELL((n) + 3)
 static const uint8_t cells[16][2] = { CELLS4(0), CELLS4(4), CELLS4(8), CELLS4(12) };
 
-/* Counts the set bits in each group of four bits of the mask. */
+/* Returns the number of set bits of each group of four bits, in the same four bits. */
 static uint64_t counts_of(uint64_t mask)
 {
     const uint64_t twos = mask - (mask >> 1 & UINT64_C(0x5555555555555555));
     return (twos & UINT64_C(0x3333333333333333)) + (twos >> 2 & UINT64_C(0x3333333333333333));
 }
 
-/* Returns the minimum turned code of each group of four. */
+/* Computes the minimum turned code of each group of four voxels. */
 static void find_around(const trip_square *of, const uint16_t *codes, bool round,
                         uint16_t around[16])
 {
@@ -118,7 +120,7 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
 {
     const uint32_t corner = trip_square_corner(of);
     const size_t first = position_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
-    uint32_t sums[65]; /* number of codes before each group */
+    uint32_t sums[65]; /* sums[i] adds up the first i codes */
     uint16_t codes[64], around[16];
     trip_square_codes(of, codes);
     sums[0] = 0;
@@ -158,7 +160,7 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
     }
 }
 
-/* The bytes of the first run and of the runs directly behind it in its list. */
+/* Returns the number of words of the first run and of the runs directly behind it in its list. */
 static uint64_t words_together(const trip_level_source *squares, unsigned count)
 {
     const uint64_t first = squares->run.at[TRIP_PLANE_VOXELS];
@@ -292,7 +294,7 @@ static uint32_t shares_of(const trip_coarse_mean *mean, int axis)
                                  mean->kept / (double)mean->cover[axis]);
 }
 
-/* The members that differ between the lists of means. */
+/* Writes the members that differ between the lists of means. */
 static void put_shares(trip_level_lane *l, uint32_t count, int axis)
 {
     for (uint32_t i = 0; i < count; i++) {

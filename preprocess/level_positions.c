@@ -35,7 +35,8 @@ uint64_t trip_level_positions_squares(const int64_t dims[3], unsigned edge_log2,
     return squares < MIN_ROOM ? MIN_ROOM : squares;
 }
 
-/* Number of sheets: arrays can be twice as long as their contents, plus one that is copied. */
+/* Counts twice the contents for the array of each sheet, and one array more for the copy when an
+ * array grows. */
 uint64_t trip_level_positions_later_bytes(const int64_t dims[3], unsigned edge_log2,
                                           uint64_t voxels)
 {

@@ -1,5 +1,5 @@
-/* The file positions of squares written by trip_level_file_append(), for a few consecutive sheets.
- * While one thread advances in the file, no other may look up squares. */
+/* Knows the file positions of squares written by trip_level_file_append(), for a few consecutive
+ * sheets. While one thread advances in the file, no other may look up squares. */
 #ifndef TRIP_LEVEL_POSITIONS_H
 #define TRIP_LEVEL_POSITIONS_H
 
@@ -8,7 +8,7 @@
 #include "output.h"
 
 typedef struct trip_level_position {
-    uint64_t key, at; /* file position of its voxels */
+    uint64_t key, at; /* `at` is the file position of its voxels */
     uint32_t count;
 } trip_level_position;
 
@@ -27,7 +27,7 @@ typedef struct trip_level_positions {
     bool means; /* the file contains means */
     unsigned edge_log2;
     uint64_t ahead; /* file position of the first square not yet in a sheet */
-    trip_level_sheet sheets[TRIP_LEVEL_SHEETS_HELD]; /* sheets in a ring, by sheet number */
+    trip_level_sheet sheets[TRIP_LEVEL_SHEETS_HELD]; /* by number modulo their count */
 } trip_level_positions;
 
 /* Opens the positions of a file with squares of 2^edge_log2 voxels, with or without means. The file
@@ -36,19 +36,20 @@ void trip_level_positions_open(trip_level_positions *p, const trip_output *file,
                                unsigned edge_log2, trip_budget *budget);
 void trip_level_positions_close(trip_level_positions *p);
 
-/* Return the maximum number of squares of a sheet, for a level of at most `voxels` voxels, and the
- * memory allocated later for them. */
+/* Return the maximum number of squares of a sheet and the maximum bytes allocated later, for a
+ * level of at most `voxels` voxels. */
 uint64_t trip_level_positions_squares(const int64_t dims[3], unsigned edge_log2, uint64_t voxels);
 uint64_t trip_level_positions_later_bytes(const int64_t dims[3], unsigned edge_log2,
                                           uint64_t voxels);
 
-/* Advances until all squares of sheets up to `last` are known. They replace the oldest sheets of
- * the ring. */
+/* Reads ahead until all squares of sheets up to `last` are known. New sheets replace the oldest
+ * ones. */
 int trip_level_positions_look_ahead(trip_level_positions *p, uint64_t last);
-/* Returns the sheet of the first square after the known ones, or UINT64_MAX. */
+/* Sets *sheet to the sheet of the first square after the known ones, or to UINT64_MAX at the end of
+ * the file. */
 int trip_level_positions_next(const trip_level_positions *p, uint64_t *sheet);
 
-/* Returns a sheet, or NULL if it is not known. */
+/* Returns a sheet, or NULL if its squares are not known. */
 static inline const trip_level_sheet *trip_level_positions_sheet(const trip_level_positions *p,
                                                                  uint64_t number)
 {
@@ -56,8 +57,8 @@ static inline const trip_level_sheet *trip_level_positions_sheet(const trip_leve
     return sheet->number == number ? sheet : NULL;
 }
 
-/* Returns the square at an offset in squares and sheets from a key. A missing square has count 0.
- */
+/* Returns the position of the square at an offset, in squares and sheets, from the square of a key.
+ * Its count is 0 if there is no such square. */
 trip_level_position trip_level_position_beside(const trip_level_positions *p, uint64_t key,
                                                int64_t u, int64_t v, int64_t sheet);
 

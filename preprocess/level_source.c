@@ -11,9 +11,9 @@ typedef struct square_header {
     uint64_t key;
     uint32_t count, reserved;
 } square_header;
-static_assert(sizeof(square_header) == TRIP_LEVEL_SQUARE_BYTES, "what precedes voxels");
+static_assert(sizeof(square_header) == TRIP_LEVEL_SQUARE_BYTES, "header before the voxels");
 
-/* Computes the position in the next level of the current square, from its sheet and Morton code. */
+/* Computes where the current square lies in the next level, from its sheet and Morton code. */
 static void position(trip_level_source *s, uint64_t sheet, uint64_t morton)
 {
     unsigned up = s->edge_log2 + 1 - s->tile_log2;
@@ -62,7 +62,7 @@ int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_l
     return status;
 }
 
-/* Skips the unwanted sheets. */
+/* Advances to the next square of the file. Skips sheets of the other parity. */
 static int next_of_file(trip_level_source *s)
 {
     uint64_t key;

@@ -1,6 +1,6 @@
-/* The source of a level's voxels while the next level is made: runs of level 0's finished Z lists,
- * or the file of a coarse level's voxels. A source delivers the even or the odd sheets, square by
- * square, in list order. One thread advances it. */
+/* Reads a level's voxels while the next level is made. The voxels come from the finished Z lists of
+ * level 0, or from the file of a coarse level. A source delivers the even or the odd sheets, square
+ * by square, in list order. One thread advances it. */
 #ifndef TRIP_LEVEL_SOURCE_H
 #define TRIP_LEVEL_SOURCE_H
 
@@ -9,14 +9,14 @@
 #include "piece.h"
 #include "writer.h"
 
-/* Returns the key of a square of 2^edge_log2 voxels: sheet << TRIP_TILE_MORTON_BITS | Morton code.
- */
+/* The key of a square is sheet << TRIP_TILE_MORTON_BITS | its Morton code, in squares of
+ * 2^edge_log2 voxels. */
 
 typedef struct trip_level_source {
     unsigned odd;
-    bool has;     /* there is a current square: */
-    uint64_t key; /* of the next level's square that contains its voxels */
-    int64_t u, v; /* its position in that square, in voxels of this level */
+    bool has;     /* there is a current square */
+    uint64_t key; /* key of the next level's square that contains the current square */
+    int64_t u, v; /* position of the current square in that square, in voxels of this level */
     /* For a list: */
     trip_list_cursor *cursor;
     bool kept;
@@ -30,12 +30,12 @@ typedef struct trip_level_source {
         uint32_t count;
     } voxels;
 
-    unsigned edge_log2; /* edge of the next level's squares */
-    unsigned tile_log2; /* edge of this level's squares */
+    unsigned edge_log2; /* log2 of the edge of the next level's squares */
+    unsigned tile_log2; /* log2 of the edge of this level's squares */
 } trip_level_source;
 
-/* Opens a Z list. `kept` means that it holds kept voxels, not halo. `normals` also reads its
- * normals, if any. */
+/* Opens a Z list. `kept` means that the list holds kept voxels, not halo. With `normals`, the
+ * list's normals are read too, if it has any. */
 int trip_level_source_list(trip_level_source *s, trip_writer *w, unsigned list, bool kept,
                            bool normals, unsigned odd, unsigned tile_log2, unsigned edge_log2,
                            trip_budget *budget);
@@ -44,12 +44,12 @@ int trip_level_source_file(trip_level_source *s, const trip_output *file, bool m
                            unsigned edge_log2);
 void trip_level_source_close(trip_level_source *s);
 
-/* Advances to the next square and sets `has`. It does not read voxels: any thread may read them
- * with a copy of the source. */
+/* Advances to the next square and sets `has`. Reads no voxels. Any thread may read the voxels with
+ * a copy of the source. */
 int trip_level_source_next(trip_level_source *s);
 
-/* Returns the next part of some memory, aligned to 64, and advances *used. With NULL it only
- * counts. */
+/* Returns the next part of `memory`, aligned to 64 bytes, and advances *used. With `memory` NULL it
+ * only advances *used. */
 static inline void *trip_level_carve(unsigned char *memory, size_t *used, size_t bytes)
 {
     const size_t at = *used;
@@ -65,13 +65,14 @@ int trip_level_fail_memory(void);
 int trip_level_file_append(trip_output *file, uint64_t key, const trip_coarse_value *values,
                            const trip_coarse_mean *means, uint32_t count);
 
-/* Returns the bytes of a square with `count` voxels. */
+/* Returns the bytes of a square's voxels, without its header. */
 static inline uint64_t trip_level_voxels_bytes(uint32_t count, bool means)
 {
     return count * (sizeof(trip_coarse_value) + (means ? sizeof(trip_coarse_mean) : 0));
 }
 
-/* Reads back the header of a square. Its voxels follow after TRIP_LEVEL_SQUARE_BYTES. */
+/* Reads back the header of the square at file position `at`. The voxels start
+ * TRIP_LEVEL_SQUARE_BYTES after it. */
 enum { TRIP_LEVEL_SQUARE_BYTES = 16 };
 int trip_level_file_square(const trip_output *file, uint64_t at, unsigned edge_log2, uint64_t *key,
                            uint32_t *count);

@@ -11,15 +11,15 @@
 
 enum { SOURCES = TRIP_LEVEL_SOURCES, PROGRESS_MS = 200 };
 
-/* Memory for a level's voxels before they go to a file: a share of the rest, or the minimum for
- * writing files. */
+/* Memory that holds a level's voxels before they go to disk: at most 1 / FILE_PART of the memory
+ * left, but at least FILE_BUFFER_BYTES. */
 enum { FILE_PART = 8, FILE_BUFFER_BYTES = 1 << 16 };
-/* Squares that each lane may be ahead of the next one to write. */
+/* Maximum number of finished squares per lane that wait to be written. */
 enum { AHEAD = 2 };
 
 /* Memory of a list builder without its pieces. */
 #define BUILDER_BYTES ((uint64_t)3 << 20)
-/* Bytes in the pieces per voxel of the level below. */
+/* Bytes of pieces per voxel of the level below. */
 #define PIECE_BYTES 64
 
 /* A square that waits to be written, with memory for its voxels. */
@@ -35,27 +35,28 @@ typedef struct made_square {
  * appended to the file in the order of squares. The thread that made the next square appends it and
  * all consecutive waiting squares. */
 typedef struct making {
-    trip_level_work work; /* read-only for lanes */
+    trip_level_work work; /* lanes only read it */
     trip_budget *budget;
     unsigned level, first_list;
     int64_t dims[3];
     trip_level_source sources[SOURCES];
     unsigned source_count;
     trip_output *file;     /* file of its voxels, for its values and the next level; may be NULL */
-    trip_output with_halo; /* file with the level's halo, for its values; above level 1 */
+    trip_output with_halo; /* copy of the file with the level's own halo, for its values; used above
+                              level 1 */
     trip_sharpen sharpen;
-    uint64_t sheets_before, sheets; /* progress over all levels */
+    uint64_t sheets_before, sheets; /* sheets of lower levels; of all levels */
 
     unsigned lane_count;
     trip_level_lane *lanes;
-    size_t lane_bytes; /* sources of each lane, with their current squares */
+    size_t lane_bytes; /* bytes of memory per lane, with the squares that wait */
     unsigned char *memory;
-    made_square *made; /* ring of `ahead` squares, by square number */
+    made_square *made; /* `ahead` squares; square n is at n modulo `ahead` */
     unsigned ahead;
 
     pthread_mutex_t lock; /* guards all below, the sources, and the state of sharpening */
     pthread_cond_t turned;
-    uint64_t taken;    /* squares */
+    uint64_t taken;    /* number of squares taken by lanes */
     uint64_t appended; /* number of the next square to write */
     bool appending;    /* a thread uses the file */
     uint64_t sheet;
@@ -142,8 +143,8 @@ static uint64_t records_below(const making *m)
     return records;
 }
 
-/* Level 0's halo reaches most neighbours of level 1's voxels. The others would make lists 1.5 times
- * as long, so level 1 has no extra halo. */
+/* Level 1 has no halo of its own. Level 0's halo reaches most neighbours of its voxels, and adding
+ * the others would make its lists 1.5 times as long. */
 static bool has_halo_of_its_own(const making *m)
 {
     return m->work.format.halo && m->level > 1;
@@ -153,7 +154,7 @@ static bool has_halo_of_its_own(const making *m)
 static uint64_t late_bytes(const making *m)
 {
     uint64_t bytes = BUILDER_BYTES;
-    if (has_halo_of_its_own(m)) /* a kept voxel has 26 neighbours */
+    if (has_halo_of_its_own(m)) /* a kept voxel has 26 neighbours, hence 27 */
         bytes += trip_level_halo_bytes(m->dims, m->work.edge_log2, 27 * records_below(m));
     else if (m->work.format.halo)
         bytes += trip_level_positions_later_bytes(m->dims, m->work.edge_log2, records_below(m));
@@ -239,7 +240,7 @@ static int poll(void)
     return trip_interrupted() ? trip_fail(TRIP_INTERRUPTED, "brick", "", "interrupted") : 0;
 }
 
-/* Stops all lanes after one failed. Returns its status. */
+/* Stops all lanes if `status` is a failure. Returns `status`. */
 static int end_lane(making *m, int status)
 {
     if (status == 0)
@@ -251,8 +252,8 @@ static int end_lane(making *m, int status)
     return status;
 }
 
-/* Finds the sources of the next square's voxels. Returns 0 if there is none or another lane failed.
- */
+/* Finds the sources of the next square's voxels. Returns 1, or 0 if no square is left or another
+ * lane failed. */
 static int take_square(making *m, trip_level_lane *l)
 {
     int status = 0;
@@ -275,8 +276,8 @@ static int take_square(making *m, trip_level_lane *l)
     return status < 0 ? status : l->key != UINT64_MAX;
 }
 
-/* Appends all squares that are next. Called under the lock, which is released while the file is
- * written. */
+/* Appends the squares that are next in file order. The caller holds the lock, which is released
+ * while the file is written. */
 static int append_made(making *m)
 {
     int status = 0;
@@ -295,8 +296,8 @@ static int append_made(making *m)
     }
 }
 
-/* Queues the current square's voxels for the file, once at most `ahead` squares wait. The lane
- * continues with other memory. */
+/* Queues the current square's voxels for the file. Waits until fewer than `ahead` squares before it
+ * are unwritten. The lane continues with other memory. */
 static int append(making *m, trip_level_lane *l, uint32_t count)
 {
     made_square *to = &m->made[l->number % m->ahead];
@@ -325,7 +326,7 @@ static int make_square(making *m, trip_level_lane *l)
     return status == 0 ? poll() : status;
 }
 
-/* Runs a lane. */
+/* Runs a lane until no square is left. */
 static int make_squares(void *user, unsigned thread, uint64_t item)
 {
     making *m = user;
@@ -430,7 +431,8 @@ static int open_file(making *m, const trip_output *below)
     return status;
 }
 
-/* Maximum bytes for this many voxels, each possibly in its own square. */
+/* Returns the size of the memory for `voxels` voxels. In the worst case, each voxel has its own
+ * square. */
 static size_t file_buffer_bytes(const making *m, uint64_t voxels, bool means)
 {
     const uint64_t grid = (uint64_t)m->dims[0] * (uint64_t)m->dims[1] * (uint64_t)m->dims[2];
@@ -457,7 +459,7 @@ static int create_file(const making *m, trip_output *file, uint64_t voxels, bool
 static int open_sharpen(making *m)
 {
     const bool own = has_halo_of_its_own(m);
-    /* A kept voxel has 26 neighbours. */
+    /* A kept voxel has 26 neighbours, hence 27. */
     int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
     trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file,
                       m->work.params->kinds.means && !own, m->work.params->hidden_above,
@@ -507,7 +509,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     trip_level_work *w = &m->work;
     w->params = params;
     w->format = params->format;
-    w->format.quantised = true; /* pieces hold codes, whatever level 0's held */
+    w->format.quantised = true; /* pieces of coarse levels always hold codes */
     w->format.halo = params->kinds.values;
     w->format.normals = params->format.normals && params->kinds.means;
     w->scale = trip_mean_scale_make(params->value_min, params->value_max, params->quantiser.lo,

@@ -1,8 +1,8 @@
-/* Makes the coarse levels of a data set, each from the finished level below: level 1 from level 0's
- * Z lists, the others from a file of the level's voxels, which stays in memory if possible. Two
- * sheets are read at a time, square by square, so that memory does not grow with the volume. A list
- * builder sorts the pieces. Only lists of means need normals and kept shares; without such lists
- * they are not read. */
+/* Makes the coarse levels of a data set, each from the finished level below. Level 1 is made from
+ * the Z lists of level 0. Every other level is made from a file of the voxels below, which stays in
+ * memory if possible. Two sheets are read at a time, square by square, so that memory does not grow
+ * with the volume. A list builder sorts the pieces. Only lists of means need normals and kept
+ * shares; without such lists, neither is read. */
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 
@@ -16,35 +16,35 @@ enum { TRIP_LEVELS_MAX = 24 };
 /* The kinds of lists of a coarse level, three lists each: means, drawn as splats, come before
  * values, which are interpolated. */
 typedef struct trip_level_kinds {
-    bool means, values; /* at least one */
+    bool means, values; /* at least one of them */
 } trip_level_kinds;
 
 typedef struct trip_levels_params {
-    trip_piece_format format; /* of level 0 */
+    trip_piece_format format; /* format of level 0's pieces */
     trip_level_kinds kinds;   /* values require a halo in level 0 */
     trip_quantiser quantiser;
     const trip_compact_normals *compact; /* encoding of 3-byte normals; NULL means 4 bytes */
-    int64_t dims[3];                     /* of level 0 */
+    int64_t dims[3];                     /* voxels of level 0 along each axis */
     trip_affine index_to_world;
     unsigned levels;
-    double value_min, value_max; /* of the volume */
+    double value_min, value_max; /* range of the volume's values */
     bool hidden_above;           /* dropped values lie mostly above the kept ones */
-    const char *folder;          /* for temporary files */
+    const char *folder;          /* folder for temporary files */
     trip_writer *writer;         /* has the lists of trip_levels_lists() */
-    trip_spill *spill;           /* its sequences are no longer needed */
+    trip_spill *spill;           /* its sequences are retired, because they are no longer needed */
     trip_workers *workers;
-    /* Called from time to time with the progress. */
+    /* Called from time to time with the number of finished sheets. May be NULL. */
     void (*progress)(void *user, uint64_t done, uint64_t total);
     void *progress_user;
 } trip_levels_params;
 
-/* Returns the number of levels for trip_brick_params.levels. */
+/* Returns the number of coarse levels for `wanted`, as defined by trip_brick_params.levels. */
 unsigned trip_levels_count(const int64_t dims[3], int wanted, unsigned tile_voxels);
 
 trip_level_kinds trip_levels_kinds(trip_brick_levels_for wanted, bool halo);
 
-/* Fills in the lists of levels 0 to `levels` for the writer. Returns their number. `lists` has room
- * for 6 per level. */
+/* Fills in the lists of levels 0 to `levels` for the writer. `lists` has room for 6 lists per
+ * level. Returns the number of lists. */
 unsigned trip_levels_lists(const int64_t dims[3], const trip_affine *index_to_world, bool halo,
                            trip_level_kinds kinds, unsigned levels, trip_writer_list *lists);
 

@@ -24,15 +24,14 @@ typedef struct job {
 struct trip_list_builder {
     trip_list_builder_params params;
     unsigned lists;
-    uint32_t (
-        *open)[TRIP_MAX_LISTS]; /* [producer][list]: the current chunk, owned by the producer */
-    trip_list_output outputs[TRIP_MAX_LISTS]; /* until the merge only the background thread uses the
-                                                 ordered list's */
+    uint32_t (*open)[TRIP_MAX_LISTS];         /* [producer][list]: a producer's current chunk */
+    trip_list_output outputs[TRIP_MAX_LISTS]; /* until the merge, only the background thread uses
+                                                 the ordered list's output */
     pthread_t thread;
     bool thread_runs;
-    trip_scope *scope; /* scope of the creator */
+    trip_scope *scope; /* scope of the creating thread */
 
-    pthread_mutex_t lock; /* guards all below, and the chunks in the chains */
+    pthread_mutex_t lock; /* guards all members below, and the chunks in their chains */
     pthread_cond_t work, freed;
     trip_piece_pool pool;
     bool stopping, has_spilled;
@@ -44,7 +43,8 @@ struct trip_list_builder {
 
 uint64_t trip_list_builder_min_bytes(const trip_piece_format *f, unsigned producers)
 {
-    /* Every producer fills one chunk of each list while as many chunks wait for spilling. */
+    /* Every producer fills one chunk of each list, while the same number of chunks waits for
+     * spilling. */
     return (uint64_t)trip_chunk_bytes(f) * 2 * trip_piece_list_count(f) * ((uint64_t)producers + 1);
 }
 
@@ -68,8 +68,8 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
     pthread_mutex_unlock(&b->lock);
 }
 
-/* Writes the checkpoint on the thread that appends to the ordered list, because it contains that
- * list's lengths. */
+/* Writes the checkpoint. Runs on the thread that appends to the ordered list, because the
+ * checkpoint contains the lengths of this list. */
 static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
 {
     for (int plane = 0; plane < TRIP_PLANES; plane++)
@@ -178,7 +178,7 @@ static int take_chunk(trip_list_builder *b, uint32_t *chunk)
     return b->status;
 }
 
-/* Under the lock. */
+/* Under the lock: moves a producer's current chunk to the filled chunks. */
 static void close_chunk(trip_list_builder *b, unsigned producer, unsigned list)
 {
     uint32_t chunk = b->open[producer][list];

@@ -45,7 +45,7 @@ int trip_spill_chain(trip_spill *spill, unsigned list, const trip_piece_pool *po
 typedef struct merge_job {
     const trip_list_merge *merge;
     unsigned lists[TRIP_MAX_LISTS];
-    pthread_mutex_t lock;
+    pthread_mutex_t lock; /* guards the free chunks of the pool */
 } merge_job;
 
 static size_t sequences_of(const trip_list_merge *m, unsigned list)
@@ -134,8 +134,8 @@ static int merge_list(void *user, unsigned thread, uint64_t item)
     return status;
 }
 
-/* Merges sequences of a list into one. The number of free chunks limits how many, since each needs
- * a buffer. */
+/* Merges sequences of a list into one. Each needs a free chunk as its buffer, which limits their
+ * number. */
 static int consolidate(merge_job *job, unsigned list)
 {
     const trip_list_merge *m = job->merge;

@@ -1,5 +1,5 @@
-/* Writes a list to a data set: takes pieces by ascending key, combines the pieces of each tile of a
- * sheet into a run, and appends it. One thread per list. */
+/* Writes a list to a data set. It takes pieces by ascending key, combines the pieces of each tile
+ * of a sheet into a run, and appends the run. One thread per list. */
 #ifndef TRIP_LIST_OUTPUT_H
 #define TRIP_LIST_OUTPUT_H
 
@@ -12,7 +12,7 @@ typedef struct trip_list_output {
     trip_writer *writer;
     trip_run_builder *builder;
     _Atomic uint64_t splats; /* records appended so far; other threads may read it (relaxed) */
-    unsigned pieces;         /* pieces taken so far */
+    unsigned pieces;         /* pieces taken so far, for the interruption check */
     /* If not NULL, called after each appended run. */
     int (*run)(void *user, uint64_t key, const uint32_t *voxels, const uint32_t *normals,
                uint32_t splats);

@@ -95,7 +95,7 @@ class Look(program.ProgramTest):
                 off = abs(scaled - expected)
                 self.assertLess(off[open_still].max(), 2e-4, (classify, scale))
 
-    def test_early_termination_is_refused_if_it_does_not_apply(self):
+    def test_early_termination_is_checked_and_reported(self):
         pre = ["--classify", "pre"]
         for options, says in (
             (["--early-termination=0.11"], "0.11 is not between 0 and 0.1"),
@@ -230,7 +230,7 @@ class Look(program.ProgramTest):
         for value in (0, 7):
             program.write_nrrd("even.nrrd", numpy.full((32, 32, 32), value, "u1"))
             run = self.works("brick", "even.nrrd", "-q", "--force")
-            self.assertIn(f"every voxel there is has the value {value}", run.stderr)
+            self.assertIn(f"every voxel has the value {value}", run.stderr)
             alpha = self.picture("even.trip", *FRONT)[..., 3]
             # The optical depth through the cube is 1.2. Oblique rays are up to sqrt(3) times as
             # long.

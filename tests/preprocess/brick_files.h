@@ -1,5 +1,5 @@
-/* For tests of the bricker: a folder of their own, raw volumes in it, and data sets read back into
- * dense arrays, one for each list, by the reader's iterators. */
+/* Helpers for tests of the bricker. They make a temporary folder, write raw volumes, and read data
+ * sets back into one dense array for each list. Reading uses the iterators of stream/. */
 #ifndef TRIP_TEST_BRICK_FILES_H
 #define TRIP_TEST_BRICK_FILES_H
 
@@ -31,7 +31,7 @@ static inline void test_catch(const char *line, void *user)
     snprintf(test_report + used, sizeof test_report - used, "%s\n", line);
 }
 
-/* For cmocka's setup and teardown: a fresh folder, and reports kept. */
+/* cmocka's setup and teardown. They make and remove an empty folder, and catch reports. */
 static inline int test_begin(void **state)
 {
     (void)state;
@@ -51,7 +51,7 @@ static inline int test_end(void **state)
     return system(command);
 }
 
-/* FOLDER/NAME; good until the eighth call after. */
+/* Returns FOLDER/NAME. The string stays valid for the next seven calls. */
 static inline const char *test_path(const char *name)
 {
     static char paths[8][128];
@@ -82,8 +82,8 @@ static inline bool test_exists(const char *name)
 
 enum { TEST_LISTS = 6 };
 
-/* What a data set holds at level 0: [k][j][i] of every list (X, Y and Z of kept voxels, then of the
- * halo), code -1 where there is no splat. */
+/* The lists of level 0 as dense arrays [k][j][i]. The first three are the X, Y and Z lists of kept
+ * voxels, then come the lists of the halo. Code -1 means no splat. */
 typedef struct test_lists {
     trip_file_header header;
     size_t voxels;
@@ -91,7 +91,8 @@ typedef struct test_lists {
     int32_t *codes[TEST_LISTS];
     uint32_t *normals[TEST_LISTS];
     uint64_t splats[TEST_LISTS];
-    uint64_t out_of_order; /* splats not after the one before, by sheet and Morton code */
+    uint64_t out_of_order; /* splats that do not follow their predecessor in order of sheet and
+                              Morton code */
     char *text;
 } test_lists;
 
@@ -176,7 +177,8 @@ static inline void test_free_lists(test_lists *l)
     free(l->text);
 }
 
-/* Sound, in order, and the same splats in all three lists of a kind. */
+/* Checks that the lists are valid and in order, and that all three lists of a kind have the same
+ * splats. */
 static inline void test_check_lists(const test_lists *l)
 {
     assert_int_equal(l->out_of_order, 0);
@@ -202,8 +204,8 @@ static inline bool test_same_file(const char *a, const char *b)
     return c == d;
 }
 
-/* Bricks a raw volume of bytes, those from 100 on being kept, and returns the data set's text, for
- * free(). `p`: what else is said of it. */
+/* Bricks a raw volume of bytes and keeps the values from 100 on. `p` gives the other parameters.
+ * Returns the data set's text, which the caller frees. */
 static inline char *test_brick_bytes(trip_brick_params p, const uint8_t *bytes, const int dims[3],
                                      trip_brick_summary *s)
 {
@@ -227,7 +229,7 @@ static inline char *test_brick_bytes(trip_brick_params p, const uint8_t *bytes, 
     return text;
 }
 
-/* All files of two data sets alike, byte for byte. */
+/* Checks that all files of two data sets are equal byte for byte. */
 static inline void test_same_dataset(const char *a, const char *b)
 {
     static const char *const files[] = { "index.trip", "x0.voxels",  "y0.voxels",  "z0.voxels",

@@ -1,5 +1,5 @@
-/* What files of netCDF's forms have besides the sample volume as variable "t" of (z, lat, x), and
- * what is to be read of them. */
+/* Contents of the netCDF test files, and checks of the volumes read from them. Variable "t" of (z,
+ * lat, x) is the sample volume. */
 #ifndef NETCDF_FILES_H
 #define NETCDF_FILES_H
 
@@ -16,7 +16,7 @@ static inline int z_position(int k)
     return NZ - 1 - k;
 }
 
-/* The variable has these coordinates, and such a name. */
+/* Checks the volume's coordinates against x_position() and z_position(), and its name. */
 static inline void assert_placed(const char *path, const char *name)
 {
     static const double x[NX] = { 0, 4.0 / 15, 12.0 / 15, 28.0 / 15, 4 };
@@ -36,14 +36,14 @@ static inline void assert_placed(const char *path, const char *name)
     trip_budget_destroy(budget);
 }
 
-/* Of variables whose attribute says that they have no sign, while their type has one. */
+/* Coordinates for variables of a signed type with an attribute that declares them unsigned. */
 static inline int unsigned_x_position(int i)
 {
     return 100 + 25 * i;
 }
 
-/* Its numbers, stored as `type`, have no sign; where one is -7 by that type it has no value, if any
- * are missing. x lies where such bytes say. */
+/* Checks a volume stored as signed `type` and declared unsigned. If `missing`, a voxel stored as -7
+ * has no value. The x coordinates are unsigned_x_position(). */
 static inline void assert_unsigned(const char *path, trip_scalar type, bool missing)
 {
     const double beyond = type == TRIP_I8 ? 256 : 65536;
@@ -63,7 +63,7 @@ static inline void assert_unsigned(const char *path, trip_scalar type, bool miss
                (const double[3][4]){ { 25, 0, 0, 100 }, { 0, 1, 0, 0 }, { 0, 0, -1, 6 } });
 }
 
-/* Its numbers stand for twice as much, and 3; where one is 5 it has no value. */
+/* Checks a volume with scale 2 and offset 3. A voxel stored as 5 has no value. */
 static inline void assert_scaled(const char *path, trip_scalar type)
 {
     float values[VOXELS];

@@ -14,8 +14,7 @@ enum { NX = 97, NY = 70, NZ = 61, N = NX * NY * NZ };
 static uint8_t bytes[N];
 static float floats[N];
 
-/* Spheres around the middle with some noise, so that neither dense nor empty regions are missing.
- */
+/* Makes concentric spheres with some noise, so that there are dense and empty regions. */
 static void make_bytes(void)
 {
     uint64_t random = 11;
@@ -48,7 +47,7 @@ static trip_brick_params params_for(const char *type, const char *output)
 
 static const trip_value_range middle = { 100, 180 };
 
-/* Of all plane files; those of the halo are as long as `halo`. */
+/* Returns the bytes of all plane files. The halo's plane files must have `halo` bytes each. */
 static uint64_t bytes_of_lists(const char *name, uint64_t halo)
 {
     static const char *const planes[] = { "halo", "voxels", "normals" };
@@ -112,7 +111,7 @@ static void a_transfer_function_keeps_what_it_shows(void **state)
     test_free_lists(&l);
 }
 
-/* Before a voxel is read. */
+/* The refusal comes before any voxel is read. */
 static void functions_that_a_data_set_has_no_room_for_are_refused(void **state)
 {
     (void)state;
@@ -151,8 +150,8 @@ static void without_an_envelope_something_is_kept_and_a_function_stored(void **s
     test_free_lists(&l);
 }
 
-/* Codes of so many steps are the nearest over the whole range of the values, kept or not, and a
- * share of that on either side. */
+/* Checks that each code is the nearest of `steps` steps. They cover the range of all values, kept
+ * or not, extended by `room` times the range on either side. */
 static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes, int steps,
                                   double room)
 {
@@ -189,7 +188,8 @@ static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes
     test_free_lists(&l);
 }
 
-/* The range of wide types is only known at the end; codes are of the whole range nevertheless. */
+/* The range of a wide type is only known once all values are read. Codes cover the whole range
+ * nevertheless. */
 static void codes_of_floats_are_of_the_range_of_all_values(void **state)
 {
     (void)state;
@@ -202,7 +202,8 @@ static void codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values(
     check_codes_of_floats(TRIP_CODE_BITS_8, 1, 771, 258.0 / 255);
 }
 
-/* The range is that of the values, not of the type, in which they would be a few codes. */
+/* Codes cover the range of the values. Over the range of the type, these values would share a few
+ * codes. */
 static void shorts_of_a_narrow_range_have_all_codes_of_a_byte(void **state)
 {
     (void)state;
@@ -268,8 +269,8 @@ static void gradients_of_floats_are_right(void **state)
                 double full = l.header.gradient_full;
                 trip_normal_unpack(l.normals[0][f - floats], full, g);
                 double length = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-                /* Of a lattice with steps of full / 511; beyond, half a step of the length's root,
-                 * and 0.06 degrees. */
+                /* Below `full` the error is bounded by a lattice with steps of full / 511. Above,
+                 * it is half a step of the length's square root, and 0.06 degrees. */
                 double error = length < full
                                    ? full / 511
                                    : sqrt(length * full) / 32 + full / 1024 + 0.0012 * length;
@@ -301,7 +302,7 @@ static void values_that_are_not_finite_are_left_out_with_one_warning(void **stat
     test_free_lists(&l);
 }
 
-/* 8 bits are stored as they are, signed or not; 16 bits in their own. */
+/* 8-bit values are their own codes, signed or not. 16-bit values have 16-bit codes. */
 static void codes_have_the_bytes_of_the_source(void **state)
 {
     (void)state;
@@ -327,7 +328,7 @@ static void codes_have_the_bytes_of_the_source(void **state)
     }
 }
 
-/* Bricks the bytes as NIfTI-1, which scales them. */
+/* Bricks the bytes as a NIfTI-1 file with this slope and intercept. */
 static trip_brick_summary brick_scaled(float slope, float inter)
 {
     static struct {
@@ -357,7 +358,7 @@ static trip_brick_summary brick_scaled(float slope, float inter)
     return s;
 }
 
-/* 10 - 2 times the bytes: -500 to 10. */
+/* The values are 10 - 2 times the bytes: -500 to 10. */
 static void codes_of_bytes_are_exact_where_values_fall_as_they_rise(void **state)
 {
     (void)state;
@@ -377,7 +378,7 @@ static void codes_of_bytes_are_exact_where_values_fall_as_they_rise(void **state
     test_free_lists(&l);
 }
 
-/* About 10^6 floats are a sixteenth apart, so that tenths are not among them. */
+/* Floats near 10^6 are 1/16 apart, so they cannot represent tenths. */
 static void bytes_whose_values_are_no_floats_have_codes_of_16_bits(void **state)
 {
     (void)state;
@@ -386,7 +387,7 @@ static void bytes_whose_values_are_no_floats_have_codes_of_16_bits(void **state)
     assert_int_equal(brick_scaled(0.1f, 1e6f).code_bytes, 2);
 }
 
-/* Of a field that is linear in the world they are the same everywhere. */
+/* The field is linear in world space, so its gradient is the same everywhere. */
 static void gradients_of_uneven_grids_are_those_of_the_world(void **state)
 {
     (void)state;
@@ -422,7 +423,7 @@ static void gradients_of_uneven_grids_are_those_of_the_world(void **state)
             assert_true(fabs(g[a] - slope[a]) <= l.header.gradient_full / 511);
     }
     test_free_lists(&l);
-    make_bytes(); /* whose differences are no multiples of a step, either */
+    make_bytes(); /* the differences of the bytes are no multiples of a step */
     p.volume.raw_type = "uint8";
     p.replace = true;
     assert_int_equal(trip_brick(&p, &s), 0);
@@ -468,8 +469,9 @@ static void normals_of_bytes_are_compact_and_exact_below_full_shading(void **sta
     test_free_lists(&l);
 }
 
-/* Halves of a difference of bytes reach 63.5. The longest vector that is kept as one is that of
- * 0.04 * 255 over a voxel, along z as many times a voxel's mean length as z is long. */
+/* Compact normals store half differences of bytes up to 63.5. A gradient is stored exactly up to
+ * 0.04 * 255 per mean voxel length. Along z, that limit is multiplied by the z spacing over the
+ * mean voxel length. */
 static void normals_of_bytes_are_compact_where_halves_reach_far_enough(void **state)
 {
     (void)state;
@@ -479,13 +481,13 @@ static void normals_of_bytes_are_compact_where_halves_reach_far_enough(void **st
         trip_brick_params p = params_for("uint8", "a.trip");
         p.keep_all = p.replace = true;
         p.volume.spacing[0] = p.volume.spacing[1] = 1;
-        p.volume.spacing[2] = i ? 27 : 8; /* 10.2 * 27 / 3 is beyond, 10.2 * 8 / 2 is not */
+        p.volume.spacing[2] = i ? 27 : 8; /* 10.2 * 27 / 3 exceeds 63.5, 10.2 * 8 / 2 does not */
         assert_int_equal(trip_brick(&p, &s), 0);
         assert_int_equal(s.normal_bytes, i ? 4 : 3);
     }
 }
 
-/* Compact normals need the range of values: where nothing else does, normals are full. */
+/* Compact normals need the range of values. If nothing else needs the range, normals are full. */
 static void normals_have_the_bytes_that_were_chosen(void **state)
 {
     (void)state;
@@ -567,7 +569,8 @@ static void splats_come_in_one_order_whatever_the_tile(void **state)
         test_read_lists("b.trip", &l);
         test_check_lists(&l);
         test_free_lists(&l);
-        /* Normals follow the order but not the tile, unlike positions in voxel records. */
+        /* Normals depend on the order of splats, not on the tile size. Positions in voxel records
+         * depend on both. */
         assert_true(test_same_file(test_path("a.trip/x0.normals"), test_path("b.trip/x0.normals")));
         assert_true(test_same_file(test_path("a.trip/y0.normals"), test_path("b.trip/y0.normals")));
         assert_true(test_same_file(test_path("a.trip/z0.normals"), test_path("b.trip/z0.normals")));
@@ -616,7 +619,8 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
     p = params_for("uint8", "a.trip");
     p.memory_bytes = 1 << 20;
     check_refused(p, "--memory");
-    for (unsigned threads = 1; threads < 4; threads++) { /* what it says that it needs suffices */
+    for (unsigned threads = 1; threads < 4;
+         threads++) { /* the memory that the error line asks for suffices */
         unsigned min = 0;
         char same[200];
         p.memory_bytes = 1 << 20;
@@ -670,7 +674,7 @@ static void an_existing_data_set_stays_unless_it_is_to_be_replaced(void **state)
     assert_int_equal(trip_brick(&p, &s), 0);
 }
 
-/* Kills the process when a stage is so far. */
+/* Kills the process when a stage reaches this share. */
 typedef struct killer {
     const char *stage;
     double share;
@@ -711,7 +715,7 @@ static void check_resumed(const trip_brick_params *base, bool *any_checkpoint)
     strcpy(output, test_path("b.trip"));
     p.output = output;
     p.resume = true;
-    /* The scan is only in runs that have one: those are the ones with an automatic envelope. */
+    /* Only runs with an automatic envelope scan the volume first. */
     for (size_t i = p.keep_all ? 1 : 0; i < sizeof killers / sizeof *killers; i++)
         run_killed(p, &killers[i]);
     assert_false(test_exists("b.trip"));
@@ -762,7 +766,7 @@ static void another_input_or_other_parameters_are_not_gone_on_with(void **state)
     assert_false(s.resumed);
 }
 
-/* As uneven coordinates of the slices. */
+/* Writes squares, used as uneven coordinates of the slices. */
 static void write_squares(const char *name)
 {
     char text[512];
@@ -772,7 +776,7 @@ static void write_squares(const char *name)
     test_write(name, text, (size_t)used);
 }
 
-/* The file that is named as the input stays as it is. */
+/* Another data file changes, not the file named as the input. */
 static void other_data_files_are_not_gone_on_with(void **state)
 {
     (void)state;
@@ -794,7 +798,7 @@ static void other_data_files_are_not_gone_on_with(void **state)
         p.resume = false;
         test_report[0] = 0;
         run_killed(p, &(killer){ "read", 0.5 });
-        /* Another file takes the name, with the same bytes: it has another inode. */
+        /* Another file with the same bytes replaces the file. Its inode differs. */
         if (i == 0)
             test_write("new", bytes, sizeof bytes);
         else

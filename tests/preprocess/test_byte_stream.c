@@ -15,8 +15,8 @@ static bytes plain(void)
     return b;
 }
 
-/* Reads the source in pieces of `step` bytes and compares it with the plain bytes from `from` on.
- */
+/* Reads the source in pieces of `step` bytes and compares them with the plain bytes from offset
+ * `from` on. */
 static void assert_delivers(const trip_byte_source *source, size_t from, size_t step)
 {
     bytes expected = plain();
@@ -34,7 +34,8 @@ static void assert_delivers(const trip_byte_source *source, size_t from, size_t 
     trip_byte_stream_close(s);
 }
 
-/* Opens and reads everything; fails with one line that contains `text`. */
+/* Opens the source and reads it to its end. Expects a failure with one line that contains `text`.
+ */
 static void assert_fails(const trip_byte_source *source, const char *text)
 {
     trip_byte_stream *s = NULL;
@@ -118,8 +119,8 @@ static void members_one_after_the_other_are_one_stream(void **state)
     }
 }
 
-/* As gzip and bzip2 do: what follows a complete stream and does not begin as another is passed
- * over, be it padding, or of the two bytes that one begins with the first alone. */
+/* Bytes behind a complete stream that do not begin another stream are skipped, as gzip and bzip2
+ * do. They are padding, or only the first of the two bytes that begin a stream. */
 static void bytes_behind_a_complete_stream_are_passed_over(void **state)
 {
     (void)state;
@@ -156,8 +157,8 @@ static void bytes_behind_a_complete_stream_are_passed_over(void **state)
         }
 }
 
-/* A mebibyte is read at once: of the second member it has no byte, one, or two. The first is made
- * as long by a comment. */
+/* The reader takes a mebibyte at once. That block holds no byte, one byte or two bytes of the
+ * second member. A comment gives the first member the necessary length. */
 static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
 {
     (void)state;
@@ -170,7 +171,7 @@ static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
     append(&half, all.data + COUNT / 2, COUNT / 2);
     append_gzip(&second, &half);
     assert_int_equal(first.data[3], 0);
-    first.data[3] = 16; /* there is a comment behind the header's 10 bytes */
+    first.data[3] = 16; /* a comment follows the header's 10 bytes */
     for (size_t left = 0; left < 3; left++) {
         const size_t end = (1 << 20) - left, comment = end - first.count;
         memcpy(whole, first.data, 10);
@@ -185,7 +186,8 @@ static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
     }
 }
 
-/* One byte less at a time, down to an empty file: also the checksums at the end are missed. */
+/* Cuts off one byte more each time, down to an empty file. A cut in the checksum at the end is an
+ * error, too. */
 static void a_cut_file_is_refused_wherever_it_is_cut(void **state)
 {
     (void)state;
@@ -285,7 +287,6 @@ static void what_is_no_file_is_refused(void **state)
     assert_fails(&(trip_byte_source){ .path = "/dev/zero", .size_bytes = 1 }, "not a regular file");
 }
 
-/* Reading and passing over, of every encoding. */
 static void a_signal_ends_reading_and_skipping(void **state)
 {
     (void)state;
@@ -309,7 +310,7 @@ static void a_signal_ends_reading_and_skipping(void **state)
         assert_int_equal(reports, 1);
         assert_non_null(strstr(reported, "interrupted"));
         trip_byte_stream_close(s);
-        trip_interrupt_install(); /* forgets the signal */
+        trip_interrupt_install(); /* clears the signal */
         signal(SIGINT, SIG_DFL);
         signal(SIGTERM, SIG_DFL);
     }

@@ -1,10 +1,10 @@
-/* Voxels made of the eight of the level below, against what they are by hand. */
+/* Compares voxels made of eight voxels of the next finer level with results computed by hand. */
 #include "test.h"
 
 #include "coarse.h"
 
-/* Beside it there is nothing, so that parts are divided by eight from level to level, until they
- * would be less than a step. */
+/* The voxel has no neighbours, so each level divides its share by eight. The share never falls
+ * below one step. */
 static void a_voxel_alone_never_vanishes(void **state)
 {
     (void)state;
@@ -24,7 +24,7 @@ static void a_voxel_alone_never_vanishes(void **state)
         assert_true(mean.kept >= 1 && fabs(mean.kept - ldexp(65535, -3 * level)) <= 1);
         assert_int_equal(value.value, 777);
         assert_int_equal(mean.mean, 777);
-        for (int a = 0; a < 3; a++) /* what is kept is in its columns, and at most all of them */
+        for (int a = 0; a < 3; a++) /* the columns cover at least the kept share */
             assert_true(mean.cover[a] >= mean.kept);
     }
 }
@@ -47,8 +47,8 @@ static void values_count_by_what_is_known_of_them(void **state)
     assert_int_equal(out.value, 11); /* (65535 * 10 + 1 * 65535) / 65536 */
 }
 
-/* Half a column behind half of it leaves a quarter open, by chance: of four columns 3/16 are
- * covered. */
+/* Two halves of a column overlap as if by chance and leave a quarter open. So 3/16 of four columns
+ * are covered. */
 static void columns_are_covered_as_if_by_chance(void **state)
 {
     (void)state;
@@ -57,11 +57,11 @@ static void columns_are_covered_as_if_by_chance(void **state)
     trip_coarse_mean out;
     trip_coarse_mean_clear(&sum);
     trip_coarse_mean_add(&sum, &half, 0, NULL);
-    trip_coarse_mean_add(&sum, &half, 1, NULL); /* beside it along x */
+    trip_coarse_mean_add(&sum, &half, 1, NULL); /* the next voxel along x */
     trip_coarse_mean_get(&sum, &out);
     assert_int_equal(out.kept, 8192);
     assert_true(fabs(out.cover[0] - 65535 * 3 / 16.0) <= 65535 / 510.0);
-    for (int a = 1; a < 3; a++) /* two columns, half of each */
+    for (int a = 1; a < 3; a++) /* half of each of two columns */
         assert_true(fabs(out.cover[a] - 65535 / 4.0) <= 65535 / 510.0);
 }
 
@@ -76,7 +76,8 @@ static void gradients_whose_sign_was_lost_add_up(void **state)
     trip_coarse_mean_add_whole(&sum, 1, 1, short_one);
     trip_coarse_mean_gradient(&sum, gradient);
     assert_true(gradient[0] == 0 && gradient[1] == 0);
-    assert_close(gradient[2], (2 * 2 + 1 * 1) / 3.0, 1e-6); /* each counts by its length */
+    assert_close(gradient[2], (2 * 2 + 1 * 1) / 3.0,
+                 1e-6); /* each gradient is weighted by its length */
     trip_coarse_mean_clear(&sum);
     trip_coarse_mean_gradient(&sum, gradient);
     assert_true(gradient[2] == 0);

@@ -1,4 +1,4 @@
-/* Coarse levels against plain sums over the voxels that each of theirs covers. */
+/* Compares coarse levels with plain sums over the voxels that each coarse voxel covers. */
 #include "brick_files.h"
 
 #include <math.h>
@@ -18,7 +18,7 @@ static bool is_kept(int64_t x, int64_t y, int64_t z)
            bytes[(z * NY + y) * NX + x] >= MIN;
 }
 
-/* Kept, or next to what is. */
+/* Returns whether the voxel is kept or a neighbour of a kept voxel. */
 static bool is_known(int64_t x, int64_t y, int64_t z)
 {
     for (int n = 0; n < 27; n++)
@@ -35,7 +35,7 @@ static void find_known(void)
         known[i] = is_known(i % NX, i / NX % NY, i / NX / NY);
 }
 
-/* A ball and some voxels anywhere. */
+/* Makes a ball and some single voxels at random positions. */
 static void make_bytes(uint64_t seed, unsigned rare)
 {
     uint64_t random = seed;
@@ -72,9 +72,9 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
     return s;
 }
 
-/* Sums over the cube of voxels that one of a level covers. */
+/* Sums over the cube of voxels that one coarse voxel covers. */
 typedef struct cube {
-    int kept, known, columns; /* columns along the axis with kept voxels */
+    int kept, known, columns; /* columns along the axis that contain kept voxels */
     double mean, value;       /* codes */
 } cube;
 
@@ -106,7 +106,7 @@ static cube sum_cube(const int64_t at[3], unsigned level, int axis)
     return c;
 }
 
-/* Exact but for what a code has no room for. */
+/* The means are exact up to the rounding of codes. */
 static void expect_mean(const trip_mean_scale *scale, const cube *c, unsigned code, unsigned level)
 {
     const double edge = (double)(1u << level), cover = c->columns / (edge * edge);
@@ -119,10 +119,10 @@ static void expect_mean(const trip_mean_scale *scale, const cube *c, unsigned co
         assert_int_equal(code & (TRIP_MEAN_SHARES - 1), TRIP_MEAN_SHARES - 1);
 }
 
-/* What is interpolated, of a voxel of level 1 or 2, before it is sharpened. */
+/* A voxel of level 1 or 2 for interpolation, before sharpening. */
 typedef struct base {
     bool kept, there, added;
-    double value, around; /* codes; the latter the least of what is not kept */
+    double value, around; /* codes; `around` is the minimum of the voxels not kept */
 } base;
 
 enum { MAX_LEVEL = 2, MAX = (NX / 2 + 1) * (NY / 2 + 1) * (NZ / 2 + 1) };
@@ -134,7 +134,7 @@ static int64_t size_of(int axis, unsigned level)
     return (((int64_t[]){ NX, NY, NZ }[axis] - 1) >> level) + 1;
 }
 
-/* NULL: beyond the grid. */
+/* Returns NULL beyond the grid. */
 static base *base_at(int64_t x, int64_t y, int64_t z, unsigned level)
 {
     if (x < 0 || y < 0 || z < 0 || x >= size_of(0, level) || y >= size_of(1, level) ||
@@ -143,8 +143,9 @@ static base *base_at(int64_t x, int64_t y, int64_t z, unsigned level)
     return &bases[level][(z * size_of(1, level) + y) * size_of(0, level) + x];
 }
 
-/* The least of what was not kept in it: of the halo, or of level 1 what voxels have around, or
- * their value where none is kept. */
+/* Returns the minimum of the voxels not kept in this coarse voxel. At level 1 these are its halo
+ * voxels. At level 2 each voxel of level 1 counts with `around`, or with its value if it covers no
+ * kept voxel. */
 static double min_in(const int64_t at[3], unsigned level)
 {
     double min = INFINITY;
@@ -160,8 +161,8 @@ static double min_in(const int64_t at[3], unsigned level)
     return min;
 }
 
-/* A voxel of level 2 that covers none known, beside some that cover kept ones, has the least that
- * these have around. */
+/* Fills a voxel of level 2 that covers neither kept nor halo voxels. The new value is the minimum
+ * of `around` over the neighbours that cover kept voxels. */
 static void add_halo(const int64_t at[3], unsigned level, base *b)
 {
     double min = INFINITY;
@@ -196,8 +197,8 @@ static void find_bases(void)
         }
 }
 
-/* Its value, and an eighth of how much more it is than each of the six beside it that have one; no
- * more than its value where it was added, as what is kept lies above. */
+/* Returns the value plus an eighth of its difference from each of the six neighbours that exist.
+ * Sharpening never raises an added voxel, because the kept values lie above it. */
 static double sharp_value(const int64_t at[3], unsigned level)
 {
     const base *own = base_at(at[0], at[1], at[2], level);
@@ -212,7 +213,8 @@ static double sharp_value(const int64_t at[3], unsigned level)
     return fmin(own->added ? own->value : 65535, fmax(0, sum));
 }
 
-/* Of each record of a list: where it is, and its code. Returns how many there are. */
+/* Calls `each` with the position and the code of each record of a list. Returns the number of
+ * records. */
 static uint64_t visit(const trip_dataset *d, const trip_list *list,
                       void (*each)(const trip_dataset *d, const trip_list *list,
                                    const int64_t at[3], unsigned code, void *user),
@@ -258,7 +260,8 @@ static void check_record(const trip_dataset *d, const trip_list *list, const int
     assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : b && b->there);
 }
 
-/* How many voxels of a level cover one kept, or have a value. */
+/* Returns the number of voxels of the list's level that cover a kept voxel. For a list of values,
+ * returns the number that have a value. */
 static uint64_t count_cubes(const trip_list *list)
 {
     uint64_t count = 0;
@@ -271,7 +274,7 @@ static uint64_t count_cubes(const trip_list *list)
     return count;
 }
 
-/* `lists`: of each coarse level. */
+/* `lists` is the number of lists of each coarse level. */
 static void check_data_set(const char *name, unsigned levels, unsigned lists)
 {
     trip_dataset *d;
@@ -305,7 +308,7 @@ static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
     }
 }
 
-/* Voxels that cover nothing known: none may show. */
+/* Voxels that cover neither kept nor halo voxels. None of them may be visible. */
 typedef struct added {
     int shown_from, shown_to; /* values */
     uint64_t count;
@@ -322,7 +325,7 @@ static void check_added_record(const trip_dataset *d, const trip_list *list, con
     a->count++;
 }
 
-/* Those of level 2 along X. */
+/* Returns the number of added voxels in the list of level 2 along X. */
 static uint64_t check_added(const char *name, int shown_from, int shown_to)
 {
     added a = { shown_from, shown_to, 0 };
@@ -346,7 +349,7 @@ static void what_is_added_about_kept_voxels_does_not_show(void **state)
     const uint64_t count = check_added("a.trip", MIN, 255);
     assert_true(count > 100);
     for (int i = 0; i < N; i++)
-        bytes[i] = (uint8_t)(255 - bytes[i]); /* what is known remains so */
+        bytes[i] = (uint8_t)(255 - bytes[i]); /* the same voxels are kept */
     test_write("v.raw", bytes, sizeof bytes);
     p.ranges = &low;
     p.range_count = 1;
@@ -354,11 +357,11 @@ static void what_is_added_about_kept_voxels_does_not_show(void **state)
     assert_int_equal(check_added("a.trip", 0, 255 - MIN), count);
 }
 
-/* Below all values that codes have, and above. */
+/* Below and above all values that codes can hold. */
 enum { LOWEST = -258, HIGHEST = 513 };
 
-/* What is kept in the place of what make_bytes() kept; of the others every second one, along any
- * axis, lies below that, and the rest above. */
+/* Moves the voxels that make_bytes() kept into the ranges `kept`. The other voxels move below and
+ * above the ranges, alternating along each axis. */
 static void spread_bytes(const trip_value_range *kept, unsigned count)
 {
     const int lo = (int)kept[0].lo, hi = (int)kept[count - 1].hi;
@@ -374,8 +377,8 @@ static void spread_bytes(const trip_value_range *kept, unsigned count)
     test_write("v.raw", bytes, sizeof bytes);
 }
 
-/* What is not kept lies on both sides of what is: it is of the one with more of the range, though
- * sharpened. */
+/* The values not kept lie on both sides of the kept ranges. Added voxels get values from the wider
+ * side, even after sharpening. */
 static void what_is_added_is_of_the_wider_side(void **state)
 {
     static const struct {
@@ -387,7 +390,7 @@ static void what_is_added_is_of_the_wider_side(void **state)
         { { { 155, 195 } }, 1, false },
         { { { 35, 50 }, { 205, 215 } }, 2, true },
         { { { 40, 50 }, { 205, 220 } }, 2, false },
-        { { { 40, 50 }, { 205, 215 } }, 2, false }, /* as much of it on both */
+        { { { 40, 50 }, { 205, 215 } }, 2, false }, /* both sides are equally wide */
     };
     (void)state;
     for (size_t i = 0; i < sizeof forms / sizeof *forms; i++) {
@@ -410,13 +413,13 @@ static trip_dataset *open_data_set(const char *name, trip_budget **budget)
     return d;
 }
 
-/* Voxels of 16 bits, some squares long along y: at level 1 the means of up to eight of them, to
- * the nearest. */
+/* A volume of 16-bit voxels, several squares long along y. Level 1 has the rounded means of up to
+ * eight of them. */
 enum { SX = 7, SY = 300, SZ = 9 };
 
 static uint16_t shorts[SX * SY * SZ];
 
-/* -1: beyond the grid. */
+/* Returns -1 beyond the grid. */
 static double mean_of_shorts(const int64_t at[3])
 {
     double sum = 0, count = 0;
@@ -451,7 +454,7 @@ static void values_are_sharpened_to_the_nearest_code_and_stay_in_the_range_of_co
 {
     (void)state;
     uint64_t random = 4, counts[3] = { 0 };
-    for (int i = 0; i < SX * SY * SZ; i++) { /* cubes that are nearly black or nearly white */
+    for (int i = 0; i < SX * SY * SZ; i++) { /* cubes that are nearly black, nearly white or grey */
         const int which = (i % SX / 2 + i / SX % SY / 2 * 7 + i / SX / SY / 2 * 31) % 3;
         const uint16_t near = (uint16_t)(test_random(&random) % 100);
         shorts[i] = which == 0 ? near : which == 1 ? UINT16_MAX - near : 30000 + near;
@@ -482,9 +485,9 @@ static void expect_records(const char *name, unsigned level, uint64_t records)
     trip_budget_destroy(budget);
 }
 
-/* A voxel in the middle of one of level 2, which lies where a square begins and far from the first
- * sheet. What is around it is in 2 x 2 x 2 voxels of level 1, and in that one of level 2, which
- * gets all 26 beside it. */
+/* One kept voxel lies in the middle of a voxel of level 2, at the start of a square and far from
+ * the first sheet. The halo lies in 2 x 2 x 2 voxels of level 1 and in one voxel of level 2. Level
+ * 2 gets all 26 neighbours of that one voxel as added voxels. */
 static void what_is_beside_a_voxel_is_added_wherever_it_lies(void **state)
 {
     enum { X = 20, Y = 300, Z = 200 };
@@ -500,7 +503,7 @@ static void what_is_beside_a_voxel_is_added_wherever_it_lies(void **state)
     expect_records("a.trip", 2, 27);
 }
 
-/* Where all that is there was kept, nothing is to be had that would not show. */
+/* If all values are kept, no value is left that an added voxel could take and stay invisible. */
 static void nothing_is_added_beside_what_is_kept_whole(void **state)
 {
     enum { EDGE = 16 };
@@ -550,8 +553,8 @@ static void expect_same_file(const char *a, const char *b)
     assert_int_equal(system(command), 0);
 }
 
-/* By default there are those to interpolate, without the halo those to splat; either are the same
- * as where there are both. */
+/* The default is levels for interpolation. Without the halo, the default is levels for splats.
+ * A data set with both kinds of levels contains the same files. */
 static void levels_are_of_what_they_are_for(void **state)
 {
     (void)state;
@@ -587,8 +590,8 @@ static void levels_can_be_left_out_and_stop_at_one_voxel(void **state)
     assert_false(test_exists("a.trip/x1.values"));
 }
 
-/* A slab of 4 voxels along z has the normals of its faces, and their length, whatever the level:
- * those inside have none, and do not count. */
+/* Every level of a slab of 4 voxels along z has the normals of its faces, with their length. Voxels
+ * inside the slab have no normal and do not count. */
 static void normals_are_those_of_the_faces(void **state)
 {
     (void)state;
@@ -615,7 +618,7 @@ static void normals_are_those_of_the_faces(void **state)
     trip_budget_destroy(budget);
 }
 
-/* The same slab in a world whose x is the grid's z. */
+/* The slab has its z axis along x of world space. */
 static void compact_normals_are_those_of_the_faces_in_a_turned_world(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Where voxels lie, from text files, and what is made of it. */
+/* Coordinates of the voxels from text files, and the tables and maps made from them. */
 #include "volume_files.h"
 
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 
 static trip_budget *budget;
 
-/* A file of an axis; its path lasts until the next of that axis. */
+/* Writes the file of an axis. The path stays valid until the next call for that axis. */
 static const char *write_text(char axis, const char *text)
 {
     static char paths[3][256];
@@ -33,7 +33,7 @@ static const char *sample_file(void)
     return write_file("sample.raw", &b);
 }
 
-/* "X,Y,Z" of files in the test's folder. */
+/* Returns the option value "X,Y,Z" for files in the test's folder. */
 static char *option(const char *x, const char *y, const char *z)
 {
     char *text;
@@ -87,7 +87,7 @@ static void coordinates_that_are_even_are_a_spacing(void **state)
     free(files);
 }
 
-/* Every second voxel keeps its place in the world. */
+/* If every second voxel is left out, the others keep their positions in world space. */
 static void what_is_left_out_leaves_the_others_where_they_are(void **state)
 {
     (void)state;
@@ -151,7 +151,7 @@ static void bad_coordinates_are_refused(void **state)
     assert_refused_as(TRIP_USAGE, sample_file(), &four, "three files");
 }
 
-/* The data are a hole in the file. */
+/* Writes a header and a hole of `data_bytes` bytes in place of data. */
 static const char *write_hole(const char *name, const char *header, int64_t data_bytes)
 {
     const char *path = write_bytes(name, header, strlen(header));
@@ -159,7 +159,7 @@ static const char *write_hole(const char *name, const char *header, int64_t data
     return path;
 }
 
-/* An axis without coordinates gets a table where another one has some. */
+/* An axis without coordinates gets a table if another axis has coordinates. */
 static void no_table_is_made_of_an_axis_that_is_too_long(void **state)
 {
     (void)state;
@@ -194,7 +194,7 @@ static void a_locale_with_decimal_commas_changes_nothing(void **state)
                (const double[3][4]){ { 2, 0, 0, 0.5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
 }
 
-/* A pipe is waited for, until an interruption. */
+/* The reader waits for a pipe until an interruption. */
 static void coordinates_may_come_through_a_pipe(void **state)
 {
     (void)state;
@@ -220,7 +220,7 @@ static void coordinates_may_come_through_a_pipe(void **state)
     free(files);
 }
 
-/* Place and index are one another's inverse, beyond the ends too. */
+/* The maps from position to index and from index to position are inverse, beyond the ends too. */
 static void positions_and_indices_are_inverse(void **state)
 {
     (void)state;
@@ -240,7 +240,7 @@ static void positions_and_indices_are_inverse(void **state)
     assert_true(fabs(c.widest - 1.375) < 1e-12);
 }
 
-/* Exactly, so that both ends of the grid are where they are without a table. */
+/* Both ends are exact, so that the grid covers the same space as without a table. */
 static void places_of_voxels_are_those_of_the_table(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* What others may have written, of tests/regress: journals of interrupted runs, and answers of the
- * image helper. Each kind has one that is sound, and others that differ from it in one number. */
+/* Tests of untrusted files of tests/regress: journals of interrupted runs, and answers of the image
+ * helper. Each kind has one sound file. The other files differ from it in one number. */
 #include "test.h"
 
 #include <errno.h>
@@ -45,7 +45,8 @@ static FILE *create(const char *name)
     return f;
 }
 
-/* What `brick --resume` makes of a journal with these records, its other files being there. */
+/* Returns the status of `brick --resume` with a journal of these records. All other files are
+ * present. */
 static int resume(const char *name, trip_budget *budget)
 {
     static const trip_journal_params params = { .resume = true,
@@ -76,10 +77,10 @@ static int resume(const char *name, trip_budget *budget)
 static void journals_are_not_trusted(void **state)
 {
     static const char *const names[][2] = {
-        { "journal_exponent", "its count of values is not what such a run writes" },
-        { "journal_voxels", "its count of values is not what such a run writes" },
-        { "journal_slices", "how far it came is not what such a run writes" },
-        { "journal_segments", "a record is not what such a run writes" },
+        { "journal_exponent", "its count of values is invalid" },
+        { "journal_voxels", "its count of values is invalid" },
+        { "journal_slices", "its progress is invalid" },
+        { "journal_segments", "a record is invalid" },
     };
     trip_budget *budget;
     (void)state;
@@ -98,7 +99,7 @@ static struct {
     int fd;
 } answer;
 
-/* All of the answer at once, and no more after it. */
+/* Sends the whole answer at once, and nothing after it. */
 static int answer_at_once(int fd)
 {
     answer.fd = dup(fd);
@@ -107,7 +108,7 @@ static int answer_at_once(int fd)
     return sent == (ssize_t)answer.count ? 0 : EIO;
 }
 
-/* Opens slices of which the helper says this. */
+/* Opens slices with this answer of the helper. */
 static int open_slices(const char *name, trip_budget *budget)
 {
     trip_volume *v;

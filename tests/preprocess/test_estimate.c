@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* Values that grow along Z, so that a look at the first slices alone would mislead. */
+/* Size of a volume with values that grow along Z. The first slices alone would give a wrong
+ * estimate. */
 enum { NX = 64, NY = 48, NZ = 512, N = NX * NY * NZ };
 
 static uint8_t values[N];
@@ -29,12 +30,12 @@ static void a_sample_tells_what_will_be_kept_and_written(void **state)
     trip_brick_params p = make_volume();
     trip_brick_estimate e;
     trip_brick_summary s;
-    p.ranges = &(trip_value_range){ 128, 191 }; /* a quarter */
+    p.ranges = &(trip_value_range){ 128, 191 }; /* a quarter of the voxels */
     p.range_count = 1;
     assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
     assert_int_equal(e.voxels, N);
     assert_true(e.kept > N / 4 * 0.8 && e.kept < N / 4 * 1.2);
-    /* One byte of code and three of normal in each list, and what masks take. */
+    /* Each list has one byte of code and three of normal for each splat, plus the masks. */
     assert_true(e.bytes >= 12 * e.kept && e.bytes < 13.5 * (double)e.kept);
     assert_true(e.seconds > 0 && e.free_bytes > 0);
     assert_false(test_exists("v.trip"));
@@ -72,7 +73,7 @@ static void temporary_data_is_foreseen_where_memory_is_short(void **state)
     }
 }
 
-/* One byte of code in each list, and of masks an eighth and what says where they are. */
+/* Each list has one byte of code and an eighth of mask for each splat, plus the presence words. */
 static void without_normals_little_is_written(void **state)
 {
     (void)state;
@@ -85,7 +86,7 @@ static void without_normals_little_is_written(void **state)
     assert_int_equal(e.halo, 0);
 }
 
-/* Of 16 portions of 4 slices each, at regular distances, none has a value. */
+/* The estimate samples 16 evenly spaced portions of 4 slices. None of them has a finite value. */
 static void a_sample_without_values_says_nothing_of_the_volume(void **state)
 {
     (void)state;
@@ -101,7 +102,7 @@ static void a_sample_without_values_says_nothing_of_the_volume(void **state)
     for (int ranges = 0; ranges < 2; ranges++) {
         p.ranges = &(trip_value_range){ 100, 200 };
         p.range_count = (size_t)ranges;
-        p.max_bytes = 1 << 20; /* for which the run looks at a sample, too */
+        p.max_bytes = 1 << 20; /* the run samples the volume for this limit, too */
         p.replace = true;
         assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
         assert_int_equal(trip_brick(&p, &s), 0);

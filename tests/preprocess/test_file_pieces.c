@@ -9,7 +9,7 @@ enum { BYTES = 5 * 1024 * 1024 + 77 };
 
 static unsigned char contents[BYTES], got[BYTES + 64];
 
-/* In the folder of the test program: memory has no direct I/O. */
+/* Lies in the folder of the test program, because a file system in memory has no direct I/O. */
 static char path[64];
 static int fd;
 

@@ -1,4 +1,4 @@
-/* The halo of data sets against a plain search of all neighbours. */
+/* Compares the halo of data sets with a plain search of all neighbours. */
 #include "brick_files.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@ enum { NX = 97, NY = 70, NZ = 61, N = NX * NY * NZ };
 
 static uint8_t bytes[N];
 
-/* One voxel in `rare` is kept, anywhere, and a ball. */
+/* Makes a kept ball, and keeps one voxel in `rare` at random positions. */
 static void make_bytes(uint64_t seed, unsigned rare)
 {
     uint64_t random = seed;
@@ -50,7 +50,7 @@ static trip_brick_summary brick_to(trip_brick_params p, const char *output)
     return s;
 }
 
-/* Whether a voxel that is not kept itself has a neighbour in the grid that is. */
+/* Returns whether a voxel is not kept but has a kept neighbour in the grid. */
 static bool is_halo(const int32_t *kept, const int64_t dims[3], int64_t x, int64_t y, int64_t z)
 {
     if (kept[(z * dims[1] + y) * dims[0] + x] >= 0)
@@ -64,7 +64,8 @@ static bool is_halo(const int32_t *kept, const int64_t dims[3], int64_t x, int64
     return false;
 }
 
-/* The halo has exactly the neighbours of what is kept; `value` gives their codes. */
+/* Checks that the halo consists of exactly the neighbours of kept voxels. `value` gives their
+ * codes. */
 static void check_halo(const test_lists *l, int32_t (*value)(const test_lists *l, size_t voxel))
 {
     const int64_t dims[3] = { (int64_t)l->header.dims[0], (int64_t)l->header.dims[1],
@@ -177,11 +178,12 @@ static void values_that_are_not_finite_are_not_in_the_halo(void **state)
     test_free_lists(&l);
 }
 
-/* A field that is written twice: its voxels above 0 to a sparse grid, all of them to a raw one. */
+/* A field written to two files. The sparse grid has the voxels above 0, the raw file has all
+ * voxels. */
 enum { EDGE = 100 };
 
 static float field[EDGE * EDGE * EDGE];
-static int64_t corner[3]; /* of the sparse grid in the field */
+static int64_t corner[3]; /* position of the sparse grid in the field */
 
 static void generate(const char *name)
 {
@@ -209,7 +211,7 @@ static void read_field(void)
         corner[a] = lo[a] - 1;
 }
 
-/* Of the field's value. */
+/* Returns the code of the field's value. */
 static int32_t code_of_field(const test_lists *l, size_t voxel)
 {
     int64_t x = (int64_t)(voxel % l->header.dims[0]) + corner[0];
@@ -248,7 +250,8 @@ static void a_sparse_volume_has_its_background_around_what_is_kept(void **state)
         }
 }
 
-/* Every second, third ... voxel of it: of some the last is kept, which has nothing behind it. */
+/* Takes every voxel, every second voxel, and so on. Some samples keep the last voxel along an axis,
+ * with no neighbour behind it. */
 static void samples_of_a_sparse_volume_have_their_halo_within_the_grid(void **state)
 {
     (void)state;

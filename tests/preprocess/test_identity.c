@@ -1,4 +1,4 @@
-/* What a data set depends on is in the text of its options, and what it does not is not. */
+/* The text of the options names every option that changes the data set, and no other option. */
 #include "brick_files.h"
 
 #include "identity.h"
@@ -13,7 +13,7 @@ static char *text_of(const trip_brick_params *p)
 static const trip_value_range ranges[] = { { 1, 2 }, { 1, 3 }, { 0, 2 } };
 static const char *const functions[] = { "ct", "mr" };
 
-/* Each is of another data set than all others. */
+/* Each entry leads to a data set that differs from all others. */
 static const trip_brick_params different[] = {
     { 0 },
     { .volume.grid = "a" },
@@ -80,7 +80,7 @@ static void options_that_change_nothing_change_no_text(void **state)
         { .input = "a", .output = "b" },
         { .replace = true, .resume = true },
         { .memory_bytes = 1 << 30, .threads = 3, .slices = 5, .max_bytes = 1 },
-        { .levels_for = TRIP_LEVELS_FOR_POST }, /* as where nothing is said */
+        { .levels_for = TRIP_LEVELS_FOR_POST }, /* the default */
     };
     char *text = text_of(&different[0]);
     for (size_t i = 0; i < sizeof alike / sizeof *alike; i++) {

@@ -1,5 +1,5 @@
-/* Journals of interrupted runs: a run of `brick` is killed, its journal rewritten with right
- * checksums, and gone on with. */
+/* Tests of journals of interrupted runs. Each test kills a run of `brick`, rewrites its journal
+ * with valid checksums, and resumes the run. */
 #include "brick_files.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@
 enum { NX = 128, NY = 96, NZ = 128, N = NX * NY * NZ };
 enum { START = 1, CHECKPOINT = 2, OUTPUT = 3, MAX_RECORDS = 16 };
 
-/* As journal.c lays it out. */
+/* A record in the layout of journal.c. */
 typedef struct record {
     uint64_t kind, bytes, checksum;
     unsigned char *body;
@@ -57,7 +57,7 @@ static void kill_at(void *user, const char *stage, uint64_t done, uint64_t total
         raise(SIGKILL);
 }
 
-/* Killed when this share of the volume was read. */
+/* Runs `brick` in a child and kills it once this share of the volume is read. */
 static void leave_killed_at(double share, trip_brick_params p)
 {
     pid_t child = fork();
@@ -89,7 +89,7 @@ static void read_journal(void)
         r->body = malloc(r->bytes);
         if (fread(r->body, 1, r->bytes, f) == r->bytes)
             continue;
-        free(r->body); /* killed while it was written */
+        free(r->body); /* the run was killed while it wrote this record */
         break;
     }
     fclose(f);
@@ -112,7 +112,7 @@ static void write_journal(void)
 
 static long journal_bytes;
 
-/* All of its bytes, for restore_journal(). */
+/* Returns all bytes of the journal, for restore_journal(). */
 static unsigned char *copy_journal(void)
 {
     FILE *f = fopen(journal_path, "rb");
@@ -152,7 +152,7 @@ static trip_checkpoint *checkpoint(void)
     return (void *)records[record_count - 1].body;
 }
 
-/* The first of those that came with the first checkpoint. */
+/* Returns the first sequence of the first checkpoint. */
 static trip_sequence *sequences(void)
 {
     return (void *)(records[1].body + sizeof(trip_checkpoint));
@@ -181,7 +181,8 @@ typedef struct attack {
     void (*change)(void);
 } attack;
 
-/* What the killed run left outlives each refusal, so that its journal may be changed again. */
+/* Applies each change to the sound journal and expects a refusal. A refusal leaves the killed run's
+ * files, so they serve for all changes. */
 static void check_attacks(const attack *attacks, size_t count, const char *why, bool automatic)
 {
     trip_brick_params p = params();
@@ -202,7 +203,7 @@ static void check_attacks(const attack *attacks, size_t count, const char *why, 
 #define CHECK_ATTACKS(attacks, why, automatic)                                                     \
     check_attacks((attacks), sizeof(attacks) / sizeof *(attacks), (why), (automatic))
 
-/* A change of the start, of the last checkpoint, or of the first sequence. */
+/* Defines a change of the start record, of the last checkpoint or of the first sequence. */
 #define ATTACK(name, change)                                                                       \
     static void name(void)                                                                         \
     {                                                                                              \
@@ -235,7 +236,7 @@ ATTACK(done_beyond_the_end, checkpoint()->done = NZ + 1)
 ATTACK(max_done, checkpoint()->done = UINT64_MAX)
 ATTACK(done_before, checkpoint()->done = 0)
 ATTACK(more_kept_than_there_are, checkpoint()->kept = N + 1)
-/* Of all values, those of the slices that were read are fewer. */
+/* One more than the voxels of the slices read so far, but fewer than all voxels. */
 ATTACK(more_kept_than_read, checkpoint()->kept = checkpoint()->done * NX * NY + 1)
 ATTACK(halo_without_room, checkpoint()->halo = 1)
 ATTACK(max_halo, checkpoint()->halo = UINT64_MAX)
@@ -341,7 +342,8 @@ static void false_lengths_of_files_in_order_are_found_when_they_are_read(void **
     make_volume();
     leave_killed_run(p);
     read_journal();
-    for (size_t i = 1; i < record_count; i++) /* of the last, not all may be at hand */
+    for (size_t i = 1; i < record_count;
+         i++) /* all checkpoints, because the data of the last may be incomplete */
         ((trip_checkpoint *)(void *)records[i].body)->ordered_bytes[TRIP_PLANE_VOXELS] -= 8;
     write_journal();
     free_records();
@@ -353,7 +355,7 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     (void)state;
     trip_brick_params p = params();
     make_volume();
-    p.slices = 20; /* the list in order is spilled, too, and says nothing of the count */
+    p.slices = 20; /* the Z list is spilled, too, so its length does not reveal the wrong count */
     leave_killed_run(p);
     read_journal();
     a_kept_voxel_less();
@@ -376,10 +378,10 @@ static void a_false_count_of_voxels_around_them_is_found_at_the_end(void **state
     a_voxel_less_around();
     write_journal();
     free_records();
-    expect_refused(p, "a voxel less around", "voxels around them were counted");
+    expect_refused(p, "a voxel less around", "halo voxels were counted");
 }
 
-/* Bytes of a file of the killed run. */
+/* Overwrites bytes of a file of the killed run. */
 static void overwrite(const char *name, long offset, const void *data, size_t bytes)
 {
     char path[192];
@@ -391,8 +393,8 @@ static void overwrite(const char *name, long offset, const void *data, size_t by
     fclose(f);
 }
 
-/* All voxels are kept, so that the first run is a whole tile: one word of squares, 64 masks, then
- * codes. */
+/* All voxels are kept, so the first run is a whole tile. Its block has one word of squares, 64
+ * masks, then codes. */
 static void false_records_of_the_list_in_order_are_refused(void **state)
 {
     (void)state;
@@ -418,7 +420,8 @@ static void false_records_of_the_list_in_order_are_refused(void **state)
     }
 }
 
-/* With codes of 16 bits there is a form behind the masks: of codes that have 65535 bits each. */
+/* With 16-bit codes a form follows the masks. The test sets its width to 65535 bits for each code.
+ */
 static void a_block_that_is_longer_than_any_is_refused(void **state)
 {
     (void)state;
@@ -487,7 +490,7 @@ static void folders_of_another_user_are_refused(void **state)
 {
     (void)state;
     if (geteuid() != 0)
-        skip(); /* only root can give a folder away */
+        skip(); /* only root can change the owner of a folder */
     make_volume();
     check_foreign("spill");
 }
@@ -496,12 +499,13 @@ static void partial_folders_of_another_user_are_refused(void **state)
 {
     (void)state;
     if (geteuid() != 0)
-        skip(); /* only root can give a folder away */
+        skip(); /* only root can change the owner of a folder */
     make_volume();
     check_foreign("partial");
 }
 
-/* Lost to a power failure, say: the run goes back to a checkpoint that has all it needs. */
+/* A power failure may lose data. The run then resumes from an earlier checkpoint with complete
+ * data. */
 static void what_is_no_longer_at_hand_is_made_again(void **state)
 {
     (void)state;
@@ -546,7 +550,8 @@ static void a_journal_as_it_was_written_is_gone_on_with(void **state)
     }
 }
 
-/* Its checksum is right; the journal ends before it, as before one that is cut off. */
+/* The checksum of the record is valid. The journal ends before the record, as it does before a
+ * truncated record. */
 static void a_record_that_is_longer_than_any_is_none(void **state)
 {
     (void)state;
@@ -565,8 +570,8 @@ static void a_record_that_is_longer_than_any_is_none(void **state)
     assert_true(s.resumed);
 }
 
-/* Killed until the last checkpoint, which is written behind the run, is one of this run: it has
- * less of the list in order than was kept. */
+/* Kills runs until the last checkpoint in the journal belongs to the killed run. Checkpoints lag
+ * behind the run. A checkpoint of this run has fewer splats in order than kept voxels. */
 static void leave_killed_out_of_order(double share, trip_brick_params p)
 {
     bool in_order = true;
@@ -579,8 +584,8 @@ static void leave_killed_out_of_order(double share, trip_brick_params p)
     assert_false(in_order);
 }
 
-/* Blocks of 16 slices leave no room for the Z list to be written as it comes, which it is with
- * blocks of 2. */
+/* With blocks of 2 slices the run writes the Z list directly. With blocks of 16 slices it lacks the
+ * memory for this and spills the list. */
 static void a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more(void **state)
 {
     (void)state;
@@ -629,7 +634,7 @@ static void what_an_interrupted_run_did_outlives_a_refusal_to_go_on(void **state
     assert_false(test_exists("a.trip.spill"));
 }
 
-/* As a run writes it that is killed when its output has just been completed. */
+/* Adds the record that a run writes before it renames its complete output. */
 static void add_output(uint64_t device, uint64_t inode)
 {
     trip_journal_output *noted = malloc(sizeof *noted);

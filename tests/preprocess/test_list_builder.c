@@ -4,7 +4,7 @@
 
 #include "list_builder.h"
 
-/* Random splats of a grid, given to a builder as pieces of a few each, in no order. */
+/* Gives random splats of a grid to a builder, in small pieces and in no order. */
 enum { NX = 200, NY = 90, NZ = 60, BATCHES = 12 };
 
 typedef struct run_params {
@@ -12,7 +12,7 @@ typedef struct run_params {
     unsigned producers;
     bool in_order; /* batches are slabs along Z */
     bool checkpoints;
-    bool damage; /* a byte of the spilled data, before the merge */
+    bool damage; /* damages a byte of the spilled data before the merge */
 } run_params;
 
 typedef struct building {
@@ -62,7 +62,7 @@ static void close_building(building *b)
     trip_budget_destroy(b->budget);
 }
 
-/* Whether a voxel is a splat, and its records' contents. */
+/* Returns a hash that decides whether a voxel is a splat, and gives its code and normal. */
 static uint32_t hash_of(unsigned x, unsigned y, unsigned z)
 {
     uint64_t state = x + 1000 * y + 1000000 * (uint64_t)z;
@@ -76,7 +76,7 @@ static bool is_splat(unsigned x, unsigned y, unsigned z)
     return hash_of(x, y, z) % 3 == 0;
 }
 
-/* The piece of one row of voxels: x from x0 to x0 + 31, in the list along `axis`. */
+/* Gives the builder one row of voxels along `step_axis`, as a piece of the list along `axis`. */
 static void put_row(trip_list_builder *b, unsigned producer, unsigned axis, const unsigned from[3],
                     unsigned step_axis)
 {
@@ -110,8 +110,8 @@ static void put_row(trip_list_builder *b, unsigned producer, unsigned axis, cons
     memcpy(at + parts.normals, normals, splats * sizeof *normals);
 }
 
-/* Rows along an axis that is not the list's: in the lists along X they step along Y, and so on, in
- * which order positions ascend. */
+/* Puts rows along an axis that differs from the list's axis, Y in the X lists and so on. Positions
+ * ascend along these rows. */
 static void put_slice(building *b, unsigned producer, unsigned z)
 {
     for (unsigned y = 0; y < NY; y++)
@@ -156,7 +156,7 @@ static int run(const char *name, const run_params *p, uint64_t *spilled)
     assert_int_equal(trip_workers_create(&producers, p->producers), 0);
     int status = 0;
     for (unsigned batch = 0; batch < BATCHES; batch++) {
-        /* In order or, without it, from the last slab to the first. */
+        /* Without in_order the slabs come from the last to the first. */
         slab s = { &b, (p->in_order ? batch : BATCHES - 1 - batch) * (NZ / BATCHES) };
         assert_int_equal(trip_workers_run(producers, put_slab_slice, &s, NZ / BATCHES), 0);
         int full = trip_list_builder_end_batch(b.builder, (batch + 1.0) / BATCHES);
@@ -247,7 +247,7 @@ static void damaged_temporary_data_is_a_failure(void **state)
     assert_false(test_exists("spill"));
 }
 
-/* The thread that spills is the one that sees the interruption. */
+/* The spilling thread detects the interruption. */
 static void who_waits_for_memory_learns_that_the_spill_was_interrupted(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Level sides: shares worked out by hand or in closed form, and volumes that stand on a known side.
- */
+/* Tests that find the level side on which an object stands. The shares are computed by hand or in
+ * closed form, and the volumes stand on a known side. */
 #include "brick_files.h"
 
 #include <math.h>
@@ -8,17 +8,21 @@
 
 enum { EDGE = TRIP_OCCUPANCY_EDGE };
 
-/* Whether a point, in parts of the edge from -1 to 1, is in the half of a ball whose flat side
- * faces `side`. */
+/* Returns whether a point is in the half ball with its flat side towards `side`. Coordinates are
+ * from -1 to 1 along each edge. */
 static bool is_in_half_ball(const double p[3], int side)
 {
     double up = side % 2 ? -p[side / 2] : p[side / 2];
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < 0.9 * 0.9 && up > 0;
 }
 
-/* All of the flat side is at its end. Of the round one, what is higher than 0.9 of the radius: a
- * disc of 1 - 0.81 of the radius squared. Along the flat side the object is two radii long, and the
- * rows that reach farther than 0.8 of one cover 1 - 0.64 of the half disc. */
+/* The share of a side is the part of the object's shadow that reaches into the last tenth of its
+ * length.
+ *
+ * - Flat side: 1, the whole disc.
+ * - Round side: the rows higher than 0.9 radii, a disc of 1 - 0.81 of the radius squared.
+ * - Other sides: the object is two radii long. The rows that reach farther than 0.8 radii cover 1 -
+ * 0.64 of the half disc. */
 static void shares_of_half_a_ball_are_those_of_its_discs(void **state)
 {
     (void)state;
@@ -41,7 +45,8 @@ static void shares_of_half_a_ball_are_those_of_its_discs(void **state)
 static void rows_that_reach_into_the_tenth_count(void **state)
 {
     (void)state;
-    /* Eleven bins from the third on, so that two are the tenth; the third row has nothing. */
+    /* The object covers eleven bins from the third on, so the last tenth is two bins. The third row
+     * is empty. */
     trip_occupancy o = { { 14, 4, 1 }, { 0 } };
     o.weights[2] = o.weights[12] = UINT16_MAX;
     o.weights[14 + 3] = UINT16_MAX;
@@ -64,14 +69,15 @@ static void one_side_stands_out_or_there_is_none(void **state)
         { { 0.9, 0.44, 0, 0, 0.45, 0 }, 0 },
         { { 1, 1, 1, 1, 1, 1 }, -1 },
         { { 0.1, 0.9, 0.1, 0.8, 0.1, 0.1 }, -1 }, /* two */
-        { { 0, 0, 0, 0, 0.55, 0 }, -1 },          /* hardly level */
+        { { 0, 0, 0, 0, 0.55, 0 }, -1 },          /* no side is level enough */
         { { 0, 0, 0, 0, 0, 0 }, -1 },
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         assert_int_equal(trip_orientation_base_side(rows[i].shares), rows[i].side);
 }
 
-/* Half a ball on `side`, or a whole one for -1; its text is for free(), its note in the summary. */
+/* Bricks a half ball that stands on `side`, or a whole ball if `side` is -1. Returns the data set's
+ * text, which the caller frees. The summary holds the note. */
 static char *brick_ball(int side, trip_brick_params p, trip_brick_summary *s)
 {
     enum { NX = 90, NY = 84, NZ = 76 };
@@ -98,7 +104,7 @@ static void half_a_ball_stands_on_its_flat_side(void **state)
         if (!strstr(text, expected))
             fail_msg("%s is not in: %.300s", expected, text);
         snprintf(expected, sizeof expected, "up at %s", names[side ^ 1]);
-        assert_true((strstr(s.note, expected) != NULL) == (side != 4)); /* z is up anyway */
+        assert_true((strstr(s.note, expected) != NULL) == (side != 4)); /* z is up by default */
         free(text);
     }
 }
@@ -109,7 +115,7 @@ static void a_ball_a_part_and_what_is_said_to_lie_otherwise_stand_on_none(void *
     const trip_brick_params ways[] = { { 0 },
                                        { .volume.axes = "PIR" },
                                        { .region.past = { 0, 0,
-                                                          75 } } /* of the whole but a slice */ };
+                                                          75 } } /* the ball without one slice */ };
     for (int i = 0; i < 3; i++) {
         trip_brick_summary s;
         char *text = brick_ball(i - 1, ways[i], &s);

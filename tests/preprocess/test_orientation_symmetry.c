@@ -1,4 +1,5 @@
-/* Mirror symmetry: sums worked out by hand, and volumes that have it across a known axis. */
+/* Tests of mirror symmetry, by hand-computed sums and by volumes that are symmetric across a known
+ * axis. */
 #include "brick_files.h"
 
 #include <math.h>
@@ -15,7 +16,8 @@ static double score(int i, int j, int k, const uint16_t *weights, int axis)
 static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
 {
     (void)state;
-    /* 1 2 on itself: 1, 4 and 4, by the mirror's place; its squares come to 5. */
+    /* The row 1 2 overlaps its mirror image by 1, 4 or 4, depending on the position of the mirror.
+     * The sum of squares is 5. */
     const uint16_t row[] = { 1, 2 };
     for (int axis = 0; axis < 3; axis++) {
         int n[3] = { 1, 1, 1 };
@@ -23,10 +25,11 @@ static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
         assert_float_equal(score(n[0], n[1], n[2], row, axis), 4.0 / 5, 1e-15);
         assert_float_equal(score(n[0], n[1], n[2], row, (axis + 1) % 3), 1, 0);
     }
-    /* Beside the middle: the mirror is where it fits best. */
+    /* The mirror stands where the overlap is greatest, here beside the middle. */
     const uint16_t aside[] = { 0, 0, 0, 7, 9, 7, 0 };
     assert_float_equal(score(7, 1, 1, aside, 0), 1, 0);
-    /* Rows share a mirror: 3 and 1 0 3 0 of the second row, at the same place, 9 + 9 of 9 + 10. */
+    /* All rows share one mirror. At the best position, the first row has 9 of 9 and the second row
+     * 9 of 10. */
     const uint16_t rows[] = { 0, 0, 3, 0, 1, 0, 3, 0 };
     assert_float_equal(score(4, 2, 1, rows, 0), 18.0 / 19, 1e-15);
     const uint16_t nothing[8] = { 0 };
@@ -53,15 +56,16 @@ static void one_axis_stands_out_or_there_is_none(void **state)
         { { 0.95, 0.8, 0.75 }, 0 },  { { 0.8, 0.95, 0.75 }, 1 },  { { 0.75, 0.8, 0.95 }, 2 },
         { { 1, 1, 1 }, -1 },         { { 0.99, 0.95, 0.5 }, -1 }, /* two */
         { { 0.5, 0.6, 0.85 }, -1 },                               /* weak */
-        { { 0.5, 0.86, 0.92 }, -1 },                              /* hardly more than another */
+        { { 0.5, 0.86, 0.92 }, -1 }, /* the two best scores are too close */
         { { 0, 0, 0 }, -1 },         { { 1, 1, 0.3 }, -1 },
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         assert_int_equal(trip_orientation_symmetry_axis(rows[i].scores), rows[i].axis);
 }
 
-/* In parts of the edge, from -1 to 1: a wedge that is thin in front and at the top, rounded at its
- * sides. The mirror image of a right triangle across a leg's direction covers at most 2/3 of it. */
+/* Returns whether a point is in a wedge that is thin in front and at the top, and has rounded
+ * sides. Coordinates are from -1 to 1 along each edge. The mirror image of a right triangle across
+ * the direction of a leg covers at most 2/3 of the triangle. */
 static bool is_in_wedge(double side, double front, double up)
 {
     return side * side + 0.2 * up * up < 0.3 && front > -0.8 && up > -0.8 && front + up < 0.2;
@@ -124,7 +128,8 @@ static void what_is_found_does_not_depend_on_how_it_is_bricked(void **state)
         assert_mirror(ways[i], "\"mirror\":\"z\"");
 }
 
-/* Where it is not even, the mirror image of voxels is not that of the object. */
+/* With uneven spacing, the mirror image of the voxels differs from the mirror image of the object.
+ */
 static void no_symmetry_is_found_across_uneven_spacing(void **state)
 {
     (void)state;

@@ -5,7 +5,6 @@
 #include "piece.h"
 #include "run_builder.h"
 
-/* A piece with its memory. */
 typedef struct sample {
     union {
         trip_piece piece;
@@ -19,7 +18,7 @@ static unsigned words_of(const trip_piece_format *f)
     return 1u << (2 * f->tile_log2 - 6);
 }
 
-/* The splats of a bitmap, with values and normals that follow from their places. */
+/* Makes the splats of a bitmap. Their values and normals are computed from their positions. */
 static void make_piece(sample *s, const trip_piece_format *f, const uint64_t *bitmap)
 {
     unsigned used = 0, splats = 0, n = 0;
@@ -60,7 +59,7 @@ static void check_records(const trip_piece_format *f, const uint64_t *bitmap, ui
             continue;
         assert_true(n < splats);
         assert_int_equal(trip_morton(trip_voxel_u(voxels[n]), trip_voxel_v(voxels[n])), p);
-        /* Unquantised values run from 0 to 65535 here, so that codes are the values. */
+        /* Unquantised values run from 0 to 65535 here, so that each code equals its value. */
         assert_int_equal(trip_voxel_code(voxels[n]), f->quantised ? (uint16_t)(p * 3 + 1) : p);
         if (f->normals && f->quantised)
             assert_int_equal(normals[n], p | 200u << 24);
@@ -73,7 +72,7 @@ static void check_records(const trip_piece_format *f, const uint64_t *bitmap, ui
     assert_int_equal(n, splats);
 }
 
-/* Bitmaps from one splat to all, in three pieces with none in common. */
+/* Tries bitmaps of few splats up to all splats, divided among three disjoint pieces. */
 static void check_format(const trip_piece_format *f, trip_budget *budget)
 {
     static sample pieces[3];
@@ -113,7 +112,8 @@ static void pieces_of_a_tile_come_out_as_one_run(void **state)
     trip_budget_destroy(budget);
 }
 
-/* Whatever bytes say, a piece that passes the check can be added without harm (see sanitizers). */
+/* A piece that passes the check can be added without harm, whatever its bytes are. The sanitizers
+ * watch the additions. */
 static void damaged_pieces_are_refused_or_harmless(void **state)
 {
     (void)state;
@@ -148,8 +148,8 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
     trip_budget_destroy(budget);
 }
 
-/* Of a tile of 4 words: a word beyond it in place of one within; a position in place of the one
- * before it. */
+/* The tile has a bitmap of 4 words. One damage names a word beyond the tile. The other repeats the
+ * preceding position. */
 static void positions_twice_or_beyond_the_tile_are_refused(void **state)
 {
     (void)state;

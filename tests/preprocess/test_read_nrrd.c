@@ -6,7 +6,7 @@ static const char *const nrrd_types[] = { "uint8",  "signed char", "unsigned sho
                                           "uint32", "int",         "uint64",         "longlong",
                                           NULL,     "float",       "double" };
 
-/* A header with the given further lines, which end it or not. */
+/* Appends a header with the lines `more`, which may include the blank line at its end. */
 static void append_header(bytes *b, trip_scalar type, bool big, const char *encoding,
                           const char *more)
 {
@@ -18,7 +18,7 @@ static void append_header(bytes *b, trip_scalar type, bool big, const char *enco
     append_text(b, text);
 }
 
-/* The sample as uint16 with the header given, whose values follow it plain. */
+/* Writes the given header and the sample as plain uint16 values behind it. */
 static const char *write_with_header(const char *name, const char *header)
 {
     bytes b = { .count = 0 };
@@ -106,7 +106,7 @@ static void a_detached_header_finds_its_data_beside_it(void **state)
     write_file("detached.raw", &values);
     for (int n = 0; n < 2; n++) {
         bytes b = { .count = 0 };
-        append_header(&b, TRIP_I16, true, "raw", names[n]); /* no line end: the file ends it */
+        append_header(&b, TRIP_I16, true, "raw", names[n]); /* the end of the file ends the line */
         assert_holds_sample(write_file("detached.nhdr", &b), NULL, TRIP_I16);
     }
 }
@@ -122,7 +122,7 @@ static void detached_data_may_be_compressed(void **state)
     assert_holds_sample(write_file("gz.nhdr", &b), NULL, TRIP_F32);
 }
 
-/* The sample as `count` files of equal length. */
+/* Writes the sample as `count` files of equal length. */
 static void write_parts(const char *stem, int width, int first, int step, int count, bool gzip)
 {
     bytes all = { .count = 0 };
@@ -218,7 +218,7 @@ static void lines_and_bytes_are_skipped(void **state)
     assert_holds_sample(write_file("skipgz.nhdr", &b), NULL, TRIP_U16);
 }
 
-/* Files without an end or without a writer, and long ones without lines. */
+/* Tries files without an end, pipes without a writer, and long files without lines. */
 static void looking_for_lines_ends(void **state)
 {
     (void)state;
@@ -247,8 +247,7 @@ static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
     assert_holds_sample(write_file("tail.nhdr", &b), NULL, TRIP_U16);
 }
 
-/* What the report says that --spacing can do, it does; of what it cannot the report says nothing.
- */
+/* The error line suggests --spacing only if --spacing supplies the missing lengths. */
 static void lengths_that_are_none_can_be_given(void **state)
 {
     (void)state;
@@ -279,7 +278,7 @@ static void lengths_that_are_none_can_be_given(void **state)
     }
 }
 
-/* Of a file that is cut off, the header is not taken for values; nor are lines to skip. */
+/* If the file is cut off, neither the header nor lines to skip are read as values. */
 static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
 {
     (void)state;
@@ -477,7 +476,7 @@ static void an_unknown_field_is_warned_of(void **state)
     assert_non_null(strstr(reported, "line 8: unknown field \"spacing\""));
 }
 
-/* Sum and single values as NumPy reads them. */
+/* Expects the sum and the single values that NumPy reads. */
 static void the_included_tooth_is_read_as_by_others(void **state)
 {
     (void)state;
@@ -542,7 +541,7 @@ static void any_byte_of_the_header_may_be_wrong(void **state)
         }
 }
 
-/* The spellings that the format lists. */
+/* Tries all spellings that the format lists. */
 static void the_space_says_how_the_world_lies_in_the_patient(void **state)
 {
     (void)state;
@@ -643,7 +642,6 @@ static void vectors_with_time_give_their_place_in_space(void **state)
                    "line 9: \"space origin\" must be \"(x,y,z)\"");
 }
 
-/* It is about vectors and tensors. */
 static void coordinates_of_axes_are_a_key_and_value(void **state)
 {
     (void)state;

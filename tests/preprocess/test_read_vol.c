@@ -32,7 +32,8 @@ static void version_2_is_plain(void **state)
     assert_holds_sample(write_vol("b.vol", text, false), NULL, TRIP_U8);
 }
 
-/* What follows a header without a version: the sizes, in either byte order, and a line feed. */
+/* Appends the sizes, in either byte order, and a line feed. They follow a header without a version.
+ */
 static bytes unversioned(bool big, int depth, char end)
 {
     bytes b = { .count = 0 };
@@ -68,7 +69,8 @@ static void lines_may_end_in_carriage_returns(void **state)
                         NULL, TRIP_U8);
 }
 
-/* Voxel-Size is not how far apart voxels are, and voxels of four bytes are not taken for bytes. */
+/* Voxel-Size is a number of bytes, not the spacing. The reader does not take voxels of four bytes
+ * for bytes. */
 static void voxels_of_several_bytes_are_refused(void **state)
 {
     (void)state;
@@ -132,7 +134,7 @@ static void a_file_cut_anywhere_is_refused(void **state)
         assert_true(survives(write_bytes("cut.vol", b.data, length), NULL));
 }
 
-/* Or they do not change the values. */
+/* A flipped bit is an error or leaves the values unchanged. */
 static void flipped_bits_never_change_the_values_silently(void **state)
 {
     (void)state;

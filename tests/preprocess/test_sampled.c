@@ -1,11 +1,12 @@
-/* Every n-th voxel of volumes, through slices and through portions of a reader of this test's. */
+/* Reads every n-th voxel of volumes, from slices and from the portions of a reader that this test
+ * defines. */
 #include "test.h"
 
 #include <unistd.h>
 
 #include "sampled.h"
 
-/* What voxel (i, j, k) holds. */
+/* Returns the value of voxel (i, j, k). */
 static unsigned value_at(int64_t i, int64_t j, int64_t k)
 {
     return (unsigned)(1 + (i + 5 * j + 11 * k) % 250);
@@ -31,7 +32,7 @@ static void write_raw(const char *path)
     assert_int_equal(fclose(f), 0);
 }
 
-/* All portions' voxels, once each. */
+/* Checks that the portions contain each voxel exactly once. */
 static void assert_samples(trip_volume *v, int64_t step, int64_t slices)
 {
     const trip_volume_info *info = trip_volume_get_info(v);
@@ -69,7 +70,7 @@ static void slices_are_sampled_along_each_axis(void **state)
         trip_budget *budget = new_budget();
         trip_volume_params params = plain;
         params.max_voxels = 1;
-        for (int a = 0; a < 3; a++) /* as many as there are at this step, and no fewer at another */
+        for (int a = 0; a < 3; a++) /* exactly the voxels at this step */
             params.max_voxels *= (uint64_t)((dims[a] - 1) / step + 1);
         assert_int_equal(trip_volume_open(&v, "v.raw", &params, budget), 0);
         const trip_volume_info *info = trip_volume_get_info(v);
@@ -146,7 +147,7 @@ static int next_box(void *state, trip_volume_portion *p)
     return 1;
 }
 
-/* Anywhere; beyond the grid is background. */
+/* Decodes any box. Voxels beyond the grid are background. */
 static int decode_box(const void *state, const trip_volume_portion *p, const int64_t lo[3],
                       const int64_t size[3], float *values, uint8_t *active)
 {

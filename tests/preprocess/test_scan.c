@@ -18,7 +18,7 @@ static void integers_are_binned_like_one_by_one(void **state)
     uint64_t random = 1, expected[1024] = { 0 };
     trip_tally_clear(&t);
     float row[100];
-    /* Every row reaches further than the one before, so that bins have to be merged on the way. */
+    /* Every row has a wider range than the preceding row, so the tally merges bins. */
     int lo = 0, hi = 0;
     for (int r = 0; r < 400; r++)
         for (int i = 0; i < 100; i++) {
@@ -104,7 +104,7 @@ static void zero_has_no_sign(void **state)
         assert_false(trip_tally_check(&t));                                                        \
     } while (0)
 
-/* Values 1 to 4 are 12289 bins of 2^-12 apart, from bin 4096 to bin 16384. */
+/* The values 1 to 4 cover 12289 bins of width 2^-12, from bin 4096 to bin 16384. */
 static void tallies_that_no_scan_makes_are_refused(void **state)
 {
     (void)state;
@@ -123,8 +123,8 @@ static void tallies_that_no_scan_makes_are_refused(void **state)
     REFUSE(t.counted = 3);
     REFUSE(t.counts[1]++);
     REFUSE((t.counts[0] = UINT64_MAX, t.counts[1] = 2));
-    REFUSE((t.counts[0] = 0, t.counts[12289] = 1)); /* above 4 */
-    REFUSE(t.first--);                              /* 1 would be in the bin below it */
+    REFUSE((t.counts[0] = 0, t.counts[12289] = 1)); /* a count above the maximum 4 */
+    REFUSE(t.first--);                              /* the bin of the minimum 1 is then empty */
     REFUSE(
         (memset(t.counts, 0, sizeof t.counts), t.counts[0] = 4, t.exponent = -11, t.first = 2048));
     REFUSE(t.exponent = -150);
@@ -132,11 +132,11 @@ static void tallies_that_no_scan_makes_are_refused(void **state)
     REFUSE(t.value_min = NAN);
     REFUSE(t.value_max = INFINITY);
     REFUSE(t.value_max = 0.5);
-    REFUSE(t.value_max = 4.1); /* no float */
+    REFUSE(t.value_max = 4.1); /* no float has this value */
     trip_tally_clear(&sound);
     REFUSE(t.value_min = 0);
     REFUSE(t.value_max = 0);
-    sound.voxels = sound.finite = 1; /* of a sample: in no bin */
+    sound.voxels = sound.finite = 1; /* a sampled voxel is in no bin */
     REFUSE(t.voxels = 1);
     sound.value_min = sound.value_max = 7;
     assert_true(trip_tally_check(&sound));
@@ -169,7 +169,7 @@ static void the_extremes_of_float_are_counted(void **state)
     assert_int_equal(h.counts[0], 1);
     assert_int_equal(h.counts[512], 2);
     assert_int_equal(h.counts[1023], 1);
-    trip_tally_clear(&t); /* no bin is narrower than what is between floats */
+    trip_tally_clear(&t); /* no bin is narrower than the distance between floats */
     tally_row(&t, values, NULL, 1);
     assert_int_equal(t.exponent, -149);
     assert_true(trip_tally_check(&t));

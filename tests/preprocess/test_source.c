@@ -34,7 +34,7 @@ static void write_file(const char *path, const char *text)
 
 static const char png[] = "\x89PNG\r\n\x1a\n";
 
-/* The names found, each followed by a space. */
+/* Compares the names found. Each is followed by a space. */
 static void assert_files(const char *path, const char *names)
 {
     static const trip_volume_params defaults;
@@ -122,7 +122,8 @@ static void content_tells_volumes_apart_and_names_only_where_they_are_read(void 
                             content_of("a_2x2x1_uint8.raw", "").text);
 }
 
-/* A time of change cannot be set, so a file is what it was as long as that stays. */
+/* Programs cannot set the time of the last status change (ctime). A file is unchanged as long as
+ * its ctime is. */
 static void a_change_shows_in_the_state_even_when_size_and_time_are_set_back(void **state)
 {
     (void)state;

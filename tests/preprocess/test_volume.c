@@ -60,7 +60,8 @@ static int clamp(int v, int n)
     return v < 0 ? 0 : v >= n ? n - 1 : v;
 }
 
-/* The box [lo, hi) of a portion against the sample's formula, edges repeated. */
+/* Compares a box of a portion with the sample's formula. The values at the edges of the volume
+ * repeat beyond it. */
 static void assert_box(const trip_volume *v, const trip_volume_portion *portion,
                        const int64_t lo[3], const int64_t size[3])
 {
@@ -156,7 +157,7 @@ static void portions_live_until_they_are_released(void **state)
 
 static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
 
-/* Takes portions in turn with the other threads, then decodes and releases without a lock. */
+/* Takes portions under a lock that the threads share, then decodes and releases them without it. */
 static void *decode_portions(void *volume)
 {
     trip_volume *v = volume;
@@ -249,7 +250,7 @@ static void a_read_that_fails_in_mid_volume_stays_failed(void **state)
     assert_int_equal(trip_volume_next(v, 2, &portion), TRIP_ERROR);
     trip_report_redirect(NULL, NULL);
     assert_int_equal(reports, 1);
-    assert_int_equal(trip_volume_rewind(v), 0); /* what there is can be read again */
+    assert_int_equal(trip_volume_rewind(v), 0); /* the file can be read again up to its end */
     assert_int_equal(trip_volume_next(v, 2, &portion), 1);
     trip_portion_release(v, &portion);
     trip_volume_close(v);
@@ -271,8 +272,8 @@ static void spacing_replaces_lengths_and_keeps_directions(void **state)
                (const double[3][4]){ { 0, 0, -3, 1 }, { 0.6, -1.6, 0, 2 }, { 0.8, 1.2, 0, 3 } });
 }
 
-/* Files that do not say how they lie: x up, y to the left, z to the back, which are +z, +x and +y
- * of LPS; each keeps its own spacing. */
+/* The files give no orientation. The option says x up, y left and z back, which are +z, +x and +y
+ * of LPS. Each axis keeps its spacing. */
 static void axes_turn_files_that_lie_along_their_own(void **state)
 {
     (void)state;
@@ -325,7 +326,7 @@ static void what_cannot_be_opened_is_named(void **state)
     assert_refused("/dev/null", "not a regular file");
 }
 
-/* Only a user without root's rights can be denied. */
+/* The system denies root nothing, so the test needs another user. */
 static void a_file_without_permission_is_named(void **state)
 {
     (void)state;

@@ -15,7 +15,7 @@ typedef struct work {
     _Atomic unsigned times[ITEMS];
     _Atomic unsigned threads_wrong;
     unsigned threads;
-    uint64_t failing; /* item; ITEMS: none */
+    uint64_t failing; /* index of the item that fails; ITEMS disables it */
 } work;
 
 static int do_item(void *user, unsigned thread, uint64_t item)
@@ -60,7 +60,7 @@ static void a_failure_stops_the_loop_and_is_told(void **state)
     for (int i = 0; i < ITEMS; i++)
         done += w.times[i];
     assert_int_equal(done, 101);
-    /* The pool goes on to be used. */
+    /* The pool stays usable. */
     w.failing = ITEMS;
     assert_int_equal(trip_workers_run(pool, do_item, &w, 3), 0);
     trip_workers_destroy(pool);
@@ -102,7 +102,7 @@ static void waiting_may_be_cut_short(void **state)
     trip_workers_destroy(pool);
 }
 
-/* Each item waits for the others, so that all fail. */
+/* Waits for all other items, so that all fail. */
 static int fail_together(void *user, unsigned thread, uint64_t item)
 {
     (void)thread;
@@ -135,7 +135,7 @@ static int count_up(void *user, unsigned thread, uint64_t item)
     return 0;
 }
 
-/* One thread has failed without a report of its own when the other reports why. */
+/* One thread fails without a report. The other thread then fails and reports the reason. */
 static int fail_late_with_the_report(void *user, unsigned thread, uint64_t item)
 {
     atomic_int *failed = user;

@@ -1,6 +1,6 @@
-/* What the tests of the readers share: a small volume with known values, its bytes in every type
- * and byte order, compression, files in a folder of the test's own, reading a volume back through
- * the portions, and catching what is reported. */
+/* Helpers for the tests of the readers. They make a small volume with known values, in every type
+ * and byte order, plain or compressed. They write files in a temporary folder, read a volume
+ * through its portions, and catch reports. */
 #ifndef VOLUME_FILES_H
 #define VOLUME_FILES_H
 
@@ -24,7 +24,6 @@
 #include "scope.h"
 #include "volume.h"
 
-/* The sample volume. */
 enum { NX = 5, NY = 4, NZ = 7, VOXELS = NX * NY * NZ };
 
 typedef struct bytes {
@@ -49,14 +48,15 @@ static inline bool is_signed(trip_scalar t)
     return t == TRIP_I8 || t == TRIP_I16 || t == TRIP_I32 || t == TRIP_I64 || t >= TRIP_F16;
 }
 
-/* A value that every type can hold, negative for some voxels of signed types. */
+/* Returns a value that the type can hold. Some voxels of signed types are negative. */
 static inline int sample(trip_scalar type, int i, int j, int k)
 {
     int v = (7 * i + 31 * j + 13 * k + i * j * k) % 127;
     return is_signed(type) ? v - 60 : v;
 }
 
-/* The bits of a small whole number as half, float or double, put together by hand. */
+/* Returns the bits of a small whole number as a half, float or double, computed without the code
+ * under test. */
 static inline uint64_t float_bits(int v, int exponent_bits, int fraction_bits)
 {
     if (v == 0)
@@ -88,7 +88,7 @@ static inline void append_value(bytes *b, trip_scalar type, int v, bool big)
     append_word(b, word, trip_scalar_bytes(type), big);
 }
 
-/* The sample volume as stored, slices [first, first + count). */
+/* Appends slices [first, first + count) of the sample volume as a file stores them. */
 static inline void append_slices(bytes *b, trip_scalar type, bool big, int first, int count)
 {
     for (int k = first; k < first + count; k++)
@@ -136,7 +136,7 @@ static inline void append_bzip2(bytes *b, const bytes *from)
     b->count += room;
 }
 
-/* Files: all in one folder, made at the start of the program and removed at its end. */
+/* Folder of all files. The program makes it at its start and removes it at its end. */
 static char folder[] = "volume-files-XXXXXX";
 
 static int make_folder(void **state)
@@ -161,7 +161,7 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-/* In the folder; one of eight buffers that are used in turn. */
+/* Returns the path of `name` in the folder. It stays valid for the next seven calls. */
 static inline const char *path_of(const char *name)
 {
     static char paths[8][300];
@@ -186,7 +186,7 @@ static inline const char *write_file(const char *name, const bytes *b)
     return write_bytes(name, b->data, b->count);
 }
 
-/* Reports, while caught, are kept here, one a line. */
+/* Caught reports, one a line. */
 static char reported[8192];
 static int reports;
 
@@ -205,8 +205,8 @@ static inline void catch_reports(void)
     trip_report_redirect(keep_report, NULL);
 }
 
-/* The volume's values through portions of `slices` slices into values[0..count); the first
- * failure's status. Everything taken from the budget must be given back. */
+/* Reads the volume through portions of `slices` slices into values[0..count). Returns 0 or the
+ * status of the first failure. Checks that the budget is whole again. */
 static inline int read_volume(const char *path, const trip_volume_params *params, int64_t slices,
                               float *values, size_t count, trip_volume_info *info)
 {
@@ -235,8 +235,8 @@ static inline int read_volume(const char *path, const trip_volume_params *params
     return status;
 }
 
-/* The file holds the sample volume, whatever the number of slices read at a time; nothing is
- * reported. */
+/* Checks that the file holds the sample volume, for any number of slices read at a time, and that
+ * nothing is reported. */
 static inline void assert_holds_sample(const char *path, const trip_volume_params *params,
                                        trip_scalar type)
 {
@@ -258,7 +258,7 @@ static inline void assert_holds_sample(const char *path, const trip_volume_param
     }
 }
 
-/* Reading fails with `status` and one line that contains `text`. */
+/* Checks that reading fails with `status` and one line that contains `text`. */
 static inline void assert_refused_as(int status, const char *path, const trip_volume_params *params,
                                      const char *text)
 {
@@ -276,7 +276,7 @@ static inline void assert_refused(const char *path, const char *text)
     assert_refused_as(TRIP_ERROR, path, NULL, text);
 }
 
-/* Work that is cancelled ends with one line that says so. */
+/* Checks that an interruption ends reading with one line that reports it. */
 static inline void assert_interrupted(const char *path, const trip_volume_params *params)
 {
     trip_scope cancelled = { .around = NULL };
@@ -286,8 +286,8 @@ static inline void assert_interrupted(const char *path, const trip_volume_params
     trip_scope_enter(before);
 }
 
-/* Whatever the bytes: either read or refused with a single line, never a crash; used for
- * truncations and corruptions. Returns whether it was refused. */
+/* Reads a truncated or corrupted file. Checks that reading succeeds or fails with a single line.
+ * Returns whether it failed. */
 static inline bool survives(const char *path, const trip_volume_params *params)
 {
     static float values[VOXELS * 4];
