@@ -327,7 +327,7 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a
                                   last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
     if (!(medium.a > 0.0))
         return;
-    vec3 colour = tint.w > 0.0 ? vec3(tint.xyz) : medium.rgb;
+    vec3 colour = debug_colour.w > 0.0 ? vec3(debug_colour.xyz) : medium.rgb;
     float middle = mix(start, end, 0.5 * (first + last));
 #if defined(SHADED)
     vec4 gradient = gradient_between(a, b, from, to);

@@ -107,8 +107,8 @@ void main()
     cover(pixels);
     footprint = vec4(s.centre, s.conic.xz * s.ray2);
     shear = 2.0 * s.conic.y * s.ray2;
-    if (tint.w > 0.0)
-        entry.rgb = vec3(tint.xyz);
+    if (debug_colour.w > 0.0)
+        entry.rgb = vec3(debug_colour.xyz);
 #ifdef LIT
     entry.rgb = shade_here(entry.rgb, r.normal, r.from_eye, position_of(r.voxel));
 #elif defined(SHADED)

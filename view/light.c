@@ -65,7 +65,7 @@ const trip_effect_switch trip_effect_switches[TRIP_EFFECT_SWITCHES] = {
     { TRIPTYCH_SHADOWS, "shadows", "Shadows", "shadows" },
     { TRIPTYCH_OCCLUSION, "occlusion", "Occlusion", "occlusion" },
     { TRIPTYCH_CUEING, "cueing", "Depth cueing", "depth cueing" },
-    { TRIPTYCH_EFFECTS_AUTO, "auto", "By the data", "what the data calls for" },
+    { TRIPTYCH_EFFECTS_AUTO, "auto", "Automatic effects", "effects chosen by the kind of data" },
     { TRIPTYCH_EMISSION, "emission", "Emission", "emission" },
 };
 

@@ -59,16 +59,16 @@ static void set_rays(trip_cpu_view *view)
 {
     const trip_camera *camera = &view->splat.camera;
     bool alike = trip_affine_is_similarity(&camera->index_to_world);
-    bool defaults = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
-    defaults |= view->sums;
+    bool simple_blend = view->front_to_back && view->of->settings->target == TRIP_TARGET_RGBA32F;
+    simple_blend |= view->sums;
     view->stretch_varies = !(camera->ortho || alike);
     view->affine = view->splat.affine;
     view->stretch =
         view->stretch_varies ? camera->voxel_world : trip_splat_stretch(&view->splat, 0, 0);
     view->rays = TRIP_CPU_STRETCHED;
-    if (defaults && (camera->ortho || view->affine))
+    if (simple_blend && (camera->ortho || view->affine))
         view->rays = TRIP_CPU_PARALLEL;
-    else if (defaults && alike)
+    else if (simple_blend && alike)
         view->rays = TRIP_CPU_PERSPECTIVE;
 }
 
@@ -189,10 +189,11 @@ void trip_cpu_view_make(trip_cpu_view *view, const trip_frame *frame, const trip
               front_to_back);
     view->list = list;
     trip_cpu_effects_make(&view->effects, frame, list->axis, &frame->plan->lists[list->index].grid);
-    double tint[3] = { 0 };
-    view->tinted = trip_debug_view_of(frame->settings, list->axis, list->level, tint);
+    double debug_colour[3] = { 0 };
+    view->has_debug_colour =
+        trip_debug_view_of(frame->settings, list->axis, list->level, debug_colour);
     for (int i = 0; i < 3; i++)
-        view->tint[i] = (float)tint[i];
+        view->debug_colour[i] = (float)debug_colour[i];
 }
 
 void trip_cpu_layer_view_make(trip_cpu_view *view, const trip_frame *frame, int axis,

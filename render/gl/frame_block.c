@@ -186,7 +186,7 @@ static void set_debug_view(trip_gl_frame_double *out, const trip_settings *s, in
 {
     double rgb[3];
     if (trip_debug_view_of(s, axis, level, rgb))
-        out->tint = (trip_gl_double4){ { rgb[0], rgb[1], rgb[2], 1 } };
+        out->debug_colour = (trip_gl_double4){ { rgb[0], rgb[1], rgb[2], 1 } };
 }
 
 /* Returns the length of a voxel along an axis in world units. */

@@ -526,7 +526,7 @@ static void make_position(trip_gl_sheets *s, const trip_batch *batch)
     begin_sheet(s, number);
 }
 
-static bool is_at_hand(const trip_gl_sheets *s, const trip_batch *batch)
+static bool is_held(const trip_gl_sheets *s, const trip_batch *batch)
 {
     return s->count > 0 && batch->pass == s->pass &&
            s->held[s->count - 1].number == batch->runs[s->batch.next_run].sheet;
@@ -539,7 +539,7 @@ int trip_gl_sheets_draw(trip_gl_sheets *s, const trip_batch *batch)
         status = draw_part(s);
     else if (!s->batch.begun)
         status = begin_batch(s, batch);
-    else if (!is_at_hand(s, batch))
+    else if (!is_held(s, batch))
         make_position(s, batch);
     else
         status = decode_runs(s, batch);

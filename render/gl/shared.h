@@ -119,7 +119,7 @@
     /* r, g, b, a; not premultiplied. */                                                           \
     R4 background;                                                                                 \
     /* rgb: replaces all colours before lighting, unless w is 0. */                                \
-    R4 tint;
+    R4 debug_colour;
 
 /* Constants of the effects of a list, or of a layer of sheets (render/effects.h,
  * render/emission.h). */

@@ -1,5 +1,5 @@
-"""Volumes that are cut off, damaged, empty, too large, not what they say: one line, exit status 1
-or 2, and nothing half-made. For every reader."""
+"""Tests truncated, damaged, empty, too large and inconsistent volumes with every reader. Each gives
+one line and exit status 1 or 2, and leaves no data set."""
 import concurrent.futures
 import os
 import random
@@ -24,7 +24,7 @@ def make_nrrd(encoding):
     return read("made.nrrd")
 
 
-LONGER = int(os.environ.get("TRIP_LONGER", 1))  # times as many damaged files, by hand
+LONGER = int(os.environ.get("TRIP_LONGER", 1))  # factor on the number of damaged files, for runs by hand
 
 
 def read(path):
@@ -33,7 +33,8 @@ def read(path):
 
 
 def lengths(data, header):
-    """Where to cut: nothing, the magic, within and after the header, within and before the end."""
+    """Returns lengths for truncated files: nothing, the magic number, within and after the header,
+    within and before the end."""
     return sorted(
         {
             0,
@@ -67,13 +68,13 @@ class BadVolumes(program.ProgramTest):
         self.waiting.append(self.pool.submit(check, *arguments, **named))
 
     def finish(self):
-        """All that was put off; every fault at once."""
+        """Waits for all checks and reports all faults at once."""
         faults = [str(r.exception())[:400] for r in self.waiting if r.exception()]
         self.assertEqual(faults, [], "\n".join(faults))
         self.assertFalse([n for n in os.listdir(".") if ".trip" in n])
 
     def refused(self, source, *options, status=(1,)):
-        """Exactly one line and no data set."""
+        """Checks that there is exactly one line and no data set."""
         run = program.call(
             "brick", source, "-o", f"{source}.trip".replace("/", "-"), "-q", *options
         )
@@ -87,7 +88,7 @@ class BadVolumes(program.ProgramTest):
         return self.refused(source, *options, status=status)
 
     def endured(self, data, extension, *options):
-        """Refused, or read as what it may still be; no more than one line."""
+        """Checks that the file is refused or still readable, with at most one error line."""
         source = self.name(extension)
         program.write(source, data)
         run = program.call(
@@ -108,7 +109,7 @@ class BadVolumes(program.ProgramTest):
             self.later(self.refused_bytes, data[:length], extension, *options)
 
     def damage(self, data, extension, *options, first=0, last=None, times=12):
-        """Bytes of [first, last) replaced, a few at a time."""
+        """Replaces bytes of [first, last), a few at a time."""
         chance = random.Random(len(data))
         for _ in range(times * LONGER):
             changed = bytearray(data)
@@ -118,7 +119,7 @@ class BadVolumes(program.ProgramTest):
 
     # Raw
 
-    def test_raw(self):
+    def test_bad_raw_files_are_refused(self):
         program.write_raw("good.raw", VALUES)
         size = "--size=14,12,10"
         for bad in (
@@ -169,7 +170,7 @@ class BadVolumes(program.ProgramTest):
 
     # NRRD
 
-    def test_nrrd(self):
+    def test_bad_nrrd_files_are_refused(self):
         for encoding in "raw", "gzip":
             data = make_nrrd(encoding)
             header = data.index(b"\n\n") + 2
@@ -178,7 +179,7 @@ class BadVolumes(program.ProgramTest):
             self.damage(data, ".nrrd", first=header, times=4)
         self.finish()
 
-    def test_nrrd_headers(self):
+    def test_bad_nrrd_headers_are_refused(self):
         good = {"type": "uint8", "dimension": "3", "sizes": "14 12 10", "encoding": "raw"}
         bad = [
             {"type": "block"},
@@ -243,7 +244,7 @@ class BadVolumes(program.ProgramTest):
 
     # NIfTI
 
-    def test_nifti(self):
+    def test_bad_nifti_files_are_refused(self):
         for packed in False, True:
             program.write_nifti("made.nii", VALUES, packed=packed)
             data = read("made.nii")
@@ -251,7 +252,7 @@ class BadVolumes(program.ProgramTest):
             self.damage(data, ".nii.gz" if packed else ".nii", last=352, times=8 if packed else 24)
         self.finish()
 
-    def test_nifti_headers(self):
+    def test_bad_nifti_headers_are_refused(self):
         program.write_nifti("made.nii", VALUES)
         good = read("made.nii")
         bad = [
@@ -292,7 +293,7 @@ class BadVolumes(program.ProgramTest):
 
     # .vol
 
-    def test_vol(self):
+    def test_bad_vol_files_are_refused(self):
         for version in 2, 3:
             program.write_vol("made.vol", VALUES, version)
             data = read("made.vol")
@@ -322,7 +323,7 @@ class BadVolumes(program.ProgramTest):
 
     # Stacks
 
-    def test_images(self):
+    def test_bad_images_are_refused(self):
         for write, extension in (program.write_tiff, ".tif"), (program.write_png, ".png"):
             write("made" + extension, VALUES[3])
             data = read("made" + extension)
@@ -336,7 +337,7 @@ class BadVolumes(program.ProgramTest):
         self.damage(data, ".dcm", first=128, times=6)
         self.finish()
 
-    def test_stacks(self):
+    def test_bad_stacks_are_refused(self):
         def stack(name, *images):
             os.mkdir(name)
             for i, image in enumerate(images):
@@ -375,7 +376,7 @@ class BadVolumes(program.ProgramTest):
     # OpenVDB
 
     @unittest.skipUnless(pyopenvdb, "python3-openvdb is not installed")
-    def test_openvdb(self):
+    def test_bad_openvdb_files_are_refused(self):
         grid = pyopenvdb.FloatGrid()
         grid.name = "density"
         grid.copyFromArray(numpy.ascontiguousarray(VALUES.astype("f4")))
@@ -393,7 +394,7 @@ class BadVolumes(program.ProgramTest):
         self.later(self.refused, "points-only.vdb")
         self.finish()
 
-    def test_level_set_is_filled_with_a_line_that_says_so(self):
+    def test_a_level_set_is_filled_with_a_note(self):
         if not pyopenvdb:
             self.skipTest("python3-openvdb is not installed")
         ball = pyopenvdb.createLevelSetSphere(radius=5.0)
@@ -409,18 +410,18 @@ class BadVolumes(program.ProgramTest):
         for how in "default", "filled", "band":
             program.shutil.rmtree(f"{how}.trip")
 
-    def test_the_grid_taken_and_the_others_are_named(self):
+    def test_a_note_names_the_chosen_grid_and_the_others(self):
         run = self.works("brick", os.path.join(program.DATASETS, "densityAndHeat.vdb"), "-o", "chosen.trip")
-        self.assertRegex(run.stderr, r'^triptych: note: [^\n]*"density" is taken[^\n]*: heat\n$')
+        self.assertRegex(run.stderr, r'^triptych: note: [^\n]*"density" is used[^\n]*: heat\n$')
         self.assertEqual(self.info("chosen.trip")["source"]["grid"], "density")
         program.shutil.rmtree("chosen.trip")
         self.fails(
             2, "brick", os.path.join(program.DATASETS, "densityAndHeat.vdb"), "--grid", "heat", "--grid", "density", says="one grid"
         )
 
-    # Anything
+    # Any path
 
-    def test_what_is_no_volume(self):
+    def test_files_that_are_no_volumes_are_refused(self):
         program.write("text.txt", b"hello\n" * 100)
         program.write("zeros", bytes(5000))
         program.write("a.trip.png", b"")
@@ -450,7 +451,7 @@ class BadVolumes(program.ProgramTest):
         self.assertIn(run.returncode, (1, 2), (source, run.stderr))
         self.assertTrue(program.LINE.fullmatch(run.stderr), (source, run.stderr))
 
-    def test_values_without_any_use(self):
+    def test_volumes_without_usable_values(self):
         for name, value in ("nan", numpy.nan), ("inf", numpy.inf):
             values = numpy.full((4, 5, 6), value, "f4")
             program.write_nrrd(f"{name}.nrrd", values)

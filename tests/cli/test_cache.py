@@ -1,5 +1,5 @@
-"""`render VOLUME` in one step, and the cache that it bricks into: found again, never stale, bounded,
-and harmless whatever lies in its folder."""
+"""Tests of `render VOLUME` and of the cache of bricked volumes. The cache finds volumes again, is
+never stale, keeps its size limit, and is safe against any content of its folder."""
 import fcntl
 import json
 import os
@@ -19,7 +19,7 @@ SIZE = ["--size", "40x40", "--renderer", "cpu"]
 
 
 def tree(folder):
-    """Every path below it, with what files hold and where links lead."""
+    """Returns every path in the folder, with the contents of files and the targets of links."""
     found = {}
     for base, folders, files in os.walk(folder):
         for name in folders:
@@ -50,7 +50,7 @@ class Cache(program.ProgramTest):
         return sorted(n for n in os.listdir(self.cache) if n.endswith(".trip"))
 
     def draw(self, volume, *options, bricked):
-        """The picture of a volume, which has to be bricked for it or is there."""
+        """Draws a volume. Returns the picture, and checks whether the volume was bricked for it."""
         run = self.works("render", volume, "-o", "one.exr", *SIZE, *options)
         self.assertEqual("bricked into the cache" in run.stdout.decode(), bricked, run)
         return program.read_exr("one.exr")
@@ -67,7 +67,7 @@ class Cache(program.ProgramTest):
 
     # Found again
 
-    def test_one_step_draws_what_two_do_and_the_next_picture_is_there(self):
+    def test_one_step_equals_two_and_the_next_picture_is_cached(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
         wanted = self.two_steps("ball.nrrd")
         self.assertGreater(wanted[..., 3].max(), 0.5)
@@ -76,13 +76,13 @@ class Cache(program.ProgramTest):
         self.same(self.draw("./ball.nrrd", bricked=False), wanted)
         self.assertEqual(len(self.entries()), 1)
 
-    def test_a_copy_is_the_same_volume(self):
+    def test_a_copy_of_a_volume_is_found(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
         self.draw("ball.nrrd", bricked=True)
         shutil.copy("ball.nrrd", "copy.nrrd")
         self.draw("copy.nrrd", bricked=False)
 
-    def test_a_raw_file_of_another_shape_is_another_volume(self):
+    def test_raw_files_of_different_shapes_are_different_volumes(self):
         values = program.noise((8, 12, 16))
         program.write_raw("a_16x12x8_uint8.raw", values)
         program.write_raw("a_8x12x16_uint8.raw", values)
@@ -91,7 +91,7 @@ class Cache(program.ProgramTest):
             self.draw("a_8x12x16_uint8.raw", bricked=True),
         )
 
-    def test_each_kind_of_file(self):
+    def test_every_format_is_cached(self):
         values = program.ball((12, 14, 16))
         program.write_nifti("v.nii", values)
         program.write_nifti("v.nii.gz", values, packed=True)
@@ -119,7 +119,7 @@ class Cache(program.ProgramTest):
                 self.same(self.draw(volume, bricked=first), wanted)
                 self.same(self.draw(volume, bricked=False), wanted)
 
-    def test_options_make_other_data_sets(self):
+    def test_options_make_separate_data_sets(self):
         vdb = os.path.join(program.DATASETS, "densityAndHeat.vdb")
         self.draw(vdb, bricked=True)
         heat = self.draw(vdb, "--grid", "heat", bricked=True)
@@ -128,19 +128,19 @@ class Cache(program.ProgramTest):
         self.same(wide, self.two_steps(vdb, brick=("--spacing", "1,2,3")))
         self.assertEqual(len(self.entries()), 3)
 
-    def test_a_function_shows_what_the_automatic_one_leaves_out(self):
+    def test_a_transfer_function_shows_more_than_the_automatic_one(self):
         values = program.noise((16, 16, 16))
         program.write_nrrd("noise.nrrd", values)
         program.write("all.tf", b"0 1 0 0 0.1\n255 0 0 1 0.1\n")
         drawn = self.draw("noise.nrrd", "--tf", "all.tf", bricked=True)
         wanted = self.two_steps("noise.nrrd", "--tf", "all.tf", brick=["--keep-all"])
-        self.assertLess(abs(drawn - wanted).max(), 1 / 255)  # but for how normals are rounded
+        self.assertLess(abs(drawn - wanted).max(), 1 / 255)  # only the rounding of normals differs
         self.assertGreater(abs(drawn - self.two_steps("noise.nrrd", "--tf", "all.tf")).max(), 0.1)
         self.same(self.draw("noise.nrrd", "--tf", "all.tf", bricked=False), drawn)
         program.write("all.tf", b"0 0 1 0 0.1\n255 0 0 1 0.1\n")
         self.differ(self.draw("noise.nrrd", "--tf", "all.tf", bricked=True), drawn)
 
-    def test_the_usual_data_set_serves_every_function_that_shows_no_more(self):
+    def test_the_default_data_set_serves_narrower_transfer_functions(self):
         values = program.ball((20, 20, 20))
         program.write_nrrd("ball.nrrd", values)
         self.draw("ball.nrrd", bricked=True)
@@ -149,7 +149,7 @@ class Cache(program.ProgramTest):
         self.same(drawn, self.two_steps("ball.nrrd", "--tf", "few.tf"))
         self.assertEqual(len(self.entries()), 1)
 
-    def test_a_window_shows_what_the_automatic_function_leaves_out(self):
+    def test_a_window_shows_more_than_the_automatic_function(self):
         values = program.noise((16, 16, 16))
         program.write_nrrd("noise.nrrd", values)
         window = ["--tf", "grey", "--window", "60", "--level", "40"]
@@ -162,8 +162,8 @@ class Cache(program.ProgramTest):
 
     # Never stale
 
-    def test_a_changed_file_is_drawn_anew(self):
-        """Also at the same size, at once, and with its time set back."""
+    def test_a_changed_file_is_bricked_again(self):
+        """This holds if the file changes at once, keeps its size, and gets its old time back."""
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=1))
         times = os.stat("v.nrrd")
         old = self.draw("v.nrrd", bricked=True)
@@ -175,9 +175,9 @@ class Cache(program.ProgramTest):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=1))
         self.same(self.draw("v.nrrd", bricked=False), old)
 
-    def test_a_file_that_was_remembered_and_changes_is_drawn_anew(self):
+    def test_a_changed_file_with_a_stored_link_is_bricked_again(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=1))
-        time.sleep(2.2)  # its times are certain only then
+        time.sleep(2.2)  # the program trusts times only when they are this old
         old = self.draw("v.nrrd", bricked=True)
         links = [n for n in os.listdir(self.cache) if n.endswith(".link")]
         self.assertEqual(len(links), 1)
@@ -185,7 +185,7 @@ class Cache(program.ProgramTest):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12), seed=2))
         self.differ(self.draw("v.nrrd", bricked=True), old)
 
-    def test_a_change_in_a_file_that_another_refers_to_counts(self):
+    def test_a_change_in_a_referenced_file_counts(self):
         values = [program.noise((12, 12, 12), seed=s) for s in (1, 2)]
 
         def detached(v):
@@ -226,7 +226,7 @@ class Cache(program.ProgramTest):
                 [program.GENERATE, "cloud", "--size", "192", "-o", "cloud.nrrd"], check=True
             )
 
-    def test_two_at_once_brick_once(self):
+    def test_concurrent_runs_brick_once(self):
         self.cloud()
         runs = [program.start("render", "cloud.nrrd", "-o", f"{i}.png", *SIZE) for i in range(3)]
         said = [r.communicate(timeout=120) for r in runs]
@@ -248,7 +248,7 @@ class Cache(program.ProgramTest):
         out, err = run.communicate(timeout=60)
         return run.returncode, err.decode()
 
-    def test_an_interrupted_bricking_leaves_nothing(self):
+    def test_interrupted_bricking_leaves_nothing(self):
         self.cloud()
         status, err = self.stop_while_bricking(signal.SIGINT)
         if status == 0:
@@ -257,7 +257,7 @@ class Cache(program.ProgramTest):
         self.assertEqual(len(err.splitlines()), 1, err)
         self.assertEqual([n for n in os.listdir(self.cache) if not n.endswith(".link")], [])
 
-    def test_a_killed_bricking_leaves_no_data_set_and_is_cleaned_up(self):
+    def test_the_next_run_cleans_up_after_a_killed_one(self):
         self.cloud()
         status, _ = self.stop_while_bricking(signal.SIGKILL)
         if status == 0:
@@ -267,7 +267,7 @@ class Cache(program.ProgramTest):
         self.draw("cloud.nrrd", bricked=True)
         self.assertEqual(len([n for n in os.listdir(self.cache) if not n.endswith(".link")]), 1)
 
-    def test_what_a_killed_process_left_goes_with_clear(self):
+    def test_clear_removes_files_of_a_killed_process(self):
         self.cloud()
         status, _ = self.stop_while_bricking(signal.SIGKILL)
         self.works("cache", "clear")
@@ -279,7 +279,7 @@ class Cache(program.ProgramTest):
             data = bytearray(f.read())
         program.write(path, bytes(change(data)))
 
-    def test_a_damaged_data_set_is_made_anew_with_a_line(self):
+    def test_a_damaged_data_set_is_replaced_with_a_warning(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         wanted = self.draw("v.nrrd", bricked=True)
 
@@ -304,7 +304,7 @@ class Cache(program.ProgramTest):
                 self.same(program.read_exr("one.exr"), wanted)
                 self.same(self.draw("v.nrrd", bricked=False), wanted)
 
-    def test_damage_that_shows_while_drawing_removes_the_data_set(self):
+    def test_damage_found_while_drawing_removes_the_data_set(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         wanted = self.draw("v.nrrd", bricked=True)
         for list_name in "xyz":
@@ -314,13 +314,13 @@ class Cache(program.ProgramTest):
         self.assertIn("the same command makes it again", run.stderr)
         self.same(self.draw("v.nrrd", bricked=True), wanted)
 
-    # Bounded
+    # Limited
 
     def size_of(self, name):
         folder = os.path.join(self.cache, name)
         return sum(os.path.getsize(os.path.join(folder, n)) for n in os.listdir(folder))
 
-    def test_what_was_used_least_recently_makes_room(self):
+    def test_the_least_recently_used_data_set_makes_room(self):
         for i in range(4):
             program.write_nrrd(f"v{i}.nrrd", program.noise((14, 14, 14), seed=i))
         made = []
@@ -339,7 +339,7 @@ class Cache(program.ProgramTest):
         self.draw("v0.nrrd", bricked=False)
         self.draw("v1.nrrd", bricked=True)
 
-    def test_a_data_set_larger_than_the_cache_is_refused_before_it_is_made(self):
+    def test_a_data_set_too_large_for_the_cache_is_refused(self):
         program.write_nrrd("v.nrrd", program.noise((40, 40, 40)))
         os.environ["TRIPTYCH_CACHE_SIZE"] = "4K"
         self.fails(1, "render", "v.nrrd", "-o", "x.png", says="TRIPTYCH_CACHE_SIZE")
@@ -349,7 +349,7 @@ class Cache(program.ProgramTest):
             os.environ["TRIPTYCH_CACHE_SIZE"] = size
             self.fails(2, "render", "v.nrrd", "-o", "x.png", says="TRIPTYCH_CACHE_SIZE")
 
-    def test_a_data_set_in_use_stays(self):
+    def test_a_data_set_in_use_is_kept(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         self.draw("v.nrrd", bricked=True)
         name = self.entries()[0]
@@ -363,7 +363,7 @@ class Cache(program.ProgramTest):
 
     # The folder
 
-    def test_without_a_folder_to_write_to_a_line_says_so(self):
+    def test_a_missing_cache_folder_is_reported(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         del os.environ["XDG_CACHE_HOME"]
         for home in None, "", "relative":
@@ -375,13 +375,13 @@ class Cache(program.ProgramTest):
         os.environ["HOME"] = "/proc"
         self.leaves_nothing(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME")
         os.environ["HOME"] = self.home
-        os.environ["XDG_CACHE_HOME"] = "relative"  # to be ignored
+        os.environ["XDG_CACHE_HOME"] = "relative"  # a relative path is ignored
         self.works("render", "v.nrrd", "-o", "one.exr", *SIZE)
         self.cache = os.path.join(self.home, ".cache", "triptych")
         self.assertEqual(len(self.entries()), 1)
         self.assertFalse(os.path.exists("relative/triptych"))
 
-    def test_a_home_that_is_read_only(self):
+    def test_a_read_only_home_is_reported(self):
         identity = {"user": 65534, "group": 65534, "extra_groups": []} if ROOT else {}
         try:
             able = program.call("--version", **identity).returncode == 0
@@ -396,7 +396,7 @@ class Cache(program.ProgramTest):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         self.fails(1, "render", "v.nrrd", "-o", "open/x.png", says="XDG_CACHE_HOME", **identity)
 
-    def test_a_folder_of_another_or_open_to_others_is_refused(self):
+    def test_a_cache_folder_open_to_others_is_refused(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         self.draw("v.nrrd", bricked=True)
         self.assertEqual(os.stat(self.cache).st_mode & 0o777, 0o700)
@@ -412,7 +412,7 @@ class Cache(program.ProgramTest):
             os.chown(self.cache, 0, 0)
         self.assertEqual(len(self.entries()), 1)
 
-    def test_a_link_or_file_in_its_place_is_refused(self):
+    def test_a_link_or_file_as_the_cache_folder_is_refused(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         os.makedirs(os.path.dirname(self.cache))
         other = os.path.join(self.home, "other")
@@ -425,8 +425,8 @@ class Cache(program.ProgramTest):
         program.write(self.cache, b"file")
         self.fails(1, "render", "v.nrrd", "-o", "x.png", says="XDG_CACHE_HOME")
 
-    def test_whatever_lies_in_the_folder_does_no_harm(self):
-        """Nothing outside is touched; what has no name of ours stays."""
+    def test_foreign_files_in_the_cache_folder_do_no_harm(self):
+        """Nothing outside the folder changes. Entries with foreign names stay."""
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         wanted = self.draw("v.nrrd", bricked=True)
         entry = self.entries()[0]
@@ -476,7 +476,7 @@ class Cache(program.ProgramTest):
 
     # The command
 
-    def test_list_and_clear(self):
+    def test_cache_list_and_clear_work(self):
         run = self.works("cache", "list")
         self.assertIn(b"0 data sets", run.stdout)
         self.assertIn(b"removed 0 data sets", self.works("cache", "clear").stdout)
@@ -494,7 +494,7 @@ class Cache(program.ProgramTest):
             self.assertEqual(d["bytes"], self.size_of(os.path.basename(d["path"])))
             self.works("info", "--verify", d["path"])
         with open(os.path.join(found["data_sets"][0]["path"], "index.trip"), "r+b") as f:
-            f.seek(8)  # as of an earlier version
+            f.seek(8)  # a data set of an earlier version
             f.write(b"\2")
         run = self.works("cache", "list")
         self.assertIn(b"(damaged, or of another version)", run.stdout)
@@ -504,7 +504,7 @@ class Cache(program.ProgramTest):
         for wrong in [], ["nonsense"], ["list", "clear"], ["clear", "--json"], ["list", "--x"]:
             self.fails(2, "cache", *wrong)
 
-    def test_another_build_of_the_same_version_finds_it(self):
+    def test_another_build_of_the_same_version_finds_a_data_set(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
         self.draw("ball.nrrd", bricked=True)
         shutil.copy(program.PROGRAM, "rebuilt")
@@ -519,7 +519,7 @@ class Cache(program.ProgramTest):
         self.assertNotIn(b"bricked", run.stdout)
         self.assertEqual(len(self.entries()), 1)
 
-    def test_a_function_through_a_pipe(self):
+    def test_a_transfer_function_can_come_through_a_pipe(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
         text = b"values data\n20 1 0 0 0\n90 1 0.2 0 0.3\n200 0 0 1 0.6\n"
         pictures = []
@@ -548,15 +548,15 @@ class Cache(program.ProgramTest):
 
     # Messages
 
-    def test_what_was_chosen_is_said_of_what_is_in_the_cache_too(self):
+    def test_notes_are_printed_for_cached_volumes_too(self):
         vdb = os.path.join(program.DATASETS, "densityAndHeat.vdb")
         for bricked in True, False:
             run = self.works("render", vdb, "-o", "one.png", *SIZE)
             self.assertEqual(b"bricked" in run.stdout, bricked)
-            self.assertRegex(run.stderr, r'\Atriptych: note: [^\n]*"density" is taken[^\n]*\n\Z')
+            self.assertRegex(run.stderr, r'\Atriptych: note: [^\n]*"density" is used[^\n]*\n\Z')
         self.assertEqual(self.works("render", vdb, "-o", "a.png", *SIZE, "--grid=heat").stderr, "")
 
-    def test_what_cannot_be_written_is_said_before_the_volume_is_read(self):
+    def test_an_impossible_output_is_reported_before_reading(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
         os.makedirs("folder.png", exist_ok=True)
         for wrong in (
@@ -568,7 +568,7 @@ class Cache(program.ProgramTest):
             self.leaves_nothing(1, "render", "ball.nrrd", *wrong, says=wrong[-1])
         self.assertEqual(self.entries(), [])
 
-    def test_what_is_no_volume_leaves_nothing(self):
+    def test_files_that_are_no_volumes_leave_nothing(self):
         program.write("text.txt", b"hello\n" * 100)
         program.write("plain.raw", bytes(1000))
         self.leaves_nothing(1, "render", "text.txt", "-o", "x.png", says="triptych brick FILE --size")

@@ -4,7 +4,7 @@
 
 enum { WIDTH = 800, HEIGHT = 600 };
 
-/* A box of 10 x 20 x 30 about the origin, in parallel view from `eye`, 60 units high. */
+/* Returns a parallel view of the origin from (x, y, z), 60 units high. */
 static trip_navigation parallel(double x, double y, double z)
 {
     const triptych_camera camera = { .eye = { x, y, z }, .up = { 0, 0, 1 }, .ortho_height = 60 };
@@ -19,7 +19,7 @@ static trip_annotation_box box(void)
     return trip_annotation_box_of(&info);
 }
 
-static void a_box_reaches_to_the_outer_faces_of_its_voxels(void **state)
+static void a_box_includes_whole_voxels_at_its_border(void **state)
 {
     (void)state;
     trip_annotation_box b = box();
@@ -29,8 +29,8 @@ static void a_box_reaches_to_the_outer_faces_of_its_voxels(void **state)
             assert_close(b.corners[n][a], n >> a & 1 ? half[a] : -half[a], 1e-12);
 }
 
-/* From the front, 10 px a unit. */
-static void edges_lie_where_the_box_does(void **state)
+/* The view is from the front, at 10 px per unit. */
+static void edges_of_the_box_are_projected(void **state)
 {
     (void)state;
     trip_annotation_box b = box();
@@ -46,7 +46,7 @@ static void edges_lie_where_the_box_does(void **state)
             assert_close(fabs(p[1] - 300), 150, 1e-12);
         }
     }
-    /* Along x, at the lower end of z and the upper end of y: behind. */
+    /* Edge 1 is parallel to x, at the lower end of z and the upper end of y. */
     assert_close(edges[1].from[0], 350, 1e-12);
     assert_close(edges[1].to[0], 450, 1e-12);
 }
@@ -59,9 +59,10 @@ static int count(const trip_annotation_edge *edges, int hidden, int outline)
     return n;
 }
 
-/* Of a box three faces are seen from outside, at a corner of which three edges meet that are no
- * outline; the opposite three are hidden. From inside, all are. */
-static void three_edges_are_behind_the_box(void **state)
+/* From outside, three faces of the box are visible. The three edges at their common corner are not
+ * part of the outline. The three edges at the opposite corner are hidden. From inside, all edges
+ * are hidden. */
+static void three_edges_are_hidden_from_outside_and_all_from_inside(void **state)
 {
     (void)state;
     trip_annotation_box b = box();
@@ -73,14 +74,15 @@ static void three_edges_are_behind_the_box(void **state)
         assert_int_equal(count(edges, true, false), 3);
         assert_int_equal(count(edges, false, true), 6);
         assert_int_equal(count(edges, false, false), 3);
-        /* Between the lower face, the one at the left and the one at the back. */
+        /* The lower, the left and the back face meet in the hidden edges. */
         assert_true(edges[1].hidden && edges[4].hidden && edges[10].hidden);
     }
     const triptych_camera inside = { .eye = { 1, 0, 0 }, .up = { 0, 0, 1 }, .fov_degrees = 40 };
     trip_navigation n = trip_navigation_from_camera(&inside, NULL);
     trip_annotation_edges(&b, &n, WIDTH, HEIGHT, edges);
     assert_int_equal(count(edges, true, false), 12);
-    /* Looking along -x: the edges about x = 5 are behind the eye, those along x cross it. */
+    /* The view is along -x. The edges at x = 5 are behind the eye. The edges parallel to x begin
+     * behind the eye. */
     int drawn = 0;
     for (int i = 0; i < TRIP_ANNOTATION_EDGES; i++) {
         drawn += edges[i].drawn;
@@ -90,7 +92,7 @@ static void three_edges_are_behind_the_box(void **state)
     assert_int_equal(drawn, 8);
 }
 
-static void numbers_are_round(void **state)
+static void steps_are_rounded_up_to_1_2_or_5(void **state)
 {
     (void)state;
     assert_close(trip_annotation_round(1), 1, 1e-15);
@@ -104,7 +106,7 @@ static void numbers_are_round(void **state)
 static void a_scale_bar_is_the_longest_that_fits(void **state)
 {
     (void)state;
-    trip_navigation n = parallel(0, -100, 0); /* 10 px a unit */
+    trip_navigation n = parallel(0, -100, 0); /* 10 px per unit */
     static const struct {
         double max_px, length;
         const char *text;
@@ -117,13 +119,13 @@ static void a_scale_bar_is_the_longest_that_fits(void **state)
         assert_string_equal(bar.text, bars[i].text);
     }
     assert_string_equal(trip_annotation_scale_bar(&n, HEIGHT, 100, 200, NULL).text, "20");
-    /* In perspective by the distance. */
+    /* In perspective, the length depends on the distance. */
     trip_navigation_set_parallel(&n, false);
     double depth = trip_navigation_distance(&n);
     assert_close(trip_annotation_scale_bar(&n, HEIGHT, depth / 2, 200, NULL).length, 10, 1e-12);
 }
 
-/* From in front and above the ticks along x are under the picture of the box. */
+/* In a view from the front and above, the ticks of x are below the box. */
 static void ticks_are_round_numbers_on_the_lowest_edge(void **state)
 {
     (void)state;
@@ -134,7 +136,7 @@ static void ticks_are_round_numbers_on_the_lowest_edge(void **state)
     assert_string_equal(axes[0].name, "x (mm)");
     assert_string_equal(axes[2].name, "z (mm)");
     static const char *const texts[] = { "-5", "0", "5" };
-    assert_int_equal(axes[0].count, 3); /* 100 px: two steps of 50 */
+    assert_int_equal(axes[0].count, 3); /* 100 px hold two steps of 50 px */
     for (int i = 0; i < 3; i++) {
         const trip_annotation_tick *t = &axes[0].ticks[i];
         const double p[3] = { 5 * (i - 1), -10, -15 };
@@ -147,14 +149,14 @@ static void ticks_are_round_numbers_on_the_lowest_edge(void **state)
         assert_true(t->label[1] > t->to[1]);
     }
     assert_true(axes[0].title[1] > axes[0].ticks[0].label[1]);
-    /* Looking straight along y there is no room for its scale. */
+    /* In a view along y, the scale of y has no room. */
     n = parallel(0, -100, 0);
     trip_annotation_axes(&b, &n, WIDTH, HEIGHT, NULL, axes);
     assert_int_equal(axes[1].count, 0);
     assert_string_equal(axes[0].name, "x");
 }
 
-static void oblique_axes_count_from_the_corner(void **state)
+static void scales_of_oblique_axes_begin_at_the_corner(void **state)
 {
     (void)state;
     const triptych_info info = { .edges = { { -0.5, -0.5, -0.5 }, { 9.5, 9.5, 9.5 } },
@@ -177,13 +179,13 @@ static void oblique_axes_count_from_the_corner(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_box_reaches_to_the_outer_faces_of_its_voxels),
-        cmocka_unit_test(edges_lie_where_the_box_does),
-        cmocka_unit_test(three_edges_are_behind_the_box),
-        cmocka_unit_test(numbers_are_round),
+        cmocka_unit_test(a_box_includes_whole_voxels_at_its_border),
+        cmocka_unit_test(edges_of_the_box_are_projected),
+        cmocka_unit_test(three_edges_are_hidden_from_outside_and_all_from_inside),
+        cmocka_unit_test(steps_are_rounded_up_to_1_2_or_5),
         cmocka_unit_test(a_scale_bar_is_the_longest_that_fits),
         cmocka_unit_test(ticks_are_round_numbers_on_the_lowest_edge),
-        cmocka_unit_test(oblique_axes_count_from_the_corner),
+        cmocka_unit_test(scales_of_oblique_axes_begin_at_the_corner),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

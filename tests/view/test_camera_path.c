@@ -6,7 +6,7 @@
 
 #define PI 3.14159265358979323846
 
-/* From so many degrees round the z axis, 10 units away. */
+/* Returns a view of (3, 4, 5) from a distance of 10, at an angle around the z axis. */
 static trip_navigation around(double degrees)
 {
     const triptych_camera camera = { .eye = { 3 + 10 * cos(degrees * PI / 180),
@@ -29,7 +29,7 @@ static void assert_eye(const trip_navigation *n, double x, double y, double z)
     assert_close(n->eye[2], z, 1e-12);
 }
 
-static void keys_are_their_views_to_the_last_bit(void **state)
+static void the_path_passes_through_its_keys_exactly(void **state)
 {
     (void)state;
     trip_camera_path p = { 0 };
@@ -49,7 +49,8 @@ static void keys_are_their_views_to_the_last_bit(void **state)
     trip_camera_path_release(&p);
 }
 
-/* Keys on a circle at equal speed: the path is the circle, at that speed, whatever the steps. */
+/* The keys lie on a circle and have a constant speed. The path must be this circle at this speed,
+ * although the times between keys differ. */
 static void a_turn_about_an_axis_has_constant_speed(void **state)
 {
     (void)state;
@@ -68,7 +69,7 @@ static void a_turn_about_an_axis_has_constant_speed(void **state)
     trip_camera_path_release(&p);
 }
 
-/* About one of the camera's own axes. */
+/* Returns a view that is turned about one of the camera's axes. */
 static trip_navigation turned(int axis, double degrees)
 {
     trip_navigation n = around(20);
@@ -79,8 +80,8 @@ static trip_navigation turned(int axis, double degrees)
     return n;
 }
 
-/* Between two keys, of which each is more than a right angle from the other. */
-static void a_turn_goes_the_shorter_way_round(void **state)
+/* The two keys are more than a right angle apart. */
+static void a_turn_takes_the_shorter_way(void **state)
 {
     (void)state;
     for (int i = 0; i < 24; i++) {
@@ -98,7 +99,7 @@ static void a_turn_goes_the_shorter_way_round(void **state)
     }
 }
 
-static void a_flight_straight_on_is_straight(void **state)
+static void a_path_of_keys_on_a_line_is_straight(void **state)
 {
     (void)state;
     trip_camera_path p = { 0 };
@@ -115,8 +116,8 @@ static void a_flight_straight_on_is_straight(void **state)
     trip_camera_path_release(&p);
 }
 
-/* Going nearer by equal factors: the distance falls exponentially. */
-static void distances_go_by_factors(void **state)
+/* Each key is nearer by the same factor, so that the distance falls exponentially. */
+static void distances_are_interpolated_exponentially(void **state)
 {
     (void)state;
     trip_camera_path p = { 0 };
@@ -134,7 +135,7 @@ static void distances_go_by_factors(void **state)
     trip_camera_path_release(&p);
 }
 
-/* The derivatives of both sides of a key agree: there is no jerk. */
+/* The derivatives on both sides of a key agree. */
 static void the_eye_passes_keys_smoothly(void **state)
 {
     (void)state;
@@ -156,7 +157,7 @@ static void the_eye_passes_keys_smoothly(void **state)
     trip_camera_path_release(&p);
 }
 
-/* Any turn between two keys, half a turn included, begins and ends at them. */
+/* Every turn between two keys ends at the second key, including a half turn. */
 static void turns_end_at_their_keys(void **state)
 {
     (void)state;
@@ -203,7 +204,7 @@ static void frames_divide_the_time_equally(void **state)
     trip_camera_path_release(&p);
 }
 
-static void functions_go_over_between_keys_that_have_others(void **state)
+static void transfer_functions_are_mixed_between_keys_that_have_one(void **state)
 {
     (void)state;
     trip_camera_path p = { 0 };
@@ -265,7 +266,7 @@ static void assert_refused(const char *text, const char *why)
     assert_null(p.keys);
 }
 
-static void what_is_no_path_is_refused_by_its_key(void **state)
+static void an_invalid_path_is_refused_with_the_key(void **state)
 {
     (void)state;
     trip_camera_path p = { 0 };
@@ -307,7 +308,7 @@ static void what_is_no_path_is_refused_by_its_key(void **state)
     assert_refused(PATH(KEY("0", "\"fov\": 3") "," KEY("100000", "\"fov\": 3")), "frames or more");
 }
 
-static void a_loop_goes_on_from_the_last_key_to_the_first(void **state)
+static void a_loop_continues_from_the_last_key_to_the_first(void **state)
 {
     (void)state;
     trip_camera_path p = { .frames_per_second = 10, .loop_seconds = 1 };
@@ -333,7 +334,7 @@ static void a_loop_goes_on_from_the_last_key_to_the_first(void **state)
     trip_camera_path_release(&q);
 }
 
-static void functions_of_a_loop_go_over_into_the_first(void **state)
+static void a_loop_mixes_the_last_transfer_function_with_the_first(void **state)
 {
     (void)state;
     trip_camera_path p = { .loop_seconds = 2 };
@@ -372,7 +373,7 @@ static void boxes_and_planes_move_between_keys(void **state)
     assert_close(c.plane[0][0], 0.75, 1e-12);
     assert_close(c.plane[0][1], 0.25, 1e-12);
     assert_close(c.plane[0][3], -2.5, 1e-12);
-    assert_true(trip_camera_path_clip(&p, 4.9, &c)); /* that of 3 until nothing is cut */
+    assert_true(trip_camera_path_clip(&p, 4.9, &c)); /* the clipping of key 3 holds */
     assert_true(c.box && c.box_lo[0] == 4 && c.plane[0][1] == 1);
     assert_true(trip_camera_path_clip(&p, 5, &c));
     assert_true(!c.box && c.planes == 0);
@@ -386,7 +387,7 @@ static void boxes_and_planes_move_between_keys(void **state)
     trip_camera_path_release(&q);
 }
 
-static void clips_that_are_none_are_refused(void **state)
+static void invalid_clips_are_refused(void **state)
 {
     (void)state;
     static const char *const clips[][2] = {
@@ -417,21 +418,21 @@ static void clips_that_are_none_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keys_are_their_views_to_the_last_bit),
+        cmocka_unit_test(the_path_passes_through_its_keys_exactly),
         cmocka_unit_test(a_turn_about_an_axis_has_constant_speed),
-        cmocka_unit_test(a_turn_goes_the_shorter_way_round),
-        cmocka_unit_test(a_flight_straight_on_is_straight),
-        cmocka_unit_test(distances_go_by_factors),
+        cmocka_unit_test(a_turn_takes_the_shorter_way),
+        cmocka_unit_test(a_path_of_keys_on_a_line_is_straight),
+        cmocka_unit_test(distances_are_interpolated_exponentially),
         cmocka_unit_test(the_eye_passes_keys_smoothly),
         cmocka_unit_test(turns_end_at_their_keys),
         cmocka_unit_test(frames_divide_the_time_equally),
-        cmocka_unit_test(functions_go_over_between_keys_that_have_others),
+        cmocka_unit_test(transfer_functions_are_mixed_between_keys_that_have_one),
         cmocka_unit_test(a_path_is_read_as_it_was_written),
-        cmocka_unit_test(what_is_no_path_is_refused_by_its_key),
-        cmocka_unit_test(a_loop_goes_on_from_the_last_key_to_the_first),
-        cmocka_unit_test(functions_of_a_loop_go_over_into_the_first),
+        cmocka_unit_test(an_invalid_path_is_refused_with_the_key),
+        cmocka_unit_test(a_loop_continues_from_the_last_key_to_the_first),
+        cmocka_unit_test(a_loop_mixes_the_last_transfer_function_with_the_first),
         cmocka_unit_test(boxes_and_planes_move_between_keys),
-        cmocka_unit_test(clips_that_are_none_are_refused),
+        cmocka_unit_test(invalid_clips_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,8 +21,8 @@ static void a_view_is_written_as_options(void **state)
                    "--eye 1,-2.5,0 --look 0,0,1e-20 --up 0,0,1 --ortho 12.25 --size 1x2");
 }
 
-/* Read back, each number is the same to the last bit. */
-static void no_bit_is_lost(void **state)
+/* Numbers that are read back have the same bits. */
+static void numbers_are_written_without_loss(void **state)
 {
     (void)state;
     for (int i = 0; i < 1000; i++) {
@@ -47,7 +47,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_view_is_written_as_options),
-        cmocka_unit_test(no_bit_is_lost),
+        cmocka_unit_test(numbers_are_written_without_loss),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

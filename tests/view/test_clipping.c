@@ -10,7 +10,7 @@ static const triptych_info info = {
     .index_to_world = { { 2, 0, 0, 1 }, { 0, 3, 0, 0 }, { 0, 0, 1, 0 } },
 };
 
-static void the_box_begins_as_all_and_stays_a_box(void **state)
+static void the_box_begins_around_all_voxels_and_is_never_empty(void **state)
 {
     (void)state;
     triptych_clip c = { 0 };
@@ -22,7 +22,7 @@ static void the_box_begins_as_all_and_stays_a_box(void **state)
     assert_true(c.box_lo[1] < c.box_hi[1] && trip_clipping_is_sound(&c));
 }
 
-static void a_plane_cuts_what_lies_before_the_point_looked_at(void **state)
+static void a_new_plane_cuts_in_front_of_the_look_point(void **state)
 {
     (void)state;
     const triptych_camera camera = {
@@ -37,7 +37,7 @@ static void a_plane_cuts_what_lies_before_the_point_looked_at(void **state)
     assert_close(p[0], 0, 1e-12);
     assert_close(p[1], 1, 1e-12);
     assert_close(p[3], -5, 1e-12);
-    /* Half of the diagonal is 30; the middle is at y = 0. */
+    /* Half the diagonal is 30, and the centre is at y = 0. */
     assert_close(trip_clipping_depth(&c, 0, &info), 5.0 / 30, 1e-12);
     trip_clipping_set_depth(&c, 0, &info, -0.5);
     assert_close(c.plane[0][3], 15, 1e-12);
@@ -49,7 +49,7 @@ static void a_plane_cuts_what_lies_before_the_point_looked_at(void **state)
     assert_true(c.plane[0][3] == 7);
 }
 
-static void a_box_of_voxels_stays_where_it_is_when_voxels_get_smaller(void **state)
+static void a_box_of_voxels_keeps_its_position_in_a_finer_grid(void **state)
 {
     (void)state;
     triptych_info fine = info;
@@ -65,7 +65,7 @@ static void a_box_of_voxels_stays_where_it_is_when_voxels_get_smaller(void **sta
     assert_true(c.box_lo[0] == 4);
 }
 
-static void opposite_planes_have_none_between_them(void **state)
+static void opposite_planes_are_not_interpolated(void **state)
 {
     (void)state;
     const triptych_clip a = { .planes = 1, .plane = { { 1, 0, 0, 2 } } };
@@ -74,7 +74,7 @@ static void opposite_planes_have_none_between_them(void **state)
     assert_true(mix.planes == 1 && mix.plane[0][0] == 1 && trip_clipping_is_sound(&mix));
 }
 
-static void the_text_is_what_render_takes(void **state)
+static void clipping_is_written_as_options_of_render(void **state)
 {
     (void)state;
     const triptych_clip c = { .box = 1,
@@ -93,11 +93,11 @@ static void the_text_is_what_render_takes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_box_begins_as_all_and_stays_a_box),
-        cmocka_unit_test(a_plane_cuts_what_lies_before_the_point_looked_at),
-        cmocka_unit_test(a_box_of_voxels_stays_where_it_is_when_voxels_get_smaller),
-        cmocka_unit_test(opposite_planes_have_none_between_them),
-        cmocka_unit_test(the_text_is_what_render_takes),
+        cmocka_unit_test(the_box_begins_around_all_voxels_and_is_never_empty),
+        cmocka_unit_test(a_new_plane_cuts_in_front_of_the_look_point),
+        cmocka_unit_test(a_box_of_voxels_keeps_its_position_in_a_finer_grid),
+        cmocka_unit_test(opposite_planes_are_not_interpolated),
+        cmocka_unit_test(clipping_is_written_as_options_of_render),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,8 @@ enum { SIDE = 20, WIDTH = 60, HEIGHT = 40, LARGE = 200 };
 static char folder[] = "/tmp/trip-frames-XXXXXX";
 static char data[64], other[64], with_levels[64];
 
-/* A ball whose middle is nearer to one end, of values that differ everywhere. */
+/* Writes a ball that is not at the centre of the volume. Neighbouring voxels have different values.
+ */
 static void write_volume(const char *path, int seed)
 {
     FILE *f = fopen(path, "wb");
@@ -92,7 +93,7 @@ static trip_wanted wanted_of(unsigned document, const char *input)
                           .settings = triptych_default_settings() };
 }
 
-/* Until the picture is whole or has failed. */
+/* Waits until the picture is complete or has failed. */
 static trip_frames_status await(trip_frames *f, unsigned document)
 {
     for (;;) {
@@ -124,7 +125,8 @@ static copy take(trip_frames *f)
     return c;
 }
 
-/* Whether the library draws a large picture with this memory, keeping nothing for the next. */
+/* Returns whether the library can draw a large picture with this memory if it caches nothing for
+ * the next picture. */
 static bool suffices(uint64_t memory_bytes)
 {
     triptych *t;
@@ -160,7 +162,7 @@ static void assert_drawn_alike(const copy *c, const char *path, const trip_wante
         assert_int_equal(c->rgba[i], i % 4 == 3 ? 255 : (int)floor(rgba[i] * 255 + 0.5f));
 }
 
-static void at_rest_it_is_the_librarys_picture(void **state)
+static void the_picture_at_rest_equals_the_picture_of_the_library(void **state)
 {
     (void)state;
     trip_frames *f = start();
@@ -183,9 +185,9 @@ static void at_rest_it_is_the_librarys_picture(void **state)
     trip_frames_stop(f);
 }
 
-/* Of coarse levels there are those for post alone: moving views are drawn by these, without a
- * warning that there are no others; the picture at rest is of splats. */
-static void splats_move_by_the_levels_that_there_are(void **state)
+/* The data set has coarse levels for `post` only. Moving views use these levels without a warning.
+ * The picture at rest consists of splats. */
+static void moving_views_of_splats_use_coarse_levels_of_post(void **state)
 {
     (void)state;
     trip_frames *f = start();
@@ -201,7 +203,7 @@ static void splats_move_by_the_levels_that_there_are(void **state)
     trip_frames_stop(f);
 }
 
-static void of_many_wishes_the_last_is_fulfilled(void **state)
+static void only_the_last_of_many_requests_is_drawn(void **state)
 {
     (void)state;
     trip_opened o;
@@ -227,7 +229,7 @@ static void of_many_wishes_the_last_is_fulfilled(void **state)
     trip_frames_stop(f);
 }
 
-static void failures_are_said_and_do_not_last(void **state)
+static void failures_are_reported_and_end_with_the_next_request(void **state)
 {
     (void)state;
     trip_frames *f = start();
@@ -250,8 +252,8 @@ static void failures_are_said_and_do_not_last(void **state)
     trip_frames_stop(f);
 }
 
-/* What is kept between frames gives way to the picture. */
-static void the_least_memory_for_a_picture_is_enough(void **state)
+/* Caches between frames give their memory back to the picture. */
+static void the_minimum_memory_for_a_picture_suffices(void **state)
 {
     (void)state;
     uint64_t bytes = 1 << 20;
@@ -274,7 +276,7 @@ static void the_least_memory_for_a_picture_is_enough(void **state)
     trip_frames_stop(f);
 }
 
-static void other_sizes_and_data_sets_take_turns(void **state)
+static void picture_sizes_and_data_sets_can_alternate(void **state)
 {
     (void)state;
     trip_frames *f = start();
@@ -294,7 +296,7 @@ static void other_sizes_and_data_sets_take_turns(void **state)
     trip_frames_stop(f);
 }
 
-static void it_stops_whatever_goes_on(void **state)
+static void frames_can_be_stopped_at_any_moment(void **state)
 {
     (void)state;
     for (int i = 0; i < 20; i++) {
@@ -306,7 +308,7 @@ static void it_stops_whatever_goes_on(void **state)
     }
 }
 
-static void a_place_of_the_picture_is_looked_at(void **state)
+static void a_pixel_of_the_picture_can_be_probed(void **state)
 {
     (void)state;
     trip_frames *f = start();
@@ -324,14 +326,14 @@ static void a_place_of_the_picture_is_looked_at(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(at_rest_it_is_the_librarys_picture),
-        cmocka_unit_test(splats_move_by_the_levels_that_there_are),
-        cmocka_unit_test(of_many_wishes_the_last_is_fulfilled),
-        cmocka_unit_test(failures_are_said_and_do_not_last),
-        cmocka_unit_test(the_least_memory_for_a_picture_is_enough),
-        cmocka_unit_test(other_sizes_and_data_sets_take_turns),
-        cmocka_unit_test(it_stops_whatever_goes_on),
-        cmocka_unit_test(a_place_of_the_picture_is_looked_at),
+        cmocka_unit_test(the_picture_at_rest_equals_the_picture_of_the_library),
+        cmocka_unit_test(moving_views_of_splats_use_coarse_levels_of_post),
+        cmocka_unit_test(only_the_last_of_many_requests_is_drawn),
+        cmocka_unit_test(failures_are_reported_and_end_with_the_next_request),
+        cmocka_unit_test(the_minimum_memory_for_a_picture_suffices),
+        cmocka_unit_test(picture_sizes_and_data_sets_can_alternate),
+        cmocka_unit_test(frames_can_be_stopped_at_any_moment),
+        cmocka_unit_test(a_pixel_of_the_picture_can_be_probed),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -6,10 +6,10 @@
 
 #include "light.h"
 
-/* Its middle is (1, 2, 3), half of its diagonal 6. */
+/* The centre is (1, 2, 3), and half the diagonal is 6. */
 static const triptych_info box = { .lo = { -3, -2, 1 }, .hi = { 5, 6, 5 } };
 
-static void a_light_stands_about_the_middle_of_the_data(void **state)
+static void a_light_is_placed_around_the_centre_of_the_data(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -21,7 +21,7 @@ static void a_light_stands_about_the_middle_of_the_data(void **state)
         assert_close(s.light[i], position[i], 1e-12);
 }
 
-static void from_the_farthest_on_it_is_a_direction(void **state)
+static void at_the_maximum_distance_a_light_is_a_direction(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -33,7 +33,7 @@ static void from_the_farthest_on_it_is_a_direction(void **state)
     assert_true(trip_light_control_of(&s, &box).distance == TRIP_LIGHT_FARTHEST);
 }
 
-static void what_is_set_is_shown(void **state)
+static void the_controls_show_the_numbers_that_were_set(void **state)
 {
     (void)state;
     const double distances[] = { TRIP_LIGHT_NEAREST, 0.3, 1, 9.9, TRIP_LIGHT_FARTHEST };
@@ -49,8 +49,8 @@ static void what_is_set_is_shown(void **state)
         }
 }
 
-/* In the very middle it has no direction. */
-static void any_light_has_numbers_to_show(void **state)
+/* A light at the centre of the data has no direction. */
+static void a_light_at_the_centre_has_finite_numbers(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -68,7 +68,7 @@ static void assert_text(const triptych_settings *s, const char *expected)
     free(text);
 }
 
-static void it_is_written_as_an_option_where_it_lights(void **state)
+static void a_light_is_written_as_an_option_if_it_has_an_effect(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -94,7 +94,7 @@ static void assert_effects(const triptych_settings *s, const char *heat, const c
     assert_string_equal(said, words);
 }
 
-static void effects_are_written_as_options_and_said_in_words(void **state)
+static void effects_are_written_as_options_and_in_words(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -118,7 +118,7 @@ static void effects_are_written_as_options_and_said_in_words(void **state)
     assert_effects(&s, "h",
                    " --effects auto --anisotropy 0.5 --cueing 0.25 --light-cells 64 --emission h"
                    " --temperature 0:1800.5",
-                   "what the data calls for, emission of h, 0 to 1800.5 K");
+                   "effects chosen by the kind of data, emission of h, 0 to 1800.5 K");
 }
 
 static const trip_effect_switch *switch_of(int bit)
@@ -129,7 +129,7 @@ static const trip_effect_switch *switch_of(int bit)
     return &trip_effect_switches[i];
 }
 
-static void every_effect_has_a_switch_that_turns_it_alone(void **state)
+static void every_effect_has_its_own_switch(void **state)
 {
     (void)state;
     int all = 0;
@@ -147,7 +147,7 @@ static void every_effect_has_a_switch_that_turns_it_alone(void **state)
                               TRIPTYCH_EFFECTS_AUTO | TRIPTYCH_EMISSION);
 }
 
-static void what_lacks_its_light_or_heat_is_not_turned_on(void **state)
+static void effects_without_light_or_heat_cannot_be_turned_on(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -170,7 +170,7 @@ static const trip_effect_number *number_of(const char *name)
     return &trip_effect_numbers[i];
 }
 
-static void numbers_of_effects_keep_within_their_bounds(void **state)
+static void numbers_of_effects_stay_within_their_bounds(void **state)
 {
     (void)state;
     for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
@@ -196,8 +196,8 @@ static void numbers_of_effects_keep_within_their_bounds(void **state)
     assert_true(s.kelvin[1] == 3000);
 }
 
-/* The cells of lattices are of three effects, and stand below one of them. */
-static void a_number_of_several_effects_stands_below_one(void **state)
+/* Three effects use --light-cells. The panel shows this number below one of them. */
+static void a_number_of_several_effects_is_below_only_one(void **state)
 {
     (void)state;
     const trip_effect_number *n = number_of("light-cells");
@@ -215,7 +215,7 @@ static void a_number_of_several_effects_stands_below_one(void **state)
     assert_true(trip_effect_number_set(n, 48, &s) && s.light_cells == 48);
 }
 
-static void words_end_where_the_text_does(void **state)
+static void words_are_cut_at_the_end_of_the_buffer(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -231,17 +231,17 @@ static void words_end_where_the_text_does(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_light_stands_about_the_middle_of_the_data),
-        cmocka_unit_test(from_the_farthest_on_it_is_a_direction),
-        cmocka_unit_test(what_is_set_is_shown),
-        cmocka_unit_test(any_light_has_numbers_to_show),
-        cmocka_unit_test(it_is_written_as_an_option_where_it_lights),
-        cmocka_unit_test(effects_are_written_as_options_and_said_in_words),
-        cmocka_unit_test(every_effect_has_a_switch_that_turns_it_alone),
-        cmocka_unit_test(what_lacks_its_light_or_heat_is_not_turned_on),
-        cmocka_unit_test(numbers_of_effects_keep_within_their_bounds),
-        cmocka_unit_test(a_number_of_several_effects_stands_below_one),
-        cmocka_unit_test(words_end_where_the_text_does),
+        cmocka_unit_test(a_light_is_placed_around_the_centre_of_the_data),
+        cmocka_unit_test(at_the_maximum_distance_a_light_is_a_direction),
+        cmocka_unit_test(the_controls_show_the_numbers_that_were_set),
+        cmocka_unit_test(a_light_at_the_centre_has_finite_numbers),
+        cmocka_unit_test(a_light_is_written_as_an_option_if_it_has_an_effect),
+        cmocka_unit_test(effects_are_written_as_options_and_in_words),
+        cmocka_unit_test(every_effect_has_its_own_switch),
+        cmocka_unit_test(effects_without_light_or_heat_cannot_be_turned_on),
+        cmocka_unit_test(numbers_of_effects_stay_within_their_bounds),
+        cmocka_unit_test(a_number_of_several_effects_is_below_only_one),
+        cmocka_unit_test(words_are_cut_at_the_end_of_the_buffer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

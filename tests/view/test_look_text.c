@@ -12,14 +12,14 @@ static void assert_text(const triptych_settings *s, const char *function, double
     free(text);
 }
 
-static void what_is_as_usual_is_left_out(void **state)
+static void defaults_are_left_out(void **state)
 {
     (void)state;
     const triptych_settings s = triptych_default_settings();
     assert_text(&s, NULL, 1, "");
 }
 
-static void a_function_is_one_word(void **state)
+static void a_transfer_function_is_quoted_as_one_word(void **state)
 {
     (void)state;
     const triptych_settings s = triptych_default_settings();
@@ -27,7 +27,7 @@ static void a_function_is_one_word(void **state)
     assert_text(&s, "it's my.tf", 0.1, " --tf 'it'\\''s my.tf' --opacity-scale 0.1");
 }
 
-static void splats_and_values_have_options_of_their_own(void **state)
+static void pre_and_post_have_their_own_options(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -41,7 +41,7 @@ static void splats_and_values_have_options_of_their_own(void **state)
     assert_text(&s, NULL, 1, " --classify pre --compositing sheet --kernel-radius 2.5");
 }
 
-static void what_the_panel_has_is_written(void **state)
+static void settings_of_the_panel_are_written(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings();
@@ -52,7 +52,7 @@ static void what_the_panel_has_is_written(void **state)
     assert_text(&s, NULL, 1, " --h 0.25 --early-termination 0 --lod 1.5 --samples 2");
     s = triptych_default_settings();
     s.method = TRIPTYCH_AXIS;
-    s.h = 0.25; /* of merge alone */
+    s.h = 0.25; /* only `merge` uses h */
     s.shading = 0;
     s.show = TRIPTYCH_SHOW_LEVELS;
     s.background[1] = 0.5;
@@ -62,10 +62,10 @@ static void what_the_panel_has_is_written(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_as_usual_is_left_out),
-        cmocka_unit_test(a_function_is_one_word),
-        cmocka_unit_test(splats_and_values_have_options_of_their_own),
-        cmocka_unit_test(what_the_panel_has_is_written),
+        cmocka_unit_test(defaults_are_left_out),
+        cmocka_unit_test(a_transfer_function_is_quoted_as_one_word),
+        cmocka_unit_test(pre_and_post_have_their_own_options),
+        cmocka_unit_test(settings_of_the_panel_are_written),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,7 +6,7 @@ enum { WIDTH = 640, HEIGHT = 480 };
 
 #define PI 3.14159265358979323846
 
-/* From (0, -10, 0) at the origin, z up: x is to the right. */
+/* Returns a view from (0, -10, 0) to the origin. z is up and x is to the right. */
 static trip_navigation front(void)
 {
     const triptych_camera camera = {
@@ -40,7 +40,7 @@ static void assert_pixel(const trip_navigation *n, const double p[3], double x, 
     assert_close(pixel[1], y, 1e-9);
 }
 
-static void a_view_points_at_the_state(void **state)
+static void a_view_points_to_the_members_of_the_state(void **state)
 {
     (void)state;
     trip_navigation n = oblique(false);
@@ -54,7 +54,7 @@ static void a_view_points_at_the_state(void **state)
     assert_point(n.upright, 0, 0, 1);
 }
 
-static void points_are_projected_as_by_a_lens(void **state)
+static void points_are_projected_in_perspective_and_in_parallel(void **state)
 {
     (void)state;
     trip_navigation n = front();
@@ -67,8 +67,8 @@ static void points_are_projected_as_by_a_lens(void **state)
     assert_pixel(&n, (const double[3]){ 1, -5, 0 }, WIDTH / 2 + k / 10, HEIGHT / 2);
 }
 
-/* Points of a pixel's ray fall on the pixel again, and lie along it. */
-static void a_ray_is_where_a_pixel_looks(void **state)
+/* Points on the ray of a pixel project onto this pixel. */
+static void points_on_the_ray_of_a_pixel_project_onto_it(void **state)
 {
     (void)state;
     for (int parallel = 0; parallel < 2; parallel++) {
@@ -87,7 +87,7 @@ static void a_ray_is_where_a_pixel_looks(void **state)
     }
 }
 
-static void an_orbit_goes_round_the_point_looked_at(void **state)
+static void an_orbit_moves_the_eye_around_the_look_point(void **state)
 {
     (void)state;
     trip_navigation n = front();
@@ -109,12 +109,12 @@ static void an_orbit_passes_over_the_top(void **state)
     trip_navigation_orbit(&n, 0, 135);
     assert_point(n.eye, 0, 10 * sin(PI / 4), 10 * sin(PI / 4));
     assert_true(n.up[2] < 0);
-    /* Upside down, a drag still moves what is near in its direction. */
+    /* In a view upside down, near points still follow a drag. */
     trip_navigation_orbit(&n, 90, 0);
     assert_point(n.eye, 10 * sin(PI / 4), 0, 10 * sin(PI / 4));
 }
 
-static void what_is_grabbed_stays_under_the_cursor(void **state)
+static void a_grabbed_point_stays_under_the_cursor(void **state)
 {
     (void)state;
     for (int parallel = 0; parallel < 2; parallel++) {
@@ -142,7 +142,7 @@ static void a_dolly_goes_to_the_point_under_the_cursor(void **state)
     }
 }
 
-static void flying_moves_eye_and_point_looked_at(void **state)
+static void flying_moves_the_eye_and_the_look_point(void **state)
 {
     (void)state;
     trip_navigation n = front();
@@ -162,11 +162,11 @@ static void turning_keeps_the_eye(void **state)
     assert_point(n.look, 10 * cos(PI / 6), -10, 5);
 }
 
-static void upside_down_a_turn_goes_to_the_pictures_right_too(void **state)
+static void an_upside_down_view_also_turns_to_the_right_of_the_picture(void **state)
 {
     (void)state;
     trip_navigation n = front();
-    trip_navigation_roll(&n, 180); /* -x is to the right */
+    trip_navigation_roll(&n, 180); /* now -x is to the right */
     trip_navigation_turn(&n, 90, 0);
     assert_point(trip_navigation_get_axes(&n).forward, -1, 0, 0);
     assert_point(trip_navigation_get_axes(&n).up, 0, 0, -1);
@@ -179,10 +179,10 @@ static void a_roll_turns_the_picture_clockwise(void **state)
     const double up[3] = { 0, 0, 1 };
     double k = HEIGHT / 2 / tan(PI / 6) / 10;
     trip_navigation_roll(&n, 90);
-    assert_pixel(&n, up, WIDTH / 2 + k, HEIGHT / 2); /* what was above is at the right */
+    assert_pixel(&n, up, WIDTH / 2 + k, HEIGHT / 2); /* the top is now on the right */
 }
 
-static void another_lens_keeps_the_size_of_what_is_looked_at(void **state)
+static void another_field_of_view_keeps_the_size_at_the_look_point(void **state)
 {
     (void)state;
     trip_navigation n = front();
@@ -201,7 +201,7 @@ static void another_lens_keeps_the_size_of_what_is_looked_at(void **state)
     assert_pixel(&n, p, pixel[0], pixel[1]);
 }
 
-static void sides_are_seen_upright(void **state)
+static void views_of_the_sides_are_upright(void **state)
 {
     (void)state;
     trip_navigation n = oblique(false);
@@ -216,8 +216,8 @@ static void sides_are_seen_upright(void **state)
     assert_point(trip_navigation_get_axes(&n).right, 1, 0, 0);
 }
 
-/* All corners are in the part of the picture that is to be filled, and they touch two opposite
- * borders of it. */
+/* Checks that all corners project into the central part of the picture, `fill` of its sides. The
+ * corners must touch two opposite borders of this part. */
 static void assert_fits(const trip_navigation *n, const double lo[3], const double hi[3], int width,
                         double fill)
 {
@@ -255,7 +255,7 @@ static void a_box_is_fitted_exactly(void **state)
         }
 }
 
-static void what_is_no_view_is_left_out(void **state)
+static void movements_to_invalid_views_do_nothing(void **state)
 {
     (void)state;
     trip_navigation n = oblique(false), before = n;
@@ -271,8 +271,8 @@ static void what_is_no_view_is_left_out(void **state)
     assert_memory_equal(&n, &before, sizeof n);
 }
 
-/* Though the eye moves, heights of parallel views stay from 1e-100 to 1e100. */
-static void parallel_views_are_neither_too_low_nor_too_high(void **state)
+/* A dolly does nothing if the height of the parallel view would then be outside 1e-100 to 1e100. */
+static void heights_of_parallel_views_stay_within_bounds(void **state)
 {
     (void)state;
     const struct {
@@ -293,8 +293,8 @@ static void parallel_views_are_neither_too_low_nor_too_high(void **state)
     }
 }
 
-/* Where the eye is so near that it comes no nearer, what is seen becomes no smaller either. */
-static void a_parallel_view_grows_as_long_as_its_eye_moves(void **state)
+/* When the eye has reached its minimum distance, the height of the view stays too. */
+static void the_height_of_a_parallel_view_follows_the_distance(void **state)
 {
     (void)state;
     trip_navigation n = oblique(true);
@@ -305,7 +305,7 @@ static void a_parallel_view_grows_as_long_as_its_eye_moves(void **state)
     assert_true(ratio > 0.25 && ratio < 4);
 }
 
-static void the_point_looked_at_can_always_be_left_again(void **state)
+static void a_dolly_can_always_leave_the_look_point_again(void **state)
 {
     (void)state;
     trip_navigation n = oblique(false);
@@ -321,24 +321,24 @@ static void the_point_looked_at_can_always_be_left_again(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_view_points_at_the_state),
-        cmocka_unit_test(points_are_projected_as_by_a_lens),
-        cmocka_unit_test(a_ray_is_where_a_pixel_looks),
-        cmocka_unit_test(an_orbit_goes_round_the_point_looked_at),
+        cmocka_unit_test(a_view_points_to_the_members_of_the_state),
+        cmocka_unit_test(points_are_projected_in_perspective_and_in_parallel),
+        cmocka_unit_test(points_on_the_ray_of_a_pixel_project_onto_it),
+        cmocka_unit_test(an_orbit_moves_the_eye_around_the_look_point),
         cmocka_unit_test(an_orbit_passes_over_the_top),
-        cmocka_unit_test(what_is_grabbed_stays_under_the_cursor),
+        cmocka_unit_test(a_grabbed_point_stays_under_the_cursor),
         cmocka_unit_test(a_dolly_goes_to_the_point_under_the_cursor),
-        cmocka_unit_test(flying_moves_eye_and_point_looked_at),
+        cmocka_unit_test(flying_moves_the_eye_and_the_look_point),
         cmocka_unit_test(turning_keeps_the_eye),
-        cmocka_unit_test(upside_down_a_turn_goes_to_the_pictures_right_too),
+        cmocka_unit_test(an_upside_down_view_also_turns_to_the_right_of_the_picture),
         cmocka_unit_test(a_roll_turns_the_picture_clockwise),
-        cmocka_unit_test(another_lens_keeps_the_size_of_what_is_looked_at),
-        cmocka_unit_test(sides_are_seen_upright),
+        cmocka_unit_test(another_field_of_view_keeps_the_size_at_the_look_point),
+        cmocka_unit_test(views_of_the_sides_are_upright),
         cmocka_unit_test(a_box_is_fitted_exactly),
-        cmocka_unit_test(what_is_no_view_is_left_out),
-        cmocka_unit_test(parallel_views_are_neither_too_low_nor_too_high),
-        cmocka_unit_test(a_parallel_view_grows_as_long_as_its_eye_moves),
-        cmocka_unit_test(the_point_looked_at_can_always_be_left_again),
+        cmocka_unit_test(movements_to_invalid_views_do_nothing),
+        cmocka_unit_test(heights_of_parallel_views_stay_within_bounds),
+        cmocka_unit_test(the_height_of_a_parallel_view_follows_the_distance),
+        cmocka_unit_test(a_dolly_can_always_leave_the_look_point_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,7 +7,7 @@
 
 #include "pace.h"
 
-static void with_nothing_known_frames_are_half_as_wide(void **state)
+static void without_measurements_frames_are_half_as_wide(void **state)
 {
     (void)state;
     const trip_pace p = { 0 };
@@ -15,8 +15,8 @@ static void with_nothing_known_frames_are_half_as_wide(void **state)
     assert_true(trip_pace_expect_ms(&p, 1e6) == 0);
 }
 
-/* 10 ms and 100 ms a megapixel: 33 ms is 0.23 megapixels. */
-static void the_size_meets_the_time(void **state)
+/* A frame takes 10 ms, and 100 ms more for each megapixel. 33 ms suffice for 0.23 megapixels. */
+static void the_size_is_chosen_to_meet_the_time(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -30,8 +30,8 @@ static void the_size_meets_the_time(void **state)
     assert_true(trip_pace_scale(&p, 1e9, 10.001) == TRIP_PACE_MIN);
 }
 
-/* 100 ms whatever the size, and 40 ms a megapixel: pixels get 25 ms. */
-static void where_the_time_cannot_be_met_pixels_are_not_thrown_away(void **state)
+/* A frame takes 100 ms, and 40 ms more for each megapixel. Its pixels may then take 25 ms. */
+static void frames_keep_pixels_if_the_time_cannot_be_met(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -42,8 +42,9 @@ static void where_the_time_cannot_be_met_pixels_are_not_thrown_away(void **state
     assert_true(fabs(trip_pace_scale(&p, 1e6, 33) - sqrt(25.0 / 40)) < 1e-6);
 }
 
-/* The slower frames are the smaller ones, by chance: that is no reason for a large one. */
-static void frames_that_scatter_do_not_make_the_next_one_large(void **state)
+/* By chance the smaller frames are the slower ones. The next frame must not be large for this
+ * reason. */
+static void scattered_times_do_not_make_the_next_frame_large(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -52,7 +53,7 @@ static void frames_that_scatter_do_not_make_the_next_one_large(void **state)
         trip_pace_note(&p, pixels[i], ms[i]);
     const double part = trip_pace_scale(&p, 480e3, 33);
     assert_true(part * part * 480e3 < 3.1 * 21e3);
-    trip_pace free = { 0 }; /* pixels cost nothing: it grows, step by step */
+    trip_pace free = { 0 }; /* pixels cost nothing, so that frames grow step by step */
     for (int i = 0; i < 8; i++) {
         const double size = trip_pace_scale(&free, 480e3, 33);
         trip_pace_note(&free, size * size * 480e3, 5);
@@ -60,8 +61,9 @@ static void frames_that_scatter_do_not_make_the_next_one_large(void **state)
     assert_true(trip_pace_scale(&free, 480e3, 33) == 1);
 }
 
-/* Of one frame all of the time is taken to be of its pixels: 33 ms would be 132e3 of them. */
-static void frames_grow_threefold_at_max(void **state)
+/* After one frame, its whole time counts as time for pixels. 33 ms would then suffice for 132e3
+ * pixels. */
+static void frames_grow_by_at_most_a_factor_of_three(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -70,8 +72,8 @@ static void frames_grow_threefold_at_max(void **state)
     assert_true(fabs(part * part * 480e3 - 60e3) < 1);
 }
 
-/* The larger ones are faster, by chance: pixels may still cost as much as scatter hides. */
-static void pixels_that_seem_to_cost_nothing_may_cost_what_scatter_hides(void **state)
+/* By chance the larger frames are faster. The scatter may hide a cost of pixels. */
+static void scattered_times_may_hide_the_cost_of_pixels(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -82,8 +84,8 @@ static void pixels_that_seem_to_cost_nothing_may_cost_what_scatter_hides(void **
     assert_true(trip_pace_scale(&p, 480e3, 33) < 0.9);
 }
 
-/* Followed as a viewer does, from a start that says nothing, the time is met. */
-static void following_it_comes_to_the_time(void **state)
+/* A viewer that starts without any measurement reaches the requested time. */
+static void a_sequence_of_frames_reaches_the_requested_time(void **state)
 {
     (void)state;
     trip_pace p = { 0 };
@@ -99,13 +101,13 @@ static void following_it_comes_to_the_time(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(with_nothing_known_frames_are_half_as_wide),
-        cmocka_unit_test(the_size_meets_the_time),
-        cmocka_unit_test(where_the_time_cannot_be_met_pixels_are_not_thrown_away),
-        cmocka_unit_test(frames_that_scatter_do_not_make_the_next_one_large),
-        cmocka_unit_test(frames_grow_threefold_at_max),
-        cmocka_unit_test(pixels_that_seem_to_cost_nothing_may_cost_what_scatter_hides),
-        cmocka_unit_test(following_it_comes_to_the_time),
+        cmocka_unit_test(without_measurements_frames_are_half_as_wide),
+        cmocka_unit_test(the_size_is_chosen_to_meet_the_time),
+        cmocka_unit_test(frames_keep_pixels_if_the_time_cannot_be_met),
+        cmocka_unit_test(scattered_times_do_not_make_the_next_frame_large),
+        cmocka_unit_test(frames_grow_by_at_most_a_factor_of_three),
+        cmocka_unit_test(scattered_times_may_hide_the_cost_of_pixels),
+        cmocka_unit_test(a_sequence_of_frames_reaches_the_requested_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

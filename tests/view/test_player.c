@@ -7,10 +7,11 @@
 
 #include "player.h"
 
-/* A window that notes what a script does to it. */
+/* A window that records the actions of a script. `restful` counts the calls of rests() until it
+ * returns true, and `looks` the calls of find() while the control moves. */
 typedef struct fake {
     trip_event events[64];
-    int count, restful, looks; /* rests after so many questions; a control is found after so many */
+    int count, restful, looks;
     bool resized, unsaved;
     const char *shot, *saved, *reported;
 } fake;
@@ -34,7 +35,7 @@ static bool has_size(void *user, int width, int height)
     return f->resized && width == 300 && height == 200;
 }
 
-/* On its way to where it stays. */
+/* The control first moves, then stays. */
 static bool find(void *user, const char *label, double box[4])
 {
     fake *f = user;
@@ -78,7 +79,7 @@ static trip_player load(const char *text)
     return p;
 }
 
-static void events_come_one_by_one_in_order(void **state)
+static void each_step_sends_one_event_in_order(void **state)
 {
     (void)state;
     fake f = { 0 };
@@ -96,7 +97,7 @@ static void events_come_one_by_one_in_order(void **state)
     trip_script_free(&p.script);
 }
 
-static void waiting_and_sleeping_take_until_they_are_over(void **state)
+static void wait_and_sleep_delay_the_next_event(void **state)
 {
     (void)state;
     fake f = { .restful = 3 };
@@ -115,7 +116,7 @@ static void waiting_and_sleeping_take_until_they_are_over(void **state)
     trip_script_free(&p.script);
 }
 
-static void a_control_is_pressed_where_it_has_come_to_lie(void **state)
+static void a_control_is_pressed_once_it_no_longer_moves(void **state)
 {
     (void)state;
     fake f = { .looks = 5 };
@@ -130,7 +131,7 @@ static void a_control_is_pressed_where_it_has_come_to_lie(void **state)
     trip_script_free(&p.script);
 }
 
-static void a_control_that_never_comes_ends_the_script(void **state)
+static void a_missing_control_ends_the_script(void **state)
 {
     (void)state;
     fake f = { .looks = 1000 };
@@ -157,7 +158,7 @@ static void a_picture_that_cannot_be_written_ends_the_script(void **state)
     }
 }
 
-static void chances_are_the_same_for_the_same_seed_and_end_nothing(void **state)
+static void random_events_depend_on_the_seed_and_do_not_quit(void **state)
 {
     (void)state;
     uint64_t a = 5, b = 5, c = 6;
@@ -178,12 +179,12 @@ static void chances_are_the_same_for_the_same_seed_and_end_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(events_come_one_by_one_in_order),
-        cmocka_unit_test(waiting_and_sleeping_take_until_they_are_over),
-        cmocka_unit_test(a_control_is_pressed_where_it_has_come_to_lie),
-        cmocka_unit_test(a_control_that_never_comes_ends_the_script),
+        cmocka_unit_test(each_step_sends_one_event_in_order),
+        cmocka_unit_test(wait_and_sleep_delay_the_next_event),
+        cmocka_unit_test(a_control_is_pressed_once_it_no_longer_moves),
+        cmocka_unit_test(a_missing_control_ends_the_script),
         cmocka_unit_test(a_picture_that_cannot_be_written_ends_the_script),
-        cmocka_unit_test(chances_are_the_same_for_the_same_seed_and_end_nothing),
+        cmocka_unit_test(random_events_depend_on_the_seed_and_do_not_quit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

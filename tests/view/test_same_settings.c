@@ -1,5 +1,5 @@
-/* Settings are compared member by member: garbage between members does not count, and each member
- * does. */
+/* Tests that settings are compared member by member. Every member counts, and padding between
+ * members does not. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,7 @@
 
 #include "same_settings.h"
 
-/* The same members in memory whose other bytes are `filler`. */
+/* Copies all members. The other bytes of `to` become `filler`. */
 static void lay_out(triptych_settings *to, const triptych_settings *s, int filler)
 {
     memset(to, filler, sizeof *to);
@@ -59,7 +59,7 @@ static void lay_out(triptych_settings *to, const triptych_settings *s, int fille
 #undef MEMBER
 }
 
-static void what_lies_between_members_does_not_count(void **state)
+static void padding_between_members_does_not_count(void **state)
 {
     (void)state;
     triptych_settings s = triptych_default_settings(), a, b;
@@ -124,7 +124,7 @@ static void every_member_counts(void **state)
 #undef COUNTS
 }
 
-static void planes_count_up_to_their_number(void **state)
+static void only_clip_planes_in_use_count(void **state)
 {
     (void)state;
     triptych_settings a = triptych_default_settings(), b;
@@ -139,9 +139,9 @@ static void planes_count_up_to_their_number(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_lies_between_members_does_not_count),
+        cmocka_unit_test(padding_between_members_does_not_count),
         cmocka_unit_test(every_member_counts),
-        cmocka_unit_test(planes_count_up_to_their_number),
+        cmocka_unit_test(only_clip_planes_in_use_count),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

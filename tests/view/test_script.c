@@ -22,7 +22,7 @@ static void assert_refused(const char *text, const char *why)
     assert_null(s.events);
 }
 
-static void lines_are_events_in_their_order(void **state)
+static void lines_become_events_in_order(void **state)
 {
     (void)state;
     trip_script s = parse("# a tour\n"
@@ -76,7 +76,7 @@ static void keys_are_pressed_and_released(void **state)
     trip_script_free(&s);
 }
 
-static void a_drag_goes_in_steps(void **state)
+static void a_drag_consists_of_steps(void **state)
 {
     (void)state;
     trip_script s = parse("drag left 100 50 200 30 4 +shift\n");
@@ -115,7 +115,7 @@ static void files_and_texts_are_the_rest_of_the_line(void **state)
     trip_script_free(&s);
 }
 
-static void a_click_has_a_place_and_a_label(void **state)
+static void a_click_has_a_position_and_a_label(void **state)
 {
     (void)state;
     trip_script s = parse("click 0.25 Level of detail\nclick 1\t h  \n");
@@ -131,7 +131,7 @@ static void a_click_has_a_place_and_a_label(void **state)
     assert_refused("click", "takes 1 words");
 }
 
-static void a_locale_with_decimal_commas_changes_nothing(void **state)
+static void a_locale_with_decimal_commas_has_no_effect(void **state)
 {
     (void)state;
     trip_script s;
@@ -145,7 +145,7 @@ static void a_locale_with_decimal_commas_changes_nothing(void **state)
     trip_script_free(&s);
 }
 
-static void what_is_no_event_is_refused_by_its_line(void **state)
+static void an_invalid_event_is_refused_with_its_line(void **state)
 {
     (void)state;
     assert_refused("wait\njump 3\n", "test.script: line 2: `jump` is not an event");
@@ -202,13 +202,13 @@ static void a_script_is_read_from_a_file(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lines_are_events_in_their_order),
+        cmocka_unit_test(lines_become_events_in_order),
         cmocka_unit_test(keys_are_pressed_and_released),
-        cmocka_unit_test(a_drag_goes_in_steps),
+        cmocka_unit_test(a_drag_consists_of_steps),
         cmocka_unit_test(files_and_texts_are_the_rest_of_the_line),
-        cmocka_unit_test(a_click_has_a_place_and_a_label),
-        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
-        cmocka_unit_test(what_is_no_event_is_refused_by_its_line),
+        cmocka_unit_test(a_click_has_a_position_and_a_label),
+        cmocka_unit_test(a_locale_with_decimal_commas_has_no_effect),
+        cmocka_unit_test(an_invalid_event_is_refused_with_its_line),
         cmocka_unit_test(scripts_are_bounded),
         cmocka_unit_test(a_script_is_read_from_a_file),
     };

@@ -46,7 +46,7 @@ static trip_view_state unusual(void)
     return s;
 }
 
-/* By members: what lies between them may be anything. */
+/* Compares the members, because padding between them is undefined. */
 static void assert_same_clip(const triptych_clip *a, const triptych_clip *b)
 {
     assert_int_equal(a->box, b->box);
@@ -95,7 +95,7 @@ static int remove_folder(void **state)
     return system("rm -rf state_home");
 }
 
-static void what_is_kept_is_found_again_to_the_last_bit(void **state)
+static void a_saved_state_is_restored_exactly(void **state)
 {
     (void)state;
     trip_view_state kept = unusual(), found = defaults();
@@ -107,7 +107,7 @@ static void what_is_kept_is_found_again_to_the_last_bit(void **state)
     assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 1);
     assert_same(&found, &kept);
     assert_null(found.function);
-    /* And replaced. */
+    /* A later save replaces the file. */
     kept.settings.samples = 2;
     assert_int_equal(trip_state_file_save(&kept, "/data/head.trip"), 0);
     assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 1);
@@ -116,8 +116,8 @@ static void what_is_kept_is_found_again_to_the_last_bit(void **state)
     trip_view_state_release(&kept);
 }
 
-/* In Latin-1, as files of functions may have it: lines have 1023 bytes at most. */
-static void functions_with_long_comments_that_are_no_utf8_are_kept(void **state)
+/* Files of transfer functions may be in Latin-1, with lines of at most 1023 bytes. */
+static void transfer_functions_with_comments_in_latin_1_are_saved(void **state)
 {
     (void)state;
     trip_view_state kept = defaults(), found = defaults();
@@ -133,7 +133,7 @@ static void functions_with_long_comments_that_are_no_utf8_are_kept(void **state)
     trip_view_state_release(&kept);
 }
 
-static void the_same_data_set_by_another_name_has_the_same_state(void **state)
+static void a_link_to_a_data_set_has_the_same_state(void **state)
 {
     (void)state;
     char *a, *b;
@@ -163,7 +163,7 @@ static void assert_refused(const char *from, const char *to, const char *why)
     trip_view_state_release(&s);
 }
 
-static void what_is_no_state_is_refused_whole(void **state)
+static void an_invalid_state_is_refused_completely(void **state)
 {
     (void)state;
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t1e9", "opacity_scale");
@@ -191,7 +191,7 @@ static void what_is_no_state_is_refused_whole(void **state)
     assert_one_report("is not a state file");
 }
 
-static void other_versions_and_data_sets_are_no_state(void **state)
+static void states_of_other_versions_and_data_sets_are_ignored(void **state)
 {
     (void)state;
     trip_view_state s = defaults(), before = s;
@@ -206,7 +206,7 @@ static void other_versions_and_data_sets_are_no_state(void **state)
     free(text);
 }
 
-static void a_folder_in_its_place_is_reported(void **state)
+static void a_folder_in_place_of_the_file_is_reported(void **state)
 {
     (void)state;
     trip_view_state s = defaults();
@@ -225,12 +225,12 @@ static void a_folder_in_its_place_is_reported(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_kept_is_found_again_to_the_last_bit),
-        cmocka_unit_test(functions_with_long_comments_that_are_no_utf8_are_kept),
-        cmocka_unit_test(the_same_data_set_by_another_name_has_the_same_state),
-        cmocka_unit_test(what_is_no_state_is_refused_whole),
-        cmocka_unit_test(other_versions_and_data_sets_are_no_state),
-        cmocka_unit_test(a_folder_in_its_place_is_reported),
+        cmocka_unit_test(a_saved_state_is_restored_exactly),
+        cmocka_unit_test(transfer_functions_with_comments_in_latin_1_are_saved),
+        cmocka_unit_test(a_link_to_a_data_set_has_the_same_state),
+        cmocka_unit_test(an_invalid_state_is_refused_completely),
+        cmocka_unit_test(states_of_other_versions_and_data_sets_are_ignored),
+        cmocka_unit_test(a_folder_in_place_of_the_file_is_reported),
     };
     return cmocka_run_group_tests(tests, use_folder, remove_folder);
 }

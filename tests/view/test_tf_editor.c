@@ -36,7 +36,7 @@ static void assert_text(const trip_tf_editor *e, const char *expected)
     free(text);
 }
 
-static void a_point_takes_the_colour_of_its_place(void **state)
+static void a_new_point_has_the_interpolated_colour(void **state)
 {
     (void)state;
     trip_tf_editor *e = edit(RAMP);
@@ -81,7 +81,7 @@ static void colours_are_clamped(void **state)
     trip_tf_editor_destroy(e);
 }
 
-static void the_last_point_stays(void **state)
+static void the_last_point_cannot_be_removed(void **state)
 {
     (void)state;
     trip_tf_editor *e = edit(RAMP);
@@ -105,7 +105,7 @@ static void values_are_stretched_together(void **state)
     trip_tf_editor_destroy(e);
 }
 
-static void each_change_is_undone_and_done_again(void **state)
+static void each_change_can_be_undone_and_redone(void **state)
 {
     (void)state;
     trip_tf_editor *e = edit(RAMP);
@@ -118,13 +118,13 @@ static void each_change_is_undone_and_done_again(void **state)
     assert_true(trip_tf_editor_revision(e) > revision);
     trip_tf_editor_undo(e);
     assert_text(e, "unit 0.5\nvalues data\n-1 0 0 0 0\n1 1 0.5 0 0.8\n");
-    trip_tf_editor_undo(e); /* of the text */
+    trip_tf_editor_undo(e); /* undoes the text of edit() */
     assert_false(trip_tf_editor_can_undo(e));
     for (int i = 0; i < 3; i++)
         trip_tf_editor_redo(e);
     assert_false(trip_tf_editor_can_redo(e));
     assert_text(e, after);
-    /* A change after going back replaces what was undone. */
+    /* A change after an undo discards the undone steps. */
     trip_tf_editor_undo(e);
     trip_tf_editor_set_colour(e, 0, 1, 1, 1);
     assert_false(trip_tf_editor_can_redo(e));
@@ -132,7 +132,7 @@ static void each_change_is_undone_and_done_again(void **state)
     trip_tf_editor_destroy(e);
 }
 
-static void a_drag_is_one_step(void **state)
+static void a_drag_is_undone_in_one_step(void **state)
 {
     (void)state;
     trip_tf_editor *e = edit(RAMP);
@@ -143,7 +143,7 @@ static void a_drag_is_one_step(void **state)
     assert_close(point_of(e, 1).value, 1001, 0);
     trip_tf_editor_undo(e);
     assert_close(point_of(e, 1).value, 1, 0);
-    /* A drag that moves nothing is no step. */
+    /* A drag without movement adds no step. */
     trip_tf_editor_begin(e);
     trip_tf_editor_end(e);
     trip_tf_editor_undo(e);
@@ -151,7 +151,7 @@ static void a_drag_is_one_step(void **state)
     trip_tf_editor_destroy(e);
 }
 
-static void many_steps_are_kept_and_the_oldest_forgotten(void **state)
+static void a_limited_number_of_steps_can_be_undone(void **state)
 {
     (void)state;
     trip_tf_editor *e = edit(RAMP);
@@ -195,7 +195,7 @@ static void bad_text_changes_nothing(void **state)
     trip_tf_editor_destroy(e);
 }
 
-static void a_saved_function_is_read_again(void **state)
+static void a_saved_transfer_function_can_be_loaded(void **state)
 {
     (void)state;
     trip_tf_editor *e = edit(RAMP);
@@ -217,17 +217,17 @@ static void a_saved_function_is_read_again(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_point_takes_the_colour_of_its_place),
+        cmocka_unit_test(a_new_point_has_the_interpolated_colour),
         cmocka_unit_test(points_stay_between_their_neighbours),
         cmocka_unit_test(colours_are_clamped),
-        cmocka_unit_test(the_last_point_stays),
+        cmocka_unit_test(the_last_point_cannot_be_removed),
         cmocka_unit_test(values_are_stretched_together),
-        cmocka_unit_test(each_change_is_undone_and_done_again),
-        cmocka_unit_test(a_drag_is_one_step),
-        cmocka_unit_test(many_steps_are_kept_and_the_oldest_forgotten),
+        cmocka_unit_test(each_change_can_be_undone_and_redone),
+        cmocka_unit_test(a_drag_is_undone_in_one_step),
+        cmocka_unit_test(a_limited_number_of_steps_can_be_undone),
         cmocka_unit_test(the_nearest_point_in_reach_is_found),
         cmocka_unit_test(bad_text_changes_nothing),
-        cmocka_unit_test(a_saved_function_is_read_again),
+        cmocka_unit_test(a_saved_transfer_function_can_be_loaded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

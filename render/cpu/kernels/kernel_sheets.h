@@ -177,8 +177,8 @@ typedef struct trip_cpu_sheet_view {
     float to_eye[3]; /* only in parallel views */
     int clips; /* number of half-spaces that clip the rays; [u, v, sheet, offset] as in trip_clip */
     double clip[TRIP_CLIP_MAX][4];
-    bool tinted; /* `tint` replaces all colours before lighting */
-    float tint[3];
+    bool has_debug_colour; /* `debug_colour` replaces all colours before lighting */
+    float debug_colour[3];
     trip_cpu_effects effects;
 } trip_cpu_sheet_view;
 

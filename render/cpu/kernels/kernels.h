@@ -105,10 +105,10 @@ typedef struct trip_cpu_view {
     trip_splat_frame splat;     /* with the list's camera */
     trip_cpu_rays rays;
     bool front_to_back, shading;
-    bool flattens; /* kernels are flattened along the gradients */
-    bool sums;     /* splats are summed sheet by sheet */
-    bool tinted;   /* `tint` replaces all colours before lighting */
-    float tint[3];
+    bool flattens;         /* kernels are flattened along the gradients */
+    bool sums;             /* splats are summed sheet by sheet */
+    bool has_debug_colour; /* `debug_colour` replaces all colours before lighting */
+    float debug_colour[3];
     /* NULL with even spacing. With uneven spacing splats are projected one by one. */
     const trip_coordinates *coordinates;
     bool stretch_varies;

@@ -839,8 +839,9 @@ INLINE colour colour_of(const trip_cpu_view *view, const trip_cpu_staged *staged
     vf entry[4];
     v_load_rows(&trip_cpu_rows(view)->r, staged->code + at, entry);
     colour c = { entry[0], entry[1], entry[2] };
-    if (view->tinted)
-        c = (colour){ v_set(view->tint[0]), v_set(view->tint[1]), v_set(view->tint[2]) };
+    if (view->has_debug_colour)
+        c = (colour){ v_set(view->debug_colour[0]), v_set(view->debug_colour[1]),
+                      v_set(view->debug_colour[2]) };
     if (!view->shading && !TRIP_CPU_EFFECTS)
         return c;
     const v3 eye = unit(towards_eye(view, staged, at)), light = light_of(view, eye, staged, at);

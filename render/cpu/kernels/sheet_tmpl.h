@@ -1011,8 +1011,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         return false;
     medium s = TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
                                : classified(view->integrals, first, last);
-    for (int k = 0; k < 3 && view->tinted; k++)
-        s.rgb[k] = v_set(view->tint[k]);
+    for (int k = 0; k < 3 && view->has_debug_colour; k++)
+        s.rgb[k] = v_set(view->debug_colour[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
     if (!vm_any(open))
         return false;

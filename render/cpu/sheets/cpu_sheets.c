@@ -152,7 +152,7 @@ int trip_cpu_sheets_about(const trip_frame *frame)
     return trip_sheet_reach(frame->settings->kernel) - 1;
 }
 
-int trip_cpu_sheets_at_hand(const trip_frame *frame)
+int trip_cpu_sheets_held(const trip_frame *frame)
 {
     static_assert(2 + 2 * (TRIP_SHEET_REACH_MAX - 1) == (int)TRIP_CPU_AT_HAND_MAX, "need.h");
     return 2 + 2 * trip_cpu_sheets_about(frame);
@@ -185,11 +185,11 @@ static int find_min(const trip_cpu_sheets *s, uint64_t *bytes)
         const trip_plan_layer *layer = &frame->plan->layers[axis];
         const trip_cpu_rasters all = rasters_of_layer(layer);
         trip_cpu_need need;
-        const int at_hand = trip_cpu_sheets_at_hand(frame);
-        status = trip_cpu_need_find(&need, layer, rasters_in(&all), at_hand, s->store.budget);
+        const int held_sheets = trip_cpu_sheets_held(frame);
+        status = trip_cpu_need_find(&need, layer, rasters_in(&all), held_sheets, s->store.budget);
         if (status)
             break;
-        uint64_t min = trip_cpu_windows_min_bytes(&all, reach_of(frame), &need, at_hand,
+        uint64_t min = trip_cpu_windows_min_bytes(&all, reach_of(frame), &need, held_sheets,
                                                   frame->settings->samples_per_sheet);
         *bytes = min > *bytes ? min : *bytes;
     }

@@ -48,7 +48,7 @@ struct trip_cpu_sheets {
  * and kernels of 64 voxels read them. */
 int trip_cpu_sheets_about(const trip_frame *frame);
 /* Returns the number of sheets that an interval's picture depends on, including its own two. */
-int trip_cpu_sheets_at_hand(const trip_frame *frame);
+int trip_cpu_sheets_held(const trip_frame *frame);
 
 /* Draws from held[front] at most to held[last] and moves `front` along. `front` stays if not even
  * one interval fits in memory. The caller has found visible squares and gradients before. */

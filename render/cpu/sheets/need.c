@@ -19,12 +19,12 @@ static uint64_t greater(uint64_t a, uint64_t b)
 }
 
 /* Appends a sheet to the row, drops the oldest one, and updates the maxima. */
-static void add_sheet(trip_cpu_need *need, row *at_hand, sheet next)
+static void add_sheet(trip_cpu_need *need, row *held_sheets, sheet next)
 {
     uint64_t rasters = 0;
-    for (int i = 0; i < at_hand->count; i++) {
-        at_hand->sheets[i] = i + 1 < at_hand->count ? at_hand->sheets[i + 1] : next;
-        rasters += at_hand->sheets[i].rasters;
+    for (int i = 0; i < held_sheets->count; i++) {
+        held_sheets->sheets[i] = i + 1 < held_sheets->count ? held_sheets->sheets[i + 1] : next;
+        rasters += held_sheets->sheets[i].rasters;
     }
     need->rasters = greater(need->rasters, rasters);
     need->of_sheet = greater(need->of_sheet, next.rasters);
@@ -41,14 +41,14 @@ static uint64_t rasters_of_tile(const trip_pass *pass)
 static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_cursor *cursors,
                      uint64_t rasters, int count)
 {
-    row at_hand = { .count = count };
+    row held_sheets = { .count = count };
     sheet now = { 0 };
     const uint64_t of_tile = rasters_of_tile(pass);
     trip_pass_iterator it = trip_pass_begin(pass, cursors);
     int32_t number = 0;
     for (trip_run run; trip_pass_next(&it, &run);) {
         if (now.runs > 0 && run.sheet != number) {
-            add_sheet(need, &at_hand, now);
+            add_sheet(need, &held_sheets, now);
             now = (sheet){ 0 };
         }
         number = run.sheet;
@@ -57,11 +57,11 @@ static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_curso
         now.rasters += now.rasters + of_tile <= rasters ? of_tile : rasters - now.rasters;
     }
     for (int i = 0; i < count; i++, now = (sheet){ 0 })
-        add_sheet(need, &at_hand, now);
+        add_sheet(need, &held_sheets, now);
 }
 
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
-                       int at_hand, trip_budget *budget)
+                       int held_sheets, trip_budget *budget)
 {
     *need = (trip_cpu_need){ 0 };
     for (int i = 0; i < layer->pass_count; i++) {
@@ -72,7 +72,7 @@ int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64
             return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                              "%u lists do not fit the memory given; raise --memory",
                              pass->selection_count);
-        add_pass(need, pass, cursors, rasters, at_hand);
+        add_pass(need, pass, cursors, rasters, held_sheets);
         trip_budget_release(budget, cursors, bytes);
     }
     return 0;

@@ -11,12 +11,12 @@ typedef struct trip_cpu_need {
     uint64_t of_sheet, runs, words; /* maximum over single sheets */
 } trip_cpu_need;
 
-/* Maximum of `at_hand` in trip_cpu_need_find(). */
+/* Maximum of `held_sheets` in trip_cpu_need_find(). */
 enum { TRIP_CPU_AT_HAND_MAX = 6 };
 
-/* Finds the need of a layer. A sheet has at most `rasters` rasters, and `at_hand` sheets are in
+/* Finds the need of a layer. A sheet has at most `rasters` rasters, and `held_sheets` sheets are in
  * memory at a time. Returns TRIP_ERROR if the budget has too little left for the search. */
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
-                       int at_hand, trip_budget *budget);
+                       int held_sheets, trip_budget *budget);
 
 #endif

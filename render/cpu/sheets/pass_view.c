@@ -65,10 +65,11 @@ static void set_clip(trip_cpu_sheet_view *view, const trip_clip *clip)
 
 static void set_debug_view(trip_cpu_sheet_view *view, const trip_frame *frame)
 {
-    double tint[3] = { 0 };
-    view->tinted = trip_debug_view_of(frame->settings, view->axis, frame->plan->level, tint);
+    double debug_colour[3] = { 0 };
+    view->has_debug_colour =
+        trip_debug_view_of(frame->settings, view->axis, frame->plan->level, debug_colour);
     for (int k = 0; k < 3; k++)
-        view->tint[k] = (float)tint[k];
+        view->debug_colour[k] = (float)debug_colour[k];
 }
 
 /* Returns the largest slope of the view's rays against the view's axis, at most the extent of the

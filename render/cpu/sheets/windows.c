@@ -23,7 +23,8 @@ static size_t sheet_bytes(const trip_cpu_need *need)
 }
 
 /* Returns the rasters that a window of the given size keeps in memory, as a rectangle at 0. */
-static trip_cpu_rasters at_hand(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach)
+static trip_cpu_rasters held_rasters(const trip_cpu_rasters *all, const int64_t size[2],
+                                     int64_t reach)
 {
     trip_cpu_rasters b = { .first = { 0, 0 } };
     for (int a = 0; a < 2; a++)
@@ -40,7 +41,7 @@ static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_samples)
 static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,
                          int sheets, int samples_per_sheet)
 {
-    trip_cpu_rasters b = at_hand(all, size, reach);
+    trip_cpu_rasters b = held_rasters(all, size, reach);
     return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + samples_per_sheet));
 }
 
@@ -84,7 +85,7 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
 {
     trip_cpu_windows *w = &s->windows;
     const int samples_per_sheet = s->of->frame->settings->samples_per_sheet;
-    const int sheets = trip_cpu_sheets_at_hand(s->of->frame);
+    const int sheets = trip_cpu_sheets_held(s->of->frame);
     const uint64_t kept = kept_bytes(need, sheets);
     if (trip_cpu_windows_min_bytes(all, reach, need, sheets, samples_per_sheet) > room)
         return false;
@@ -99,7 +100,7 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
         int longer = w->size[0] > w->size[1] ? 0 : 1;
         w->size[longer] = (w->size[longer] + 1) / 2;
     }
-    trip_cpu_rasters hand = at_hand(all, w->size, reach);
+    trip_cpu_rasters hand = held_rasters(all, w->size, reach);
     uint64_t rasters = rasters_of(&hand, sheets + samples_per_sheet);
     w->used = take_runs(w, need, s->store.budget) &&
               trip_cpu_store_fit(&s->store, &hand, (unsigned)sheets, rasters, rasters, room - kept);
@@ -148,8 +149,8 @@ static void take_rasters(trip_cpu_sheets *s, trip_cpu_sheet *sheet, const trip_c
 }
 
 /* Returns whether a run of a kept sheet may have voxels inside the rectangle `hand`. */
-static bool is_at_hand(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *sheet,
-                       const trip_cpu_rasters *hand)
+static bool is_held(const trip_cpu_sheets *s, const trip_cpu_kept_sheet *sheet,
+                    const trip_cpu_rasters *hand)
 {
     const int64_t last = (1 << s->of->frame->data->header.tile_log2) - 1;
     for (size_t n = 0; n < sheet->run_count; n++) {
@@ -253,8 +254,7 @@ static int draw_window(trip_cpu_sheets *s, const trip_cpu_rasters *inner)
         hand.first[a] = greater(inner->first[a] - w->reach, w->all.first[a]);
         hand.last[a] = lesser(inner->last[a] + w->reach, w->all.last[a]);
     }
-    if (!is_at_hand(s, &w->sheets[w->from], &hand) ||
-        !is_at_hand(s, &w->sheets[w->from + 1], &hand))
+    if (!is_held(s, &w->sheets[w->from], &hand) || !is_held(s, &w->sheets[w->from + 1], &hand))
         return 0;
     trip_cpu_store_move(&s->store, &hand);
     for (int i = first_about(w, w->about); i <= last_about(w, w->about); i++) {

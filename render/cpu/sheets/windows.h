@@ -44,7 +44,8 @@ typedef struct trip_cpu_windows {
  * makes room for the largest windows that fit `room` bytes. It returns false if `room` is too
  * small. */
 uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
-                                    const trip_cpu_need *need, int at_hand, int samples_per_sheet);
+                                    const trip_cpu_need *need, int held_sheets,
+                                    int samples_per_sheet);
 bool trip_cpu_windows_fit(struct trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room);
 void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget);
