@@ -1,4 +1,5 @@
-/* A locale with decimal commas, in which numbers of files have to mean what they do without. */
+/* Sets a locale with decimal commas. Numbers in files must have the same meaning in every locale.
+ */
 #ifndef COMMA_LOCALE_H
 #define COMMA_LOCALE_H
 
@@ -9,7 +10,8 @@
 
 #include "skips.h"
 
-/* Compiled here, since few machines have one installed. setlocale(LC_ALL, "C") ends it. */
+/* Compiles a locale, since few machines have such a locale installed, and sets it.
+ * setlocale(LC_ALL, "C") resets it. */
 static inline bool set_comma_locale(void)
 {
     char made[] = "/tmp/trip-locale-XXXXXX", command[128];
@@ -23,7 +25,7 @@ static inline bool set_comma_locale(void)
     return system(command) == 0 && set && localeconv()->decimal_point[0] == ',';
 }
 
-/* Ends the test where there is none. */
+/* Skips the test if the locale cannot be compiled. */
 static inline void need_comma_locale(void)
 {
     if (set_comma_locale())

@@ -1,4 +1,4 @@
-/* What the tests are built with, whatever the compiler. */
+/* Tells for every compiler which sanitizers the tests are built with. */
 #ifndef TEST_SANITIZERS_H
 #define TEST_SANITIZERS_H
 
@@ -20,8 +20,8 @@
 #define TEST_THREAD_SANITIZER 0
 #endif
 
-/* They make everything several times slower: there a test may take by turns what it otherwise takes
- * in all combinations. */
+/* Sanitizers make tests several times slower. If TEST_BY_TURNS is 1, a test may vary its parameters
+ * one after the other, and need not try all combinations. */
 #define TEST_BY_TURNS (TEST_ADDRESS_SANITIZER || TEST_THREAD_SANITIZER)
 
 #endif

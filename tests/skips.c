@@ -13,7 +13,7 @@ enum { SKIPPED = 77 };
 static int skipped;
 static const char *named[16];
 
-/* Cmocka's own, which the linker gives these names to. */
+/* The linker gives these names to the functions of cmocka. */
 void __real__skip(const char *file, int line);
 int __real__cmocka_run_group_tests(const char *name, const struct CMUnitTest *tests, size_t count,
                                    CMFixtureFunction setup, CMFixtureFunction teardown);

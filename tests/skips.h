@@ -1,10 +1,11 @@
-/* What this machine lacks for a test is skipped, and not passed: a program one of whose tests
- * called skip() or test_lacks(), and none of which failed, ends with exit status 77, which CTest
- * shows as skipped. Linked into every test by trip_test(). */
+/* Reports tests as skipped if this machine lacks something for them. If a test of a program calls
+ * skip() or test_lacks() and no test fails, the program ends with exit status 77. CTest shows this
+ * status as skipped. trip_test() links skips.c into every test. */
 #ifndef TEST_SKIPS_H
 #define TEST_SKIPS_H
 
-/* A part of the running test is left out, for lack of `what`; the rest of it goes on. */
+/* Notes that the running test leaves out a part because this machine lacks `name`. The test
+ * continues. */
 void test_lacks(const char *name);
 
 #endif

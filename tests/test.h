@@ -1,5 +1,5 @@
-/* What tests share: cmocka with its headers, comparing within a tolerance, a
- * repeatable random sequence, and catching reports instead of printing them. */
+/* Support for all tests. It includes cmocka with its headers, compares within a tolerance, gives a
+ * repeatable random sequence, and catches reports instead of printing them. */
 #ifndef TEST_H
 #define TEST_H
 
@@ -18,7 +18,7 @@
 #include "sanitizers.h"
 #include "skips.h"
 
-/* Within `tolerance` of the larger magnitude, or of 1 where both are smaller. */
+/* The difference may be `tolerance` times the larger magnitude, or times 1 if both are smaller. */
 #define assert_close(actual, expected, tolerance)                                                  \
     test_close((actual), (expected), (tolerance), #actual, __FILE__, __LINE__)
 
@@ -32,8 +32,8 @@ static inline void test_close(double actual, double expected, double tolerance, 
     _fail(file, line);
 }
 
-/* The largest difference. Not by fmax(), on which GCC 12 for 64-bit ARM fails with an internal
- * error here. */
+/* Returns the maximum difference. GCC 12 for 64-bit ARM fails with an internal error if fmax() is
+ * used here. */
 static inline double test_max_apart(const float *a, const float *b, size_t count)
 {
     double max = 0;
@@ -45,7 +45,8 @@ static inline double test_max_apart(const float *a, const float *b, size_t count
     return max;
 }
 
-/* Uniform in [0, 1), the same sequence in every run (a 64-bit linear congruential generator). */
+/* Returns numbers uniform in [0, 1), the same in every run. A 64-bit linear congruential generator
+ * makes them. */
 static inline double test_random(void)
 {
     static uint64_t seed = 1;
@@ -63,7 +64,7 @@ static inline void test_catch(const char *line, void *user)
     snprintf(test_last_report, sizeof test_last_report, "%s", line);
 }
 
-/* Reports are kept from here on instead of printed. */
+/* Begins to keep reports instead of printing them. */
 static inline void test_catch_reports(void)
 {
     test_report_count = 0;
@@ -71,14 +72,15 @@ static inline void test_catch_reports(void)
     trip_report_redirect(test_catch, NULL);
 }
 
-/* How many reports there were since test_catch_reports(); further ones are printed. */
+/* Returns the number of reports since test_catch_reports(). Later reports are printed again. */
 static inline int test_caught_reports(void)
 {
     trip_report_redirect(NULL, NULL);
     return test_report_count;
 }
 
-/* Exactly one report since test_catch_reports(), with `part` in it, which names the message. */
+/* Checks that there was exactly one report since test_catch_reports(), and that it contains `part`.
+ * `part` must not be empty. */
 #define assert_one_report(part) test_one_report((part), __FILE__, __LINE__)
 
 static inline void test_one_report(const char *part, const char *file, int line)

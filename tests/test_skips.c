@@ -1,5 +1,5 @@
-/* What tests share keeps its word: what is skipped does not pass, and neither does a report that is
- * not named. */
+/* Tests the support for tests. A skipped test does not count as passed, and assert_one_report("")
+ * fails. */
 #include "skips.h"
 #include "test.h"
 
@@ -29,7 +29,7 @@ static void does_fail(void **state)
     fail();
 }
 
-/* Exit status of a program with these two tests. What they print stays out of this one's. */
+/* Returns the exit status of a program with these two tests. Its output is discarded. */
 static int status_of(CMUnitTestFunction first, CMUnitTestFunction second)
 {
     const struct CMUnitTest tests[] = { cmocka_unit_test(first), cmocka_unit_test(second) };
@@ -45,7 +45,7 @@ static int status_of(CMUnitTestFunction first, CMUnitTestFunction second)
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-static void a_program_that_skipped_something_ends_with_77_unless_something_failed(void **state)
+static void a_program_with_a_skip_and_no_failure_ends_with_77(void **state)
 {
     (void)state;
     assert_int_equal(status_of(passes, passes), 0);
@@ -71,7 +71,7 @@ static void expects_this_report(void **state)
     assert_one_report("here: why");
 }
 
-static void a_report_that_is_expected_has_to_be_named(void **state)
+static void an_expected_report_must_be_named(void **state)
 {
     (void)state;
     assert_int_equal(status_of(passes, expects_this_report), 0);
@@ -81,8 +81,8 @@ static void a_report_that_is_expected_has_to_be_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_program_that_skipped_something_ends_with_77_unless_something_failed),
-        cmocka_unit_test(a_report_that_is_expected_has_to_be_named),
+        cmocka_unit_test(a_program_with_a_skip_and_no_failure_ends_with_77),
+        cmocka_unit_test(an_expected_report_must_be_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,17 +1,17 @@
-/* Errors of pictures made by hand, and the figures worked out from them. */
+/* Tests the error figures with pictures made by hand. The expected figures are computed by hand. */
 #include "error.h"
 #include "test.h"
 
 enum { PIXELS = 200 };
 
-/* Grey and covered, but for the last half of the pixels, where nothing is. */
+/* The first half of the pixels is grey and translucent. The other half is empty. */
 static void make_picture(float rgba[PIXELS * 4])
 {
     for (int i = 0; i < PIXELS * 4; i++)
         rgba[i] = i < PIXELS * 2 ? 0.5F : 0;
 }
 
-static void a_picture_is_not_far_from_itself(void **state)
+static void a_picture_has_no_error_against_itself(void **state)
 {
     (void)state;
     static accuracy_error e;
@@ -24,8 +24,8 @@ static void a_picture_is_not_far_from_itself(void **state)
     assert_true(isinf(f.psnr) && f.psnr > 0);
 }
 
-/* Of the 400 channels covered 240 are off by 3, of these 2 by 51 instead. */
-static void errors_made_by_hand_have_the_figures_expected(void **state)
+/* 400 channels are covered. 238 of them are off by 3, and 2 are off by 51. */
+static void errors_made_by_hand_have_the_expected_figures(void **state)
 {
     (void)state;
     static accuracy_error e;
@@ -44,8 +44,8 @@ static void errors_made_by_hand_have_the_figures_expected(void **state)
     assert_close(f.psnr, 10 * log10(255.0 * 255 * 400 / (238 * 9 + 2 * 51.0 * 51)), 1e-5);
 }
 
-/* The least error that so many channels do not exceed: 198 of 200 are 99 of 100. */
-static void a_percentile_is_an_error_that_so_many_channels_reach_at_most(void **state)
+/* The 99th percentile is the smallest error that 198 of 200 channels do not exceed. */
+static void the_percentile_is_an_error_that_99_percent_do_not_exceed(void **state)
 {
     (void)state;
     for (int off = 2; off <= 3; off++) {
@@ -62,7 +62,7 @@ static void a_percentile_is_an_error_that_so_many_channels_reach_at_most(void **
     }
 }
 
-static void colour_and_alpha_apart_are_three_channels_and_one(void **state)
+static void colour_and_alpha_are_counted_separately(void **state)
 {
     (void)state;
     static accuracy_error colour, alpha;
@@ -75,7 +75,7 @@ static void colour_and_alpha_apart_are_three_channels_and_one(void **state)
     assert_close(accuracy_error_measure(&alpha).mean, 5, 1e-5);
 }
 
-static void pixels_count_where_either_picture_covers_them(void **state)
+static void pixels_count_if_either_picture_covers_them(void **state)
 {
     (void)state;
     static accuracy_error e;
@@ -93,11 +93,11 @@ static void pixels_count_where_either_picture_covers_them(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_picture_is_not_far_from_itself),
-        cmocka_unit_test(errors_made_by_hand_have_the_figures_expected),
-        cmocka_unit_test(a_percentile_is_an_error_that_so_many_channels_reach_at_most),
-        cmocka_unit_test(colour_and_alpha_apart_are_three_channels_and_one),
-        cmocka_unit_test(pixels_count_where_either_picture_covers_them),
+        cmocka_unit_test(a_picture_has_no_error_against_itself),
+        cmocka_unit_test(errors_made_by_hand_have_the_expected_figures),
+        cmocka_unit_test(the_percentile_is_an_error_that_99_percent_do_not_exceed),
+        cmocka_unit_test(colour_and_alpha_are_counted_separately),
+        cmocka_unit_test(pixels_count_if_either_picture_covers_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

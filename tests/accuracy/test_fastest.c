@@ -1,8 +1,8 @@
-/* Settings as options and back, and which of a report's are taken. */
+/* Tests that settings convert to options and back, and which setting of a report is selected. */
 #include "fastest.h"
 #include "test.h"
 
-static void options_say_all_of_a_setting(void **state)
+static void options_describe_a_setting_completely(void **state)
 {
     (void)state;
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
@@ -15,7 +15,7 @@ static void options_say_all_of_a_setting(void **state)
         int n = accuracy_setting_options(&all[i], options);
         for (int k = 0; k < n; k++)
             assert_true(accuracy_setting_read_option(&again, options[k].name, options[k].value));
-        if (all[i].renderer == TRIPTYCH_RENDERER_INTEGRAL) /* which has no layers */
+        if (all[i].renderer == TRIPTYCH_RENDERER_INTEGRAL) /* the integral ignores `classify` */
             again.settings.classify = all[i].settings.classify;
         assert_int_equal(again.renderer, all[i].renderer);
         assert_memory_equal(&again.settings, &all[i].settings, sizeof defaults);
@@ -96,10 +96,10 @@ static const char report[] =
 static const struct {
     double error;
     unsigned renderers;
-    const char *name; /* NULL: none */
+    const char *name; /* NULL if no setting qualifies */
 } choices[] = {
     { 3, 0, "quick" },
-    { 2, 0, "fine" }, /* below it, not at it */
+    { 2, 0, "fine" }, /* the error must be below the bound, not equal */
     { 0.5, 0, "slow" },
     { 3, 1u << TRIPTYCH_RENDERER_CPU, "fine" },
     { 0.5, 1u << TRIPTYCH_RENDERER_CPU, NULL },
@@ -107,7 +107,7 @@ static const struct {
     { 3, 1u << TRIPTYCH_RENDERER_INTEGRAL, NULL },
 };
 
-static void the_fastest_below_the_error_is_taken(void **state)
+static void the_fastest_setting_below_the_error_is_selected(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof choices / sizeof *choices; i++) {
@@ -128,7 +128,7 @@ static void the_fastest_below_the_error_is_taken(void **state)
     }
 }
 
-static void what_is_no_report_is_refused(void **state)
+static void invalid_reports_are_refused(void **state)
 {
     (void)state;
     static const char *const texts[] = {
@@ -176,7 +176,7 @@ static void a_report_of_another_data_set_is_refused(void **state)
     assert_string_equal(own, cases[0].wanted);
 }
 
-static void a_report_says_what_levels_its_data_set_was_bricked_with(void **state)
+static void a_report_names_the_levels_of_its_data_set(void **state)
 {
     (void)state;
     const struct {
@@ -203,7 +203,7 @@ static void a_report_says_what_levels_its_data_set_was_bricked_with(void **state
     }
 }
 
-static void a_report_lies_beside_the_data(void **state)
+static void a_report_is_found_beside_the_data(void **state)
 {
     (void)state;
     static const char *const pairs[][2] = { { "a.trip", "a.accuracy" },
@@ -221,13 +221,13 @@ static void a_report_lies_beside_the_data(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(options_say_all_of_a_setting),
+        cmocka_unit_test(options_describe_a_setting_completely),
         cmocka_unit_test(unknown_options_are_refused),
-        cmocka_unit_test(the_fastest_below_the_error_is_taken),
-        cmocka_unit_test(what_is_no_report_is_refused),
+        cmocka_unit_test(the_fastest_setting_below_the_error_is_selected),
+        cmocka_unit_test(invalid_reports_are_refused),
         cmocka_unit_test(a_report_of_another_data_set_is_refused),
-        cmocka_unit_test(a_report_says_what_levels_its_data_set_was_bricked_with),
-        cmocka_unit_test(a_report_lies_beside_the_data),
+        cmocka_unit_test(a_report_names_the_levels_of_its_data_set),
+        cmocka_unit_test(a_report_is_found_beside_the_data),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* FLIP of pictures without detail, whose colours alone count, worked out step by step here;
- * pictures with detail are compared with a plain computation by tests/cli/test_accuracy.py. */
+/* Tests FLIP with uniform pictures, for which only colours count. The expected values are computed
+ * here step by step. tests/cli/test_accuracy.py compares pictures with detail with a plain
+ * computation. */
 #include "flip.h"
 #include "test.h"
 
@@ -26,7 +27,7 @@ static double flip(void)
     return out;
 }
 
-/* L*, a*, b* of green and blue of sRGB under D65, as colour tables have them. */
+/* The arrays hold L*, a* and b* of sRGB green and blue under D65, from colour tables. */
 static double max_apart(void)
 {
     const double green[3] = { 87.7347, -86.1827, 83.1793 },
@@ -42,7 +43,7 @@ static double of_distance(double distance)
     return e < knee ? 0.95 * e / knee : 0.95 + 0.05 * (e - knee) / (max - knee);
 }
 
-static void a_picture_is_not_far_from_itself(void **state)
+static void a_picture_does_not_differ_from_itself(void **state)
 {
     (void)state;
     fill(a, 0.3, 0.6, 0.9);
@@ -50,8 +51,8 @@ static void a_picture_is_not_far_from_itself(void **state)
     assert_close(flip(), 0, 1e-9);
 }
 
-/* 100 of lightness. */
-static void black_is_far_from_white(void **state)
+/* The lightness differs by 100. */
+static void black_and_white_differ_by_a_lightness_of_100(void **state)
 {
     (void)state;
     fill(a, 0, 0, 0);
@@ -59,7 +60,7 @@ static void black_is_far_from_white(void **state)
     assert_close(flip(), of_distance(100), 2e-4);
 }
 
-/* Greys differ by lightness alone: 116 times the cube root of the luminance, less 16. */
+/* Greys differ only by lightness, which is 116 times the cube root of the luminance, minus 16. */
 static void greys_differ_by_lightness(void **state)
 {
     (void)state;
@@ -69,16 +70,16 @@ static void greys_differ_by_lightness(void **state)
     assert_close(flip(), of_distance(116 * (cbrt(z) - cbrt(y))), 2e-4);
 }
 
-static void green_is_as_far_from_blue_as_can_be(void **state)
+static void green_and_blue_have_the_maximum_distance(void **state)
 {
     (void)state;
     fill(a, 0, 1, 0);
     fill(b, 0, 0, 1);
-    /* Their luminances differ, but there are no edges in either. */
+    /* The luminances differ, but neither picture has edges. */
     assert_close(flip(), 1, 2e-4);
 }
 
-/* What lies beyond what a display shows is not seen. */
+/* FLIP clamps colours to the range that a display can show. */
 static void colours_are_clamped(void **state)
 {
     (void)state;
@@ -87,7 +88,7 @@ static void colours_are_clamped(void **state)
     assert_close(flip(), 0, 1e-9);
 }
 
-static void which_comes_first_does_not_matter(void **state)
+static void the_order_of_the_pictures_does_not_matter(void **state)
 {
     (void)state;
     for (int i = 0; i < 4 * SIDE * SIDE; i++) {
@@ -116,12 +117,12 @@ static void too_little_memory_is_reported(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_picture_is_not_far_from_itself),
-        cmocka_unit_test(black_is_far_from_white),
+        cmocka_unit_test(a_picture_does_not_differ_from_itself),
+        cmocka_unit_test(black_and_white_differ_by_a_lightness_of_100),
         cmocka_unit_test(greys_differ_by_lightness),
-        cmocka_unit_test(green_is_as_far_from_blue_as_can_be),
+        cmocka_unit_test(green_and_blue_have_the_maximum_distance),
         cmocka_unit_test(colours_are_clamped),
-        cmocka_unit_test(which_comes_first_does_not_matter),
+        cmocka_unit_test(the_order_of_the_pictures_does_not_matter),
         cmocka_unit_test(too_little_memory_is_reported),
     };
     if (trip_budget_create(&budget, 1 << 24))

@@ -1,5 +1,5 @@
-/* A report's folder gets its name whole, replaces reports only, and leaves nothing when given up.
- */
+/* Tests the folder of a report. It gets its name when it is complete, replaces only reports, and
+ * leaves nothing if it is abandoned. */
 #include <dirent.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -22,7 +22,7 @@ static void write_in(const accuracy_folder *f, const char *name)
     write_file(path);
 }
 
-/* Folders beside that begin with `name`. */
+/* Returns how many entries of the current folder begin with `name`. */
 static int count_folders(const char *name)
 {
     int count = 0;
@@ -34,7 +34,7 @@ static int count_folders(const char *name)
     return count;
 }
 
-static void a_report_gets_its_name_whole(void **state)
+static void a_report_gets_its_name_when_it_is_complete(void **state)
 {
     (void)state;
     accuracy_folder f;
@@ -62,7 +62,7 @@ static void a_report_replaces_a_report_if_forced(void **state)
     assert_int_equal(count_folders("fresh"), 1);
 }
 
-static void what_is_no_report_stays(void **state)
+static void files_and_folders_that_are_no_report_stay(void **state)
 {
     (void)state;
     accuracy_folder f;
@@ -79,7 +79,7 @@ static void what_is_no_report_stays(void **state)
     assert_int_equal(access("other/letter.txt", F_OK), 0);
 }
 
-static void what_is_given_up_leaves_nothing(void **state)
+static void an_abandoned_report_leaves_nothing(void **state)
 {
     (void)state;
     accuracy_folder f;
@@ -96,10 +96,10 @@ static void what_is_given_up_leaves_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_report_gets_its_name_whole),
+        cmocka_unit_test(a_report_gets_its_name_when_it_is_complete),
         cmocka_unit_test(a_report_replaces_a_report_if_forced),
-        cmocka_unit_test(what_is_no_report_stays),
-        cmocka_unit_test(what_is_given_up_leaves_nothing),
+        cmocka_unit_test(files_and_folders_that_are_no_report_stay),
+        cmocka_unit_test(an_abandoned_report_leaves_nothing),
     };
     char folder[] = "/tmp/triptych-folder-XXXXXX";
     if (!mkdtemp(folder) || chdir(folder))

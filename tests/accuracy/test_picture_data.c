@@ -1,4 +1,4 @@
-/* Pictures as text, taken apart again here: base64, the chunks of PNG, zlib's stream. */
+/* Tests pictures as text. The test decodes base64, the chunks of PNG and the zlib stream. */
 #include <zlib.h>
 
 #include "picture_data.h"
@@ -30,7 +30,7 @@ static size_t read_u32(const uint8_t *at)
     return (size_t)at[0] << 24 | (size_t)at[1] << 16 | (size_t)at[2] << 8 | at[3];
 }
 
-/* The rows of a file of one IDAT, after checking its checksums. */
+/* Decodes a PNG with one IDAT chunk into rows, and checks all checksums. */
 static void decode(char *text, int width, int height, uint8_t *rows)
 {
     static const char prefix[] = "data:image/png;base64,";
@@ -56,7 +56,7 @@ static void decode(char *text, int width, int height, uint8_t *rows)
     assert_memory_equal(file + bytes - 8, "IEND", 4);
 }
 
-static void pictures_become_smaller_by_means(void **state)
+static void pictures_are_reduced_by_averaging(void **state)
 {
     (void)state;
     float rgba[4 * 4 * 2 * 4];
@@ -75,8 +75,9 @@ static void pictures_become_smaller_by_means(void **state)
         }
 }
 
-/* The largest of the channels and of the pixels that become one: a third of the most is red. */
-static void differences_keep_the_largest(void **state)
+/* A pixel of the result shows the largest difference of its source pixels and their channels. Red
+ * is a third of ACCURACY_DIFFERENCE_MAX. */
+static void reduced_differences_keep_the_largest(void **state)
 {
     (void)state;
     float a[4 * 4 * 4] = { 0 }, b[4 * 4 * 4] = { 0 };
@@ -90,7 +91,7 @@ static void differences_keep_the_largest(void **state)
     assert_memory_equal(rows + 11, white, 3);
 }
 
-static void narrow_pictures_have_a_row(void **state)
+static void pictures_of_one_column_are_encoded(void **state)
 {
     (void)state;
     float rgba[4 * 40] = { 0 };
@@ -101,9 +102,9 @@ static void narrow_pictures_have_a_row(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pictures_become_smaller_by_means),
-        cmocka_unit_test(differences_keep_the_largest),
-        cmocka_unit_test(narrow_pictures_have_a_row),
+        cmocka_unit_test(pictures_are_reduced_by_averaging),
+        cmocka_unit_test(reduced_differences_keep_the_largest),
+        cmocka_unit_test(pictures_of_one_column_are_encoded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* SSIM of pictures whose means, variances and covariance are known. */
+/* Tests SSIM with pictures of known means, variances and covariance. */
 #include "ssim.h"
 #include "test.h"
 
@@ -36,8 +36,8 @@ static double dark(int x, int y)
     return 0.2;
 }
 
-/* Neighbours differ by so much that any window's variance is that of the whole but for the weights'
- * own sum of signs. */
+/* The variance in any window equals the variance of the whole board, except for the small sum of
+ * the weights with alternating signs. */
 static double board(int x, int y)
 {
     return (x + y) % 2 ? 0.9 : 0.1;
@@ -50,16 +50,16 @@ static double inverse_board(int x, int y)
 
 static float a[4 * SIDE * SIDE], b[4 * SIDE * SIDE];
 
-static void a_picture_is_like_itself(void **state)
+static void a_picture_is_similar_to_itself(void **state)
 {
     (void)state;
     fill(a, board);
     assert_close(ssim(a, a, SIDE, SIDE), 1, 1e-9);
 }
 
-/* One window, white in its middle alone: with w the weight of that pixel the means are w and 0, the
- * variances w - w^2 and 0, and the covariance is 0. */
-static void windows_are_weighed_by_a_gaussian_of_a_pixel_and_a_half(void **state)
+/* The picture is one window with a single white pixel, in the middle. If w is the weight of this
+ * pixel, the means are w and 0, the variances are w - w^2 and 0, and the covariance is 0. */
+static void windows_have_gaussian_weights_of_1_5_pixels(void **state)
 {
     (void)state;
     double sum = 0;
@@ -73,8 +73,8 @@ static void windows_are_weighed_by_a_gaussian_of_a_pixel_and_a_half(void **state
                  1e-7);
 }
 
-/* Without variance only the means count. */
-static void even_pictures_differ_by_their_means(void **state)
+/* The pictures have no variance, so that only the means count. */
+static void uniform_pictures_differ_by_their_means(void **state)
 {
     (void)state;
     fill(a, bright);
@@ -82,10 +82,10 @@ static void even_pictures_differ_by_their_means(void **state)
     assert_close(ssim(a, b, SIDE, SIDE), (2 * 0.8 * 0.2 + 1e-4) / (0.64 + 0.04 + 1e-4), 1e-5);
 }
 
-/* Of a board and its inverse the means are 1/2 and the variances and covariance 0.16 and -0.16, but
- * for 0.4 times the weights' sum with alternating signs squared, exp(-(pi sigma)^2/2) along each
- * side, which is 1e-5. */
-static void inverse_pictures_are_unlike(void **state)
+/* A board and its inverse have the mean 1/2, the variance 0.16 and the covariance -0.16. The
+ * figures are off by 0.4 times the square of the sum of the weights with alternating signs. This
+ * sum is exp(-(pi sigma)^2/2), or 1e-5, along each side. */
+static void inverse_pictures_are_dissimilar(void **state)
 {
     (void)state;
     fill(a, board);
@@ -93,8 +93,8 @@ static void inverse_pictures_are_unlike(void **state)
     assert_close(ssim(a, b, SIDE, SIDE), (-0.32 + 9e-4) / (0.32 + 9e-4), 1e-4);
 }
 
-/* Windows do not reach beyond the picture. */
-static void pictures_below_a_window_have_none(void **state)
+/* A window must lie within the picture. */
+static void pictures_smaller_than_a_window_have_no_ssim(void **state)
 {
     (void)state;
     fill(a, board);
@@ -117,11 +117,11 @@ static void too_little_memory_is_reported(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_picture_is_like_itself),
-        cmocka_unit_test(windows_are_weighed_by_a_gaussian_of_a_pixel_and_a_half),
-        cmocka_unit_test(even_pictures_differ_by_their_means),
-        cmocka_unit_test(inverse_pictures_are_unlike),
-        cmocka_unit_test(pictures_below_a_window_have_none),
+        cmocka_unit_test(a_picture_is_similar_to_itself),
+        cmocka_unit_test(windows_have_gaussian_weights_of_1_5_pixels),
+        cmocka_unit_test(uniform_pictures_differ_by_their_means),
+        cmocka_unit_test(inverse_pictures_are_dissimilar),
+        cmocka_unit_test(pictures_smaller_than_a_window_have_no_ssim),
         cmocka_unit_test(too_little_memory_is_reported),
     };
     if (trip_budget_create(&budget, 1 << 24))

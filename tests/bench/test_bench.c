@@ -1,5 +1,5 @@
-/* triptych bench: every table runs, and its figures agree with each other and with what is known of
- * the data set. How fast anything is does not matter here. */
+/* Tests that every table of `triptych bench` runs, and that its figures agree with each other and
+ * with the data set. They do not test speed. */
 #include <stdbool.h>
 #include <unistd.h>
 
@@ -10,7 +10,7 @@
 
 static const double kept = 20 * 18 * 16;
 
-/* A body of 20 x 18 x 16 voxels, all kept. */
+/* Bricks a body of 20 x 18 x 16 voxels and keeps all of them. */
 static int enter(void **state)
 {
     program_run r;
@@ -63,7 +63,7 @@ static void assert_close(double a, double b)
     assert_true(fabs(a - b) <= 1e-9 * fmax(fabs(a), fabs(b)));
 }
 
-/* The times of a row with fps. */
+/* Checks the times of a row. */
 static void check_times(const cJSON *row)
 {
     double ms = number(row, "ms");
@@ -72,7 +72,7 @@ static void check_times(const cJSON *row)
     assert_close(number(row, "fps"), 1000 / ms);
 }
 
-/* After the papers' rows, image-aligned sheets where the renderer has them. */
+/* Checks the rows of the papers. `image` tells whether a row of image-aligned sheets follows. */
 static void check_orders(const cJSON *rows, const double multiples[5], bool image)
 {
     static const char *const names[] = { "merge, h = 0.00", "merge, h = 0.85", "merge, h = 0.95",
@@ -92,7 +92,7 @@ static void check_orders(const cJSON *rows, const double multiples[5], bool imag
     }
 }
 
-static void orders_draws_thrice_at_h_0_and_once_from_the_side(void **state)
+static void orders_draws_three_times_at_h_0_and_once_from_the_side(void **state)
 {
     static const double oblique[] = { 3, 0, 0, 0, 1 }, lateral[] = { 1, 1, 1, 1, 1 };
     (void)state;
@@ -149,7 +149,8 @@ static void stream_reads_the_files_of_all_lists(void **state)
     assert_true(number(summary, "dataset_bytes") == planes + file_bytes("block.trip/index.trip"));
     assert_true(number(summary, "memory_limit_bytes") == 64.0 * (1 << 20));
     assert_true(number(summary, "memory_peak_bytes") <= 64.0 * (1 << 20));
-    /* Like with like: the read that has the ring's kind of memory and loads what it reads. */
+    /* The comparison uses the plain read that has the same kind of memory as the ring, and loads
+     * the bytes read. */
     assert_close(number(summary, "disk_gb_per_s"), number(stage(rows, "plain"), "gb_per_s"));
     assert_close(number(stage(rows, "streamed"), "of_blind"),
                  number(stage(rows, "streamed"), "gb_per_s") /
@@ -165,8 +166,8 @@ static void stream_reads_the_files_of_all_lists(void **state)
     cJSON_Delete(root);
 }
 
-/* Values and their halo, and no normals. */
-static void stream_of_post_reads_what_it_interpolates(void **state)
+/* `post` reads values and their halo, but no normals. */
+static void stream_of_post_reads_values_and_halo(void **state)
 {
     (void)state;
     program_run r;
@@ -190,7 +191,7 @@ static void stream_of_post_reads_what_it_interpolates(void **state)
     cJSON_Delete(root);
 }
 
-static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void **state)
+static void renderers_has_a_row_for_each_renderer_size_and_threads(void **state)
 {
     (void)state;
     cJSON *root = bench("renderers block.trip --renderer cpu,reference --size 32x32,48x40 "
@@ -201,7 +202,7 @@ static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void *
     {
         check_times(row);
         assert_true(number(row, "views") == 3);
-        /* A body in full view is drawn from one list at least, from three at most. */
+        /* A body in full view is drawn from one to three lists. */
         assert_true(number(row, "splats_drawn") >= kept);
         assert_true(number(row, "splats_drawn") <= 3 * kept);
         assert_close(number(row, "mpixels_per_s"),
@@ -210,7 +211,7 @@ static void renderers_gives_a_row_for_each_renderer_size_and_thread_count(void *
     cJSON_Delete(root);
 }
 
-static void renderers_says_what_each_view_was_and_took_counted_or_not(void **state)
+static void renderers_reports_each_view_without_counts_too(void **state)
 {
     (void)state;
     cJSON *root = bench("renderers block.trip --renderer cpu --size 32x32 --views 4 --repeat 2 "
@@ -230,7 +231,7 @@ static void renderers_says_what_each_view_was_and_took_counted_or_not(void **sta
     cJSON_Delete(root);
 }
 
-static void submit_compares_forms_where_there_is_gl(void **state)
+static void submit_compares_methods_of_gl(void **state)
 {
     (void)state;
     program_run r;
@@ -253,7 +254,7 @@ static void submit_compares_forms_where_there_is_gl(void **state)
     cJSON_Delete(root);
 }
 
-static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume(void **state)
+static void without_a_table_bench_lists_tables_and_runs_a_short_one(void **state)
 {
     (void)state;
     static const char *const names[] = { "orders", "submit", "stream", "renderers" };
@@ -268,7 +269,7 @@ static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_
         assert_non_null(strstr(r.out, line));
     }
     assert_non_null(strstr(r.out, "\n| cpu "));
-    assert_non_null(strstr(r.out, "\n- grid: 103 x 94 x 161\n")); /* the tooth's header says so */
+    assert_non_null(strstr(r.out, "\n- grid: 103 x 94 x 161\n")); /* from the header of the tooth */
     assert_string_equal(r.err, "");
     cJSON_Delete(bench("--renderer cpu --size 32x32 --views 1"));
     cJSON *root = bench("orders --renderer cpu --size 32x32 --repeat 1");
@@ -276,7 +277,7 @@ static void without_a_table_they_are_named_and_a_short_one_runs_on_the_included_
     cJSON_Delete(root);
     program_call(&r, "bench orders --renderer cpu --memory 1M");
     assert_fails(&r, 1);
-    assert_int_equal(rmdir("temporary"), 0); /* nothing was left in it */
+    assert_int_equal(rmdir("temporary"), 0); /* the folder is empty */
     unsetenv("TMPDIR");
     program_call(&r, "bench --no-counts --engine pread");
     assert_fails(&r, 2);
@@ -289,7 +290,7 @@ static void assert_a_plot(const char *path, const char *label)
     assert_true(!strncmp(text, "<svg ", 5) && strstr(text, "</svg>\n") && strstr(text, label));
 }
 
-static void a_plot_takes_the_place_of_nothing_that_is_read(void **state)
+static void a_plot_replaces_no_input_file(void **state)
 {
     (void)state;
     static const char function[] = "0 0 0 0 0\n255 1 1 1 0.5\n";
@@ -313,8 +314,8 @@ static void a_plot_takes_the_place_of_nothing_that_is_read(void **state)
     assert_works(&r);
 }
 
-/* The first row is what the others are compared with. */
-static void forms_compares_what_the_papers_do_with_the_usual_picture(void **state)
+/* All rows are compared with the first. */
+static void variants_compares_the_papers_with_the_default_picture(void **state)
 {
     (void)state;
     cJSON *root = bench("variants block.trip --size 24x24");
@@ -329,9 +330,9 @@ static void forms_compares_what_the_papers_do_with_the_usual_picture(void **stat
     cJSON_Delete(root);
 }
 
-/* Of noise, which the three lists show as differently as can be. With axis all pixels jump at once;
- * with clip those on the line between two lists, and with merge none. */
-static void popping_is_of_axis_alone(void **state)
+/* The volume is noise, so that the three lists look very different. With `axis` all pixels jump at
+ * once. With `clip` the pixels at the border of two lists jump, with `merge` none. */
+static void only_axis_pops(void **state)
 {
     (void)state;
     const char *const models[] = { "", "--compositing sheet",
@@ -357,16 +358,16 @@ static void popping_is_of_axis_alone(void **state)
     }
 }
 
-/* A body of one value without light: there is nothing for coarse levels to lose but its edges, and
- * its pixels change as the finest level's do. */
-static void levels_of_a_plain_block_are_near_the_finest(void **state)
+/* In a uniform body without shading, coarse levels differ only at the edges. Their pixels change as
+ * much as the pixels of the finest level. */
+static void levels_of_a_uniform_block_are_close_to_the_finest(void **state)
 {
     (void)state;
     program_run r;
     char tf[] = "values data\nunit 1\n0 1 1 1 0.02\n255 1 1 1 0.02\n";
     unsigned char values[32 * 32 * 32];
     for (size_t i = 0; i < sizeof values; i++)
-        values[i] = (unsigned char)(100 + i % 2); /* of one look */
+        values[i] = (unsigned char)(100 + i % 2); /* both values look the same */
     FILE *f = fopen("plain.raw", "wb");
     assert_non_null(f);
     assert_int_equal(fwrite(values, 1, sizeof values, f), sizeof values);
@@ -385,11 +386,11 @@ static void levels_of_a_plain_block_are_near_the_finest(void **state)
     for (int level = 1; level <= 2; level++) {
         row = cJSON_GetArrayItem(rows, level - 1);
         assert_true(number(row, "level") == level);
-        /* 32 voxels, turned and in a margin. */
+        /* The picture shows 32 voxels, rotated and with a margin. */
         assert_true(number(row, "width") >= 32 >> level && number(row, "width") <= 72 >> level);
         assert_true(number(row, "ms") > 0 && number(row, "fine_ms") > 0);
         assert_true(number(row, "colour_mean") > 0 && number(row, "colour_mean") < 8 * level);
-        /* It is white. */
+        /* The body is white. */
         assert_true(fabs(number(row, "colour_mean") - number(row, "alpha_mean")) < 0.01);
     }
     row = cJSON_GetArrayItem(rows_of(root, "dolly"), 1);
@@ -404,8 +405,8 @@ static void levels_of_a_plain_block_are_near_the_finest(void **state)
     assert_fails(&r, 1);
 }
 
-/* However few pictures the machine is quick enough for. */
-static void flight_ends_with_the_picture_of_render_and_counts_each_picture_once(void **state)
+/* Holds for any number of pictures that the machine is fast enough to draw. */
+static void flight_ends_with_the_picture_of_render(void **state)
 {
     (void)state;
     cJSON *root = bench("flight block.trip --renderer cpu --threads 2 --size 40x30 --seconds 0.4 "
@@ -431,7 +432,7 @@ static void flight_ends_with_the_picture_of_render_and_counts_each_picture_once(
     cJSON_Delete(root);
 }
 
-static void levels_without_a_data_set_samples_an_object_and_plots_it(void **state)
+static void levels_without_a_data_set_samples_a_field(void **state)
 {
     (void)state;
     program_run r;
@@ -439,13 +440,13 @@ static void levels_without_a_data_set_samples_an_object_and_plots_it(void **stat
     assert_int_equal(setenv("TMPDIR", "fields", 1), 0);
     cJSON *root = bench("levels --field filaments --finest 128 --size 32x24 --views 1 --repeat 1 "
                         "--plot levels.svg");
-    assert_int_equal(rmdir("fields"), 0); /* nothing was left in it */
+    assert_int_equal(rmdir("fields"), 0); /* the folder is empty */
     unsetenv("TMPDIR");
     const cJSON *rows = rows_of(root, "finer"), *row = cJSON_GetArrayItem(rows, 0);
     assert_int_equal(cJSON_GetArraySize(rows), 1);
     assert_true(number(row, "voxels") == 128);
     assert_true(number(row, "ms") > 0 && number(row, "fine_ms") > 0);
-    /* One volume has no coarser level that is wanted. */
+    /* A single volume has no coarser level to compare. */
     assert_close(number(row, "colour"), number(row, "fine_colour"));
     cJSON_Delete(root);
     assert_a_plot("levels.svg", "128");
@@ -455,8 +456,9 @@ static void levels_without_a_data_set_samples_an_object_and_plots_it(void **stat
     assert_fails(&r, 2);
 }
 
-/* On the axis of view, by the formulas of render/splat.h: with t the distance from the centre in
- * standard deviations, the exact form divides t^2 by 1 + (t sigma / distance)^2. */
+/* Returns the maximum error on the view axis, by the formulas of render/splat.h. With t, the
+ * distance from the centre in standard deviations, the exact form divides t^2 by 1 + (t sigma /
+ * distance)^2. */
 static double max_on_axis(double radii)
 {
     const double k = 10.0 / 3, edge = exp(-k * k / 2);
@@ -497,7 +499,7 @@ static void ewa_compares_splats_and_pictures(void **state)
     cJSON_Delete(root);
 }
 
-static void tables_for_people_name_the_command_and_their_limits(void **state)
+static void printed_tables_name_the_command_and_their_limits(void **state)
 {
     (void)state;
     program_run r;
@@ -545,7 +547,7 @@ static void wrong_usage_is_refused_in_one_line(void **state)
     }
 }
 
-static void what_cannot_be_measured_fails_in_one_line(void **state)
+static void impossible_measurements_fail_in_one_line(void **state)
 {
     (void)state;
     program_run r;
@@ -558,24 +560,23 @@ static void what_cannot_be_measured_fails_in_one_line(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(orders_draws_thrice_at_h_0_and_once_from_the_side),
+        cmocka_unit_test(orders_draws_three_times_at_h_0_and_once_from_the_side),
         cmocka_unit_test(stream_reads_the_files_of_all_lists),
-        cmocka_unit_test(stream_of_post_reads_what_it_interpolates),
-        cmocka_unit_test(renderers_gives_a_row_for_each_renderer_size_and_thread_count),
-        cmocka_unit_test(renderers_says_what_each_view_was_and_took_counted_or_not),
-        cmocka_unit_test(submit_compares_forms_where_there_is_gl),
-        cmocka_unit_test(
-            without_a_table_they_are_named_and_a_short_one_runs_on_the_included_volume),
-        cmocka_unit_test(forms_compares_what_the_papers_do_with_the_usual_picture),
-        cmocka_unit_test(popping_is_of_axis_alone),
-        cmocka_unit_test(a_plot_takes_the_place_of_nothing_that_is_read),
-        cmocka_unit_test(levels_of_a_plain_block_are_near_the_finest),
-        cmocka_unit_test(levels_without_a_data_set_samples_an_object_and_plots_it),
-        cmocka_unit_test(flight_ends_with_the_picture_of_render_and_counts_each_picture_once),
+        cmocka_unit_test(stream_of_post_reads_values_and_halo),
+        cmocka_unit_test(renderers_has_a_row_for_each_renderer_size_and_threads),
+        cmocka_unit_test(renderers_reports_each_view_without_counts_too),
+        cmocka_unit_test(submit_compares_methods_of_gl),
+        cmocka_unit_test(without_a_table_bench_lists_tables_and_runs_a_short_one),
+        cmocka_unit_test(variants_compares_the_papers_with_the_default_picture),
+        cmocka_unit_test(only_axis_pops),
+        cmocka_unit_test(a_plot_replaces_no_input_file),
+        cmocka_unit_test(levels_of_a_uniform_block_are_close_to_the_finest),
+        cmocka_unit_test(levels_without_a_data_set_samples_a_field),
+        cmocka_unit_test(flight_ends_with_the_picture_of_render),
         cmocka_unit_test(ewa_compares_splats_and_pictures),
-        cmocka_unit_test(tables_for_people_name_the_command_and_their_limits),
+        cmocka_unit_test(printed_tables_name_the_command_and_their_limits),
         cmocka_unit_test(wrong_usage_is_refused_in_one_line),
-        cmocka_unit_test(what_cannot_be_measured_fails_in_one_line),
+        cmocka_unit_test(impossible_measurements_fail_in_one_line),
     };
     return cmocka_run_group_tests(tests, enter, program_leave_folder);
 }

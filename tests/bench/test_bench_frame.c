@@ -1,10 +1,11 @@
-/* Reports that a table keeps in the place of printing them. */
+/* Tests reports that a table keeps and does not print. */
 #include "bench_frame.h"
 
 #include "report.h"
 #include "test.h"
 
-/* What is kept under a scope whose lines are caught: why a part of a table was left out. */
+/* Fails in a scope with caught reports. `why` gets the reason for which a part of a table was left
+ * out. */
 static void fail_in_scope(char why[256], bool cancelled, int status, const char *name)
 {
     trip_scope scope = { .around = trip_scope_current() };
@@ -18,7 +19,7 @@ static void fail_in_scope(char why[256], bool cancelled, int status, const char 
     trip_scope_renew(before);
 }
 
-static void a_fault_is_kept_without_the_name_of_the_program(void **state)
+static void a_failure_is_kept_without_the_program_name(void **state)
 {
     (void)state;
     char why[256] = "";
@@ -28,7 +29,7 @@ static void a_fault_is_kept_without_the_name_of_the_program(void **state)
     assert_int_equal(test_caught_reports(), 0);
 }
 
-static void an_interruption_is_printed_and_not_kept(void **state)
+static void an_interrupt_is_printed_and_not_kept(void **state)
 {
     (void)state;
     char why[256] = "";
@@ -41,8 +42,8 @@ static void an_interruption_is_printed_and_not_kept(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_fault_is_kept_without_the_name_of_the_program),
-        cmocka_unit_test(an_interruption_is_printed_and_not_kept),
+        cmocka_unit_test(a_failure_is_kept_without_the_program_name),
+        cmocka_unit_test(an_interrupt_is_printed_and_not_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

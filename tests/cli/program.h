@@ -1,4 +1,4 @@
-/* Runs the program as a user does and keeps what it said. */
+/* Runs the program as a user does, and keeps its exit status and output. */
 #ifndef PROGRAM_H
 #define PROGRAM_H
 
@@ -15,7 +15,7 @@
 #include <cmocka.h>
 
 typedef struct program_run {
-    int exit_status; /* -1: ended by a signal */
+    int exit_status; /* -1 if a signal ended it */
     char out[65536], err[65536];
 } program_run;
 
@@ -27,7 +27,7 @@ static inline void program_read(const char *path, char *text, size_t bytes)
     fclose(f);
 }
 
-/* `triptych ARGS` by the shell, in the current folder. */
+/* Runs `triptych ARGS` in a shell, in the current folder. */
 __attribute__((format(printf, 2, 3))) static inline void program_call(program_run *r,
                                                                       const char *args, ...)
 {
@@ -44,7 +44,7 @@ __attribute__((format(printf, 2, 3))) static inline void program_call(program_ru
     program_read("err.txt", r->err, sizeof r->err);
 }
 
-/* One line on stderr in the project's form, and this exit status. */
+/* Checks the exit status, and that stderr has one line in the project's form. */
 static inline void assert_fails(const program_run *r, int exit_status)
 {
     const char *end = strchr(r->err, '\n');
@@ -62,7 +62,7 @@ static inline void assert_works(const program_run *r)
     assert_int_equal(r->exit_status, 0);
 }
 
-/* A new folder to work in, current until program_leave_folder(). */
+/* Makes a new folder the current one, until program_leave_folder(). */
 static inline int program_enter_folder(void **state)
 {
     static char folder[64];

@@ -1,6 +1,6 @@
-"""`triptych accuracy`: JSON, CSV and page agree with one another and with figures that are computed
-here, plainly, from the pictures it keeps. FLIP is written out from the paper a second time, by
-kernels of two dimensions, and SSIM by windows one by one."""
+"""Tests that the JSON, the CSV and the page of `triptych accuracy` agree with one another. Also
+compares them with figures computed here from the pictures of the report. FLIP is implemented a
+second time from the paper, with two-dimensional kernels. SSIM is computed window by window."""
 import csv
 import html.parser
 import json
@@ -23,13 +23,13 @@ STEPS = ("total", "storage", "model", "method", "level", "precision")
 
 
 def covered_errors(picture, truth):
-    """Of 255, of all channels of pixels that either picture covers."""
+    """Returns the errors in 255ths, for all channels of pixels that either picture covers."""
     covered = numpy.maximum(picture[..., 3], truth[..., 3]) > numpy.float32(1 / 255)
     return 255 * numpy.abs(picture - truth)[covered].ravel()
 
 
 def plain_ssim(a, b):
-    """The mean over windows of 11 x 11, of luminance over black."""
+    """Returns the mean over windows of 11 x 11 pixels, for luminance over black."""
     weights = numpy.exp(-((numpy.arange(11) - 5) ** 2) / (2 * 1.5**2))
     weights = numpy.outer(weights, weights) / weights.sum() ** 2
     x, y = (p[..., :3] @ (0.299, 0.587, 0.114) for p in (a, b))
@@ -46,7 +46,7 @@ def plain_ssim(a, b):
 
 
 def convolve(plane, kernel):
-    """With edges repeated."""
+    """Convolves a plane. Edges are repeated."""
     reach = kernel.shape[0] // 2
     padded = numpy.pad(plane, reach, mode="edge")
     out = numpy.zeros_like(plane)
@@ -84,7 +84,7 @@ def distance(a, b):
 
 
 def seen(rgb):
-    """Colours after the eye's contrast sensitivity."""
+    """Returns the colours after the contrast sensitivity of the eye."""
     t = relative(rgb)
     opponent = [116 * t[..., 1] - 16, 500 * (t[..., 0] - t[..., 1]), 200 * (t[..., 1] - t[..., 2])]
     curves = [(1, 0.0047, 0, 1e-5), (1, 0.0053, 0, 1e-5), (34.1, 0.04, 13.5, 0.025)]
@@ -159,7 +159,7 @@ class Accuracy(program.ProgramTest):
             yield (program.read_exr(f"report/{name}-{view}.exr"),
                    program.read_exr(f"report/truth-{view}.exr"))
 
-    def test_figures_are_those_of_the_pictures(self):
+    def test_figures_equal_figures_of_the_pictures(self):
         for name in "post", "post-samples-per-sheet-1", "pre", "pre-rgba8":
             total, pairs = self.rows[name]["total"], list(self.pictures(name))
             errors = [covered_errors(*pair) for pair in pairs]
@@ -178,9 +178,9 @@ class Accuracy(program.ProgramTest):
             self.assertAlmostEqual(total["ssim"], numpy.mean([plain_ssim(*p) for p in pairs]), 4)
             self.assertAlmostEqual(total["flip"], numpy.mean([plain_flip(*p) for p in pairs]), 4)
 
-    def test_steps_stand_apart(self):
-        """Rounded layers change precision alone, slices the method. Of the values, of which all that
-        show and their neighbours are stored whole, nothing is lost but the last bits."""
+    def test_steps_have_separate_errors(self):
+        """Rounded layers change only the precision, and samples per sheet only the method. Storage
+        loses only the last bits, since all visible values and their neighbours are stored."""
         rows = self.rows
         self.assertLess(rows["post"]["storage"]["max"], 0.1)
         for name, row in rows.items():
@@ -207,7 +207,8 @@ class Accuracy(program.ProgramTest):
         self.assertIsNone(rows["post"]["splats_drawn"])
 
     def turned(self, degrees, method):
-        """From so many degrees of index space from X towards Y, as far as the first view is."""
+        """Draws from a direction `degrees` from X towards Y in index space, at the distance of the
+        first view."""
         view = self.report["views"][0]
         eye, look = numpy.array(view["eye"]), numpy.array(view["look"])
         way = numpy.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.3])
@@ -217,7 +218,7 @@ class Accuracy(program.ProgramTest):
             "--classify", "post", "--method", method, "--eye=" + ",".join(map(repr, map(float, eye))),
             "--look=" + ",".join(map(repr, view["look"])), "--up=0,0,1")
 
-    def test_popping_is_that_of_the_pictures(self):
+    def test_popping_equals_changes_between_pictures(self):
         rows = {row["settings"]: row for row in self.report["popping"]["popping-post"]}
         self.assertEqual(list(rows), ["merge, h 0", "merge, h 0.5", "merge, h 0.85", "merge, h 0.95",
                                       "merge, h 0.99", "clip", "axis"])
@@ -240,9 +241,9 @@ class Accuracy(program.ProgramTest):
         with open("report/index.html", encoding="utf-8") as f:
             self.assertIn("0.95</text>", f.read())
 
-    def test_popping_is_left_out_where_its_changes_do_not_fit(self):
-        """A pixel's are 40, beside the four components before and one number for sorting, of 4 bytes each;
-        the pictures that are compared take half as much."""
+    def test_popping_is_left_out_in_little_memory(self):
+        """A pixel needs 40 changes, the four components of the previous picture and one number for
+        sorting, each of 4 bytes. The pictures to compare take half as much."""
         small = [a if a != "40x32" else "300x300" for a in SMALL]
         self.assertNotEqual(small, SMALL)
         run = self.works("accuracy", "a.trip", "-o", "fits", *small, "--no-ladder", "--settings",
@@ -254,8 +255,9 @@ class Accuracy(program.ProgramTest):
         self.assertEqual([one["name"] for one in report["left_out"]], ["popping-pre"])
         self.assertEqual(report["popping"], {})
 
-    def test_spacing_may_be_uneven(self):
-        """Splats have an integral of their sum, and no other kernel interpolates."""
+    def test_uneven_grids_are_measured(self):
+        """Splats have an integral of their sum. Kernels other than linear cannot interpolate an
+        uneven grid."""
         for axis, count in zip("xyz", (40, 28, 24)):
             places = " ".join(str(i + 0.3 * math.sin(i)) for i in range(count))
             program.write(f"{axis}.txt", places.encode())
@@ -269,7 +271,7 @@ class Accuracy(program.ProgramTest):
         self.assertTrue(models["post"] == 0 < models["pre"], models)
         self.assertIn("left out: post-cubic: uneven.trip: has uneven spacing", run.stdout.decode())
 
-    def test_what_is_left_out_is_listed(self):
+    def test_settings_left_out_are_listed(self):
         (left_out,) = self.report["left_out"]
         self.assertEqual(left_out["name"], "post-samples-2")
         self.assertIn("--samples 2", left_out["why"])
@@ -290,7 +292,7 @@ class Accuracy(program.ProgramTest):
                 else:
                     self.assertEqual(line[f"{step}_mean"], "")
 
-    def test_commands_draw_the_same(self):
+    def test_printed_options_draw_the_same_pictures(self):
         view = self.report["views"][0]
         camera = ["--size", "40x32", "--fov", repr(view["fov_degrees"]), "--tf", "a.tf"]
         camera += [f"--{k}=" + ",".join(map(repr, view[k])) for k in ("eye", "look", "up")]
@@ -299,7 +301,7 @@ class Accuracy(program.ProgramTest):
             again = self.picture("a.trip", *camera, *options)
             self.assertTrue((again == program.read_exr(f"report/{name}-0.exr")).all())
 
-    def test_an_error_is_turned_into_settings(self):
+    def test_an_error_bound_selects_settings(self):
         view = ["--size", "40x32", "--tf", "a.tf", "--report", "report"]
         bound = 1.01 * self.rows["pre"]["total"]["worst_percentile_99"]
         fits = [r for r in self.rows.values() if r["total"]["worst_percentile_99"] < bound]
@@ -314,15 +316,15 @@ class Accuracy(program.ProgramTest):
         self.assertIn("the data set's own; errors", run.stderr)
         self.assertIn("measured with light", run.stderr)
 
-    def test_without_a_report_an_error_is_refused(self):
+    def test_an_error_bound_without_a_report_is_refused(self):
         size = ["--size", "40x32", "-o", "e.exr"]
         self.fails(1, "render", "a.trip", *size, "--error", "1", says="triptych accuracy")
         self.fails(1, "render", "a.trip", *size, "--error", "1", "--report", "a.tf", says="accuracy.json")
         self.fails(1, "render", "a.trip", *size, "--error", "1e-6", "--report", "report",
                    says="has the smallest")
 
-    def test_a_report_is_of_its_data_set(self):
-        """Bricked again alike it is the same, otherwise not."""
+    def test_a_report_applies_only_to_its_data_set(self):
+        """A data set bricked again with the same options counts as the same. Any other does not."""
         size = ["--size", "40x32", "-o", "e.exr", "--tf", "a.tf", "--error", "255"]
         for name, options in ("again", ["--keep-all"]), ("other", ["--range", "60:255"]):
             self.works("brick", "a.nrrd", "-q", "--tile", "16", "--levels-for", "both", "-o",
@@ -333,8 +335,8 @@ class Accuracy(program.ProgramTest):
         self.assertEqual(run.returncode, 1)
         self.assertIn("triptych: --error: a.nrrd: the report measured another data set", run.stderr)
 
-    def test_a_volume_is_bricked_with_the_levels_of_the_report(self):
-        """Whichever of its settings is the fastest."""
+    def test_a_volume_is_bricked_with_the_levels_of_its_report(self):
+        """This holds whichever setting is the fastest."""
         program.write_nrrd("long.nrrd", program.ball((20, 24, 80)))
         for levels in "auto", "pre", "both":
             data = levels + ".trip"
@@ -353,8 +355,8 @@ class Accuracy(program.ProgramTest):
                 self.assertTrue((self.picture("long.nrrd", *options)
                                  == self.picture(data, *options)).all())
 
-    def test_qualities_are_settings(self):
-        """Options beside a quality go before what it says, wherever they stand."""
+    def test_qualities_select_settings(self):
+        """An explicit option wins over --quality, wherever it stands."""
         draw = lambda *options: self.picture("a.trip", "--size", "40x32", "--tf", "a.tf", *options)
         same = {("--quality", "draft"): ("--samples-per-sheet", "1"),
                 ("--quality", "normal"): (),
@@ -368,7 +370,7 @@ class Accuracy(program.ProgramTest):
         for a, b in ((0, 1), (1, 2), (2, 3)):
             self.assertTrue((pictures[a] != pictures[b]).any())
 
-    def test_page_holds_all_it_shows(self):
+    def test_the_page_contains_its_pictures(self):
         page = Page()
         with open("report/index.html", encoding="utf-8") as f:
             page.feed(f.read())
@@ -380,7 +382,7 @@ class Accuracy(program.ProgramTest):
             self.assertIn(name, page.text)
         self.assertNotIn("nan", page.text)
 
-    def test_page_opens_in_chromium(self):
+    def test_the_page_opens_in_chromium(self):
         chromium = shutil.which("chromium")
         if not chromium or program.SANITIZED:
             self.skipTest("chromium is not installed")
@@ -393,7 +395,7 @@ class Accuracy(program.ProgramTest):
         self.assertEqual(run.stdout.count("<svg"), 3)
         self.assertIn("</html>", run.stdout)
 
-    def test_seconds_bound_the_work(self):
+    def test_the_time_budget_limits_the_work(self):
         self.works("accuracy", "a.trip", "-o", "short", *SMALL, "--budget", "0", "--no-ladder",
                    "--settings", "post,pre*")
         with open("short/accuracy.json", encoding="utf-8") as f:
@@ -403,13 +405,13 @@ class Accuracy(program.ProgramTest):
         self.assertEqual(report["views_left_out"], 1)
         self.assertIn("pre", [one["name"] for one in report["left_out"]])
 
-    def test_progress_is_shown_but_not_when_quiet(self):
+    def test_progress_is_shown_without_quiet(self):
         arguments = [a for a in SMALL if a != "--quiet"]
         run = self.works("accuracy", "a.trip", "-o", "given", *arguments, "--no-ladder",
                          "--settings", "post")
         self.assertRegex(run.stderr, r"^accuracy  0:00")
 
-    def test_other_data_sets_stand_beside(self):
+    def test_other_data_sets_are_compared(self):
         self.brick("a.nrrd", "bare.trip", "--tf", "a.tf", "--halo", "0")
         self.works("accuracy", "a.trip", "-o", "beside", *SMALL, "--no-ladder", "--source", "a.nrrd",
                    "--settings", "post,post-bare.trip", "--also", "bare.trip")
@@ -419,8 +421,9 @@ class Accuracy(program.ProgramTest):
         self.assertGreater(bare["total"]["mean"], whole["total"]["mean"])
         self.assertGreater(bare["storage"]["mean"], whole["storage"]["mean"])
 
-    def test_other_programs_stand_beside(self):
-        """One that draws nothing is off by all there is, and takes what it says."""
+    def test_other_programs_are_compared(self):
+        """A program that draws nothing has the error of an empty picture, and the time that it
+        reports."""
         program.write("beside.py", b"""
 import json, sys
 job = json.loads(sys.stdin.readline())
@@ -451,7 +454,7 @@ for line in sys.stdin:
         self.assertEqual(page.count("<rect class=program"), 2)
         self.assertFalse(os.path.exists("others/program.raw"))
 
-    def test_vtk_stands_beside_where_it_is_installed(self):
+    def test_vtk_is_compared_if_installed(self):
         worker = os.path.join(os.path.dirname(program.DATASETS), "accuracy", "vtk_worker.py")
         if not shutil.which("xvfb-run") or subprocess.run(
                 [sys.executable, "-c", "import vtkmodules.vtkRenderingVolume"],
@@ -464,7 +467,7 @@ for line in sys.stdin:
             [row] = json.load(f)["compared"]
         self.assertEqual(row["name"], "vtk-cpu-step-0.5")
         self.assertLess(row["total"]["mean"], 8)
-        # Of itself, and not where it is not wanted.
+        # The setting `vtk` starts VTK without --compare; `--compare none` prevents this.
         path = {**os.environ, "PATH": os.path.dirname(sys.executable) + ":" + os.environ["PATH"]}
         for arguments, beside in (["--settings", "post,vtk"], [row["name"]]), (
                 ["--settings", "post,vtk", "--compare", "none"], []), (["--settings", "post"], []):
@@ -477,9 +480,9 @@ for line in sys.stdin:
                 self.assertEqual(report["compared"][0]["total"], row["total"])
         self.fails(2, "accuracy", "a.trip", "--compare", "none", "--compare", "true", says="--compare")
 
-    # Trouble
+    # Faults
 
-    def test_what_is_there_stays_without_force(self):
+    def test_an_existing_folder_stays_without_force(self):
         self.leaves_nothing(1, "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", says="--force")
         os.mkdir("mine")
         program.write("mine/letter.txt", b"dear")
@@ -487,7 +490,7 @@ for line in sys.stdin:
                             says="not a report")
         self.assertEqual(os.listdir("mine"), ["letter.txt"])
 
-    def test_bad_input(self):
+    def test_invalid_input_is_refused(self):
         self.fails(1, "accuracy", "none.trip", "-o", "x", says="cannot open")
         self.leaves_nothing(2, "accuracy", says="NAME.trip")
         self.leaves_nothing(2, "accuracy", "a.trip", "--size", "8x8", says="32 to 4096")
@@ -502,13 +505,13 @@ for line in sys.stdin:
                             says="cannot create")
         self.leaves_nothing(1, "accuracy", "a.trip", "-o", "out", "--memory", "64K", *SMALL)
 
-    def test_a_full_disk(self):
-        """A limit on the size of files stands for it."""
+    def test_a_full_disk_leaves_nothing(self):
+        """A limit on the size of files stands for a full disk."""
         self.leaves_nothing(1, "accuracy", "a.trip", "-o", "out", *SMALL, "--no-ladder",
                             "--settings", "post", preexec_fn=lambda: resource.setrlimit(
                                 resource.RLIMIT_FSIZE, (2048, 2048)))
 
-    def test_no_permission(self):
+    def test_missing_permission_is_one_line(self):
         os.mkdir("closed", 0o555)
         if os.getuid() == 0 and os.access("closed", os.W_OK):
             identity = {"user": 65534, "group": 65534, "extra_groups": []}
@@ -522,7 +525,7 @@ for line in sys.stdin:
         self.fails(1, "accuracy", "a.trip", "-o", "closed/out", *SMALL, says="cannot create",
                    **identity)
 
-    def test_an_interruption_leaves_nothing(self):
+    def test_an_interrupt_leaves_nothing(self):
         before = set(os.listdir("."))
         process = program.start("accuracy", "a.trip", "-o", "out", "--views", "1000", "--quiet")
         program.await_handler(process)

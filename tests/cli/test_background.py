@@ -1,5 +1,6 @@
-"""Values of OpenVDB grids fall to the background around the outermost active voxels, as they do in
-OpenVDB's own sampler: pictures of fog and of filled level sets against closed forms."""
+"""Tests that values of OpenVDB grids fall to the background around the outermost active voxels, as
+in OpenVDB's own sampler. Pictures of fog and of filled level sets are compared with closed
+forms."""
 import math
 import unittest
 
@@ -11,17 +12,17 @@ try:
 except ImportError:
     pyopenvdb = None
 
-OPACITY, VALUE = 0.6, 0.5  # of a voxel of value 1; of the fog
-EDGE, ZOOM = 8, 4  # voxels of the fog along each axis; pixels of a voxel
+OPACITY, VALUE = 0.6, 0.5  # opacity at value 1; value of the fog
+EDGE, ZOOM = 8, 4  # voxels of the fog along each axis; pixels per voxel
 
 
 def depth_of_ramp(a):
-    """Optical depth of a voxel's length over which the opacity rises from 0 to a."""
+    """Returns the optical depth of one voxel length over which the opacity rises from 0 to a."""
     return 1 + (1 - a) / a * math.log1p(-a)
 
 
 def trapezoid(x):
-    """1 over the fog's voxels, 0 a voxel beyond them."""
+    """Returns 1 over the voxels of the fog, and 0 from one voxel beyond them on."""
     return min(1.0, max(0.0, min(x + 1, EDGE - x)))
 
 
@@ -52,7 +53,7 @@ class Background(program.ProgramTest):
             ",".join(map(str, (middle, middle, middle))), "--up", "0,1,0", *options)[..., 3]
 
     def ways(self, volume, data):
-        """Of drawing a volume and its data set."""
+        """Yields the ways to draw a volume and its data set."""
         yield data, "--renderer", "reference"
         yield data, "--renderer", "cpu", "--samples-per-sheet", "4"
         yield data, "--renderer", "integral"
@@ -60,22 +61,22 @@ class Background(program.ProgramTest):
         if "GL" not in program.SWITCHED_OFF:
             yield data, "--renderer", "gl"
 
-    def test_fog_fades_out_beyond_its_outermost_voxels(self):
+    def test_fog_fades_out_beyond_its_last_voxels(self):
         made = self.brick("fog.vdb", "fog.trip", "--tf", "linear.tf")
         self.assertEqual(made["dims"], [EDGE + 2] * 3)
         middle, pixels = (EDGE - 1) / 2, (EDGE + 2) * ZOOM
         at = [middle + (i + 0.5 - pixels / 2) / ZOOM for i in range(pixels)]
         expected = numpy.array([[expected_alpha(x, y) for x in at] for y in at])
-        self.assertGreater(expected[pixels // 2, 2], 0.1)  # beyond the last voxel
+        self.assertGreater(expected[pixels // 2, 2], 0.1)  # this pixel is beyond the last voxel
         for data, *how in self.ways("fog.vdb", "fog.trip"):
             alpha = self.draw(data, middle, EDGE + 2, pixels, *how)
             self.assertLess(numpy.abs(alpha - expected).max(), 1 / 255, how)
 
-    def test_a_filled_ball_ends_softly_where_its_band_is_narrow(self):
-        """Its ramp is as wide as its band, whose outermost voxels are not yet at 0."""
+    def test_a_filled_level_set_with_a_narrow_band_ends_softly(self):
+        """The ramp is as wide as the band. The outermost voxels of the band are not yet at 0."""
         made = self.brick("ball.vdb", "ball.trip", "--tf", "linear.tf")
         self.assertEqual(made["dims"][0], made["dims"][2])
-        # The ray through the middle: half the ramp, 2.4 voxels, is inside the sphere.
+        # On the ray through the centre, half of the ramp of 2.4 voxels is inside the sphere.
         inner = 2 * (10 - 1.2) * math.log1p(-OPACITY)
         expected = 1 - math.exp(inner - 2 * 2.4 * depth_of_ramp(OPACITY))
         pictures = [self.draw(data, 0, 26, 52, *how)

@@ -1,5 +1,5 @@
-"""Data sets that were cut off, damaged, mixed up or taken away: nothing of it is drawn, nothing
-crashes, and `info --verify` notices every byte."""
+"""Tests of truncated, damaged, mixed and missing data sets. No damaged part is drawn, the program
+never crashes, and `info --verify` finds every changed byte."""
 import concurrent.futures
 import os
 import random
@@ -31,13 +31,14 @@ class BadDatasets(program.ProgramTest):
         cls.good = cls.draw(cls, "a.trip")[1]
 
     def draw(self, path):
-        """Exit status and picture."""
+        """Draws a data set. Returns the finished process, and the picture or None."""
         output = f"{path}.exr"
         run = program.call("render", path, "-o", output, *VIEW, program=program.QUICK_PROGRAM)
         return run, program.read_exr(output) if run.returncode == 0 else None
 
     def check(self, name, change):
-        """A changed copy: verifying fails, drawing fails or does not meet the change."""
+        """Changes a copy of the data set. Verifying must fail. Drawing must fail, or give the right
+        picture if it does not read the change."""
         path = f"{name}.trip"
         shutil.copytree("a.trip", path)
         change(path)
@@ -64,7 +65,7 @@ class BadDatasets(program.ProgramTest):
         faults = [str(w.exception()) for w in waiting if w.exception()]
         self.assertEqual(faults, [], "\n".join(faults))
 
-    def test_cut_off_or_longer(self):
+    def test_files_of_wrong_length_are_found(self):
         changes = []
         for name in FILES:
             size = os.path.getsize(f"a.trip/{name}")
@@ -72,7 +73,7 @@ class BadDatasets(program.ProgramTest):
                 changes.append(lambda path, n=name, l=length: os.truncate(f"{path}/{n}", l))
         self.check_all(changes)
 
-    def test_damaged_bytes(self):
+    def test_damaged_bytes_are_found(self):
         chance = random.Random(5)
         changes = []
         for name in FILES:
@@ -92,7 +93,7 @@ class BadDatasets(program.ProgramTest):
                 changes.append(change)
         self.check_all(changes)
 
-    def test_missing_exchanged_or_of_another_kind(self):
+    def test_missing_and_exchanged_files_are_found(self):
         changes = []
         for name in FILES:
 
@@ -111,7 +112,7 @@ class BadDatasets(program.ProgramTest):
         changes.append(lambda path: os.replace(f"{path}/x0.voxels", f"{path}/y0.voxels"))
         self.check_all(changes)
 
-    def test_what_is_no_data_set(self):
+    def test_other_paths_are_refused(self):
         os.mkdir("empty.trip")
         os.mkdir("zeros.trip")
         for name in FILES:
@@ -133,11 +134,11 @@ class BadDatasets(program.ProgramTest):
         ):
             self.fails(1, "info", path)
             self.fails(1, "info", "--verify", "--json", path)
-            if path not in (".", "a.nrrd"):  # a folder of pictures and a volume, which can be drawn
+            if path not in (".", "a.nrrd"):  # `render` can draw these: a folder of pictures and a volume
                 self.fails(1, "render", path, "-o", "no.png")
         self.assertFalse(os.path.exists("no.png"))
 
-    def test_a_name_with_a_slash_is_the_same_data_set(self):
+    def test_a_slash_after_the_name_is_ignored(self):
         self.assertEqual(self.info("a.trip/")["kept"], self.info("a.trip")["kept"])
         self.assertTrue(numpy.array_equal(self.picture("./a.trip/", *VIEW), self.good))
 

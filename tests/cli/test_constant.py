@@ -1,5 +1,5 @@
-"""A volume in which every voxel has one value: the range that codes share has no length. Through it
-a ray loses what the transfer function says of that value, over and over."""
+"""Tests volumes in which every voxel has the same value, so that the range of codes has no length.
+The opacity along a ray follows from the opacity of this value."""
 import numpy
 import program
 
@@ -10,13 +10,14 @@ ACROSS = ("--size=9x9", "--ortho=4", "--eye=5.5,5.5,100", "--look=5.5,5.5,5.5", 
 
 class Constant(program.ProgramTest):
     def assert_through(self, value, voxels, bound, *options):
-        """Over so many voxels' lengths, at every pixel: none is near the border."""
+        """Checks every pixel against the opacity along `voxels` voxel lengths. No pixel is near the
+        border."""
         alpha = 1 - (1 - OPACITY)**voxels
         picture = self.picture("a.trip", *ACROSS, *options)
         expected = numpy.append(numpy.array(COLOUR) * alpha, alpha)
         self.assertLess(abs(picture - expected).max(), bound, (value, options))
 
-    def test_it_is_drawn_as_one_body(self):
+    def test_a_constant_volume_is_drawn_as_one_body(self):
         for dtype, value in ("u1", 7), ("<u2", 40000), ("f4", -3.5):
             program.write_nrrd("a.nrrd", numpy.full((VOXELS,) * 3, value, dtype))
             entry = " ".join(map(str, COLOUR + (OPACITY,)))

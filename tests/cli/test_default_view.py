@@ -1,5 +1,5 @@
-"""What the demo does, on every included data set: brick, render, no options. The picture is not
-blank, lies in the middle, is not cropped, and stands upright."""
+"""Tests `brick` and `render` without options on every included data set. The picture is not blank,
+is centred, is not cropped, and is upright."""
 import os
 
 import numpy
@@ -23,8 +23,8 @@ class DefaultView(program.ProgramTest):
         self.assertGreater(shows.mean(), 0.05, name)
         self.assertGreater(picture.max(), 0.4, name)
         rim = numpy.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
-        self.assertLess(rim.max(), 2 / 255, name)  # nobody sees that
-        # What shows fills nine tenths of one side, and lies in the middle.
+        self.assertLess(rim.max(), 2 / 255, name)  # so faint values are not visible
+        # The visible part is centred and fills nine tenths of one side.
         spans = [c.max() - c.min() + 1 for c in (rows, columns)]
         self.assertGreater(max(spans), 256 * 0.87, name)
         self.assertLess(max(spans), 256 * 0.93, name)
@@ -32,15 +32,15 @@ class DefaultView(program.ProgramTest):
             self.assertLess(abs((at.max() + at.min()) / 2 - 127.5), 256 * 0.02, name)
         return picture
 
-    def test_included_data_sets(self):
+    def test_included_data_sets_are_framed(self):
         for name in "tooth.nhdr", "stent.nrrd", "wdas_cloud_sixteenth.vdb", "densityAndHeat.vdb":
             self.check(name)
 
-    def test_a_single_slice_is_seen_from_the_front_as_a_picture(self):
+    def test_a_single_slice_is_upright_and_seen_from_the_front(self):
         picture = numpy.full((30, 40), 90, "u1")
-        picture[:10, :12], picture[15, 20] = 250, 0  # bright at the top on the left
+        picture[:10, :12], picture[15, 20] = 250, 0  # bright at the top left
         for name, shape in ("k", (1, 30, 40)), ("j", (30, 1, 40)), ("i", (30, 40, 1)):
-            upright = picture if name == "k" else picture[::-1]  # k goes up
+            upright = picture if name == "k" else picture[::-1]  # k points up
             program.write_nrrd(f"{name}.nrrd", upright.reshape(shape))
             self.works("brick", f"{name}.nrrd", "-o", "a.trip", "-q", "--force", "--keep-all")
             drawn = self.picture("a.trip", "--size=120x120", "--tf=grey", "--no-shading",
@@ -52,7 +52,7 @@ class DefaultView(program.ProgramTest):
             self.assertLess(rows.max(), 62, name)
             self.assertLess(columns.max(), 55, name)
 
-    def test_wide_and_tall_pictures(self):
+    def test_wide_and_tall_pictures_are_not_cropped(self):
         self.works(
             "brick", os.path.join(program.DATASETS, "tooth.nhdr"), "-o", "a.trip", "-q", "--force"
         )
@@ -73,8 +73,8 @@ class DefaultView(program.ProgramTest):
             self.assertEqual(rim.max(), 0)
             self.assertGreater((alpha > 0.1).mean(), 0.02)
 
-    def test_the_tooth_stands_on_its_roots(self):
-        """The crown is the broad and the bright end, and at the top."""
+    def test_the_tooth_is_upright(self):
+        """The crown is the broad and bright end. It is at the top."""
         picture = brightness(self.draw("tooth.nhdr"))
         rows = numpy.nonzero((picture > 0.03).any(axis=1))[0]
         upper = picture[rows.min() : (rows.min() + rows.max()) // 2]
@@ -82,7 +82,7 @@ class DefaultView(program.ProgramTest):
         self.assertGreater(upper.sum(), 1.5 * lower.sum())
         self.assertGreater((upper > 0.03).sum(), (lower > 0.03).sum())
 
-    def test_smoke_is_grey_and_lets_light_through(self):
+    def test_smoke_is_grey_and_translucent(self):
         for name in "wdas_cloud_sixteenth.vdb", "densityAndHeat.vdb":
             picture = self.draw(name, "--background", "none")
             covered = picture[picture[..., 3] > 0.1]

@@ -1,5 +1,5 @@
-"""What others script against: the keys of `info --json` and `render --stats`, and what the papers'
-tables rest on, how many splats each method draws."""
+"""Tests of output that other scripts read: the keys of `info --json` and `render --stats`. Also
+tests how many splats each method draws, on which the tables of the papers rely."""
 import os
 import random
 
@@ -45,7 +45,7 @@ class Drawn(program.ProgramTest):
         cls.kept["sheared"] = cls.brick(cls(), "sheared.nii", "sheared.trip")["kept"]
 
     def middle(self, name):
-        """Of the grid, in the world; and half the diagonal."""
+        """Returns the centre of the grid in world space, half its diagonal, and index_to_world."""
         info = self.info(f"{name}.trip")
         matrix = numpy.array(info["index_to_world"])
         dims = numpy.array(info["dims"])
@@ -59,7 +59,7 @@ class Drawn(program.ProgramTest):
         return centre, max(numpy.linalg.norm(c - centre) for c in corners), matrix
 
     def view_from(self, name, direction, *options):
-        """A perspective view that contains all of it."""
+        """Returns the options of a perspective view that contains the whole grid."""
         centre, radius, _ = self.middle(name)
         eye = centre + numpy.array(direction) / numpy.linalg.norm(direction) * radius * 4.5
         return [
@@ -112,7 +112,7 @@ class Drawn(program.ProgramTest):
                         self.assertLessEqual(counts["splats_drawn"], counts["splats_projected"])
                         self.assertLessEqual(counts["splats_projected"], counts["splats_read"])
 
-    def test_splats_neither_read_nor_draw_the_halo_and_only_with_it_values_are_interpolated(self):
+    def test_only_interpolation_reads_the_halo(self):
         seen, renderers = [], ("cpu", "reference", *program.GL)
         for halo in "0", "1":
             made = self.brick(os.path.join(program.DATASETS, "tooth.nhdr"), "h.trip", "--force",
@@ -130,12 +130,13 @@ class Drawn(program.ProgramTest):
         for without, with_halo in zip(seen[: len(renderers)], seen[len(renderers) :]):
             self.assertEqual(without[1:], with_halo[1:])
 
-    def test_an_orbit_has_a_frame_of_stats_for_each_image(self):
+    def test_stats_have_a_frame_for_each_image_of_an_orbit(self):
         stats = self.stats("heat.trip", "--orbit", "5", "--size", "30x30")
         self.assertEqual(len(stats["frames"]), 5)
 
-    def test_with_h_0_a_view_of_everything_draws_thrice_what_was_kept(self):
-        """From beyond a corner: a splat counts twice where rays go both ways along an axis."""
+    def test_with_h_0_a_full_view_draws_every_voxel_three_times(self):
+        """The eye is beyond a corner. Elsewhere rays go both ways along an axis, and splats count
+        twice."""
         directions = random.Random(3)
         for name, kept in self.kept.items():
             for renderer in "cpu", "reference":
@@ -146,7 +147,7 @@ class Drawn(program.ProgramTest):
                                       renderer)
                 self.assertEqual(self.drawn(*view), 3 * kept, view)
 
-    def test_a_parallel_view_along_an_axis_draws_it_once(self):
+    def test_a_parallel_view_along_an_axis_draws_every_voxel_once(self):
         for name, kept in self.kept.items():
             centre, radius, matrix = self.middle(name)
             for axis in range(3):
@@ -173,7 +174,7 @@ class Drawn(program.ProgramTest):
                     read = [c["splats_read"] for c in stats["frames"][0]["lists"].values()]
                     self.assertEqual([n for n in read if n], [kept], view)
 
-    def test_drawn_falls_with_h_then_clip_then_axis(self):
+    def test_fewer_splats_are_drawn_with_larger_h_clip_and_axis(self):
         for name, kept in self.kept.items():
             for direction in (1, 0.9, 0.8), (-1, 0.5, 0.1):
                 view = self.view_from(name, direction)
@@ -194,8 +195,9 @@ class Drawn(program.ProgramTest):
         for axis in "xyz":
             self.assertEqual(lists[0][axis]["splats_drawn"], lists[1][axis]["splats_drawn"])
 
-    def test_the_last_sheet_of_a_list_is_drawn_where_the_next_list_waits_for_the_queue(self):
-        """Walls of fog: in so large a picture the queue of gl is full when a list ends."""
+    def test_a_full_queue_does_not_drop_the_last_sheet_of_a_list(self):
+        """Walls of fog fill a large picture, so that the queue of `gl` is full at the end of a
+        list."""
         fog = numpy.full((24, 24, 24), 1, "u1")
         for end in 0, -1:
             fog[end] = fog[:, end] = fog[:, :, end] = 2
@@ -210,8 +212,8 @@ class Drawn(program.ProgramTest):
             drawn = self.picture("walls.trip", *view, *look, f"--renderer={gl}")
             self.assertLess(255 * abs(drawn - expected).max(), 1)
 
-    def test_only_what_the_view_sees_is_read(self):
-        """Looking past it, and at a corner of it close up."""
+    def test_only_bricks_in_the_view_are_read(self):
+        """One view looks past the volume, another at a small part of it."""
         centre, radius, _ = self.middle("tooth")
         away = [
             "tooth.trip",
@@ -241,7 +243,7 @@ class Drawn(program.ProgramTest):
         self.assertLess(lists["z"]["splats_read"], 0.7 * self.kept["tooth"])
         self.assertEqual(lists["x"]["splats_read"] + lists["y"]["splats_read"], 0)
 
-    def test_a_bound_that_no_level_keeps_is_named(self):
+    def test_a_bound_below_the_coarsest_level_is_reported(self):
         for classify in "pre", "post":
             draw = ["render", "tooth.trip", "-o", "x.png", "--size=20x20", f"--classify={classify}"]
             held = self.works(*draw, "--max-bytes=1G")

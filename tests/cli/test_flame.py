@@ -1,4 +1,4 @@
-"""A flame: the heat of an OpenVDB file makes its soot glow."""
+"""Tests of emission: the heat in an OpenVDB file makes the soot of a flame glow."""
 import glob
 import json
 import os
@@ -30,7 +30,7 @@ class Emission(program.ProgramTest):
         with open(path, "rb") as f:
             return f.read()
 
-    def test_what_is_hot_glows_red_to_yellow_below_its_smoke(self):
+    def test_hot_soot_glows_red_to_yellow_below_the_smoke(self):
         cold, flame = self.draw(), self.draw(*GLOWS)
         self.assertEqual(cold[..., :3].max(), 0)
         numpy.testing.assert_array_equal(flame[..., 3], cold[..., 3])
@@ -41,7 +41,7 @@ class Emission(program.ProgramTest):
         rows = red.sum(axis=1)
         self.assertGreater(rows[30:].sum(), 10 * rows[:30].sum())
 
-    def test_less_hot_is_darker_and_hotter_is_less_red(self):
+    def test_hotter_soot_is_bluer(self):
         def share_of_blue(*options):
             flame = self.draw(*GLOWS, *options).sum(axis=(0, 1))
             return flame[2] / flame[0]
@@ -49,7 +49,7 @@ class Emission(program.ProgramTest):
         self.assertLess(share_of_blue("--temperature", "0:1800"), share_of_blue())
         self.assertLess(share_of_blue(), share_of_blue("--temperature", "0:9000"))
 
-    def test_it_runs_where_heat_is_given_and_wanted_and_costs_nothing_elsewhere(self):
+    def test_emission_runs_only_with_heat_and_costs_nothing_without(self):
         for options, runs in (((*GLOWS,), True), (("--effects", "auto", *HEAT), True),
                               (("--effects", "auto"), False), ((), False)):
             text = self.works("render", "density.trip", "-o", "a.png", *LOOK, "--explain",
@@ -58,8 +58,8 @@ class Emission(program.ProgramTest):
             self.assertEqual(text.count("\nheat "), 2 if runs else 0, text)
         numpy.testing.assert_array_equal(self.draw("--effects", "auto"), self.draw())
 
-    def test_statistics_have_the_bytes_of_heat(self):
-        """Once, however many frames there are: it is kept."""
+    def test_stats_have_the_bytes_read_of_heat(self):
+        """Heat is read once for all frames and then kept."""
         draw = ("render", "density.trip", "-o", "a.png", *LOOK, "--orbit", "2", "--stats", "-")
         whole = sum(os.path.getsize(path) for path in glob.glob("heat.trip/**", recursive=True))
         for renderer in ("cpu", *program.GL):
@@ -76,7 +76,7 @@ class Emission(program.ProgramTest):
             off = abs(self.draw(*GLOWS, "--classify", "post", renderer=renderer) - exact)
             self.assertLess(off.max(), 0.02, renderer)
 
-    def test_frames_in_flight_glow_alike(self):
+    def test_emission_is_the_same_with_frames_in_flight(self):
         frames = []
         for count in ("1", "2"):
             self.works("render", "density.trip", "-o", "o.png", *LOOK, *GLOWS, "--orbit", "2",
@@ -84,7 +84,7 @@ class Emission(program.ProgramTest):
             frames.append([self.bytes_of("o-%03d.png" % i) for i in range(2)])
         self.assertEqual(*frames)
 
-    def test_what_does_not_go_is_refused(self):
+    def test_contradictory_options_are_refused(self):
         draw = ("render", "density.trip", "-o", "bad.png", *LOOK)
         for options, says in (
             (HEAT, "--effects emission"),

@@ -1,5 +1,5 @@
-"""The same data through every format gives the same picture, and where the voxels lie in the world
-reaches it."""
+"""Tests that the same data gives the same picture in every format, and that the positions of voxels
+in world space are right."""
 import unittest
 
 import numpy
@@ -15,7 +15,7 @@ TRANSFER_FUNCTION = "values data\n20 0.2 0.3 0.9 0\n120 0.9 0.5 0.2 0.05\n255 1 
 
 
 def look_from(eye, size="96x80"):
-    """The whole of a grid of 40 x 36 x 28 voxels, or of one as large."""
+    """Returns the options of a view of a whole grid of 40 x 36 x 28 voxels."""
     return [
         "--size",
         size,
@@ -34,7 +34,7 @@ VIEW = look_from((75, -60, 50))
 
 
 class Formats(program.ProgramTest):
-    """Every format against raw."""
+    """Compares every format with raw."""
 
     @classmethod
     def setUpClass(cls):
@@ -60,12 +60,13 @@ class Formats(program.ProgramTest):
         )
 
     def alike(self, source, *options, most=1 / 100, mean=1 / 5000):
-        """Gradients are stored in 8 bits over the range of the type, so shading differs a little."""
+        """Compares with tolerance. Gradients are stored in 8 bits over the range of the type, so
+        that shading differs slightly."""
         difference = abs(self.draw(source, *options) - self.plain)
         self.assertLess(difference.max(), most, source)
         self.assertLess(difference.mean(), mean, source)
 
-    def test_the_same_picture_is_the_same_file(self):
+    def test_equal_pictures_give_equal_files(self):
         for extension in "exr", "png", "tif", "jpg":
             names = [f"{i}.{extension}" for i in (1, 2)]
             for name in names:
@@ -73,13 +74,13 @@ class Formats(program.ProgramTest):
             with open(names[0], "rb") as a, open(names[1], "rb") as b:
                 self.assertEqual(a.read(), b.read())
 
-    def test_nrrd(self):
+    def test_nrrd_equals_raw(self):
         program.write_nrrd("plain.nrrd", self.values)
         self.same("plain.nrrd")
         program.write_nrrd("packed.nrrd", self.values, encoding="gzip", endian="big")
         self.same("packed.nrrd")
 
-    def test_nhdr_with_detached_slices_of_raw(self):
+    def test_nhdr_with_detached_data_equals_raw(self):
         program.write(
             "detached.nhdr",
             b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 40 36 28\n"
@@ -87,7 +88,7 @@ class Formats(program.ProgramTest):
         )
         self.same("detached.nhdr")
 
-    def test_big_and_little_endian_words(self):
+    def test_big_and_little_endian_values_are_equal(self):
         for source, endian in ("big.nrrd", "big"), ("little.nrrd", "little"):
             program.write_nrrd(source, self.values.astype("u2"), endian=endian)
         big, little = self.draw("big.nrrd"), self.draw("little.nrrd")
@@ -102,13 +103,13 @@ class Formats(program.ProgramTest):
         self.assertTrue(numpy.array_equal(big, words))
         self.alike("big.nrrd", most=0.1, mean=0.005)
 
-    def test_nifti(self):
+    def test_nifti_equals_raw(self):
         program.write_nifti("plain.nii", self.values)
         self.same("plain.nii")
         program.write_nifti("packed.nii.gz", self.values, packed=True)
         self.same("packed.nii.gz")
 
-    def test_nifti_slope_and_intercept(self):
+    def test_nifti_slope_and_intercept_apply(self):
         program.write_nifti(
             "scaled.nii",
             ((self.values.astype("f4") + 100) * 4).astype("i2"),
@@ -117,12 +118,12 @@ class Formats(program.ProgramTest):
         )
         self.alike("scaled.nii", most=0.1, mean=0.005)
 
-    def test_vol(self):
+    def test_vol_equals_raw(self):
         for version in 2, 3:
             program.write_vol("plain.vol", self.values, version)
             self.same("plain.vol")
 
-    def test_stacks_of_tiff_and_png(self):
+    def test_stacks_of_tiff_and_png_equal_raw(self):
         program.write_stack("tiffs", self.values, program.write_tiff, "tif")
         program.write_stack("pngs", self.values, program.write_png, "png")
         self.same("tiffs")
@@ -130,7 +131,7 @@ class Formats(program.ProgramTest):
         self.same("tiffs/slice-%04d.tif")
         self.same("pngs/slice-*.png")
 
-    def test_stack_of_dicom(self):
+    def test_a_stack_of_dicom_equals_nrrd(self):
         program.write_stack(
             "dicoms",
             self.values.astype("u2"),
@@ -140,28 +141,29 @@ class Formats(program.ProgramTest):
         program.write_nrrd("words.nrrd", self.values.astype("u2"))
         self.assertTrue(numpy.array_equal(self.draw("dicoms"), self.draw("words.nrrd")))
 
-    def test_floats(self):
+    def test_wider_types_look_like_raw(self):
         for kind in "f4", "f8", "i4", "u4":
             program.write_nrrd("wide.nrrd", self.values.astype(kind))
             self.alike("wide.nrrd")
 
     @unittest.skipUnless(pyopenvdb, "python3-openvdb is not installed")
-    def test_openvdb(self):
-        values = self.values.copy()  # beyond the grid there is 0, which the border shall be too
+    def test_openvdb_looks_like_nrrd(self):
+        values = self.values.copy()  # values beyond the grid are 0, so the border is made 0 too
         values[[0, -1]] = values[:, [0, -1]] = values[:, :, [0, -1]] = 0
         program.write_nrrd("bordered.nrrd", values)
         grid = pyopenvdb.FloatGrid()
         grid.name = "density"
         grid.copyFromArray(numpy.ascontiguousarray(values.transpose(2, 1, 0).astype("f4")))
         pyopenvdb.write("bordered.vdb", grid)
-        # By splats, since what is not active is not of the grid: its cells are missing at the border.
+        # `pre` draws splats. `post` would lack cells at the border, because inactive voxels are not
+        # part of the grid.
         view = *VIEW, "--classify", "pre"
         drawn = [self.draw(f"bordered.{kind}", view=view) for kind in ("vdb", "nrrd")]
         difference = abs(drawn[0] - drawn[1])
         self.assertLess(difference.max(), 0.02)
         self.assertLess(difference.mean(), 1 / 5000)
 
-    def test_names_of_any_kind(self):
+    def test_unusual_file_names_work(self):
         for name in (
             "with space.raw",
             "new\nline.raw",
@@ -180,15 +182,15 @@ class Formats(program.ProgramTest):
 
 
 class World(program.ProgramTest):
-    """Spacing, rotation, shear."""
+    """Tests of spacing, rotation and shear."""
 
     def silhouette(self, *view):
-        """Extent of what covers most of the background, across and down."""
+        """Returns the width and height of the region with opacity above 0.5."""
         picture = self.picture("a.trip", "--no-shading", *view)
         rows, columns = numpy.nonzero(picture[..., 3] > 0.5)
         return numpy.ptp(columns) + 1, numpy.ptp(rows) + 1
 
-    def test_a_ball_stays_round_whatever_the_spacing(self):
+    def test_a_ball_is_round_for_every_spacing(self):
         for spacing in (1, 1, 1), (1, 1, 2.5), (3, 1, 1), (0.02, 0.05, 0.03):
             shape = [round(64 * min(spacing) / s) + 8 for s in spacing[::-1]]
             program.write_nrrd("ball.nrrd", program.ball(shape, spacing), spacing)
@@ -211,7 +213,7 @@ class World(program.ProgramTest):
                 self.assertGreater(across, 30)
                 self.assertLess(abs(across - down), 0.1 * across, (spacing, direction))
 
-    def test_given_spacing_is_that_of_the_file(self):
+    def test_given_spacing_equals_spacing_in_the_file(self):
         values = program.noise((20, 24, 28))
         program.write_nrrd("file.nrrd", values, (1, 2, 3))
         program.write_raw("plain.raw", values)
@@ -226,8 +228,8 @@ class World(program.ProgramTest):
         self.brick("turned.nii", "a.trip", "--keep-all")
         return self.picture("a.trip", *view)
 
-    def test_an_affine_moves_voxels_where_it_says(self):
-        """The same voxels at the same places of the world, stored along other axes."""
+    def test_an_affine_map_places_the_voxels(self):
+        """Stores the same voxels at the same positions in world space along other axes."""
         values = program.noise((20, 24, 28))
         view = [
             "--size",
@@ -247,13 +249,13 @@ class World(program.ProgramTest):
         affine = numpy.array([[0, 0, 1, 0], [-1, 0, 0, 23], [0, 1, 0, 0], [0, 0, 0, 1]], float)
         moved = values.transpose(2, 0, 1)[:, :, ::-1]
         turned = self.turned(numpy.ascontiguousarray(moved), affine, view)
-        # Only the order of splats within a sheet is another one.
+        # Only the order of splats within a sheet differs.
         self.assertLess(abs(turned - plain).max(), 0.2)
         self.assertLess(abs(turned - plain).mean(), 0.01)
         self.assertGreater(abs(self.turned(values, affine, view) - plain).mean(), 0.02)
 
-    def test_a_sheared_grid_is_drawn_sheared(self):
-        """Bars along k, sheared by one voxel in x for each in k, lean by 45 degrees."""
+    def test_a_sheared_grid_is_sheared_in_the_picture(self):
+        """Bars along k lean by 45 degrees, because each step in k shifts them by one voxel in x."""
         values = numpy.zeros((40, 9, 60), "u1")
         values[:, 3:6, 8:12] = 200
         affine = numpy.eye(4)
@@ -281,7 +283,8 @@ class World(program.ProgramTest):
         self.assertAlmostEqual(slope, -1, delta=0.05)
 
     def test_pictures_are_neither_upside_down_nor_mirrored(self):
-        """A body at one corner of a large volume: high z is up, high x right when seen along y."""
+        """A body is at one corner of a large volume. In a view along y, high z is up and high x is
+        right."""
         values = numpy.full((40, 40, 40), 10, "u1")
         values[30:38, 4:12, 30:38] = 200
         program.write_nrrd("corner.nrrd", values)

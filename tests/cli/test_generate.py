@@ -1,5 +1,5 @@
-"""triptych-generate: the files hold the fields' values, computed here from their formulas; what
-cannot be written leaves one line and no file."""
+"""Tests of triptych-generate. Its files hold the values that the test computes from the formulas of
+the fields. Output that cannot be written leaves one line and no file."""
 import os
 import signal
 import subprocess
@@ -17,7 +17,7 @@ except ImportError:
 
 
 def positions(dims):
-    """x, y, z of the voxels, [z, y, x]; the longest side spans -1 to 1."""
+    """Returns x, y and z of the voxels as arrays [z, y, x]. The longest side spans -1 to 1."""
     step = 2 / (max(dims) - 1)
     axes = [(numpy.arange(n) - (n - 1) / 2) * step for n in dims]
     z, y, x = numpy.meshgrid(*axes[::-1], indexing="ij")
@@ -75,7 +75,7 @@ class Generate(program.ProgramTest):
         r = generate(field, dims, path, *arguments)
         self.assertEqual((r.returncode, r.stderr), (0, ""))
 
-    def test_files_hold_the_values_of_the_formula(self):
+    def test_files_hold_the_values_of_the_formulas(self):
         dims = 61, 40, 53
         for field, formula in FIELDS.items():
             for detail in 1, 2.5:
@@ -87,7 +87,7 @@ class Generate(program.ProgramTest):
                 self.made(field, dims, "v.raw", "--type", "float", "--detail", detail)
                 self.assertLess(abs(read_raw("v.raw", dims, "<f4") - wanted).max(), 1e-6, field)
 
-    def test_the_header_says_what_is_there(self):
+    def test_the_header_describes_the_data(self):
         dims = 20, 10, 30
         self.made("cloud", dims, "v.raw", "--type", "uint16")
         self.made("cloud", dims, "v.nrrd", "--type", "uint16")
@@ -99,8 +99,8 @@ class Generate(program.ProgramTest):
             self.assertEqual(f.read(), data)
 
     @unittest.skipUnless(pyopenvdb, "python3-openvdb is not installed")
-    def test_openvdb_reads_the_same_values_from_a_vdb(self):
-        """Across cubes of 128 and nodes of 4096 voxels, with sides that are no multiples of them."""
+    def test_openvdb_reads_the_same_values(self):
+        """The sides are not multiples of the cubes of 128 and the nodes of 4096 voxels."""
         for field in "shells", "cloud", "filaments":
             for dims in (60, 60, 60), (130, 70, 257), (10, 4110, 9):
                 self.made(field, dims, "v.raw", "--type", "float", "--detail", 1)
@@ -111,16 +111,16 @@ class Generate(program.ProgramTest):
                 self.assertEqual(grid.activeVoxelCount(), numpy.count_nonzero(wanted))
                 self.assertEqual(grid.gridClass, "fog volume")
 
-    def test_threads_make_no_difference(self):
+    def test_the_number_of_threads_does_not_change_files(self):
         for name in "a.raw", "a.vdb":
             contents = set()
             for threads in 1, 3, 8:
                 self.made("cloud", (90, 80, 70), name, "--threads", threads)
-                with open(name, "rb") as f:  # a VDB begins with an identifier that is made up
+                with open(name, "rb") as f:  # a VDB file begins with a random identifier
                     contents.add(f.read()[64:])
             self.assertEqual(len(contents), 1, name)
 
-    def test_what_cannot_be_written_leaves_nothing(self):
+    def test_output_that_cannot_be_written_leaves_nothing(self):
         os.mkdir("folder.raw")
         for name, status in ("nowhere/v.vdb", 1), ("nowhere/v.raw", 1), ("v.xyz", 2):
             r = generate("shells", (20, 20, 20), name)
@@ -144,7 +144,7 @@ class Generate(program.ProgramTest):
             self.assertRegex(said, r"\Atriptych: [^\n]*interrupted\n\Z")
             self.assertEqual(set(os.listdir(".")), before)
 
-    def test_a_full_disk(self):
+    def test_a_full_disk_leaves_one_line(self):
         for name in "v.raw", "v.vdb":
             program.skip_what_is_switched_off([name])
             script = (

@@ -1,4 +1,5 @@
-/* What the text of a hostile data set costs, and what of it reaches a terminal. */
+/* Tests the text of hostile data sets. The memory and time for it are bounded, and it reaches a
+ * terminal only with escapes. */
 #include "program.h"
 
 #include <stdbool.h>
@@ -13,10 +14,10 @@
 #include "writer.h"
 
 enum { MIB = 1 << 20, TEXT_BYTES = 16 * MIB, MEMORY = 64 * MIB };
-/* The program, its libraries, its threads' stacks. */
+/* Bound on the program, its libraries and the stacks of its threads. */
 enum { PROGRAM_BYTES = 56 * MIB };
 
-/* A data set of one splat with this text. */
+/* Writes a data set of one voxel with this text. */
 static void write_dataset(const char *path, const char *text)
 {
     trip_budget *budget;
@@ -37,7 +38,7 @@ static void write_dataset(const char *path, const char *text)
     trip_budget_destroy(budget);
 }
 
-/* `open`, as often as there is room for it, then `close`. */
+/* Returns `begin`, as many copies of `unit` as TEXT_BYTES allow, and `end`. */
 static char *repeat(const char *begin, const char *unit, const char *end)
 {
     char *text = malloc(TEXT_BYTES + 1), *at = stpcpy(text, begin);
@@ -57,8 +58,8 @@ static long peak_of_children(void)
 }
 #endif
 
-/* Texts of which a tree takes up to forty times their length. */
-static void text_of_16_mib_stays_within_the_memory_promised(void **state)
+/* The JSON tree of such a text needs up to forty times its length. */
+static void text_of_16_mib_stays_within_the_given_memory(void **state)
 {
     (void)state;
     program_run *r = malloc(sizeof *r);
@@ -86,7 +87,7 @@ static void text_of_16_mib_stays_within_the_memory_promised(void **state)
 #endif
 }
 
-/* In quadratic time these would take a quarter of an hour. */
+/* An algorithm of quadratic time would take a quarter of an hour. */
 static void large_envelopes_and_histograms_take_linear_time(void **state)
 {
     (void)state;
@@ -117,9 +118,9 @@ static bool is_clean(const char *text)
     return true;
 }
 
-/* The file holds escapes of terminals, in one byte and in two, a mark that turns the direction of
- * writing, and bytes that are no UTF-8, in keys and in values. */
-static void control_characters_and_bad_utf8_of_the_text_are_escaped(void **state)
+/* Keys and values of the file hold terminal escapes of one and of two bytes, a mark that reverses
+ * the direction of writing, and invalid UTF-8. */
+static void control_characters_and_bad_utf8_are_escaped(void **state)
 {
     (void)state;
     program_run *r = malloc(sizeof *r);
@@ -149,11 +150,11 @@ static void control_characters_and_bad_utf8_of_the_text_are_escaped(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(text_of_16_mib_stays_within_the_memory_promised,
+        cmocka_unit_test_setup_teardown(text_of_16_mib_stays_within_the_given_memory,
                                         program_enter_folder, program_leave_folder),
         cmocka_unit_test_setup_teardown(large_envelopes_and_histograms_take_linear_time,
                                         program_enter_folder, program_leave_folder),
-        cmocka_unit_test_setup_teardown(control_characters_and_bad_utf8_of_the_text_are_escaped,
+        cmocka_unit_test_setup_teardown(control_characters_and_bad_utf8_are_escaped,
                                         program_enter_folder, program_leave_folder),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

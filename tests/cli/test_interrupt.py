@@ -1,6 +1,6 @@
-"""Ctrl-C while a large picture is planned, drawn, merged or written, or a volume is bricked: the
-program ends soon, with one line, and leaves nothing. How soon is judged by the processors' time that
-it still takes, since machines may be busy; the limit is ten times what is wanted."""
+"""Tests Ctrl-C while a large picture is planned, drawn, merged or written, and while a volume is
+bricked. The program ends soon with one line, and leaves nothing. Machines may be busy, so that the
+tests measure processor time after the signal. Their limit is ten times the goal."""
 import os
 import signal
 import time
@@ -8,12 +8,12 @@ import time
 import program
 
 SIZE = "4096x4096"
-LIMIT_S = 5 * (4 if program.SANITIZED else 1)  # of processors
+LIMIT_S = 5 * (4 if program.SANITIZED else 1)  # seconds of processor time
 HANGS_S = 60
 
 
 class Ended:
-    """A process that was waited for, with what it took in all."""
+    """A process that was waited for, with its total processor time."""
 
     def __init__(self, process, seconds):
         limit = time.monotonic() + seconds
@@ -34,7 +34,8 @@ class Interrupt(program.ProgramTest):
         assert program.call("brick", "a.nrrd", "-o", "a.trip", "-q").returncode == 0
 
     def interrupt(self, made, seconds, *arguments):
-        """Of processors from the signal to the end; None where it had ended before."""
+        """Interrupts a run after `seconds`. Returns the processor time from the signal to the end,
+        or None if the run had ended before."""
         before = set(os.listdir("."))
         process = program.start(*arguments)
         program.await_handler(process)
@@ -55,7 +56,7 @@ class Interrupt(program.ProgramTest):
             self.fail(f"{arguments}, after {seconds} s: does not end")
         took = ended.processor_seconds - taken
         err = process.communicate()[1].decode()
-        if process.returncode == 0:  # it was all done already
+        if process.returncode == 0:  # the work was already done
             self.remove(made)
             return None
         self.assertEqual(process.returncode, 1, err)
@@ -89,20 +90,20 @@ class Interrupt(program.ProgramTest):
         draw = ["render", "a.trip", "-o", "p.png", f"--size={size}", f"--renderer={renderer}"]
         self.times(f"{renderer}, {size}", "p.png", (0.2, 1, 3), *draw)
 
-    def test_the_processors_renderer(self):
+    def test_cpu_can_be_interrupted(self):
         self.check("cpu")
 
-    def test_the_reference(self):
+    def test_reference_can_be_interrupted(self):
         self.check("reference")
 
-    def test_the_integral(self):
+    def test_integral_can_be_interrupted(self):
         self.check("integral")
 
-    def test_opengl(self):
+    def test_gl_can_be_interrupted(self):
         self.check("gl")
         self.check("gl", "8192x8192")
 
-    def test_bricking_what_does_not_fit_into_memory(self):
+    def test_bricking_beyond_memory_can_be_interrupted(self):
         program.write_nrrd("b.nrrd", program.noise((160, 256, 256), "u2"), encoding="gzip")
         brick = ["brick", "b.nrrd", "-o", "b.trip", "--keep-all", "--memory=64M"]
         self.times("brick", "b.trip", (0.2, 0.5, 1, 1.5, 2, 3, 5), *brick)

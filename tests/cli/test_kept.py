@@ -36,7 +36,7 @@ def read_stent():
 
 
 def read_grid(path, name):
-    """Returns the values of the active voxels, including those of active tiles."""
+    """Returns the values of the active voxels. Active tiles count as voxels."""
     grid = pyopenvdb.read(path, name)
     low, high = grid.evalActiveVoxelBoundingBox()
     values, active = numpy.zeros((2, *(h - l + 1 for l, h in zip(low, high))), numpy.float32)
@@ -131,7 +131,7 @@ class Counts(program.ProgramTest):
         program.write_nrrd("holes.nrrd", values)
         run = program.call("brick", "holes.nrrd", "-o", "holes.trip", "-q", "--keep-all")
         self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertIn(f"{(~numpy.isfinite(values)).sum()} values that are not finite", run.stderr)
+        self.assertIn(f"{(~numpy.isfinite(values)).sum()} values are not finite", run.stderr)
         self.assertEqual(self.info("holes.trip")["kept"], numpy.isfinite(values).sum())
 
     def test_every_type_keeps_the_same_voxels(self):

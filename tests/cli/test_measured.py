@@ -152,7 +152,7 @@ class Depth(program.ProgramTest):
 
     def test_distances_to_interpolated_values(self):
         """Interpolated values between 0 and 200 become visible at 100, half a voxel before the
-        plate, and opaque at 150. A renderer assigns the middle of a segment as the distance."""
+        plate, and opaque at 150. The distance of a segment is the distance of its middle."""
         for renderer in self.renderers():
             for slices in 1, 4:
                 z = self.distances(

@@ -1,5 +1,5 @@
 """Tests that one phantom, acquired in several ways and stored in several formats, gives the same
-picture, and that left, right, front and head are where radiologists expect them.
+picture. Left, right, front and head are where radiologists expect them.
 
 The phantom is a function of the position in the patient, in millimetres to the left, the back and
 the head. It has a body, a nose in front, a marker at the left and a marker at the head. It has no
@@ -99,8 +99,9 @@ def write_frames(path, affine, values):
 
 
 class Camera:
-    """A view of the patient from the front, the left and above, computed in the test. options()
-    gives its options in a world with axes that are the rows of `to_patient` in the patient."""
+    """A view of the patient from the front, the left and above, computed in the test. The rows of
+    `to_patient` are the axes of the world in the patient. options() returns the options for this
+    world."""
 
     SIZE, FOV = 128, 30
     EYE, LOOK, UP = (75, -180, 70), (0, 0, 4), (0, 0, 1)

@@ -1,4 +1,4 @@
-/* What a plain program gets of the disk. */
+/* Tests the plain reads with which the speed of a disk is measured. */
 #include "plain_disk.h"
 
 #include <fcntl.h>
@@ -27,14 +27,14 @@ static int remove_file(void **state)
     return unlink(path);
 }
 
-static void a_file_is_read_from_end_to_end(void **state)
+static void a_file_is_read_completely(void **state)
 {
     plain_disk d = { .look = true };
     assert_int_equal(plain_disk_read(&d, path, *state), 0);
     assert_int_equal(d.bytes, BYTES);
 }
 
-static void a_read_that_is_cancelled_ends_before_the_file_does(void **state)
+static void a_cancelled_read_ends_before_the_end_of_the_file(void **state)
 {
     plain_disk d = { .look = true };
     trip_scope scope = { .around = trip_scope_current() };
@@ -50,8 +50,8 @@ static void a_read_that_is_cancelled_ends_before_the_file_does(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_file_is_read_from_end_to_end),
-        cmocka_unit_test(a_read_that_is_cancelled_ends_before_the_file_does),
+        cmocka_unit_test(a_file_is_read_completely),
+        cmocka_unit_test(a_cancelled_read_ends_before_the_end_of_the_file),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }

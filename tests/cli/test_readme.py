@@ -1,4 +1,4 @@
-"""The examples of README.md run as they stand there, and draw something."""
+"""Tests that the examples of README.md run unchanged and draw a picture."""
 import os
 import re
 import shlex
@@ -14,16 +14,16 @@ except ImportError:
     raise SystemExit(program.SKIPPED)
 
 ROOT = os.environ["TRIP_SOURCE_DIR"]
-# Examples with tests of their own: they set up, wait for a person, or measure for long.
+# Other tests cover these commands: they install, wait for a person, or measure for long.
 ELSEWHERE = ("./demo.sh", "./check.sh", "export", "tests/compare/compare", "triptych view",
              "triptych serve", "triptych bench", "triptych accuracy")
-# The same example in less time: a volume of a 64th of the voxels, fewer pictures, a given error.
+# Replacements that make an example faster: smaller volumes, fewer pictures, a given error.
 SMALLER = (("512x512x512", "128x128x128"), ("-s 512", "-s 128"), ("--memory 128M", "--memory 96M"),
            ("--orbit 60", "--orbit 3"), ("turn.mp4", "turn.png"), ("--size 512x512", "--size 96x96"))
 
 
 def examples():
-    """The command lines in README's blocks of shell, without their comments."""
+    """Yields the command lines in the shell blocks of README.md, without comments."""
     with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as f:
         blocks = re.findall(r"^```sh\n(.*?)^```$", f.read(), re.S | re.M)
     for line in "".join(blocks).replace("\\\n", " ").splitlines():
@@ -38,7 +38,7 @@ def read_picture(path):
 
 
 class Readme(program.ProgramTest):
-    def test_each_example_works_and_draws_something(self):
+    def test_each_example_works_and_draws_a_picture(self):
         os.symlink(program.DATASETS, "datasets")
         pictures = 0
         for line in examples():
@@ -65,7 +65,7 @@ class Readme(program.ProgramTest):
         pixels = read_picture(path)
         self.assertGreater((abs(pixels - pixels[0, 0]).max(axis=-1) > 16).mean(), 0.01, path)
 
-    def test_examples_that_are_not_run_here_are_commands_with_known_options(self):
+    def test_all_examples_have_known_options(self):
         for line in examples():
             name, *arguments = shlex.split(line)
             if name != "triptych":
@@ -75,7 +75,7 @@ class Readme(program.ProgramTest):
                 if option.startswith("--"):
                     self.assertIn(option.split("=")[0], text, line)
 
-    def test_the_page_is_short_and_its_links_lead_somewhere(self):
+    def test_the_page_is_short_and_its_links_exist(self):
         with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as f:
             text = f.read()
         self.assertLessEqual(text.count("\n"), 140)

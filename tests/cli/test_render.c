@@ -45,7 +45,7 @@ static const float *at(const picture *p, int x, int y)
     return p->rgba + 4 * ((size_t)y * (size_t)p->width + (size_t)x);
 }
 
-/* Largest colour on the rim of the picture, and of all of it. */
+/* Finds the maximum colour at the border of the picture, and in the whole picture. */
 static void brightness(const picture *p, double *rim, double *all)
 {
     *rim = *all = 0;
@@ -113,7 +113,7 @@ static void wrong_usage_is_one_line_and_exit_status_2(void **state)
     }
 }
 
-static void what_cannot_be_done_is_one_line_and_exit_status_1(void **state)
+static void failures_are_one_line_and_exit_status_1(void **state)
 {
     (void)state;
     FILE *f = fopen("bad.tf", "w");
@@ -136,7 +136,7 @@ static void what_cannot_be_done_is_one_line_and_exit_status_1(void **state)
     }
 }
 
-static void by_default_everything_is_in_view_and_something_shows(void **state)
+static void the_default_view_shows_the_whole_volume(void **state)
 {
     (void)state;
     const char *const data[] = { "fog", "stent" };
@@ -156,7 +156,7 @@ static void by_default_everything_is_in_view_and_something_shows(void **state)
     }
 }
 
-static void the_background_is_black_in_png_and_none_in_exr_unless_given(void **state)
+static void the_default_background_is_black_in_png_and_clear_in_exr(void **state)
 {
     (void)state;
     program_call(&run, "render fog.trip -o a.png --size 32x32");
@@ -189,7 +189,7 @@ static cJSON *stats_of(const char *args)
 {
     program_call(&run, "render %s -o a.exr --count --stats -", args);
     assert_works(&run);
-    cJSON *root = cJSON_Parse(run.out); /* nothing else is on stdout */
+    cJSON *root = cJSON_Parse(run.out); /* stdout has only the JSON */
     assert_non_null(root);
     return root;
 }
@@ -217,7 +217,7 @@ static double kept_voxels(const char *data)
     return kept;
 }
 
-static void stats_hold_the_fixed_keys(void **state)
+static void stats_have_the_fixed_keys(void **state)
 {
     (void)state;
     const char *const strings[] = { "renderer", "device", "method" };
@@ -248,7 +248,7 @@ static void stats_hold_the_fixed_keys(void **state)
     cJSON_Delete(root);
 }
 
-static void with_h_zero_thrice_the_kept_voxels_are_drawn_and_along_an_axis_once(void **state)
+static void with_h_0_each_voxel_is_drawn_three_times_or_once(void **state)
 {
     (void)state;
     const char *const renderers[] = { "auto", "cpu", "reference" };
@@ -265,7 +265,7 @@ static void with_h_zero_thrice_the_kept_voxels_are_drawn_and_along_an_axis_once(
     }
 }
 
-static void skipping_what_is_occluded_does_not_change_the_picture(void **state)
+static void skipping_occluded_bricks_does_not_change_the_picture(void **state)
 {
     (void)state;
     const char *const classify[] = { "pre", "post" };
@@ -282,7 +282,7 @@ static void skipping_what_is_occluded_does_not_change_the_picture(void **state)
     }
 }
 
-static void explain_prints_the_plan_and_what_it_cost(void **state)
+static void explain_prints_the_plan_and_its_cost(void **state)
 {
     (void)state;
     const char *const more[] = { "", "--classify pre" };
@@ -299,7 +299,7 @@ static void explain_prints_the_plan_and_what_it_cost(void **state)
     }
 }
 
-static void a_function_that_shows_what_was_left_out_warns_with_a_count(void **state)
+static void a_warning_counts_the_voxels_that_bricking_dropped(void **state)
 {
     (void)state;
     FILE *f = fopen("all.tf", "w");
@@ -313,12 +313,12 @@ static void a_function_that_shows_what_was_left_out_warns_with_a_count(void **st
     const char *about = strstr(run.err, "reveals about ");
     assert_int_equal(strncmp(run.err, "triptych: warning: part.trip: ", 30), 0);
     assert_non_null(about);
-    /* 6124 voxels were read and those kept show: the count is of the others. */
+    /* The volume has 6124 voxels. The warning counts all voxels that are not kept. */
     double others = 6124 - kept_voxels("part.trip");
     assert_true(fabs(strtod(about + strlen("reveals about "), NULL) - others) < 0.02 * others);
 }
 
-static void what_cannot_be_written_fails_and_leaves_nothing_behind(void **state)
+static void a_failed_write_leaves_no_file(void **state)
 {
     (void)state;
     program_call(&run, "render fog.trip -o /dev/full/a.png --size 32x32");
@@ -332,7 +332,7 @@ static void what_cannot_be_written_fails_and_leaves_nothing_behind(void **state)
     assert_int_equal(WEXITSTATUS(system("ls *.partial* 2>/dev/null")), 2);
 }
 
-/* Each --option of --help stands in the man page. */
+/* Every --option of --help must be in the man page. */
 static void man_pages_name_every_option(void **state)
 {
     (void)state;
@@ -364,16 +364,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(wrong_usage_is_one_line_and_exit_status_2),
-        cmocka_unit_test(what_cannot_be_done_is_one_line_and_exit_status_1),
-        cmocka_unit_test(by_default_everything_is_in_view_and_something_shows),
-        cmocka_unit_test(the_background_is_black_in_png_and_none_in_exr_unless_given),
+        cmocka_unit_test(failures_are_one_line_and_exit_status_1),
+        cmocka_unit_test(the_default_view_shows_the_whole_volume),
+        cmocka_unit_test(the_default_background_is_black_in_png_and_clear_in_exr),
         cmocka_unit_test(an_orbit_writes_numbered_images_that_differ),
-        cmocka_unit_test(stats_hold_the_fixed_keys),
-        cmocka_unit_test(with_h_zero_thrice_the_kept_voxels_are_drawn_and_along_an_axis_once),
-        cmocka_unit_test(skipping_what_is_occluded_does_not_change_the_picture),
-        cmocka_unit_test(explain_prints_the_plan_and_what_it_cost),
-        cmocka_unit_test(a_function_that_shows_what_was_left_out_warns_with_a_count),
-        cmocka_unit_test(what_cannot_be_written_fails_and_leaves_nothing_behind),
+        cmocka_unit_test(stats_have_the_fixed_keys),
+        cmocka_unit_test(with_h_0_each_voxel_is_drawn_three_times_or_once),
+        cmocka_unit_test(skipping_occluded_bricks_does_not_change_the_picture),
+        cmocka_unit_test(explain_prints_the_plan_and_its_cost),
+        cmocka_unit_test(a_warning_counts_the_voxels_that_bricking_dropped),
+        cmocka_unit_test(a_failed_write_leaves_no_file),
         cmocka_unit_test(man_pages_name_every_option),
     };
     return cmocka_run_group_tests(tests, enter_with_data, program_leave_folder);

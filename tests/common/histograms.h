@@ -1,4 +1,4 @@
-/* Histograms for tests, put together from peaks and single values. */
+/* Makes histograms for tests from peaks and single values. */
 #ifndef HISTOGRAMS_H
 #define HISTOGRAMS_H
 
@@ -22,7 +22,7 @@ static inline void put(double value, double count)
     h.total += (uint64_t)count;
 }
 
-/* `count` voxels over the values lo, lo + 1, ... hi like a normal distribution. */
+/* Adds `count` voxels with a normal distribution over the values lo, lo + 1, ... hi. */
 static inline void put_peak(double lo, double hi, double mean, double deviation, double count)
 {
     for (double v = lo; v <= hi; v++) {
@@ -31,7 +31,7 @@ static inline void put_peak(double lo, double hi, double mean, double deviation,
     }
 }
 
-/* A chest in Hounsfield units: air, lung, fat, muscle, bone. */
+/* Makes the histogram of a chest in Hounsfield units, with air, lung, fat, muscle and bone. */
 static inline void put_chest(double lo, double hi)
 {
     start(lo, hi);
@@ -42,7 +42,8 @@ static inline void put_chest(double lo, double hi)
     put_peak(lo, hi, 400, 200, 1e5);
 }
 
-/* A head by magnetic resonance: noise, then tissue about two broad peaks. */
+/* Makes the histogram of a magnetic resonance image of a head, with noise and two broad peaks of
+ * tissue. */
 static inline void put_head(void)
 {
     start(0, 1200);

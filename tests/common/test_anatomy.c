@@ -9,7 +9,7 @@ static void assert_vec(trip_vec3 actual, double x, double y, double z)
     assert_close(actual.z, z, 0);
 }
 
-static void left_handed_and_other_names_are_no_convention(void **state)
+static void only_lps_and_ras_are_conventions(void **state)
 {
     (void)state;
     char ends[4];
@@ -23,7 +23,7 @@ static void left_handed_and_other_names_are_no_convention(void **state)
     }
 }
 
-static void each_end_of_the_body_is_where_its_convention_has_it(void **state)
+static void directions_of_the_ends_of_the_body_follow_the_convention(void **state)
 {
     (void)state;
     assert_vec(trip_anatomy_direction("LPS", 'L'), 1, 0, 0);
@@ -40,7 +40,7 @@ static void each_end_of_the_body_is_where_its_convention_has_it(void **state)
     assert_vec(trip_anatomy_direction("RAS", '\0'), 0, 0, 0);
 }
 
-/* Left, as seen by the patient, is up x forward in a right-handed space. */
+/* In a right-handed space, the patient's left is the cross product of up and forward. */
 static void both_conventions_are_right_handed(void **state)
 {
     (void)state;
@@ -53,7 +53,7 @@ static void both_conventions_are_right_handed(void **state)
     }
 }
 
-static void vectors_are_named_by_the_ends_they_point_to_most_first(void **state)
+static void vectors_are_named_by_the_ends_they_point_to(void **state)
 {
     (void)state;
     char ends[4], words[TRIP_ANATOMY_WORDS];
@@ -71,7 +71,7 @@ static void vectors_are_named_by_the_ends_they_point_to_most_first(void **state)
     assert_string_equal(trip_anatomy_words("LPS", trip_v3(NAN, 0, 0), words), "");
 }
 
-static void scans_from_above_lie_along_their_axes_in_slices_apart(void **state)
+static void scans_from_above_have_straight_axes_and_thick_slices(void **state)
 {
     (void)state;
     static const double along[][4] = {
@@ -85,7 +85,7 @@ static void scans_from_above_lie_along_their_axes_in_slices_apart(void **state)
             m.m[a][a] = along[i][a];
         assert_int_equal(trip_anatomy_is_scan_from_above(&m), along[i][3] > 0);
     }
-    for (int n = 0; n < 12; n++) { /* turned, or moved */
+    for (int n = 0; n < 12; n++) { /* sheared or moved */
         m = (trip_affine){ { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 3, 0 } } };
         if (n / 4 == n % 4)
             continue;
@@ -94,7 +94,7 @@ static void scans_from_above_lie_along_their_axes_in_slices_apart(void **state)
     }
 }
 
-static void axes_are_one_end_of_each_pair(void **state)
+static void axes_name_one_end_of_each_pair(void **state)
 {
     (void)state;
     static const char *const good[] = { "PIR", "LPS", "RAS", "SAL", "IRA" };
@@ -109,12 +109,12 @@ static void axes_are_one_end_of_each_pair(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(left_handed_and_other_names_are_no_convention),
-        cmocka_unit_test(each_end_of_the_body_is_where_its_convention_has_it),
+        cmocka_unit_test(only_lps_and_ras_are_conventions),
+        cmocka_unit_test(directions_of_the_ends_of_the_body_follow_the_convention),
         cmocka_unit_test(both_conventions_are_right_handed),
-        cmocka_unit_test(vectors_are_named_by_the_ends_they_point_to_most_first),
-        cmocka_unit_test(scans_from_above_lie_along_their_axes_in_slices_apart),
-        cmocka_unit_test(axes_are_one_end_of_each_pair),
+        cmocka_unit_test(vectors_are_named_by_the_ends_they_point_to),
+        cmocka_unit_test(scans_from_above_have_straight_axes_and_thick_slices),
+        cmocka_unit_test(axes_name_one_end_of_each_pair),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -49,9 +49,9 @@ static void huge_requests_are_refused_without_overflow(void **state)
     trip_budget_destroy(b);
 }
 
-#if !TEST_ADDRESS_SANITIZER /* whose heap ends the program instead */
-/* Half of all addresses, which no system gives. */
-static void what_the_system_refuses_is_not_counted(void **state)
+#if !TEST_ADDRESS_SANITIZER /* AddressSanitizer would abort */
+/* Requests half of the address space, which every system refuses. */
+static void memory_refused_by_the_system_is_not_counted(void **state)
 {
     (void)state;
     trip_budget *b;
@@ -62,7 +62,7 @@ static void what_the_system_refuses_is_not_counted(void **state)
 }
 #endif
 
-static void nothing_takes_a_page(void **state)
+static void zero_bytes_take_one_page(void **state)
 {
     (void)state;
     trip_budget *b;
@@ -75,7 +75,7 @@ static void nothing_takes_a_page(void **state)
     trip_budget_destroy(b);
 }
 
-static void releasing_nothing_is_allowed(void **state)
+static void releasing_null_is_allowed(void **state)
 {
     (void)state;
     trip_budget *b;
@@ -193,7 +193,7 @@ static void other_texts_are_not_sizes(void **state)
     }
 }
 
-static void sizes_are_shown_with_three_digits(void **state)
+static void sizes_are_printed_with_three_digits(void **state)
 {
     (void)state;
     char text[32];
@@ -213,16 +213,16 @@ int main(void)
         cmocka_unit_test(whole_limit_fits_and_one_byte_more_does_not),
         cmocka_unit_test(huge_requests_are_refused_without_overflow),
 #if !TEST_ADDRESS_SANITIZER
-        cmocka_unit_test(what_the_system_refuses_is_not_counted),
+        cmocka_unit_test(memory_refused_by_the_system_is_not_counted),
 #endif
-        cmocka_unit_test(nothing_takes_a_page),
-        cmocka_unit_test(releasing_nothing_is_allowed),
+        cmocka_unit_test(zero_bytes_take_one_page),
+        cmocka_unit_test(releasing_null_is_allowed),
         cmocka_unit_test(default_limit_is_a_quarter_of_the_available_memory),
         cmocka_unit_test(threads_never_exceed_the_limit),
         cmocka_unit_test(peak_resident_set_grows_with_touched_memory),
         cmocka_unit_test(sizes_have_binary_suffixes),
         cmocka_unit_test(other_texts_are_not_sizes),
-        cmocka_unit_test(sizes_are_shown_with_three_digits),
+        cmocka_unit_test(sizes_are_printed_with_three_digits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,7 +2,7 @@
 
 #include "geometry.h"
 
-/* A quarter turn about z, then axes scaled by 2, 3 and 4, then moved. */
+/* Makes a quarter turn about z, scales the axes by 2, 3 and 4, then moves by (10, 20, 30). */
 static const trip_affine turned = { { { 0, -2, 0, 10 }, { 3, 0, 0, 20 }, { 0, 0, 4, 30 } } };
 
 static void assert_vec(trip_vec3 actual, double x, double y, double z)
@@ -22,14 +22,14 @@ static void products_follow_the_right_hand_rule(void **state)
     assert_vec(trip_normalize(trip_v3(0, 0, 0)), 0, 0, 0);
 }
 
-static void points_move_and_vectors_do_not(void **state)
+static void translation_moves_points_but_not_vectors(void **state)
 {
     (void)state;
     assert_vec(trip_affine_point(&turned, trip_v3(1, 2, 3)), 6, 23, 42);
     assert_vec(trip_affine_vector(&turned, trip_v3(1, 2, 3)), -4, 3, 12);
 }
 
-static void product_applies_the_right_map_first(void **state)
+static void a_product_applies_the_right_map_first(void **state)
 {
     (void)state;
     trip_affine shift = trip_affine_identity();
@@ -45,7 +45,7 @@ static void determinant_is_the_volume_of_a_voxel(void **state)
     assert_close(trip_affine_determinant(&turned), 24, 1e-12);
 }
 
-static void similar_maps_turn_mirror_and_scale_alike(void **state)
+static void similarities_rotate_mirror_and_scale_uniformly(void **state)
 {
     (void)state;
     const trip_affine turns = { { { 0.6, -0.8, 0, 5 }, { 0.8, 0.6, 0, -9 }, { 0, 0, -1, 2 } } };
@@ -81,7 +81,7 @@ static void singular_and_infinite_maps_have_no_inverse(void **state)
     assert_false(trip_affine_invert(&infinite, &out));
 }
 
-/* f(world) = n . world has gradient n; seen in index space it is linear^T n. */
+/* f(world) = n . world has the gradient n in world space, and linear^T n in index space. */
 static void gradients_map_by_the_transpose(void **state)
 {
     (void)state;
@@ -94,10 +94,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(products_follow_the_right_hand_rule),
-        cmocka_unit_test(points_move_and_vectors_do_not),
-        cmocka_unit_test(product_applies_the_right_map_first),
+        cmocka_unit_test(translation_moves_points_but_not_vectors),
+        cmocka_unit_test(a_product_applies_the_right_map_first),
         cmocka_unit_test(determinant_is_the_volume_of_a_voxel),
-        cmocka_unit_test(similar_maps_turn_mirror_and_scale_alike),
+        cmocka_unit_test(similarities_rotate_mirror_and_scale_uniformly),
         cmocka_unit_test(inverse_undoes_a_sheared_map),
         cmocka_unit_test(singular_and_infinite_maps_have_no_inverse),
         cmocka_unit_test(gradients_map_by_the_transpose),

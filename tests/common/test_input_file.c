@@ -40,11 +40,11 @@ static void a_file_is_read_to_its_end(void **state)
     assert_int_equal(errno, ENOENT);
 }
 
-static void a_pipe_is_waited_for_and_read_to_its_end(void **state)
+static void a_pipe_is_read_to_its_end(void **state)
 {
     (void)state;
     char text[16] = "";
-    int fd = trip_input_open("pipe"); /* before anybody writes */
+    int fd = trip_input_open("pipe"); /* no process writes yet */
     assert_true(fd >= 0);
     pid_t child = fork();
     if (child == 0) {
@@ -57,7 +57,7 @@ static void a_pipe_is_waited_for_and_read_to_its_end(void **state)
     close(fd);
 }
 
-static void a_signal_ends_the_wait_for_a_pipe_that_nobody_writes_to(void **state)
+static void a_signal_ends_the_wait_for_a_pipe(void **state)
 {
     (void)state;
     char text[16];
@@ -74,8 +74,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_file_is_read_to_its_end),
-        cmocka_unit_test(a_pipe_is_waited_for_and_read_to_its_end),
-        cmocka_unit_test(a_signal_ends_the_wait_for_a_pipe_that_nobody_writes_to),
+        cmocka_unit_test(a_pipe_is_read_to_its_end),
+        cmocka_unit_test(a_signal_ends_the_wait_for_a_pipe),
     };
     return cmocka_run_group_tests(tests, enter_folder, leave_folder);
 }

@@ -4,7 +4,7 @@
 
 #include "json.h"
 
-static void memory_is_charged_before_it_is_taken(void **state)
+static void memory_is_charged_before_it_is_allocated(void **state)
 {
     (void)state;
     trip_budget *budget;
@@ -16,7 +16,7 @@ static void memory_is_charged_before_it_is_taken(void **state)
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 20), 0);
     assert_int_equal(trip_json_parse(&j, text, "a.trip", budget), 0);
     assert_int_equal(cJSON_GetArraySize(j.root), 1001);
-    /* A node each, which is larger than cJSON's structure. */
+    /* Each number takes a node, which is larger than the structure cJSON. */
     assert_true(j.bytes >= 1001 * sizeof(cJSON));
     assert_int_equal(trip_budget_left_bytes(budget), ((uint64_t)1 << 20) - j.bytes);
     trip_json_free(&j);
@@ -30,7 +30,7 @@ static void memory_is_charged_before_it_is_taken(void **state)
     trip_budget_destroy(budget);
 }
 
-static void what_is_not_json_is_no_failure(void **state)
+static void invalid_json_is_no_failure(void **state)
 {
     (void)state;
     static const char *const bad[] = { "", "{", "}", "[1,", "\"a", "nul" };
@@ -54,7 +54,7 @@ static void deep_nesting_is_refused(void **state)
     test_catch_reports();
     assert_int_equal(trip_json_parse(&j, text, "a.trip", NULL), TRIP_ERROR);
     assert_one_report("nested more than 64 deep");
-    text[129] = 0; /* one less of each */
+    text[129] = 0; /* removes one pair */
     assert_int_equal(trip_json_parse(&j, text + 1, "a.trip", NULL), 0);
     assert_non_null(j.root);
     trip_json_free(&j);
@@ -73,7 +73,7 @@ static void brackets_and_commas_in_strings_are_not_counted(void **state)
     trip_json_free(&j);
 }
 
-static void what_is_printed_is_sound_whatever_the_strings_hold(void **state)
+static void printed_json_escapes_control_characters_and_bad_utf8(void **state)
 {
     (void)state;
     cJSON *root = cJSON_CreateObject();
@@ -88,11 +88,11 @@ static void what_is_printed_is_sound_whatever_the_strings_hold(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(memory_is_charged_before_it_is_taken),
-        cmocka_unit_test(what_is_not_json_is_no_failure),
+        cmocka_unit_test(memory_is_charged_before_it_is_allocated),
+        cmocka_unit_test(invalid_json_is_no_failure),
         cmocka_unit_test(deep_nesting_is_refused),
         cmocka_unit_test(brackets_and_commas_in_strings_are_not_counted),
-        cmocka_unit_test(what_is_printed_is_sound_whatever_the_strings_hold),
+        cmocka_unit_test(printed_json_escapes_control_characters_and_bad_utf8),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Against a made-up file system root in a temporary folder. */
+/* Tests memory limits in a temporary folder that stands in for the root of the file system. */
 #include "test.h"
 
 #include "memory_limits.h"
@@ -23,7 +23,7 @@ static int remove_root(void **state)
     return system(command);
 }
 
-/* Writes `text` to root/path, with the folders on the way. */
+/* Writes `text` to root/path. Creates missing folders. */
 static void write_below_root(const char *path, const char *text)
 {
     char full[256];
@@ -45,7 +45,7 @@ static void no_control_groups_mean_no_limit(void **state)
     assert_true(trip_cgroup_limit_bytes(root) == UINT64_MAX);
 }
 
-static void version_2_limit_of_the_own_group_counts(void **state)
+static void version_2_limit_of_the_group_counts(void **state)
 {
     (void)state;
     write_below_root("proc/self/cgroup", "0::/a/b\n");
@@ -54,7 +54,7 @@ static void version_2_limit_of_the_own_group_counts(void **state)
     assert_true(trip_cgroup_limit_bytes(root) == 1000000);
 }
 
-static void smaller_limit_of_a_group_above_counts(void **state)
+static void a_smaller_limit_of_a_parent_group_counts(void **state)
 {
     (void)state;
     write_below_root("proc/self/cgroup", "0::/a/b\n");
@@ -63,7 +63,7 @@ static void smaller_limit_of_a_group_above_counts(void **state)
     assert_true(trip_cgroup_limit_bytes(root) == 5000);
 }
 
-static void group_not_mounted_here_leaves_the_root_limit(void **state)
+static void a_group_that_is_not_mounted_has_the_limit_of_the_root(void **state)
 {
     (void)state;
     write_below_root("proc/self/cgroup", "0::/machine/outside\n");
@@ -71,7 +71,7 @@ static void group_not_mounted_here_leaves_the_root_limit(void **state)
     assert_true(trip_cgroup_limit_bytes(root) == 70000);
 }
 
-static void version_1_limit_counts_among_other_controllers(void **state)
+static void version_1_limit_of_the_memory_controller_counts(void **state)
 {
     (void)state;
     write_below_root("proc/self/cgroup",
@@ -90,7 +90,7 @@ static void malformed_files_mean_no_limit(void **state)
     assert_true(trip_cgroup_limit_bytes(root) == UINT64_MAX);
 }
 
-static void proc_field_is_found_by_its_whole_name(void **state)
+static void a_field_in_proc_is_found_by_its_whole_name(void **state)
 {
     (void)state;
     char path[256];
@@ -107,12 +107,12 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         WITH_ROOT(no_control_groups_mean_no_limit),
-        WITH_ROOT(version_2_limit_of_the_own_group_counts),
-        WITH_ROOT(smaller_limit_of_a_group_above_counts),
-        WITH_ROOT(group_not_mounted_here_leaves_the_root_limit),
-        WITH_ROOT(version_1_limit_counts_among_other_controllers),
+        WITH_ROOT(version_2_limit_of_the_group_counts),
+        WITH_ROOT(a_smaller_limit_of_a_parent_group_counts),
+        WITH_ROOT(a_group_that_is_not_mounted_has_the_limit_of_the_root),
+        WITH_ROOT(version_1_limit_of_the_memory_controller_counts),
         WITH_ROOT(malformed_files_mean_no_limit),
-        WITH_ROOT(proc_field_is_found_by_its_whole_name),
+        WITH_ROOT(a_field_in_proc_is_found_by_its_whole_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,7 +48,7 @@ static void assert_holds(const char *path, const char *text)
     assert_string_equal(read_back, text);
 }
 
-static void a_file_is_there_only_once_it_is_finished(void **state)
+static void a_file_appears_when_it_is_finished(void **state)
 {
     (void)state;
     trip_new_file f;
@@ -63,7 +63,7 @@ static void a_file_is_there_only_once_it_is_finished(void **state)
     assert_int_equal(count_files(), 0);
 }
 
-static void what_is_replaced_hands_on_its_mode_and_stays_until_then(void **state)
+static void a_replaced_file_stays_until_the_end_and_passes_on_its_mode(void **state)
 {
     (void)state;
     struct stat st;
@@ -80,7 +80,7 @@ static void what_is_replaced_hands_on_its_mode_and_stays_until_then(void **state
     unlink("a");
 }
 
-static void a_link_is_replaced_and_what_it_points_to_stays(void **state)
+static void a_link_is_replaced_and_its_target_stays(void **state)
 {
     (void)state;
     struct stat st;
@@ -94,7 +94,7 @@ static void a_link_is_replaced_and_what_it_points_to_stays(void **state)
     unlink("link");
 }
 
-/* Opened by others: to replace it would cut them off. */
+/* Other processes may have the device or pipe open, and would lose their connection. */
 static void a_device_or_a_pipe_is_not_replaced(void **state)
 {
     (void)state;
@@ -118,7 +118,7 @@ static void a_device_or_a_pipe_is_not_replaced(void **state)
     assert_int_equal(count_files(), 0);
 }
 
-static void a_text_is_written_whole_or_not_at_all(void **state)
+static void a_text_is_written_completely_or_not_at_all(void **state)
 {
     (void)state;
     assert_int_equal(trip_new_file_of_text("write", "a", "one\n"), 0);
@@ -132,7 +132,7 @@ static void a_text_is_written_whole_or_not_at_all(void **state)
     assert_int_equal(count_files(), 0);
 }
 
-static void files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way(void **state)
+static void temporaries_of_one_file_have_different_names(void **state)
 {
     (void)state;
     trip_new_file one, two;
@@ -143,7 +143,7 @@ static void files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way
     trip_new_file_abandon(&two);
 }
 
-static void what_cannot_be_written_is_one_report_and_leaves_nothing(void **state)
+static void a_failed_write_is_one_report_and_leaves_nothing(void **state)
 {
     (void)state;
     trip_new_file f;
@@ -162,13 +162,13 @@ static void what_cannot_be_written_is_one_report_and_leaves_nothing(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_file_is_there_only_once_it_is_finished),
-        cmocka_unit_test(what_is_replaced_hands_on_its_mode_and_stays_until_then),
-        cmocka_unit_test(a_link_is_replaced_and_what_it_points_to_stays),
+        cmocka_unit_test(a_file_appears_when_it_is_finished),
+        cmocka_unit_test(a_replaced_file_stays_until_the_end_and_passes_on_its_mode),
+        cmocka_unit_test(a_link_is_replaced_and_its_target_stays),
         cmocka_unit_test(a_device_or_a_pipe_is_not_replaced),
-        cmocka_unit_test(a_text_is_written_whole_or_not_at_all),
-        cmocka_unit_test(files_left_behind_by_a_process_of_the_same_number_are_in_nobodys_way),
-        cmocka_unit_test(what_cannot_be_written_is_one_report_and_leaves_nothing),
+        cmocka_unit_test(a_text_is_written_completely_or_not_at_all),
+        cmocka_unit_test(temporaries_of_one_file_have_different_names),
+        cmocka_unit_test(a_failed_write_is_one_report_and_leaves_nothing),
     };
     return cmocka_run_group_tests(tests, enter_folder, leave_folder);
 }

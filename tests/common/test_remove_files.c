@@ -1,5 +1,5 @@
-/* Files are removed by name; large ones are freed by a process that holds nothing else, and is
- * nobody's child. */
+/* Tests that files are removed by name. A process of its own frees large files. It is no child of
+ * the caller and keeps no other file open. */
 #include "remove_files.h"
 
 #include <errno.h>
@@ -53,14 +53,14 @@ static void make_file(const char *name, off_t bytes)
     close(fd);
 }
 
-/* More than is freed in place. */
+/* Makes files too large to be freed by the caller itself. */
 static void make_large_files(void)
 {
     make_file("a1", TRIP_REMOVE_APART_BYTES / 2 + 4096);
     make_file("a2", TRIP_REMOVE_APART_BYTES / 2 + 4096);
 }
 
-static void only_the_files_that_are_named_go(void **state)
+static void only_the_named_files_are_removed(void **state)
 {
     (void)state;
     make_file("a", 0);
@@ -72,7 +72,7 @@ static void only_the_files_that_are_named_go(void **state)
     assert_int_equal(unlinkat(folder, "b", 0), 0);
 }
 
-static void large_files_go_too_and_no_child_is_left(void **state)
+static void large_files_are_removed_and_leave_no_child(void **state)
 {
     (void)state;
     make_large_files();
@@ -82,8 +82,8 @@ static void large_files_go_too_and_no_child_is_left(void **state)
     assert_int_equal(errno, ECHILD);
 }
 
-/* What frees the files may still be at work when this process has gone on. */
-static void nothing_of_this_process_stays_open(void **state)
+/* The process that frees the files may still run after the call returns. */
+static void files_of_the_caller_do_not_stay_open(void **state)
 {
     (void)state;
     int ends[2];
@@ -114,10 +114,10 @@ static void nothing_of_this_process_stays_open(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(only_the_files_that_are_named_go, make_folder, drop_folder),
-        cmocka_unit_test_setup_teardown(large_files_go_too_and_no_child_is_left, make_folder,
+        cmocka_unit_test_setup_teardown(only_the_named_files_are_removed, make_folder, drop_folder),
+        cmocka_unit_test_setup_teardown(large_files_are_removed_and_leave_no_child, make_folder,
                                         drop_folder),
-        cmocka_unit_test_setup_teardown(nothing_of_this_process_stays_open, make_folder,
+        cmocka_unit_test_setup_teardown(files_of_the_caller_do_not_stay_open, make_folder,
                                         drop_folder),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

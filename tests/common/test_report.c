@@ -7,7 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static void failure_is_one_line_with_stage_place_and_cause(void **state)
+static void a_failure_is_one_line_with_stage_position_and_cause(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -16,7 +16,7 @@ static void failure_is_one_line_with_stage_place_and_cause(void **state)
     assert_one_report("triptych: read: a.nrrd: line 3: 4 axes, not 3");
 }
 
-static void empty_position_is_left_out(void **state)
+static void an_empty_position_is_left_out(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -24,7 +24,7 @@ static void empty_position_is_left_out(void **state)
     assert_one_report("triptych: memory: none left");
 }
 
-static void control_characters_are_made_visible(void **state)
+static void control_characters_are_escaped(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -34,7 +34,7 @@ static void control_characters_are_made_visible(void **state)
     assert_one_report("triptych: read: a\\nb\\x1b[31m: c\\td\\x7fe\\xc2\\x85");
 }
 
-static void letters_beyond_ascii_stay(void **state)
+static void letters_outside_ascii_stay(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -46,7 +46,7 @@ static void letters_beyond_ascii_stay(void **state)
                       "e.tf");
 }
 
-static void bad_utf8_and_marks_of_direction_are_made_visible(void **state)
+static void bad_utf8_and_direction_marks_are_escaped(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -55,7 +55,7 @@ static void bad_utf8_and_marks_of_direction_are_made_visible(void **state)
                       "\\xe2\\x82");
 }
 
-static void a_cut_line_holds_whole_characters(void **state)
+static void a_line_is_cut_between_characters(void **state)
 {
     (void)state;
     for (int shift = 0; shift < 3; shift++) {
@@ -69,7 +69,7 @@ static void a_cut_line_holds_whole_characters(void **state)
     }
 }
 
-static void overlong_line_is_cut_and_marked(void **state)
+static void a_line_that_is_too_long_is_cut_and_marked(void **state)
 {
     (void)state;
     char longname[10000];
@@ -98,7 +98,7 @@ static void errno_text_follows_the_action(void **state)
     assert_one_report("triptych: read: x.raw: Permission denied");
 }
 
-static void reporting_leaves_errno_alone(void **state)
+static void reporting_does_not_change_errno(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -142,7 +142,7 @@ static void first_signal_sets_a_flag(void **state)
     trip_interrupt_install();
 }
 
-static void a_hangup_that_is_ignored_stays_so(void **state)
+static void an_ignored_hangup_stays_ignored(void **state)
 {
     (void)state;
     signal(SIGHUP, SIG_IGN);
@@ -156,7 +156,7 @@ static void a_hangup_that_is_ignored_stays_so(void **state)
     signal(SIGHUP, SIG_DFL);
 }
 
-static void a_signal_interrupts_scopes_that_point_to_its_flag_alone(void **state)
+static void a_signal_interrupts_only_scopes_that_heed_its_flag(void **state)
 {
     (void)state;
     volatile sig_atomic_t flag = 0;
@@ -173,7 +173,7 @@ static void a_signal_interrupts_scopes_that_point_to_its_flag_alone(void **state
     trip_scope_enter(before);
 }
 
-static void an_interruption_is_told_once(void **state)
+static void an_interrupt_is_reported_once(void **state)
 {
     (void)state;
     trip_interrupt_install();
@@ -195,7 +195,7 @@ static void take_line(const char *line, void *user)
     snprintf(user, 64, "%.60s", line);
 }
 
-static void a_scope_takes_the_lines_of_its_threads_alone(void **state)
+static void a_scope_gets_only_the_lines_of_its_threads(void **state)
 {
     (void)state;
     char text[64] = "";
@@ -210,7 +210,7 @@ static void a_scope_takes_the_lines_of_its_threads_alone(void **state)
     assert_one_report("triptych: warning: a: outside");
 }
 
-static void failures_go_where_they_are_wanted_and_other_lines_further_out(void **state)
+static void a_scope_for_failures_passes_other_lines_outwards(void **state)
 {
     (void)state;
     char text[64] = "";
@@ -224,7 +224,7 @@ static void failures_go_where_they_are_wanted_and_other_lines_further_out(void *
     assert_one_report("triptych: warning: a: odd");
 }
 
-static void a_held_failure_is_reported_where_it_is_given_back(void **state)
+static void a_held_failure_is_reported_when_it_is_printed(void **state)
 {
     (void)state;
     char text[64] = "";
@@ -241,8 +241,8 @@ static void a_held_failure_is_reported_where_it_is_given_back(void **state)
     assert_string_equal(text, "-1 triptych: a: b: first");
 }
 
-/* Whether the work of a thread in some scopes is still wanted. */
-static bool is_wanted_in(trip_scope *s)
+/* Returns whether a thread in this scope should continue its work. */
+static bool should_continue_in(trip_scope *s)
 {
     trip_scope *before = trip_scope_enter(s);
     bool wanted = !trip_interrupted();
@@ -250,23 +250,23 @@ static bool is_wanted_in(trip_scope *s)
     return wanted;
 }
 
-static void cancelling_ends_a_scope_and_those_in_it(void **state)
+static void cancelling_a_scope_includes_inner_scopes(void **state)
 {
     (void)state;
     trip_scope outer = { 0 }, inner = { .around = &outer }, other = { 0 };
     trip_scope_cancel(&inner);
-    assert_false(is_wanted_in(&inner));
-    assert_true(is_wanted_in(&outer));
-    assert_true(is_wanted_in(&other));
+    assert_false(should_continue_in(&inner));
+    assert_true(should_continue_in(&outer));
+    assert_true(should_continue_in(&other));
     trip_scope_renew(&inner);
-    assert_true(is_wanted_in(&inner));
+    assert_true(should_continue_in(&inner));
     trip_scope_cancel(&outer);
-    assert_false(is_wanted_in(&inner));
-    assert_true(is_wanted_in(&other));
+    assert_false(should_continue_in(&inner));
+    assert_true(should_continue_in(&other));
     assert_false(trip_interrupted());
 }
 
-static void a_cancelled_scope_reports_one_interruption(void **state)
+static void a_cancelled_scope_reports_one_interrupt(void **state)
 {
     (void)state;
     trip_scope s = { .around = trip_scope_current() };
@@ -285,13 +285,13 @@ static void pass_on(const char *line, void *user)
     trip_report_line(line);
 }
 
-static void what_takes_lines_of_the_outermost_scope_may_report_itself(void **state)
+static void the_sink_of_the_outermost_scope_may_report(void **state)
 {
     (void)state;
     int lines = 0;
     assert_null(trip_scope_current()->around);
     trip_report_redirect(pass_on, &lines);
-    trip_warn("a", "b"); /* to stderr */
+    trip_warn("a", "b"); /* printed on stderr */
     trip_report_redirect(NULL, NULL);
     assert_int_equal(lines, 1);
 }
@@ -317,7 +317,7 @@ static void count_own(const char *line, void *user)
     *(strcmp(line, own) ? &c->foreign : &c->count) += 1;
 }
 
-static void threads_in_different_scopes_do_not_meet(void **state)
+static void threads_in_different_scopes_are_independent(void **state)
 {
     (void)state;
     counter counters[2] = { { .count = 0 }, { .count = 0 } };
@@ -352,27 +352,27 @@ static void second_signal_ends_the_process(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(failure_is_one_line_with_stage_place_and_cause),
-        cmocka_unit_test(empty_position_is_left_out),
-        cmocka_unit_test(control_characters_are_made_visible),
-        cmocka_unit_test(letters_beyond_ascii_stay),
-        cmocka_unit_test(bad_utf8_and_marks_of_direction_are_made_visible),
-        cmocka_unit_test(a_cut_line_holds_whole_characters),
-        cmocka_unit_test(overlong_line_is_cut_and_marked),
+        cmocka_unit_test(a_failure_is_one_line_with_stage_position_and_cause),
+        cmocka_unit_test(an_empty_position_is_left_out),
+        cmocka_unit_test(control_characters_are_escaped),
+        cmocka_unit_test(letters_outside_ascii_stay),
+        cmocka_unit_test(bad_utf8_and_direction_marks_are_escaped),
+        cmocka_unit_test(a_line_is_cut_between_characters),
+        cmocka_unit_test(a_line_that_is_too_long_is_cut_and_marked),
         cmocka_unit_test(errno_text_follows_the_action),
-        cmocka_unit_test(reporting_leaves_errno_alone),
+        cmocka_unit_test(reporting_does_not_change_errno),
         cmocka_unit_test(without_a_sink_lines_go_to_stderr),
         cmocka_unit_test(first_signal_sets_a_flag),
-        cmocka_unit_test(a_hangup_that_is_ignored_stays_so),
-        cmocka_unit_test(a_signal_interrupts_scopes_that_point_to_its_flag_alone),
-        cmocka_unit_test(an_interruption_is_told_once),
-        cmocka_unit_test(a_scope_takes_the_lines_of_its_threads_alone),
-        cmocka_unit_test(failures_go_where_they_are_wanted_and_other_lines_further_out),
-        cmocka_unit_test(a_held_failure_is_reported_where_it_is_given_back),
-        cmocka_unit_test(cancelling_ends_a_scope_and_those_in_it),
-        cmocka_unit_test(a_cancelled_scope_reports_one_interruption),
-        cmocka_unit_test(what_takes_lines_of_the_outermost_scope_may_report_itself),
-        cmocka_unit_test(threads_in_different_scopes_do_not_meet),
+        cmocka_unit_test(an_ignored_hangup_stays_ignored),
+        cmocka_unit_test(a_signal_interrupts_only_scopes_that_heed_its_flag),
+        cmocka_unit_test(an_interrupt_is_reported_once),
+        cmocka_unit_test(a_scope_gets_only_the_lines_of_its_threads),
+        cmocka_unit_test(a_scope_for_failures_passes_other_lines_outwards),
+        cmocka_unit_test(a_held_failure_is_reported_when_it_is_printed),
+        cmocka_unit_test(cancelling_a_scope_includes_inner_scopes),
+        cmocka_unit_test(a_cancelled_scope_reports_one_interrupt),
+        cmocka_unit_test(the_sink_of_the_outermost_scope_may_report),
+        cmocka_unit_test(threads_in_different_scopes_are_independent),
         cmocka_unit_test(second_signal_ends_the_process),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,23 +1,23 @@
-"""The libraries keep nothing for the whole process: no variable that can change, but those below."""
+"""Tests that the libraries have no writable global variable except the ones listed here."""
 import re
 import subprocess
 import sys
 
 REASONS = {
-    "c_locale": "made once, by pthread_once()",
-    "c_locale_once": "pthread_once()'s own",
-    "runnable": "filled before main(), then constant",
-    "__ioinit": "of the C++ library, where <iostream> is included",
-    "guard variable for initialized": "made once: OpenVDB's types are registered",
-    "host": "the program's functions, the same each time (preprocess/vdb/module.c)",
+    "c_locale": "set once by pthread_once()",
+    "c_locale_once": "used by pthread_once()",
+    "runnable": "set before main(), then constant",
+    "__ioinit": "set by the C++ library if <iostream> is included",
+    "guard variable for initialized": "set once when the types of OpenVDB are registered",
+    "host": "functions of the program, always the same (preprocess/vdb/module.c)",
 }
-OTHERS = re.compile(r"^(guard variable for )?openvdb::|^DW\.ref\.|"  # from headers and the compiler
-                    r"^(completed\.\d+|__TMC_END__|__dso_handle)$")  # in every shared library
+OTHERS = re.compile(r"^(guard variable for )?openvdb::|^DW\.ref\.|"  # from headers
+                    r"^(completed\.\d+|__TMC_END__|__dso_handle)$")  # from the compiler
 WRITABLE = re.compile(r"^(\.data|\.bss|\*COM\*|\.data\.(?!rel\.ro)\S+|\.bss\.\S+)$")
 
 
 def variables(library):
-    """(object file, name) of all that lies where it can be written, but thread-local variables."""
+    """Yields (object file, name) of all writable variables that are not thread-local."""
     table = subprocess.run(["objdump", "-tC", library], check=True, text=True, capture_output=True)
     where = ""
     for line in table.stdout.splitlines():
@@ -29,7 +29,7 @@ def variables(library):
 
 
 def name_of(symbol):
-    """Without its scope and the number by which functions' statics differ."""
+    """Returns the name without its scope, and without the number of a static variable of a function."""
     symbol = re.sub(r"\.\d+$", "", symbol)
     return re.sub(r"^(guard variable for )?.*::(\w+)$", r"\1\2", symbol)
 

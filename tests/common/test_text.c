@@ -22,7 +22,7 @@ static void decimal_numbers_are_read(void **state)
     }
 }
 
-static void anything_else_is_refused(void **state)
+static void other_texts_are_not_numbers(void **state)
 {
     (void)state;
     static const char *const texts[] = { "",     " ",     "1 ",   " 1",  "1,5", "0x10",
@@ -35,7 +35,7 @@ static void anything_else_is_refused(void **state)
     }
 }
 
-static void written_numbers_read_back_the_same(void **state)
+static void written_numbers_can_be_read_without_loss(void **state)
 {
     (void)state;
     static const double values[] = { 0, 1, -1, 0.1, 1.0 / 3, 1e-300, DBL_MAX, DBL_MIN, 5e-324 };
@@ -61,7 +61,7 @@ static void written_numbers_are_short(void **state)
     assert_string_equal(trip_text_from_double(-1000, text), "-1000");
 }
 
-static void a_locale_with_decimal_commas_changes_nothing(void **state)
+static void a_locale_with_decimal_commas_has_no_effect(void **state)
 {
     (void)state;
     need_comma_locale();
@@ -89,8 +89,9 @@ static void check_character(const char *text, uint32_t code, unsigned bytes, boo
     assert_int_equal(c.printable, printable);
 }
 
-/* The Unicode standard, table 3-7: well-formed byte sequences, and the first ones that are not. */
-static void utf8_is_told_from_other_bytes(void **state)
+/* The bytes are the first and last valid sequences, and the nearest invalid sequences, of table 3-7
+ * in the Unicode standard. */
+static void valid_utf8_is_recognised(void **state)
 {
     (void)state;
     check_character("a", 'a', 1, true);
@@ -112,7 +113,7 @@ static void utf8_is_told_from_other_bytes(void **state)
     check_character("\xe2\x81\xa6", 0x2066, 3, false);
 }
 
-static void what_is_not_printable_is_shown_as_bytes(void **state)
+static void unprintable_characters_are_printed_as_bytes(void **state)
 {
     (void)state;
     char text[64] = "";
@@ -122,7 +123,7 @@ static void what_is_not_printable_is_shown_as_bytes(void **state)
     assert_string_equal(text, "a\\n\\t\\x1b\xc3\xbc\\xc2\\x9b\\xff");
 }
 
-static void distance_counts_the_changes_of_single_characters(void **state)
+static void the_distance_counts_changes_of_single_characters(void **state)
 {
     (void)state;
     assert_int_equal(trip_text_distance("bone", "bone"), 0);
@@ -141,13 +142,13 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(decimal_numbers_are_read),
-        cmocka_unit_test(anything_else_is_refused),
-        cmocka_unit_test(written_numbers_read_back_the_same),
+        cmocka_unit_test(other_texts_are_not_numbers),
+        cmocka_unit_test(written_numbers_can_be_read_without_loss),
         cmocka_unit_test(written_numbers_are_short),
-        cmocka_unit_test(utf8_is_told_from_other_bytes),
-        cmocka_unit_test(what_is_not_printable_is_shown_as_bytes),
-        cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
-        cmocka_unit_test(distance_counts_the_changes_of_single_characters),
+        cmocka_unit_test(valid_utf8_is_recognised),
+        cmocka_unit_test(unprintable_characters_are_printed_as_bytes),
+        cmocka_unit_test(a_locale_with_decimal_commas_has_no_effect),
+        cmocka_unit_test(the_distance_counts_changes_of_single_characters),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

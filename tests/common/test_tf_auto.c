@@ -28,7 +28,7 @@ static void put(double value, double count)
     h.counts[bin < 1024 ? bin : 1023] += (uint64_t)count;
 }
 
-/* `count` voxels spread over the values lo, lo + 1, ... hi like a normal distribution. */
+/* Adds `count` voxels with a normal distribution over the values lo, lo + 1, ... hi. */
 static void put_peak(double lo, double hi, double mean, double deviation, double count)
 {
     for (double v = lo; v <= hi; v++) {
@@ -60,14 +60,14 @@ static void one_value_is_fog_of_moderate_depth(void **state)
     }
 }
 
-static void nothing_at_all_still_makes_a_function(void **state)
+static void an_empty_histogram_gives_a_transfer_function(void **state)
 {
     (void)state;
     start(0, 0);
     trip_tf_destroy(automatic());
 }
 
-static void two_values_show_the_upper_one_only(void **state)
+static void of_two_values_only_the_upper_one_is_visible(void **state)
 {
     (void)state;
     start(0, 128);
@@ -79,7 +79,7 @@ static void two_values_show_the_upper_one_only(void **state)
     trip_tf_destroy(tf);
 }
 
-static void angiogram_shows_all_but_its_zeros(void **state)
+static void an_angiogram_shows_all_values_but_zero(void **state)
 {
     (void)state;
     start(0, 255);
@@ -94,8 +94,8 @@ static void angiogram_shows_all_but_its_zeros(void **state)
     trip_tf_destroy(tf);
 }
 
-/* Background is the lowest peak, also where another is three times as high. */
-static void little_background_is_hidden_all_the_same(void **state)
+/* The background is the lowest peak, although another peak has three times as many voxels. */
+static void a_small_background_is_hidden_too(void **state)
 {
     (void)state;
     start(0, 1000);
@@ -109,9 +109,9 @@ static void little_background_is_hidden_all_the_same(void **state)
     trip_tf_destroy(tf);
 }
 
-/* The background ends with a group of sixteen bins of 1024, and what is stored with it is up to
- * half a code of 65535 above. */
-static void background_that_codes_round_upwards_is_hidden_too(void **state)
+/* The background ends with a group of 16 of the 1024 bins. Stored values may be up to half a code
+ * of 65535 higher. */
+static void background_values_rounded_up_to_a_code_are_hidden(void **state)
 {
     (void)state;
     start(0, 1024);
@@ -124,7 +124,7 @@ static void background_that_codes_round_upwards_is_hidden_too(void **state)
     trip_tf_destroy(tf);
 }
 
-static void tomogram_hides_air_veils_tissue_and_shows_bone(void **state)
+static void a_tomogram_shows_bone_through_translucent_tissue(void **state)
 {
     (void)state;
     start(-1000, 2000);
@@ -139,7 +139,7 @@ static void tomogram_hides_air_veils_tissue_and_shows_bone(void **state)
     trip_tf_destroy(tf);
 }
 
-static void small_values_below_the_background_do_not_count_as_it(void **state)
+static void a_few_values_below_the_background_do_not_replace_it(void **state)
 {
     (void)state;
     start(0, 1300);
@@ -162,11 +162,11 @@ static void fog_with_a_long_tail_shows_its_dense_part(void **state)
     trip_tf *tf = automatic();
     assert_true(opacity(tf, 1e-5) == 0);
     assert_true(opacity(tf, 1) > 0.02);
-    assert_true(opacity(tf, 3) > 0.2); /* ten voxels of it hide nine tenths of what is behind */
+    assert_true(opacity(tf, 3) > 0.2); /* ten voxels are 90 % opaque */
     trip_tf_destroy(tf);
 }
 
-static void bright_background_is_turned_round(void **state)
+static void for_a_bright_background_opacity_falls_with_the_value(void **state)
 {
     (void)state;
     start(0, 255);
@@ -179,11 +179,11 @@ static void bright_background_is_turned_round(void **state)
     trip_tf_destroy(tf);
 }
 
-static void background_rounded_up_to_the_next_code_stays_invisible(void **state)
+static void background_at_the_end_of_a_group_of_bins_is_hidden(void **state)
 {
     (void)state;
     start(0, 1);
-    double background = nextafter(16.0 / 1024, 0); /* the very end of a group of bins */
+    double background = nextafter(16.0 / 1024, 0); /* end of a group of bins */
     put(background, 9e5);
     put(0, 2);
     for (int i = 100; i < 1000; i++)
@@ -210,7 +210,7 @@ static void opacity_and_luminance_rise_with_the_value(void **state)
     trip_tf_destroy(tf);
 }
 
-static void range_that_is_not_finite_is_refused(void **state)
+static void a_range_that_is_not_finite_is_refused(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -224,18 +224,18 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_value_is_fog_of_moderate_depth),
-        cmocka_unit_test(nothing_at_all_still_makes_a_function),
-        cmocka_unit_test(two_values_show_the_upper_one_only),
-        cmocka_unit_test(angiogram_shows_all_but_its_zeros),
-        cmocka_unit_test(little_background_is_hidden_all_the_same),
-        cmocka_unit_test(background_that_codes_round_upwards_is_hidden_too),
-        cmocka_unit_test(tomogram_hides_air_veils_tissue_and_shows_bone),
-        cmocka_unit_test(small_values_below_the_background_do_not_count_as_it),
+        cmocka_unit_test(an_empty_histogram_gives_a_transfer_function),
+        cmocka_unit_test(of_two_values_only_the_upper_one_is_visible),
+        cmocka_unit_test(an_angiogram_shows_all_values_but_zero),
+        cmocka_unit_test(a_small_background_is_hidden_too),
+        cmocka_unit_test(background_values_rounded_up_to_a_code_are_hidden),
+        cmocka_unit_test(a_tomogram_shows_bone_through_translucent_tissue),
+        cmocka_unit_test(a_few_values_below_the_background_do_not_replace_it),
         cmocka_unit_test(fog_with_a_long_tail_shows_its_dense_part),
-        cmocka_unit_test(bright_background_is_turned_round),
-        cmocka_unit_test(background_rounded_up_to_the_next_code_stays_invisible),
+        cmocka_unit_test(for_a_bright_background_opacity_falls_with_the_value),
+        cmocka_unit_test(background_at_the_end_of_a_group_of_bins_is_hidden),
         cmocka_unit_test(opacity_and_luminance_rise_with_the_value),
-        cmocka_unit_test(range_that_is_not_finite_is_refused),
+        cmocka_unit_test(a_range_that_is_not_finite_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

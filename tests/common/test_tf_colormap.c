@@ -26,7 +26,7 @@ static void assert_rgba(trip_rgba c, double r, double g, double b, double opacit
     assert_close(c.opacity, opacity, 1e-6);
 }
 
-static void colours_and_opacities_with_points_of_their_own_are_merged(void **state)
+static void points_of_colours_and_of_opacities_are_merged(void **state)
 {
     (void)state;
     trip_tf *tf = from_json("{\"ColorSpace\":\"RGB\",\"RGBPoints\":[0,0,0,0, 100,1,0,0, 200,1,1,0],"
@@ -43,7 +43,7 @@ static void colours_and_opacities_with_points_of_their_own_are_merged(void **sta
     trip_tf_destroy(tf);
 }
 
-static void map_without_opacities_gets_a_ramp(void **state)
+static void a_map_without_opacities_gets_a_ramp(void **state)
 {
     (void)state;
     trip_tf *tf = from_json("[{\"RGBPoints\":[100,0,0,1, 300,1,0,0]}]");
@@ -70,7 +70,8 @@ static void maps_over_generic_ranges_are_normalised(void **state)
     trip_tf_destroy(tf);
 }
 
-/* vtkPiecewiseFunction of VTK 9.1: AddPoint(0, 0.1, midpoint, sharpness), AddPoint(2, 0.9). */
+/* The expected values are from vtkPiecewiseFunction of VTK 9.1, after AddPoint(0, 0.1, midpoint,
+ * sharpness) and AddPoint(2, 0.9). */
 static void midpoint_and_sharpness_bend_opacity_as_in_vtk(void **state)
 {
     (void)state;
@@ -97,7 +98,7 @@ static void midpoint_and_sharpness_bend_opacity_as_in_vtk(void **state)
     }
 }
 
-static void sharp_step_is_invisible_below_its_midpoint(void **state)
+static void a_sharp_step_is_invisible_below_its_midpoint(void **state)
 {
     (void)state;
     trip_tf *tf = from_json("{\"RGBPoints\":[0,0,0,0,100,1,1,1],"
@@ -108,7 +109,8 @@ static void sharp_step_is_invisible_below_its_midpoint(void **state)
     trip_tf_destroy(tf);
 }
 
-/* vtkColorTransferFunction of VTK 9.1 with these points in each space, GetColor(30.1). */
+/* The expected values are from GetColor(30.1) of vtkColorTransferFunction of VTK 9.1, with these
+ * points in each space. */
 static void colour_spaces_are_sampled_finely_enough(void **state)
 {
     (void)state;
@@ -135,7 +137,7 @@ static void colour_spaces_are_sampled_finely_enough(void **state)
     }
 }
 
-static void step_space_has_one_colour_between_two_points(void **state)
+static void the_step_space_has_one_colour_between_two_points(void **state)
 {
     (void)state;
     trip_tf *tf = from_json("{\"ColorSpace\":\"Step\",\"RGBPoints\":[0,1,0,0, 10,0,1,0, 20,0,0,1],"
@@ -148,7 +150,7 @@ static void step_space_has_one_colour_between_two_points(void **state)
     trip_tf_destroy(tf);
 }
 
-static void first_map_or_the_named_one_is_taken(void **state)
+static void the_first_or_the_named_map_is_read(void **state)
 {
     (void)state;
     static const char text[] = "[7, {\"Name\":\"a\",\"RGBPoints\":[5,1,0,0]},"
@@ -161,7 +163,7 @@ static void first_map_or_the_named_one_is_taken(void **state)
     trip_tf_destroy(tf);
 }
 
-static void rounding_errors_of_exports_are_forgiven(void **state)
+static void rounding_errors_of_exports_are_accepted(void **state)
 {
     (void)state;
     trip_tf *tf = from_json("{\"RGBPoints\":[5,1.0000001,-1e-8,0]}");
@@ -170,7 +172,7 @@ static void rounding_errors_of_exports_are_forgiven(void **state)
     trip_tf_destroy(tf);
 }
 
-static void what_cannot_be_honoured_is_said(void **state)
+static void unsupported_features_give_a_warning(void **state)
 {
     (void)state;
     test_catch_reports();
@@ -184,7 +186,7 @@ static void what_cannot_be_honoured_is_said(void **state)
     trip_tf_destroy(tf);
 }
 
-static void faulty_maps_are_refused_with_their_name(void **state)
+static void invalid_maps_are_refused_with_their_name(void **state)
 {
     (void)state;
     assert_refused("[{\"Name\":\"n\",\"RGBPoints\":[0,0,0]}]", "m.json: n: RGBPoints is not");
@@ -203,7 +205,7 @@ static void faulty_maps_are_refused_with_their_name(void **state)
     assert_refused("[1, [2]]", "m.json: holds no colour map");
 }
 
-static void broken_json_names_the_line(void **state)
+static void the_report_of_invalid_json_names_the_line(void **state)
 {
     (void)state;
     assert_refused("[\n{\"RGBPoints\":\n[0,0,,", "m.json: line 3: not JSON");
@@ -240,18 +242,18 @@ static void too_many_points_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(colours_and_opacities_with_points_of_their_own_are_merged),
-        cmocka_unit_test(map_without_opacities_gets_a_ramp),
+        cmocka_unit_test(points_of_colours_and_of_opacities_are_merged),
+        cmocka_unit_test(a_map_without_opacities_gets_a_ramp),
         cmocka_unit_test(maps_over_generic_ranges_are_normalised),
         cmocka_unit_test(midpoint_and_sharpness_bend_opacity_as_in_vtk),
-        cmocka_unit_test(sharp_step_is_invisible_below_its_midpoint),
+        cmocka_unit_test(a_sharp_step_is_invisible_below_its_midpoint),
         cmocka_unit_test(colour_spaces_are_sampled_finely_enough),
-        cmocka_unit_test(step_space_has_one_colour_between_two_points),
-        cmocka_unit_test(first_map_or_the_named_one_is_taken),
-        cmocka_unit_test(rounding_errors_of_exports_are_forgiven),
-        cmocka_unit_test(what_cannot_be_honoured_is_said),
-        cmocka_unit_test(faulty_maps_are_refused_with_their_name),
-        cmocka_unit_test(broken_json_names_the_line),
+        cmocka_unit_test(the_step_space_has_one_colour_between_two_points),
+        cmocka_unit_test(the_first_or_the_named_map_is_read),
+        cmocka_unit_test(rounding_errors_of_exports_are_accepted),
+        cmocka_unit_test(unsupported_features_give_a_warning),
+        cmocka_unit_test(invalid_maps_are_refused_with_their_name),
+        cmocka_unit_test(the_report_of_invalid_json_names_the_line),
         cmocka_unit_test(deep_nesting_is_refused),
         cmocka_unit_test(too_many_points_are_refused),
     };

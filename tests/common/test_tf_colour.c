@@ -7,8 +7,8 @@ typedef struct mixture {
     double a[3], b[3], s, expected[3];
 } mixture;
 
-/* What vtkColorTransferFunction of VTK 9.1 gives: AddRGBPoint(0, a), AddRGBPoint(1, b),
- * SetHSVWrap(space is HSV_WRAP), GetColor(s). */
+/* The expected values are from GetColor(s) of vtkColorTransferFunction of VTK 9.1, after
+ * AddRGBPoint(0, a), AddRGBPoint(1, b) and SetHSVWrap(space is HSV_WRAP). */
 static const mixture by_vtk[] = {
     { TRIP_COLOUR_RGB,
       { 0.231373, 0.298039, 0.752941 },
@@ -214,7 +214,7 @@ static const mixture by_vtk[] = {
     { TRIP_COLOUR_HSV_WRAP, { 0.9, 0.7, 0.1 }, { 0.9, 0.1, 0.2 }, 0.2, { 0.9, 0.56, 0.1 } },
 };
 
-static void mixtures_equal_those_of_vtk(void **state)
+static void mixtures_equal_the_mixtures_of_vtk(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof by_vtk / sizeof *by_vtk; i++) {
@@ -226,8 +226,8 @@ static void mixtures_equal_those_of_vtk(void **state)
     }
 }
 
-/* Greys are left out: the diverging space gives them the hue of the other end. */
-static void every_space_meets_its_end_colours(void **state)
+/* Greys are not tested, because the diverging space gives them the hue of the other end. */
+static void every_space_keeps_its_end_colours(void **state)
 {
     (void)state;
     static const double ends[][3] = { { 0.9, 0.1, 0.2 }, { 0.1, 0.3, 0.8 }, { 0.2, 0.7, 0.3 },
@@ -246,7 +246,7 @@ static void every_space_meets_its_end_colours(void **state)
     }
 }
 
-static void equal_ends_stay_the_same_in_between(void **state)
+static void between_equal_ends_the_colour_is_constant(void **state)
 {
     (void)state;
     static const double grey[3] = { 0.5, 0.5, 0.5 }, black[3] = { 0 };
@@ -259,7 +259,7 @@ static void equal_ends_stay_the_same_in_between(void **state)
     }
 }
 
-static void step_is_the_upper_colour_above_the_lower_value(void **state)
+static void the_step_space_has_the_upper_colour_above_the_lower_value(void **state)
 {
     (void)state;
     static const double a[3] = { 1, 0, 0 }, b[3] = { 0, 1, 0 };
@@ -273,10 +273,10 @@ static void step_is_the_upper_colour_above_the_lower_value(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mixtures_equal_those_of_vtk),
-        cmocka_unit_test(every_space_meets_its_end_colours),
-        cmocka_unit_test(equal_ends_stay_the_same_in_between),
-        cmocka_unit_test(step_is_the_upper_colour_above_the_lower_value),
+        cmocka_unit_test(mixtures_equal_the_mixtures_of_vtk),
+        cmocka_unit_test(every_space_keeps_its_end_colours),
+        cmocka_unit_test(between_equal_ends_the_colour_is_constant),
+        cmocka_unit_test(the_step_space_has_the_upper_colour_above_the_lower_value),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

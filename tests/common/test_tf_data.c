@@ -9,7 +9,7 @@ static trip_tf *parse(const char *text)
     return tf;
 }
 
-static void a_window_spans_the_points_of_a_function_in_data_units(void **state)
+static void a_window_covers_the_points_of_a_function_in_data_units(void **state)
 {
     (void)state;
     trip_tf *tf = parse("10 0 0 0 0\n20 0.5 0 0 0.5\n50 1 0 0 1\n");
@@ -21,7 +21,7 @@ static void a_window_spans_the_points_of_a_function_in_data_units(void **state)
     trip_tf_destroy(tf);
 }
 
-static void a_window_spans_0_to_1_of_a_normalised_function(void **state)
+static void a_window_covers_0_to_1_of_a_normalised_function(void **state)
 {
     (void)state;
     trip_tf *tf = parse("values normalised\n0.25 0 0 0 0\n0.75 1 1 1 1\n");
@@ -32,7 +32,7 @@ static void a_window_spans_0_to_1_of_a_normalised_function(void **state)
     trip_tf_destroy(tf);
 }
 
-static void windows_that_cannot_be_are_refused(void **state)
+static void impossible_windows_are_refused(void **state)
 {
     (void)state;
     const struct {
@@ -52,7 +52,7 @@ static void windows_that_cannot_be_are_refused(void **state)
     }
 }
 
-static void a_window_over_the_widest_function_stays_in_order(void **state)
+static void a_window_of_the_widest_function_keeps_the_order(void **state)
 {
     (void)state;
     trip_tf *tf = parse("-1.7e308 0 0 0 0\n0 0 0 0 1\n1.7e308 0 0 0 1\n");
@@ -62,7 +62,7 @@ static void a_window_over_the_widest_function_stays_in_order(void **state)
     trip_tf_destroy(tf);
 }
 
-static void functions_made_from_a_histogram_take_one(void **state)
+static void automatic_transfer_functions_need_a_histogram(void **state)
 {
     (void)state;
     trip_tf *tf, *expected;
@@ -83,7 +83,7 @@ static void functions_made_from_a_histogram_take_one(void **state)
     trip_tf_destroy(expected);
 }
 
-static void warned_of(const char *name, double lo, double hi, const char *part)
+static void check_warning(const char *name, double lo, double hi, const char *part)
 {
     trip_tf *tf;
     assert_int_equal(trip_tf_load(&tf, name), TRIP_OK);
@@ -97,19 +97,19 @@ static void warned_of(const char *name, double lo, double hi, const char *part)
     trip_tf_destroy(tf);
 }
 
-static void hounsfield_units_are_told_from_other_values(void **state)
+static void presets_for_ct_warn_of_other_values(void **state)
 {
     (void)state;
-    warned_of("ct-bone", -1024, 3071, NULL);
-    warned_of("ct-bone", -3024, 1900, NULL);
-    warned_of("ct-bone", 0, 255, "do not look like the Hounsfield units");
-    warned_of("ct-soft", 0, 1, "do not look like the Hounsfield units");
-    warned_of("ct-skin", 0, 4095, "do not look like the Hounsfield units");
-    warned_of("bone", 0, 255, NULL);
-    warned_of("ct-bone", -1024, 120, "no value from -1024 to 120 is visible");
+    check_warning("ct-bone", -1024, 3071, NULL);
+    check_warning("ct-bone", -3024, 1900, NULL);
+    check_warning("ct-bone", 0, 255, "do not look like the Hounsfield units");
+    check_warning("ct-soft", 0, 1, "do not look like the Hounsfield units");
+    check_warning("ct-skin", 0, 4095, "do not look like the Hounsfield units");
+    check_warning("bone", 0, 255, NULL);
+    check_warning("ct-bone", -1024, 120, "no value from -1024 to 120 is visible");
 }
 
-static void the_span_of_what_shows_reaches_to_the_points_beside_it(void **state)
+static void the_visible_span_ends_at_the_neighbouring_points(void **state)
 {
     (void)state;
     double span[2];
@@ -125,13 +125,13 @@ static void the_span_of_what_shows_reaches_to_the_points_beside_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_window_spans_the_points_of_a_function_in_data_units),
-        cmocka_unit_test(a_window_spans_0_to_1_of_a_normalised_function),
-        cmocka_unit_test(windows_that_cannot_be_are_refused),
-        cmocka_unit_test(a_window_over_the_widest_function_stays_in_order),
-        cmocka_unit_test(functions_made_from_a_histogram_take_one),
-        cmocka_unit_test(hounsfield_units_are_told_from_other_values),
-        cmocka_unit_test(the_span_of_what_shows_reaches_to_the_points_beside_it),
+        cmocka_unit_test(a_window_covers_the_points_of_a_function_in_data_units),
+        cmocka_unit_test(a_window_covers_0_to_1_of_a_normalised_function),
+        cmocka_unit_test(impossible_windows_are_refused),
+        cmocka_unit_test(a_window_of_the_widest_function_keeps_the_order),
+        cmocka_unit_test(automatic_transfer_functions_need_a_histogram),
+        cmocka_unit_test(presets_for_ct_warn_of_other_values),
+        cmocka_unit_test(the_visible_span_ends_at_the_neighbouring_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,7 +4,7 @@
 
 static trip_histogram h;
 
-/* Densities that fall off as in smoke: `count` voxels of mean density about `mean`. */
+/* Makes a histogram of `count` voxels with exponentially distributed densities, as in smoke. */
 static void put_smoke(double value_max, double mean, double count)
 {
     memset(&h, 0, sizeof h);
@@ -37,7 +37,7 @@ static void extinction_is_proportional_to_density(void **state)
     trip_tf_destroy(tf);
 }
 
-static void a_ray_through_all_of_it_has_an_optical_depth_of_about_four(void **state)
+static void a_ray_through_the_fog_has_an_optical_depth_of_about_4(void **state)
 {
     (void)state;
     const double counts[] = { 1e5, 1e7, 1e9 }, scales[] = { 1e-3, 1, 1e4 };
@@ -51,7 +51,7 @@ static void a_ray_through_all_of_it_has_an_optical_depth_of_about_four(void **st
     }
 }
 
-static void next_to_nothing_does_not_show(void **state)
+static void the_lowest_densities_are_invisible(void **state)
 {
     (void)state;
     put_smoke(1, 0.1, 1e6);
@@ -61,7 +61,7 @@ static void next_to_nothing_does_not_show(void **state)
     trip_tf_destroy(tf);
 }
 
-static void colours_are_near_white(void **state)
+static void colours_are_close_to_white(void **state)
 {
     (void)state;
     put_smoke(1, 0.1, 1e6);
@@ -75,7 +75,7 @@ static void colours_are_near_white(void **state)
     trip_tf_destroy(tf);
 }
 
-static void what_is_mostly_full_is_a_solid(void **state)
+static void a_mostly_full_volume_is_drawn_as_a_solid(void **state)
 {
     (void)state;
     memset(&h, 0, sizeof h);
@@ -87,11 +87,11 @@ static void what_is_mostly_full_is_a_solid(void **state)
     trip_tf_destroy(tf);
 }
 
-static void other_values_are_no_densities(void **state)
+static void values_that_are_no_densities_get_the_default_function(void **state)
 {
     (void)state;
     trip_tf *fog, *other;
-    const double lowest[] = { -1, 2, 2 }; /* below zero; one value; no voxel */
+    const double lowest[] = { -1, 2, 2 }; /* a negative value, a single value, no voxel */
     for (int i = 0; i < 3; i++) {
         put_smoke(2, 0.3, i < 2 ? 1e5 : 0);
         h.value_min = lowest[i];
@@ -110,11 +110,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(extinction_is_proportional_to_density),
-        cmocka_unit_test(a_ray_through_all_of_it_has_an_optical_depth_of_about_four),
-        cmocka_unit_test(next_to_nothing_does_not_show),
-        cmocka_unit_test(colours_are_near_white),
-        cmocka_unit_test(what_is_mostly_full_is_a_solid),
-        cmocka_unit_test(other_values_are_no_densities),
+        cmocka_unit_test(a_ray_through_the_fog_has_an_optical_depth_of_about_4),
+        cmocka_unit_test(the_lowest_densities_are_invisible),
+        cmocka_unit_test(colours_are_close_to_white),
+        cmocka_unit_test(a_mostly_full_volume_is_drawn_as_a_solid),
+        cmocka_unit_test(values_that_are_no_densities_get_the_default_function),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

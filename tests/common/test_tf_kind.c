@@ -6,7 +6,7 @@ static trip_tf_kind recognise(bool sparse, bool integers, bool patient)
         &(trip_tf_origin){ .sparse = sparse, .integers = integers, .patient = patient }, &h);
 }
 
-static void names_are_read_as_they_are_written(void **state)
+static void names_of_kinds_can_be_read_back(void **state)
 {
     (void)state;
     for (int i = 0; i < TRIP_TF_KINDS; i++)
@@ -15,20 +15,20 @@ static void names_are_read_as_they_are_written(void **state)
     assert_int_equal(trip_tf_kind_from_name(NULL), TRIP_TF_AUTOMATIC);
 }
 
-static void tomograms_are_known_by_air_and_tissue_at_their_places(void **state)
+static void tomograms_are_recognised_by_air_and_tissue(void **state)
 {
     (void)state;
     const double lowest[] = { -1024, -2048, -3024 };
     for (int i = 0; i < 3; i++) {
         put_chest(lowest[i], 3071);
-        put(lowest[i], i ? 5e5 : 0); /* what lies outside the scanner's circle */
+        put(lowest[i], i ? 5e5 : 0); /* outside the scanner's circle */
         assert_int_equal(recognise(false, true, true), TRIP_TF_CT);
         assert_int_equal(recognise(false, true, false), TRIP_TF_CT);
         assert_int_equal(recognise(false, false, false), TRIP_TF_CT);
     }
 }
 
-static void the_same_moved_to_start_at_zero_is_no_tomogram_in_hounsfield_units(void **state)
+static void a_tomogram_moved_to_zero_is_not_in_hounsfield_units(void **state)
 {
     (void)state;
     put_chest(-1024, 3071);
@@ -37,7 +37,7 @@ static void the_same_moved_to_start_at_zero_is_no_tomogram_in_hounsfield_units(v
     assert_int_equal(recognise(false, true, false), TRIP_TF_SIMULATION);
 }
 
-static void values_spread_evenly_about_zero_are_a_simulation(void **state)
+static void values_symmetric_about_zero_are_a_simulation(void **state)
 {
     (void)state;
     start(-1000, 1000);
@@ -49,13 +49,13 @@ static void values_spread_evenly_about_zero_are_a_simulation(void **state)
     assert_int_equal(recognise(false, false, true), TRIP_TF_SIMULATION);
 }
 
-static void magnetic_resonance_takes_a_patient_and_broad_tissue(void **state)
+static void magnetic_resonance_requires_a_patient_and_broad_peaks(void **state)
 {
     (void)state;
     put_head();
     assert_int_equal(recognise(false, true, true), TRIP_TF_MR);
     assert_int_equal(recognise(false, true, false), TRIP_TF_SIMULATION);
-    start(0, 255); /* falls off all the way: a jet, a haze */
+    start(0, 255); /* decreases everywhere, as in a jet or haze */
     for (int v = 0; v < 256; v++)
         put(v, 1e6 * exp(-v / 10.0) + 50);
     assert_int_equal(recognise(false, true, true), TRIP_TF_SIMULATION);
@@ -75,15 +75,15 @@ static void sparse_densities_are_fog(void **state)
     assert_int_equal(recognise(true, false, false), TRIP_TF_SIMULATION);
 }
 
-static void labels_are_few_or_vary_without_rule(void **state)
+static void labels_are_few_or_have_irregular_counts(void **state)
 {
     (void)state;
     start(0, 7);
     for (int v = 0; v <= 7; v++)
         put(v, 1000 * (v + 1));
     assert_int_equal(recognise(false, true, true), TRIP_TF_LABELS);
-    assert_int_equal(recognise(false, false, false), TRIP_TF_SIMULATION); /* no whole numbers */
-    start(0, 2035); /* as atlases number their regions */
+    assert_int_equal(recognise(false, false, false), TRIP_TF_SIMULATION); /* not integers */
+    start(0, 2035); /* like regions in an atlas */
     put(0, 1e7);
     for (int v = 1; v < 200; v++)
         put(v < 100 ? v : v < 150 ? 900 + v : 1885 + v, 100 * pow(1000, test_random()));
@@ -94,7 +94,7 @@ static void an_image_of_few_grey_levels_is_not_labels(void **state)
 {
     (void)state;
     start(0, 252);
-    for (int v = 0; v < 64; v++) /* stretched: three of four levels are empty */
+    for (int v = 0; v < 64; v++) /* only every fourth level occurs */
         put(4 * v, 1e6 * exp(-v / 12.0) + 2000);
     assert_int_equal(recognise(false, true, false), TRIP_TF_SIMULATION);
 }
@@ -108,7 +108,7 @@ static void a_binary_solid_is_a_label(void **state)
     assert_int_equal(recognise(false, true, false), TRIP_TF_LABELS);
 }
 
-static void dicom_says_what_it_is(void **state)
+static void the_dicom_modality_selects_the_kind(void **state)
 {
     (void)state;
     put_head();
@@ -118,8 +118,8 @@ static void dicom_says_what_it_is(void **state)
     assert_int_equal(trip_tf_recognise(&other, &h), TRIP_TF_SIMULATION);
 }
 
-/* Values whose histogram fits several kinds. */
-static void dicom_says_that_values_are_hounsfield_units(void **state)
+/* These histograms match several kinds. */
+static void the_dicom_modality_confirms_hounsfield_units(void **state)
 {
     (void)state;
     trip_tf_origin origin = { .integers = true, .patient = true };
@@ -129,13 +129,13 @@ static void dicom_says_that_values_are_hounsfield_units(void **state)
     assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_SIMULATION);
     origin.modality = "CT";
     assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_CT);
-    start(0, 2000); /* not rescaled */
+    start(0, 2000); /* no Hounsfield units */
     for (int v = 0; v < 2000; v += 10)
         put(v, 1000);
     assert_int_equal(trip_tf_recognise(&origin, &h), TRIP_TF_SIMULATION);
 }
 
-static void magnetic_resonance_below_zero_is_no_tomogram(void **state)
+static void negative_magnetic_resonance_is_no_tomogram(void **state)
 {
     (void)state;
     put_chest(-1024, 3071);
@@ -148,18 +148,18 @@ static void magnetic_resonance_below_zero_is_no_tomogram(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(names_are_read_as_they_are_written),
-        cmocka_unit_test(tomograms_are_known_by_air_and_tissue_at_their_places),
-        cmocka_unit_test(the_same_moved_to_start_at_zero_is_no_tomogram_in_hounsfield_units),
-        cmocka_unit_test(values_spread_evenly_about_zero_are_a_simulation),
-        cmocka_unit_test(magnetic_resonance_takes_a_patient_and_broad_tissue),
+        cmocka_unit_test(names_of_kinds_can_be_read_back),
+        cmocka_unit_test(tomograms_are_recognised_by_air_and_tissue),
+        cmocka_unit_test(a_tomogram_moved_to_zero_is_not_in_hounsfield_units),
+        cmocka_unit_test(values_symmetric_about_zero_are_a_simulation),
+        cmocka_unit_test(magnetic_resonance_requires_a_patient_and_broad_peaks),
         cmocka_unit_test(sparse_densities_are_fog),
-        cmocka_unit_test(labels_are_few_or_vary_without_rule),
+        cmocka_unit_test(labels_are_few_or_have_irregular_counts),
         cmocka_unit_test(an_image_of_few_grey_levels_is_not_labels),
         cmocka_unit_test(a_binary_solid_is_a_label),
-        cmocka_unit_test(dicom_says_what_it_is),
-        cmocka_unit_test(dicom_says_that_values_are_hounsfield_units),
-        cmocka_unit_test(magnetic_resonance_below_zero_is_no_tomogram),
+        cmocka_unit_test(the_dicom_modality_selects_the_kind),
+        cmocka_unit_test(the_dicom_modality_confirms_hounsfield_units),
+        cmocka_unit_test(negative_magnetic_resonance_is_no_tomogram),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

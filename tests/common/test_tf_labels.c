@@ -7,8 +7,8 @@ static trip_tf *labels(void)
     return tf;
 }
 
-/* Numbers so large that those beside them are more than one apart. */
-static void numbers_that_cannot_be_counted_are_no_labels(void **state)
+/* The numbers are so large that neighbouring doubles are more than 1 apart. */
+static void numbers_too_large_for_integers_are_no_labels(void **state)
 {
     (void)state;
     start(1e17, 1e17 + 1024);
@@ -26,7 +26,7 @@ static double difference(trip_rgba a, trip_rgba b)
     return fabs(a.r - b.r) + fabs(a.g - b.g) + fabs(a.b - b.b);
 }
 
-static void every_label_has_a_colour_of_its_own(void **state)
+static void every_label_has_its_own_colour(void **state)
 {
     (void)state;
     start(0, 12);
@@ -42,7 +42,7 @@ static void every_label_has_a_colour_of_its_own(void **state)
     trip_tf_destroy(tf);
 }
 
-static void a_code_beside_the_label_has_its_colour(void **state)
+static void a_code_next_to_a_label_has_the_same_colour(void **state)
 {
     (void)state;
     start(0, 1000);
@@ -59,7 +59,7 @@ static void a_code_beside_the_label_has_its_colour(void **state)
     trip_tf_destroy(tf);
 }
 
-static void every_whole_number_of_a_wide_range_has_a_place(void **state)
+static void every_integer_of_a_wide_range_is_a_label(void **state)
 {
     (void)state;
     start(0, 16383);
@@ -104,10 +104,10 @@ static void a_binary_solid_is_solid(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_that_cannot_be_counted_are_no_labels),
-        cmocka_unit_test(every_label_has_a_colour_of_its_own),
-        cmocka_unit_test(a_code_beside_the_label_has_its_colour),
-        cmocka_unit_test(every_whole_number_of_a_wide_range_has_a_place),
+        cmocka_unit_test(numbers_too_large_for_integers_are_no_labels),
+        cmocka_unit_test(every_label_has_its_own_colour),
+        cmocka_unit_test(a_code_next_to_a_label_has_the_same_colour),
+        cmocka_unit_test(every_integer_of_a_wide_range_is_a_label),
         cmocka_unit_test(without_a_zero_the_most_frequent_is_the_background),
         cmocka_unit_test(a_binary_solid_is_solid),
     };

@@ -5,14 +5,14 @@ static double opacity(const trip_tf *tf, double value)
     return trip_tf_evaluate(tf, value).opacity;
 }
 
-static void tomograms_hide_air_and_lungs_veil_tissue_and_show_bone(void **state)
+static void tomograms_show_bone_through_translucent_tissue(void **state)
 {
     (void)state;
     trip_tf *tf;
     put_chest(-1024, 3071);
     assert_int_equal(trip_tf_ct_from_histogram(&tf, &h), TRIP_OK);
     assert_false(trip_tf_visible_in(tf, -1024, -300));
-    double on_ray = 1e6 / pow((double)h.total, 2.0 / 3); /* voxels of muscle */
+    double on_ray = 1e6 / pow((double)h.total, 2.0 / 3); /* number of muscle voxels */
     double depth = on_ray * trip_extinction(opacity(tf, 50));
     assert_true(depth > 0.8 && depth < 2);
     assert_true(opacity(tf, -100) < opacity(tf, 50));
@@ -20,13 +20,13 @@ static void tomograms_hide_air_and_lungs_veil_tissue_and_show_bone(void **state)
     trip_tf_destroy(tf);
 }
 
-static void tissue_of_a_head_shows_and_noise_does_not(void **state)
+static void tissue_of_a_head_is_visible_and_noise_is_not(void **state)
 {
     (void)state;
     trip_tf *tf;
     put_head();
     assert_int_equal(trip_tf_mr_from_histogram(&tf, &h), TRIP_OK);
-    assert_false(trip_tf_visible_in(tf, 0, 60)); /* four deviations of the noise */
+    assert_false(trip_tf_visible_in(tf, 0, 60)); /* four standard deviations */
     assert_true(opacity(tf, 350) > 0.02);
     assert_true(opacity(tf, 600) > 0.2);
     for (double v = 0; v < 1200; v++)
@@ -51,7 +51,7 @@ static void a_few_bright_voxels_change_little(void **state)
     trip_tf_destroy(stretched);
 }
 
-static void without_a_valley_there_is_no_tissue_but_still_a_function(void **state)
+static void without_a_valley_the_default_function_is_used(void **state)
 {
     (void)state;
     trip_tf *mr, *other;
@@ -69,10 +69,10 @@ static void without_a_valley_there_is_no_tissue_but_still_a_function(void **stat
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tomograms_hide_air_and_lungs_veil_tissue_and_show_bone),
-        cmocka_unit_test(tissue_of_a_head_shows_and_noise_does_not),
+        cmocka_unit_test(tomograms_show_bone_through_translucent_tissue),
+        cmocka_unit_test(tissue_of_a_head_is_visible_and_noise_is_not),
         cmocka_unit_test(a_few_bright_voxels_change_little),
-        cmocka_unit_test(without_a_valley_there_is_no_tissue_but_still_a_function),
+        cmocka_unit_test(without_a_valley_the_default_function_is_used),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,7 +12,7 @@ static trip_tf *parse(const char *text)
 #define A "0 0 0 0 0\n2 1 0.5 0 0.8\n2 0 0 1 0.4\n5 1 1 1 0.1\n"
 #define B "-1 1 1 1 0.2\n1 0 0 0 0.6\n3 0.5 0.5 0.5 1\n3 0 1 0 0\n"
 
-static void mixes_lie_between_at_every_value(void **state)
+static void a_mix_is_linear_at_every_value(void **state)
 {
     (void)state;
     trip_tf *a = parse(A), *b = parse(B), *m;
@@ -28,7 +28,7 @@ static void mixes_lie_between_at_every_value(void **state)
             assert_close(got.b, (1 - t) * p.b + t * q.b, 1e-14);
             assert_close(got.opacity, (1 - t) * p.opacity + t * q.opacity, 1e-14);
         }
-        /* Just below the steps. */
+        /* The values are just below the steps. */
         assert_close(trip_tf_evaluate(m, 2 - 1e-9).opacity, (1 - t) * 0.8 + t * 0.8, 1e-8);
         assert_close(trip_tf_evaluate(m, 3 - 1e-9).opacity, (1 - t) * 0.3 + t * 1, 1e-8);
         trip_tf_destroy(m);
@@ -37,7 +37,7 @@ static void mixes_lie_between_at_every_value(void **state)
     trip_tf_destroy(b);
 }
 
-static void ends_are_the_functions_themselves(void **state)
+static void a_mix_of_0_or_1_equals_one_of_the_functions(void **state)
 {
     (void)state;
     trip_tf *a = parse(A), *b = parse(B), *m;
@@ -74,8 +74,8 @@ static void opacities_of_different_units_are_not_mixed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mixes_lie_between_at_every_value),
-        cmocka_unit_test(ends_are_the_functions_themselves),
+        cmocka_unit_test(a_mix_is_linear_at_every_value),
+        cmocka_unit_test(a_mix_of_0_or_1_equals_one_of_the_functions),
         cmocka_unit_test(opacities_of_different_units_are_not_mixed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

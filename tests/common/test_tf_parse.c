@@ -2,7 +2,7 @@
 
 #include "tf_internal.h"
 
-static void comments_blank_lines_and_line_ends_are_free(void **state)
+static void comments_blank_lines_and_both_line_ends_are_allowed(void **state)
 {
     (void)state;
     static const char text[] = "\xef\xbb\xbf# a comment\r\n\n   \t\n"
@@ -30,7 +30,7 @@ static void directives_set_unit_and_values(void **state)
     trip_tf_destroy(tf);
 }
 
-static void every_fault_names_its_line(void **state)
+static void every_report_names_the_line(void **state)
 {
     (void)state;
     static const struct {
@@ -73,7 +73,7 @@ static void every_fault_names_its_line(void **state)
     }
 }
 
-static void zero_byte_is_named(void **state)
+static void a_zero_byte_is_refused(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -82,7 +82,7 @@ static void zero_byte_is_named(void **state)
     assert_one_report("line 2: a zero byte");
 }
 
-static void overlong_line_is_refused(void **state)
+static void a_line_that_is_too_long_is_refused(void **state)
 {
     (void)state;
     char text[3000];
@@ -93,7 +93,7 @@ static void overlong_line_is_refused(void **state)
     assert_one_report("line 1: longer than 1023 characters");
 }
 
-static void as_many_points_as_allowed_and_no_more(void **state)
+static void the_number_of_points_is_limited(void **state)
 {
     (void)state;
     static const char line[] = "1 0 0 0 0\n";
@@ -115,12 +115,12 @@ static void as_many_points_as_allowed_and_no_more(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(comments_blank_lines_and_line_ends_are_free),
+        cmocka_unit_test(comments_blank_lines_and_both_line_ends_are_allowed),
         cmocka_unit_test(directives_set_unit_and_values),
-        cmocka_unit_test(every_fault_names_its_line),
-        cmocka_unit_test(zero_byte_is_named),
-        cmocka_unit_test(overlong_line_is_refused),
-        cmocka_unit_test(as_many_points_as_allowed_and_no_more),
+        cmocka_unit_test(every_report_names_the_line),
+        cmocka_unit_test(a_zero_byte_is_refused),
+        cmocka_unit_test(a_line_that_is_too_long_is_refused),
+        cmocka_unit_test(the_number_of_points_is_limited),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

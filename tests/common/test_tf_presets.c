@@ -16,7 +16,7 @@ static bool has_basis(size_t i, const char *basis)
     return strcmp(trip_tf_preset_basis(i), basis) == 0;
 }
 
-static void each_basis_has_its_kind_of_points(void **state)
+static void points_of_presets_match_their_basis(void **state)
 {
     (void)state;
     int over_range = 0, hounsfield = 0, made = 0;
@@ -36,7 +36,7 @@ static void each_basis_has_its_kind_of_points(void **state)
     assert_int_equal(made, TRIP_TF_KINDS);
 }
 
-static void presets_over_the_range_hide_its_lowest_value_and_show_its_highest(void **state)
+static void presets_over_the_range_hide_only_its_minimum(void **state)
 {
     (void)state;
     for (size_t n = 0; trip_tf_preset_name(n); n++) {
@@ -52,7 +52,7 @@ static void presets_over_the_range_hide_its_lowest_value_and_show_its_highest(vo
     }
 }
 
-static void unknown_preset_lists_the_known_ones(void **state)
+static void the_report_of_an_unknown_preset_lists_all_presets(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -72,9 +72,9 @@ static bool shows(const char *name, double value)
     return shown;
 }
 
-/* Hounsfield units: air -1000, lung -800 to -500, fat -100, muscle 50, spongy bone 300, dense 1000.
- */
-static void presets_for_ct_show_what_they_are_for(void **state)
+/* In Hounsfield units, air is -1000, lung -800 to -500, fat -100, muscle 50, spongy bone 300 and
+ * dense bone 1000. */
+static void presets_for_ct_show_their_tissue(void **state)
 {
     (void)state;
     const double values[] = { -1000, -700, -100, 50, 300, 1000 };
@@ -92,7 +92,7 @@ static void presets_for_ct_show_what_they_are_for(void **state)
             assert_int_equal(shows(expected[i].name, values[k]), expected[i].shown[k]);
 }
 
-static void a_slip_is_answered_with_the_nearest_name(void **state)
+static void a_mistyped_name_suggests_a_preset(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -115,11 +115,11 @@ static void a_slip_is_answered_with_the_nearest_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_basis_has_its_kind_of_points),
-        cmocka_unit_test(presets_over_the_range_hide_its_lowest_value_and_show_its_highest),
-        cmocka_unit_test(presets_for_ct_show_what_they_are_for),
-        cmocka_unit_test(a_slip_is_answered_with_the_nearest_name),
-        cmocka_unit_test(unknown_preset_lists_the_known_ones),
+        cmocka_unit_test(points_of_presets_match_their_basis),
+        cmocka_unit_test(presets_over_the_range_hide_only_its_minimum),
+        cmocka_unit_test(presets_for_ct_show_their_tissue),
+        cmocka_unit_test(a_mistyped_name_suggests_a_preset),
+        cmocka_unit_test(the_report_of_an_unknown_preset_lists_all_presets),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,7 +2,7 @@
 
 #include "tf_internal.h"
 
-/* The example of Slicer's own page on the format. */
+/* The example is from Slicer's documentation of the format. */
 #define HEAD "1\n1\n0.9\n0.1\n0.2\n10\n"
 #define OPACITY                                                                                    \
     "14 -3024 0 -86.9767 0 45.3791 0.169643 139.919 0.589286 347.907 0.607143 1224.16 "            \
@@ -11,7 +11,7 @@
     "28 -3024 0 0 0 -86.9767 0 0.25098 1 45.3791 1 0 0 139.919 1 0.894893 0.894893 "               \
     "347.907 1 1 0.25098 1224.16 1 1 1 3071 0.827451 0.658824 1\n"
 
-static void nine_lines_make_a_function(void **state)
+static void nine_lines_are_a_transfer_function(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -28,7 +28,7 @@ static void nine_lines_make_a_function(void **state)
     trip_tf_destroy(tf);
 }
 
-static void lines_may_end_in_crlf_and_gradients_be_left_out(void **state)
+static void lines_may_end_in_crlf_and_gradients_may_be_absent(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -39,7 +39,7 @@ static void lines_may_end_in_crlf_and_gradients_be_left_out(void **state)
     trip_tf_destroy(tf);
 }
 
-static void what_is_wrong_is_named_with_its_line(void **state)
+static void every_report_names_the_line(void **state)
 {
     (void)state;
     static const char *const bad[][2] = {
@@ -64,7 +64,7 @@ static void what_is_wrong_is_named_with_its_line(void **state)
     assert_one_report("zero byte");
 }
 
-static void the_json_form_holds_the_unit_of_opacity(void **state)
+static void the_json_format_has_a_unit_of_opacity(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -97,10 +97,10 @@ static void the_json_form_holds_the_unit_of_opacity(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nine_lines_make_a_function),
-        cmocka_unit_test(lines_may_end_in_crlf_and_gradients_be_left_out),
-        cmocka_unit_test(what_is_wrong_is_named_with_its_line),
-        cmocka_unit_test(the_json_form_holds_the_unit_of_opacity),
+        cmocka_unit_test(nine_lines_are_a_transfer_function),
+        cmocka_unit_test(lines_may_end_in_crlf_and_gradients_may_be_absent),
+        cmocka_unit_test(every_report_names_the_line),
+        cmocka_unit_test(the_json_format_has_a_unit_of_opacity),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

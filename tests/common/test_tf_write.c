@@ -9,7 +9,7 @@ static trip_tf *parse(const char *text)
     return tf;
 }
 
-/* `tf` written in a form and read again. */
+/* Writes `tf` in a format and reads it back. */
 static trip_tf *again(const trip_tf *tf, trip_tf_format format)
 {
     char *text;
@@ -28,7 +28,7 @@ static void assert_same_at(const trip_tf *a, const trip_tf *b, double value)
     assert_close(p.opacity, q.opacity, 1e-12);
 }
 
-/* At every point, just below it, half way to the next, and beyond the ends. */
+/* Compares at every point, just below it, half way to the next point, and beyond the ends. */
 static void assert_same(const trip_tf *a, const trip_tf *b)
 {
     assert_true(trip_tf_is_normalised(a) == trip_tf_is_normalised(b));
@@ -45,15 +45,15 @@ static void assert_same(const trip_tf *a, const trip_tf *b)
 static const char *const functions[] = {
     "-400 0.6 0.3 0.2 0\n-50 0.8 0.5 0.4 0.01\n150 0.9 0.6 0.5 0.01\n150 1 0.9 0.8 0.3\n"
     "3000 1 1 0.9 0.9\n",
-    "0 0 0 0 0\n0 1 1 1 1\n1 1 0 0 0.5\n",          /* begins with a step, over 0 to 1 */
-    "-1 0 0 0 0\n0.1 0.1 0.2 0.3 0.4\n1 1 1 1 1\n", /* over -1 to 1, but in data units */
+    "0 0 0 0 0\n0 1 1 1 1\n1 1 0 0 0.5\n",          /* 0 to 1, begins with a step */
+    "-1 0 0 0 0\n0.1 0.1 0.2 0.3 0.4\n1 1 1 1 1\n", /* -1 to 1 in data units */
     "5 0.1 0.2 0.3 0.4\n",                          /* one point */
-    "1 0 0 0 0\n2 0.1 0 0 0.1\n2 0.9 0 0 0.9\n2 0.2 0 0 0.2\n3 1 1 1 1\n", /* an idle point */
+    "1 0 0 0 0\n2 0.1 0 0 0.1\n2 0.9 0 0 0.9\n2 0.2 0 0 0.2\n3 1 1 1 1\n", /* an unused point */
     "1e-300 0 0 0 0\n1e300 1 1 1 1\n",
 };
 enum { FUNCTIONS = sizeof functions / sizeof *functions };
 
-static void every_form_is_read_as_it_was_written(void **state)
+static void every_format_can_be_read_back(void **state)
 {
     (void)state;
     for (int i = 0; i < FUNCTIONS; i++)
@@ -65,7 +65,7 @@ static void every_form_is_read_as_it_was_written(void **state)
         }
 }
 
-static void all_presets_pass_through_paraviews_form(void **state)
+static void all_presets_can_be_written_for_paraview(void **state)
 {
     (void)state;
     for (size_t i = 0; trip_tf_preset_name(i); i++) {
@@ -80,7 +80,7 @@ static void all_presets_pass_through_paraviews_form(void **state)
     }
 }
 
-static void a_normalised_function_short_of_its_range_stays_so(void **state)
+static void a_normalised_function_keeps_its_range_in_paraview(void **state)
 {
     (void)state;
     trip_tf *tf = parse("values normalised\n0.2 0 0 0 0\n0.6 1 1 1 1\n");
@@ -92,7 +92,7 @@ static void a_normalised_function_short_of_its_range_stays_so(void **state)
     trip_tf_destroy(other);
 }
 
-static void units_of_opacity_go_where_there_is_a_place_for_them(void **state)
+static void units_of_opacity_are_written_if_the_format_has_them(void **state)
 {
     (void)state;
     trip_tf *tf = parse("unit 2.5\n0 0 0 0 0\n9 1 1 1 1\n");
@@ -113,7 +113,7 @@ static void units_of_opacity_go_where_there_is_a_place_for_them(void **state)
     trip_tf_destroy(tf);
 }
 
-static void forms_without_a_range_of_the_data_refuse_normalised_functions(void **state)
+static void formats_in_data_units_refuse_normalised_functions(void **state)
 {
     (void)state;
     trip_tf *tf = parse("values normalised\n0 0 0 0 0\n1 1 1 1 1\n");
@@ -128,7 +128,7 @@ static void forms_without_a_range_of_the_data_refuse_normalised_functions(void *
     trip_tf_destroy(tf);
 }
 
-static void a_function_of_most_points_passes_through_every_form(void **state)
+static void every_format_can_hold_32768_points(void **state)
 {
     (void)state;
     enum { POINTS = 32768 };
@@ -136,7 +136,7 @@ static void a_function_of_most_points_passes_through_every_form(void **state)
     trip_tf *tf;
     assert_non_null(points);
     for (int i = 0; i < POINTS; i++) {
-        double at = (i + 1) / 2 - 0.5, shade = (i / 2) % 7 / 7.0; /* a step at every second */
+        double at = (i + 1) / 2 - 0.5, shade = (i / 2) % 7 / 7.0; /* a step every two points */
         points[i] = (trip_tf_point){ at, { shade, 1 - shade, 0.5, shade } };
     }
     assert_int_equal(trip_tf_from_points(&tf, points, POINTS, false, 0), TRIP_OK);
@@ -153,12 +153,12 @@ static void a_function_of_most_points_passes_through_every_form(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_form_is_read_as_it_was_written),
-        cmocka_unit_test(all_presets_pass_through_paraviews_form),
-        cmocka_unit_test(a_normalised_function_short_of_its_range_stays_so),
-        cmocka_unit_test(units_of_opacity_go_where_there_is_a_place_for_them),
-        cmocka_unit_test(forms_without_a_range_of_the_data_refuse_normalised_functions),
-        cmocka_unit_test(a_function_of_most_points_passes_through_every_form),
+        cmocka_unit_test(every_format_can_be_read_back),
+        cmocka_unit_test(all_presets_can_be_written_for_paraview),
+        cmocka_unit_test(a_normalised_function_keeps_its_range_in_paraview),
+        cmocka_unit_test(units_of_opacity_are_written_if_the_format_has_them),
+        cmocka_unit_test(formats_in_data_units_refuse_normalised_functions),
+        cmocka_unit_test(every_format_can_hold_32768_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,7 +26,7 @@ static void assert_rgba(trip_rgba c, double r, double g, double b, double opacit
     assert_close(c.opacity, opacity, 1e-9);
 }
 
-/* Two presets as Slicer's presets.xml has them. */
+/* Two presets in the form of Slicer's presets.xml. */
 static const char slicer[] =
     "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<MRML>\n"
     "<VolumeProperty name=\"One\" gradientOpacity=\"4 0 1 255 1\" specularPower=\"10\"\n"
@@ -35,7 +35,7 @@ static const char slicer[] =
     "<VolumeProperty name=\"Two &lt;&amp;\" scalarOpacity=\"4 0 0 10 1\"\n"
     " colorTransfer=\"8 0 1 0 0 10 0 1 0\" scalarOpacityUnitDistance=\"2.5\"/>\n</MRML>\n";
 
-static void slicers_presets_hold_numbers_in_attributes(void **state)
+static void presets_of_slicer_have_numbers_in_attributes(void **state)
 {
     (void)state;
     trip_tf *tf = from_xml(slicer, NULL);
@@ -48,7 +48,7 @@ static void slicers_presets_hold_numbers_in_attributes(void **state)
     trip_tf_destroy(tf);
 }
 
-static void one_of_several_presets_is_picked_by_its_name(void **state)
+static void a_preset_is_selected_by_its_name(void **state)
 {
     (void)state;
     trip_tf *tf = from_xml(slicer, "Two <&");
@@ -58,8 +58,8 @@ static void one_of_several_presets_is_picked_by_its_name(void **state)
     assert_refused(slicer, "Three", "m.xml: holds no function named `Three`");
 }
 
-/* As vtkXMLVolumePropertyWriter writes it; of its components the first counts. */
-static void vtks_properties_hold_points_as_elements(void **state)
+/* The text has the form of vtkXMLVolumePropertyWriter. Only its first component is read. */
+static void properties_of_vtk_have_points_as_elements(void **state)
 {
     (void)state;
     trip_tf *tf = from_xml(
@@ -79,12 +79,12 @@ static void vtks_properties_hold_points_as_elements(void **state)
         NULL);
     assert_true(trip_tf_unit_world(tf) == 0.5);
     assert_rgba(trip_tf_evaluate(tf, 200), 0.5, 0, 0.5, 0.8);
-    assert_rgba(trip_tf_evaluate(tf, 149), 0.245, 0, 0.755, 0); /* sharp: a step at 150 */
+    assert_rgba(trip_tf_evaluate(tf, 149), 0.245, 0, 0.755, 0); /* a step at 150 */
     assert_rgba(trip_tf_evaluate(tf, 151), 0.255, 0, 0.745, 0.8);
     trip_tf_destroy(tf);
 }
 
-static void grey_colours_are_brightness(void **state)
+static void grey_transfer_functions_are_read(void **state)
 {
     (void)state;
     trip_tf *tf = from_xml("<VolumeProperty><Component Index=\"0\"><GrayTransferFunction>"
@@ -97,7 +97,7 @@ static void grey_colours_are_brightness(void **state)
     trip_tf_destroy(tf);
 }
 
-static void colour_maps_of_older_paraviews_are_stretched_over_the_data(void **state)
+static void colour_maps_of_older_paraview_versions_are_normalised(void **state)
 {
     (void)state;
     trip_tf *tf = from_xml("<ColorMaps><ColorMap name=\"a\" space=\"RGB\">"
@@ -111,7 +111,7 @@ static void colour_maps_of_older_paraviews_are_stretched_over_the_data(void **st
     trip_tf_destroy(tf);
 }
 
-static void opacity_by_gradient_is_warned_of(void **state)
+static void opacity_by_gradient_gives_a_warning(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -123,7 +123,7 @@ static void opacity_by_gradient_is_warned_of(void **state)
     trip_tf_destroy(tf);
 }
 
-static void what_is_wrong_is_named_with_its_place(void **state)
+static void every_report_names_the_fault(void **state)
 {
     (void)state;
     static const char *const bad[][2] = {
@@ -150,7 +150,7 @@ static void what_is_wrong_is_named_with_its_place(void **state)
         assert_refused(bad[i][0], NULL, bad[i][1]);
 }
 
-/* Entities that multiply, the "billion laughs", and one that names a file. */
+/* The first text has nested entities that multiply ("billion laughs"), the second names a file. */
 static void entities_are_never_expanded(void **state)
 {
     (void)state;
@@ -165,13 +165,13 @@ static void entities_are_never_expanded(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slicers_presets_hold_numbers_in_attributes),
-        cmocka_unit_test(one_of_several_presets_is_picked_by_its_name),
-        cmocka_unit_test(vtks_properties_hold_points_as_elements),
-        cmocka_unit_test(grey_colours_are_brightness),
-        cmocka_unit_test(colour_maps_of_older_paraviews_are_stretched_over_the_data),
-        cmocka_unit_test(opacity_by_gradient_is_warned_of),
-        cmocka_unit_test(what_is_wrong_is_named_with_its_place),
+        cmocka_unit_test(presets_of_slicer_have_numbers_in_attributes),
+        cmocka_unit_test(a_preset_is_selected_by_its_name),
+        cmocka_unit_test(properties_of_vtk_have_points_as_elements),
+        cmocka_unit_test(grey_transfer_functions_are_read),
+        cmocka_unit_test(colour_maps_of_older_paraview_versions_are_normalised),
+        cmocka_unit_test(opacity_by_gradient_gives_a_warning),
+        cmocka_unit_test(every_report_names_the_fault),
         cmocka_unit_test(entities_are_never_expanded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -65,7 +65,7 @@ static void colours_and_opacity_are_linear_between_points(void **state)
     trip_tf_destroy(tf);
 }
 
-static void end_points_hold_outside(void **state)
+static void end_points_apply_outside_the_points(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("10 0.1 0.2 0.3 0.4\n20 0.5 0.6 0.7 0.8\n");
@@ -76,7 +76,7 @@ static void end_points_hold_outside(void **state)
     trip_tf_destroy(tf);
 }
 
-static void later_point_holds_at_a_step(void **state)
+static void the_later_point_applies_at_a_step(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("0 0 0 0 0\n5 0 0 0 0\n5 1 1 1 .5\n5 1 0 0 .9\n10 1 0 0 .9\n");
@@ -87,7 +87,7 @@ static void later_point_holds_at_a_step(void **state)
     trip_tf_destroy(tf);
 }
 
-static void one_point_holds_everywhere(void **state)
+static void a_single_point_applies_everywhere(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("3 1 0 1 0.25\n");
@@ -97,7 +97,7 @@ static void one_point_holds_everywhere(void **state)
     trip_tf_destroy(tf);
 }
 
-static void not_a_number_is_transparent(void **state)
+static void nan_is_transparent(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("3 1 0 1 0.25\n");
@@ -115,7 +115,7 @@ static void values_at_the_limits_of_double_are_interpolated(void **state)
     trip_tf_destroy(tf);
 }
 
-static void faulty_points_are_refused(void **state)
+static void invalid_points_are_refused(void **state)
 {
     (void)state;
     static const trip_tf_point faulty[] = {
@@ -132,7 +132,7 @@ static void faulty_points_are_refused(void **state)
     }
 }
 
-static void empty_list_decreasing_values_and_bad_units_are_refused(void **state)
+static void no_points_decreasing_values_and_bad_units_are_refused(void **state)
 {
     (void)state;
     trip_tf_point points[2] = { { 1, { 0, 0, 0, 0 } }, { 0, { 0, 0, 0, 0 } } };
@@ -151,7 +151,7 @@ static void empty_list_decreasing_values_and_bad_units_are_refused(void **state)
     assert_one_report("unit of length");
 }
 
-static void normalised_function_stretches_over_the_data(void **state)
+static void a_normalised_function_covers_the_range_of_the_data(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("values normalised\n0 0 0 0 0\n0.25 1 1 1 0.5\n1 0 0 0 1\n");
@@ -166,7 +166,7 @@ static void normalised_function_stretches_over_the_data(void **state)
     trip_tf_destroy(tf);
 }
 
-static void normalised_function_on_constant_data_takes_its_last_point(void **state)
+static void a_normalised_function_of_constant_data_has_its_last_point(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("values normalised\n0 0 0 0 0\n1 1 1 1 0.5\n");
@@ -178,7 +178,8 @@ static void normalised_function_on_constant_data_takes_its_last_point(void **sta
 static void visibility_respects_open_ends(void **state)
 {
     (void)state;
-    /* A triangle over (10, 20) and a step at 30 whose upper part begins with the value 30. */
+    /* The function has a triangle over (10, 20) and steps at 30 and 40. The values from 30 to just
+     * below 40 are visible. */
     trip_tf *tf = from_text("10 0 0 0 0\n15 0 0 0 .5\n20 0 0 0 0\n30 0 0 0 0\n30 0 0 0 .5\n"
                             "40 0 0 0 .5\n40 0 0 0 0\n");
     assert_false(trip_tf_visible_in(tf, 0, 10));
@@ -193,7 +194,7 @@ static void visibility_respects_open_ends(void **state)
     trip_tf_destroy(tf);
 }
 
-static void point_between_invisible_neighbours_of_equal_value_does_not_show(void **state)
+static void a_point_inside_a_step_is_invisible(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("0 0 0 0 0\n5 0 0 0 0\n5 0 0 0 1\n5 0 0 0 0\n9 0 0 0 0\n");
@@ -201,12 +202,12 @@ static void point_between_invisible_neighbours_of_equal_value_does_not_show(void
     trip_tf_destroy(tf);
 }
 
-/* Between neighbouring critical values (points, lo, hi) opacity is linear and never negative, so
- * something shows there exactly when it does in the middle. */
+/* Between neighbouring critical values (points, lo, hi) opacity is linear and not negative. Some
+ * opacity there is positive if and only if the opacity in the middle is positive. */
 static bool visible_by_sampling(const trip_tf *tf, double lo, double hi)
 {
     bool visible = false;
-    for (int half = 0; half <= 64; half++) { /* points, lo and hi are whole numbers from 0 to 32 */
+    for (int half = 0; half <= 64; half++) { /* points, lo and hi are integers from 0 to 32 */
         double value = half / 2.0;
         if (value >= lo && value <= hi)
             visible = visible || trip_tf_evaluate(tf, value).opacity > 0;
@@ -236,7 +237,7 @@ static void visibility_equals_sampling_for_random_functions(void **state)
     }
 }
 
-static void extinction_gives_back_the_opacity_of_any_thickness(void **state)
+static void extinction_gives_the_opacity_of_any_thickness(void **state)
 {
     (void)state;
     static const double opacities[] = { 0, 0.001, 0.3, 0.9, 0.9999 };
@@ -250,7 +251,7 @@ static void extinction_gives_back_the_opacity_of_any_thickness(void **state)
 
 static trip_tf_entry table[65536];
 
-static void table_holds_the_function_at_every_code(void **state)
+static void the_table_has_the_function_at_every_code(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("-1000 0 1 0 0\n3000 1 0 0.5 0.5\n");
@@ -271,7 +272,7 @@ static void peaks_narrower_than_a_code_are_found(void **state)
     (void)state;
     static const struct {
         const char *points;
-        double value; /* 0: none */
+        double value; /* 0 if no peak is lost */
     } functions[] = {
         { "0 1 1 1 0\n99.99 1 1 1 0\n100.02 1 1 1 0.9\n100.05 1 1 1 0\n", 100.02 },
         { "0 1 1 1 0\n99.9 1 1 1 0\n100.02 1 1 1 0.9\n100.1 1 1 1 0\n", 0 },
@@ -291,7 +292,7 @@ static void peaks_narrower_than_a_code_are_found(void **state)
     }
 }
 
-static void unit_in_world_length_replaces_the_voxel(void **state)
+static void a_unit_in_world_space_replaces_the_voxel(void **state)
 {
     (void)state;
     trip_tf *tf = from_text("unit 0.25\n0 1 1 1 0.5\n");
@@ -302,7 +303,7 @@ static void unit_in_world_length_replaces_the_voxel(void **state)
     trip_tf_destroy(tf);
 }
 
-static void text_form_keeps_every_bit(void **state)
+static void the_text_format_keeps_every_bit(void **state)
 {
     (void)state;
     trip_tf_point points[20];
@@ -325,7 +326,7 @@ static void text_form_keeps_every_bit(void **state)
     }
 }
 
-static void load_tells_text_and_json_apart_by_content(void **state)
+static void load_recognises_text_and_json_by_content(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -338,7 +339,7 @@ static void load_tells_text_and_json_apart_by_content(void **state)
     trip_tf_destroy(tf);
 }
 
-static void load_picks_a_preset_after_the_hash(void **state)
+static void load_selects_the_preset_after_the_hash(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -359,7 +360,7 @@ static void load_picks_a_preset_after_the_hash(void **state)
     assert_one_report("#b");
 }
 
-static void file_with_a_hash_in_its_name_is_found(void **state)
+static void a_file_with_a_hash_in_its_name_is_found(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -367,7 +368,7 @@ static void file_with_a_hash_in_its_name_is_found(void **state)
     trip_tf_destroy(tf);
 }
 
-static void what_is_no_readable_file_gives_one_line(void **state)
+static void an_unreadable_file_gives_one_line(void **state)
 {
     (void)state;
     trip_tf *tf;
@@ -390,27 +391,27 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(colours_and_opacity_are_linear_between_points),
-        cmocka_unit_test(end_points_hold_outside),
-        cmocka_unit_test(later_point_holds_at_a_step),
-        cmocka_unit_test(one_point_holds_everywhere),
-        cmocka_unit_test(not_a_number_is_transparent),
+        cmocka_unit_test(end_points_apply_outside_the_points),
+        cmocka_unit_test(the_later_point_applies_at_a_step),
+        cmocka_unit_test(a_single_point_applies_everywhere),
+        cmocka_unit_test(nan_is_transparent),
         cmocka_unit_test(values_at_the_limits_of_double_are_interpolated),
-        cmocka_unit_test(faulty_points_are_refused),
-        cmocka_unit_test(empty_list_decreasing_values_and_bad_units_are_refused),
-        cmocka_unit_test(normalised_function_stretches_over_the_data),
-        cmocka_unit_test(normalised_function_on_constant_data_takes_its_last_point),
+        cmocka_unit_test(invalid_points_are_refused),
+        cmocka_unit_test(no_points_decreasing_values_and_bad_units_are_refused),
+        cmocka_unit_test(a_normalised_function_covers_the_range_of_the_data),
+        cmocka_unit_test(a_normalised_function_of_constant_data_has_its_last_point),
         cmocka_unit_test(visibility_respects_open_ends),
-        cmocka_unit_test(point_between_invisible_neighbours_of_equal_value_does_not_show),
+        cmocka_unit_test(a_point_inside_a_step_is_invisible),
         cmocka_unit_test(visibility_equals_sampling_for_random_functions),
-        cmocka_unit_test(extinction_gives_back_the_opacity_of_any_thickness),
-        cmocka_unit_test(table_holds_the_function_at_every_code),
+        cmocka_unit_test(extinction_gives_the_opacity_of_any_thickness),
+        cmocka_unit_test(the_table_has_the_function_at_every_code),
         cmocka_unit_test(peaks_narrower_than_a_code_are_found),
-        cmocka_unit_test(unit_in_world_length_replaces_the_voxel),
-        cmocka_unit_test(text_form_keeps_every_bit),
-        cmocka_unit_test(load_tells_text_and_json_apart_by_content),
-        cmocka_unit_test(load_picks_a_preset_after_the_hash),
-        cmocka_unit_test(file_with_a_hash_in_its_name_is_found),
-        cmocka_unit_test(what_is_no_readable_file_gives_one_line),
+        cmocka_unit_test(a_unit_in_world_space_replaces_the_voxel),
+        cmocka_unit_test(the_text_format_keeps_every_bit),
+        cmocka_unit_test(load_recognises_text_and_json_by_content),
+        cmocka_unit_test(load_selects_the_preset_after_the_hash),
+        cmocka_unit_test(a_file_with_a_hash_in_its_name_is_found),
+        cmocka_unit_test(an_unreadable_file_gives_one_line),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -36,7 +36,7 @@ static void values_lie_between_0_and_1(void **state)
     }
 }
 
-/* Second derivatives reach some 1e4 here, so central differences are good to about 1e-4. */
+/* Second derivatives reach about 1e4, so the error of central differences is about 1e-4. */
 static void gradients_agree_with_differences(void **state)
 {
     (void)state;
@@ -65,8 +65,8 @@ static void filaments_are_sparse_and_marschner_lobb_is_dense(void **state)
     assert_true(dense > 19900);
 }
 
-/* At the centre axis r = 0 the formula gives (1 - sin(pi z / 2) + alpha (1 + cos(2 pi f_M))) / (2
- * (1 + alpha)). */
+/* On the central axis, r = 0, the formula gives (1 - sin(pi z / 2) + alpha (1 + cos(2 pi f_M))) /
+ * (2 (1 + alpha)). */
 static void marschner_lobb_has_its_published_values(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* What every fuzzer needs: libFuzzer's entry points, a promise that must hold, and silence for the
- * errors that hostile input is expected to give. */
+/* Common parts of all fuzzers: libFuzzer's entry points, FUZZ_PROMISE for conditions that must
+ * hold, and a start that silences error lines. No input may cause a crash, a hang or a leak. */
 #ifndef TRIP_FUZZ_H
 #define TRIP_FUZZ_H
 

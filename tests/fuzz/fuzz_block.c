@@ -1,6 +1,7 @@
-/* Blocks of the voxel plane: the input is a run's and its brick's numbers, and a block. One that
- * passes the checks decodes to records that are inside the brick and in Morton order, and those are
- * packed again: where codes have a byte each to the same bytes, else to no more. */
+/* Fuzzes blocks of the voxel plane. The input gives the fields of a run and its brick, and a block.
+ *
+ * A block that passes the checks decodes to records inside the brick, in Morton order. Packing
+ * these records again gives the same bytes if codes have one byte, and otherwise no more bytes. */
 #include "fuzz.h"
 
 #include "block.h"

@@ -1,5 +1,5 @@
-/* Paths of the camera: no crash, and what is accepted has views at all times, and survives being
- * written and read again. */
+/* Fuzzes camera paths. An accepted path must have a valid view at all times, and stay the same when
+ * it is written and read again. */
 #include "fuzz.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-/* ParaView colour maps: no crash, and what is accepted is a valid function. */
+/* Fuzzes ParaView colour maps. An accepted map must give a valid transfer function. */
 #include "fuzz.h"
 
 #include "tf_internal.h"

@@ -1,5 +1,6 @@
-/* index.trip: the input is given right checksums and sizes, so that what is behind those checks is
- * reached. What is accepted must be safe to walk, and add up. */
+/* Fuzzes index.trip. The input gets valid checksums and sizes, so that the fuzzer reaches the code
+ * behind these checks. An accepted index must be safe to iterate, and its counts must be
+ * consistent. */
 #include "fuzz.h"
 
 #include "dataset_check.h"
@@ -8,7 +9,8 @@
 #include <string.h>
 #include <xxhash.h>
 
-/* The input as an index: checksums are appended and the header's places for them set. */
+/* Makes an index of the input. Appends the checksums and sets their offset in the header.
+ */
 static unsigned char *seal(const uint8_t *data, size_t size, size_t *bytes)
 {
     size_t content = size & ~(size_t)7;

@@ -1,6 +1,8 @@
-/* What an interrupted run of `brick` left: the journal from the input, with right checksums. What
- * is accepted must be safe to go on with, and be in bounds. The first byte says what kind of run
- * reads it; then records, as journal_file.h says. */
+/* Fuzzes the journal of an interrupted run of `brick`. The journal comes from the input and gets
+ * valid checksums. An accepted journal must have all numbers in bounds, so that the run can resume.
+ *
+ * Input: a byte for the kind of run that reads the journal, then records in the format of
+ * journal_file.h. */
 #include "fuzz.h"
 
 #include <fcntl.h>
@@ -47,7 +49,7 @@ static void write_files(const uint8_t *data, size_t size)
     fclose(pieces);
 }
 
-/* A tally that was accepted can be added to another, and made a histogram of. */
+/* Adds an accepted tally to another tally, and makes a histogram of it. */
 static void use_tally(const trip_tally *t)
 {
     static trip_tally sum;

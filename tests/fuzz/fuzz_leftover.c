@@ -1,7 +1,9 @@
-/* What an interrupted run of `brick` left of the ordered list: runs with right checksums, where
- * they decode, whose blocks and normals are the input. What is accepted is appended whole; nothing
- * else does harm. The first byte says of what form; then 8 bytes a run, and behind the last of
- * these, which a run of 0 splats is, the bytes of the planes. */
+/* Fuzzes the ordered list that an interrupted run of `brick` left. Blocks and normals come from the
+ * input, and runs that decode get valid checksums. Accepted runs are appended completely, and
+ * refused runs do no harm.
+ *
+ * Input: a byte for the form, 8 bytes for each run up to a run of 0 splats, then the bytes of the
+ * planes. */
 #include "fuzz.h"
 
 #include <fcntl.h>
@@ -19,7 +21,7 @@ typedef struct given_run {
     uint16_t sheet, u, v, splats;
 } given_run;
 
-/* The input, taken apart. */
+/* The parsed input. */
 typedef struct given {
     trip_block_form form;
     trip_piece_format format;
@@ -44,7 +46,7 @@ static void make_folder(void)
     FUZZ_PROMISE(mkdir(in_folder("a.partial"), 0700) == 0);
 }
 
-/* Normals are the last third of what follows the runs. */
+/* Parses the input. The normals are the last third of the bytes behind the runs. */
 static void take_apart(given *g, const uint8_t *data, size_t size)
 {
     static const unsigned normal_bytes[] = { 0, 3, 4 };
@@ -80,7 +82,8 @@ static void write_plane(const given *g, int plane)
     fclose(f);
 }
 
-/* The checksum of the run that begins at `at`, which moves on; 0 where it does not decode. */
+/* Returns the checksum of the run at `at`, and advances `at`. Returns 0 if the run does not decode.
+ */
 static uint32_t checksum_of(const given *g, uint32_t splats, size_t at[TRIP_PLANES])
 {
     static uint64_t words[TRIP_BLOCK_WORDS_MAX];
@@ -110,7 +113,7 @@ static uint32_t checksum_of(const given *g, uint32_t splats, size_t at[TRIP_PLAN
     return trip_run_checksum(voxels, normal_bytes ? normals : NULL, splats);
 }
 
-/* The journal of a run that appended those runs and was then interrupted. */
+/* Writes the journal of a run that appended these runs before its interruption. */
 static void write_journal(const given *g, trip_budget *budget)
 {
     static trip_journal_start start;
@@ -139,7 +142,7 @@ static void write_journal(const given *g, trip_budget *budget)
     trip_spill_close(spill);
 }
 
-/* The data set and the lists of the run that goes on. */
+/* The data set and the lists of the resumed run. */
 typedef struct building {
     trip_writer *writer;
     trip_list_builder *builder;

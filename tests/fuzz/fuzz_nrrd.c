@@ -1,4 +1,4 @@
-/* NRRD headers: no crash and no leak, and what is accepted is within the bounds that the reader
+/* Fuzzes NRRD headers. The fields of an accepted header must be within the bounds that the reader
  * relies on. */
 #include "fuzz.h"
 

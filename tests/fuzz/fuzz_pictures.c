@@ -1,8 +1,9 @@
-/* Pictures and DICOM slices, read by the helper program in its own process: whatever they hold, the
- * helper's end included, this side reports it and goes on. A start of the helper each makes it
- * slow, one or two files a second. In this process it would be faster and no better: the libraries
- * are Debian's, not instrumented, so that nothing they do guides the fuzzer, and where they end the
- * process or keep memory they would end the fuzzer. */
+/* Fuzzes pictures and DICOM slices, which the helper program reads in a separate process. If the
+ * helper fails or ends, this side must report the failure and continue.
+ *
+ * Each input starts a helper, so the fuzzer runs only one or two files a second. Reading in this
+ * process would be faster but of no use. The libraries are not instrumented, so their code cannot
+ * guide the fuzzer. A library that ends the process or leaks memory would also end the fuzzer. */
 #include "volume_file.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,4 +1,4 @@
-/* Reports of accuracy: no crash, and what is taken stays below the error. */
+/* Fuzzes accuracy reports. Chosen settings must stay below the error bound. */
 #include "fuzz.h"
 
 #include <math.h>

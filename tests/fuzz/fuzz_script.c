@@ -1,4 +1,4 @@
-/* Scripts of the viewer: no crash, and what is accepted lies within its bounds. */
+/* Fuzzes scripts of the viewer. The numbers of an accepted script must be within their bounds. */
 #include "fuzz.h"
 
 #include <math.h>

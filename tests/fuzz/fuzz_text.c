@@ -1,5 +1,5 @@
-/* The text that brick leaves in a data set: whatever stands there, it is refused or gives numbers
- * that can be drawn with. */
+/* Fuzzes the text that brick stores in a data set. The text must be refused, or give numbers valid
+ * for drawing. */
 #include "fuzz.h"
 
 #include "dataset_metadata.h"

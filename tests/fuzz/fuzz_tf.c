@@ -1,4 +1,5 @@
-/* `.tf` text: no crash, and what is accepted survives being written and read again. */
+/* Fuzzes `.tf` text. An accepted transfer function must stay the same when it is written and read
+ * again. */
 #include "fuzz.h"
 
 #include "transfer_function.h"

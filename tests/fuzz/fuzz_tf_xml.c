@@ -1,5 +1,6 @@
-/* Functions in XML and in Slicer's text: no crash, and what is accepted is a valid function that
- * survives being written in every form. The first byte says whether one is picked by its name. */
+/* Fuzzes transfer functions in XML and in Slicer's text. An accepted transfer function must be
+ * valid. Every format that can write it must also read it back. The first byte decides whether a
+ * transfer function is chosen by name. */
 #include "fuzz.h"
 
 #include "tf_internal.h"

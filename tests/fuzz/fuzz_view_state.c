@@ -1,5 +1,5 @@
-/* What the viewer keeps of a data set: no crash, and what is accepted is a view, and is the same
- * once it is written and read again. */
+/* Fuzzes the state that the viewer keeps for a data set. An accepted state must give a valid view,
+ * and stay the same when it is written and read again. */
 #include "fuzz.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-/* Volume files of every format, whole: no crash and no leak, memory within the budget, and blocks
- * within the volume. The first byte says which name the file gets. */
+/* Fuzzes complete volume files of every format. Memory must stay within the budget, and portions
+ * inside the volume. The first byte chooses the file extension. */
 #include "volume_file.h"
 
 static const char *const extensions[] = { "nii", "vol", "vdb", "nrrd", "nii.gz", "nc" };

@@ -1,6 +1,8 @@
-/* A helper that answers anything: no crash, no hang and no leak, and what is accepted is a volume
- * or a picture of its own size. The first byte chooses the request: odd, a picture; else slices, of
- * netCDF-4 where it is 2 more than a multiple of 4. */
+/* Fuzzes the answers of a helper. Accepted answers must give a volume or a picture of the declared
+ * size.
+ *
+ * The lowest two bits of the first byte choose the request. Odd numbers request a picture, 2
+ * requests netCDF-4 slices, and 0 other slices. */
 #include "fuzz.h"
 
 #include "image_file.h"
@@ -22,7 +24,7 @@ static struct {
     int fd;
 } answer;
 
-/* All of the answer at once, which the connection holds, and no more after it. */
+/* Sends the whole answer at once, and nothing after it. The buffer of the connection holds it. */
 static int answer_at_once(int fd)
 {
     answer.fd = dup(fd);
@@ -32,14 +34,14 @@ static int answer_at_once(int fd)
     return sent ? 0 : EIO;
 }
 
-/* No further helper: what is kept of the last one fails, and is dropped. */
+/* Refuses to start a helper. The kept connection to the last helper then fails and closes. */
 static int refuse(int fd)
 {
     (void)fd;
     return EIO;
 }
 
-/* The name of a file that begins as one of netCDF-4. */
+/* Returns the path of a file with the signature of netCDF-4. */
 static const char *netcdf_file(void)
 {
     static char path[64];
@@ -78,7 +80,7 @@ static void read_picture(trip_image_files *files)
         return;
     FUZZ_PROMISE(width >= 1 && height >= 1);
     for (size_t i = 0; i < (size_t)width * (size_t)height * 4; i++)
-        sum += rgba[i]; /* all of it can be read */
+        sum += rgba[i]; /* the whole picture must be readable */
     free(rgba);
 }
 

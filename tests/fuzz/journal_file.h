@@ -1,5 +1,5 @@
-/* Journals of `brick` with right checksums, made of few bytes: each record is a byte of kind, two
- * of length, and as many bytes. */
+/* Makes journals of `brick` with valid checksums from few bytes. Each record has one byte of kind,
+ * two bytes of length, then that many bytes. */
 #ifndef TRIP_JOURNAL_FILE_H
 #define TRIP_JOURNAL_FILE_H
 
@@ -12,8 +12,8 @@
 
 enum { RAW, START, CHECKPOINT, CHECKPOINT_WITH_SEQUENCES, OUTPUT, KINDS };
 
-/* Records are long and mostly zero: the input gives how they begin, and after a byte of how many,
- * the sequences of a checkpoint before that. */
+/* Writes a record. The data give its first bytes, and the rest is zero. Data of a checkpoint with
+ * sequences begin with a count byte and the sequences. */
 static void write_record(FILE *f, unsigned kind, const uint8_t *data, size_t size)
 {
     size_t sequences = kind == CHECKPOINT_WITH_SEQUENCES && size ? data[0] % 8 : 0;

@@ -1,4 +1,4 @@
-/* Reads a volume file whole, as brick does: for the fuzzers of what volumes are made of. */
+/* Reads a complete volume file as brick does, for the fuzzers of volume files and of slices. */
 #ifndef FUZZ_VOLUME_FILE_H
 #define FUZZ_VOLUME_FILE_H
 
@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
-/* A corner of the portion with its neighbours. */
+/* Decodes a corner of the portion with its neighbours. */
 static void fuzz_decode(const trip_volume *v, const trip_volume_portion *b)
 {
     float values[6 * 6 * 6];
@@ -37,7 +37,7 @@ static void fuzz_read_through(trip_volume *v)
     }
 }
 
-/* The bytes as a file with this extension: no crash, no leak, and the budget whole again. */
+/* Reads the bytes as a file with this extension. Checks that all memory returns to the budget. */
 static void fuzz_volume_file(const uint8_t *data, size_t size, const char *extension)
 {
     enum { MEMORY_BYTES = 64 << 20 };

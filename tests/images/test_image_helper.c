@@ -45,7 +45,7 @@ static void assert_one_report(const char *text)
         fail_msg("\"%s\" is not in: %s", text, reported);
 }
 
-/* The only child of this process, or 0. */
+/* Returns the only child of this process, or 0. */
 static pid_t only_child(void)
 {
     char path[64];
@@ -70,7 +70,7 @@ static int count_descriptors(void)
     return count;
 }
 
-static void kinds_are_told_by_content(void **state)
+static void kinds_are_detected_by_content(void **state)
 {
     (void)state;
     unsigned char dicom[132] = { 0 };
@@ -85,7 +85,7 @@ static void kinds_are_told_by_content(void **state)
     assert_int_equal(trip_image_kind_of(dicom, 0), TRIP_IMAGE_OTHER);
 }
 
-static void one_helper_answers_request_after_request(void **state)
+static void one_helper_answers_several_requests(void **state)
 {
     (void)state;
     trip_image_helper *h;
@@ -136,7 +136,8 @@ static void a_helper_ends_with_its_connection(void **state)
     trip_image_helper_stop(NULL);
 }
 
-/* What a stand-in answers before it is silent or gone; it has the connection until then. */
+/* Answer of a simulated helper. Then the helper stays silent if `stays` is set, or closes the
+ * connection `fd`. */
 static struct {
     unsigned char bytes[1 << 16];
     size_t count;
@@ -172,7 +173,7 @@ static void begin_answer(bool stays)
     answer.stays = stays;
 }
 
-/* The status of a request that is answered so. */
+/* Sends a request to the simulated helper and returns the outcome. */
 static int request(uint64_t *data_bytes)
 {
     trip_image_helper *h;
@@ -196,7 +197,7 @@ static void expect_distrust(const char *text)
     assert_one_report(text);
 }
 
-static void an_answer_that_cannot_be_is_a_reported_failure(void **state)
+static void an_impossible_answer_is_a_reported_failure(void **state)
 {
     (void)state;
     begin_answer(true);
@@ -216,7 +217,7 @@ static void an_answer_that_cannot_be_is_a_reported_failure(void **state)
     expect_distrust("unexpected data");
 }
 
-static void warnings_have_an_end(void **state)
+static void the_number_of_warnings_is_limited(void **state)
 {
     (void)state;
     begin_answer(true);
@@ -224,11 +225,11 @@ static void warnings_have_an_end(void **state)
         add_reply(TRIP_IMAGE_WARNING, 0, 0, 0);
     uint64_t bytes;
     assert_int_equal(request(&bytes), TRIP_ERROR);
-    assert_int_equal(reports, 65); /* 64 of them and the failure */
+    assert_int_equal(reports, 65); /* 64 warnings and the failure */
     assert_non_null(strstr(reported, "too many warnings"));
 }
 
-static void signs_of_life_are_passed_over(void **state)
+static void signs_of_life_are_skipped(void **state)
 {
     (void)state;
     uint64_t bytes = 0;
@@ -279,8 +280,8 @@ static void a_wait_for_a_silent_helper_ends_with_a_signal(void **state)
     assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-/* A process that starts a helper, which answers a request if it is to, and stops it. Returns the
- * process. */
+/* Starts a process that starts a helper and stops it with SIGSTOP. If `answered`, the helper
+ * answers a request first. Returns the process. */
 static pid_t stop_a_helper(bool answered, pid_t *helper)
 {
     int pipes[2];
@@ -308,7 +309,8 @@ static pid_t stop_a_helper(bool answered, pid_t *helper)
     return parent;
 }
 
-/* Stopped, it cannot see that its connection has ended: while it loads its libraries, and later. */
+/* A stopped helper cannot see that its connection has ended. The test stops helpers while they load
+ * libraries, and later. */
 static void a_helper_ends_with_its_killed_parent(void **state)
 {
     (void)state;
@@ -331,13 +333,13 @@ static void a_helper_ends_with_its_killed_parent(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kinds_are_told_by_content),
-        cmocka_unit_test(one_helper_answers_request_after_request),
+        cmocka_unit_test(kinds_are_detected_by_content),
+        cmocka_unit_test(one_helper_answers_several_requests),
         cmocka_unit_test(a_helper_that_dies_is_a_reported_failure),
         cmocka_unit_test(a_helper_ends_with_its_connection),
-        cmocka_unit_test(an_answer_that_cannot_be_is_a_reported_failure),
-        cmocka_unit_test(warnings_have_an_end),
-        cmocka_unit_test(signs_of_life_are_passed_over),
+        cmocka_unit_test(an_impossible_answer_is_a_reported_failure),
+        cmocka_unit_test(the_number_of_warnings_is_limited),
+        cmocka_unit_test(signs_of_life_are_skipped),
         cmocka_unit_test(silence_and_an_early_end_are_reported_failures),
         cmocka_unit_test(a_wait_for_a_silent_helper_ends_with_a_signal),
         cmocka_unit_test(a_helper_ends_with_its_killed_parent),

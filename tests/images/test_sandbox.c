@@ -36,7 +36,7 @@ static int leave_folder(void **state)
     return unlink("there") == 0 && chdir("..") == 0 ? rmdir(folder) : -1;
 }
 
-/* What becomes of a child that does this in the sandbox. */
+/* Runs `act` in a sandboxed child. Returns the wait status of the child. */
 static int run_inside(int (*act)(void))
 {
     int status = 0;
@@ -56,8 +56,8 @@ static bool refused(long result)
     return result < 0 && errno == EPERM;
 }
 
-/* The number of the first thing that is not refused, 0 where all are. */
-static int try_what_is_denied(void)
+/* Tries denied system calls. Returns the number of the first call that is not refused, or 0. */
+static int try_denied_calls(void)
 {
     char *argv[] = { (char[]){ "true" }, NULL };
     pid_t pid;
@@ -97,7 +97,7 @@ static int try_what_is_denied(void)
 static void programs_processes_network_and_changes_to_files_are_denied(void **state)
 {
     (void)state;
-    int status = run_inside(try_what_is_denied);
+    int status = run_inside(try_denied_calls);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
     assert_int_equal(access("there", F_OK), 0);
@@ -108,9 +108,9 @@ static void *answer(void *user)
     return user;
 }
 
-static int descriptor; /* open for writing from before */
+static int descriptor; /* opened for writing before the sandbox starts */
 
-static int try_what_is_allowed(void)
+static int try_allowed_calls(void)
 {
     char text[8] = "";
     pthread_t thread;
@@ -132,7 +132,7 @@ static void reading_threads_and_open_descriptors_are_allowed(void **state)
     descriptor = open(".", O_TMPFILE | O_RDWR, 0600);
     if (descriptor < 0)
         descriptor = open("/dev/null", O_WRONLY);
-    int status = run_inside(try_what_is_allowed);
+    int status = run_inside(try_allowed_calls);
     close(descriptor);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
@@ -144,14 +144,15 @@ static int end_by_abort(void)
     abort();
 }
 
-static void a_crash_is_still_told_by_its_signal(void **state)
+static void a_crash_still_reports_its_signal(void **state)
 {
     (void)state;
     int status = run_inside(end_by_abort);
     assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT);
 }
 
-/* 0: 80 MiB can be had and 1 GiB cannot, also not after asking for a higher limit. */
+/* Returns 0 if 80 MiB can be allocated and 1 GiB cannot, even after a request for a higher limit.
+ */
 static int try_memory(void)
 {
     const size_t little = (size_t)80 << 20, much = (size_t)1 << 30;
@@ -160,7 +161,7 @@ static int try_memory(void)
     void *some = mmap(NULL, little, PROT_READ | PROT_WRITE, flags, -1, 0);
     if (some == MAP_FAILED)
         return 1;
-    trip_sandbox_limit_memory((uint64_t)2 << 30); /* given up is given up */
+    trip_sandbox_limit_memory((uint64_t)2 << 30); /* a limit cannot be raised again */
     return mmap(NULL, much, PROT_READ | PROT_WRITE, flags, -1, 0) == MAP_FAILED ? 0 : 2;
 }
 
@@ -181,7 +182,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(programs_processes_network_and_changes_to_files_are_denied),
         cmocka_unit_test(reading_threads_and_open_descriptors_are_allowed),
-        cmocka_unit_test(a_crash_is_still_told_by_its_signal),
+        cmocka_unit_test(a_crash_still_reports_its_signal),
         cmocka_unit_test(memory_beyond_the_limit_is_refused),
     };
     return cmocka_run_group_tests(tests, enter_folder, leave_folder);

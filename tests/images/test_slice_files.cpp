@@ -43,7 +43,7 @@ int leave_folder(void **)
     return chdir("..") == 0 && system((std::string("rm -r ") + folder).c_str()) == 0 ? 0 : -1;
 }
 
-/* A file by whose first bytes it is a TIFF. */
+/* Writes a file with the first bytes of a TIFF. */
 void make_slice(const std::string &path)
 {
     std::ofstream(path) << "II*" << '\0' << "........";
@@ -77,7 +77,8 @@ void a_missing_number_is_named_with_its_file(void **)
 {
     make_folder("gap", { "s_0015.tif", "s_0016.tif", "s_0018.tif", "s_0019.tif" });
     for (const char *path : { "gap", "gap/", "gap/s_*.tif", "gap/s_%04d.tif" })
-        assert_refused(path, "slice 17 is missing (s_0017.tif); --allow-gaps lets its neighbours touch");
+        assert_refused(path,
+                       "slice 17 is missing (s_0017.tif); --allow-gaps lets its neighbours touch");
     unlink("gap/s_0016.tif");
     assert_refused("gap", "slice 16 is missing (s_0016.tif), and 1 more");
     warnings = 0;
@@ -102,14 +103,15 @@ void numbers_in_equal_steps_have_no_gap(void **)
     assert_refused("even", "slice 20 is missing (z20.tif)");
 }
 
-void zeros_in_front_are_as_many_as_the_names_have(void **)
+void leading_zeros_match_the_names(void **)
 {
     make_folder("bare", { "8.tif", "9.tif", "11.tif" });
     assert_refused("bare", "slice 10 is missing (10.tif)");
 }
 
-/* Dates and times, two counters, names without numbers, and too many digits: nothing is counted. */
-void names_that_no_single_number_counts_have_no_gaps(void **)
+/* No counter is found in dates and times, two counters, names without numbers, and numbers with too
+ * many digits. */
+void names_without_a_single_counter_have_no_gaps(void **)
 {
     make_folder("dates", { "20240131_0959.tif", "20240201_1107.tif", "20240201_1115.tif" });
     make_folder("words", { "back.tif", "front.tif", "middle.tif" });
@@ -118,13 +120,13 @@ void names_that_no_single_number_counts_have_no_gaps(void **)
         assert_true(why_refused(path).empty());
 }
 
-void names_of_another_shape_are_no_part_of_the_count(void **)
+void names_of_another_pattern_are_not_counted(void **)
 {
     make_folder("mixed", { "cover.tif", "p1.tif", "p2.tif", "p3.tif", "q7.tif" });
     assert_true(why_refused("mixed").empty());
 }
 
-void what_is_named_as_a_slice_and_is_none_is_an_error(void **)
+void a_file_named_as_a_slice_but_no_slice_is_an_error(void **)
 {
     make_folder("bad", { "im1", "im2", "im4" });
     assert_int_equal(symlink("nowhere", "bad/im3"), 0);
@@ -147,20 +149,20 @@ void what_is_named_as_a_slice_and_is_none_is_an_error(void **)
     assert_refused("bad", "bad/other.tif: is a broken link");
 }
 
-void a_slice_that_may_not_be_read_is_an_error(void **)
+void an_unreadable_slice_is_an_error(void **)
 {
     const uid_t self = geteuid();
     make_folder("closed", { "c1.tif", "c2.tif" });
     assert_int_equal(chmod("closed/c2.tif", 0), 0);
     assert_int_equal(chmod(".", 0755), 0);
-    if (self == 0) /* root may read everything */
+    if (self == 0) /* root can read every file */
         assert_int_equal(seteuid(65534), 0);
     const std::string why = why_refused("closed");
     assert_int_equal(seteuid(self), 0);
     assert_string_equal(why.c_str(), "closed/c2.tif: cannot open: Permission denied");
 }
 
-void other_files_and_folders_beside_slices_are_passed_over(void **)
+void other_files_and_folders_are_skipped(void **)
 {
     make_folder("beside", { "t1.tif", "t2.tif", ".t9.tif" });
     std::ofstream("beside/notes.txt") << "hello";
@@ -170,7 +172,7 @@ void other_files_and_folders_beside_slices_are_passed_over(void **)
     assert_int_equal(trip_slice_find("beside", false).names.size(), 2);
 }
 
-void places_in_equal_steps_have_no_gap(void **)
+void positions_in_equal_steps_have_no_gap(void **)
 {
     assert_true(trip_check_positions({}, {}, false) == 1);
     assert_true(trip_check_positions({ 3 }, { "a" }, false) == 1);
@@ -178,14 +180,15 @@ void places_in_equal_steps_have_no_gap(void **)
     assert_true(trip_check_positions({ 0, 1.5, 3, 4.5 }, { "a", "b", "c", "d" }, false) == 1);
 }
 
-/* Neither twice the usual step nor thrice: uneven, but nothing is missing. */
-void places_in_uneven_steps_have_no_gap(void **)
+/* No step is two or three times the common step, so the steps are uneven but no slice is missing.
+ */
+void positions_in_uneven_steps_have_no_gap(void **)
 {
     assert_true(trip_check_positions({ 0, 1, 2.3, 3.8 }, { "a", "b", "c", "d" }, false) == 1);
 }
 
-/* Steps of 2, 2, 6 and 2, whose mean is 3. */
-void a_place_that_is_left_out_is_named_by_its_neighbours(void **)
+/* The steps are 2, 2, 6 and 2, with a mean of 3. */
+void a_missing_position_is_named_by_its_neighbours(void **)
 {
     const std::vector<double> positions = { 0, 2, 4, 10, 12 };
     const std::vector<std::string> names = { "a", "b", "c", "d", "e" };
@@ -211,15 +214,15 @@ int main()
         cmocka_unit_test(a_missing_number_is_named_with_its_file),
         cmocka_unit_test(two_slices_that_are_not_neighbours_have_a_gap),
         cmocka_unit_test(numbers_in_equal_steps_have_no_gap),
-        cmocka_unit_test(zeros_in_front_are_as_many_as_the_names_have),
-        cmocka_unit_test(names_that_no_single_number_counts_have_no_gaps),
-        cmocka_unit_test(names_of_another_shape_are_no_part_of_the_count),
-        cmocka_unit_test(what_is_named_as_a_slice_and_is_none_is_an_error),
-        cmocka_unit_test(a_slice_that_may_not_be_read_is_an_error),
-        cmocka_unit_test(other_files_and_folders_beside_slices_are_passed_over),
-        cmocka_unit_test(places_in_equal_steps_have_no_gap),
-        cmocka_unit_test(places_in_uneven_steps_have_no_gap),
-        cmocka_unit_test(a_place_that_is_left_out_is_named_by_its_neighbours),
+        cmocka_unit_test(leading_zeros_match_the_names),
+        cmocka_unit_test(names_without_a_single_counter_have_no_gaps),
+        cmocka_unit_test(names_of_another_pattern_are_not_counted),
+        cmocka_unit_test(a_file_named_as_a_slice_but_no_slice_is_an_error),
+        cmocka_unit_test(an_unreadable_slice_is_an_error),
+        cmocka_unit_test(other_files_and_folders_are_skipped),
+        cmocka_unit_test(positions_in_equal_steps_have_no_gap),
+        cmocka_unit_test(positions_in_uneven_steps_have_no_gap),
+        cmocka_unit_test(a_missing_position_is_named_by_its_neighbours),
     };
     return cmocka_run_group_tests(tests, enter_folder, leave_folder);
 }

@@ -1,4 +1,4 @@
-/* What tests of the library begin with. After <cmocka.h>. */
+/* Functions with which tests of the library begin. Include this header after <cmocka.h>. */
 #ifndef CONTEXTS_H
 #define CONTEXTS_H
 
@@ -14,7 +14,7 @@ static inline triptych *new_context(void)
     return t;
 }
 
-/* For a group's setup: says why where it fails. */
+/* Bricks a volume in the setup of a group. Prints the reason of a failure. */
 static inline int brick_volume(const char *volume, const char *data_set,
                                const triptych_brick_options *options)
 {

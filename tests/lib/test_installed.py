@@ -1,5 +1,5 @@
-"""The installed library: found by pkg-config alone, it draws the example's picture with the bits of
-the program's, as a shared and as a static library, and shows nothing but its headers' functions."""
+"""Tests the installed library, which programs find by pkg-config. As a shared and as a static
+library it draws the same picture as the program. Only the functions of its headers are visible."""
 import os
 import re
 import shutil
@@ -47,19 +47,19 @@ class Installed(unittest.TestCase):
         return os.path.join(self.folder.name, name)
 
     def draw(self, program):
-        """By the example: its picture has the bits of the program's."""
+        """Runs the example. Its picture must equal the picture of the program, bit for bit."""
         picture = self.path("picture.exr")
         run(program, self.data, "grey", picture, env=self.environment, cwd=self.folder.name)
         with open(picture, "rb") as one, open(self.expected, "rb") as other:
             self.assertEqual(one.read(), other.read())
 
-    def test_the_example_draws_what_the_program_draws(self):
+    def test_the_example_draws_the_same_picture_as_the_program(self):
         run(CC, "-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Werror", "-o",
             self.path("example"), os.path.join(SOURCE, "lib", "example.c"),
             *self.pkg_config("--cflags", "--libs"))
         self.draw(self.path("example"))
 
-    def test_so_it_does_with_the_static_library(self):
+    def test_the_static_library_draws_the_same_picture(self):
         flags = self.pkg_config("--static", "--cflags", "--libs")
         static = [os.path.join(self.libraries, "libtriptych.a") if flag == "-ltriptych" else flag
                   for flag in flags]
@@ -70,7 +70,7 @@ class Installed(unittest.TestCase):
         self.assertNotIn("libtriptych", needed)
         self.draw(self.path("static"))
 
-    def test_the_header_is_c_plus_plus_too(self):
+    def test_the_headers_compile_as_c_plus_plus(self):
         with open(self.path("a.cpp"), "w") as f:
             f.write("#include <triptych_brick.h>\n#include <cstdio>\nint main() { triptych *t;"
                     " if (triptych_create(&t)) return 1; triptych_view view{}; view.width = 8;"
@@ -80,7 +80,7 @@ class Installed(unittest.TestCase):
             *self.pkg_config("--cflags", "--libs"))
         self.assertIn("no data set is open", run(self.path("cpp"), env=self.environment))
 
-    def test_nothing_but_the_headers_functions_is_visible(self):
+    def test_only_functions_of_the_headers_are_visible(self):
         header = set()
         for name in "triptych.h", "triptych_brick.h":
             with open(os.path.join(SOURCE, "lib", name)) as f:
@@ -90,7 +90,7 @@ class Installed(unittest.TestCase):
         self.assertEqual(visible, header)
         self.assertGreater(len(header), 30)
 
-    def test_openvdb_is_loaded_from_where_it_is_installed_and_only_for_its_files(self):
+    def test_openvdb_is_loaded_only_for_its_files(self):
         module = os.path.join(self.prefix, "bin", "..", "libexec", "triptych", "triptych-openvdb.so")
         if not os.path.exists(module):
             self.skipTest("built without OpenVDB")
@@ -103,7 +103,7 @@ class Installed(unittest.TestCase):
             self.assertEqual(f"calling init: {module}" in result.stderr, wanted)
             self.assertEqual("libopenvdb" in result.stderr, wanted)
 
-    def test_a_module_that_does_not_fit_is_refused(self):
+    def test_a_module_of_another_version_is_refused(self):
         if not os.path.exists(os.path.join(self.prefix, "libexec", "triptych", "triptych-openvdb.so")):
             self.skipTest("built without OpenVDB")
         cloud = os.path.join(SOURCE, "datasets", "wdas_cloud_sixteenth.vdb")
@@ -127,7 +127,7 @@ class Installed(unittest.TestCase):
             self.assertIn(says, result.stderr)
             self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
 
-    def test_it_has_a_version_and_a_name_with_one(self):
+    def test_the_library_name_has_the_version(self):
         library = os.path.realpath(os.path.join(self.libraries, "libtriptych.so"))
         version = self.pkg_config("--modversion")[0]
         self.assertEqual(os.path.basename(library), f"libtriptych.so.{version}")

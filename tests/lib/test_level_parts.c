@@ -1,6 +1,6 @@
-/* Pictures of interpolated values in parts of several levels of detail, of a volume whose levels
- * are all alike: its values rise linearly, so that means of them, interpolated, are the values
- * themselves. Whatever the levels, the picture is then that of the integral through the finest. */
+/* Tests pictures of interpolated values that are drawn in parts at several levels of detail. The
+ * values of the volume rise linearly, so that interpolated means equal the values, and all levels
+ * are alike. The picture must therefore equal the integral through the finest level. */
 #include <triptych_brick.h>
 
 #include <math.h>
@@ -20,7 +20,7 @@ enum { NX = 64, NY = 64, NZ = 192, SIZE = 64, FLOATS = 4 * SIZE * SIZE };
 #define VOLUME "ramp.nrrd"
 #define DATA_SET "ramp.trip"
 
-/* Away from the border, where coarse levels end earlier than fine ones. */
+/* The box is away from the border of the volume, where coarse levels end before fine levels. */
 static const triptych_clip inside = {
     .box = 1, .box_of_voxels = 1, .box_lo = { 9, 9, 9 }, .box_hi = { NX - 10, NY - 10, NZ - 10 }
 };
@@ -68,7 +68,7 @@ static int remove_data(void **state)
     return system("rm -r " VOLUME " " DATA_SET);
 }
 
-/* Along the volume, from a little before it, and from within. */
+/* Both eyes look along the volume. One is in front of it, the other inside. */
 static const double eyes[2][3] = { { 20, 40, -30 }, { 30, 35, 40 } };
 
 static triptych *open_at(triptych_renderer renderer, const double eye[3])
@@ -121,7 +121,7 @@ static void assert_near(const float *a, const float *b, double mean, double max)
         fail_msg("%.3f in the mean, at most %.3f of 255", 255 * sum / FLOATS, 255 * greatest);
 }
 
-/* Of how many levels a frame is made, by what it says. */
+/* Returns the number of parts that the plan of the frame names. */
 static int count_parts(triptych *t)
 {
     char *text = NULL;
@@ -143,7 +143,7 @@ static const triptych_renderer renderers[] = {
 #endif
 };
 
-/* A gap or an overlap of a voxel would be up to 7 of 255. */
+/* A gap or an overlap of one voxel would differ by up to 7 of 255. */
 static void parts_join_without_a_seam(void **state)
 {
     (void)state;
@@ -168,8 +168,8 @@ static void parts_join_without_a_seam(void **state)
     }
 }
 
-/* What is behind all, mean colours and several rays a pixel come after the last part. */
-static void what_comes_after_the_last_part(void **state)
+/* The background, normalised colours and several samples per pixel apply after the last part. */
+static void the_background_is_added_after_the_last_part(void **state)
 {
     (void)state;
     static float clear[FLOATS], other[FLOATS];
@@ -192,12 +192,13 @@ static void what_comes_after_the_last_part(void **state)
     s = plain(8);
     s.samples = 2;
     draw(t, &s, other);
-    assert_near(other, clear, 0.3, 12); /* the rim of the box is smooth then */
+    assert_near(other, clear, 0.3, 12); /* the rim of the box is smoother */
     triptych_destroy(t);
 }
 
-/* The same from frame to frame; in steps, pictures on the way are those of the parts before. */
-static void steps_come_to_the_same_bits(void **state)
+/* Frames drawn in steps and at once are the same. Before the end, a picture holds only the parts
+ * drawn so far. */
+static void drawing_in_steps_gives_the_same_bits(void **state)
 {
     (void)state;
     static float whole[FLOATS], again[FLOATS], on_the_way[FLOATS];
@@ -221,8 +222,8 @@ static void steps_come_to_the_same_bits(void **state)
     triptych_destroy(t);
 }
 
-/* Light that reaches places, and distances, are of one level: the finest that is called for. */
-/* Which of the pictures it is, from 1 on; lists of its level are read, or have no weight. */
+/* Returns the number of the part that the plan explains, counted from 1. Checks that only lists of
+ * the level of this part are read. */
 static int check_plan(triptych *t)
 {
     static const char said[] = "3 pictures are drawn; the lines below explain number ";
@@ -246,7 +247,7 @@ static int check_plan(triptych *t)
     return number;
 }
 
-static void the_plan_is_of_the_picture_that_is_drawn(void **state)
+static void the_plan_explains_the_part_being_drawn(void **state)
 {
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
@@ -280,7 +281,7 @@ static void assert_levels(triptych *t, const triptych_settings *s, const char *w
     triptych_end(t);
 }
 
-static void the_plan_says_why_levels_are_what_they_are(void **state)
+static void the_plan_gives_the_reasons_for_the_levels(void **state)
 {
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
@@ -295,7 +296,8 @@ static void the_plan_says_why_levels_are_what_they_are(void **state)
     triptych_destroy(t);
 }
 
-static void what_takes_one_level_has_one(void **state)
+/* Distances and occlusion use one level in the whole frame, the finest that is needed anywhere. */
+static void distances_and_effects_use_one_level(void **state)
 {
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
@@ -313,8 +315,8 @@ static void what_takes_one_level_has_one(void **state)
     triptych_destroy(t);
 }
 
-/* A bound on bytes makes levels coarser, what is nearest last. */
-static void a_bound_makes_parts_coarser(void **state)
+/* A bound on bytes makes levels coarser, the nearest parts last. */
+static void a_bound_on_bytes_makes_parts_coarser(void **state)
 {
     (void)state;
     static float truth[FLOATS], bounded[FLOATS];
@@ -333,9 +335,9 @@ static void a_bound_makes_parts_coarser(void **state)
     triptych_destroy(t);
 }
 
-/* Where all has one level, that is bounded by all of it, though the nearest voxels are the widest.
- */
-static void a_bound_holds_for_one_level(void **state)
+/* If the whole frame has one level, the bound applies to all bricks of this level, although the
+ * nearest voxels are the widest. */
+static void a_bound_on_bytes_applies_to_a_single_level(void **state)
 {
     (void)state;
     static float picture[FLOATS];
@@ -344,14 +346,15 @@ static void a_bound_holds_for_one_level(void **state)
     s.effects = TRIPTYCH_OCCLUSION;
     s.shading = 1;
     const uint64_t of_fine = draw(t, &s, picture);
-    s.max_bytes = 3.0 * 2 * NX * NY * NZ / 8;        /* of the first level, in three lists */
-    assert_true(draw(t, &s, picture) < of_fine / 4); /* bricks are wider, and more of them seen */
+    s.max_bytes = 3.0 * 2 * NX * NY * NZ / 8;        /* level 1 in three lists */
+    assert_true(draw(t, &s, picture) < of_fine / 4); /* wider bricks, more of them visible */
     assert_int_equal(count_parts(t), 1);
     triptych_destroy(t);
 }
 
-/* The second level of three voxels has one, in which there is no cell: it is not drawn. */
-static void levels_of_a_thin_grid_have_cells(void **state)
+/* The grid is three voxels wide. Its level 2 is one voxel wide and has no cells, so that it is not
+ * drawn. */
+static void a_level_without_cells_is_not_drawn(void **state)
 {
     (void)state;
     static float thin[FLOATS];
@@ -371,14 +374,14 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_join_without_a_seam),
-        cmocka_unit_test(what_comes_after_the_last_part),
-        cmocka_unit_test(steps_come_to_the_same_bits),
-        cmocka_unit_test(the_plan_is_of_the_picture_that_is_drawn),
-        cmocka_unit_test(the_plan_says_why_levels_are_what_they_are),
-        cmocka_unit_test(what_takes_one_level_has_one),
-        cmocka_unit_test(a_bound_makes_parts_coarser),
-        cmocka_unit_test(a_bound_holds_for_one_level),
-        cmocka_unit_test(levels_of_a_thin_grid_have_cells),
+        cmocka_unit_test(the_background_is_added_after_the_last_part),
+        cmocka_unit_test(drawing_in_steps_gives_the_same_bits),
+        cmocka_unit_test(the_plan_explains_the_part_being_drawn),
+        cmocka_unit_test(the_plan_gives_the_reasons_for_the_levels),
+        cmocka_unit_test(distances_and_effects_use_one_level),
+        cmocka_unit_test(a_bound_on_bytes_makes_parts_coarser),
+        cmocka_unit_test(a_bound_on_bytes_applies_to_a_single_level),
+        cmocka_unit_test(a_level_without_cells_is_not_drawn),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);
 }

@@ -1,4 +1,4 @@
-/* The library as others use it: its headers and its shared object alone. */
+/* Tests the library as other programs use it, with only its headers and its shared object. */
 #include <triptych_brick.h>
 
 #include <math.h>
@@ -63,25 +63,26 @@ static void assert_fails(const triptych *t, int status, int expected, const char
     assert_null(strchr(triptych_error(t), '\n'));
 }
 
-static void info_is_that_of_the_volume(void **state)
+static void info_describes_the_volume(void **state)
 {
     (void)state;
     triptych *t = new_context();
     triptych_info info;
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
-    /* As datasets/tooth.nhdr says. */
+    /* from datasets/tooth.nhdr */
     assert_int_equal(info.dims[0], 103);
     assert_int_equal(info.dims[1], 94);
     assert_int_equal(info.dims[2], 161);
     assert_true(info.kept > 0 && info.kept < 103 * 94 * 161);
     assert_true(info.bytes > 0);
     assert_int_equal(info.voxels, 103 * 94 * 161);
-    assert_int_equal(info.lists, 6); /* three of voxels, three of their neighbours */
+    assert_int_equal(info.lists, 6); /* three of kept voxels, three of halo */
     assert_int_equal(info.normal_bytes, 3);
     assert_true(info.value_min < info.value_max);
     for (int a = 0; a < 3; a++) {
-        /* The volume's axes are those of the world: the box is the kept voxels' own. */
+        /* The grid is parallel to the axes of world space, so that the box encloses exactly the
+         * kept voxels. */
         double step = info.index_to_world[a][a], corner = info.index_to_world[a][3];
         assert_true(info.first[a] >= 0 && info.first[a] < info.last[a]);
         assert_true(info.last[a] < info.dims[a]);
@@ -121,8 +122,8 @@ static void lists_hold_the_kept_voxels_along_each_axis(void **state)
     triptych_destroy(t);
 }
 
-/* What the frame reads is what its lists read, and a count changes nothing of the picture. */
-static void a_frame_has_statistics_by_list(void **state)
+/* The figures of a frame are the sums over its lists. Counting does not change the picture. */
+static void a_frame_has_statistics_for_each_list(void **state)
 {
     (void)state;
     static float timed[FLOATS], counted[FLOATS];
@@ -167,8 +168,8 @@ static void a_frame_has_statistics_by_list(void **state)
     triptych_destroy(t);
 }
 
-/* Normals are those that splats are lit by. */
-static void a_frame_reads_what_it_needs_whatever_was_drawn_before(void **state)
+/* `pre` reads normals for shading, `post` does not. */
+static void reads_of_a_frame_do_not_depend_on_earlier_frames(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -213,8 +214,8 @@ static void the_plan_of_a_frame_can_be_printed(void **state)
     triptych_destroy(t);
 }
 
-/* A camera given in full is found again as it is, and looks at what was given. */
-static void the_view_found_gives_the_same_picture_again(void **state)
+/* The program uses a completely given camera without any change. */
+static void the_reported_camera_gives_the_same_picture(void **state)
 {
     (void)state;
     static float found[FLOATS], given[FLOATS];
@@ -240,7 +241,7 @@ static void the_view_found_gives_the_same_picture_again(void **state)
     triptych_destroy(t);
 }
 
-static void pictures_take_of_the_memory_given(void **state)
+static void pictures_are_part_of_the_given_memory(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -249,17 +250,18 @@ static void pictures_take_of_the_memory_given(void **state)
     assert_fails(t, triptych_new_picture(t, 0, 8, 4, &rgba), TRIPTYCH_USAGE, "pixels");
     assert_fails(t, triptych_new_picture(t, 8, 8, 3, &rgba), TRIPTYCH_USAGE, "channels");
     assert_fails(t, triptych_new_picture(t, 4096, 4096, 4, &rgba), TRIPTYCH_ERROR, "fit in memory");
-    assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK); /* 36 of 64 MiB */
+    assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK); /* 36 MiB of 64 */
     assert_fails(t, triptych_new_picture(t, 1536, 1536, 4, &other), TRIPTYCH_ERROR,
                  "fit in memory");
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 1, &other), TRIPTYCH_OK);
     triptych_release_picture(t, rgba);
     assert_int_equal(triptych_new_picture(t, 1536, 1536, 4, &rgba), TRIPTYCH_OK);
     assert_float_equal(rgba[4 * 1536 * 1536 - 1], 0, 0);
-    triptych_destroy(t); /* with the picture */
+    triptych_destroy(t); /* also frees the picture */
 }
 
-/* What a frame with these settings was classified as, as its plan has it in words, too. */
+/* Checks the classification of a frame with these settings, in its statistics and in the words of
+ * its plan. */
 static void check_classified(triptych *t, const triptych_settings *s, triptych_classify expected,
                              const char *words)
 {
@@ -278,7 +280,7 @@ static void check_classified(triptych *t, const triptych_settings *s, triptych_c
     assert_int_equal(frame.samples_per_sheet > 0, expected == TRIPTYCH_POST);
 }
 
-static void what_only_splats_have_is_drawn_by_them(void **state)
+static void settings_for_splats_select_pre(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -309,8 +311,8 @@ static void what_only_splats_have_is_drawn_by_them(void **state)
     triptych_destroy(t);
 }
 
-/* The eye looks at the box of what is kept from outside: what is seen lies within it. */
-static void depth_is_the_distance_of_what_is_seen(void **state)
+/* The eye is outside the box of the kept voxels. All distances must lie within this box. */
+static void depth_is_the_distance_of_the_visible_surface(void **state)
 {
     (void)state;
     static float rgba[FLOATS], plain[FLOATS], depth[SIZE * SIZE];
@@ -358,7 +360,8 @@ static void depth_is_the_distance_of_what_is_seen(void **state)
     triptych_destroy(t);
 }
 
-/* Within 3 world units of the pixel's the distances of the pixels around are, too. */
+/* Returns whether the distances of the eight pixels around pixel i differ by at most 3 world units
+ * from its own. */
 static int is_smooth(const float *depth, int i)
 {
     static const int around[] = { -SIZE - 1, -SIZE, -SIZE + 1, -1, 1, SIZE - 1, SIZE, SIZE + 1 };
@@ -370,8 +373,8 @@ static int is_smooth(const float *depth, int i)
     return 1;
 }
 
-/* Of a surface that hides nearly all behind it, the mean and the median are close together. */
-static void a_probe_finds_what_is_seen(void **state)
+/* The mean and the median distance are close together if the surface is almost opaque. */
+static void a_probe_finds_the_visible_surface(void **state)
 {
     (void)state;
     static float rgba[FLOATS], depth[SIZE * SIZE];
@@ -442,8 +445,8 @@ static void the_histogram_counts_all_voxels(void **state)
     triptych_destroy(t);
 }
 
-/* What a name gives, its text gives. */
-static void a_function_is_taken_as_text(void **state)
+/* The name of a transfer function and its text give the same picture. */
+static void a_transfer_function_can_be_given_as_text(void **state)
 {
     (void)state;
     static float named[FLOATS], worded[FLOATS];
@@ -468,7 +471,7 @@ static void a_function_is_taken_as_text(void **state)
     triptych_destroy(t);
 }
 
-static void functions_are_listed_and_converted(void **state)
+static void transfer_functions_are_listed_and_converted(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -492,7 +495,7 @@ static void functions_are_listed_and_converted(void **state)
     assert_int_equal(triptych_convert(t, &grey_over, &text), TRIPTYCH_OK);
     assert_non_null(strstr(text, "30"));
     free(text);
-    /* The data set's own function is the volume's automatic one. */
+    /* The data set stores the automatic transfer function of the volume. */
     char *own, *volumes;
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_convert(t, &(triptych_conversion){ 0 }, &own), TRIPTYCH_OK);
@@ -518,7 +521,7 @@ static void note_stage(void *user, const char *stage, uint64_t done, uint64_t to
     s->others++;
 }
 
-static void progress_goes_by_stages(void **state)
+static void progress_is_reported_by_stage(void **state)
 {
     (void)state;
     static float rgba[FLOATS];
@@ -543,7 +546,7 @@ static void progress_goes_by_stages(void **state)
     assert_int_equal(system("rm -r progress.trip"), 0);
 }
 
-static void bricking_says_what_it_made(void **state)
+static void bricking_describes_its_result(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -591,8 +594,8 @@ static void write_volume(const char *name, int bytes, int value)
     assert_int_equal(fclose(f), 0);
 }
 
-/* The same bytes under another name are the same volume in another state. */
-static void volumes_are_identified_by_content_and_by_state(void **state)
+/* Equal bytes in another file have the same content and another state. */
+static void volumes_are_identified_by_content_and_state(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -610,7 +613,7 @@ static void volumes_are_identified_by_content_and_by_state(void **state)
     write_volume(one, 64, 2);
     assert_int_equal(triptych_identify(t, one, NULL, 1000, &changed), TRIPTYCH_OK);
     assert_int_equal(a.bytes, 64);
-    assert_int_equal(a.stable, 0); /* it was written just now */
+    assert_int_equal(a.stable, 0); /* the file is too new */
     assert_int_equal(strlen(a.content), 32);
     assert_string_equal(a.content, copy.content);
     assert_string_not_equal(a.state, copy.state);
@@ -645,7 +648,7 @@ static void the_files_of_a_volume_are_listed(void **state)
     assert_int_equal(remove(volume), 0);
 }
 
-static void what_fails_says_why_and_the_context_goes_on(void **state)
+static void a_failure_gives_its_reason_and_the_context_continues(void **state)
 {
     (void)state;
     static float rgba[FLOATS];
@@ -693,7 +696,7 @@ static void count_message(void *user, const char *line)
     ++*(int *)user;
 }
 
-static void messages_go_to_whoever_takes_them(void **state)
+static void messages_go_to_the_callback_if_there_is_one(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -702,7 +705,7 @@ static void messages_go_to_whoever_takes_them(void **state)
     assert_int_equal(pipe(ends), 0);
     dup2(ends[1], STDERR_FILENO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    /* Nothing of the volume lies there. */
+    /* The window shows no voxel. */
     const triptych_transfer_function none = { .window = 1, .level = 1e9, .name = "grey" };
     int silent = triptych_set_transfer_function(t, &none);
     triptych_set_messages(t, count_message, &messages);
@@ -730,8 +733,9 @@ static void keep_message(void *user, const char *line)
     snprintf(user, 400, "%s", line);
 }
 
-/* By the formula of the kernel a radius of 1 gives 1.807 and 0.423 of the extinction. */
-static void a_kernel_too_small_to_be_smooth_is_warned_of_once(void **state)
+/* By the formula of the kernel, the extinction varies from 0.423 to 1.807 of its value at a radius
+ * of 1. */
+static void a_too_small_kernel_gives_one_warning(void **state)
 {
     (void)state;
     triptych *t = new_context();
@@ -756,7 +760,7 @@ static void a_kernel_too_small_to_be_smooth_is_warned_of_once(void **state)
     triptych_destroy(t);
 }
 
-static void steps_draw_what_one_call_draws(void **state)
+static void steps_draw_the_same_picture_as_one_call(void **state)
 {
     (void)state;
     static float whole[FLOATS], stepped[FLOATS];
@@ -778,7 +782,7 @@ static void steps_draw_what_one_call_draws(void **state)
     triptych_destroy(t);
 }
 
-static void a_frame_given_up_leaves_the_next_one_as_it_is(void **state)
+static void an_abandoned_frame_does_not_change_the_next_one(void **state)
 {
     (void)state;
     static float whole[FLOATS], after[FLOATS];
@@ -815,9 +819,10 @@ static void a_turned_view_can_be_turned_back(void **state)
     triptych_destroy(t);
 }
 
-/* The tooth has 16 bits, which codes hold exactly, and with a halo every cell with a visible value
- * has its corners: unlit, nothing is lost. Lit, normals are stored in fewer bits. */
-static void the_integral_of_what_is_kept_is_that_of_the_volume(void **state)
+/* The tooth has 16 bits, which codes hold exactly. With a halo, all corners of each cell with a
+ * visible value are stored. Without shading, nothing is lost. Shading would lose precision, because
+ * normals have fewer bits. */
+static void the_integral_of_kept_voxels_equals_the_one_of_the_volume(void **state)
 {
     (void)state;
     enum { SMALL = 20, SMALL_FLOATS = 4 * SMALL * SMALL };
@@ -843,7 +848,7 @@ static void the_integral_of_what_is_kept_is_that_of_the_volume(void **state)
     triptych_destroy(t);
 }
 
-static void more_samples_are_the_mean_of_a_larger_picture(void **state)
+static void samples_are_averaged_as_in_a_larger_picture(void **state)
 {
     (void)state;
     enum { SIDE = 3, LARGE = SIDE * SIZE };
@@ -879,7 +884,7 @@ static void more_samples_are_the_mean_of_a_larger_picture(void **state)
     triptych_destroy(t);
 }
 
-/* In steps, whose pictures on the way are those of the first level, or parts of it. */
+/* Draws in steps and fetches the picture after each step. */
 static triptych_frame_stats draw_in_steps(triptych *t, float *rgba)
 {
     triptych_frame_stats stats = { 0 };
@@ -898,7 +903,7 @@ static triptych_frame_stats draw_in_steps(triptych *t, float *rgba)
     return stats;
 }
 
-/* Voxels of level 1 are 2^octaves times as wide as those that are drawn. */
+/* Draws with an `lod_px` that makes voxels of level 1 2^octaves times too wide. */
 static triptych_frame_stats draw_at(triptych *t, double octaves, float *rgba)
 {
     triptych_settings s = triptych_default_settings();
@@ -910,7 +915,7 @@ static triptych_frame_stats draw_at(triptych *t, double octaves, float *rgba)
     return draw_in_steps(t, rgba);
 }
 
-static void a_level_is_mixed_into_the_one_before_it(void **state)
+static void two_levels_are_blended(void **state)
 {
     (void)state;
     static float fine[FLOATS], coarse[FLOATS], mixed[FLOATS], again[FLOATS];
@@ -950,7 +955,7 @@ static void a_level_is_mixed_into_the_one_before_it(void **state)
     assert_int_equal(system("rm -r levels.trip"), 0);
 }
 
-/* A thread with a context of its own. */
+/* A thread with its own context. */
 typedef struct worker {
     pthread_t thread;
     triptych *t;
@@ -960,7 +965,7 @@ typedef struct worker {
     char error[256];
 } worker;
 
-/* The frame is begun already, so that cancelling is noticed whenever it comes. */
+/* The frame has already begun, so that no cancel is missed. */
 static void *draw_until_cancelled(void *user)
 {
     worker *w = user;
@@ -988,7 +993,7 @@ static void *draw_some(void *user)
     return NULL;
 }
 
-static void two_contexts_draw_in_two_threads_and_one_is_cancelled(void **state)
+static void one_of_two_drawing_contexts_can_be_cancelled(void **state)
 {
     (void)state;
     worker w[2] = { { .status = 0 }, { .status = 0 } };
@@ -1022,8 +1027,9 @@ static void *draw_once(void *user)
     return NULL;
 }
 
-/* At moments all over a frame: while it is begun, reads, draws or waits for the disk. */
-static void a_frame_that_is_cancelled_passes_one_message(void **state)
+/* The cancels arrive at many moments of a frame, while it begins, reads, draws, or waits for the
+ * disk. */
+static void a_cancelled_frame_gives_one_message(void **state)
 {
     (void)state;
     enum { TRIES = 200, APART_NS = 50000 };
@@ -1071,7 +1077,7 @@ static triptych_settings with_effects(int effects)
     return s;
 }
 
-static void effects_cost_what_is_asked_for_and_are_kept_from_view_to_view(void **state)
+static void effects_cost_nothing_when_off_and_are_kept_between_views(void **state)
 {
     (void)state;
     static float plain[FLOATS], lit[FLOATS], turned[FLOATS], again[FLOATS];
@@ -1114,7 +1120,7 @@ static void effects_cost_what_is_asked_for_and_are_kept_from_view_to_view(void *
     triptych_destroy(t);
 }
 
-static void heat_is_read_once_where_emission_runs(void **state)
+static void heat_is_read_once_if_emission_runs(void **state)
 {
     (void)state;
     static float plain[FLOATS], hot[FLOATS], again[FLOATS];
@@ -1141,7 +1147,8 @@ static void heat_is_read_once_where_emission_runs(void **state)
     triptych_destroy(t);
 }
 
-/* In steps along z, so that the values of a part of it end below those of the whole. */
+/* Bricks two halves of a volume separately. Its values rise along z, so that the lower half has a
+ * smaller maximum. */
 static void brick_rising_volume(void)
 {
     enum { EDGE = 16 };
@@ -1167,8 +1174,7 @@ static void brick_rising_volume(void)
     triptych_destroy(t);
 }
 
-/* As a context draws it that has drawn nothing before, and whether the function had a closed form.
- */
+/* Checks that `t` draws the same picture as a new context, and whether both use the closed form. */
 static void assert_drawn_afresh(triptych *t, const char *function, const triptych_settings *s,
                                 bool with_high, bool closed)
 {
@@ -1188,7 +1194,7 @@ static void assert_drawn_afresh(triptych *t, const char *function, const triptyc
                 both[i], &(triptych_view){ .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO }),
             TRIPTYCH_OK);
     }
-    for (int i = 0; i < 2; i++) /* what the first frame found is there for the second */
+    for (int i = 0; i < 2; i++) /* the second frame reuses results of the first */
         assert_int_equal(draw(t, rgba).closed_form, closed);
     assert_int_equal(draw(other, expected).closed_form, closed);
     assert_true(are_same(rgba, expected));
@@ -1197,15 +1203,15 @@ static void assert_drawn_afresh(triptych *t, const char *function, const triptyc
 
 #define LOOK "unit voxel\nvalues data\n0 .9 .6 .3 0\n"
 
-static void whether_a_function_is_looked_up_goes_by_what_is_drawn_now(void **state)
+static void the_closed_form_depends_on_the_current_settings(void **state)
 {
     (void)state;
     static const char *const line = LOOK "255 .9 .6 .3 .1\n";
-    /* Up to 140 as before; the greatest value of the lower part and about it is 136. */
+    /* Up to 140 this equals `line`. The maximum value in the lower half and its halo is 136. */
     static const char *const bent = LOOK "140 .9 .6 .3 .054902\n255 .1 .6 .9 .9\n";
     triptych_settings defaults = triptych_default_settings(), cued = defaults, cubic = defaults;
     cued.effects = TRIPTYCH_CUEING;
-    cubic.kernel = TRIPTYCH_CUBIC; /* which overshoots that */
+    cubic.kernel = TRIPTYCH_CUBIC; /* overshoots the maximum value */
     brick_rising_volume();
     triptych *t = new_context();
     assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
@@ -1225,8 +1231,8 @@ static void whether_a_function_is_looked_up_goes_by_what_is_drawn_now(void **sta
     assert_int_equal(system("rm -r low.trip high.trip rising.nrrd"), 0);
 }
 
-/* Sheets that are interpolated from 64 voxels have plain kernels alone. */
-static void the_device_names_the_kernels_that_draw(void **state)
+/* Interpolation from 64 voxels has only plain kernels. */
+static void the_device_names_the_kernels_in_use(void **state)
 {
     (void)state;
     static float rgba[FLOATS];
@@ -1245,7 +1251,7 @@ static void the_device_names_the_kernels_that_draw(void **state)
     triptych_destroy(t);
 }
 
-static void measurements_keep_their_colours_unless_effects_are_asked_for(void **state)
+static void measured_volumes_have_effects_only_on_request(void **state)
 {
     (void)state;
     static float rgba[FLOATS];
@@ -1278,39 +1284,39 @@ static void measurements_keep_their_colours_unless_effects_are_asked_for(void **
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(info_is_that_of_the_volume),
+        cmocka_unit_test(info_describes_the_volume),
         cmocka_unit_test(lists_hold_the_kept_voxels_along_each_axis),
-        cmocka_unit_test(a_frame_has_statistics_by_list),
-        cmocka_unit_test(a_frame_reads_what_it_needs_whatever_was_drawn_before),
+        cmocka_unit_test(a_frame_has_statistics_for_each_list),
+        cmocka_unit_test(reads_of_a_frame_do_not_depend_on_earlier_frames),
         cmocka_unit_test(the_plan_of_a_frame_can_be_printed),
-        cmocka_unit_test(the_view_found_gives_the_same_picture_again),
-        cmocka_unit_test(pictures_take_of_the_memory_given),
-        cmocka_unit_test(depth_is_the_distance_of_what_is_seen),
-        cmocka_unit_test(a_probe_finds_what_is_seen),
+        cmocka_unit_test(the_reported_camera_gives_the_same_picture),
+        cmocka_unit_test(pictures_are_part_of_the_given_memory),
+        cmocka_unit_test(depth_is_the_distance_of_the_visible_surface),
+        cmocka_unit_test(a_probe_finds_the_visible_surface),
         cmocka_unit_test(the_histogram_counts_all_voxels),
-        cmocka_unit_test(a_function_is_taken_as_text),
-        cmocka_unit_test(functions_are_listed_and_converted),
-        cmocka_unit_test(progress_goes_by_stages),
-        cmocka_unit_test(bricking_says_what_it_made),
-        cmocka_unit_test(volumes_are_identified_by_content_and_by_state),
+        cmocka_unit_test(a_transfer_function_can_be_given_as_text),
+        cmocka_unit_test(transfer_functions_are_listed_and_converted),
+        cmocka_unit_test(progress_is_reported_by_stage),
+        cmocka_unit_test(bricking_describes_its_result),
+        cmocka_unit_test(volumes_are_identified_by_content_and_state),
         cmocka_unit_test(the_files_of_a_volume_are_listed),
-        cmocka_unit_test(what_fails_says_why_and_the_context_goes_on),
-        cmocka_unit_test(a_kernel_too_small_to_be_smooth_is_warned_of_once),
-        cmocka_unit_test(messages_go_to_whoever_takes_them),
-        cmocka_unit_test(steps_draw_what_one_call_draws),
-        cmocka_unit_test(a_frame_given_up_leaves_the_next_one_as_it_is),
+        cmocka_unit_test(a_failure_gives_its_reason_and_the_context_continues),
+        cmocka_unit_test(a_too_small_kernel_gives_one_warning),
+        cmocka_unit_test(messages_go_to_the_callback_if_there_is_one),
+        cmocka_unit_test(steps_draw_the_same_picture_as_one_call),
+        cmocka_unit_test(an_abandoned_frame_does_not_change_the_next_one),
         cmocka_unit_test(a_turned_view_can_be_turned_back),
-        cmocka_unit_test(the_integral_of_what_is_kept_is_that_of_the_volume),
-        cmocka_unit_test(what_only_splats_have_is_drawn_by_them),
-        cmocka_unit_test(more_samples_are_the_mean_of_a_larger_picture),
-        cmocka_unit_test(a_level_is_mixed_into_the_one_before_it),
-        cmocka_unit_test(effects_cost_what_is_asked_for_and_are_kept_from_view_to_view),
-        cmocka_unit_test(heat_is_read_once_where_emission_runs),
-        cmocka_unit_test(whether_a_function_is_looked_up_goes_by_what_is_drawn_now),
-        cmocka_unit_test(the_device_names_the_kernels_that_draw),
-        cmocka_unit_test(measurements_keep_their_colours_unless_effects_are_asked_for),
-        cmocka_unit_test(two_contexts_draw_in_two_threads_and_one_is_cancelled),
-        cmocka_unit_test(a_frame_that_is_cancelled_passes_one_message),
+        cmocka_unit_test(the_integral_of_kept_voxels_equals_the_one_of_the_volume),
+        cmocka_unit_test(settings_for_splats_select_pre),
+        cmocka_unit_test(samples_are_averaged_as_in_a_larger_picture),
+        cmocka_unit_test(two_levels_are_blended),
+        cmocka_unit_test(effects_cost_nothing_when_off_and_are_kept_between_views),
+        cmocka_unit_test(heat_is_read_once_if_emission_runs),
+        cmocka_unit_test(the_closed_form_depends_on_the_current_settings),
+        cmocka_unit_test(the_device_names_the_kernels_in_use),
+        cmocka_unit_test(measured_volumes_have_effects_only_on_request),
+        cmocka_unit_test(one_of_two_drawing_contexts_can_be_cancelled),
+        cmocka_unit_test(a_cancelled_frame_gives_one_message),
     };
     return cmocka_run_group_tests(tests, brick, remove_data);
 }

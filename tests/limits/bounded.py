@@ -1,17 +1,17 @@
-"""Bricking a volume many times the size of a memory cgroup, drawing it and flying through it, each in
-a cgroup of its own: what test_memory.py does at a small scale and large.py at any."""
+"""Bricks a volume many times the size of a memory cgroup, draws it and flies through it. Each stage
+has a cgroup of its own. test_memory.py does this at a small scale, large.py at any scale."""
 import json
 import os
 
 import limits
 from memory_group import Group
 
-SLACK_BYTES = 64 * 2**20  # the program itself: code, stacks, libraries
-RANGE = "0.18:"  # of the shells' values: at every size a little more than a tenth of the voxels
+SLACK_BYTES = 64 * 2**20  # the program itself, with code, stacks and libraries
+RANGE = "0.18:"  # this range holds a little more than a tenth of the voxels of `shells`, at every size
 
 
 class Stage:
-    """One program's run and what the kernel says it took."""
+    """One run of a program, and the memory that the kernel reports for it."""
 
     def __init__(self, what, outcome, group, promise_bytes, driver):
         self.what, self.outcome, self.driver = what, outcome, driver
@@ -20,11 +20,11 @@ class Stage:
         self.promise_bytes = promise_bytes
 
     def problem(self):
-        """None when it worked within its promise."""
+        """Returns why the stage failed or exceeded its limit, or None."""
         if self.outcome.status or self.outcome.err:
             return f"{self.what}: exit status {self.outcome.status}: {self.outcome.err.strip()}"
         if not self.driver and self.peak_bytes > self.promise_bytes + SLACK_BYTES:
-            return f"{self.what}: more was resident than promised"
+            return f"{self.what}: more memory was resident than --memory allows"
         return None
 
     def line(self, moved_bytes):
@@ -38,7 +38,8 @@ class Stage:
 
 
 class Bounded:
-    """Gives each line of the report to `note` and stops at the first stage that fails: AssertionError."""
+    """Passes each line of the report to `note`. The first stage that fails raises
+    AssertionError."""
 
     def __init__(self, folder, limit_bytes, memory_bytes, note):
         self.folder, self.note = folder, note
@@ -56,7 +57,8 @@ class Bounded:
         assert problem is None, problem
 
     def generate(self, volume_bytes):
-        """A volume of floats of that size or a little more, outside the group; kept if there."""
+        """Generates a volume of floats of at least this size, outside the group. Keeps an existing
+        file."""
         n = 2
         while n**3 * 4 < volume_bytes:
             n += 1
@@ -78,11 +80,12 @@ class Bounded:
         self.note(f"    {limits.text_bytes(made['input_bytes'])} read, {share:.1f} % of the voxels "
                   f"kept, {limits.text_bytes(made['temporary_bytes'])} spilled, "
                   f"{limits.text_bytes(made['bytes'])} written")
-        assert made["kept"] >= 0.1 * made["voxels"], "less than a tenth of the voxels is kept"
+        assert made["kept"] >= 0.1 * made["voxels"], "less than a tenth of the voxels was kept"
         return made
 
     def render(self, renderer, size, *arguments):
-        """From the disk, not from the page cache. What a graphics driver holds is not promised."""
+        """Draws from the disk, not from the page cache. The memory of a graphics driver has no
+        limit."""
         limits.forget_pages(self.data)
         what = " ".join(["render", renderer, *map(str, arguments)])
         stage = self.stage(what, "render", self.data, "-o",
@@ -95,8 +98,8 @@ class Bounded:
         return frames
 
     def flight(self, *arguments):
-        """What the viewer draws while the eye moves, from the disk: what `bench flight` prints, as
-        JSON. At rest the picture is that of render."""
+        """Runs `bench flight` from the disk, which draws like the viewer while the eye moves.
+        Returns its JSON. The picture at rest must equal the picture of render."""
         limits.forget_pages(self.data)
         stage = self.stage("flight", "bench", "flight", self.data, "--renderer", "cpu", "--json",
                            *arguments)
@@ -105,11 +108,11 @@ class Bounded:
         self.note(stage.line(0))
         for part in flown["tables"]["parts"]["rows"]:
             self.note("    {part:<10}{fps:6.1f} pictures a second; ms between: median {ms:.1f}, "
-                      "99 % {ms_99:.1f}, most {ms_max:.1f}; from input: median {age_ms:.1f}, "
+                      "99 % {ms_99:.1f}, maximum {ms_max:.1f}; from input: median {age_ms:.1f}, "
                       "99 % {age_ms_99:.1f}".format(**part))
         rest = flown["tables"]["rest"]["rows"][0]
         self.note("    first picture {first_ms:.0f} ms, whole picture {first_whole_ms:.0f}, whole "
                   "after the flight {rest_ms:.0f}".format(**rest))
-        assert rest["differ"] == 0, "the picture at rest is not that of render"
-        assert rest["peak_bytes"] <= rest["limit_bytes"], "more memory was taken than promised"
+        assert rest["differ"] == 0, "the picture at rest differs from the picture of render"
+        assert rest["peak_bytes"] <= rest["limit_bytes"], "more memory was taken than --memory allows"
         return flown

@@ -1,11 +1,11 @@
-/* The data set that is damaged on purpose: two thirds of the voxels of a small grid at random, with
+/* The data set that the tests damage. It has a random two thirds of the voxels of a small grid and
  * a halo, at two levels. */
 #ifndef CLOUD_H
 #define CLOUD_H
 
 #include "scenes.h"
 
-/* Its lists along X; those along Y and Z follow each. */
+/* Indices of the X lists. The Y and Z lists follow each X list. */
 enum {
     CLOUD_VOXELS = 0,
     CLOUD_HALO = 3,
@@ -14,7 +14,7 @@ enum {
     CLOUD_LISTS = 12
 };
 
-/* index.trip, three planes along each axis at each level. */
+/* index.trip, and three planes for each axis and level */
 enum { CLOUD_FILES = 1 + 2 * 3 * 3 };
 
 static inline bool cloud_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -28,7 +28,7 @@ static inline bool cloud_voxel(void *user, int i, int j, int k, unsigned *code, 
     return hash % 3 != 0;
 }
 
-/* Half of the other voxels. */
+/* Puts half of the other voxels into the halo. */
 static inline bool cloud_halo(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     return !cloud_voxel(user, i, j, k, code, gradient) && *code % 2;

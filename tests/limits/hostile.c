@@ -77,7 +77,7 @@ void hostile_free(hostile *h)
     free(h->planes);
 }
 
-/* The checksums of consecutive pages of data[0, bytes), to a table. */
+/* Stores the checksums of consecutive pages of data[0, bytes) in a table. */
 static void sum_pages(const unsigned char *data, size_t bytes, unsigned page_log2,
                       unsigned char *table)
 {

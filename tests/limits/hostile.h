@@ -1,5 +1,5 @@
-/* A data set's files in memory, to be changed at will and sealed with right checksums, as someone
- * would who means harm: what is behind the checksums is then all that protects a reader. */
+/* The files of a data set in memory. Tests change them and then compute valid checksums, as an
+ * attacker would. The reader must detect the changes by other checks. */
 #ifndef HOSTILE_H
 #define HOSTILE_H
 
@@ -10,7 +10,7 @@
 
 typedef struct hostile_file {
     char name[32];
-    unsigned list; /* of a plane file: what of */
+    unsigned list; /* list of a plane file */
     int plane;
     size_t bytes;
     unsigned char *data;
@@ -18,11 +18,11 @@ typedef struct hostile_file {
 
 typedef struct hostile {
     hostile_file index;
-    hostile_file *planes; /* of all lists, one after the other */
+    hostile_file *planes; /* plane files of all lists in order */
     unsigned plane_count;
 } hostile;
 
-/* From a data set on disk; the path is a folder's. */
+/* Loads the data set in folder `path`. */
 void hostile_load(hostile *h, const char *path);
 void hostile_copy(hostile *to, const hostile *from);
 void hostile_free(hostile *h);
@@ -32,17 +32,17 @@ static inline trip_file_header *hostile_header(const hostile *h)
     return (trip_file_header *)(void *)h->index.data;
 }
 
-/* Descriptor of a list, by the place that the header of `sound` gives it. */
+/* Returns the descriptor of a list in `h`, at the offset that the header of `sound` gives. */
 static inline trip_file_list *hostile_list(const hostile *h, const hostile *sound, unsigned list)
 {
     return (trip_file_list *)(void *)(h->index.data + hostile_header(sound)->lists_offset) + list;
 }
 
-/* Right checksums for whatever stands there now. Tables are found by the places that `sound`, the
- * data set before it was changed, gives them, so that the places themselves may be changed. */
+/* Computes valid checksums for the current bytes. `sound` is the data set before all changes. Its
+ * header gives the offsets of the tables, so tests may also change the offsets in `h`. */
 void hostile_seal(hostile *h, const hostile *sound);
-/* Makes what lies in a folder, `disk`, the same as `h`: files that differ are written. Nothing lies
- * there yet where `disk` is all zero. */
+/* Writes the files of `h` that differ from `disk`, the current files in folder `path`, and updates
+ * `disk`. An all-zero `disk` means that the folder is empty. */
 void hostile_write(const hostile *h, hostile *disk, const char *path);
 
 #endif

@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""At full size what test_memory.py does small: generates a volume, bricks it, draws it and flies
-through it with --memory in a memory cgroup, and prints for each stage time, throughput, promise, and
-what the kernel says was resident. Fails when a stage fails or takes more than it promised.
+"""Does the work of test_memory.py at full size. It generates a volume, bricks it, draws it and flies
+through it with --memory in a memory cgroup. For each stage it prints the time, the throughput, the
+limit, and the maximum resident memory that the kernel reports. It fails if a stage fails or exceeds
+its limit.
 
     cmake --preset release && cmake --build --preset release
     sudo tests/limits/large.py --work /a/folder/on/a/disk
 
-Needs root or a cgroup of one's own, and 2.5 times the volume's size of disk. brick's throughput is
-of input and output, render's of what it reads. What a graphics driver holds is no part of the
-promise but counts as resident, all of it where the driver is software (llvmpipe): with --renderers
-gl it is printed and not judged."""
+The script needs root or its own cgroup, and disk space of 2.5 times the size of the volume. The
+throughput of brick counts input and output. The throughput of render counts the bytes read.
+
+--memory does not limit a graphics driver. The driver's memory counts as resident, all of it for a
+software driver (llvmpipe). With --renderers gl the script prints this memory and does not check it."""
 import argparse
 import os
 import shutil
@@ -32,14 +34,14 @@ def parse():
     p.add_argument("--work", default=".", help="folder for the files, on a disk")
     p.add_argument("--build", default=os.path.join(ROOT, "build", "release"), help="build folder")
     p.add_argument("--volume", type=size_bytes, default="8G", help="bytes of voxels")
-    p.add_argument("--limit", type=size_bytes, default="512M", help="of the memory cgroup")
-    p.add_argument("--memory", type=size_bytes, default="256M", help="what brick and render promise")
-    p.add_argument("--size", default="1024x1024", help="of the picture")
+    p.add_argument("--limit", type=size_bytes, default="512M", help="limit of the memory cgroup")
+    p.add_argument("--memory", type=size_bytes, default="256M", help="--memory of brick and render")
+    p.add_argument("--size", default="1024x1024", help="size of the picture")
     p.add_argument("--renderers", default="cpu", help="cpu, gl, reference, with commas")
-    p.add_argument("--orbit", type=int, default=3, help="frames of the sequence drawn besides")
+    p.add_argument("--orbit", type=int, default=3, help="number of frames in a sequence")
     p.add_argument("--flight", type=float, default=12, metavar="SECONDS",
-                   help="that the eye moves, in 800x600 by cpu; 0: no flight")
-    p.add_argument("--keep", action="store_true", help="leave the files, and use the volume if there")
+                   help="duration of the flight with cpu at 800x600; 0 disables it")
+    p.add_argument("--keep", action="store_true", help="keep the files, and use an existing volume")
     return p.parse_args()
 
 
@@ -53,7 +55,7 @@ def remove_made(o, bounded, volume):
 
 def work(o, note):
     bounded = Bounded(o.work, o.limit, o.memory, note)
-    shutil.rmtree(bounded.data, ignore_errors=True)  # of an earlier run
+    shutil.rmtree(bounded.data, ignore_errors=True)  # left by an earlier run
     volume = bounded.generate(o.volume)
     try:
         bounded.brick(volume)

@@ -1,7 +1,7 @@
-"""What the tests of limits share: they run the real programs as a user does and judge what these
-leave behind. Python's standard library only.
+"""Support for the tests in this folder. They run the programs as a user does, and check the files
+that the programs leave. It uses Python's standard library only.
 
-    test_x.py --program PATH... [--set NAME=VALUE]... [unittest's own arguments]
+    test_x.py --program PATH... [--set NAME=VALUE]... [arguments of unittest]
 """
 import ctypes
 import hashlib
@@ -15,18 +15,18 @@ import threading
 import time
 import unittest
 
-FAILED = {1, 2}  # exit statuses of what is refused or cannot be done
-SKIPPED = 77  # CTest's
+FAILED = {1, 2}  # exit statuses of failures and of wrong usage
+SKIPPED = 77  # CTest's exit status for skipped tests
 HANGS_SECONDS = 300
 DATASETS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "datasets")
 
 _paths = {}
-options = {}  # of the command line, by name
+options = {}  # options of the command line, by name
 
 
 def program(name):
-    """`quick` is triptych that writes OpenEXR files by what stands in for triptych-images (tests/quick):
-    for pictures whose pixels are all that counts."""
+    """Returns the path of a program. `quick` is triptych with a stand-in for triptych-images
+    (tests/quick), for tests that need only pixels."""
     return options["quick"] if name == "quick" else _paths[name]
 
 
@@ -38,12 +38,13 @@ def use_programs(*paths):
 class Outcome:
     def __init__(self, status, out, err, peak_bytes, seconds):
         self.status, self.out, self.err = status, out, err
-        self.peak_bytes = peak_bytes  # resident, as the kernel reports
+        self.peak_bytes = peak_bytes  # maximum resident size, from the kernel
         self.seconds = seconds
 
 
 def run(name, *arguments, **popen):
-    """Runs a program to its end. What takes OpenVDB is skipped where that is switched off."""
+    """Runs a program to its end. Skips the test if an argument needs OpenVDB and the build lacks
+    it."""
     vdb = any(str(a).endswith(".vdb") for a in arguments)
     if vdb and "OPENVDB" in options.get("switched_off", "").split():
         raise unittest.SkipTest("built without OpenVDB")
@@ -69,7 +70,7 @@ def read_bytes(path):
 
 
 def picture_hash(path):
-    """Of the file, but for the date that the format's library puts into it."""
+    """Returns the hash of a file without the date that the format's library writes."""
     data = bytearray(read_bytes(path))
     at = data.find(b"capDate\0string\0")
     if at >= 0:
@@ -92,7 +93,7 @@ def text_bytes(n):
 
 
 class Test(unittest.TestCase):
-    """Works in a folder of its own below the current one, since /tmp may be memory."""
+    """Works in a folder of its own below the current one, because /tmp may be in memory."""
 
     @classmethod
     def setUpClass(cls):
@@ -110,7 +111,8 @@ class Test(unittest.TestCase):
         print(f"    {text}", flush=True)
 
     def works(self, name, *arguments, warns="", **popen):
-        """Ends well and silently, or with one line of warning that holds `warns`."""
+        """Checks that the program succeeds silently, or with one line of warning that contains
+        `warns`."""
         r = run(name, *arguments, **popen)
         self.assertEqual((r.status, r.err.count("\n")), (0, 1 if warns else 0),
                          f"{name} {arguments}: {r.err}")
@@ -118,7 +120,7 @@ class Test(unittest.TestCase):
         return r
 
     def fails(self, name, *arguments, says="", **popen):
-        """Ends with one line of error that holds every text of `says`."""
+        """Checks that the program fails with one error line that contains every text of `says`."""
         r = run(name, *arguments, **popen)
         self.assertRefused(r, says)
         return r
@@ -130,7 +132,7 @@ class Test(unittest.TestCase):
             self.assertIn(text, r.err)
 
     def draw(self, data, *arguments, renderer="cpu", size="160x120", **popen):
-        """The picture's hash."""
+        """Draws a picture. Returns its hash."""
         path = self.path("picture.exr")
         if os.path.exists(path):
             os.remove(path)
@@ -139,7 +141,7 @@ class Test(unittest.TestCase):
         return picture_hash(path)
 
     def stats(self, data, *arguments, renderer="cpu", size="160x120"):
-        """--stats of a frame, and the picture's hash."""
+        """Returns the --stats of a frame, and the hash of its picture."""
         path = self.path("picture.exr")
         r = self.works("quick", "render", data, "-o", path, "--size", size, "--renderer",
                        renderer, "--stats", "-", *arguments)
@@ -155,7 +157,7 @@ class Test(unittest.TestCase):
 
 
 def forget_pages(folder):
-    """Drops a data set's files from the page cache."""
+    """Drops the files of a data set from the page cache."""
     for name in os.listdir(folder):
         f = os.open(os.path.join(folder, name), os.O_RDONLY)
         os.fsync(f)
@@ -164,7 +166,7 @@ def forget_pages(folder):
 
 
 def refuse_io_uring():
-    """For preexec_fn: the kernel refuses to set up rings, as containers' filters do."""
+    """Makes the kernel refuse to set up rings, like the filters of containers. For preexec_fn."""
 
     class Program(ctypes.Structure):
         _fields_ = [("length", ctypes.c_ushort), ("code", ctypes.c_void_p)]
@@ -173,7 +175,7 @@ def refuse_io_uring():
         return code.to_bytes(2, sys.byteorder) + bytes([jt, jf]) + k.to_bytes(4, sys.byteorder)
 
     io_uring_setup, eperm = 425, 1
-    code = (instruction(0x20, 0, 0, 0) +  # load the number of the call
+    code = (instruction(0x20, 0, 0, 0) +  # load the number of the system call
             instruction(0x15, 0, 1, io_uring_setup) +
             instruction(0x06, 0, 0, 0x00050000 | eperm) + instruction(0x06, 0, 0, 0x7FFF0000))
     buffer = ctypes.create_string_buffer(code, len(code))
@@ -186,17 +188,18 @@ def refuse_io_uring():
 
 
 def rounds(count):
-    """How often something random is tried: more by the environment, for a night."""
+    """Returns how often to try something random. TRIP_LIMITS_ROUNDS multiplies the number, for long
+    runs."""
     return count * int(os.environ.get("TRIP_LIMITS_ROUNDS", 1))
 
 
 def option(name, default):
-    """What --set gave, of the default's type."""
+    """Returns the value of --set, converted to the type of the default."""
     return type(default)(options.get(name, default))
 
 
 def main():
-    """Runs the module's tests; 77 when one of them was skipped and none failed."""
+    """Runs the module's tests. Exits with 77 if a test was skipped and none failed."""
     rest = []
     arguments = iter(sys.argv[1:])
     for argument in arguments:

@@ -1,12 +1,13 @@
-"""Memory cgroups, version 1 or 2: programs in one get no more than its limit, page cache included."""
+"""Memory cgroups, version 1 or 2. Programs in a group get at most its limit, page cache
+included."""
 import errno
 import os
 import time
 
 
 class Group:
-    """Below this process's own; removed at the end of a with block. Raises OSError where none can be
-    made."""
+    """A group below the group of this process. A with block removes it at its end. Raises OSError
+    if no group can be made."""
 
     def __init__(self, limit_bytes):
         self.limit_bytes = limit_bytes
@@ -21,7 +22,7 @@ class Group:
         try:
             self._write(self._names["swap"], self._names["swap_bytes"](limit_bytes))
         except OSError:
-            pass  # no swap is accounted here
+            pass  # this machine does not account for swap
 
     def __enter__(self):
         return self
@@ -30,16 +31,17 @@ class Group:
         self.remove()
 
     def enter(self):
-        """For preexec_fn."""
+        """Moves this process into the group. For preexec_fn."""
         self._write("cgroup.procs", os.getpid())
 
     def peak_bytes(self):
-        """With the page cache, of all that ran in it."""
+        """Returns the maximum memory of all programs in the group, with the page cache."""
         with open(os.path.join(self._folder, self._names["peak"])) as f:
             return int(f.read())
 
     def remove(self):
-        """The kernel's own threads for io_uring leave it a moment after the program has ended."""
+        """Retries, because the kernel's threads for io_uring leave the group a moment after the
+        program has ended."""
         for _ in range(200):
             try:
                 return os.rmdir(self._folder)
@@ -55,7 +57,7 @@ class Group:
 
 
 def _own_group():
-    """The folder of this process's memory cgroup and what its files are called."""
+    """Returns the folder of this process's memory cgroup, and the names of its files."""
     v1 = {"limit": "memory.limit_in_bytes", "peak": "memory.max_usage_in_bytes",
           "swap": "memory.memsw.limit_in_bytes", "swap_bytes": lambda n: n}
     v2 = {"limit": "memory.max", "peak": "memory.peak", "swap": "memory.swap.max",
@@ -69,5 +71,6 @@ def _own_group():
 
 
 def _mounted_part(mount, group):
-    """In a container the mount may show the group itself as its root."""
+    """Returns the path below the mount. In a container, the mount may show the group itself as its
+    root."""
     return group if os.path.isdir(mount + group) else ""

@@ -1,5 +1,5 @@
-/* How much of what is random a test tries: TRIP_LIMITS_ROUNDS times as much as by default, and
- * under sanitizers a quarter. */
+/* Returns the number of random rounds of a test. The environment variable TRIP_LIMITS_ROUNDS
+ * multiplies the default. Sanitizer builds run a quarter of the rounds. */
 #ifndef ROUNDS_H
 #define ROUNDS_H
 

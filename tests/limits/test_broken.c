@@ -1,5 +1,5 @@
-/* Whatever happens to a data set's bytes, on disk or on their way, a frame is the same picture or
- * ends with one line that names the file; and the next frame is whole. */
+/* Tests with bytes damaged on disk or during reads. A frame gives the same picture or fails with
+ * one line that names the file. After a fault during reads, the next frame is complete. */
 #include "cloud.h"
 #include "renderer_choice.h"
 #include "rounds.h"
@@ -29,7 +29,7 @@ static unsigned random_below(unsigned count)
     return (unsigned)(test_random() * count);
 }
 
-/* Everything that takes part in drawing frames, from the disk on. */
+/* All objects that draw a frame, from the data set to the renderer. */
 typedef struct drawing {
     trip_budget *budget;
     trip_dataset *data;
@@ -118,7 +118,7 @@ static int tear_down(void **state)
 
 static const trip_engine engines[] = { TRIP_ENGINE_AUTO, TRIP_ENGINE_PREAD, TRIP_ENGINE_NULL };
 
-/* One frame by any engine from what is on disk; true when it was drawn. */
+/* Draws a frame of the files on disk with a random engine. Returns whether it succeeded. */
 static bool judge(const char *file)
 {
     static float rgba[SIZE * SIZE * 4];
@@ -158,7 +158,7 @@ static void change(const char *file, long at, unsigned char bits)
     close(fd);
 }
 
-static void a_flipped_byte_ends_the_frame_or_leaves_the_picture_as_it_is(void **state)
+static void a_flipped_byte_ends_the_frame_or_changes_nothing(void **state)
 {
     int flips = limits_rounds(FLIPS), drawn = 0;
     (void)state;
@@ -182,7 +182,7 @@ static void copy_file(const char *from, const char *to)
     assert_int_equal(system(command), 0);
 }
 
-/* Where a file is kept while it is damaged. */
+/* Returns the path that holds the sound file while a damaged file replaces it. */
 static const char *spare(void)
 {
     static char path[512];
@@ -216,8 +216,8 @@ static void a_file_of_any_other_length_ends_the_frame(void **state)
     assert_true(judge(""));
 }
 
-/* Planes of normals have the same length along each axis. */
-static void a_file_in_place_of_another_ends_the_frame(void **state)
+/* The planes of normals have equal lengths for all three axes. */
+static void a_swapped_file_ends_the_frame(void **state)
 {
     const unsigned step = TEST_BY_TURNS ? 4 : 1;
     (void)state;
@@ -234,7 +234,7 @@ static void a_file_in_place_of_another_ends_the_frame(void **state)
     assert_true(judge(""));
 }
 
-/* What happens to the n-th read of a frame. */
+/* A fault in the read of a frame that `countdown` reads precede. */
 typedef struct mishap {
     enum { FAILS, ENDS, COMES_SHORT, COMES_CHANGED, IS_INTERRUPTED, MISHAPS } kind;
     _Atomic int countdown;
@@ -261,8 +261,8 @@ static long happen(void *user, void *data, uint64_t offset, size_t bytes, long r
     }
 }
 
-/* One read of the frame in fifteen, another one for each mishap. A frame gets over what is short or
- * interrupted. */
+/* Applies a mishap to every fifteenth read of a frame. Each mishap starts at another read. A frame
+ * recovers from short and interrupted reads. */
 static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int name,
                           const float *wanted)
 {
@@ -293,7 +293,7 @@ static void check_mishaps(trip_renderer_kind kind, trip_engine engine, int name,
     close_drawing(&d);
 }
 
-static void a_read_that_fails_comes_short_or_damaged_in_mid_frame(void **state)
+static void failed_short_or_damaged_reads_do_no_harm(void **state)
 {
     static float wanted[SIZE * SIZE * 4];
     const trip_renderer_kind kinds[] = { TRIP_RENDERER_CPU, TRIP_RENDERER_REFERENCE };
@@ -312,10 +312,10 @@ static void a_read_that_fails_comes_short_or_damaged_in_mid_frame(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_flipped_byte_ends_the_frame_or_leaves_the_picture_as_it_is),
+        cmocka_unit_test(a_flipped_byte_ends_the_frame_or_changes_nothing),
         cmocka_unit_test(a_file_of_any_other_length_ends_the_frame),
-        cmocka_unit_test(a_file_in_place_of_another_ends_the_frame),
-        cmocka_unit_test(a_read_that_fails_comes_short_or_damaged_in_mid_frame),
+        cmocka_unit_test(a_swapped_file_ends_the_frame),
+        cmocka_unit_test(failed_short_or_damaged_reads_do_no_harm),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,5 @@
-"""A disk that fills up while a data set is made: one line, and nothing left behind."""
+"""Tests a disk that fills up while a data set is made. There is one error line, and nothing
+remains."""
 import os
 import subprocess
 
@@ -15,7 +16,7 @@ class DiskFull(limits.Test):
         os.mkdir(cls.disk)
 
     def run_on_disk(self, mebibytes, commands):
-        """Shell commands in a mount namespace where `disk` is that small."""
+        """Runs shell commands in a mount namespace in which `disk` has this size."""
         script = (f"mount -t tmpfs -o size={mebibytes}m none '{self.disk}' && cd '{self.disk}' "
                   f"|| exit 1\n{commands}")
         return subprocess.run(["unshare", "--mount", "--map-root-user", "sh", "-c", script],
@@ -30,18 +31,20 @@ class DiskFull(limits.Test):
             self.skipTest(f"a small disk cannot be mounted here: {r.stderr.strip()}")
 
     def brick(self, mebibytes, *arguments):
-        """What brick says and leaves there."""
+        """Runs brick on the small disk. Returns its exit status, its stderr, and the names of the
+        remaining files."""
         command = " ".join([f"'{limits.program('triptych')}' brick '{self.volume}' -o d.trip -q",
                             *(arguments or ["--keep-all"])])
         r = self.run_on_disk(mebibytes, f"{command}; echo status $?; ls -A")
         status, *left = r.stdout.split("\n", 1)
         return int(status.split()[1]), r.stderr, left[0].split()
 
-    def test_brick_refuses_or_stops_and_leaves_nothing_under_the_name(self):
+    def test_bricking_on_a_small_disk_leaves_no_data_set(self):
         for mebibytes, *arguments in (
-                [1], [2], [4], [6], [8], [9], [10],  # 96^3 * 3 * 4 bytes and masks are 10.3 MiB
+                # the data set has 96^3 * 3 * 4 bytes and masks, which is 10.3 MiB
+                [1], [2], [4], [6], [8], [9], [10],
                 [1, "--keep-all", "--normals=none"], [2, "--keep-all", "--normals=none"],
-                [1, "--range=100:160"], [2, "--range=100:160"]):  # with a halo
+                [1, "--range=100:160"], [2, "--range=100:160"]):  # this range makes a halo
             with self.subTest(mebibytes=mebibytes, arguments=arguments):
                 status, said, left = self.brick(mebibytes, *arguments)
                 self.assertIn(status, limits.FAILED, said)
@@ -49,12 +52,12 @@ class DiskFull(limits.Test):
                 self.assertRegex(said, r"[Nn]o space|disk|free")
                 self.assertNotIn("d.trip", left)
 
-    def test_with_room_enough_it_works(self):
+    def test_bricking_with_enough_room_works(self):
         status, said, left = self.brick(64)
         self.assertEqual((status, said, left), (0, "", ["d.trip"]))
 
-    def test_a_disk_that_others_fill_meanwhile(self):
-        """The check beforehand is passed, since the disk is full only later."""
+    def test_a_disk_that_others_fill_leaves_no_data_set(self):
+        """The disk fills up only after brick has checked the free space."""
         brick = (f"'{limits.program('triptych')}' brick '{self.volume}' -o d.trip --keep-all -q "
                  "--memory 40M")
         fill = "head -c 200M /dev/zero >fill 2>/dev/null"
@@ -69,7 +72,7 @@ class DiskFull(limits.Test):
                 self.assertRegex(r.stderr, r"\Atriptych: [^\n]+\ntriptych: [^\n]*d\.trip[^\n]*\n\Z")
                 self.assertNotIn("d.trip\n", r.stdout.replace("d.trip.partial", ""))
 
-    def test_a_picture_that_does_not_fit(self):
+    def test_a_picture_that_does_not_fit_leaves_nothing(self):
         r = self.run_on_disk(64, f"'{limits.program('triptych')}' brick '{self.volume}' -o d.trip "
                                  "-q --keep-all && (head -c 200M /dev/zero >fill 2>/dev/null; "
                                  f"'{limits.program('triptych')}' render d.trip -o p.exr; "

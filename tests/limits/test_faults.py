@@ -1,5 +1,6 @@
-"""Damaged, mixed-up, missing and forbidden files: an error that names file and place, or the same
-picture; never another one, nor a crash."""
+"""Tests damaged, exchanged, missing and unreadable files. The program prints an error that names
+the file and the offset, or draws the same picture. It never draws another picture, and never
+crashes."""
 import os
 import random
 import re
@@ -9,7 +10,7 @@ import subprocess
 import limits
 
 SIZE = "48x40"
-FLIPS = 20  # many more in test_broken.c, without a process each
+FLIPS = 20  # test_broken.c tries many more, without a process for each
 
 
 class Faults(limits.Test):
@@ -17,7 +18,7 @@ class Faults(limits.Test):
     def setUpClass(cls):
         super().setUpClass()
         cls.random = random.Random(limits.option("seed", 1))
-        function = cls.path("upper.tf")  # leaves values out, so that there is a halo
+        function = cls.path("upper.tf")  # this transfer function hides values, so that there is a halo
         with open(function, "w") as f:
             f.write("0 0 0 0 0\n100 0 0 0 0\n101 1 1 1 0.5\n255 1 1 1 0.5\n")
         for name, field in ("a", "shells"), ("b", "marschner-lobb"):
@@ -41,7 +42,8 @@ class Faults(limits.Test):
         shutil.copyfile(os.path.join(self.good, name), os.path.join(self.data, name))
 
     def judge(self, name, what, renderer="cpu", must_fail=False):
-        """An error that names the file, or the same picture."""
+        """Checks that drawing fails with an error that names the file, or gives the same
+        picture."""
         path = self.path("o.exr")
         engine = self.random.choice(["io_uring", "pread", "null"])
         r = limits.run("quick", "render", self.data, "-o", path, "--size", SIZE, "--renderer",
@@ -57,12 +59,12 @@ class Faults(limits.Test):
         return 1
 
     def verify(self, name, what):
-        """Reading all of it always finds what is wrong, and where."""
+        """Checks that `info --verify` fails and names the file."""
         r = self.fails("triptych", "info", "--verify", self.data)
         self.assertIn(os.path.join(self.data, name), r.err, what)
         return r
 
-    def test_flipped_bits(self):
+    def test_flipped_bits_are_found_or_do_not_matter(self):
         found = 0
         count = limits.rounds(FLIPS)
         for _ in range(count):
@@ -75,12 +77,12 @@ class Faults(limits.Test):
                 f.write(data)
             found += self.judge(name, f"{name} byte {at}")
             place = re.search(r"byte (\d+)", self.verify(name, f"{name} byte {at}").err)
-            if name != "index.trip":  # the page that starts there
+            if name != "index.trip":  # the message names the start of the page
                 self.assertTrue(int(place[1]) <= at < int(place[1]) + 65536, (name, at, place[1]))
             self.restore(name)
         self.note(f"{count} bytes flipped: {found} errors, {count - found} same pictures")
 
-    def test_overwritten_and_moved_parts(self):
+    def test_overwritten_and_moved_parts_are_found(self):
         for i in range(limits.rounds(FLIPS) // 5):
             name = self.random_file()
             path = os.path.join(self.data, name)
@@ -98,25 +100,25 @@ class Faults(limits.Test):
             self.verify(name, f"{name} {length} bytes from {at}")
             self.restore(name)
 
-    def test_every_file_cut_off_or_longer(self):
+    def test_files_of_wrong_length_are_found(self):
         for name in sorted(os.listdir(self.data)):
             path = os.path.join(self.data, name)
             size = os.path.getsize(path)
-            lengths = {0, size - 1, size + 4096}  # more in test_broken.c
+            lengths = {0, size - 1, size + 4096}  # test_broken.c tries more lengths
             lengths |= {self.random.randrange(size) for _ in range(limits.rounds(1))}
             for length in sorted(lengths):
                 os.truncate(path, length)
                 self.judge(name, f"{name} cut to {length} bytes", must_fail=True)
                 self.restore(name)
 
-    def test_files_of_another_data_set(self):
+    def test_files_of_another_data_set_are_found(self):
         other = self.path("b.trip")
         for name in sorted(os.listdir(self.data)):
-            # All the others of the same data set are tried in test_broken.c.
+            # test_broken.c tries all files of the same data set.
             mine = self.random.choice(sorted(n for n in os.listdir(self.good) if n != name))
             for source in os.path.join(other, name), os.path.join(self.good, mine):
                 shutil.copyfile(source, os.path.join(self.data, name))
-                if name == "index.trip":  # then the planes do not fit it
+                if name == "index.trip":  # the planes do not match this index
                     self.fails("triptych", "info", "--verify", self.data, says=self.data)
                     self.judge("", f"{source} as {name}", must_fail=True)
                 else:
@@ -124,7 +126,7 @@ class Faults(limits.Test):
                     self.judge(name, f"{source} as {name}")
                 self.restore(name)
 
-    def test_missing_files_and_things_that_are_no_files(self):
+    def test_missing_and_irregular_files_are_refused(self):
         def folder(path):
             os.mkdir(path)
 
@@ -150,8 +152,8 @@ class Faults(limits.Test):
                     os.remove(path)
                 self.restore(name)
 
-    def test_files_that_may_not_be_read(self):
-        """Root may read everything, so another user tries."""
+    def test_unreadable_files_are_refused(self):
+        """Root can read everything, so that the test runs as another user."""
         as_user = {}
         if os.geteuid() == 0:
             as_user = {"user": 65534, "group": 65534, "extra_groups": []}

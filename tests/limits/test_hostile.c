@@ -1,7 +1,9 @@
-/* Data sets changed on purpose, with right checksums: every field of every table and records, to
- * every value that has ever made trouble, in lists of voxels and halos at two levels. Opening,
- * checking and drawing each of them by all renderers ends well or with one line; a picture that
- * comes out holds finite numbers. */
+/* Tests of manipulated data sets with valid checksums. The tests set every field of every table,
+ * and some records, to values that cause trouble. They do so in lists of voxels and halos at two
+ * levels.
+ *
+ * Opening, verifying and drawing each data set with all renderers succeeds or fails with one line.
+ * Every picture drawn has finite numbers. */
 #include "cloud.h"
 #include "dataset_metadata.h"
 #include "hostile.h"
@@ -16,7 +18,7 @@ enum { SIZE = 24, RECORDS = 200, SPANS = 60, MEMORY_BYTES = 64 << 20 };
 static struct {
     scene scene;
     hostile sound, disk;
-    char path[128]; /* of the changed data set */
+    char path[128]; /* path of the changed data set */
     const scene_renderer *renderers;
 } shared;
 
@@ -48,7 +50,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-/* A failure is said once, and success is silent. */
+/* Checks that a failure reports one line, and success none. */
 static void check_reports(const char *label, const char *step, int status)
 {
     int reports = test_caught_reports();
@@ -132,8 +134,9 @@ static void check_text(const char *label, const trip_dataset *data)
     trip_dataset_metadata_destroy(text);
 }
 
-/* The CPU renderer draws every data set, under sanitizers by each classification in turn; the slow
- * ones take turns where there is reason to. */
+/* Returns whether a renderer draws this data set. The CPU renderer draws every data set, and
+ * alternates the classification under sanitizers. The slow renderers alternate, and draw only if
+ * `slow` is set. */
 static bool takes_part(const scene_renderer *r, trip_classify classify, bool slow)
 {
     if (!strcmp(r->name, "cpu"))
@@ -141,7 +144,7 @@ static bool takes_part(const scene_renderer *r, trip_classify classify, bool slo
     return slow && counts.tried % 6 == (r == shared.renderers ? 0 : 3);
 }
 
-/* Opens, checks and draws what lies there. */
+/* Opens, verifies and draws the changed data set. */
 static void judge(const char *label, bool slow)
 {
     trip_budget *budget;
@@ -169,7 +172,7 @@ static void judge(const char *label, bool slow)
     trip_budget_destroy(budget);
 }
 
-/* The sound data set but for `bytes` bytes of one file. */
+/* Tries the sound data set with `bytes` bytes of one file replaced. */
 static void judge_changed(const char *label, hostile *h, bool slow)
 {
     hostile_seal(h, &shared.sound);
@@ -213,8 +216,8 @@ static const double real_numbers[] = {
 };
 enum { REAL_NUMBERS = sizeof real_numbers / sizeof real_numbers[0] };
 
-/* Sets one whole number of the index to each of the values, and a little more and less than it is.
- */
+/* Sets one integer of the index to each of the values, and to values slightly above and below the
+ * original. */
 static void try_whole(const char *label, size_t at, size_t bytes)
 {
     uint64_t was = 0;
@@ -245,7 +248,7 @@ static void try_real(const char *label, size_t at)
     }
 }
 
-static void the_headers_whole_numbers(void **state)
+static void changed_integers_of_the_header_do_no_harm(void **state)
 {
     (void)state;
     for (size_t at = offsetof(trip_file_header, dims);
@@ -266,7 +269,7 @@ static void the_headers_whole_numbers(void **state)
         try_whole("header", at, 8);
 }
 
-static void the_headers_real_numbers(void **state)
+static void changed_real_numbers_of_the_header_do_no_harm(void **state)
 {
     (void)state;
     for (size_t at = offsetof(trip_file_header, index_to_world);
@@ -274,8 +277,8 @@ static void the_headers_real_numbers(void **state)
         try_real("header", at);
 }
 
-/* Whole maps and ranges at once, which one number alone cannot be without being refused. */
-static void the_scale_of_the_map_and_of_the_values(void **state)
+/* Scales whole maps and ranges at once, because a change of one number alone is refused. */
+static void scaled_maps_and_ranges_do_no_harm(void **state)
 {
     static const double scales[] = {
         1e-150, 1e-40, 1e-20, 1e-12, 1e-6, 1e6, 1e12, 1e20, 1e40, 1e99
@@ -318,7 +321,7 @@ static void try_list(const char *label, unsigned list)
         try_real(label, list_at(list) + at);
 }
 
-static void the_lists(void **state)
+static void changed_lists_do_no_harm(void **state)
 {
     (void)state;
     try_list("list Z", CLOUD_VOXELS + 2);
@@ -326,7 +329,7 @@ static void the_lists(void **state)
     try_list("level 1 Y", CLOUD_COARSE + 1);
 }
 
-/* What a level's lists say alike, changed in all of them: one alone is refused. */
+/* Changes a number in all lists of a level. A change in one list alone is refused. */
 static void try_map_of_level(unsigned field, double value)
 {
     char name[96];
@@ -352,7 +355,7 @@ static void try_size_of_level(unsigned axis, uint64_t voxels)
     judge_changed(name, &h, true);
 }
 
-static void the_grid_of_a_level(void **state)
+static void a_changed_grid_of_a_level_does_no_harm(void **state)
 {
     (void)state;
     for (int i = 0; i < REAL_NUMBERS; i++)
@@ -363,7 +366,7 @@ static void the_grid_of_a_level(void **state)
             try_size_of_level(axis, whole_numbers[i]);
 }
 
-/* The tables and planes of two lists, exchanged; what the lists are stays. */
+/* Exchanges the tables and planes of two lists. Their axes, levels and kinds stay. */
 static void exchange(unsigned a, unsigned b)
 {
     char name[96];
@@ -379,7 +382,7 @@ static void exchange(unsigned a, unsigned b)
     judge_changed(name, &h, true);
 }
 
-static void lists_that_change_positions(void **state)
+static void exchanged_lists_do_no_harm(void **state)
 {
     (void)state;
     for (unsigned a = 0; a < CLOUD_LISTS; a++)
@@ -390,7 +393,7 @@ static void lists_that_change_positions(void **state)
 static void try_tables(const char *label, unsigned number)
 {
     const trip_file_list *list = hostile_list(&shared.sound, &shared.sound, number);
-    size_t slab = list->slabs_offset + sizeof(trip_file_slab); /* the second */
+    size_t slab = list->slabs_offset + sizeof(trip_file_slab); /* the second slab */
     size_t brick = list->bricks_offset + sizeof(trip_file_brick);
     size_t run = list->runs_offset + 5 * sizeof(trip_file_run);
     assert_true(list->slab_count > 1 && list->brick_count > 2);
@@ -408,7 +411,7 @@ static void try_tables(const char *label, unsigned number)
         try_whole(label, run + at, 2);
 }
 
-static void slabs_bricks_and_runs(void **state)
+static void changed_slabs_bricks_and_runs_do_no_harm(void **state)
 {
     (void)state;
     try_tables("tables of Y", CLOUD_VOXELS + 1);
@@ -421,7 +424,7 @@ static unsigned random_below(unsigned count)
     return (unsigned)(test_random() * count);
 }
 
-static void records(void **state)
+static void changed_records_do_no_harm(void **state)
 {
     int rounds = limits_rounds(RECORDS);
     (void)state;
@@ -438,8 +441,8 @@ static void records(void **state)
     }
 }
 
-/* Parts of the index moved onto other parts, as no single number does. */
-static void spans_of_the_index(void **state)
+/* Copies spans of the index over other spans, which changes several numbers at once. */
+static void copied_spans_of_the_index_do_no_harm(void **state)
 {
     int rounds = limits_rounds(SPANS);
     unsigned content = (unsigned)hostile_header(&shared.sound)->checksums_offset;
@@ -462,15 +465,15 @@ static void spans_of_the_index(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_headers_whole_numbers),
-        cmocka_unit_test(the_headers_real_numbers),
-        cmocka_unit_test(the_scale_of_the_map_and_of_the_values),
-        cmocka_unit_test(the_lists),
-        cmocka_unit_test(the_grid_of_a_level),
-        cmocka_unit_test(lists_that_change_positions),
-        cmocka_unit_test(slabs_bricks_and_runs),
-        cmocka_unit_test(records),
-        cmocka_unit_test(spans_of_the_index),
+        cmocka_unit_test(changed_integers_of_the_header_do_no_harm),
+        cmocka_unit_test(changed_real_numbers_of_the_header_do_no_harm),
+        cmocka_unit_test(scaled_maps_and_ranges_do_no_harm),
+        cmocka_unit_test(changed_lists_do_no_harm),
+        cmocka_unit_test(a_changed_grid_of_a_level_does_no_harm),
+        cmocka_unit_test(exchanged_lists_do_no_harm),
+        cmocka_unit_test(changed_slabs_bricks_and_runs_do_no_harm),
+        cmocka_unit_test(changed_records_do_no_harm),
+        cmocka_unit_test(copied_spans_of_the_index_do_no_harm),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,5 +1,5 @@
-"""A terabyte of voxels, in a file of holes: it is looked at within the memory allowed, and refused
-where the disk cannot hold the result; and slices that take most of the memory."""
+"""Tests a terabyte of voxels in a sparse file. It is read within the memory limit, and refused if
+the disk cannot hold the result. Also tests slices that take most of the memory."""
 import json
 import os
 import shutil
@@ -7,7 +7,7 @@ import shutil
 import limits
 
 MIB = 2**20
-SLACK = 64 * MIB  # the program itself
+SLACK = 64 * MIB  # the program itself, with code, stacks and libraries
 
 
 class Huge(limits.Test):
@@ -24,7 +24,7 @@ class Huge(limits.Test):
         if not limits.option("sanitizer", ""):
             self.assertLess(r.peak_bytes, memory + SLACK)
 
-    def test_a_terabyte(self):
+    def test_a_terabyte_is_estimated_in_little_memory(self):
         voxels, memory = 2**40, 256 * MIB
         arguments = ["brick", self.holes("v.raw", voxels), "--size", "4096,4096,65536", "--type",
                      "uint8", "-o", self.path("d.trip"), "--memory", memory]
@@ -33,8 +33,9 @@ class Huge(limits.Test):
             self.assertPromise(r, memory)
             e = json.loads(r.out)
             self.assertEqual((e["voxels"], e["kept"]), (voxels, voxels))
-            # Three lists: a code and a normal of 3 bytes each, and a bit in a full square's mask.
-            # Coarse levels have a seventh of the voxels, of which values alone.
+            # Each of three lists has a code of 1 byte and a normal of 3 bytes per voxel, and a bit
+            # in the mask of a full square. Coarse levels have a seventh of the voxels, with values
+            # only.
             fine, coarse = 3 * (1 + 3 + 1 / 8), 3 * (1 + 1 / 8) / 7
             self.assertGreaterEqual(e["bytes"], (fine + coarse) * voxels)
             self.assertLess(e["bytes"], 1.06 * (fine + coarse) * voxels)
@@ -48,8 +49,9 @@ class Huge(limits.Test):
         r = self.works("triptych", *arguments, "--range", "1:255", "--dry-run", "--json")
         self.assertEqual(json.loads(r.out)["kept"], 0)
 
-    def test_slices_as_large_as_memory_allows(self):
-        """What the refusal names is enough, a first pass for the values' range included."""
+    def test_the_memory_named_in_the_error_holds_large_slices(self):
+        """The memory named in the error line also suffices for a first pass that finds the range of
+        values."""
         volume = self.holes("large.raw", 1024 * 1024 * 6 * 4)
         data = self.path("l.trip")
         arguments = ["brick", volume, "--size", "1024,1024,6", "--type", "float", "-o", data,

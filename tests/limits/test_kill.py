@@ -1,5 +1,5 @@
-"""kill -9 at random moments while a data set is made, and --resume: complete and the same bytes, or
-absent."""
+"""Tests kill -9 at random moments while a data set is made, and --resume. The data set is complete
+with the same bytes, or absent."""
 import os
 import random
 import shutil
@@ -32,7 +32,7 @@ class Kill(limits.Test):
         shutil.rmtree(self.name)
 
     def kill_at(self, seconds, *arguments):
-        """True when it had to be killed."""
+        """Kills the program after `seconds`. Returns False if it had ended before."""
         child = subprocess.Popen([limits.program("triptych"), *self.arguments, *arguments],
                                  stdin=subprocess.DEVNULL, stderr=subprocess.PIPE)
         try:
@@ -45,7 +45,7 @@ class Kill(limits.Test):
         return child.returncode != 0
 
     def leave_half_made(self, share, *arguments):
-        """Kills it at about this share of its time, before it is complete."""
+        """Kills the program at this fraction of its time, or earlier if it was already complete."""
         while not self.kill_at(share * self.seconds, *arguments) or os.path.exists(self.name):
             shutil.rmtree(self.name)
             share *= 0.7
@@ -54,7 +54,7 @@ class Kill(limits.Test):
         if os.path.exists(self.name):
             self.assertEqual(limits.folder_hashes(self.name), self.wanted)
 
-    def test_killed_any_number_of_times_and_resumed(self):
+    def test_a_data_set_is_resumed_after_any_number_of_kills(self):
         moments = limits.rounds(100)
         killed = resumed = complete = 0
         while killed < moments:
@@ -72,8 +72,8 @@ class Kill(limits.Test):
         self.note(f"killed {killed} times within {self.seconds:.2f} s, finished {complete} times, "
                   f"{resumed} of them undisturbed")
 
-    def test_killed_while_it_replaces_another(self):
-        """The old or the new one, never a mixture."""
+    def test_a_kill_during_replacement_leaves_one_data_set(self):
+        """The old or the new data set remains, never a mixture."""
         other = self.path("old.trip")
         self.works("triptych", "brick", self.volume, "-o", other, "-q", "--range", "30000:")
         old = limits.folder_hashes(other)
@@ -90,7 +90,7 @@ class Kill(limits.Test):
         self.works("triptych", *self.arguments, "--force")
         self.assertEqual(os.listdir(self.work), ["d.trip"])
 
-    def test_other_memory_or_threads_resume_it_with_the_same_bytes(self):
+    def test_other_memory_and_threads_resume_with_the_same_bytes(self):
         for memory, threads in ("64M", 1), ("200M", 3), ("40M", 4):
             self.leave_half_made(0.7)
             self.works("triptych", *self.arguments, "--resume", "--memory", memory, "--threads",
@@ -98,11 +98,11 @@ class Kill(limits.Test):
             self.check_absent_or_complete()
             shutil.rmtree(self.name)
 
-    def test_what_was_left_by_another_command_is_not_taken_for_this_ones(self):
+    def test_files_of_another_command_are_not_resumed(self):
         for change in ["--range", "20000:"], ["--tile", "32"], ["--normals=none"], ["--halo=0"]:
             self.leave_half_made(0.8, *change)
             r = limits.run("triptych", *self.arguments, "--resume")
-            if r.status:  # it says so, and starts over only without --resume
+            if r.status:  # the program refuses, and starts again only without --resume
                 self.assertRefused(r)
                 self.works("triptych", *self.arguments)
             self.check_absent_or_complete()

@@ -1,4 +1,5 @@
-"""What a frame does not need is not read, and counted; the picture is the same to the bit."""
+"""Tests that a frame does not read data that it does not need, and counts it. The picture is the
+same, bit for bit."""
 import json
 import re
 
@@ -22,10 +23,10 @@ class Hidden(limits.Test):
         volume = self.generate("dense.nrrd", "marschner-lobb", n)
         data = self.brick(volume, "dense.trip", "--keep-all", "--tf", self.tf)
         view = ["--tf", self.tf]
-        if n <= 256:  # close by: the edges of what is so small, and the ring, are most of it
+        if n <= 256:  # a close view, because edges and the ring are most of the reads of a small volume
             view += ["--fov", 60, "--look", f"{n / 2},{n / 2},{n / 2}", "--eye",
                      f"{n / 2},{-n / 3},{n / 2}"]
-        # Post draws several sheets at once, and has read more by then.
+        # `post` draws several sheets at once, so that it has read more before pixels are opaque.
         for classify, most in ("pre", 0.5), ("post", 0.65):
             look = [*view, "--classify", classify]
             drawn, wanted = self.stats(data, *look, "--occluded", "draw", size="512x512")
@@ -42,7 +43,7 @@ class Hidden(limits.Test):
                        "--explain", "--occluded", "skip", *look)
         self.assertRegex(r.out, r"occluded +[\d.]+ [kMG]?B in \d+ runs not read")
 
-    def test_the_larger_the_saturation_the_less_is_read_behind(self):
+    def test_a_higher_early_termination_reads_less(self):
         volume = self.generate("haze.nrrd", "marschner-lobb", 192)
         haze = self.path("haze.tf")
         with open(haze, "w") as f:
@@ -77,7 +78,7 @@ class Hidden(limits.Test):
             left_out = [a + int(b) for a, b in zip(left_out, found.groups())]
         return r.out, left_out
 
-    def test_transparent_bricks_and_those_out_of_view_are_not_read(self):
+    def test_transparent_bricks_and_bricks_out_of_view_are_not_read(self):
         volume = self.generate("cloud.nrrd", "cloud", 96)
         data = self.brick(volume, "cloud.trip", "--keep-all", "--tile", 16, "--tf", self.tf)
         faint = self.path("faint.tf")
@@ -104,7 +105,7 @@ class Hidden(limits.Test):
         plain = self.stats(data, "--no-shading", "--occluded", "draw", *pre)[0]
         splats = sum(axis["splats_read"] for axis in plain["frames"][0]["lists"].values())
         normals = json.loads(self.works("triptych", "info", data, "--json").out)["normal_bytes"] * splats
-        # Whole pages are read, some of them twice where slots meet.
+        # The reader reads whole pages, some of them twice at the ends of slots.
         self.assertGreaterEqual(bytes_read(shaded) - bytes_read(plain), normals)
         self.assertLess(bytes_read(shaded) - bytes_read(plain), 1.25 * normals)
         self.assertEqual(shaded["frames"][0]["bytes_of_planes_left_out"], 0)
@@ -113,14 +114,15 @@ class Hidden(limits.Test):
         said = re.search(r"normal planes are not read, ([\d.]+) MB",
                          self.explained(data, "--no-shading", *pre)[0])
         self.assertAlmostEqual(float(said[1]), 1e-6 * normals, delta=0.01)
-        # Post takes differences of values, and reads what it reads without light.
+        # `post` computes gradients from values, so that it reads the same data with and without
+        # shading.
         of_as_much = "--h", "0.85", "--occluded", "draw"
         lit, flat = (self.stats(data, *of_as_much, *more)[0]["frames"][0]
                      for more in ((), ("--no-shading",)))
         self.assertEqual(lit["lists"], flat["lists"])
         self.assertGreaterEqual(lit["bytes_of_planes_left_out"], normals)
 
-    def test_a_sequence_reads_less_where_bricks_find_room_in_memory(self):
+    def test_cached_bricks_are_not_read_again_in_a_sequence(self):
         data = self.brick(self.generate("turned.nrrd", "marschner-lobb", 144), "turned.trip",
                           "--keep-all")
         for classify in "pre", "post":
@@ -133,11 +135,12 @@ class Hidden(limits.Test):
             read = {memory: [sum(axis["bytes_read"] for axis in frame["lists"].values())
                              for frame in drawn] for memory, drawn in frames.items()}
             self.note(f"{classify}: bytes read by each frame: {read}")
-            # The same but for pages that two reads share, of which smaller slots make more.
+            # Smaller slots read more pages twice.
             self.assertAlmostEqual(read["1G"][0], read["24M"][0], delta=0.01 * read["24M"][0])
-            if classify == "pre":  # without normals, all finds room in either
+            if classify == "pre":  # without normals, all bricks fit into either memory
                 self.assertLess(sum(read["1G"]), 0.7 * sum(read["24M"]))
-            self.assertEqual(read["1G"][2:], [0, 0])  # from behind: the lists of the first two
+            # later frames look from behind and use the lists of the first two
+            self.assertEqual(read["1G"][2:], [0, 0])
             for frame in frames["1G"][2:]:
                 self.assertGreater(frame["bytes_cached"], 0)
 

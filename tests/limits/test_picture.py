@@ -1,5 +1,6 @@
-"""The program's picture is the same to the bit for any memory, engine, tiles, threads and caches;
-many more of these in test_same_picture.c, without a process each."""
+"""Tests that the picture is the same, bit for bit, for any memory, engine, tile size, number of
+threads and cache. The C test test_same_picture.c tries many more combinations without a process for
+each."""
 import json
 import os
 import random
@@ -16,7 +17,7 @@ class Picture(limits.Test):
         cls.random = random.Random(1)
 
     def combinations(self, renderer, count):
-        """One thing at a time, then all of them by chance."""
+        """Yields each option alone, then random combinations."""
         memory = ["64M", "100M", "1G", "100G"]
         engines = ["io_uring", "pread", "null"]
         threads = [1, 2, 3, 8]
@@ -48,15 +49,15 @@ class Picture(limits.Test):
         for renderer, count in ("cpu", limits.rounds(4)), ("reference", limits.rounds(1)):
             self.check(sets + [slabs], renderer, view, count)
 
-    def test_of_a_scan(self):
+    def test_a_scan_gives_the_same_picture(self):
         self.check_volume(os.path.join(limits.DATASETS, "tooth.nhdr"), "tooth", [])
 
-    def test_inside_shells_with_both_sides_of_every_list(self):
+    def test_an_eye_inside_the_volume_gives_the_same_picture(self):
         view = ["--h", "0.3", "--fov", "75", "--eye", "60,50,55", "--look", "30,40,50"]
         volume = self.generate("shells.nrrd", "shells", "80x70x90", "--type", "uint16")
         self.check_volume(volume, "shells", view, "--tf", "preset:bone", "--keep-all")
 
-    def test_of_later_frames_that_a_cache_serves(self):
+    def test_later_frames_from_a_cache_are_the_same(self):
         data = self.brick(self.generate("cloud.nrrd", "cloud", "80"), "cloud.trip")
         wanted = None
         for engine in "io_uring", "pread", "null":
@@ -68,7 +69,7 @@ class Picture(limits.Test):
                 wanted = wanted or hashes
                 self.assertEqual(hashes, wanted, f"{engine} {memory}")
 
-    def test_whether_reads_land_in_gl_memory_or_are_copied_there(self):
+    def test_reads_into_gl_memory_and_copies_give_the_same_picture(self):
         data = self.brick(os.path.join(limits.DATASETS, "tooth.nhdr"), "gl.trip")
         picture = self.path("gl.exr")
         arguments = ["triptych", "render", data, "-o", picture, "--size", "48x48", "--renderer",
@@ -93,12 +94,12 @@ class Picture(limits.Test):
         self.fails(*arguments, env={**os.environ, "TRIPTYCH_GL_SLOTS": "some"},
                    says=["TRIPTYCH_GL_SLOTS", "use mapped or copy"])
 
-    def test_where_the_kernel_refuses_io_uring(self):
+    def test_refused_io_uring_falls_back_to_pread(self):
         data = self.brick(os.path.join(limits.DATASETS, "tooth.nhdr"), "refused.trip")
         refused = {"preexec_fn": limits.refuse_io_uring}
         try:
             limits.run("triptych", "--version", **refused)
-        except Exception as e:  # what subprocess makes of an error in preexec_fn
+        except Exception as e:  # an error in preexec_fn
             self.skipTest(f"system call filters are not allowed here: {e}")
         self.assertEqual(self.draw(data, **refused), self.draw(data))
         r = self.works("triptych", "render", data, "-o", self.path("p.exr"), "--size", "32x32",

@@ -1,5 +1,6 @@
-/* The pictures of the reference and the CPU renderer have the same bits whatever tiles, slabs,
- * rings, engines, caches and threads brought the bytes, in whatever order reads end. */
+/* Checks that the pictures of the reference and the CPU renderer have the same bits for all sizes
+ * of tiles, slabs, rings and caches. Reader engines, numbers of threads, and the order in which
+ * reads end must not matter either. */
 #include "cpu/cpu_renderer.h"
 #include "renderer_choice.h"
 #include "rounds.h"
@@ -28,7 +29,8 @@ static unsigned pick(uint64_t *state, unsigned count)
     return (unsigned)(next_random(state) % count);
 }
 
-/* A solid core in a translucent, ragged cloud: some bricks hide others, some are transparent. */
+/* A solid core in a translucent, ragged cloud. Some bricks hide others, and some bricks are
+ * transparent. */
 static bool cloudy(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     double x = (i - 35) / 35.0, y = (j - 20) / 20.0, z = (k - 25) / 25.0;
@@ -52,7 +54,8 @@ static void create_scene(scene *s, unsigned tile, unsigned slab)
     scene_colour(s, 65535, 65535, 0.2, 0.6, 1, 0.99);
 }
 
-/* From far away, near by, and inside, where a list has two sides. */
+/* Returns a view from far away, from nearby or from inside. From inside, the camera splits a list
+ * into two sides. */
 static trip_camera_params view_of(const scene *s, int view)
 {
     static const struct {
@@ -65,7 +68,7 @@ static trip_camera_params view_of(const scene *s, int view)
                       SIZE);
 }
 
-/* One in eight reads ends up to two milliseconds late. */
+/* Delays one in eight reads by up to two milliseconds. */
 static long delay(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
     static _Atomic uint32_t calls;
@@ -76,16 +79,16 @@ static long delay(void *user, void *data, uint64_t offset, size_t bytes, long re
     return result;
 }
 
-/* How one picture comes about. */
+/* Parameters of one picture. */
 typedef struct trial {
     unsigned tile, slab, threads;
     bool skip;
-    int frames;            /* drawn one after the other by the same reader, the last counts */
-    uint64_t memory_bytes; /* the renderer's: with little it blends few splats at a time */
+    int frames;            /* frames drawn by the same reader; the test compares the last */
+    uint64_t memory_bytes; /* memory of the renderer; a small memory blends few splats at a time */
     trip_reader_params reader;
 } trial;
 
-/* Tiles, slots, engines, threads and delays come in turn, the rest by chance. */
+/* Cycles through tiles, slots, engines, threads and delays. All other parameters are random. */
 static trial make_trial(unsigned number, uint64_t *random)
 {
     static const unsigned tiles[] = { 16, 32, 64, 128 }, slabs[] = { 1, 5, 8, 64 };
@@ -108,7 +111,8 @@ static trial make_trial(unsigned number, uint64_t *random)
     return t;
 }
 
-/* Blends and reads little at a time, so that bricks are found occluded before they are read. */
+/* Blends and reads little at a time, so that the renderer finds occluded bricks before it reads
+ * them. */
 static trial skipping_trial(void)
 {
     return (trial){ .tile = 16,
@@ -130,7 +134,7 @@ static void print_trial(const trial *t)
                   r->gap_bytes, r->threads, r->buffered, r->cache_bytes, r->fault != NULL);
 }
 
-/* What draws, and in which way. */
+/* The renderer and its settings. */
 typedef struct drawing {
     trip_renderer_kind kind;
     trip_classify classify;
@@ -196,15 +200,15 @@ static void check_renderer(drawing by, int trials)
     assert_int_equal(skipped > 0, by.kind == TRIP_RENDERER_CPU);
 }
 
-/* It has neither threads nor memory to set. */
-static void the_reference_picture_does_not_depend_on_how_it_is_read(void **state)
+/* The reference has no settings for threads and memory. */
+static void the_reference_picture_does_not_depend_on_reading(void **state)
 {
     (void)state;
     check_renderer((drawing){ TRIP_RENDERER_REFERENCE, TRIP_CLASSIFY_PRE }, FEW_TRIALS);
     check_renderer((drawing){ TRIP_RENDERER_REFERENCE, TRIP_CLASSIFY_POST }, FEW_TRIALS);
 }
 
-static void the_cpu_picture_does_not_depend_on_how_it_is_read(void **state)
+static void the_cpu_picture_does_not_depend_on_reading(void **state)
 {
     (void)state;
     check_renderer((drawing){ TRIP_RENDERER_CPU, TRIP_CLASSIFY_PRE }, TRIALS);
@@ -214,8 +218,8 @@ static void the_cpu_picture_does_not_depend_on_how_it_is_read(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_reference_picture_does_not_depend_on_how_it_is_read),
-        cmocka_unit_test(the_cpu_picture_does_not_depend_on_how_it_is_read),
+        cmocka_unit_test(the_reference_picture_does_not_depend_on_reading),
+        cmocka_unit_test(the_cpu_picture_does_not_depend_on_reading),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

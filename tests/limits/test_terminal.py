@@ -1,4 +1,5 @@
-"""On a terminal: progress with rate and time left, and Ctrl-C, which stops cleanly."""
+"""Tests output on a terminal: progress with rate and time left, and Ctrl-C, which stops the program
+cleanly."""
 import os
 import pty
 import re
@@ -8,7 +9,7 @@ import threading
 
 import limits
 
-# An error clears what is left of the progress line in its place.
+# An error line replaces the rest of the progress line.
 END = r"\x1b\[K\r\n(\r\x1b\[K)?\Z"
 
 
@@ -26,7 +27,8 @@ class Terminal(limits.Test):
         os.mkdir(cls.work)
 
     def on_terminal(self, arguments, until=None, keys=b""):
-        """Exit status and all that was shown; types `keys` once `until` is to be seen."""
+        """Runs the program on a terminal. Types `keys` once `until` is visible. Returns the exit
+        status and all output."""
         child, terminal = pty.fork()
         if child == 0:
             os.execv(limits.program("triptych"), ["triptych", *map(str, arguments)])
@@ -37,7 +39,7 @@ class Terminal(limits.Test):
         while True:
             try:
                 more = os.read(terminal, 65536)
-            except OSError:  # its end
+            except OSError:  # end of the terminal
                 break
             if not more:
                 break
@@ -52,23 +54,24 @@ class Terminal(limits.Test):
         return status, shown.decode()
 
     def slow_frame(self):
-        """Takes many seconds with every ray near the splats' centres."""
+        """Returns options of a frame that takes many seconds, with every ray near the centres of
+        splats."""
         return ["render", self.data, "-o", self.picture, "--renderer", "reference", "--size",
                 "1500x1500", "--kernel-radius", "3", "--tf", "preset:xray"]
 
-    def test_a_long_frame_shows_rate_and_time_left_and_ctrl_c_ends_it(self):
+    def test_a_long_frame_shows_progress_and_ctrl_c_ends_it(self):
         line = rb"splat +\d+ %  [\d.]+ million splats/s  \d+:\d\d left"
         status, shown = self.on_terminal(self.slow_frame(), line, b"\x03")
         self.assertEqual(status, 1, shown)
         self.assertRegex(shown, r"triptych: render: [^\n]*interrupted" + END)
         self.assertEqual([n for n in os.listdir(self.folder) if n.startswith("p.")], [])
 
-    def test_a_second_ctrl_c_ends_it_at_once(self):
+    def test_a_second_ctrl_c_ends_the_program_at_once(self):
         status, shown = self.on_terminal(self.slow_frame(), rb"splat", b"\x03\x03")
         self.assertIn(status, (1, -signal.SIGINT), shown)
         self.assertFalse(os.path.exists(self.picture))
 
-    def test_terminated_like_interrupted(self):
+    def test_sigterm_ends_the_program_like_ctrl_c(self):
         child = subprocess.Popen([limits.program("triptych"), *self.slow_frame()],
                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                  stderr=subprocess.PIPE, text=True)
@@ -82,13 +85,13 @@ class Terminal(limits.Test):
         self.assertRegex(err, r"\Atriptych: render: [^\n]*interrupted\n\Z")
         self.assertFalse(os.path.exists(self.picture))
 
-    def test_in_a_pipe_nothing_is_shown_on_the_way(self):
+    def test_a_pipe_gets_no_progress(self):
         r = self.works("triptych", "render", self.data, "-o", self.picture, "--renderer",
                        "reference", "--size", "300x300")
         self.assertEqual(r.out.count("\n"), 1)
         os.remove(self.picture)
 
-    def test_every_bench_shows_how_far_it_is(self):
+    def test_every_bench_shows_progress(self):
         tiny = self.brick(self.generate("tiny.nrrd", "marschner-lobb", 12), "tiny.trip", "--keep-all")
         small = ["--size", "40x40", "--repeat", 1]
         lacks = None
@@ -99,14 +102,14 @@ class Terminal(limits.Test):
             if table == "submit" and r.status and "OpenGL" in r.err:
                 lacks = r.err.strip()
                 continue
-            self.assertEqual((r.status, r.err), (0, ""))  # in a pipe nothing
+            self.assertEqual((r.status, r.err), (0, ""))  # no progress in a pipe
             status, shown = self.on_terminal(arguments)
             self.assertEqual(status, 0, shown)
             self.assertRegex(shown, rf"\r\x1b\[K{table}  \d+:\d\d[^|]*\r[^|]*\r\x1b\[K[^\r]*bench")
         if lacks:
             self.skipTest(f"all but submit: {lacks}")
 
-    def test_ctrl_c_ends_a_bench_of_the_included_volume_with_nothing_left(self):
+    def test_ctrl_c_ends_a_bench_and_leaves_nothing(self):
         temporary = self.path("temporary")
         os.mkdir(temporary)
         os.environ["TMPDIR"] = temporary
@@ -124,7 +127,7 @@ class Terminal(limits.Test):
         name = os.path.join(self.work, "i.trip")
         status, shown = self.on_terminal(["brick", self.volume, "-o", name, "--keep-all",
                                           "--threads", 1], until, b"\x03")
-        if status == 0:  # was quicker
+        if status == 0:  # brick was done before
             return False
         self.assertEqual(status, 1, shown)
         self.assertRegex(shown, r"triptych: [^\n]*interrupted[^\n]*" + END)
@@ -132,7 +135,7 @@ class Terminal(limits.Test):
         self.works("triptych", "brick", self.volume, "-o", name, "--keep-all", "-q", "--resume")
         return True
 
-    def test_ctrl_c_ends_brick_and_resume_finishes_it(self):
+    def test_resume_finishes_after_ctrl_c(self):
         name = os.path.join(self.work, "i.trip")
         wanted = limits.folder_hashes(self.brick(self.volume, "w.trip", "--keep-all"))
         for stage in rb"scan", rb"read", rb"merge":

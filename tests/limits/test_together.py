@@ -1,4 +1,5 @@
-"""Two processes at one data set: pictures of one that is replaced meanwhile, two that make it."""
+"""Tests two processes on one data set: drawing while it is replaced, and making it at the same
+time."""
 import os
 import shutil
 import subprocess
@@ -19,7 +20,7 @@ class Together(limits.Test):
                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                 stderr=subprocess.PIPE, text=True)
 
-    def test_many_draw_the_same_data_set_at_once(self):
+    def test_many_processes_draw_the_same_data_set(self):
         data = self.brick(self.volume, "one.trip")
         wanted = self.draw(data, size="100x100")
         for _ in range(5):
@@ -31,7 +32,7 @@ class Together(limits.Test):
                 self.assertEqual((child.communicate()[1], child.returncode), ("", 0))
                 self.assertEqual(limits.picture_hash(path), wanted)
 
-    def test_a_picture_of_a_data_set_that_is_replaced_is_of_the_old_or_of_the_new_one(self):
+    def test_drawing_during_replacement_shows_the_old_or_the_new(self):
         data = self.brick(self.volume, "replaced.trip", "--tf", "preset:fog")
         other = self.brick(self.volume, "other.trip", "--tf", "preset:vessels", "--tile", 32)
         wanted = {self.draw(data, size="60x60"), self.draw(other, size="60x60")}
@@ -59,18 +60,18 @@ class Together(limits.Test):
                            "cpu")
             if r.status == 0:
                 seen.add(limits.picture_hash(path))
-            else:  # opened while one went and the other came
+            else:  # the data set was opened at the moment of replacement
                 self.assertRefused(r, "replaced.trip")
                 failures += 1
         stop.set()
         thread.join()
         self.assertEqual(said, [])
         self.assertLessEqual(seen, wanted)
-        self.note(f"{failures} of {limits.rounds(30)} came upon the moment of change")
+        self.note(f"{failures} of {limits.rounds(30)} runs met the moment of replacement")
         self.works("triptych", "info", "--verify", data)
 
-    def test_two_that_make_the_same_data_set(self):
-        """One of them makes it, or one after the other; what is there is complete."""
+    def test_two_processes_make_the_same_data_set(self):
+        """One process makes it, or both do one after the other. The result is complete."""
         name = self.path("made.trip")
         wanted = limits.folder_hashes(self.brick(self.volume, "wanted.trip"))
         for arguments in [], ["--force"], ["--resume"]:

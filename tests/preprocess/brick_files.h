@@ -91,8 +91,7 @@ typedef struct test_lists {
     int32_t *codes[TEST_LISTS];
     uint32_t *normals[TEST_LISTS];
     uint64_t splats[TEST_LISTS];
-    uint64_t out_of_order; /* splats that do not follow their predecessor in order of sheet and
-                              Morton code */
+    uint64_t out_of_order; /* splats not in order of sheet and Morton code */
     char *text;
 } test_lists;
 

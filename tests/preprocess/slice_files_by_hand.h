@@ -1,5 +1,5 @@
-/* Slices of the sample volume as TIFF, PNG, EXR and DICOM files, put together by hand, so that what
- * is read does not depend on the libraries that read it. */
+/* Writes slices of the sample volume as TIFF, PNG, EXR and DICOM files. It uses none of the
+ * libraries that read these files, so that errors of a library show. */
 #ifndef SLICE_FILES_BY_HAND_H
 #define SLICE_FILES_BY_HAND_H
 
@@ -36,8 +36,8 @@ static inline unsigned tiff_sample_format(trip_scalar type)
     return type >= TRIP_F16 ? 3 : is_signed(type) ? 2 : 1;
 }
 
-/* Pages [first, first + count) of the sample volume, little-endian and uncompressed; the width can
- * be made wrong by `wider`. */
+/* Appends slices [first, first + count) as little-endian, uncompressed pages. `wider` adds to the
+ * width to make it wrong. */
 static inline void append_tiff(bytes *b, trip_scalar type, int first, int count, int wider)
 {
     append(b, "II*\0", 4);
@@ -65,7 +65,7 @@ static inline void append_tiff(bytes *b, trip_scalar type, int first, int count,
     }
 }
 
-/* One TIFF with depth: a single tile of 16 x 16 x 16 voxels. */
+/* Appends a TIFF with a single three-dimensional tile of 16 x 16 x 16 voxels. */
 static inline void append_deep_tiff(bytes *b)
 {
     enum { SIDE = 16, VOXELS_IN_TILE = SIDE * SIDE * SIDE };
@@ -97,7 +97,8 @@ static inline void append_png_chunk(bytes *b, const char *name, const void *data
     append_word(b, crc32(0, b->data + start, (unsigned)(b->count - start)), 4, true);
 }
 
-/* Slice k with `channels` copies of the value (the last one of 2 or 4 half opaque). */
+/* Appends slice k with `channels` channels. Colour channels repeat the value, and the last of 2 or
+ * 4 channels is an alpha of one half. */
 static inline void append_png(bytes *b, trip_scalar type, int k, int channels)
 {
     static const unsigned char colour_type[] = { 0, 0, 4, 2, 6 };
@@ -129,7 +130,7 @@ static inline void append_exr_attribute(bytes *b, const char *name, const char *
     append(b, data, count);
 }
 
-/* Slice k as an uncompressed single-channel EXR; half (pixel type 1) or float (2). */
+/* Appends slice k as an uncompressed EXR with one channel of half (pixel type 1) or float (2). */
 static inline void append_exr(bytes *b, trip_scalar type, int k)
 {
     const int32_t window[4] = { 0, 0, NX - 1, NY - 1 };
@@ -164,12 +165,12 @@ static inline void append_exr(bytes *b, trip_scalar type, int k)
     }
 }
 
-/* What a DICOM slice says; texts left NULL are left out. */
+/* Contents of a DICOM slice. NULL omits an element. */
 typedef struct dicom {
     const char *series, *number, *position, *orientation, *spacing, *thickness, *slope, *inter;
     const char *frames;
-    const char *const *frame_slopes, *const *frame_positions; /* of each frame, or NULL */
-    unsigned stored, shift; /* bits that hold the value, and unused ones below; 0: all, none */
+    const char *const *frame_slopes, *const *frame_positions; /* for each frame, or NULL */
+    unsigned stored, shift; /* bits of the value (0 for all), and unused bits below */
     trip_scalar type;
 } dicom;
 
@@ -202,7 +203,7 @@ static inline void append_dicom_u16(bytes *b, unsigned group, unsigned element, 
     append_element(b, group, element, "US", data, 2);
 }
 
-/* One of a sequence's items. */
+/* Appends an item of a sequence. */
 static inline void append_item(bytes *b, const bytes *item)
 {
     append_u16(b, 0xfffe);
@@ -211,7 +212,7 @@ static inline void append_item(bytes *b, const bytes *item)
     append(b, item->data, item->count);
 }
 
-/* A sequence of one item. */
+/* Appends a sequence of one item. */
 static inline void append_group(bytes *b, unsigned group, unsigned element, const bytes *item)
 {
     bytes items = { .count = 0 };
@@ -219,7 +220,7 @@ static inline void append_group(bytes *b, unsigned group, unsigned element, cons
     append_element(b, group, element, "SQ", items.data, items.count);
 }
 
-/* What each frame says, in an item of its own. */
+/* Appends one item for each frame, with its slope and position. */
 static inline void append_frame_groups(bytes *b, const dicom *d, int count)
 {
     bytes frames = { .count = 0 };
@@ -238,7 +239,7 @@ static inline void append_frame_groups(bytes *b, const dicom *d, int count)
     append_element(b, 0x5200, 0x9230, "SQ", frames.data, frames.count);
 }
 
-/* Slices [first, first + count), one where `frames` is NULL. Explicit, little-endian. */
+/* Appends slices [first, first + count) as frames with explicit VR, little-endian. */
 static inline void append_dicom(bytes *b, const dicom *d, int first, int count)
 {
     unsigned bits = 8 * trip_scalar_bytes(d->type), stored = d->stored ? d->stored : bits;
@@ -272,7 +273,7 @@ static inline void append_dicom(bytes *b, const dicom *d, int first, int count)
         for (int j = 0; j < NY; j++)
             for (int i = 0; i < NX; i++) {
                 uint64_t value = (uint64_t)(int64_t)sample(d->type, i, j, k);
-                /* Bits beside the value hold rubbish. */
+                /* Sets an unused bit above the value and one below it. */
                 value = (value & ((UINT64_C(1) << stored) - 1)) << d->shift;
                 value |= stored + d->shift < bits ? UINT64_C(1) << (bits - 1) : 0;
                 value |= d->shift ? 1 : 0;

@@ -62,7 +62,7 @@ static uint64_t bytes_of_lists(const char *name, uint64_t halo)
     return sums[0] + sums[1] + sums[2];
 }
 
-static void kept_voxels_are_those_of_the_envelope(void **state)
+static void the_envelope_selects_the_kept_voxels(void **state)
 {
     (void)state;
     test_lists l;
@@ -89,7 +89,7 @@ static void kept_voxels_are_those_of_the_envelope(void **state)
     test_free_lists(&l);
 }
 
-static void a_transfer_function_keeps_what_it_shows(void **state)
+static void a_transfer_function_keeps_the_voxels_it_shows(void **state)
 {
     (void)state;
     static const char text[] = "values data\n10 0 0 0 0\n90 1 1 1 0\n120 1 1 1 0.5\n150 1 1 1 0\n";
@@ -112,7 +112,7 @@ static void a_transfer_function_keeps_what_it_shows(void **state)
 }
 
 /* The refusal comes before any voxel is read. */
-static void functions_that_a_data_set_has_no_room_for_are_refused(void **state)
+static void transfer_functions_too_large_for_a_data_set_are_refused(void **state)
 {
     (void)state;
     trip_brick_summary s;
@@ -135,7 +135,7 @@ static void functions_that_a_data_set_has_no_room_for_are_refused(void **state)
     assert_false(test_exists("a.trip"));
 }
 
-static void without_an_envelope_something_is_kept_and_a_function_stored(void **state)
+static void the_automatic_envelope_keeps_voxels_and_stores_a_function(void **state)
 {
     (void)state;
     test_lists l;
@@ -190,13 +190,13 @@ static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes
 
 /* The range of a wide type is only known once all values are read. Codes cover the whole range
  * nevertheless. */
-static void codes_of_floats_are_of_the_range_of_all_values(void **state)
+static void codes_of_floats_cover_the_range_of_all_values(void **state)
 {
     (void)state;
     check_codes_of_floats(TRIP_CODE_BITS_AUTO, 2, 65535, 0.25);
 }
 
-static void codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values(void **state)
+static void byte_codes_are_the_nearest_over_the_range_of_all_values(void **state)
 {
     (void)state;
     check_codes_of_floats(TRIP_CODE_BITS_8, 1, 771, 258.0 / 255);
@@ -204,7 +204,7 @@ static void codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values(
 
 /* Codes cover the range of the values. Over the range of the type, these values would share a few
  * codes. */
-static void shorts_of_a_narrow_range_have_all_codes_of_a_byte(void **state)
+static void shorts_of_a_narrow_range_use_all_codes_of_a_byte(void **state)
 {
     (void)state;
     test_lists l;
@@ -228,7 +228,7 @@ static void shorts_of_a_narrow_range_have_all_codes_of_a_byte(void **state)
     test_free_lists(&l);
 }
 
-static void codes_of_bytes_are_as_exact_in_16_bits(void **state)
+static void bytes_are_exact_in_16_bit_codes(void **state)
 {
     (void)state;
     test_lists l;
@@ -246,7 +246,7 @@ static void codes_of_bytes_are_as_exact_in_16_bits(void **state)
     test_free_lists(&l);
 }
 
-static void gradients_of_floats_are_right(void **state)
+static void gradients_of_floats_are_correct(void **state)
 {
     (void)state;
     test_lists l;
@@ -280,7 +280,7 @@ static void gradients_of_floats_are_right(void **state)
     test_free_lists(&l);
 }
 
-static void values_that_are_not_finite_are_left_out_with_one_warning(void **state)
+static void non_finite_values_are_dropped_with_one_warning(void **state)
 {
     (void)state;
     test_lists l;
@@ -359,7 +359,7 @@ static trip_brick_summary brick_scaled(float slope, float inter)
 }
 
 /* The values are 10 - 2 times the bytes: -500 to 10. */
-static void codes_of_bytes_are_exact_where_values_fall_as_they_rise(void **state)
+static void byte_codes_are_exact_under_a_negative_slope(void **state)
 {
     (void)state;
     test_lists l;
@@ -379,7 +379,7 @@ static void codes_of_bytes_are_exact_where_values_fall_as_they_rise(void **state
 }
 
 /* Floats near 10^6 are 1/16 apart, so they cannot represent tenths. */
-static void bytes_whose_values_are_no_floats_have_codes_of_16_bits(void **state)
+static void bytes_scaled_to_inexact_floats_have_16_bit_codes(void **state)
 {
     (void)state;
     make_bytes();
@@ -388,7 +388,7 @@ static void bytes_whose_values_are_no_floats_have_codes_of_16_bits(void **state)
 }
 
 /* The field is linear in world space, so its gradient is the same everywhere. */
-static void gradients_of_uneven_grids_are_those_of_the_world(void **state)
+static void gradients_of_uneven_grids_are_in_world_space(void **state)
 {
     (void)state;
     const int size[3] = { NX, NY, NZ };
@@ -445,7 +445,7 @@ static void check_compact_normal(const trip_compact_normals *c, uint32_t normal,
     }
 }
 
-static void normals_of_bytes_are_compact_and_exact_below_full_shading(void **state)
+static void compact_normals_of_bytes_are_exact_below_full_shading(void **state)
 {
     (void)state;
     test_lists l;
@@ -472,7 +472,7 @@ static void normals_of_bytes_are_compact_and_exact_below_full_shading(void **sta
 /* Compact normals store half differences of bytes up to 63.5. A gradient is stored exactly up to
  * 0.04 * 255 per mean voxel length. Along z, that limit is multiplied by the z spacing over the
  * mean voxel length. */
-static void normals_of_bytes_are_compact_where_halves_reach_far_enough(void **state)
+static void bytes_get_compact_normals_if_half_steps_cover_the_range(void **state)
 {
     (void)state;
     make_bytes();
@@ -488,7 +488,7 @@ static void normals_of_bytes_are_compact_where_halves_reach_far_enough(void **st
 }
 
 /* Compact normals need the range of values. If nothing else needs the range, normals are full. */
-static void normals_have_the_bytes_that_were_chosen(void **state)
+static void normals_have_the_chosen_number_of_bytes(void **state)
 {
     (void)state;
     static const struct {
@@ -536,7 +536,7 @@ static void check_ways(const trip_brick_params *base)
     }
 }
 
-static void memory_threads_and_slabs_make_no_difference(void **state)
+static void memory_threads_and_slabs_do_not_change_the_result(void **state)
 {
     (void)state;
     trip_brick_params p = params_for("uint8", "a.trip");
@@ -553,7 +553,7 @@ static void memory_threads_and_slabs_make_no_difference(void **state)
     check_ways(&p);
 }
 
-static void splats_come_in_one_order_whatever_the_tile(void **state)
+static void the_order_of_splats_does_not_depend_on_tiles(void **state)
 {
     (void)state;
     trip_brick_params p = params_for("uint8", "a.trip");
@@ -577,7 +577,7 @@ static void splats_come_in_one_order_whatever_the_tile(void **state)
     }
 }
 
-static void without_normals_there_is_no_such_plane(void **state)
+static void without_normals_the_plane_is_absent(void **state)
 {
     (void)state;
     test_lists l;
@@ -607,7 +607,7 @@ static void check_refused(trip_brick_params p, const char *why)
     assert_false(test_exists("a.trip.spill"));
 }
 
-static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **state)
+static void impossible_requests_report_one_line_and_leave_no_files(void **state)
 {
     (void)state;
     const trip_value_range above = { 300, 400 };
@@ -619,8 +619,8 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
     p = params_for("uint8", "a.trip");
     p.memory_bytes = 1 << 20;
     check_refused(p, "--memory");
-    for (unsigned threads = 1; threads < 4;
-         threads++) { /* the memory that the error line asks for suffices */
+    /* The memory that the error line asks for suffices. */
+    for (unsigned threads = 1; threads < 4; threads++) {
         unsigned min = 0;
         char same[200];
         p.memory_bytes = 1 << 20;
@@ -658,7 +658,7 @@ static void what_cannot_be_done_is_said_in_one_line_and_leaves_nothing(void **st
     check_refused(p, "has no finite values");
 }
 
-static void an_existing_data_set_stays_unless_it_is_to_be_replaced(void **state)
+static void an_existing_data_set_stays_without_replace(void **state)
 {
     (void)state;
     trip_brick_summary s;
@@ -727,7 +727,7 @@ static void check_resumed(const trip_brick_params *base, bool *any_checkpoint)
     assert_int_equal(system(command), 0);
 }
 
-static void killed_runs_go_on_and_end_in_the_same_bytes(void **state)
+static void killed_runs_resume_and_give_the_same_bytes(void **state)
 {
     (void)state;
     bool resumed = false;
@@ -747,7 +747,7 @@ static void killed_runs_go_on_and_end_in_the_same_bytes(void **state)
     assert_true(resumed);
 }
 
-static void another_input_or_other_parameters_are_not_gone_on_with(void **state)
+static void a_run_does_not_resume_with_other_input_or_parameters(void **state)
 {
     (void)state;
     trip_brick_params p = params_for("uint8", "a.trip");
@@ -777,7 +777,7 @@ static void write_squares(const char *name)
 }
 
 /* Another data file changes, not the file named as the input. */
-static void other_data_files_are_not_gone_on_with(void **state)
+static void a_run_does_not_resume_after_a_data_file_changed(void **state)
 {
     (void)state;
     static const char header[] = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 97 70 61\n"
@@ -810,7 +810,7 @@ static void other_data_files_are_not_gone_on_with(void **state)
     }
 }
 
-static void what_levels_were_asked_for_is_told(void **state)
+static void the_summary_tells_the_requested_levels(void **state)
 {
     (void)state;
     const struct {
@@ -840,7 +840,7 @@ static void what_levels_were_asked_for_is_told(void **state)
     }
 }
 
-static void a_locale_with_decimal_commas_makes_no_other_data_set(void **state)
+static void a_locale_with_decimal_commas_changes_nothing(void **state)
 {
     (void)state;
     char *points = NULL, *commas = NULL;
@@ -883,57 +883,54 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(codes_have_the_bytes_of_the_source, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(normals_of_bytes_are_compact_and_exact_below_full_shading,
+        cmocka_unit_test_setup_teardown(compact_normals_of_bytes_are_exact_below_full_shading,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(normals_of_bytes_are_compact_where_halves_reach_far_enough,
+        cmocka_unit_test_setup_teardown(bytes_get_compact_normals_if_half_steps_cover_the_range,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(normals_have_the_bytes_that_were_chosen, test_begin,
+        cmocka_unit_test_setup_teardown(normals_have_the_chosen_number_of_bytes, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(kept_voxels_are_those_of_the_envelope, test_begin,
+        cmocka_unit_test_setup_teardown(the_envelope_selects_the_kept_voxels, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(a_transfer_function_keeps_the_voxels_it_shows, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(a_transfer_function_keeps_what_it_shows, test_begin,
+        cmocka_unit_test_setup_teardown(transfer_functions_too_large_for_a_data_set_are_refused,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(the_automatic_envelope_keeps_voxels_and_stores_a_function,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(codes_of_floats_cover_the_range_of_all_values, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(functions_that_a_data_set_has_no_room_for_are_refused,
+        cmocka_unit_test_setup_teardown(byte_codes_are_the_nearest_over_the_range_of_all_values,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(without_an_envelope_something_is_kept_and_a_function_stored,
+        cmocka_unit_test_setup_teardown(shorts_of_a_narrow_range_use_all_codes_of_a_byte,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(codes_of_floats_are_of_the_range_of_all_values, test_begin,
+        cmocka_unit_test_setup_teardown(bytes_are_exact_in_16_bit_codes, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(gradients_of_floats_are_correct, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(non_finite_values_are_dropped_with_one_warning, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(
-            codes_of_a_byte_are_the_nearest_of_256_over_the_range_of_all_values, test_begin,
-            test_end),
-        cmocka_unit_test_setup_teardown(shorts_of_a_narrow_range_have_all_codes_of_a_byte,
+        cmocka_unit_test_setup_teardown(memory_threads_and_slabs_do_not_change_the_result,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(codes_of_bytes_are_as_exact_in_16_bits, test_begin,
+        cmocka_unit_test_setup_teardown(the_order_of_splats_does_not_depend_on_tiles, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(gradients_of_floats_are_right, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(values_that_are_not_finite_are_left_out_with_one_warning,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(memory_threads_and_slabs_make_no_difference, test_begin,
+        cmocka_unit_test_setup_teardown(without_normals_the_plane_is_absent, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(byte_codes_are_exact_under_a_negative_slope, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(splats_come_in_one_order_whatever_the_tile, test_begin,
+        cmocka_unit_test_setup_teardown(bytes_scaled_to_inexact_floats_have_16_bit_codes,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(gradients_of_uneven_grids_are_in_world_space, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(without_normals_there_is_no_such_plane, test_begin,
+        cmocka_unit_test_setup_teardown(impossible_requests_report_one_line_and_leave_no_files,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(an_existing_data_set_stays_without_replace, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(codes_of_bytes_are_exact_where_values_fall_as_they_rise,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(bytes_whose_values_are_no_floats_have_codes_of_16_bits,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(gradients_of_uneven_grids_are_those_of_the_world,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(what_cannot_be_done_is_said_in_one_line_and_leaves_nothing,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(an_existing_data_set_stays_unless_it_is_to_be_replaced,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(killed_runs_go_on_and_end_in_the_same_bytes, test_begin,
+        cmocka_unit_test_setup_teardown(killed_runs_resume_and_give_the_same_bytes, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(other_data_files_are_not_gone_on_with, test_begin,
+        cmocka_unit_test_setup_teardown(a_run_does_not_resume_after_a_data_file_changed, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(another_input_or_other_parameters_are_not_gone_on_with,
+        cmocka_unit_test_setup_teardown(a_run_does_not_resume_with_other_input_or_parameters,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(what_levels_were_asked_for_is_told, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(a_locale_with_decimal_commas_makes_no_other_data_set,
-                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(the_summary_tells_the_requested_levels, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(a_locale_with_decimal_commas_changes_nothing, test_begin,
+                                        test_end),
         cmocka_unit_test_setup_teardown(levels_of_uneven_grids_are_refused, test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

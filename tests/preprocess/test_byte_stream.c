@@ -98,7 +98,7 @@ static void bytes_can_be_skipped_before_and_after_decompression(void **state)
     }
 }
 
-static void members_one_after_the_other_are_one_stream(void **state)
+static void consecutive_members_form_one_stream(void **state)
 {
     (void)state;
     for (int e = TRIP_BYTES_ZLIB; e <= TRIP_BYTES_BZIP2; e++) {
@@ -121,7 +121,7 @@ static void members_one_after_the_other_are_one_stream(void **state)
 
 /* Bytes behind a complete stream that do not begin another stream are skipped, as gzip and bzip2
  * do. They are padding, or only the first of the two bytes that begin a stream. */
-static void bytes_behind_a_complete_stream_are_passed_over(void **state)
+static void bytes_behind_a_complete_stream_are_skipped(void **state)
 {
     (void)state;
     static const unsigned char zeros[600];
@@ -159,7 +159,7 @@ static void bytes_behind_a_complete_stream_are_passed_over(void **state)
 
 /* The reader takes a mebibyte at once. That block holds no byte, one byte or two bytes of the
  * second member. A comment gives the first member the necessary length. */
-static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
+static void members_may_end_anywhere_in_a_block_read(void **state)
 {
     (void)state;
     static unsigned char whole[(1 << 20) + (1 << 16)];
@@ -188,7 +188,7 @@ static void members_may_end_anywhere_in_what_is_read_at_once(void **state)
 
 /* Cuts off one byte more each time, down to an empty file. A cut in the checksum at the end is an
  * error, too. */
-static void a_cut_file_is_refused_wherever_it_is_cut(void **state)
+static void a_file_truncated_anywhere_is_refused(void **state)
 {
     (void)state;
     bytes small = { .count = 0 };
@@ -231,7 +231,7 @@ static void corrupt_data_is_found_by_the_checksum(void **state)
     }
 }
 
-static void other_content_than_promised_is_refused(void **state)
+static void unexpected_content_is_refused(void **state)
 {
     (void)state;
     bytes b = plain();
@@ -240,7 +240,7 @@ static void other_content_than_promised_is_refused(void **state)
     assert_fails(&(trip_byte_source){ path, TRIP_BYTES_BZIP2, 0, 0, COUNT, false }, "bzip2 data");
 }
 
-static void bytes_left_over_are_warned_of_once(void **state)
+static void leftover_bytes_cause_one_warning(void **state)
 {
     (void)state;
     bytes b = plain();
@@ -278,7 +278,7 @@ static void impossible_offsets_and_sizes_are_refused(void **state)
     trip_report_redirect(NULL, NULL);
 }
 
-static void what_is_no_file_is_refused(void **state)
+static void folders_and_missing_files_are_refused(void **state)
 {
     (void)state;
     assert_fails(&(trip_byte_source){ .path = folder, .size_bytes = 1 }, "not a regular file");
@@ -322,15 +322,15 @@ int main(void)
         cmocka_unit_test(a_signal_ends_reading_and_skipping),
         cmocka_unit_test(all_encodings_deliver_the_same_bytes_in_any_pieces),
         cmocka_unit_test(bytes_can_be_skipped_before_and_after_decompression),
-        cmocka_unit_test(members_one_after_the_other_are_one_stream),
-        cmocka_unit_test(bytes_behind_a_complete_stream_are_passed_over),
-        cmocka_unit_test(members_may_end_anywhere_in_what_is_read_at_once),
-        cmocka_unit_test(a_cut_file_is_refused_wherever_it_is_cut),
+        cmocka_unit_test(consecutive_members_form_one_stream),
+        cmocka_unit_test(bytes_behind_a_complete_stream_are_skipped),
+        cmocka_unit_test(members_may_end_anywhere_in_a_block_read),
+        cmocka_unit_test(a_file_truncated_anywhere_is_refused),
         cmocka_unit_test(corrupt_data_is_found_by_the_checksum),
-        cmocka_unit_test(other_content_than_promised_is_refused),
-        cmocka_unit_test(bytes_left_over_are_warned_of_once),
+        cmocka_unit_test(unexpected_content_is_refused),
+        cmocka_unit_test(leftover_bytes_cause_one_warning),
         cmocka_unit_test(impossible_offsets_and_sizes_are_refused),
-        cmocka_unit_test(what_is_no_file_is_refused),
+        cmocka_unit_test(folders_and_missing_files_are_refused),
     };
     return cmocka_run_group_tests_name("byte_stream", tests, make_folder, remove_folder);
 }

@@ -5,7 +5,7 @@
 
 /* The voxel has no neighbours, so each level divides its share by eight. The share never falls
  * below one step. */
-static void a_voxel_alone_never_vanishes(void **state)
+static void a_single_voxel_never_vanishes(void **state)
 {
     (void)state;
     trip_coarse_value value = { .known = TRIP_COARSE_ALL, .value = 777 };
@@ -29,7 +29,7 @@ static void a_voxel_alone_never_vanishes(void **state)
     }
 }
 
-static void values_count_by_what_is_known_of_them(void **state)
+static void values_are_weighted_by_their_known_share(void **state)
 {
     (void)state;
     const trip_coarse_value whole = { .known = TRIP_COARSE_ALL, .value = 10 },
@@ -49,7 +49,7 @@ static void values_count_by_what_is_known_of_them(void **state)
 
 /* Two halves of a column overlap as if by chance and leave a quarter open. So 3/16 of four columns
  * are covered. */
-static void columns_are_covered_as_if_by_chance(void **state)
+static void columns_overlap_as_if_by_chance(void **state)
 {
     (void)state;
     const trip_coarse_mean half = { .kept = 32768, .cover = { 32768, 32768, 32768 } };
@@ -65,7 +65,7 @@ static void columns_are_covered_as_if_by_chance(void **state)
         assert_true(fabs(out.cover[a] - 65535 / 4.0) <= 65535 / 510.0);
 }
 
-static void gradients_whose_sign_was_lost_add_up(void **state)
+static void gradients_of_unknown_sign_add_up(void **state)
 {
     (void)state;
     const double long_one[3] = { 0, 0, 2 }, short_one[3] = { 0, 0, -1 };
@@ -76,8 +76,7 @@ static void gradients_whose_sign_was_lost_add_up(void **state)
     trip_coarse_mean_add_whole(&sum, 1, 1, short_one);
     trip_coarse_mean_gradient(&sum, gradient);
     assert_true(gradient[0] == 0 && gradient[1] == 0);
-    assert_close(gradient[2], (2 * 2 + 1 * 1) / 3.0,
-                 1e-6); /* each gradient is weighted by its length */
+    assert_close(gradient[2], (2 * 2 + 1 * 1) / 3.0, 1e-6); /* weighted by length */
     trip_coarse_mean_clear(&sum);
     trip_coarse_mean_gradient(&sum, gradient);
     assert_true(gradient[2] == 0);
@@ -86,10 +85,10 @@ static void gradients_whose_sign_was_lost_add_up(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_voxel_alone_never_vanishes),
-        cmocka_unit_test(values_count_by_what_is_known_of_them),
-        cmocka_unit_test(columns_are_covered_as_if_by_chance),
-        cmocka_unit_test(gradients_whose_sign_was_lost_add_up),
+        cmocka_unit_test(a_single_voxel_never_vanishes),
+        cmocka_unit_test(values_are_weighted_by_their_known_share),
+        cmocka_unit_test(columns_overlap_as_if_by_chance),
+        cmocka_unit_test(gradients_of_unknown_sign_add_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -295,7 +295,7 @@ static void check_data_set(const char *name, unsigned levels, unsigned lists)
     trip_budget_destroy(budget);
 }
 
-static void coarse_voxels_have_the_means_of_those_they_cover(void **state)
+static void coarse_voxels_are_means_of_the_voxels_they_cover(void **state)
 {
     (void)state;
     for (int sparse = 0; sparse < 2; sparse++) {
@@ -339,7 +339,7 @@ static uint64_t check_added(const char *name, int shown_from, int shown_to)
     return a.count;
 }
 
-static void what_is_added_about_kept_voxels_does_not_show(void **state)
+static void voxels_added_around_kept_voxels_are_invisible(void **state)
 {
     static const trip_value_range low = { 0, 255 - MIN };
     trip_brick_params p = { .levels = 2 };
@@ -379,7 +379,7 @@ static void spread_bytes(const trip_value_range *kept, unsigned count)
 
 /* The values not kept lie on both sides of the kept ranges. Added voxels get values from the wider
  * side, even after sharpening. */
-static void what_is_added_is_of_the_wider_side(void **state)
+static void added_voxels_get_values_of_the_wider_side(void **state)
 {
     static const struct {
         trip_value_range kept[2];
@@ -450,7 +450,7 @@ static void check_short(const trip_dataset *d, const trip_list *list, const int6
     ((uint64_t *)user)[sharp < 0 ? 0 : sharp > 65535 ? 2 : 1]++;
 }
 
-static void values_are_sharpened_to_the_nearest_code_and_stay_in_the_range_of_codes(void **state)
+static void sharpened_values_are_nearest_codes_within_range(void **state)
 {
     (void)state;
     uint64_t random = 4, counts[3] = { 0 };
@@ -487,8 +487,8 @@ static void expect_records(const char *name, unsigned level, uint64_t records)
 
 /* One kept voxel lies in the middle of a voxel of level 2, at the start of a square and far from
  * the first sheet. The halo lies in 2 x 2 x 2 voxels of level 1 and in one voxel of level 2. Level
- * 2 gets all 26 neighbours of that one voxel as added voxels. */
-static void what_is_beside_a_voxel_is_added_wherever_it_lies(void **state)
+ * 2 also gets the 26 neighbours of the one voxel as added voxels. */
+static void neighbours_are_added_at_any_position(void **state)
 {
     enum { X = 20, Y = 300, Z = 200 };
     (void)state;
@@ -504,7 +504,7 @@ static void what_is_beside_a_voxel_is_added_wherever_it_lies(void **state)
 }
 
 /* If all values are kept, no value is left that an added voxel could take and stay invisible. */
-static void nothing_is_added_beside_what_is_kept_whole(void **state)
+static void no_voxel_is_added_if_all_values_are_kept(void **state)
 {
     enum { EDGE = 16 };
     (void)state;
@@ -531,7 +531,7 @@ static void tiles_of_any_size_have_levels(void **state)
     }
 }
 
-static void memory_threads_and_slices_make_no_difference(void **state)
+static void memory_threads_and_slices_do_not_change_the_result(void **state)
 {
     (void)state;
     make_bytes(9, 100);
@@ -555,7 +555,7 @@ static void expect_same_file(const char *a, const char *b)
 
 /* The default is levels for interpolation. Without the halo, the default is levels for splats.
  * A data set with both kinds of levels contains the same files. */
-static void levels_are_of_what_they_are_for(void **state)
+static void levels_for_one_use_have_only_its_kind(void **state)
 {
     (void)state;
     make_bytes(11, 100);
@@ -592,7 +592,7 @@ static void levels_can_be_left_out_and_stop_at_one_voxel(void **state)
 
 /* Every level of a slab of 4 voxels along z has the normals of its faces, with their length. Voxels
  * inside the slab have no normal and do not count. */
-static void normals_are_those_of_the_faces(void **state)
+static void normals_of_a_slab_are_the_normals_of_its_faces(void **state)
 {
     (void)state;
     for (int i = 0; i < N; i++)
@@ -619,7 +619,7 @@ static void normals_are_those_of_the_faces(void **state)
 }
 
 /* The slab has its z axis along x of world space. */
-static void compact_normals_are_those_of_the_faces_in_a_turned_world(void **state)
+static void compact_normals_of_a_turned_slab_are_face_normals(void **state)
 {
     (void)state;
     const char header[] = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 300 70 41\n"
@@ -667,26 +667,27 @@ static void compact_normals_are_those_of_the_faces_in_a_turned_world(void **stat
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(coarse_voxels_have_the_means_of_those_they_cover,
+        cmocka_unit_test_setup_teardown(coarse_voxels_are_means_of_the_voxels_they_cover,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(what_is_added_about_kept_voxels_does_not_show, test_begin,
+        cmocka_unit_test_setup_teardown(voxels_added_around_kept_voxels_are_invisible, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(what_is_added_is_of_the_wider_side, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(
-            values_are_sharpened_to_the_nearest_code_and_stay_in_the_range_of_codes, test_begin,
-            test_end),
-        cmocka_unit_test_setup_teardown(what_is_beside_a_voxel_is_added_wherever_it_lies,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(nothing_is_added_beside_what_is_kept_whole, test_begin,
+        cmocka_unit_test_setup_teardown(added_voxels_get_values_of_the_wider_side, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(sharpened_values_are_nearest_codes_within_range, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(neighbours_are_added_at_any_position, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(no_voxel_is_added_if_all_values_are_kept, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(tiles_of_any_size_have_levels, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(memory_threads_and_slices_make_no_difference, test_begin,
+        cmocka_unit_test_setup_teardown(memory_threads_and_slices_do_not_change_the_result,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(levels_for_one_use_have_only_its_kind, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(levels_are_of_what_they_are_for, test_begin, test_end),
         cmocka_unit_test_setup_teardown(levels_can_be_left_out_and_stop_at_one_voxel, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(normals_are_those_of_the_faces, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(compact_normals_are_those_of_the_faces_in_a_turned_world,
+        cmocka_unit_test_setup_teardown(normals_of_a_slab_are_the_normals_of_its_faces, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(compact_normals_of_a_turned_slab_are_face_normals,
                                         test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -41,7 +41,7 @@ static char *option(const char *x, const char *y, const char *z)
     return text;
 }
 
-static void coordinates_are_places_and_a_map(void **state)
+static void coordinates_give_positions_and_a_map(void **state)
 {
     (void)state;
     trip_volume *v;
@@ -68,7 +68,7 @@ static void coordinates_are_places_and_a_map(void **state)
     free(files);
 }
 
-static void coordinates_that_are_even_are_a_spacing(void **state)
+static void even_coordinates_become_a_spacing(void **state)
 {
     (void)state;
     trip_volume *v;
@@ -88,7 +88,7 @@ static void coordinates_that_are_even_are_a_spacing(void **state)
 }
 
 /* If every second voxel is left out, the others keep their positions in world space. */
-static void what_is_left_out_leaves_the_others_where_they_are(void **state)
+static void sampling_keeps_the_positions_of_voxels(void **state)
 {
     (void)state;
     trip_volume *v;
@@ -160,7 +160,7 @@ static const char *write_hole(const char *name, const char *header, int64_t data
 }
 
 /* An axis without coordinates gets a table if another axis has coordinates. */
-static void no_table_is_made_of_an_axis_that_is_too_long(void **state)
+static void no_table_is_made_for_an_axis_that_is_too_long(void **state)
 {
     (void)state;
     const int64_t voxels = TRIP_VOLUME_AXIS_MAX + 1;
@@ -241,7 +241,7 @@ static void positions_and_indices_are_inverse(void **state)
 }
 
 /* Both ends are exact, so that the grid covers the same space as without a table. */
-static void places_of_voxels_are_those_of_the_table(void **state)
+static void positions_of_voxels_come_from_the_table(void **state)
 {
     (void)state;
     for (int i = 1; i < 6000; i++) {
@@ -256,15 +256,15 @@ static void places_of_voxels_are_those_of_the_table(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(coordinates_are_places_and_a_map),
-        cmocka_unit_test(coordinates_that_are_even_are_a_spacing),
-        cmocka_unit_test(what_is_left_out_leaves_the_others_where_they_are),
+        cmocka_unit_test(coordinates_give_positions_and_a_map),
+        cmocka_unit_test(even_coordinates_become_a_spacing),
+        cmocka_unit_test(sampling_keeps_the_positions_of_voxels),
         cmocka_unit_test(bad_coordinates_are_refused),
-        cmocka_unit_test(no_table_is_made_of_an_axis_that_is_too_long),
+        cmocka_unit_test(no_table_is_made_for_an_axis_that_is_too_long),
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(coordinates_may_come_through_a_pipe),
         cmocka_unit_test(positions_and_indices_are_inverse),
-        cmocka_unit_test(places_of_voxels_are_those_of_the_table),
+        cmocka_unit_test(positions_of_voxels_come_from_the_table),
     };
     return cmocka_run_group_tests_name("coordinates", tests, make_folder, remove_folder);
 }

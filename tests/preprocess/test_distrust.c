@@ -45,8 +45,7 @@ static FILE *create(const char *name)
     return f;
 }
 
-/* Returns the status of `brick --resume` with a journal of these records. All other files are
- * present. */
+/* Resumes `brick` with the journal `name` and returns its status. All other files are present. */
 static int resume(const char *name, trip_budget *budget)
 {
     static const trip_journal_params params = { .resume = true,

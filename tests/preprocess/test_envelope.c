@@ -18,12 +18,12 @@ static void silence(const char *line, void *user)
     (void)user;
 }
 
-static void a_range_holds_both_its_ends_and_nothing_beside(void **state)
+static void a_range_includes_both_ends_and_nothing_beyond(void **state)
 {
     (void)state;
     trip_envelope e = { 0 };
     assert_int_equal(trip_envelope_add_range(&e, 0.1, 7), 0);
-    /* 0.1 is between two floats: the one below it is outside. */
+    /* 0.1 lies between two floats. The range excludes the lower float. */
     float above = (float)0.1 >= 0.1 ? (float)0.1 : nextafterf((float)0.1, 1);
     assert_true(trip_envelope_keeps(&e, above));
     assert_false(trip_envelope_keeps(&e, nextafterf(above, 0)));
@@ -32,7 +32,7 @@ static void a_range_holds_both_its_ends_and_nothing_beside(void **state)
     trip_envelope_destroy(&e);
 }
 
-static void what_is_not_finite_is_never_kept(void **state)
+static void non_finite_values_are_never_kept(void **state)
 {
     (void)state;
     trip_envelope e = { 0 };
@@ -47,7 +47,7 @@ static void what_is_not_finite_is_never_kept(void **state)
     trip_envelope_destroy(&e);
 }
 
-static void both_zeros_are_one_value(void **state)
+static void both_zeros_are_equal(void **state)
 {
     (void)state;
     trip_envelope e = { 0 };
@@ -75,7 +75,7 @@ static void ranges_that_touch_become_one_interval(void **state)
     trip_envelope_destroy(&e);
 }
 
-static void a_range_the_wrong_way_round_is_refused(void **state)
+static void a_reversed_range_is_refused(void **state)
 {
     (void)state;
     trip_envelope e = { 0 };
@@ -104,7 +104,8 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Opacities are often 0 and sometimes so small that they vanish in arithmetic; values repeat. */
+/* Makes a random transfer function. Many opacities are 0, some are the smallest positive double.
+ * Values repeat. */
 static trip_tf *random_function(uint64_t *random)
 {
     trip_tf_point points[12] = { 0 };
@@ -132,7 +133,7 @@ static void check_at(const trip_envelope *e, const trip_tf *tf, float value)
                  trip_tf_evaluate(tf, value).opacity);
 }
 
-static void a_function_keeps_exactly_what_it_shows(void **state)
+static void a_transfer_function_keeps_exactly_the_visible_values(void **state)
 {
     (void)state;
     uint64_t random = 1;
@@ -159,7 +160,7 @@ static void a_function_keeps_exactly_what_it_shows(void **state)
     }
 }
 
-static void rows_and_single_values_agree_however_many_intervals(void **state)
+static void rows_and_single_values_agree_for_any_intervals(void **state)
 {
     (void)state;
     for (int intervals = 0; intervals < 12; intervals++) {
@@ -180,13 +181,13 @@ static void rows_and_single_values_agree_however_many_intervals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_range_holds_both_its_ends_and_nothing_beside),
-        cmocka_unit_test(what_is_not_finite_is_never_kept),
-        cmocka_unit_test(both_zeros_are_one_value),
+        cmocka_unit_test(a_range_includes_both_ends_and_nothing_beyond),
+        cmocka_unit_test(non_finite_values_are_never_kept),
+        cmocka_unit_test(both_zeros_are_equal),
         cmocka_unit_test(ranges_that_touch_become_one_interval),
-        cmocka_unit_test(a_range_the_wrong_way_round_is_refused),
-        cmocka_unit_test(a_function_keeps_exactly_what_it_shows),
-        cmocka_unit_test(rows_and_single_values_agree_however_many_intervals),
+        cmocka_unit_test(a_reversed_range_is_refused),
+        cmocka_unit_test(a_transfer_function_keeps_exactly_the_visible_values),
+        cmocka_unit_test(rows_and_single_values_agree_for_any_intervals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,7 +24,7 @@ static trip_brick_params make_volume(void)
                                 .threads = 2 };
 }
 
-static void a_sample_tells_what_will_be_kept_and_written(void **state)
+static void a_sample_estimates_the_voxels_kept_and_bytes_written(void **state)
 {
     (void)state;
     trip_brick_params p = make_volume();
@@ -55,7 +55,7 @@ static void an_automatic_envelope_is_estimated_from_the_sample(void **state)
     assert_true((double)e.kept > 0.8 * (double)s.kept && (double)e.kept < 1.2 * (double)s.kept);
 }
 
-static void temporary_data_is_foreseen_where_memory_is_short(void **state)
+static void temporary_data_is_estimated_if_memory_is_short(void **state)
 {
     (void)state;
     trip_brick_params p = make_volume();
@@ -74,7 +74,7 @@ static void temporary_data_is_foreseen_where_memory_is_short(void **state)
 }
 
 /* Each list has one byte of code and an eighth of mask for each splat, plus the presence words. */
-static void without_normals_little_is_written(void **state)
+static void without_normals_the_estimate_is_smaller(void **state)
 {
     (void)state;
     trip_brick_params p = make_volume();
@@ -87,7 +87,7 @@ static void without_normals_little_is_written(void **state)
 }
 
 /* The estimate samples 16 evenly spaced portions of 4 slices. None of them has a finite value. */
-static void a_sample_without_values_says_nothing_of_the_volume(void **state)
+static void a_sample_without_finite_values_gives_no_estimate(void **state)
 {
     (void)state;
     enum { SIDE = 16, AREA = SIDE * SIDE, DEPTH = 2000, FIRST = 44, SLICES = 8 };
@@ -120,15 +120,16 @@ static void a_sample_without_values_says_nothing_of_the_volume(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_sample_tells_what_will_be_kept_and_written, test_begin,
-                                        test_end),
+        cmocka_unit_test_setup_teardown(a_sample_estimates_the_voxels_kept_and_bytes_written,
+                                        test_begin, test_end),
         cmocka_unit_test_setup_teardown(an_automatic_envelope_is_estimated_from_the_sample,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(temporary_data_is_foreseen_where_memory_is_short,
+        cmocka_unit_test_setup_teardown(temporary_data_is_estimated_if_memory_is_short, test_begin,
+                                        test_end),
+        cmocka_unit_test_setup_teardown(a_sample_without_finite_values_gives_no_estimate,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(a_sample_without_values_says_nothing_of_the_volume,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(without_normals_little_is_written, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(without_normals_the_estimate_is_smaller, test_begin,
+                                        test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -70,7 +70,7 @@ static void any_part_is_read_from_memory_and_from_disk(void **state)
     close_pieces(p);
 }
 
-static void what_was_changed_just_now_is_seen(void **state)
+static void recent_changes_are_read(void **state)
 {
     (void)state;
     trip_file_pieces *p = open_pieces();
@@ -96,7 +96,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_part_is_read_from_memory_and_from_disk),
-        cmocka_unit_test(what_was_changed_just_now_is_seen),
+        cmocka_unit_test(recent_changes_are_read),
         cmocka_unit_test(a_file_that_became_shorter_is_not_read),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -90,7 +90,7 @@ static int32_t code_of_byte(const test_lists *l, size_t voxel)
     return 85 * (258 + bytes[voxel]);
 }
 
-static void kept_voxels_have_their_neighbours_whatever_the_tile(void **state)
+static void the_halo_has_all_neighbours_for_any_tile(void **state)
 {
     (void)state;
     for (unsigned tile = 16; tile <= 128; tile *= 2) {
@@ -106,7 +106,7 @@ static void kept_voxels_have_their_neighbours_whatever_the_tile(void **state)
     }
 }
 
-static void memory_threads_and_slabs_make_no_difference(void **state)
+static void memory_threads_and_slabs_do_not_change_the_result(void **state)
 {
     (void)state;
     make_bytes(5, 100);
@@ -124,7 +124,7 @@ static void memory_threads_and_slabs_make_no_difference(void **state)
     }
 }
 
-static void splats_are_the_same_bytes_with_a_halo_and_without(void **state)
+static void splats_have_the_same_bytes_with_and_without_a_halo(void **state)
 {
     (void)state;
     static const char *const planes[] = { "voxels", "normals" };
@@ -149,7 +149,7 @@ static void splats_are_the_same_bytes_with_a_halo_and_without(void **state)
     test_free_lists(&l);
 }
 
-static void values_that_are_not_finite_are_not_in_the_halo(void **state)
+static void non_finite_values_are_not_in_the_halo(void **state)
 {
     (void)state;
     enum { EDGE = 20, COUNT = EDGE * EDGE * EDGE };
@@ -223,7 +223,7 @@ static int32_t code_of_field(const test_lists *l, size_t voxel)
     return (int32_t)fmin(65535, fmax(0, floor(code + 0.5)));
 }
 
-static void a_sparse_volume_has_its_background_around_what_is_kept(void **state)
+static void a_sparse_volume_has_background_around_kept_voxels(void **state)
 {
     (void)state;
     static const trip_value_range ranges[] = { { 1e-6, 2 }, { 0.2, 2 } };
@@ -252,7 +252,7 @@ static void a_sparse_volume_has_its_background_around_what_is_kept(void **state)
 
 /* Takes every voxel, every second voxel, and so on. Some samples keep the last voxel along an axis,
  * with no neighbour behind it. */
-static void samples_of_a_sparse_volume_have_their_halo_within_the_grid(void **state)
+static void a_sampled_sparse_volume_has_its_halo_within_the_grid(void **state)
 {
     (void)state;
     static const trip_value_range all = { 1e-6, 2 };
@@ -291,17 +291,17 @@ static void samples_of_a_sparse_volume_have_their_halo_within_the_grid(void **st
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(kept_voxels_have_their_neighbours_whatever_the_tile,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(memory_threads_and_slabs_make_no_difference, test_begin,
+        cmocka_unit_test_setup_teardown(the_halo_has_all_neighbours_for_any_tile, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(splats_are_the_same_bytes_with_a_halo_and_without,
+        cmocka_unit_test_setup_teardown(memory_threads_and_slabs_do_not_change_the_result,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(values_that_are_not_finite_are_not_in_the_halo, test_begin,
+        cmocka_unit_test_setup_teardown(splats_have_the_same_bytes_with_and_without_a_halo,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(non_finite_values_are_not_in_the_halo, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(a_sparse_volume_has_its_background_around_what_is_kept,
+        cmocka_unit_test_setup_teardown(a_sparse_volume_has_background_around_kept_voxels,
                                         test_begin, test_end),
-        cmocka_unit_test_setup_teardown(samples_of_a_sparse_volume_have_their_halo_within_the_grid,
+        cmocka_unit_test_setup_teardown(a_sampled_sparse_volume_has_its_halo_within_the_grid,
                                         test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -59,7 +59,7 @@ static const trip_brick_params different[] = {
 
 enum { COUNT = sizeof different / sizeof *different };
 
-static void every_option_that_matters_changes_the_text(void **state)
+static void every_relevant_option_changes_the_text(void **state)
 {
     (void)state;
     char *texts[COUNT];
@@ -73,7 +73,7 @@ static void every_option_that_matters_changes_the_text(void **state)
         free(texts[i]);
 }
 
-static void options_that_change_nothing_change_no_text(void **state)
+static void irrelevant_options_leave_the_text_unchanged(void **state)
 {
     (void)state;
     static const trip_brick_params alike[] = {
@@ -94,8 +94,8 @@ static void options_that_change_nothing_change_no_text(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_option_that_matters_changes_the_text),
-        cmocka_unit_test(options_that_change_nothing_change_no_text),
+        cmocka_unit_test(every_relevant_option_changes_the_text),
+        cmocka_unit_test(irrelevant_options_leave_the_text_unchanged),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -258,7 +258,7 @@ ATTACK(checkpoint_cut_short, records[record_count - 1].bytes = 16)
 ATTACK(a_kept_voxel_less, checkpoint()->kept--)
 ATTACK(a_voxel_less_around, checkpoint()->halo--)
 
-static void numbers_that_no_run_writes_are_refused(void **state)
+static void invalid_numbers_are_refused(void **state)
 {
     (void)state;
     static const attack attacks[] = {
@@ -299,7 +299,7 @@ static void numbers_that_no_run_writes_are_refused(void **state)
     CHECK_ATTACKS(attacks, "is invalid; run again", false);
 }
 
-static void sequences_that_no_run_writes_are_refused(void **state)
+static void invalid_sequences_are_refused(void **state)
 {
     (void)state;
     static const attack attacks[] = {
@@ -335,15 +335,15 @@ static void another_identity_is_refused(void **state)
     CHECK_ATTACKS(attacks, "another input or other options", false);
 }
 
-static void false_lengths_of_files_in_order_are_found_when_they_are_read(void **state)
+static void false_lengths_of_ordered_files_are_found_on_reading(void **state)
 {
     (void)state;
     trip_brick_params p = params();
     make_volume();
     leave_killed_run(p);
     read_journal();
-    for (size_t i = 1; i < record_count;
-         i++) /* all checkpoints, because the data of the last may be incomplete */
+    /* Changes all checkpoints, because the data of the last may be incomplete. */
+    for (size_t i = 1; i < record_count; i++)
         ((trip_checkpoint *)(void *)records[i].body)->ordered_bytes[TRIP_PLANE_VOXELS] -= 8;
     write_journal();
     free_records();
@@ -365,7 +365,7 @@ static void a_false_count_of_kept_voxels_is_found_at_the_end(void **state)
     assert_false(test_exists("a.trip.partial"));
 }
 
-static void a_false_count_of_voxels_around_them_is_found_at_the_end(void **state)
+static void a_false_count_of_halo_voxels_is_found_at_the_end(void **state)
 {
     (void)state;
     trip_brick_params p = params();
@@ -395,7 +395,7 @@ static void overwrite(const char *name, long offset, const void *data, size_t by
 
 /* All voxels are kept, so the first run is a whole tile. Its block has one word of squares, 64
  * masks, then codes. */
-static void false_records_of_the_list_in_order_are_refused(void **state)
+static void false_records_of_the_ordered_list_are_refused(void **state)
 {
     (void)state;
     static const struct {
@@ -422,7 +422,7 @@ static void false_records_of_the_list_in_order_are_refused(void **state)
 
 /* With 16-bit codes a form follows the masks. The test sets its width to 65535 bits for each code.
  */
-static void a_block_that_is_longer_than_any_is_refused(void **state)
+static void a_block_beyond_the_maximum_length_is_refused(void **state)
 {
     (void)state;
     static const unsigned char width[2] = { 255, 255 };
@@ -434,7 +434,7 @@ static void a_block_that_is_longer_than_any_is_refused(void **state)
     expect_refused(p, "a block without end", "the data of the interrupted run are damaged");
 }
 
-static void links_and_what_is_no_file_are_not_followed(void **state)
+static void links_and_pipes_are_not_followed(void **state)
 {
     (void)state;
     static const char *const names[] = { "journal", "runs", "pieces", "z0.voxels" };
@@ -506,7 +506,7 @@ static void partial_folders_of_another_user_are_refused(void **state)
 
 /* A power failure may lose data. The run then resumes from an earlier checkpoint with complete
  * data. */
-static void what_is_no_longer_at_hand_is_made_again(void **state)
+static void lost_data_are_made_again(void **state)
 {
     (void)state;
     static const char *const names[] = { "spill/pieces", "spill/runs", "partial/z0.voxels" };
@@ -530,7 +530,7 @@ static void what_is_no_longer_at_hand_is_made_again(void **state)
     }
 }
 
-static void a_journal_as_it_was_written_is_gone_on_with(void **state)
+static void an_unchanged_journal_is_resumed(void **state)
 {
     (void)state;
     trip_brick_params p = params();
@@ -552,7 +552,7 @@ static void a_journal_as_it_was_written_is_gone_on_with(void **state)
 
 /* The checksum of the record is valid. The journal ends before the record, as it does before a
  * truncated record. */
-static void a_record_that_is_longer_than_any_is_none(void **state)
+static void a_record_beyond_the_maximum_length_is_ignored(void **state)
 {
     (void)state;
     trip_brick_params p = params();
@@ -586,7 +586,7 @@ static void leave_killed_out_of_order(double share, trip_brick_params p)
 
 /* With blocks of 2 slices the run writes the Z list directly. With blocks of 16 slices it lacks the
  * memory for this and spills the list. */
-static void a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more(void **state)
+static void a_run_resumes_with_less_or_more_memory(void **state)
 {
     (void)state;
     trip_brick_params p = params();
@@ -615,7 +615,7 @@ static void a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more(v
     assert_false(test_exists("a.trip.spill"));
 }
 
-static void what_an_interrupted_run_did_outlives_a_refusal_to_go_on(void **state)
+static void a_refusal_to_resume_keeps_the_interrupted_run(void **state)
 {
     (void)state;
     trip_brick_params p = params();
@@ -656,7 +656,7 @@ static void expect_another_output(trip_brick_params p)
     assert_true(test_exists("a.trip.spill"));
 }
 
-static void only_the_output_that_the_run_completed_is_taken_for_done(void **state)
+static void only_the_completed_output_of_the_run_counts_as_done(void **state)
 {
     (void)state;
     trip_brick_params p = params(), other = p;
@@ -678,7 +678,7 @@ static void only_the_output_that_the_run_completed_is_taken_for_done(void **stat
     assert_false(test_exists("a.trip.spill"));
 }
 
-static void a_run_that_replaces_goes_on_where_another_output_stands(void **state)
+static void a_replacing_run_resumes_beside_another_output(void **state)
 {
     (void)state;
     trip_brick_params p = params(), other = p;
@@ -700,25 +700,25 @@ static void a_run_that_replaces_goes_on_where_another_output_stands(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(a_journal_as_it_was_written_is_gone_on_with),
-        TEST(numbers_that_no_run_writes_are_refused),
-        TEST(sequences_that_no_run_writes_are_refused),
+        TEST(an_unchanged_journal_is_resumed),
+        TEST(invalid_numbers_are_refused),
+        TEST(invalid_sequences_are_refused),
         TEST(a_false_tally_of_all_values_is_refused),
         TEST(another_identity_is_refused),
-        TEST(false_lengths_of_files_in_order_are_found_when_they_are_read),
+        TEST(false_lengths_of_ordered_files_are_found_on_reading),
         TEST(a_false_count_of_kept_voxels_is_found_at_the_end),
-        TEST(a_false_count_of_voxels_around_them_is_found_at_the_end),
-        TEST(false_records_of_the_list_in_order_are_refused),
-        TEST(a_block_that_is_longer_than_any_is_refused),
-        TEST(a_record_that_is_longer_than_any_is_none),
-        TEST(links_and_what_is_no_file_are_not_followed),
+        TEST(a_false_count_of_halo_voxels_is_found_at_the_end),
+        TEST(false_records_of_the_ordered_list_are_refused),
+        TEST(a_block_beyond_the_maximum_length_is_refused),
+        TEST(a_record_beyond_the_maximum_length_is_ignored),
+        TEST(links_and_pipes_are_not_followed),
         TEST(folders_of_another_user_are_refused),
         TEST(partial_folders_of_another_user_are_refused),
-        TEST(what_is_no_longer_at_hand_is_made_again),
-        TEST(a_run_goes_on_with_less_room_than_the_killed_one_had_and_with_more),
-        TEST(what_an_interrupted_run_did_outlives_a_refusal_to_go_on),
-        TEST(only_the_output_that_the_run_completed_is_taken_for_done),
-        TEST(a_run_that_replaces_goes_on_where_another_output_stands),
+        TEST(lost_data_are_made_again),
+        TEST(a_run_resumes_with_less_or_more_memory),
+        TEST(a_refusal_to_resume_keeps_the_interrupted_run),
+        TEST(only_the_completed_output_of_the_run_counts_as_done),
+        TEST(a_replacing_run_resumes_beside_another_output),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -197,7 +197,7 @@ static void lists_hold_the_splats_in_order(void **state)
     test_free_lists(&l);
 }
 
-static void memory_producers_and_order_make_no_difference(void **state)
+static void memory_producers_and_order_do_not_change_the_result(void **state)
 {
     (void)state;
     uint64_t spilled, min = trip_list_builder_min_bytes(&format, 1);
@@ -221,7 +221,7 @@ static void memory_producers_and_order_make_no_difference(void **state)
     assert_false(test_exists("spill"));
 }
 
-static void what_fits_is_not_spilled(void **state)
+static void data_that_fits_memory_is_not_spilled(void **state)
 {
     (void)state;
     uint64_t all, spilled;
@@ -248,7 +248,7 @@ static void damaged_temporary_data_is_a_failure(void **state)
 }
 
 /* The spilling thread detects the interruption. */
-static void who_waits_for_memory_learns_that_the_spill_was_interrupted(void **state)
+static void threads_waiting_for_memory_learn_of_an_interrupted_spill(void **state)
 {
     (void)state;
     const run_params p = { trip_list_builder_min_bytes(&format, 1), 1, false, true, false };
@@ -286,11 +286,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(lists_hold_the_splats_in_order, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(memory_producers_and_order_make_no_difference, test_begin,
-                                        test_end),
-        cmocka_unit_test_setup_teardown(what_fits_is_not_spilled, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(memory_producers_and_order_do_not_change_the_result,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(data_that_fits_memory_is_not_spilled, test_begin, test_end),
         cmocka_unit_test_setup_teardown(damaged_temporary_data_is_a_failure, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(who_waits_for_memory_learns_that_the_spill_was_interrupted,
+        cmocka_unit_test_setup_teardown(threads_waiting_for_memory_learn_of_an_interrupted_spill,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(a_spill_in_use_is_refused, test_begin, test_end),
     };

@@ -16,14 +16,14 @@ static bool is_in_half_ball(const double p[3], int side)
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < 0.9 * 0.9 && up > 0;
 }
 
-/* The share of a side is the part of the object's shadow that reaches into the last tenth of its
- * length.
+/* The share of a side is the fraction of the rows through the object that reach into the last
+ * tenth.
  *
  * - Flat side: 1, the whole disc.
  * - Round side: the rows higher than 0.9 radii, a disc of 1 - 0.81 of the radius squared.
  * - Other sides: the object is two radii long. The rows that reach farther than 0.8 radii cover 1 -
  * 0.64 of the half disc. */
-static void shares_of_half_a_ball_are_those_of_its_discs(void **state)
+static void shares_of_a_half_ball_are_areas_of_its_discs(void **state)
 {
     (void)state;
     static trip_occupancy o = { { EDGE, EDGE, EDGE }, { 0 } };
@@ -42,7 +42,7 @@ static void shares_of_half_a_ball_are_those_of_its_discs(void **state)
     }
 }
 
-static void rows_that_reach_into_the_tenth_count(void **state)
+static void rows_that_reach_into_the_last_tenth_count(void **state)
 {
     (void)state;
     /* The object covers eleven bins from the third on, so the last tenth is two bins. The third row
@@ -57,7 +57,7 @@ static void rows_that_reach_into_the_tenth_count(void **state)
     assert_float_equal(trip_orientation_base_share(&nothing, 2), 0, 0);
 }
 
-static void one_side_stands_out_or_there_is_none(void **state)
+static void a_base_needs_a_clearly_level_side(void **state)
 {
     (void)state;
     static const struct {
@@ -92,7 +92,7 @@ static char *brick_ball(int side, trip_brick_params p, trip_brick_summary *s)
     return test_brick_bytes(p, bytes, (const int[]){ NX, NY, NZ }, s);
 }
 
-static void half_a_ball_stands_on_its_flat_side(void **state)
+static void a_half_ball_stands_on_its_flat_side(void **state)
 {
     (void)state;
     static const char *const names[] = { "-x", "+x", "-y", "+y", "-z", "+z" };
@@ -109,7 +109,7 @@ static void half_a_ball_stands_on_its_flat_side(void **state)
     }
 }
 
-static void a_ball_a_part_and_what_is_said_to_lie_otherwise_stand_on_none(void **state)
+static void balls_parts_and_oriented_volumes_have_no_base(void **state)
 {
     (void)state;
     const trip_brick_params ways[] = { { 0 },
@@ -130,11 +130,11 @@ static void a_ball_a_part_and_what_is_said_to_lie_otherwise_stand_on_none(void *
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(shares_of_half_a_ball_are_those_of_its_discs),
-        TEST(rows_that_reach_into_the_tenth_count),
-        TEST(one_side_stands_out_or_there_is_none),
-        TEST(half_a_ball_stands_on_its_flat_side),
-        TEST(a_ball_a_part_and_what_is_said_to_lie_otherwise_stand_on_none),
+        TEST(shares_of_a_half_ball_are_areas_of_its_discs),
+        TEST(rows_that_reach_into_the_last_tenth_count),
+        TEST(a_base_needs_a_clearly_level_side),
+        TEST(a_half_ball_stands_on_its_flat_side),
+        TEST(balls_parts_and_oriented_volumes_have_no_base),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,7 +13,7 @@ static double score(int i, int j, int k, const uint16_t *weights, int axis)
     return trip_orientation_symmetry_score(&o, axis);
 }
 
-static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
+static void scores_are_the_maximum_overlap_with_the_mirror_image(void **state)
 {
     (void)state;
     /* The row 1 2 overlaps its mirror image by 1, 4 or 4, depending on the position of the mirror.
@@ -36,7 +36,7 @@ static void scores_are_the_greatest_overlap_with_the_mirror_image(void **state)
     assert_float_equal(score(2, 2, 2, nothing, 1), 0, 0);
 }
 
-static void the_greatest_weights_do_not_overflow(void **state)
+static void maximum_weights_do_not_overflow(void **state)
 {
     (void)state;
     trip_occupancy full = { { TRIP_OCCUPANCY_EDGE, TRIP_OCCUPANCY_EDGE, TRIP_OCCUPANCY_EDGE },
@@ -46,7 +46,7 @@ static void the_greatest_weights_do_not_overflow(void **state)
         assert_float_equal(trip_orientation_symmetry_score(&full, axis), 1, 0);
 }
 
-static void one_axis_stands_out_or_there_is_none(void **state)
+static void an_axis_needs_a_clearly_best_score(void **state)
 {
     (void)state;
     static const struct {
@@ -100,7 +100,7 @@ static void assert_mirror(trip_brick_params p, const char *expected)
     free(text);
 }
 
-static void a_wedge_is_symmetric_across_its_own_axis(void **state)
+static void a_wedge_is_symmetric_across_its_axis(void **state)
 {
     (void)state;
     static const char *const expected[] = { "\"mirror\":\"x\"", "\"mirror\":\"y\"",
@@ -113,7 +113,7 @@ static void a_wedge_is_symmetric_across_its_own_axis(void **state)
     assert_mirror((trip_brick_params){ 0 }, NULL);
 }
 
-static void what_is_found_does_not_depend_on_how_it_is_bricked(void **state)
+static void the_axis_found_does_not_depend_on_bricking(void **state)
 {
     (void)state;
     const trip_brick_params ways[] = {
@@ -142,7 +142,7 @@ static void no_symmetry_is_found_across_uneven_spacing(void **state)
     assert_mirror((trip_brick_params){ .volume.coordinates = files }, NULL);
 }
 
-static void nothing_is_guessed_where_it_is_said_how_the_volume_lies(void **state)
+static void nothing_is_guessed_if_the_orientation_is_given(void **state)
 {
     (void)state;
     make_wedge(2, 0, false);
@@ -154,13 +154,13 @@ static void nothing_is_guessed_where_it_is_said_how_the_volume_lies(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(scores_are_the_greatest_overlap_with_the_mirror_image),
-        TEST(the_greatest_weights_do_not_overflow),
-        TEST(one_axis_stands_out_or_there_is_none),
-        TEST(a_wedge_is_symmetric_across_its_own_axis),
-        TEST(what_is_found_does_not_depend_on_how_it_is_bricked),
+        TEST(scores_are_the_maximum_overlap_with_the_mirror_image),
+        TEST(maximum_weights_do_not_overflow),
+        TEST(an_axis_needs_a_clearly_best_score),
+        TEST(a_wedge_is_symmetric_across_its_axis),
+        TEST(the_axis_found_does_not_depend_on_bricking),
         TEST(no_symmetry_is_found_across_uneven_spacing),
-        TEST(nothing_is_guessed_where_it_is_said_how_the_volume_lies),
+        TEST(nothing_is_guessed_if_the_orientation_is_given),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -101,7 +101,7 @@ static void check_format(const trip_piece_format *f, trip_budget *budget)
     trip_run_builder_destroy(builder);
 }
 
-static void pieces_of_a_tile_come_out_as_one_run(void **state)
+static void pieces_of_a_tile_merge_into_one_run(void **state)
 {
     (void)state;
     trip_budget *budget;
@@ -150,7 +150,7 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
 
 /* The tile has a bitmap of 4 words. One damage names a word beyond the tile. The other repeats the
  * preceding position. */
-static void positions_twice_or_beyond_the_tile_are_refused(void **state)
+static void repeated_positions_and_positions_beyond_the_tile_are_refused(void **state)
 {
     (void)state;
     static sample s;
@@ -169,7 +169,7 @@ static void positions_twice_or_beyond_the_tile_are_refused(void **state)
     assert_false(trip_piece_check(&s.piece, &f, s.length));
 }
 
-static void codes_are_the_nearest_and_end_at_the_ends(void **state)
+static void codes_are_nearest_and_clamped_to_the_range(void **state)
 {
     (void)state;
     const trip_quantiser q = { .lo = -3, .hi = 5 };
@@ -202,10 +202,10 @@ static void codes_of_8_and_16_bits_are_exact(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pieces_of_a_tile_come_out_as_one_run),
+        cmocka_unit_test(pieces_of_a_tile_merge_into_one_run),
         cmocka_unit_test(damaged_pieces_are_refused_or_harmless),
-        cmocka_unit_test(positions_twice_or_beyond_the_tile_are_refused),
-        cmocka_unit_test(codes_are_the_nearest_and_end_at_the_ends),
+        cmocka_unit_test(repeated_positions_and_positions_beyond_the_tile_are_refused),
+        cmocka_unit_test(codes_are_nearest_and_clamped_to_the_range),
         cmocka_unit_test(codes_of_8_and_16_bits_are_exact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

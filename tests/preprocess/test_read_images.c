@@ -14,7 +14,7 @@ static void write_dicom(const char *name, const dicom *d, int first, int count)
     write_file(name, &b);
 }
 
-/* As assert_holds_sample, but in one reading and with values changed by slope and inter. */
+/* Reads the file once and compares it with the sample, scaled by `slope` and `inter`. */
 static trip_volume_info assert_sample(const char *path, trip_scalar type, trip_scalar read_as,
                                       double slope, double inter, int expected_reports)
 {
@@ -59,7 +59,7 @@ static void a_pattern_gives_the_slices_by_number(void **state)
     }
 }
 
-/* "s2" comes before "s10"; what is no picture is passed over. */
+/* "s2" comes before "s10". The reader skips files that are not pictures. */
 static void a_folder_and_a_glob_are_read_in_natural_order(void **state)
 {
     (void)state;
@@ -83,7 +83,7 @@ static void a_folder_and_a_glob_are_read_in_natural_order(void **state)
     remove(path_of("stack"));
 }
 
-static void halves_and_floats_come_from_exr(void **state)
+static void exr_gives_halves_and_floats(void **state)
 {
     (void)state;
     static const trip_scalar types[] = { TRIP_F16, TRIP_F32 };
@@ -99,7 +99,7 @@ static void halves_and_floats_come_from_exr(void **state)
     }
 }
 
-/* Not premultiplied by the alpha; luma of three equal channels is that value. */
+/* The alpha does not multiply the value. The luma of three equal channels is their value. */
 static void grey_is_taken_from_channels(void **state)
 {
     (void)state;
@@ -116,7 +116,7 @@ static void grey_is_taken_from_channels(void **state)
     }
 }
 
-static void a_tiff_with_depth_in_its_tiles_is_refused(void **state)
+static void a_tiff_with_deep_tiles_is_refused(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -125,7 +125,8 @@ static void a_tiff_with_depth_in_its_tiles_is_refused(void **state)
     assert_refused(path_of("deep.tif"), "store its slices as pages");
 }
 
-/* Names say the reverse of what the positions do; slices lie along a tilted direction. */
+/* The order of names is the reverse of the order of positions. Slices lie along a tilted direction.
+ */
 static void dicom_slices_are_ordered_and_placed_in_space(void **state)
 {
     (void)state;
@@ -154,8 +155,8 @@ static void dicom_slices_are_ordered_and_placed_in_space(void **state)
     assert_true(info.oriented);
 }
 
-/* Slices at 0, 1.5, 4.5, 6 and so on: drawn 1.5 apart where the gap is allowed. */
-static void a_dicom_slice_missing_between_others_is_refused_unless_allowed(void **state)
+/* The slices are at 0, 1.5, 4.5, 6 and so on. If the gap is allowed, the spacing is 1.5. */
+static void a_missing_dicom_slice_is_refused_unless_gaps_are_allowed(void **state)
 {
     (void)state;
     for (int k = 0; k < NZ; k++) {
@@ -178,8 +179,7 @@ static void a_dicom_slice_missing_between_others_is_refused_unless_allowed(void 
     assert_true(fabs(info.index_to_world.m[2][2] - 1.5) < 1e-12);
 }
 
-/* A single frame has none either. */
-static void gaps_are_allowed_in_stacks_of_several_files_only(void **state)
+static void only_stacks_of_several_files_may_have_gaps(void **state)
 {
     (void)state;
     const trip_volume_params params = { .allow_gaps = true };
@@ -206,7 +206,7 @@ static void dicom_without_positions_is_ordered_by_number(void **state)
     assert_false(info.oriented);
 }
 
-/* Writes slices of these places, opens them, and gives the first report, if any. */
+/* Writes slices with these positions and opens them. Returns the reports, which may be empty. */
 static const char *report_of_positions(const char *const positions[NZ], const char *orientation,
                                        int expected_status)
 {
@@ -228,8 +228,8 @@ static const char *report_of_positions(const char *const positions[NZ], const ch
     return reported;
 }
 
-/* 0.25 aside is half a pixel. */
-static void dicom_slices_beside_their_line_are_refused(void **state)
+/* An offset of 0.25 to the side is half a pixel. */
+static void dicom_slices_off_their_line_are_refused(void **state)
 {
     (void)state;
     const char *const straight[NZ] = { "0\\0\\0", "0\\1\\2",  "0.2\\2\\4", "0\\3\\6",
@@ -254,8 +254,9 @@ static void dicom_slices_beside_their_line_are_refused(void **state)
                            "not at right angles"));
 }
 
-/* Their order along the patient is a guess, and so are left and right. */
-static void dicom_without_positions_says_nothing_of_the_patient(void **state)
+/* Without positions, the direction of the slices in the patient is unknown, and so are left and
+ * right. */
+static void dicom_without_positions_gives_no_orientation(void **state)
 {
     (void)state;
     for (int k = 0; k < NZ; k++) {
@@ -274,8 +275,8 @@ static void dicom_without_positions_says_nothing_of_the_patient(void **state)
     assert_true(info.oriented);
 }
 
-/* 12 bits of 16, signed, not at the bottom, with rubbish around them. */
-static void dicom_bits_are_taken_from_where_they_are(void **state)
+/* The value has 12 of 16 bits, signed, with unused bits below and above that are not zero. */
+static void dicom_values_are_taken_from_their_bits(void **state)
 {
     (void)state;
     const dicom d = { .type = TRIP_I16, .stored = 12, .shift = 2, .frames = "7" };
@@ -306,8 +307,8 @@ static void dicom_slices_rescaled_differently_become_floats(void **state)
     }
 }
 
-/* Frames are stored from the last place to the first, each with a slope of its own. */
-static void dicom_frames_are_rescaled_each_by_its_own_slope(void **state)
+/* The file stores frames from the last position to the first, each with a different slope. */
+static void each_dicom_frame_is_rescaled_by_its_slope(void **state)
 {
     (void)state;
     static const char *const slopes[NZ] = { "1", "2", "3", "4", "5", "6", "7" };
@@ -439,8 +440,9 @@ static void slices_too_large_for_the_memory_are_refused(void **state)
     trip_budget_destroy(budget);
 }
 
-/* A window of 1048576 x 1024 pixels in 1.3 kB: its lines are never to be held, 4 GB of them. */
-static void a_picture_that_promises_more_than_the_memory_is_refused(void **state)
+/* The file of 1.3 kB declares a window of 1048576 x 1024 pixels. The reader must not allocate its
+ * lines, 4 GB. */
+static void a_picture_that_declares_more_than_the_memory_is_refused(void **state)
 {
     (void)state;
     trip_budget *budget;
@@ -485,18 +487,18 @@ int main(void)
         cmocka_unit_test(pages_of_one_tiff_are_slices),
         cmocka_unit_test(a_pattern_gives_the_slices_by_number),
         cmocka_unit_test(a_folder_and_a_glob_are_read_in_natural_order),
-        cmocka_unit_test(halves_and_floats_come_from_exr),
+        cmocka_unit_test(exr_gives_halves_and_floats),
         cmocka_unit_test(grey_is_taken_from_channels),
-        cmocka_unit_test(a_tiff_with_depth_in_its_tiles_is_refused),
+        cmocka_unit_test(a_tiff_with_deep_tiles_is_refused),
         cmocka_unit_test(dicom_slices_are_ordered_and_placed_in_space),
-        cmocka_unit_test(a_dicom_slice_missing_between_others_is_refused_unless_allowed),
-        cmocka_unit_test(gaps_are_allowed_in_stacks_of_several_files_only),
+        cmocka_unit_test(a_missing_dicom_slice_is_refused_unless_gaps_are_allowed),
+        cmocka_unit_test(only_stacks_of_several_files_may_have_gaps),
         cmocka_unit_test(dicom_without_positions_is_ordered_by_number),
-        cmocka_unit_test(dicom_slices_beside_their_line_are_refused),
-        cmocka_unit_test(dicom_without_positions_says_nothing_of_the_patient),
-        cmocka_unit_test(dicom_bits_are_taken_from_where_they_are),
+        cmocka_unit_test(dicom_slices_off_their_line_are_refused),
+        cmocka_unit_test(dicom_without_positions_gives_no_orientation),
+        cmocka_unit_test(dicom_values_are_taken_from_their_bits),
         cmocka_unit_test(dicom_slices_rescaled_differently_become_floats),
-        cmocka_unit_test(dicom_frames_are_rescaled_each_by_its_own_slope),
+        cmocka_unit_test(each_dicom_frame_is_rescaled_by_its_slope),
         cmocka_unit_test(dicom_frames_rescaled_alike_keep_their_type),
         cmocka_unit_test(dicom_slices_that_do_not_belong_together_are_refused),
         cmocka_unit_test(slices_that_do_not_fit_or_are_missing_are_refused),
@@ -504,7 +506,7 @@ int main(void)
         cmocka_unit_test(truncated_slices_are_refused),
         cmocka_unit_test(corrupted_slices_do_no_harm),
         cmocka_unit_test(slices_too_large_for_the_memory_are_refused),
-        cmocka_unit_test(a_picture_that_promises_more_than_the_memory_is_refused),
+        cmocka_unit_test(a_picture_that_declares_more_than_the_memory_is_refused),
         cmocka_unit_test(a_stack_can_be_read_again),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -1,4 +1,4 @@
-/* Files of netCDF's classic forms, put together by hand. */
+/* Tests with hand-made files of netCDF's classic forms. */
 #include "netcdf_files.h"
 
 static void put(bytes *b, uint64_t x, unsigned width)
@@ -9,7 +9,7 @@ static void put(bytes *b, uint64_t x, unsigned width)
 typedef struct file {
     bytes b;
     int form;        /* 1, 2 or 5 */
-    size_t begin[4]; /* where the places of the variables' values stand */
+    size_t begin[4]; /* offset of the header field with the start of each variable's values */
 } file;
 
 static void put_count(file *f, uint64_t x)
@@ -45,16 +45,16 @@ static void put_unsigned_attribute(file *f)
     put_text(f, "true");
 }
 
-/* What a file has besides the sample volume (netcdf_files.h). */
+/* Contents of a file in addition to the sample volume t (netcdf_files.h). */
 typedef struct contents {
     int form;
-    bool records;     /* z has as many as there are records */
-    bool coordinates; /* of x and z (netcdf_files.h) */
-    bool scaled;      /* t stands for twice as much, and 3 */
-    bool lost;        /* for nothing as much, and 3 */
-    bool missing;     /* where t is 5, of no sign -7, it has no value */
-    bool is_unsigned; /* t and x, then a byte, have no sign */
-    int type;         /* of t: 1 int8, 3 int16, 5 float */
+    bool records;     /* z is the record dimension */
+    bool coordinates; /* x and z have coordinates */
+    bool scaled;      /* t has scale 2 and offset 3 */
+    bool lost;        /* the scale is 0 instead of 2 */
+    bool missing;     /* 5 means a missing value, -7 if unsigned */
+    bool is_unsigned; /* t is unsigned, and so is x, which then has one byte */
+    int type;         /* type of t: 1 int8, 3 int16, 5 float */
 } contents;
 
 static trip_scalar scalar_of(const contents *c)
@@ -78,7 +78,7 @@ static void end_variable(file *f, int number, int type, uint64_t vsize)
     put(&f->b, 0, f->form == 1 ? 4 : 8);
 }
 
-/* Writes where a variable's values begin, which is here. */
+/* Notes in the header that the values of a variable begin here. */
 static void begin_values(file *f, int number)
 {
     bytes position = { .count = 0 };
@@ -196,7 +196,7 @@ static void coordinates_become_positions(void **state)
     }
 }
 
-/* One row of bytes, a hole in the file, and the squares of 0, 1, 2 ... as its coordinates. */
+/* Writes one row of bytes as a hole in the file, with the coordinates 0, 1, 4, 9, ... */
 static const char *write_row(uint32_t voxels, uint32_t squares)
 {
     static const char *const names[] = { "z", "y", "x" };
@@ -234,7 +234,7 @@ static const char *write_row(uint32_t voxels, uint32_t squares)
     return path;
 }
 
-/* More than are read at once. */
+/* The reader does not read so many coordinates at once. */
 static void many_coordinates_become_positions(void **state)
 {
     (void)state;
@@ -265,7 +265,7 @@ static void an_interruption_ends_the_reading_of_coordinates(void **state)
     trip_scope_renew(trip_scope_current());
 }
 
-static void numbers_are_scaled_and_missing_ones_are_none(void **state)
+static void numbers_are_scaled_and_missing_ones_have_no_value(void **state)
 {
     (void)state;
     for (int n = 0; n < 4; n++) {
@@ -283,9 +283,9 @@ static void a_scale_that_loses_the_values_is_refused(void **state)
     assert_refused(write_contents("c.nc", &c), "cannot scale its values by");
 }
 
-/* Four records of 3 x 3 bytes, and of a byte of another variable, if there is one: each part is
- * then padded to 4 bytes. */
-static void records_are_padded_where_there_are_several_variables(void **state)
+/* Writes four records of 3 x 3 bytes, with or without a byte of a second variable. With two
+ * variables, each part is padded to 4 bytes. */
+static void records_of_several_variables_are_padded(void **state)
 {
     (void)state;
     enum { RECORDS = 4, EACH = 9 };
@@ -330,8 +330,8 @@ static void records_are_padded_where_there_are_several_variables(void **state)
     }
 }
 
-/* A volume at each of two times, of which there are as many as records; beside it a number each. */
-static void of_several_times_the_first_is_read(void **state)
+/* The record dimension is time. Each of two records has a volume and one number. */
+static void the_first_of_several_times_is_read(void **state)
 {
     (void)state;
     static const char *const names[] = { "time", "z", "lat", "x" };
@@ -365,8 +365,8 @@ static void of_several_times_the_first_is_read(void **state)
     assert_holds_sample(write_file("times.nc", &f.b), NULL, TRIP_I16);
 }
 
-/* netCDF's own, 0x7cf00000 as a float. */
-static void floats_that_were_never_written_are_none(void **state)
+/* netCDF's default fill value, 0x7cf00000 as a float. */
+static void floats_never_written_have_no_value(void **state)
 {
     (void)state;
     static const char *const names[] = { "z", "y", "x" };
@@ -392,8 +392,8 @@ static void floats_that_were_never_written_are_none(void **state)
     assert_true(values[0] == 7 && isnan(values[1]));
 }
 
-/* A name that is not padded to 4 bytes, and more dimensions than could be noted. */
-static void what_the_header_has_no_room_for_is_refused_where_it_is(void **state)
+/* Tries a name without padding to 4 bytes, and more dimensions than the reader can hold. */
+static void errors_give_the_byte_where_the_header_is_invalid(void **state)
 {
     (void)state;
     file f = { .form = 1 };
@@ -409,7 +409,7 @@ static void what_the_header_has_no_room_for_is_refused_where_it_is(void **state)
     assert_refused(write_file("many.nc", &f.b), "byte 24: the header is invalid");
 }
 
-static void what_is_said_to_have_no_sign_has_none(void **state)
+static void the_unsigned_attribute_applies(void **state)
 {
     (void)state;
     for (int n = 0; n < 8; n++) {
@@ -434,14 +434,14 @@ static void a_variable_is_chosen_by_name(void **state)
                       "is not numeric or has fewer than three dimensions");
 }
 
-/* 60,000 numbers, each a variable of its own. */
+/* Writes 60,000 variables of one number each. */
 static void a_header_takes_little_memory(void **state)
 {
     (void)state;
     enum { START = 32, EACH = 28, COUNT = 60000 };
     static unsigned char whole[START + EACH * COUNT];
     memcpy(whole, "CDF\1", 4);
-    whole[27] = 11; /* a list of variables */
+    whole[27] = 11; /* tag of a list of variables */
     whole[30] = COUNT >> 8;
     whole[31] = COUNT & 255;
     for (int i = 0; i < COUNT; i++) {
@@ -456,7 +456,7 @@ static void a_header_takes_little_memory(void **state)
     assert_refused(write_bytes("h.nc", whole, sizeof whole), "three dimensions");
 }
 
-static void any_damage_is_read_or_refused(void **state)
+static void damaged_files_are_read_or_refused(void **state)
 {
     (void)state;
     const contents c = { .form = 5, .records = true, .coordinates = true, .type = 3 };
@@ -467,7 +467,7 @@ static void any_damage_is_read_or_refused(void **state)
     fclose(f);
     for (size_t length = 0; length < count; length += length < 700 ? 7 : 31)
         refused += survives(write_bytes("g.nc", whole, length), NULL);
-    assert_true(refused > 80); /* but for what pads the end */
+    assert_true(refused > 80); /* only a cut within the padding at the end is no error */
     for (size_t at = 4; at < 600; at++)
         for (int n = 0; n < 2; n++) {
             memcpy(damaged, whole, count);
@@ -484,16 +484,16 @@ int main(void)
         cmocka_unit_test(many_coordinates_become_positions),
         cmocka_unit_test(too_many_coordinates_are_not_read),
         cmocka_unit_test(an_interruption_ends_the_reading_of_coordinates),
-        cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
+        cmocka_unit_test(numbers_are_scaled_and_missing_ones_have_no_value),
         cmocka_unit_test(a_scale_that_loses_the_values_is_refused),
-        cmocka_unit_test(records_are_padded_where_there_are_several_variables),
-        cmocka_unit_test(of_several_times_the_first_is_read),
-        cmocka_unit_test(floats_that_were_never_written_are_none),
-        cmocka_unit_test(what_the_header_has_no_room_for_is_refused_where_it_is),
-        cmocka_unit_test(what_is_said_to_have_no_sign_has_none),
+        cmocka_unit_test(records_of_several_variables_are_padded),
+        cmocka_unit_test(the_first_of_several_times_is_read),
+        cmocka_unit_test(floats_never_written_have_no_value),
+        cmocka_unit_test(errors_give_the_byte_where_the_header_is_invalid),
+        cmocka_unit_test(the_unsigned_attribute_applies),
         cmocka_unit_test(a_variable_is_chosen_by_name),
         cmocka_unit_test(a_header_takes_little_memory),
-        cmocka_unit_test(any_damage_is_read_or_refused),
+        cmocka_unit_test(damaged_files_are_read_or_refused),
     };
     return cmocka_run_group_tests_name("netcdf", tests, make_folder, remove_folder);
 }

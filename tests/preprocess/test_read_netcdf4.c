@@ -1,4 +1,4 @@
-/* Files of netCDF-4, written by libnetcdf. */
+/* Tests with netCDF-4 files that libnetcdf writes. */
 #include <errno.h>
 #include <netcdf.h>
 #include <sys/socket.h>
@@ -7,24 +7,24 @@
 #include "image_helper.h"
 #include "netcdf_files.h"
 
-/* By the number of a type of netCDF. */
+/* Indexed by netCDF type number. */
 static const trip_scalar scalar_of[] = {
     TRIP_U8,  TRIP_I8, TRIP_U8,  TRIP_I16, TRIP_I32, TRIP_F32,
     TRIP_F64, TRIP_U8, TRIP_U16, TRIP_U32, TRIP_I64, TRIP_U64
 };
 
-/* What a file has besides the sample volume (netcdf_files.h). */
+/* Contents of a file in addition to the sample volume t (netcdf_files.h). */
 typedef struct contents {
     int type;
     int endian;       /* NC_ENDIAN_... */
-    bool chunks;      /* of 3 x 3 x 3, packed */
-    bool records;     /* z has no end */
-    bool deeper;      /* a dimension of 2 before: t is at its first place */
-    bool inside;      /* t lies in the group "g" */
-    bool coordinates; /* of x and z (netcdf_files.h) */
-    bool scaled;      /* t stands for twice as much, and 3 */
-    bool missing;     /* where t is 5, of no sign -7, it has no value */
-    int no_sign;      /* 1: t and x, then a byte, have none; 2: as a string says */
+    bool chunks;      /* compressed chunks of 3 x 3 x 3 */
+    bool records;     /* z is unlimited */
+    bool deeper;      /* a dimension of size 2 comes first; its first index holds the sample */
+    bool inside;      /* t is in the group "g" */
+    bool coordinates; /* x and z have coordinates */
+    bool scaled;      /* t has scale 2 and offset 3 */
+    bool missing;     /* 5 means a missing value, -7 if unsigned */
+    int no_sign;      /* 1: t and x are unsigned by a text attribute, 2: by a string attribute */
 } contents;
 
 static void put_no_sign(int file, int variable, int no_sign)
@@ -120,7 +120,7 @@ static void coordinates_become_positions(void **state)
     }
 }
 
-static void numbers_are_scaled_and_missing_ones_are_none(void **state)
+static void numbers_are_scaled_and_missing_ones_have_no_value(void **state)
 {
     (void)state;
     for (int n = 0; n < 4; n++) {
@@ -131,7 +131,7 @@ static void numbers_are_scaled_and_missing_ones_are_none(void **state)
     }
 }
 
-static void what_is_said_to_have_no_sign_has_none(void **state)
+static void the_unsigned_attribute_applies(void **state)
 {
     (void)state;
     for (int n = 0; n < 8; n++) {
@@ -155,8 +155,8 @@ static void a_variable_is_chosen_by_name(void **state)
                       "not three dimensions");
 }
 
-/* One that starts like one, and one that ends early. */
-static void what_is_no_whole_file_is_refused(void **state)
+/* Tries a file with only the signature of HDF5, and a file cut in half. */
+static void truncated_files_are_refused(void **state)
 {
     (void)state;
     unsigned char whole[1 << 16];
@@ -169,8 +169,9 @@ static void what_is_no_whole_file_is_refused(void **state)
     assert_refused(write_bytes("f.nc", whole, count / 2), "libnetcdf reports");
 }
 
-/* The program lives on, whatever the library makes of it: it reads something, or says one line. */
-static void any_damage_is_read_or_refused(void **state)
+/* Damaged files never end the program, even if the library crashes. Reading succeeds or fails with
+ * one line. */
+static void damaged_files_are_read_or_refused(void **state)
 {
     (void)state;
     static unsigned char whole[1 << 16], damaged[1 << 16];
@@ -189,7 +190,7 @@ static void any_damage_is_read_or_refused(void **state)
     assert_in_range(refused, 5, 60);
 }
 
-/* What a helper answers: all at once, and no more after it. */
+/* The answer of the helper. It sends all of it at once, and nothing after it. */
 static struct {
     trip_image_reply reply;
     trip_image_netcdf about;
@@ -206,7 +207,7 @@ static int answer_at_once(int fd)
     return sent == (ssize_t)sizeof answer ? 0 : EIO;
 }
 
-/* A sound answer, changed by what `number` says. */
+/* Makes a sound answer and applies change `number` to it. */
 static void make_answer(int number)
 {
     trip_image_netcdf *v = &answer.about;
@@ -296,8 +297,8 @@ static void answers_of_the_helper_are_not_trusted(void **state)
     }
 }
 
-/* Where the memory is less than a chunk takes, or than slices do. */
-static void what_does_not_fit_is_refused(void **state)
+/* The memory is too small for a chunk, or for the slices. */
+static void chunks_and_slices_too_large_for_memory_are_refused(void **state)
 {
     (void)state;
     int file, dims[3], variable;
@@ -330,13 +331,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_type_holds_the_sample),
         cmocka_unit_test(coordinates_become_positions),
-        cmocka_unit_test(numbers_are_scaled_and_missing_ones_are_none),
-        cmocka_unit_test(what_is_said_to_have_no_sign_has_none),
+        cmocka_unit_test(numbers_are_scaled_and_missing_ones_have_no_value),
+        cmocka_unit_test(the_unsigned_attribute_applies),
         cmocka_unit_test(a_variable_is_chosen_by_name),
-        cmocka_unit_test(what_is_no_whole_file_is_refused),
-        cmocka_unit_test(any_damage_is_read_or_refused),
+        cmocka_unit_test(truncated_files_are_refused),
+        cmocka_unit_test(damaged_files_are_read_or_refused),
         cmocka_unit_test(answers_of_the_helper_are_not_trusted),
-        cmocka_unit_test(what_does_not_fit_is_refused),
+        cmocka_unit_test(chunks_and_slices_too_large_for_memory_are_refused),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

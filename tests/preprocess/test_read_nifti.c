@@ -1,6 +1,6 @@
 #include "volume_files.h"
 
-/* Headers are written by the offsets of the standard, not by a library's structures. */
+/* Values of a header. Writing uses the offsets of the standard, not the structures of a library. */
 typedef struct nifti {
     int version;
     bool big, pair;
@@ -10,8 +10,8 @@ typedef struct nifti {
     double slope, inter;
     int qform, sform;
     double quatern[3], offset[3], srow[3][4];
-    int datatype;      /* 0: that of `type` */
-    double vox_offset; /* 0: where the header ends */
+    int datatype;      /* 0 selects the datatype of `type` */
+    double vox_offset; /* 0 selects the end of the header */
 } nifti;
 
 static const int codes[TRIP_SCALARS] = { 2, 256, 512, 4, 768, 8, 1280, 1024, 0, 16, 64 };
@@ -183,12 +183,12 @@ static void pairs_keep_the_case_of_their_names(void **state)
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         write_file(names[i][1], &values);
         assert_holds_sample(write_file(names[i][0], &head), NULL, TRIP_U16);
-        if (strcmp(names[i][1], "MIXED.img")) /* whose header would be MIXED.hdr */
+        if (strcmp(names[i][1], "MIXED.img")) /* the reader would look for MIXED.hdr */
             assert_holds_sample(path_of(names[i][1]), NULL, TRIP_U16);
     }
 }
 
-static void extensions_before_the_values_are_passed_over(void **state)
+static void extensions_before_the_values_are_skipped(void **state)
 {
     (void)state;
     nifti n = sample_header(1, TRIP_U8, false);
@@ -215,7 +215,7 @@ static void slope_and_inter_scale_the_values(void **state)
     }
 }
 
-static void a_slope_of_zero_or_nan_means_none(void **state)
+static void a_slope_of_zero_or_nan_disables_scaling(void **state)
 {
     (void)state;
     nifti n = sample_header(1, TRIP_I16, false);
@@ -231,7 +231,7 @@ static void the_sform_is_preferred(void **state)
     for (int form = 0; form < 4; form++) {
         nifti n = sample_header(1 + form / 2, TRIP_U8, form % 2);
         n.qform = n.sform = 1;
-        n.quatern[0] = 1; /* half a turn about x: not to be seen */
+        n.quatern[0] = 1; /* half a turn about x, which the reader must ignore */
         const double rows[3][4] = { { -2, 0.25, 0, 90 },
                                     { 0, 3, 0.5, -126 },
                                     { 0.125, 0, 4, -72 } };
@@ -242,7 +242,7 @@ static void the_sform_is_preferred(void **state)
     }
 }
 
-/* A quarter turn about z takes i to y and j to -x: (b, c, d) = (0, 0, sin 45 degrees). */
+/* A quarter turn about z maps i to y and j to -x: (b, c, d) = (0, 0, sin 45 degrees). */
 static void the_qform_turns_and_scales(void **state)
 {
     (void)state;
@@ -255,13 +255,13 @@ static void the_qform_turns_and_scales(void **state)
     assert_map(&info.index_to_world,
                (const double[3][4]){ { 0, -3, 0, 5 }, { 2, 0, 0, 6 }, { 0, 0, 4, 7 } });
     assert_string_equal(info.space, "RAS");
-    n.pixdim[0] = -1; /* qfac: the third axis the other way */
+    n.pixdim[0] = -1; /* qfac of -1 reverses the third axis */
     info = info_of(&n);
     assert_map(&info.index_to_world,
                (const double[3][4]){ { 0, -3, 0, 5 }, { 2, 0, 0, 6 }, { 0, 0, -4, 7 } });
 }
 
-static void without_forms_the_voxel_sizes_count(void **state)
+static void voxel_sizes_apply_without_forms(void **state)
 {
     (void)state;
     nifti n = sample_header(1, TRIP_U8, false);
@@ -273,7 +273,7 @@ static void without_forms_the_voxel_sizes_count(void **state)
     assert_false(info.oriented);
 }
 
-static void a_singular_sform_gives_way_with_a_warning(void **state)
+static void a_singular_sform_is_ignored_with_a_warning(void **state)
 {
     (void)state;
     nifti n = sample_header(1, TRIP_U8, false);
@@ -288,7 +288,7 @@ static void a_singular_sform_gives_way_with_a_warning(void **state)
     assert_string_equal(info.space, "");
 }
 
-static void of_several_volumes_the_first_is_read_with_a_warning(void **state)
+static void the_first_of_several_volumes_is_read_with_a_warning(void **state)
 {
     (void)state;
     nifti n = sample_header(1, TRIP_U8, false);
@@ -316,7 +316,7 @@ static void axes_of_size_one_are_dropped(void **state)
     assert_holds_sample(write_nifti("seven.nii", &n), NULL, TRIP_U8);
 }
 
-static void types_that_are_no_scalars_are_refused(void **state)
+static void non_scalar_types_are_refused(void **state)
 {
     (void)state;
     static const int wrong[] = { 1, 32, 128, 1536, 1792, 2048, 2304, 0x7fff, 3 };
@@ -349,7 +349,7 @@ static void hostile_headers_are_refused(void **state)
             assert_refused(write_nifti("offset.nii", &n), "vox_offset");
         }
         n = sample_header(version, TRIP_U8, false);
-        n.vox_offset = version == 1 ? 351 : 543; /* within what says whether there are extensions */
+        n.vox_offset = version == 1 ? 351 : 543; /* inside the extension flag */
         assert_refused(write_nifti("offset.nii", &n), "vox_offset");
         n = sample_header(version, TRIP_U8, false);
         n.vox_offset = 1e9;
@@ -369,7 +369,7 @@ static void hostile_headers_are_refused(void **state)
     assert_holds_sample(write_nifti("inter.nii", &n), NULL, TRIP_U8);
 }
 
-static void what_is_no_header_is_refused(void **state)
+static void invalid_headers_are_refused(void **state)
 {
     (void)state;
     nifti n = sample_header(1, TRIP_U8, false);
@@ -377,7 +377,7 @@ static void what_is_no_header_is_refused(void **state)
     put(&b, 0, 349, 4, false);
     assert_refused(write_file("size.nii", &b), "not a NIfTI");
     b = nifti_bytes(&n);
-    memset(b.data + 344, 0, 4); /* as in ANALYZE 7.5, whose orientation is anyone's guess */
+    memset(b.data + 344, 0, 4); /* as in ANALYZE 7.5, which gives no reliable orientation */
     assert_refused(write_file("analyze.nii", &b), "not a NIfTI");
     n = sample_header(2, TRIP_U8, false);
     b = nifti_bytes(&n);
@@ -385,7 +385,7 @@ static void what_is_no_header_is_refused(void **state)
     assert_refused(write_file("text.nii", &b), "in text mode");
 }
 
-static void a_file_cut_anywhere_is_refused(void **state)
+static void a_file_truncated_anywhere_is_refused(void **state)
 {
     (void)state;
     for (int form = 0; form < 4; form++) {
@@ -399,7 +399,7 @@ static void a_file_cut_anywhere_is_refused(void **state)
     }
 }
 
-static void any_byte_of_the_header_may_be_wrong(void **state)
+static void a_wrong_byte_of_the_header_does_no_harm(void **state)
 {
     (void)state;
     for (int version = 1; version <= 2; version++) {
@@ -422,20 +422,20 @@ int main(void)
         cmocka_unit_test(gzipped_files_are_read),
         cmocka_unit_test(pairs_are_read_by_either_name),
         cmocka_unit_test(pairs_keep_the_case_of_their_names),
-        cmocka_unit_test(extensions_before_the_values_are_passed_over),
+        cmocka_unit_test(extensions_before_the_values_are_skipped),
         cmocka_unit_test(slope_and_inter_scale_the_values),
-        cmocka_unit_test(a_slope_of_zero_or_nan_means_none),
+        cmocka_unit_test(a_slope_of_zero_or_nan_disables_scaling),
         cmocka_unit_test(the_sform_is_preferred),
         cmocka_unit_test(the_qform_turns_and_scales),
-        cmocka_unit_test(without_forms_the_voxel_sizes_count),
-        cmocka_unit_test(a_singular_sform_gives_way_with_a_warning),
-        cmocka_unit_test(of_several_volumes_the_first_is_read_with_a_warning),
+        cmocka_unit_test(voxel_sizes_apply_without_forms),
+        cmocka_unit_test(a_singular_sform_is_ignored_with_a_warning),
+        cmocka_unit_test(the_first_of_several_volumes_is_read_with_a_warning),
         cmocka_unit_test(axes_of_size_one_are_dropped),
-        cmocka_unit_test(types_that_are_no_scalars_are_refused),
+        cmocka_unit_test(non_scalar_types_are_refused),
         cmocka_unit_test(hostile_headers_are_refused),
-        cmocka_unit_test(what_is_no_header_is_refused),
-        cmocka_unit_test(a_file_cut_anywhere_is_refused),
-        cmocka_unit_test(any_byte_of_the_header_may_be_wrong),
+        cmocka_unit_test(invalid_headers_are_refused),
+        cmocka_unit_test(a_file_truncated_anywhere_is_refused),
+        cmocka_unit_test(a_wrong_byte_of_the_header_does_no_harm),
     };
     return cmocka_run_group_tests_name("read_nifti", tests, make_folder, remove_folder);
 }

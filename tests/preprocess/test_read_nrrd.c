@@ -86,7 +86,7 @@ static void lines_may_end_in_carriage_returns(void **state)
         NULL, TRIP_U16);
 }
 
-static void fields_come_in_any_order_and_keys_are_passed_over(void **state)
+static void fields_may_have_any_order_and_keys_are_skipped(void **state)
 {
     (void)state;
     assert_holds_sample(
@@ -97,7 +97,7 @@ static void fields_come_in_any_order_and_keys_are_passed_over(void **state)
         NULL, TRIP_U16);
 }
 
-static void a_detached_header_finds_its_data_beside_it(void **state)
+static void a_detached_header_finds_data_in_its_folder(void **state)
 {
     (void)state;
     static const char *const names[] = { "data file: detached.raw", "datafile: ./detached.raw" };
@@ -137,7 +137,7 @@ static void write_parts(const char *stem, int width, int first, int step, int co
     }
 }
 
-static void many_data_files_follow_one_another(void **state)
+static void many_data_files_are_concatenated(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -153,7 +153,7 @@ static void many_data_files_follow_one_another(void **state)
     assert_holds_sample(write_file("two.nhdr", &b), NULL, TRIP_U16);
 }
 
-static void many_data_files_are_read_again_from_the_first_and_all_there_at_opening(void **state)
+static void many_data_files_must_exist_and_can_be_read_again(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -184,7 +184,7 @@ static void many_data_files_are_read_again_from_the_first_and_all_there_at_openi
     trip_budget_destroy(budget);
 }
 
-static void a_pattern_counts_its_files(void **state)
+static void a_pattern_numbers_its_files(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -219,7 +219,7 @@ static void lines_and_bytes_are_skipped(void **state)
 }
 
 /* Tries files without an end, pipes without a writer, and long files without lines. */
-static void looking_for_lines_ends(void **state)
+static void the_search_for_lines_ends(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -236,7 +236,7 @@ static void looking_for_lines_ends(void **state)
     assert_interrupted(path_of("lines.nhdr"), NULL);
 }
 
-static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
+static void a_byte_skip_of_minus_one_reads_the_end_of_the_file(void **state)
 {
     (void)state;
     bytes data = { .count = 0 }, b = { .count = 0 };
@@ -248,7 +248,7 @@ static void a_byte_skip_of_minus_one_takes_the_end_of_the_file(void **state)
 }
 
 /* The error line suggests --spacing only if --spacing supplies the missing lengths. */
-static void lengths_that_are_none_can_be_given(void **state)
+static void invalid_lengths_can_be_replaced_by_spacing(void **state)
 {
     (void)state;
     static const struct {
@@ -279,7 +279,7 @@ static void lengths_that_are_none_can_be_given(void **state)
 }
 
 /* If the file is cut off, neither the header nor lines to skip are read as values. */
-static void a_byte_skip_of_minus_one_stays_behind_the_header(void **state)
+static void a_byte_skip_of_minus_one_never_reads_the_header(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -335,7 +335,7 @@ static void axes_of_size_one_are_dropped(void **state)
     assert_map(&a, (const double[3][4]){ { 4, 0, 0, 0 }, { 0, 5, 0, 0 }, { 0, 0, 6, 0 } });
 }
 
-static void what_is_no_scalar_volume_is_refused(void **state)
+static void vectors_and_other_non_scalar_data_are_refused(void **state)
 {
     (void)state;
     assert_refused(write_with_header("rgb.nrrd",
@@ -372,7 +372,7 @@ static void a_locale_with_decimal_commas_changes_nothing(void **state)
     assert_map(&c, (const double[3][4]){ { 2, 0, 0, 0.5 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } });
 }
 
-static void wrong_fields_are_refused_with_their_line(void **state)
+static void wrong_fields_are_refused_with_line_number(void **state)
 {
     (void)state;
     static const struct {
@@ -464,7 +464,7 @@ static void wrong_headers_are_refused(void **state)
         assert_refused(write_with_header("wrong.nrrd", wrong[i].header), wrong[i].report);
 }
 
-static void an_unknown_field_is_warned_of(void **state)
+static void an_unknown_field_causes_a_warning(void **state)
 {
     (void)state;
     float values[VOXELS];
@@ -477,7 +477,7 @@ static void an_unknown_field_is_warned_of(void **state)
 }
 
 /* Expects the sum and the single values that NumPy reads. */
-static void the_included_tooth_is_read_as_by_others(void **state)
+static void the_included_tooth_has_the_values_of_numpy(void **state)
 {
     (void)state;
     const size_t count = 103 * 94 * 161;
@@ -510,7 +510,7 @@ static void a_header_without_end_is_refused(void **state)
     free(text);
 }
 
-static void a_file_cut_anywhere_is_refused(void **state)
+static void a_file_truncated_anywhere_is_refused(void **state)
 {
     (void)state;
     for (int compressed = 0; compressed < 2; compressed++) {
@@ -526,7 +526,7 @@ static void a_file_cut_anywhere_is_refused(void **state)
     }
 }
 
-static void any_byte_of_the_header_may_be_wrong(void **state)
+static void a_wrong_byte_of_the_header_does_no_harm(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -542,7 +542,7 @@ static void any_byte_of_the_header_may_be_wrong(void **state)
 }
 
 /* Tries all spellings that the format lists. */
-static void the_space_says_how_the_world_lies_in_the_patient(void **state)
+static void the_space_gives_the_orientation(void **state)
 {
     (void)state;
     static const char *const lines[][5] = {
@@ -569,7 +569,7 @@ static void the_space_says_how_the_world_lies_in_the_patient(void **state)
     assert_true(info.oriented);
 }
 
-static void an_unknown_space_is_warned_of(void **state)
+static void an_unknown_space_causes_a_warning(void **state)
 {
     (void)state;
     static const char *const names[] = { "left-of-here",
@@ -613,7 +613,7 @@ static void left_handed_spaces_are_turned_right_handed(void **state)
                (const double[3][4]){ { -2, 0, 0, -1 }, { 0, 4 / 3.0, 0, 1 }, { 0, 0, 1, 0 } });
 }
 
-static void vectors_with_time_give_their_place_in_space(void **state)
+static void vectors_with_time_give_their_spatial_part(void **state)
 {
     (void)state;
     static const char *const names[] = { "right-anterior-superior-time", "RAST",
@@ -642,7 +642,7 @@ static void vectors_with_time_give_their_place_in_space(void **state)
                    "line 9: \"space origin\" must be \"(x,y,z)\"");
 }
 
-static void coordinates_of_axes_are_a_key_and_value(void **state)
+static void axis_coordinates_are_a_key_and_value(void **state)
 {
     (void)state;
     trip_budget *budget;
@@ -695,34 +695,34 @@ int main(void)
         cmocka_unit_test(every_type_is_read_in_both_byte_orders),
         cmocka_unit_test(compressed_values_are_read),
         cmocka_unit_test(lines_may_end_in_carriage_returns),
-        cmocka_unit_test(fields_come_in_any_order_and_keys_are_passed_over),
-        cmocka_unit_test(a_detached_header_finds_its_data_beside_it),
+        cmocka_unit_test(fields_may_have_any_order_and_keys_are_skipped),
+        cmocka_unit_test(a_detached_header_finds_data_in_its_folder),
         cmocka_unit_test(detached_data_may_be_compressed),
-        cmocka_unit_test(many_data_files_follow_one_another),
-        cmocka_unit_test(many_data_files_are_read_again_from_the_first_and_all_there_at_opening),
-        cmocka_unit_test(a_pattern_counts_its_files),
+        cmocka_unit_test(many_data_files_are_concatenated),
+        cmocka_unit_test(many_data_files_must_exist_and_can_be_read_again),
+        cmocka_unit_test(a_pattern_numbers_its_files),
         cmocka_unit_test(lines_and_bytes_are_skipped),
-        cmocka_unit_test(looking_for_lines_ends),
-        cmocka_unit_test(a_byte_skip_of_minus_one_takes_the_end_of_the_file),
-        cmocka_unit_test(lengths_that_are_none_can_be_given),
-        cmocka_unit_test(a_byte_skip_of_minus_one_stays_behind_the_header),
+        cmocka_unit_test(the_search_for_lines_ends),
+        cmocka_unit_test(a_byte_skip_of_minus_one_reads_the_end_of_the_file),
+        cmocka_unit_test(invalid_lengths_can_be_replaced_by_spacing),
+        cmocka_unit_test(a_byte_skip_of_minus_one_never_reads_the_header),
         cmocka_unit_test(spacings_and_directions_become_the_map),
-        cmocka_unit_test(the_space_says_how_the_world_lies_in_the_patient),
-        cmocka_unit_test(an_unknown_space_is_warned_of),
+        cmocka_unit_test(the_space_gives_the_orientation),
+        cmocka_unit_test(an_unknown_space_causes_a_warning),
         cmocka_unit_test(left_handed_spaces_are_turned_right_handed),
-        cmocka_unit_test(vectors_with_time_give_their_place_in_space),
-        cmocka_unit_test(coordinates_of_axes_are_a_key_and_value),
+        cmocka_unit_test(vectors_with_time_give_their_spatial_part),
+        cmocka_unit_test(axis_coordinates_are_a_key_and_value),
         cmocka_unit_test(the_measurement_frame_changes_nothing),
         cmocka_unit_test(axes_of_size_one_are_dropped),
-        cmocka_unit_test(what_is_no_scalar_volume_is_refused),
+        cmocka_unit_test(vectors_and_other_non_scalar_data_are_refused),
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
-        cmocka_unit_test(wrong_fields_are_refused_with_their_line),
+        cmocka_unit_test(wrong_fields_are_refused_with_line_number),
         cmocka_unit_test(wrong_headers_are_refused),
-        cmocka_unit_test(an_unknown_field_is_warned_of),
-        cmocka_unit_test(the_included_tooth_is_read_as_by_others),
+        cmocka_unit_test(an_unknown_field_causes_a_warning),
+        cmocka_unit_test(the_included_tooth_has_the_values_of_numpy),
         cmocka_unit_test(a_header_without_end_is_refused),
-        cmocka_unit_test(a_file_cut_anywhere_is_refused),
-        cmocka_unit_test(any_byte_of_the_header_may_be_wrong),
+        cmocka_unit_test(a_file_truncated_anywhere_is_refused),
+        cmocka_unit_test(a_wrong_byte_of_the_header_does_no_harm),
     };
     return cmocka_run_group_tests_name("read_nrrd", tests, make_folder, remove_folder);
 }

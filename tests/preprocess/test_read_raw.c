@@ -22,7 +22,7 @@ static void every_type_is_read_in_both_byte_orders(void **state)
         }
 }
 
-static void size_and_type_make_any_file_name_raw(void **state)
+static void any_file_name_is_raw_if_size_and_type_are_given(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -68,7 +68,7 @@ static void open_scivis_names_carry_size_and_type(void **state)
     assert_holds_sample(write_file("some-name_5x4x7_int16.raw.gz", &gz), &little, TRIP_I16);
 }
 
-static void options_win_over_the_name(void **state)
+static void options_override_the_name(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -91,7 +91,7 @@ static void spacing_becomes_the_map(void **state)
                (const double[3][4]){ { 0.5, 0, 0, 0 }, { 0, 2, 0, 0 }, { 0, 0, 3, 0 } });
 }
 
-static void without_size_the_options_are_named(void **state)
+static void an_error_without_size_names_the_options(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -103,7 +103,7 @@ static void without_size_the_options_are_named(void **state)
     assert_refused(write_file("unknown.xyz", &b), "--size X,Y,Z");
 }
 
-static void a_header_beside_it_is_pointed_at(void **state)
+static void an_error_points_at_a_header_in_the_folder(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -112,7 +112,7 @@ static void a_header_beside_it_is_pointed_at(void **state)
     assert_refused_as(TRIP_USAGE, write_file("beside.raw", &b), NULL, "beside.nhdr instead");
 }
 
-static void a_file_too_short_is_refused_before_reading(void **state)
+static void a_short_file_is_refused_before_reading(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -123,7 +123,7 @@ static void a_file_too_short_is_refused_before_reading(void **state)
     assert_refused_as(TRIP_ERROR, write_bytes("short.raw", b.data, 0), &sample_size, "is empty");
 }
 
-static void a_file_too_long_is_read_with_a_warning(void **state)
+static void a_long_file_is_read_with_a_warning(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -179,16 +179,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_type_is_read_in_both_byte_orders),
-        cmocka_unit_test(size_and_type_make_any_file_name_raw),
+        cmocka_unit_test(any_file_name_is_raw_if_size_and_type_are_given),
         cmocka_unit_test(compressed_raw_is_read),
         cmocka_unit_test(the_offset_counts_decompressed_bytes),
         cmocka_unit_test(open_scivis_names_carry_size_and_type),
-        cmocka_unit_test(options_win_over_the_name),
+        cmocka_unit_test(options_override_the_name),
         cmocka_unit_test(spacing_becomes_the_map),
-        cmocka_unit_test(without_size_the_options_are_named),
-        cmocka_unit_test(a_header_beside_it_is_pointed_at),
-        cmocka_unit_test(a_file_too_short_is_refused_before_reading),
-        cmocka_unit_test(a_file_too_long_is_read_with_a_warning),
+        cmocka_unit_test(an_error_without_size_names_the_options),
+        cmocka_unit_test(an_error_points_at_a_header_in_the_folder),
+        cmocka_unit_test(a_short_file_is_refused_before_reading),
+        cmocka_unit_test(a_long_file_is_read_with_a_warning),
         cmocka_unit_test(impossible_sizes_are_refused),
         cmocka_unit_test(a_wrong_type_or_offset_is_refused),
     };

@@ -44,7 +44,7 @@ void keep_line(const char *line, void *)
     last_line = line;
 }
 
-/* Reports are kept from here on instead of printed. */
+/* Catches reports from here on. */
 void expect_line()
 {
     lines = 0;
@@ -60,7 +60,7 @@ void assert_one_line(const char *part)
         fail_msg("\"%s\" is not in: %s", part, last_line.c_str());
 }
 
-/* A file that goes with the object. */
+/* A file that the destructor removes. */
 struct File {
     File() : path("test_read_vdb-" + std::to_string(getpid()) + ".vdb")
     {
@@ -85,7 +85,7 @@ struct File {
     std::string path;
 };
 
-/* A volume opened through the reader, with a budget of its own. */
+/* A volume that the reader opened with a separate budget. */
 struct Volume {
     explicit Volume(const File &file, const trip_volume_params &params = {},
                     uint64_t memory = 1 << 28)
@@ -115,7 +115,7 @@ struct Volume {
     int status;
 };
 
-/* A portion with one voxel around it. */
+/* A decoded portion with a border of one voxel. */
 struct Decoded {
     Decoded(const Volume &v, const trip_volume_portion &portion)
     {
@@ -135,9 +135,9 @@ struct Decoded {
 
 using Expected = std::function<void(const Coord &at, float &value, bool &active)>;
 
-/* Every voxel of every portion and of its border is as expected at its coordinates, which are those
- * of the volume's first voxel plus `first`. Returns how many voxels exist; none may be in two
- * portions, and portions come in order. */
+/* Compares every voxel of every portion and border with `expected`, at the grid coordinates of the
+ * voxel. `first` is the grid position of the volume's first voxel. Checks that portions come in
+ * order and share no voxel. Returns the number of active voxels. */
 size_t check_voxels(const Volume &v, const Coord &first, const Expected &expected)
 {
     size_t existing = 0;
@@ -166,13 +166,14 @@ size_t check_voxels(const Volume &v, const Coord &first, const Expected &expecte
     return existing;
 }
 
-/* One voxel of the background is around those that exist. */
+/* Returns the first voxel of the volume, which has a border of one background voxel around the
+ * active voxels. */
 template <typename GridT> Coord first_of(const GridT &grid)
 {
     return grid.evalActiveVoxelBoundingBox().min() - Coord(1, 1, 1);
 }
 
-/* As the library itself sees the grid; inactive voxels hold the background. */
+/* Expects the values that the library returns. Inactive voxels have the background value. */
 template <typename GridT> Expected as_in(const GridT &grid)
 {
     return [&grid](const Coord &at, float &value, bool &active) {
@@ -181,7 +182,8 @@ template <typename GridT> Expected as_in(const GridT &grid)
     };
 }
 
-/* Voxels in several leaves and nodes, also at negative coordinates, and a leaf-sized tile. */
+/* Fills voxels in several leaves and nodes, also at negative coordinates, and a tile of the size of
+ * a leaf. */
 template <typename GridT> void fill_scattered(GridT &grid)
 {
     std::mt19937 random(7);
@@ -209,7 +211,7 @@ template <typename GridT> void check_type(trip_scalar type, bool half_stored = f
     CoordBBox box = grid->evalActiveVoxelBoundingBox();
     for (int a = 0; a < 3; a++)
         assert_int_equal(v.info.dims[a], box.dim()[a] + 2);
-    /* All values used here are exact as half floats. */
+    /* Half floats represent all values of this test exactly. */
     assert_int_equal(check_voxels(v, first_of(*grid), as_in(*grid)), grid->activeVoxelCount());
 }
 
@@ -290,8 +292,8 @@ void every_compression_is_read(void **)
     }
 }
 
-/* Tiles of 8, 128 and 4096 voxels a side: counted and looked at in a few portions, not all of the
- * 4096-voxel one. */
+/* Uses tiles of 8, 128 and 4096 voxels a side. Counts the portions of all tiles but decodes only a
+ * few. */
 void active_tiles_of_any_level_become_boxes(void **)
 {
     openvdb::initialize();
@@ -318,7 +320,8 @@ void active_tiles_of_any_level_become_boxes(void **)
     }
 }
 
-/* The first existing voxel of the volume is at (1, 1, 1), wherever the file has it. */
+/* The first active voxel is at (1, 1, 1) of the volume, whatever its coordinates in the file are.
+ */
 void rotation_shear_and_offset_reach_world_space(void **)
 {
     openvdb::initialize();
@@ -388,7 +391,7 @@ openvdb::FloatGrid::Ptr fog_voxel(const char *name, float value)
     return grid;
 }
 
-/* Files of smoke and fire hold several grids, in any order. */
+/* Files of smoke and fire contain several grids in any order. */
 void density_comes_before_other_fog_and_fog_before_other_scalars(void **)
 {
     File named({ fog_voxel("flame", 1), fog_voxel("temperature", 2), one_voxel("density", 3) });
@@ -401,7 +404,7 @@ void density_comes_before_other_fog_and_fog_before_other_scalars(void **)
     assert_true(only_value(Volume(twice)) == 2);
 }
 
-void a_choice_among_grids_is_said(void **)
+void the_note_names_the_chosen_grid(void **)
 {
     File file({ fog_voxel("flame", 1), one_voxel("density", 3), one_voxel("heat", 3) });
     Volume v(file);
@@ -414,7 +417,7 @@ void a_choice_among_grids_is_said(void **)
     assert_string_equal(Volume(alone).info.note, "");
 }
 
-void grids_that_share_a_tree_have_their_own_transforms(void **)
+void grids_that_share_a_tree_have_separate_transforms(void **)
 {
     openvdb::FloatGrid::Ptr a = one_voxel("a", 4);
     openvdb::FloatGrid::Ptr b = a->copy();
@@ -428,7 +431,7 @@ void grids_that_share_a_tree_have_their_own_transforms(void **)
     assert_true(only_value(v) == 4 && v.info.index_to_world.m[1][1] == 0.25);
 }
 
-void a_file_written_as_a_stream_gives_its_first_grid(void **)
+void a_streamed_file_gives_its_first_grid(void **)
 {
     openvdb::FloatGrid::Ptr grid = one_voxel("first", 6);
     File file;
@@ -443,7 +446,7 @@ void a_file_written_as_a_stream_gives_its_first_grid(void **)
     assert_one_line("perhaps more");
 }
 
-/* Distance to a sphere of radius 20 voxels of 0.1. */
+/* Returns the distance to a sphere with a radius of 20 voxels. Voxels are 0.1 wide. */
 openvdb::FloatGrid::Ptr sphere()
 {
     openvdb::initialize();
@@ -453,7 +456,7 @@ openvdb::FloatGrid::Ptr sphere()
     return grid;
 }
 
-void level_set_options_are_for_level_sets(void **)
+void level_set_options_need_level_sets(void **)
 {
     File fog({ fog_voxel("fog", 1) });
     trip_volume_params params = {};
@@ -463,7 +466,7 @@ void level_set_options_are_for_level_sets(void **)
     assert_one_line("does not apply");
 }
 
-void a_level_set_is_filled_by_default_and_says_so(void **)
+void a_level_set_is_filled_by_default_with_a_note(void **)
 {
     File file({ sphere() });
     Volume by_default(file);
@@ -479,8 +482,9 @@ void a_level_set_is_filled_by_default_and_says_so(void **)
     assert_string_equal(filled.info.note, "");
 }
 
-/* Inside 1, outside 0, a ramp of four voxels' width between; the interior has no active voxels in
- * the file. The densities' sum is the mean volume of balls of radius 20 - 2 to 20 + 2. */
+/* The density is 1 inside and 0 outside, with a ramp four voxels wide between. The file has no
+ * active voxels in the interior. The sum of densities is the mean volume of balls of radius 20 - 2
+ * to 20 + 2. */
 void a_filled_level_set_is_a_ball(void **)
 {
     openvdb::FloatGrid::Ptr grid = sphere();
@@ -505,11 +509,12 @@ void a_filled_level_set_is_a_ball(void **)
         for (float value : values)
             sum += value;
     }
-    const double mean_cube = 20.0 * 20 * 20 + 20 * 2 * 2; /* of r^3, r from 18 to 22 */
+    const double mean_cube = 20.0 * 20 * 20 + 20 * 2 * 2; /* mean of r^3 for r from 18 to 22 */
     assert_true(std::fabs(sum / (4 / 3.0 * M_PI * mean_cube) - 1) < 0.001);
 }
 
-/* 1 at the surface, falling to 0 at the edges of the band, which is 3 voxels wide on each side. */
+/* The density is 1 at the surface and falls to 0 at the edges of the band, 3 voxels away on each
+ * side. */
 void a_band_is_one_at_the_surface(void **)
 {
     openvdb::FloatGrid::Ptr grid = sphere();
@@ -528,7 +533,7 @@ void a_band_is_one_at_the_surface(void **)
     assert_int_equal(count, grid->activeVoxelCount());
 }
 
-void what_cannot_be_drawn_is_refused(void **)
+void grids_that_cannot_be_drawn_are_refused(void **)
 {
     openvdb::FloatGrid::Ptr frustum = one_voxel("camera", 1);
     frustum->setTransform(openvdb::math::Transform::createFrustumTransform(
@@ -550,7 +555,7 @@ void what_cannot_be_drawn_is_refused(void **)
     assert_one_line("contains no grid");
 }
 
-void memory_that_does_not_suffice_is_refused_first(void **)
+void insufficient_memory_is_refused_first(void **)
 {
     openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
     fill_scattered(*grid);
@@ -589,7 +594,8 @@ void many_threads_decode_at_once(void **)
     assert_true(serial == parallel);
 }
 
-/* Opens and decodes all; the number of lines is 0 for success, else 1 for each failure. */
+/* Opens the file and decodes up to 100 portions. Expects one line for each failure and no other
+ * line. */
 void read_whatever_it_is(const File &file)
 {
     expect_line();
@@ -619,7 +625,7 @@ std::string small_file(uint32_t compression)
     return file.bytes();
 }
 
-/* Both read the file, and look for an interruption before each piece. */
+/* Opening and decoding both read the file, and check for an interruption before each piece. */
 void an_interruption_ends_opening_and_decoding(void **)
 {
     openvdb::initialize();
@@ -656,7 +662,8 @@ void a_truncated_file_is_refused(void **)
     }
 }
 
-/* Bytes, and sizes of eight and four bytes, that are wrong: a line or a picture, never a crash. */
+/* Writes wrong single bytes, and wrong sizes of eight and four bytes. Reading must succeed or fail
+ * with a line. */
 void a_corrupted_file_does_no_harm(void **)
 {
     namespace io = openvdb::io;
@@ -693,15 +700,15 @@ int main()
         cmocka_unit_test(rotation_shear_and_offset_reach_world_space),
         cmocka_unit_test(a_grid_is_chosen_by_name_or_is_the_first_scalar_one),
         cmocka_unit_test(density_comes_before_other_fog_and_fog_before_other_scalars),
-        cmocka_unit_test(a_choice_among_grids_is_said),
-        cmocka_unit_test(grids_that_share_a_tree_have_their_own_transforms),
-        cmocka_unit_test(a_file_written_as_a_stream_gives_its_first_grid),
-        cmocka_unit_test(level_set_options_are_for_level_sets),
-        cmocka_unit_test(a_level_set_is_filled_by_default_and_says_so),
+        cmocka_unit_test(the_note_names_the_chosen_grid),
+        cmocka_unit_test(grids_that_share_a_tree_have_separate_transforms),
+        cmocka_unit_test(a_streamed_file_gives_its_first_grid),
+        cmocka_unit_test(level_set_options_need_level_sets),
+        cmocka_unit_test(a_level_set_is_filled_by_default_with_a_note),
         cmocka_unit_test(a_filled_level_set_is_a_ball),
         cmocka_unit_test(a_band_is_one_at_the_surface),
-        cmocka_unit_test(what_cannot_be_drawn_is_refused),
-        cmocka_unit_test(memory_that_does_not_suffice_is_refused_first),
+        cmocka_unit_test(grids_that_cannot_be_drawn_are_refused),
+        cmocka_unit_test(insufficient_memory_is_refused_first),
         cmocka_unit_test(many_threads_decode_at_once),
         cmocka_unit_test(an_interruption_ends_opening_and_decoding),
         cmocka_unit_test(a_truncated_file_is_refused),

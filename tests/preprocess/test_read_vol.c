@@ -47,7 +47,7 @@ static bytes unversioned(bool big, int depth, char end)
     return b;
 }
 
-static void without_a_version_the_sizes_come_twice(void **state)
+static void a_header_without_a_version_repeats_the_sizes(void **state)
 {
     (void)state;
     for (int big = 0; big < 2; big++) {
@@ -118,7 +118,7 @@ static void a_header_without_end_is_refused(void **state)
     assert_refused(write_file("line.vol", &b), "line 1");
 }
 
-static void a_file_cut_anywhere_is_refused(void **state)
+static void a_file_truncated_anywhere_is_refused(void **state)
 {
     (void)state;
     char text[512];
@@ -162,11 +162,11 @@ int main(void)
         cmocka_unit_test(version_3_is_a_zlib_stream),
         cmocka_unit_test(version_2_is_plain),
         cmocka_unit_test(lines_may_end_in_carriage_returns),
-        cmocka_unit_test(without_a_version_the_sizes_come_twice),
+        cmocka_unit_test(a_header_without_a_version_repeats_the_sizes),
         cmocka_unit_test(voxels_of_several_bytes_are_refused),
         cmocka_unit_test(wrong_headers_are_refused),
         cmocka_unit_test(a_header_without_end_is_refused),
-        cmocka_unit_test(a_file_cut_anywhere_is_refused),
+        cmocka_unit_test(a_file_truncated_anywhere_is_refused),
         cmocka_unit_test(flipped_bits_never_change_the_values_silently),
     };
     return cmocka_run_group_tests_name("read_vol", tests, make_folder, remove_folder);

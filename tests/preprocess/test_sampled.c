@@ -89,7 +89,7 @@ static void slices_are_sampled_along_each_axis(void **state)
     unlink("v.raw");
 }
 
-static void slices_are_skipped_by_samples(void **state)
+static void sampling_skips_slices(void **state)
 {
     (void)state;
     const trip_volume_params params = { .raw_dims = { 23, 17, 13 },
@@ -178,7 +178,7 @@ static const trip_volume_reader boxes_reader = {
     .release = release_box,
 };
 
-static void portions_have_their_samples_and_what_is_beside_them(void **state)
+static void portions_have_their_samples_and_neighbours(void **state)
 {
     (void)state;
     for (int64_t step = 2; step <= 7; step++) {
@@ -227,8 +227,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(slices_are_sampled_along_each_axis),
-        cmocka_unit_test(slices_are_skipped_by_samples),
-        cmocka_unit_test(portions_have_their_samples_and_what_is_beside_them),
+        cmocka_unit_test(sampling_skips_slices),
+        cmocka_unit_test(portions_have_their_samples_and_neighbours),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

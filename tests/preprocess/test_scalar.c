@@ -2,7 +2,7 @@
 
 #include "volume_reader.h"
 
-static void every_type_is_known_by_its_own_name(void **state)
+static void every_type_has_a_name(void **state)
 {
     (void)state;
     for (int t = 0; t < TRIP_SCALARS; t++)
@@ -85,7 +85,7 @@ static void every_half_decodes_to_its_value(void **state)
     }
 }
 
-static void bits_without_a_sign_stand_for_more(void **state)
+static void unsigned_interpretation_changes_negative_values(void **state)
 {
     (void)state;
     static const trip_scalar types[][2] = { { TRIP_I8, TRIP_U8 },   { TRIP_I16, TRIP_U16 },
@@ -126,12 +126,12 @@ static void non_finite_values_pass_through(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_type_is_known_by_its_own_name),
+        cmocka_unit_test(every_type_has_a_name),
         cmocka_unit_test(common_aliases_are_known),
         cmocka_unit_test(every_type_decodes_in_both_byte_orders),
         cmocka_unit_test(extremes_of_the_integers_survive),
         cmocka_unit_test(every_half_decodes_to_its_value),
-        cmocka_unit_test(bits_without_a_sign_stand_for_more),
+        cmocka_unit_test(unsigned_interpretation_changes_negative_values),
         cmocka_unit_test(scaling_is_rounded_once),
         cmocka_unit_test(non_finite_values_pass_through),
     };

@@ -10,7 +10,7 @@ static void tally_row(trip_tally *t, const float *values, const uint8_t *active,
     trip_tally_count(t, values, active, count);
 }
 
-static void integers_are_binned_like_one_by_one(void **state)
+static void integers_are_binned_as_if_counted_one_by_one(void **state)
 {
     (void)state;
     static trip_tally t;
@@ -42,7 +42,7 @@ static void integers_are_binned_like_one_by_one(void **state)
     assert_memory_equal(h.counts, expected, sizeof expected);
 }
 
-static void order_and_sharing_out_make_no_difference(void **state)
+static void order_and_distribution_do_not_change_the_tally(void **state)
 {
     (void)state;
     enum { VALUES = 4096, ROW = 64 };
@@ -69,7 +69,7 @@ static void order_and_sharing_out_make_no_difference(void **state)
     assert_int_equal(sum.voxels, VALUES);
 }
 
-static void what_is_not_finite_or_not_there_is_left_out(void **state)
+static void non_finite_and_inactive_voxels_are_left_out(void **state)
 {
     (void)state;
     static trip_tally t;
@@ -105,7 +105,7 @@ static void zero_has_no_sign(void **state)
     } while (0)
 
 /* The values 1 to 4 cover 12289 bins of width 2^-12, from bin 4096 to bin 16384. */
-static void tallies_that_no_scan_makes_are_refused(void **state)
+static void impossible_tallies_are_refused(void **state)
 {
     (void)state;
     static trip_tally sound, t;
@@ -124,7 +124,7 @@ static void tallies_that_no_scan_makes_are_refused(void **state)
     REFUSE(t.counts[1]++);
     REFUSE((t.counts[0] = UINT64_MAX, t.counts[1] = 2));
     REFUSE((t.counts[0] = 0, t.counts[12289] = 1)); /* a count above the maximum 4 */
-    REFUSE(t.first--);                              /* the bin of the minimum 1 is then empty */
+    REFUSE(t.first--);                              /* the first bin lies below the minimum 1 */
     REFUSE(
         (memset(t.counts, 0, sizeof t.counts), t.counts[0] = 4, t.exponent = -11, t.first = 2048));
     REFUSE(t.exponent = -150);
@@ -143,7 +143,7 @@ static void tallies_that_no_scan_makes_are_refused(void **state)
     REFUSE(t.value_max = 6);
 }
 
-static void one_value_alone_makes_one_bin(void **state)
+static void a_single_value_makes_one_bin(void **state)
 {
     (void)state;
     static trip_tally t;
@@ -193,7 +193,7 @@ static int scan_raw(trip_tally *t, const char *type, int64_t nx, int64_t ny, int
     return status;
 }
 
-static void a_volume_is_seen_whole_by_any_number_of_threads(void **state)
+static void any_number_of_threads_scans_the_whole_volume(void **state)
 {
     (void)state;
     enum { NX = 70, NY = 65, NZ = 20, N = NX * NY * NZ };
@@ -235,14 +235,14 @@ static void a_volume_without_a_finite_value_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(integers_are_binned_like_one_by_one),
-        cmocka_unit_test(order_and_sharing_out_make_no_difference),
-        cmocka_unit_test(what_is_not_finite_or_not_there_is_left_out),
+        cmocka_unit_test(integers_are_binned_as_if_counted_one_by_one),
+        cmocka_unit_test(order_and_distribution_do_not_change_the_tally),
+        cmocka_unit_test(non_finite_and_inactive_voxels_are_left_out),
         cmocka_unit_test(zero_has_no_sign),
-        cmocka_unit_test(tallies_that_no_scan_makes_are_refused),
-        cmocka_unit_test(one_value_alone_makes_one_bin),
+        cmocka_unit_test(impossible_tallies_are_refused),
+        cmocka_unit_test(a_single_value_makes_one_bin),
         cmocka_unit_test(the_extremes_of_float_are_counted),
-        cmocka_unit_test_setup_teardown(a_volume_is_seen_whole_by_any_number_of_threads, test_begin,
+        cmocka_unit_test_setup_teardown(any_number_of_threads_scans_the_whole_volume, test_begin,
                                         test_end),
         cmocka_unit_test_setup_teardown(a_volume_without_a_finite_value_is_refused, test_begin,
                                         test_end),

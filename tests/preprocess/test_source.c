@@ -66,7 +66,7 @@ static void a_detached_header_refers_to_its_data_files(void **state)
     assert_files("attached.nrrd", "attached.nrrd ");
 }
 
-static void a_pair_is_two_files_by_either_name(void **state)
+static void either_name_of_a_pair_gives_both_files(void **state)
 {
     (void)state;
     write_file("p.hdr", "x");
@@ -77,7 +77,7 @@ static void a_pair_is_two_files_by_either_name(void **state)
     assert_files("single.nii", "single.nii ");
 }
 
-static void a_folder_or_pattern_is_all_its_files(void **state)
+static void a_folder_or_pattern_gives_all_its_files(void **state)
 {
     (void)state;
     mkdir("s", 0777);
@@ -104,7 +104,7 @@ static trip_digest content_of(const char *path, const char *text)
     return d;
 }
 
-static void content_tells_volumes_apart_and_names_only_where_they_are_read(void **state)
+static void the_digest_covers_content_and_only_names_that_are_read(void **state)
 {
     (void)state;
     write_file("a.nii", "same");
@@ -124,7 +124,7 @@ static void content_tells_volumes_apart_and_names_only_where_they_are_read(void 
 
 /* Programs cannot set the time of the last status change (ctime). A file is unchanged as long as
  * its ctime is. */
-static void a_change_shows_in_the_state_even_when_size_and_time_are_set_back(void **state)
+static void a_change_shows_in_the_state_despite_equal_size_and_time(void **state)
 {
     (void)state;
     static const trip_volume_params defaults;
@@ -174,10 +174,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_detached_header_refers_to_its_data_files),
-        cmocka_unit_test(a_pair_is_two_files_by_either_name),
-        cmocka_unit_test(a_folder_or_pattern_is_all_its_files),
-        cmocka_unit_test(content_tells_volumes_apart_and_names_only_where_they_are_read),
-        cmocka_unit_test(a_change_shows_in_the_state_even_when_size_and_time_are_set_back),
+        cmocka_unit_test(either_name_of_a_pair_gives_both_files),
+        cmocka_unit_test(a_folder_or_pattern_gives_all_its_files),
+        cmocka_unit_test(the_digest_covers_content_and_only_names_that_are_read),
+        cmocka_unit_test(a_change_shows_in_the_state_despite_equal_size_and_time),
         cmocka_unit_test(a_file_that_shrinks_while_it_is_read_is_reported),
     };
     return cmocka_run_group_tests(tests, enter_folder, leave_folder);

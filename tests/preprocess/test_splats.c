@@ -7,20 +7,20 @@
 #include "run_builder.h"
 #include "splats.h"
 
-/* A volume of floats as a raw file, opened, with a splatter whose pieces are put together again
- * into the splats of each list. */
+/* An open raw volume of floats with a splatter. gather() joins the splatter's pieces to the splats
+ * of each list. */
 typedef struct bench {
     int64_t dims[3];
     trip_budget *budget;
     trip_workers *workers;
     trip_volume *volume;
-    trip_volume_info info; /* the map may be changed before start() */
+    trip_volume_info info; /* tests may change the map before start() */
     trip_splatter *splatter;
     trip_piece_format format;
     trip_quantiser quantiser;
-    unsigned char *memory[TRIP_MAX_LISTS]; /* pieces, one after the other */
+    unsigned char *memory[TRIP_MAX_LISTS]; /* contiguous pieces */
     size_t used[TRIP_MAX_LISTS];
-    int refusal; /* the status with which pieces are refused; 0: they are kept */
+    int refusal; /* status that refuses pieces; 0 keeps them */
 } bench;
 
 enum { PIECE_MEMORY = 16 << 20 };
@@ -101,8 +101,8 @@ static void close_bench(bench *b)
         free(b->memory[list]);
 }
 
-/* The splats of a list by voxel: records, 0xff... where there is none. Those of a halo have no
- * normals. */
+/* Gathers the splats of a list by voxel. Voxels without a splat have all bits set. Lists of the
+ * halo have no normals. */
 static void gather(bench *b, unsigned list, uint32_t *voxels, uint32_t *normals)
 {
     trip_run_builder *builder;
@@ -141,7 +141,7 @@ static void gather(bench *b, unsigned list, uint32_t *voxels, uint32_t *normals)
     trip_run_builder_destroy(builder);
 }
 
-static void every_kept_voxel_is_once_in_every_list(void **state)
+static void every_list_has_each_kept_voxel_once(void **state)
 {
     (void)state;
     enum { NX = 131, NY = 70, NZ = 37, N = NX * NY * NZ };
@@ -175,7 +175,7 @@ static void every_kept_voxel_is_once_in_every_list(void **state)
     trip_envelope_destroy(&e);
 }
 
-/* Whether voxel i of the grid has a neighbour, or is itself, in [lo, hi]. */
+/* Returns whether voxel i or one of its neighbours has a value in [lo, hi]. */
 static bool is_near(const float *values, const int64_t dims[3], int64_t i, float lo, float hi)
 {
     int64_t at[3] = { i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1] };
@@ -211,8 +211,8 @@ static void check_halo(bench *b, const float *values, float lo, float hi)
     free(normals);
 }
 
-/* Few voxels are kept, at random, some at the borders of boxes; some values are not finite. */
-static void the_halo_is_what_is_around_kept_voxels(void **state)
+/* Keeps a few random voxels, some of them at the borders of boxes. Some values are not finite. */
+static void the_halo_is_the_neighbours_of_kept_voxels(void **state)
 {
     (void)state;
     enum { NX = 131, NY = 70, NZ = 37, N = NX * NY * NZ };
@@ -241,7 +241,7 @@ static void the_halo_is_what_is_around_kept_voxels(void **state)
         }
 }
 
-static void without_a_border_of_what_is_kept_there_is_no_halo(void **state)
+static void volumes_without_a_border_of_kept_voxels_have_no_halo(void **state)
 {
     (void)state;
     enum { N = 20 };
@@ -263,7 +263,7 @@ static void without_a_border_of_what_is_kept_there_is_no_halo(void **state)
     }
 }
 
-static void the_status_with_which_a_piece_is_refused_ends_the_run(void **state)
+static void the_status_that_refuses_a_piece_ends_the_run(void **state)
 {
     (void)state;
     static const float values[8] = { 1, 2, 3, 4, 5, 6, 7, 8 };
@@ -282,14 +282,15 @@ static const trip_affine sheared = {
     { { 0.8, -0.3, 0.1, 5 }, { 0.5, 1.1, -0.2, -7 }, { 0.05, 0.4, 2.5, 11 } }
 };
 
-/* Errors that a normal record may have. */
+/* Fails if a normal record is further from `expected` than its format allows. */
 static void check_normal(const bench *b, uint32_t normal, trip_vec3 expected)
 {
     double g[3];
     double full = b->quantiser.gradient_full, length = trip_length(expected);
     trip_normal_unpack(normal, full, g);
     trip_vec3 got = { g[0], g[1], g[2] };
-    /* Below `full` by half of sqrt(5) / 4 of 2 / 511; beyond, the root by half of 1/32. */
+    /* Below `full` the error is at most half of sqrt(5) / 4 times 2 / 511. Above, the error of the
+     * length's square root is at most half of 1/32. */
     double roots = fabs(sqrt(trip_length(got) / full) - sqrt(length / full)) * 32;
     double sine = trip_length(trip_cross(got, expected)) / (trip_length(got) * length);
     bool bad = length < full * 0.999 ? trip_length(trip_sub(got, expected)) > 0.00111 * full
@@ -299,7 +300,7 @@ static void check_normal(const bench *b, uint32_t normal, trip_vec3 expected)
                  expected.z);
 }
 
-/* Of voxels `inside` or more from the border. */
+/* Checks the gradients of the voxels that are at least `inside` voxels from the border. */
 static void check_gradients(bool quantised, double bend, int inside)
 {
     enum { NX = 20, NY = 17, NZ = 18, N = NX * NY * NZ };
@@ -342,7 +343,7 @@ static void gradients_of_a_linear_field_are_right_up_to_the_border_in_a_sheared_
 }
 
 /* Central differences are exact for quadratic fields, too. */
-static void gradients_of_a_quadratic_field_are_right_in_a_sheared_space(void **state)
+static void gradients_of_a_quadratic_field_are_right_under_shear(void **state)
 {
     (void)state;
     check_gradients(true, 1, 1);
@@ -369,7 +370,7 @@ static void differences_at_a_border_are_one_sided(void **state)
     trip_envelope_destroy(&e);
 }
 
-static void differences_are_taken_to_the_neighbour_that_is_finite(void **state)
+static void differences_use_the_finite_neighbour(void **state)
 {
     (void)state;
     enum { N = 5 };
@@ -384,7 +385,7 @@ static void differences_are_taken_to_the_neighbour_that_is_finite(void **state)
     splat_all(&b, &e, 1);
     gather(&b, 2, voxels, normals);
     check_normal(&b, normals[1], trip_v3(0, 4, 0));
-    assert_int_equal(normals[3], 0); /* neither neighbour is finite: no gradient */
+    assert_int_equal(normals[3], 0); /* no gradient, because neither neighbour is finite */
     assert_int_equal(normals[2], UINT32_MAX);
     trip_splatter_tally(b.splatter, &tally);
     assert_int_equal(tally.voxels, N);
@@ -396,23 +397,21 @@ static void differences_are_taken_to_the_neighbour_that_is_finite(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(every_kept_voxel_is_once_in_every_list, test_begin,
+        cmocka_unit_test_setup_teardown(every_list_has_each_kept_voxel_once, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(the_status_that_refuses_a_piece_ends_the_run, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(the_status_with_which_a_piece_is_refused_ends_the_run,
-                                        test_begin, test_end),
-        cmocka_unit_test_setup_teardown(the_halo_is_what_is_around_kept_voxels, test_begin,
+        cmocka_unit_test_setup_teardown(the_halo_is_the_neighbours_of_kept_voxels, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(without_a_border_of_what_is_kept_there_is_no_halo,
+        cmocka_unit_test_setup_teardown(volumes_without_a_border_of_kept_voxels_have_no_halo,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(
             gradients_of_a_linear_field_are_right_up_to_the_border_in_a_sheared_space, test_begin,
             test_end),
-        cmocka_unit_test_setup_teardown(gradients_of_a_quadratic_field_are_right_in_a_sheared_space,
+        cmocka_unit_test_setup_teardown(gradients_of_a_quadratic_field_are_right_under_shear,
                                         test_begin, test_end),
         cmocka_unit_test_setup_teardown(differences_at_a_border_are_one_sided, test_begin,
                                         test_end),
-        cmocka_unit_test_setup_teardown(differences_are_taken_to_the_neighbour_that_is_finite,
-                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(differences_use_the_finite_neighbour, test_begin, test_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

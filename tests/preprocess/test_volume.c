@@ -200,7 +200,7 @@ static void portions_may_be_decoded_and_released_by_other_threads(void **state)
     trip_volume_close(v);
 }
 
-static void rewinding_starts_again_even_in_mid_volume(void **state)
+static void rewinding_restarts_even_in_mid_volume(void **state)
 {
     (void)state;
     trip_volume *v = open_sample(TRIP_I16, NULL);
@@ -217,7 +217,7 @@ static void rewinding_starts_again_even_in_mid_volume(void **state)
     trip_volume_close(v);
 }
 
-static void slabs_come_out_of_the_budget_and_can_be_refused(void **state)
+static void the_budget_counts_slabs_and_can_refuse_them(void **state)
 {
     (void)state;
     trip_volume *v;
@@ -274,7 +274,7 @@ static void spacing_replaces_lengths_and_keeps_directions(void **state)
 
 /* The files give no orientation. The option says x up, y left and z back, which are +z, +x and +y
  * of LPS. Each axis keeps its spacing. */
-static void axes_turn_files_that_lie_along_their_own(void **state)
+static void axes_orient_files_without_orientation(void **state)
 {
     (void)state;
     const char head[] = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 7\nencoding: raw\n";
@@ -317,7 +317,7 @@ static void options_of_another_format_are_wrong_usage(void **state)
     }
 }
 
-static void what_cannot_be_opened_is_named(void **state)
+static void errors_name_the_file_that_cannot_be_opened(void **state)
 {
     (void)state;
     assert_refused(path_of("missing.nrrd"), "missing.nrrd: cannot open: No such file");
@@ -327,7 +327,7 @@ static void what_cannot_be_opened_is_named(void **state)
 }
 
 /* The system denies root nothing, so the test needs another user. */
-static void a_file_without_permission_is_named(void **state)
+static void errors_name_a_file_without_permission(void **state)
 {
     (void)state;
     const char *path = write_bytes("secret.nrrd", "NRRD0004\n", 9);
@@ -338,7 +338,7 @@ static void a_file_without_permission_is_named(void **state)
     assert_int_equal(seteuid(user), 0);
 }
 
-static void voxels_too_long_or_short_to_be_drawn_are_refused(void **state)
+static void voxels_too_long_or_short_to_draw_are_refused(void **state)
 {
     (void)state;
     bytes b = { .count = 0 };
@@ -368,18 +368,18 @@ int main(void)
                                         end_budget),
         cmocka_unit_test_setup_teardown(portions_may_be_decoded_and_released_by_other_threads,
                                         make_budget, end_budget),
-        cmocka_unit_test_setup_teardown(rewinding_starts_again_even_in_mid_volume, make_budget,
+        cmocka_unit_test_setup_teardown(rewinding_restarts_even_in_mid_volume, make_budget,
                                         end_budget),
-        cmocka_unit_test_setup_teardown(slabs_come_out_of_the_budget_and_can_be_refused,
-                                        make_budget, end_budget),
+        cmocka_unit_test_setup_teardown(the_budget_counts_slabs_and_can_refuse_them, make_budget,
+                                        end_budget),
         cmocka_unit_test_setup_teardown(a_read_that_fails_in_mid_volume_stays_failed, make_budget,
                                         end_budget),
         cmocka_unit_test(spacing_replaces_lengths_and_keeps_directions),
-        cmocka_unit_test(axes_turn_files_that_lie_along_their_own),
-        cmocka_unit_test(voxels_too_long_or_short_to_be_drawn_are_refused),
+        cmocka_unit_test(axes_orient_files_without_orientation),
+        cmocka_unit_test(voxels_too_long_or_short_to_draw_are_refused),
         cmocka_unit_test(options_of_another_format_are_wrong_usage),
-        cmocka_unit_test(what_cannot_be_opened_is_named),
-        cmocka_unit_test(a_file_without_permission_is_named),
+        cmocka_unit_test(errors_name_the_file_that_cannot_be_opened),
+        cmocka_unit_test(errors_name_a_file_without_permission),
     };
     return cmocka_run_group_tests_name("volume", tests, make_folder, remove_folder);
 }

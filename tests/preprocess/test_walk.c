@@ -6,13 +6,13 @@
 
 enum { NX = 70, NY = 66, NZ = 50, N = NX * NY * NZ };
 
-/* What a walk met: how often each voxel, and that its value was right. */
+/* Counts how often a walk met each voxel, and notes wrong values. */
 typedef struct seen {
     uint8_t times[N];
-    uint64_t done, batches, voxels; /* as last reported */
+    uint64_t done, batches, voxels; /* the last progress report */
     int64_t edge, height;
     bool wrong;
-    int stop_after; /* slices; 0: never */
+    int stop_after; /* slices; 0 disables it */
 } seen;
 
 static uint8_t value_at(size_t i)
@@ -52,7 +52,7 @@ static int see_box(void *user, unsigned thread, const trip_box *box)
         for (int64_t j = 0; j < box->size[1]; j++)
             for (int64_t i = 0; i < box->size[0]; i++, n++) {
                 int64_t at = ((box->lo[2] + k) * NY + box->lo[1] + j) * NX + box->lo[0] + i;
-                s->times[at]++; /* boxes do not overlap, or the sanitizer would find it */
+                s->times[at]++; /* boxes do not overlap, else the sanitizer reports a race */
                 s->wrong = s->wrong || values[n] != value_at((size_t)at);
             }
     return 0;
@@ -91,7 +91,7 @@ static int walk_volume(const char *name, trip_walk_params p, seen *s)
     return status;
 }
 
-static void every_voxel_is_met_once(void **state)
+static void every_voxel_is_visited_once(void **state)
 {
     (void)state;
     make_volume(false);
@@ -111,7 +111,8 @@ static void every_voxel_is_met_once(void **state)
         }
 }
 
-/* After `skip` slices, each stride-th portion of `slices` is looked at. */
+/* Checks that the walk skips `skip` slices, then visits every stride-th portion of `slices` slices.
+ */
 static void check_passing(const char *name)
 {
     static const struct {
@@ -139,7 +140,7 @@ static void check_passing(const char *name)
     }
 }
 
-static void portions_can_be_passed_over(void **state)
+static void portions_can_be_skipped(void **state)
 {
     (void)state;
     make_volume(false);
@@ -167,8 +168,8 @@ static void a_batch_may_end_the_walk(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(every_voxel_is_met_once, test_begin, test_end),
-        cmocka_unit_test_setup_teardown(portions_can_be_passed_over, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(every_voxel_is_visited_once, test_begin, test_end),
+        cmocka_unit_test_setup_teardown(portions_can_be_skipped, test_begin, test_end),
         cmocka_unit_test_setup_teardown(compressed_portions_can_be_skipped, test_begin, test_end),
         cmocka_unit_test_setup_teardown(a_batch_may_end_the_walk, test_begin, test_end),
     };

@@ -49,7 +49,7 @@ static void every_item_is_done_once(void **state)
     }
 }
 
-static void a_failure_stops_the_loop_and_is_told(void **state)
+static void a_failure_stops_the_loop_and_is_returned(void **state)
 {
     (void)state;
     static work w = { .threads = 1, .failing = 100 };
@@ -66,7 +66,7 @@ static void a_failure_stops_the_loop_and_is_told(void **state)
     trip_workers_destroy(pool);
 }
 
-static void a_loop_of_nothing_is_over_at_once(void **state)
+static void an_empty_loop_ends_at_once(void **state)
 {
     (void)state;
     trip_workers *pool;
@@ -88,7 +88,7 @@ static int wait_for_flag(void *user, unsigned thread, uint64_t item)
     return 0;
 }
 
-static void waiting_may_be_cut_short(void **state)
+static void waiting_can_be_interrupted(void **state)
 {
     (void)state;
     trip_workers *pool;
@@ -150,7 +150,7 @@ static int fail_late_with_the_report(void *user, unsigned thread, uint64_t item)
     return trip_fail(-4, "write", "here", "no space left");
 }
 
-static void a_report_that_comes_after_a_failure_without_one_is_kept(void **state)
+static void a_report_after_a_failure_without_report_is_kept(void **state)
 {
     (void)state;
     trip_workers *pool;
@@ -182,11 +182,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_item_is_done_once),
-        cmocka_unit_test(a_failure_stops_the_loop_and_is_told),
-        cmocka_unit_test(a_loop_of_nothing_is_over_at_once),
-        cmocka_unit_test(waiting_may_be_cut_short),
+        cmocka_unit_test(a_failure_stops_the_loop_and_is_returned),
+        cmocka_unit_test(an_empty_loop_ends_at_once),
+        cmocka_unit_test(waiting_can_be_interrupted),
         cmocka_unit_test(a_failure_of_several_threads_at_once_is_reported_once),
-        cmocka_unit_test(a_report_that_comes_after_a_failure_without_one_is_kept),
+        cmocka_unit_test(a_report_after_a_failure_without_report_is_kept),
         cmocka_unit_test(a_signal_to_stop_ends_a_loop_with_one_report),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

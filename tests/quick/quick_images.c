@@ -1,10 +1,8 @@
-/* Stands in for triptych-images where tests draw hundreds of small pictures only to read their
- * pixels: it starts in a hundredth of the time, since it loads none of the libraries. OpenEXR files
- * of float RGBA are written here, in chunks that are not packed; for any other request
- * triptych-images takes the place of this process before a byte of it is taken from the connection.
- * That triptych-images itself writes what it should is for the tests that read pictures of every
- * format and depth (test_image_file, test_formats). Pictures that hold what is no number are
- * refused. */
+/* Stands in for triptych-images in tests that draw hundreds of small pictures to read their pixels.
+ * It loads no libraries, so that it starts in a hundredth of the time. It writes OpenEXR files of
+ * float RGBA in uncompressed chunks. For any other request, triptych-images replaces this process,
+ * before any byte of the request is taken from the connection. test_image_file and test_formats
+ * test triptych-images itself. Refuses pictures with values that are not finite. */
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
@@ -22,7 +20,7 @@
 
 enum { CONNECTION = TRIP_IMAGE_HELPER_FD, CHANNELS = 4, CHUNK_ROWS = 16, ZIP = 3 };
 
-/* The other end is gone, or its request cannot be met: nothing is left to do. */
+/* Ends the process, because the other end is gone or its request cannot be met. */
 static void give_up(void)
 {
     _exit(1);
@@ -38,14 +36,14 @@ static void receive(void *data, size_t bytes, int flags)
     }
 }
 
-/* Where the next look at what has come begins; -1: looks are over. */
+/* Sets the offset at which the next MSG_PEEK begins. -1 ends peeking. */
 static void set_look(int offset)
 {
     if (setsockopt(CONNECTION, SOL_SOCKET, SO_PEEK_OFF, &offset, sizeof offset) != 0)
         give_up();
 }
 
-/* The next request without taking it from the connection. */
+/* Peeks at the next request. Returns whether this process can answer it. */
 static bool is_ours(void)
 {
     char byte, path[PATH_MAX];
@@ -64,7 +62,7 @@ static bool is_ours(void)
     return r.task == TRIP_IMAGE_WRITE && exr && floats && r.numbers[3] == TRIP_IMAGE_FORM_RGBA;
 }
 
-/* The descriptor that comes with a request. */
+/* Takes the file descriptor that comes with a request. */
 static int take_descriptor(void)
 {
     union {
@@ -82,7 +80,7 @@ static int take_descriptor(void)
     return fd;
 }
 
-/* What is written next, in memory of its own. */
+/* The bytes of the file, in memory. */
 typedef struct output {
     unsigned char *data;
     size_t bytes;
@@ -108,13 +106,13 @@ static void put_attribute(output *o, const char *name, const char *type, const v
     put(o, value, (size_t)bytes);
 }
 
-/* The file's head, up to the table of where its chunks are. */
+/* Puts the header of the file, up to the table of chunk offsets. */
 static void put_head(output *o, int width, int height)
 {
     unsigned char channels[CHANNELS * 18 + 1] = { 0 };
     const int32_t box[4] = { 0, 0, width - 1, height - 1 };
     const float one = 1, centre[2] = { 0, 0 };
-    for (int c = 0; c < CHANNELS; c++) { /* a name, float, linear, every pixel across and down */
+    for (int c = 0; c < CHANNELS; c++) { /* name, float, linear, every pixel in both directions */
         const int32_t fields[4] = { 2, 0, 1, 1 };
         channels[18 * c] = (unsigned char)"ABGR"[c];
         memcpy(channels + 18 * c + 2, fields, sizeof fields);
@@ -132,14 +130,15 @@ static void put_head(output *o, int width, int height)
     put(o, "", 1);
 }
 
-/* The sRGB transfer function (IEC 61966-2-1), inverted; negative numbers mirror positive ones. */
+/* Inverts the sRGB transfer function (IEC 61966-2-1). Negative numbers mirror positive ones. */
 static float linear_of_display(float v)
 {
     double x = fabs((double)v);
     return (float)copysign(x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4), (double)v);
 }
 
-/* A row of premultiplied display values, as channels of linear light one after the other. */
+/* Converts a row of premultiplied display values to channels of linear light, one after the other.
+ */
 static void put_row(output *o, int width, const float *rgba)
 {
     for (int c = CHANNELS - 1; c >= 0; c--)
@@ -151,7 +150,7 @@ static void put_row(output *o, int width, const float *rgba)
         }
 }
 
-/* One that is as long as it can be is taken as it is, whatever the compression. */
+/* Puts a chunk. Readers take a chunk of full length as uncompressed, for every compression. */
 static void put_block(output *o, int y, int rows, int width, float *rgba)
 {
     size_t row_bytes = (size_t)width * CHANNELS * sizeof *rgba;

@@ -1,5 +1,5 @@
-/* A scene of three layers, and all that one frame of it is drawn from, for tests that take its
- * steps themselves. */
+/* A scene of three layers and all objects needed to draw one frame of it. Tests that draw a frame
+ * step by step use it. */
 #ifndef DESK_H
 #define DESK_H
 
@@ -8,7 +8,7 @@
 
 enum { SIZE = 40, PIXELS = SIZE * SIZE };
 
-/* Everything that a frame is drawn from. */
+/* All objects needed to draw one frame. */
 typedef struct desk {
     const scene *scene;
     trip_settings settings;
@@ -25,7 +25,7 @@ static inline void make_scene(scene *s)
     scene_colour(s, 0, 65535, 1, 0.8, 0.6, 0.02);
 }
 
-/* All three layers have weight in this view. */
+/* Returns a view in which all three layers have weight. */
 static inline trip_camera_params view_of(const scene *s)
 {
     return scene_view(s, trip_v3(1, 1.2, 0.9), 60, 40, SIZE);

@@ -33,12 +33,12 @@ trip_settings scene_with_shadows(trip_vec3 to_light)
 
 enum { PARTS_MAX = 4 };
 
-/* What is written into a data set, and how. */
+/* The contents of a data set while it is written. */
 typedef struct writing {
     trip_writer *writer;
     trip_writer_params params;
-    trip_compact_normals compact; /* where normals have 3 bytes */
-    scene_part parts[PARTS_MAX];  /* the first are the voxels of level 0 */
+    trip_compact_normals compact; /* used for 3-byte normals */
+    scene_part parts[PARTS_MAX];  /* the first part holds the voxels of level 0 */
     trip_writer_list lists[3 * PARTS_MAX];
 } writing;
 
@@ -102,7 +102,7 @@ static void set_params(writing *w, const scene_params *p)
         return;
     }
     double voxel = cbrt(fabs(trip_affine_determinant(&params->index_to_world)));
-    params->codes.gradient_full = TRIP_GRADIENT_FULL / voxel; /* values go from 0 to 1 */
+    params->codes.gradient_full = TRIP_GRADIENT_FULL / voxel; /* values range from 0 to 1 */
     trip_compact_normals_choose(&params->index_to_world, params->codes.gradient_full, 0,
                                 params->codes.gradient_step);
     w->compact = trip_compact_normals_make(&params->index_to_world, params->codes.gradient_full,
@@ -118,7 +118,7 @@ static uint32_t pack_normal(const writing *w, const double gradient[3])
     return trip_compact_normal_pack(&w->compact, (double[3]){ g.x, g.y, g.z });
 }
 
-/* The even bits of a Morton code. */
+/* Returns the even bits of a Morton code. */
 static uint32_t even_bits(uint32_t morton)
 {
     uint32_t u = 0;
@@ -127,7 +127,7 @@ static uint32_t even_bits(uint32_t morton)
     return u;
 }
 
-/* The voxels of one tile of a sheet in Morton order. */
+/* Gathers the voxels of one tile of a sheet in Morton order. */
 static uint32_t gather_run(const writing *w, unsigned number, int sheet, uint32_t tile_u,
                            uint32_t tile_v, uint32_t *voxels, uint32_t *normals)
 {
@@ -234,9 +234,8 @@ static void drop(const char *line, void *user)
     (void)user;
 }
 
-/* Whether this machine has what the gl renderer needs. ThreadSanitizer does not see how the threads
- * of a driver that draws on the processor wait for one another, and reports them: there it is left
- * out. */
+/* Checks whether this machine can run the gl renderer. Software drivers draw in threads of their
+ * own. ThreadSanitizer cannot see their synchronisation and reports it, so its builds omit gl. */
 static bool has_gl(void)
 {
 #if TEST_THREAD_SANITIZER
@@ -293,8 +292,8 @@ const scene_renderer *scene_renderers_post(void)
     return some;
 }
 
-/* Every picture of every test: components are numbers from 0 to 1, rounding aside, and distances
- * are positive. */
+/* Checks every picture: components must lie between 0 and 1, apart from rounding, and distances
+ * must be positive. */
 static void check_numbers(const scene_picture *p, const char *name)
 {
     for (int i = 0; i < 4 * p->width * p->height; i++)
@@ -473,7 +472,7 @@ trip_camera_params scene_view(const scene *s, trip_vec3 direction, double distan
     trip_camera_params p = { .fov_degrees = fov_degrees, .width = size, .height = size };
     p.look = trip_affine_point(&s->data->index_to_world, middle);
     p.eye = trip_add(p.look, trip_scale(trip_normalize(direction), distance));
-    /* Any up that is not along the view. */
+    /* Any up vector works that is not parallel to the view direction. */
     p.up = fabs(direction.z) < 0.9 * trip_length(direction) ? trip_v3(0, 0, 1) : trip_v3(0, 1, 0);
     return p;
 }

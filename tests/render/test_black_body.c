@@ -1,4 +1,5 @@
-/* Against the Planckian locus as CIE tabulates it, and the sRGB curve. */
+/* Compares black-body colours with the Planckian locus tabulated by the CIE, and the transfer
+ * curve with the sRGB curve. */
 #include "test.h"
 
 #include <math.h>
@@ -9,7 +10,7 @@ static void chromaticity_is_that_of_the_planckian_locus(void **state)
 {
     (void)state;
     const double known[][4] = {
-        /* kelvin, x, y, how close the fit is */
+        /* kelvin, x, y, tolerance of the fit */
         { 1000, 0.6528, 0.3444, 0.012 },   { 1500, 0.5857, 0.3931, 0.005 },
         { 2000, 0.5267, 0.4133, 0.003 },   { 2856, 0.4476, 0.4074, 0.0015 },
         { 4000, 0.3805, 0.3768, 0.001 },   { 6500, 0.3135, 0.3237, 0.0005 },
@@ -24,7 +25,7 @@ static void chromaticity_is_that_of_the_planckian_locus(void **state)
     }
 }
 
-static void what_is_hotter_is_less_red_and_more_blue(void **state)
+static void hotter_bodies_are_less_red_and_more_blue(void **state)
 {
     (void)state;
     double before[3], rgb[3];
@@ -65,7 +66,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(chromaticity_is_that_of_the_planckian_locus),
-        cmocka_unit_test(what_is_hotter_is_less_red_and_more_blue),
+        cmocka_unit_test(hotter_bodies_are_less_red_and_more_blue),
         cmocka_unit_test(any_temperature_has_a_colour),
         cmocka_unit_test(a_screen_shows_half_of_the_light_by_three_quarters),
     };

@@ -3,7 +3,7 @@
 #include "camera.h"
 #include "report.h"
 
-/* Anisotropic, rotated and sheared. */
+/* Returns an anisotropic, rotated and sheared map. */
 static trip_affine sheared(void)
 {
     return (trip_affine){ { { 0.5, 0.2, -0.1, 3 }, { -0.3, 1.5, 0.4, -2 }, { 0.1, 0.2, 2.5, 7 } } };
@@ -58,7 +58,7 @@ static void a_point_at_depth_z_on_the_ray_of_a_pixel_projects_there(void **state
     }
 }
 
-static void the_point_looked_at_is_at_the_image_centre_at_its_distance(void **state)
+static void the_target_is_at_the_image_centre_at_its_distance(void **state)
 {
     (void)state;
     for (int ortho = 0; ortho < 2; ortho++) {
@@ -83,7 +83,8 @@ static void right_in_the_world_is_right_in_the_picture_and_up_is_up(void **state
     };
     trip_camera c = make(&p, trip_affine_identity());
     double x, y, z;
-    /* At distance 10 and 90 degrees the half height is 10 world units = 50 px. */
+    /* At distance 10 and a field of view of 90 degrees, half the height is 10 world units or 50
+     * px. */
     project(&c, trip_v3(2, 0, 4), &x, &y, &z);
     assert_close(x, 110, 1e-9);
     assert_close(y, 30, 1e-9);
@@ -104,7 +105,7 @@ static void a_voxel_is_as_long_as_the_cube_root_of_its_volume(void **state)
     assert_close(make(&p, m).voxel_world, 2, 1e-12);
 }
 
-static void views_that_are_none_are_refused_as_wrong_usage(void **state)
+static void invalid_views_are_refused_as_wrong_usage(void **state)
 {
     (void)state;
     trip_affine identity = trip_affine_identity();
@@ -141,12 +142,12 @@ static void views_that_are_none_are_refused_as_wrong_usage(void **state)
     }
 }
 
-static void a_view_turned_looks_from_as_far_at_the_same_point(void **state)
+static void a_turned_view_keeps_its_target_and_distance(void **state)
 {
     (void)state;
     trip_camera_params p = view(false);
     trip_camera_params turned = trip_camera_turn(&p, trip_v3(0, 0, 5), 90);
-    /* The eye was 16 right of the point looked at, 33 before it and 3 above. */
+    /* The eye was 16 right of the target, 33 before it and 3 above it. */
     assert_close(turned.eye.x, 4 + 33, 1e-12);
     assert_close(turned.eye.y, 3 + 16, 1e-12);
     assert_close(turned.eye.z, 11, 1e-12);
@@ -160,11 +161,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_point_at_depth_z_on_the_ray_of_a_pixel_projects_there),
-        cmocka_unit_test(the_point_looked_at_is_at_the_image_centre_at_its_distance),
+        cmocka_unit_test(the_target_is_at_the_image_centre_at_its_distance),
         cmocka_unit_test(right_in_the_world_is_right_in_the_picture_and_up_is_up),
         cmocka_unit_test(a_voxel_is_as_long_as_the_cube_root_of_its_volume),
-        cmocka_unit_test(views_that_are_none_are_refused_as_wrong_usage),
-        cmocka_unit_test(a_view_turned_looks_from_as_far_at_the_same_point),
+        cmocka_unit_test(invalid_views_are_refused_as_wrong_usage),
+        cmocka_unit_test(a_turned_view_keeps_its_target_and_distance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* What is cut away, by every renderer: closed forms of the path that is left, and pictures of a
- * volume that has nothing else. */
+/* Clipping by every renderer. The tests compare pictures with closed forms of the remaining path,
+ * and with pictures of a volume that contains the remaining voxels alone. */
 #include "scenes.h"
 #include "test.h"
 
@@ -33,7 +33,7 @@ static void a_box_is_the_inside_of_its_six_faces(void **state)
     }
 }
 
-/* The bit of a voxel in a square. */
+/* Returns the bit of a voxel in a square. */
 static int morton_of(int u, int v)
 {
     int bit = 0;
@@ -68,7 +68,8 @@ static void squares_hold_the_voxels_that_are_inside(void **state)
     }
 }
 
-/* By their places; those beyond the grid's last are not there, wherever they would lie. */
+/* The mask depends on the voxels' positions. Bits beyond the grid's last voxel stay clear,
+ * whatever their position would be. */
 static void squares_of_uneven_grids_hold_the_voxels_that_are_inside(void **state)
 {
     (void)state;
@@ -103,8 +104,8 @@ static void squares_of_uneven_grids_hold_the_voxels_that_are_inside(void **state
     assert_true(inside > 100 && outside > 100);
 }
 
-/* Of a plane: when no corner of theirs is inside. */
-static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
+/* A box is missed if all its corners lie outside one plane. */
+static void boxes_entirely_outside_are_missed(void **state)
 {
     (void)state;
     int missed = 0;
@@ -135,8 +136,8 @@ static void boxes_are_missed_that_lie_outside_as_a_whole(void **state)
     assert_in_range(missed, 200, 800);
 }
 
-/* Nor is a box of one voxel that counts as inside because it all but is. */
-static void boxes_of_voxels_that_count_as_inside_are_not_missed(void **state)
+/* A box of one voxel is not missed if the voxel lies outside only by rounding. */
+static void boxes_of_voxels_inside_by_rounding_are_not_missed(void **state)
 {
     (void)state;
     for (double beyond = 0.25; beyond <= 1; beyond += 0.25) {
@@ -155,7 +156,8 @@ static trip_half_space random_half_space(void)
                               20 * test_random() - 8 };
 }
 
-/* How far inside of all half-spaces a point is; below 0: outside of one. */
+/* Returns the distance of a point from the nearest half-space border: positive inside all
+ * half-spaces, negative outside. */
 static double room_at(const trip_clip *clip, trip_vec3 p)
 {
     double min = INFINITY;
@@ -164,9 +166,9 @@ static double room_at(const trip_clip *clip, trip_vec3 p)
     return min;
 }
 
-/* What is left of a ray from 1 to 20 is inside, what is beside that is not; where nothing is left
- * no place of it is. */
-static void a_ray_is_cut_to_what_is_inside(void **state)
+/* Cuts rays from 1 to 20. The remaining part must lie inside, and the parts beside it outside. If
+ * nothing remains, every point of the ray must lie outside. */
+static void a_ray_is_cut_to_its_part_inside(void **state)
 {
     (void)state;
     int left = 0;
@@ -188,8 +190,8 @@ static void a_ray_is_cut_to_what_is_inside(void **state)
     assert_in_range(left, 200, 1800);
 }
 
-/* A ray that lies in the plane is inside; of one that only touches it, nothing is left. */
-static void what_lies_on_a_plane_is_inside(void **state)
+/* A ray inside the plane counts as inside. A ray that only touches the half-space keeps nothing. */
+static void points_on_a_plane_are_inside(void **state)
 {
     (void)state;
     trip_clip clip = { 0 };
@@ -201,9 +203,10 @@ static void what_lies_on_a_plane_is_inside(void **state)
         trip_clip_ray(&clip, trip_v3(8, 0, 0), trip_v3(1, 0, 0), &(double){ -9 }, &(double){ -5 }));
 }
 
-/* Half-spaces of the world are the same ones in the source space of a map, in its units of length;
- * one without a normal holds all of it or nothing, as its offset says. */
-static void half_spaces_keep_their_side_before_a_map(void **state)
+/* A half-space mapped to the source space of a map keeps its side, and its offset is in that
+ * space's units of length. A half-space with a zero normal contains all points or none, depending
+ * on its offset. */
+static void half_spaces_keep_their_side_under_an_inverse_map(void **state)
 {
     (void)state;
     trip_clip clip = { 0 };
@@ -228,7 +231,8 @@ static void half_spaces_keep_their_side_before_a_map(void **state)
     }
 }
 
-/* Those that cut off no voxel of 10 x 20 x 30; what is left of them is in order. */
+/* A half-space that cuts no voxel of 10 x 20 x 30 is removed. The remaining ones keep their order.
+ */
 static void half_spaces_that_hold_all_voxels_are_left_out(void **state)
 {
     (void)state;
@@ -258,7 +262,7 @@ static void half_spaces_that_hold_all_voxels_are_left_out(void **state)
     assert_int_equal(clip.count, kept);
 }
 
-/* Narrows an interval of the ray to one side of a plane, index space. */
+/* Narrows an interval of a ray to one side of a plane in index space. */
 static void cut(const double plane[4], trip_vec3 o, trip_vec3 d, double *from, double *to)
 {
     double at = plane[0] * o.x + plane[1] * o.y + plane[2] * o.z + plane[3];
@@ -270,7 +274,7 @@ static void cut(const double plane[4], trip_vec3 o, trip_vec3 d, double *from, d
         *to = t;
 }
 
-/* A plane of index space, in the world. */
+/* Adds a plane given in index space to the clipping, which is in world space. */
 static void add_plane(trip_settings *s, const trip_affine *index_to_world, const double plane[4])
 {
     trip_affine to_index;
@@ -288,7 +292,7 @@ static const double planes[][4] = {
 };
 enum { PLANES = sizeof planes / sizeof *planes };
 
-/* Extinction of codes: constant, or rising with them. */
+/* Sets the extinction of all codes to a constant, or makes it rise with the code. */
 static void fill(scene *s, bool rises)
 {
     for (int code = 0; code < 65536; code++)
@@ -296,7 +300,7 @@ static void fill(scene *s, bool rises)
             (trip_tf_entry){ 1, 0.5F, 0.25F, rises ? 0.2F * (float)code / 65535 : 0.05F };
 }
 
-/* By 3000 codes a voxel along i. */
+/* Codes rise by 3000 per voxel along i. */
 static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -315,7 +319,8 @@ static double depth_between(const scene *s, bool rises, trip_vec3 o, trip_vec3 d
     return from < to ? extinction * (to - from) * scene_ray_stretch(s, d) : 0;
 }
 
-/* Through the faces of an axis, so that no segment of a ray is at the border of the grid. */
+/* Compares each pixel with the closed form. Every ray enters and leaves through the faces of one
+ * axis, so that no segment touches the grid's border. */
 static void compare_with_path(const scene *s, const trip_camera_params *view,
                               const scene_picture *p, const double plane[4], bool rises,
                               double tolerance)
@@ -333,7 +338,7 @@ static void compare_with_path(const scene *s, const trip_camera_params *view,
     }
 }
 
-static void what_is_left_of_the_path_has_its_opacity(void **state)
+static void the_unclipped_path_has_its_opacity(void **state)
 {
     (void)state;
     for (int i = 0; i < 10; i++) {
@@ -368,7 +373,7 @@ static void what_is_left_of_the_path_has_its_opacity(void **state)
     }
 }
 
-/* What is inside of two planes and a box, by its own arithmetic. */
+/* Tests whether a voxel is inside two planes and a box, computed independently of clip.c. */
 static bool is_left(int i, int j, int k)
 {
     return 3 * i + j - 2 * k >= -7 && 2 * k - i <= 23 && i >= 2 && j >= 3 && k >= 1 && i <= 17 &&
@@ -407,7 +412,7 @@ static void make_blobs(scene *s, bool cropped)
     scene_colour(s, 40001, 65535, 0.9, 0.4, 0.1, 0.4);
 }
 
-static void splats_are_those_of_a_volume_without_the_others(void **state)
+static void clipped_splats_equal_those_of_a_cropped_volume(void **state)
 {
     (void)state;
     scene all, cropped;
@@ -448,7 +453,8 @@ static bool boxed_blobs(void *user, int i, int j, int k, unsigned *code, double 
     return !user || is_in_box(i, j, k);
 }
 
-/* The volume cut to a box of whole voxels, and one that has these alone. */
+/* Creates a volume clipped to a box of whole voxels, and a volume that contains the box's voxels
+ * alone. */
 static void make_boxes(scene *all, scene *cropped, trip_settings *cutting)
 {
     static char yes;
@@ -465,8 +471,9 @@ static void make_boxes(scene *all, scene *cropped, trip_settings *cutting)
     trip_clip_add_box(&cutting->clip, lo, hi, &same);
 }
 
-/* Of rays along an axis: others have segments that pass its sides, of which a part is left. */
-static void sheets_cut_at_voxels_are_those_of_a_volume_without_the_others(void **state)
+/* Only rays along an axis are compared. Other rays have segments that cross the box's sides, and
+ * clipping keeps a part of such a segment. */
+static void sheets_cut_at_voxels_equal_those_of_a_cropped_volume(void **state)
 {
     (void)state;
     scene all, cropped;
@@ -490,7 +497,7 @@ static void sheets_cut_at_voxels_are_those_of_a_volume_without_the_others(void *
     scene_destroy(&cropped);
 }
 
-static void the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others(void **state)
+static void the_integral_cut_at_voxels_equals_that_of_a_cropped_volume(void **state)
 {
     (void)state;
     scene all, cropped;
@@ -510,7 +517,7 @@ static void the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others(vo
     scene_destroy(&cropped);
 }
 
-static void renderers_cut_as_the_reference_does(void **state)
+static void renderers_clip_like_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -539,7 +546,7 @@ static void renderers_cut_as_the_reference_does(void **state)
     scene_destroy(&s);
 }
 
-static void bricks_that_are_cut_away_are_not_read(void **state)
+static void clipped_bricks_are_not_read(void **state)
 {
     (void)state;
     scene s;
@@ -578,8 +585,9 @@ static bool lumps(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Whether bricks are small or one is all there is, the picture is the same: rays inside take values
- * and gradients from beyond the cut, the farther the steeper they are over a sheet. */
+/* The picture is the same with small bricks and with one brick for the whole volume. Rays inside
+ * the cut read values and gradients from beyond it. The distance grows with the ray's steepness to
+ * the sheets. */
 enum { WIDE = 48 };
 
 static void compare_what_is_left_out(const trip_coordinates *coordinates, double middle_position)
@@ -596,13 +604,13 @@ static void compare_what_is_left_out(const trip_coordinates *coordinates, double
         scene_colour(i ? &whole : &parts, 20000, 65535, 0.9, 0.4, 0.1, 0.1);
     }
     for (int i = 0; i < 36; i++) {
-        const bool steep = i % 3 == 2; /* along a list that the view is far from */
+        const bool steep = i % 3 == 2; /* draws from a list that is far from the view direction */
         const bool straight = i % 3 == 1;
         const trip_vec3 along = { i / 3 % 3 == 0, i / 3 % 3 == 1, i / 3 % 3 == 2 };
         const trip_vec3 middle = { middle_position, middle_position, middle_position };
         trip_half_space cut = random_half_space();
         trip_vec3 view_direction = random_half_space().normal;
-        if (straight) /* of a list the cut is between two sheets, which the view is along */
+        if (straight) /* the cut lies between two sheets of the list along the view */
             cut.normal = view_direction = trip_scale(along, i / 9 % 2 ? 1 : -1);
         trip_camera_params view =
             scene_view(&whole, view_direction, i % 4 ? 70 : 10, steep ? 120 : 40, SIZE);
@@ -628,8 +636,8 @@ static void compare_what_is_left_out(const trip_coordinates *coordinates, double
     scene_destroy(&whole);
 }
 
-/* With uneven spacing voxels in the middle, where the cut is, are nearly two wide. */
-static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
+/* With uneven spacing, the voxels near the cut are nearly two units wide. */
+static void culling_clipped_bricks_changes_nothing(void **state)
 {
     (void)state;
     double table[WIDE] = { 0 };
@@ -642,7 +650,7 @@ static void what_is_left_out_behind_a_cut_changes_nothing(void **state)
     compare_what_is_left_out(&coordinates, table[WIDE / 2]);
 }
 
-/* Where one list alone has weight its colour is that of its axis. */
+/* A pixel at which one list has all the weight shows the colour of the list's axis. */
 static void lists_are_shown_in_their_colours(void **state)
 {
     (void)state;
@@ -675,19 +683,19 @@ int main(void)
         cmocka_unit_test(a_box_is_the_inside_of_its_six_faces),
         cmocka_unit_test(squares_hold_the_voxels_that_are_inside),
         cmocka_unit_test(squares_of_uneven_grids_hold_the_voxels_that_are_inside),
-        cmocka_unit_test(boxes_are_missed_that_lie_outside_as_a_whole),
-        cmocka_unit_test(boxes_of_voxels_that_count_as_inside_are_not_missed),
-        cmocka_unit_test(a_ray_is_cut_to_what_is_inside),
-        cmocka_unit_test(what_lies_on_a_plane_is_inside),
-        cmocka_unit_test(half_spaces_keep_their_side_before_a_map),
+        cmocka_unit_test(boxes_entirely_outside_are_missed),
+        cmocka_unit_test(boxes_of_voxels_inside_by_rounding_are_not_missed),
+        cmocka_unit_test(a_ray_is_cut_to_its_part_inside),
+        cmocka_unit_test(points_on_a_plane_are_inside),
+        cmocka_unit_test(half_spaces_keep_their_side_under_an_inverse_map),
         cmocka_unit_test(half_spaces_that_hold_all_voxels_are_left_out),
-        cmocka_unit_test(what_is_left_of_the_path_has_its_opacity),
-        cmocka_unit_test(splats_are_those_of_a_volume_without_the_others),
-        cmocka_unit_test(sheets_cut_at_voxels_are_those_of_a_volume_without_the_others),
-        cmocka_unit_test(the_integral_cut_at_voxels_is_that_of_a_volume_without_the_others),
-        cmocka_unit_test(renderers_cut_as_the_reference_does),
-        cmocka_unit_test(bricks_that_are_cut_away_are_not_read),
-        cmocka_unit_test(what_is_left_out_behind_a_cut_changes_nothing),
+        cmocka_unit_test(the_unclipped_path_has_its_opacity),
+        cmocka_unit_test(clipped_splats_equal_those_of_a_cropped_volume),
+        cmocka_unit_test(sheets_cut_at_voxels_equal_those_of_a_cropped_volume),
+        cmocka_unit_test(the_integral_cut_at_voxels_equals_that_of_a_cropped_volume),
+        cmocka_unit_test(renderers_clip_like_the_reference),
+        cmocka_unit_test(clipped_bricks_are_not_read),
+        cmocka_unit_test(culling_clipped_bricks_changes_nothing),
         cmocka_unit_test(lists_are_shown_in_their_colours),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

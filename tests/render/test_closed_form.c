@@ -1,5 +1,6 @@
-/* Functions whose segments need no table: which have a closed form, and what is drawn by it,
- * against integrals worked out by hand and against the reference, which looks everything up. */
+/* Transfer functions with integrals in closed form, which need no table. Checks which functions
+ * have one. Compares the pictures with integrals worked out by hand and with the reference, which
+ * uses the table. */
 #include "closed_form.h"
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
@@ -14,8 +15,8 @@ enum { LAST = 65535 };
 
 static trip_tf_entry table[LAST + 1];
 
-/* Extinction grows from `start` on by `slope` a code; with `unit`, opacity does, of such a length.
- */
+/* Returns an entry of a linear ramp. Extinction rises from `start` by `slope` per code. If `unit`
+ * is not 0, the opacity per `unit` length rises instead. */
 static trip_tf_entry ramp_at(int code, double start, double slope, double unit)
 {
     const double x = slope * (code - start);
@@ -40,7 +41,7 @@ static trip_closed_form_fault find(unsigned min, unsigned max)
     return trip_closed_form_find(&form, table, min, max, LONGEST);
 }
 
-/* Every code is as the table has it. */
+/* Every code of the found form must equal the table. */
 static void assert_found(unsigned min, unsigned max, bool ramp, bool coloured)
 {
     trip_closed_form f;
@@ -57,7 +58,7 @@ static void assert_found(unsigned min, unsigned max, bool ramp, bool coloured)
     }
 }
 
-static void a_function_that_is_linear_in_the_value_has_a_closed_form(void **state)
+static void linear_transfer_functions_have_a_closed_form(void **state)
 {
     (void)state;
     for (int code = 0; code <= LAST; code++)
@@ -65,7 +66,7 @@ static void a_function_that_is_linear_in_the_value_has_a_closed_form(void **stat
     assert_found(0, LAST, false, false);
     assert_found(300, 300, false, false);
     assert_found(300, 302, false, false);
-    make_ramp(-1000, 1e-5, 0); /* begins before the codes */
+    make_ramp(-1000, 1e-5, 0); /* the ramp begins below the codes */
     assert_found(0, LAST, false, false);
     assert_found(7, 30000, false, false);
     make_ramp(0, 0.1, 0);
@@ -74,7 +75,7 @@ static void a_function_that_is_linear_in_the_value_has_a_closed_form(void **stat
     assert_found(0, LAST, true, false);
     assert_found(13000, 40000, true, false);
     assert_found(13108, 40000, false, false);
-    for (int code = 0; code <= LAST; code++) { /* ends, and is coloured */
+    for (int code = 0; code <= LAST; code++) { /* the ramp ends, and is coloured */
         table[code] = ramp_at(-code, -40000.5, 2e-5, 0);
         table[code].g = (float)code / LAST;
     }
@@ -82,7 +83,7 @@ static void a_function_that_is_linear_in_the_value_has_a_closed_form(void **stat
     assert_found(0, 30000, false, true);
 }
 
-static void opacity_that_is_linear_in_the_value_is_near_enough_up_to_a_fifth(void **state)
+static void linear_opacity_has_a_closed_form_up_to_a_fifth(void **state)
 {
     (void)state;
     make_ramp(0, 0.2 / LAST, 1);
@@ -96,12 +97,12 @@ static void opacity_that_is_linear_in_the_value_is_near_enough_up_to_a_fifth(voi
     assert_int_equal(find(0, LAST / 2), 0);
 }
 
-static void a_function_that_is_not_linear_has_none(void **state)
+static void nonlinear_transfer_functions_have_no_closed_form(void **state)
 {
     (void)state;
     make_ramp(20000, 1e-4, 0);
     assert_int_equal(find(1, 0), TRIP_CLOSED_FORM_ENDS);
-    assert_int_equal(find(0, 20000), TRIP_CLOSED_FORM_ENDS); /* nothing shows */
+    assert_int_equal(find(0, 20000), TRIP_CLOSED_FORM_ENDS); /* transparent */
     table[20000].extinction = 1;                             /* a step */
     assert_int_equal(find(0, LAST), TRIP_CLOSED_FORM_EXTINCTION);
     assert_int_equal(find(20001, LAST), 0);
@@ -112,12 +113,12 @@ static void a_function_that_is_not_linear_has_none(void **state)
         table[code] = ramp_at(code < 30000 ? code : 30000, 20000, 1e-4, 0);
     assert_int_equal(find(0, LAST), TRIP_CLOSED_FORM_EXTINCTION);
     assert_int_equal(find(0, 30000), 0);
-    make_ramp(-1, 1e12, 0); /* deeper than single precision goes */
+    make_ramp(-1, 1e12, 0); /* deeper than single precision can represent */
     assert_int_equal(find(0, LAST), TRIP_CLOSED_FORM_EXTINCTION);
 }
 
-/* One code of all of them, whichever it is. */
-static void one_code_that_is_off_is_found(void **state)
+/* A single differing code is found, whichever code it is. */
+static void one_differing_code_is_found(void **state)
 {
     (void)state;
     make_ramp(0, 1e-4, 0);
@@ -132,16 +133,14 @@ static void one_code_that_is_off_is_found(void **state)
         table[code].extinction = k;
         table[code].r = r + 2.0F / 8192;
         assert_int_equal(find(0, LAST), TRIP_CLOSED_FORM_COLOUR);
-        assert_int_equal(find(0, (unsigned)code - 1), 0); /* the codes that are there count */
+        assert_int_equal(find(0, (unsigned)code - 1), 0); /* only the codes in the range count */
         assert_int_equal(find((unsigned)code + 1, LAST), 0);
         table[code].r = r;
     }
     make_ramp(30000, 1e-4, 0);
-    table[100].r = 1; /* where nothing shows */
+    table[100].r = 1; /* at transparent codes */
     assert_int_equal(find(0, LAST), 0);
 }
-
-/* ---- drawn ---- */
 
 static bool is_closed(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
@@ -154,7 +153,7 @@ static bool is_closed(const scene *s, const trip_camera_params *view, const trip
     return closed;
 }
 
-/* Calls it with every renderer, and with every instruction set of the CPU's. */
+/* Calls `check` for every renderer, and for every instruction set of the CPU renderer. */
 static void by_all(void (*check)(const scene_renderer *renderer, void *user), void *user)
 {
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++)
@@ -167,7 +166,7 @@ static void by_all(void (*check)(const scene_renderer *renderer, void *user), vo
     unsetenv("TRIPTYCH_ISA");
 }
 
-/* Two sheets along an axis, of one code each. */
+/* Two sheets along an axis, each with one code. */
 typedef struct sheets {
     int axis;
     unsigned codes[2];
@@ -198,10 +197,10 @@ static void check_all_pixels(const scene_renderer *renderer, void *user)
     scene_picture_free(&p);
 }
 
-/* A segment through both sheets, from code a to code b: extinction and colours are linear, and the
- * mean of a product of linear functions is (2 k0 q0 + k0 q1 + k1 q0 + 2 k1 q1) / 6. Extinction
- * begins at `start`. */
-static void one_segment_shows_the_integrals_of_lines(void **state)
+/* One segment spans both sheets, from code a to code b. Extinction and colour are linear. The mean
+ * of a product of linear functions is (2 k0 q0 + k0 q1 + k1 q0 + 2 k1 q1) / 6. Extinction begins
+ * at `start`. */
+static void one_segment_has_the_integrals_of_linear_functions(void **state)
 {
     (void)state;
     static const unsigned codes[][2] = { { 1, LAST },     { 40000, 30000 }, { 50000, 50100 },
@@ -246,7 +245,7 @@ static void one_segment_shows_the_integrals_of_lines(void **state)
     }
 }
 
-enum { RISE = 1100 }; /* codes a voxel */
+enum { RISE = 1100 }; /* codes per voxel */
 
 static bool rise(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -255,22 +254,23 @@ static bool rise(void *user, int i, int j, int k, unsigned *code, double gradien
     return true;
 }
 
-/* A slab nine sheets thick, in which values rise along an axis. */
+/* A slab of nine sheets with values that rise along an axis. */
 typedef struct slab {
     const scene *s;
     const trip_camera_params *view;
     const trip_settings *settings;
-    int axis; /* along which they do */
+    int axis; /* the axis along which values rise */
     double start, slope, unit;
 } slab;
 
-/* The integral of extinction over opacity o = slope (code - start), by a unit: of -ln(1 - o). */
+/* Returns the integral of -ln(1 - o), the extinction at opacity o = slope (code - start), over o.
+ */
 static double antiderivative(double o)
 {
     return (1 - o) * log1p(-o) + o;
 }
 
-/* Of extinction along a ray on which codes run straight from a to b. */
+/* Returns the mean extinction along a ray with codes that go linearly from a to b. */
 static double mean_between(const slab *of, double a, double b)
 {
     const double x = of->slope * (a - of->start), y = of->slope * (b - of->start);
@@ -316,7 +316,7 @@ static void a_ramp_of_values_is_as_opaque_as_its_integral(void **state)
             of.unit = 0.7;
             of.slope = thin == axis ? 0.2 / 10000 : 0.2 / 65000;
         }
-        for (int code = 0; code <= LAST; code++) /* what no voxel has does not matter */
+        for (int code = 0; code <= LAST; code++) /* codes that no voxel has do not matter */
             s.table[code] = code > RISE * 58 ? (trip_tf_entry){ 1, 0, 0, 9 }
                                              : ramp_at(code, of.start, of.slope, of.unit);
         if (thin == axis)
@@ -335,7 +335,7 @@ static void a_ramp_of_values_is_as_opaque_as_its_integral(void **state)
     }
 }
 
-/* Waves; with *user a voxel apart from them, of a code that nothing else has. */
+/* Waves. If `user` points to true, one separate voxel has a code of its own. */
 static bool waves(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)gradient;
@@ -347,7 +347,7 @@ static bool waves(void *user, int i, int j, int k, unsigned *code, double gradie
     return i < 26 && j < 26 && k < 26;
 }
 
-/* What pictures are compared with. */
+/* The pictures to compare with. */
 typedef struct comparison {
     const scene *closed;
     const trip_camera_params *view;
@@ -366,9 +366,10 @@ static void check_same(const scene_renderer *renderer, void *user)
     scene_picture_free(&p);
 }
 
-/* The reference, and the same function where a voxel that is not drawn keeps it from having a
- * closed form, which is to be looked up. */
-static void by_form_or_by_table_the_picture_is_the_same(void **state)
+/* Compares the picture with the reference. It also compares the picture with one drawn through the
+ * table. For that, a voxel that is not drawn has a code at which the transfer function has no
+ * closed form. */
+static void closed_form_and_table_draw_the_same_picture(void **state)
 {
     (void)state;
     for (int i = 0; i < 8; i++) {
@@ -411,13 +412,13 @@ static void by_form_or_by_table_the_picture_is_the_same(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_function_that_is_linear_in_the_value_has_a_closed_form),
-        cmocka_unit_test(opacity_that_is_linear_in_the_value_is_near_enough_up_to_a_fifth),
-        cmocka_unit_test(a_function_that_is_not_linear_has_none),
-        cmocka_unit_test(one_code_that_is_off_is_found),
-        cmocka_unit_test(one_segment_shows_the_integrals_of_lines),
+        cmocka_unit_test(linear_transfer_functions_have_a_closed_form),
+        cmocka_unit_test(linear_opacity_has_a_closed_form_up_to_a_fifth),
+        cmocka_unit_test(nonlinear_transfer_functions_have_no_closed_form),
+        cmocka_unit_test(one_differing_code_is_found),
+        cmocka_unit_test(one_segment_has_the_integrals_of_linear_functions),
         cmocka_unit_test(a_ramp_of_values_is_as_opaque_as_its_integral),
-        cmocka_unit_test(by_form_or_by_table_the_picture_is_the_same),
+        cmocka_unit_test(closed_form_and_table_draw_the_same_picture),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

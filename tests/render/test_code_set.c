@@ -1,4 +1,4 @@
-/* Sets of codes against what counting one by one says. */
+/* Compares sets of codes with a count of one code at a time. */
 #include "code_set.h"
 #include "test.h"
 
@@ -6,7 +6,7 @@
 
 static trip_tf_entry table[65536];
 
-/* Codes from first to last show, but for one. */
+/* Makes the codes from `first` to `last` visible, except `but`. */
 static void show(unsigned first, unsigned last, unsigned but)
 {
     for (unsigned code = 0; code < 65536; code++)

@@ -1,5 +1,6 @@
-/* Splats composited sheet by sheet, in every renderer: closed forms, order, the reference, and that
- * a volume mirrored, turned or moved with its camera gives the same picture. */
+/* Splats composited sheet by sheet, in every renderer. Compares them with closed forms and the
+ * reference, and checks their order. A volume that is mirrored, turned or moved with its camera
+ * must give the same picture. */
 #include "cpu_scenes.h"
 #include "scenes.h"
 #include "splat.h"
@@ -21,8 +22,6 @@ static trip_vec3 vector(const double v[3])
     return trip_v3(v[0], v[1], v[2]);
 }
 
-/* ---- closed forms ---- */
-
 enum { FEW = 5, RED = 10, BLUE = 20 };
 
 typedef struct voxel {
@@ -30,14 +29,14 @@ typedef struct voxel {
     unsigned code;
 } voxel;
 
-/* Three neighbours in a sheet, and two in the next but one, all of which overlap. */
+/* Three neighbours in one sheet and two in the sheet after the next. All of them overlap. */
 static const voxel few[FEW] = { { { 3, 3, 3 }, RED },
                                 { { 3, 4, 3 }, BLUE },
                                 { { 3, 3, 4 }, BLUE },
                                 { { 5, 4, 4 }, RED },
                                 { { 5, 3, 3 }, BLUE } };
 
-/* Along the axis *user. */
+/* Places the voxels along the axis *user. */
 static bool few_voxels(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const int at[3] = { i, j, k }, axis = *(int *)user;
@@ -57,8 +56,8 @@ static double squared_distance(trip_vec3 p, trip_vec3 origin, trip_vec3 directio
     return trip_dot(across, across);
 }
 
-/* Red, blue and opacity of the voxels' sums, sheet by sheet, by the distances from the ray; the
- * splats are so large that the low-pass does not show. */
+/* Computes red, blue and opacity from the sums of the voxels, sheet by sheet, from their distances
+ * to the ray. The splats are so large that the low-pass filter has no visible effect. */
 static void expected_of_few(const scene *s, int axis, bool descending, trip_vec3 o, trip_vec3 d,
                             double out[3])
 {
@@ -87,7 +86,7 @@ static void expected_of_few(const scene *s, int axis, bool descending, trip_vec3
     out[2] = 1 - through;
 }
 
-static void splats_of_a_sheet_add_up_and_sheets_cover_one_another(void **state)
+static void splats_of_a_sheet_add_and_sheets_composite(void **state)
 {
     (void)state;
     for (int i = 0; i < 12; i++) {
@@ -146,8 +145,9 @@ static void a_slab_has_the_opacity_of_its_voxels_together(void **state)
     }
 }
 
-/* So faint that 1 - exp(-x) in single precision has lost it, in 24 sheets, whose kernels ripple by
- * about a hundredth. What cpu lets through is near 1 and rounded as such, splat by splat. */
+/* The fog is so faint that 1 - exp(-x) is lost in single precision. Its 24 sheets have kernels
+ * with a ripple of about a hundredth. The cpu renderer rounds a transmittance near 1 at every
+ * splat. */
 static void faint_fog_is_as_bright_as_the_path_through_it(void **state)
 {
     (void)state;
@@ -174,8 +174,8 @@ static void faint_fog_is_as_bright_as_the_path_through_it(void **state)
     scene_destroy(&s);
 }
 
-/* From within, what the pixel's ray passes from the eye on. */
-static void from_within_the_splats_before_the_eye_count(void **state)
+/* The eye is inside the volume: the pixel shows the path of its ray from the eye on. */
+static void inside_the_volume_splats_before_the_eye_count(void **state)
 {
     (void)state;
     scene s;
@@ -190,7 +190,7 @@ static void from_within_the_splats_before_the_eye_count(void **state)
                                     .width = 8,
                                     .height = 8 };
         view.look = trip_add(view.eye, vector(d));
-        /* To where the last voxel's kernel of half a voxel ends. */
+        /* The path ends where the last voxel's kernel of half a voxel ends. */
         double to = d[i % 3] > 0 ? 31.5 - trip_component(view.eye, i % 3)
                                  : trip_component(view.eye, i % 3) + 0.5;
         trip_settings settings = by(TRIP_COMPOSITING_SHEET);
@@ -202,8 +202,6 @@ static void from_within_the_splats_before_the_eye_count(void **state)
     }
     scene_destroy(&s);
 }
-
-/* ---- order ---- */
 
 /* Opaque sheets at 5, 12 and 18 along the axis *user. */
 static bool three_sheets(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -245,8 +243,6 @@ static void the_nearest_sheet_hides_those_behind_it(void **state)
     }
 }
 
-/* ---- against the reference ---- */
-
 static double mean_apart(const scene_picture *a, const scene_picture *b)
 {
     double sum = 0;
@@ -284,7 +280,7 @@ static void every_view_agrees_with_the_reference(void **state)
         scene s;
         cpu_scenes_blobs(&s, 32, grid ? &sheared : NULL);
         for (int i = 0; i < 8; i++) {
-            /* From far away, near and within. */
+            /* Views from far away, near and inside. */
             trip_camera_params view = scene_view(&s, trip_v3(i - 3.5, 1.2, 0.7 * i - 2),
                                                  i % 4 == 3 ? 6 : 75 - 8 * i, 50 + 5 * i, 50 + i);
             view.ortho_height = i % 4 == 1 ? 40 : 0;
@@ -307,7 +303,8 @@ static bool coarse(void *user, int i, int j, int k, unsigned *code, double gradi
     return (i + j + k) % 3 > 0;
 }
 
-/* Near the eye the voxels, farther away the coarser level, whose voxels are not cubes. */
+/* Level 0 is drawn near the eye, and the coarse level farther away. Voxels of the coarse level are
+ * not cubes. */
 static void levels_of_detail_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -330,8 +327,8 @@ static void levels_of_detail_agree_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* Layers are rounded once a sheet. */
-static void rounded_layers_are_near_those_that_are_not(void **state)
+/* Layers are rounded once per sheet. */
+static void rounded_layers_are_close_to_float_layers(void **state)
 {
     (void)state;
     scene s;
@@ -346,7 +343,7 @@ static void rounded_layers_are_near_those_that_are_not(void **state)
             scene_picture half = scene_draw(&s, r, &view, &settings);
             settings.target = TRIP_TARGET_RGBA8;
             scene_picture eight = scene_draw(&s, r, &view, &settings);
-            /* Up to half a step of 2^-11 and of 1/255 for each of 40 sheets. */
+            /* For each of 40 sheets: half a step of 2^-11, and of 1/255. */
             assert_true(scene_difference(&half, &exact) < 41 * 0x1p-12 + 1.0 / 255);
             assert_true(scene_difference(&eight, &exact) < 41 * 0.5 / 255 + 1.0 / 255);
             assert_true(scene_difference(&half, &eight) > 0);
@@ -358,14 +355,12 @@ static void rounded_layers_are_near_those_that_are_not(void **state)
     scene_destroy(&s);
 }
 
-/* ---- the same picture ---- */
-
-/* How a volume and its camera are put down: with one axis reversed, its axes in turn, or turned
- * and moved in the world. */
+/* Arranges a volume and its camera: with one axis mirrored, the axes permuted, or turned and moved
+ * in world space. */
 typedef struct arrangement {
-    int64_t dims[3]; /* as first arranged */
-    int mirrored;    /* axis; -1: none */
-    int turned;      /* axis a is what axis a + turned was */
+    int64_t dims[3]; /* before mirroring and turning */
+    int mirrored;    /* axis; -1 for none */
+    int turned;      /* axis a of the arrangement is axis a + turned of the volume */
     trip_affine world;
 } arrangement;
 
@@ -381,7 +376,7 @@ static trip_vec3 arrange(const arrangement *to, trip_vec3 p, bool direction)
                      : trip_affine_point(&to->world, vector(n));
 }
 
-/* Random voxels, translucent and opaque. */
+/* Pseudo-random voxels, translucent and opaque. */
 static bool arranged(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const arrangement *as = user;
@@ -433,8 +428,8 @@ static void flip(scene_picture *p)
 
 enum { ARRANGEMENTS = 6 };
 
-/* The largest mean difference, from the volume as it is, of the first so many arrangements: three
- * mirrored volumes, two with their axes in turn, and one moved. */
+/* Returns the largest mean difference between the original volume and the first arrangements.
+ * Arrangements are three mirrored volumes, two with permuted axes, and one that is moved. */
 static double max_apart(const scene_renderer *r, const trip_settings *settings, bool parallel,
                         int arrangements)
 {
@@ -458,8 +453,9 @@ static double max_apart(const scene_renderer *r, const trip_settings *settings, 
     return max;
 }
 
-/* By sheets alone: splats cover one another in the order of their sheet, which changes. */
-static void mirrored_turned_and_moved_it_is_the_same_picture(void **state)
+/* The test draws by sheets alone. Splats composited one by one depend on their order within a
+ * sheet, and the arrangement changes that order. */
+static void mirrored_turned_and_moved_volumes_look_the_same(void **state)
 {
     (void)state;
     for (const scene_renderer *r = scene_renderers(); r->name; r++)
@@ -478,15 +474,15 @@ static void mirrored_turned_and_moved_it_is_the_same_picture(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(splats_of_a_sheet_add_up_and_sheets_cover_one_another),
+        cmocka_unit_test(splats_of_a_sheet_add_and_sheets_composite),
         cmocka_unit_test(a_slab_has_the_opacity_of_its_voxels_together),
         cmocka_unit_test(faint_fog_is_as_bright_as_the_path_through_it),
-        cmocka_unit_test(from_within_the_splats_before_the_eye_count),
+        cmocka_unit_test(inside_the_volume_splats_before_the_eye_count),
         cmocka_unit_test(the_nearest_sheet_hides_those_behind_it),
         cmocka_unit_test(every_view_agrees_with_the_reference),
         cmocka_unit_test(levels_of_detail_agree_with_the_reference),
-        cmocka_unit_test(rounded_layers_are_near_those_that_are_not),
-        cmocka_unit_test(mirrored_turned_and_moved_it_is_the_same_picture),
+        cmocka_unit_test(rounded_layers_are_close_to_float_layers),
+        cmocka_unit_test(mirrored_turned_and_moved_volumes_look_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

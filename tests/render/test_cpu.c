@@ -1,5 +1,6 @@
-/* The CPU renderer with each instruction set against the reference: grids, views and settings that
- * take different ways through its kernels. Real data: test_gl_views.c. */
+/* Compares the CPU renderer with the reference, for each instruction set. Grids, views and
+ * settings take different paths through the kernels. test_gl_views.c does the same with real data.
+ */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "test.h"
@@ -16,11 +17,11 @@ static double mean_difference(const scene_picture *a, const scene_picture *b)
     return sum / (double)n;
 }
 
-/* What instruction sets may differ by: they round alike but for fused products. */
+/* The maximum difference between instruction sets. They round alike except for fused products. */
 #define SETS_DIFFER (0.05 / 255)
 
-/* Within 1/255 everywhere, 0.05/255 on average, and the same counts, with every instruction set;
- * and these like one another. */
+/* Checks every instruction set against the reference: within 1/255 everywhere, within 0.05/255 on
+ * average, with the same counts. Instruction sets must also agree with each other. */
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
     scene_picture expected = scene_draw(s, &cpu_scenes_reference, view, settings), first = { 0 };
@@ -77,7 +78,7 @@ static void sheared_grids_agree_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-static void the_eye_may_be_inside_and_the_view_wide(void **state)
+static void inside_and_wide_views_agree_with_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -91,7 +92,7 @@ static void the_eye_may_be_inside_and_the_view_wide(void **state)
     scene_destroy(&s);
 }
 
-/* EWA footprints, round and flat: from outside and from within, blended either way. */
+/* Draws EWA footprints, round and flat, from outside and inside, with both compositing settings. */
 static void affine_footprints_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -142,8 +143,8 @@ static void every_method_and_traversal_agrees_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* Weights are differences from h: here half of what is left between h and 1. */
-static void lists_that_begin_next_to_1_merge_as_in_the_reference(void **state)
+/* Weights are differences from h. Here they are half of the range from h to 1. */
+static void lists_with_h_close_to_1_merge_like_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -230,11 +231,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(views_from_all_sides_agree_with_the_reference),
         cmocka_unit_test(sheared_grids_agree_with_the_reference),
-        cmocka_unit_test(the_eye_may_be_inside_and_the_view_wide),
+        cmocka_unit_test(inside_and_wide_views_agree_with_the_reference),
         cmocka_unit_test(affine_footprints_agree_with_the_reference),
         cmocka_unit_test(a_voxel_may_cover_many_panes_and_many_voxels_a_pixel),
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
-        cmocka_unit_test(lists_that_begin_next_to_1_merge_as_in_the_reference),
+        cmocka_unit_test(lists_with_h_close_to_1_merge_like_the_reference),
         cmocka_unit_test(kernels_light_and_background_agree_with_the_reference),
         cmocka_unit_test(images_of_any_size_are_filled_to_their_edges),
         cmocka_unit_test(an_instruction_set_this_machine_lacks_is_refused),

@@ -1,5 +1,6 @@
-/* Pixels that the kernels give a splat, against its support in double precision: grids of any
- * shape, kernels of any size, views of any angle, voxels of up to 10^5 pixels. */
+/* Compares the pixels that the kernels assign to a splat with the splat's support in double
+ * precision. Grids have any shape, kernels any size and views any angle. Voxels are up to 10^5
+ * pixels large. */
 #include "cpu/kernels/isa.h"
 #include "cpu/cpu_view.h"
 #include "scenes.h"
@@ -19,11 +20,12 @@ typedef struct fixture {
     trip_cpu_staged staged;
     trip_cpu_lanes lanes;
     trip_cpu_splat out[TRIP_CPU_STAGED + 16];
-    trip_vec3 looked_at; /* voxel */
+    trip_vec3 looked_at;
     int checked, near;
 } fixture;
 
-/* Cubes; as long as 4000 along an axis; sheared; both. */
+/* Returns a grid of cubes, a grid 4000 times as long along one axis, a sheared grid, or one with
+ * both. */
 static trip_affine grid_of(int i)
 {
     trip_affine m = trip_affine_identity();
@@ -46,8 +48,8 @@ static trip_vec3 random_direction(void)
     return trip_normalize(v);
 }
 
-/* From anywhere in the grid to a voxel of it, and from afar, where the cube root of a voxel's
- * volume is 10^-2 to 10^5 pixels long. */
+/* Returns a view from a random position in the grid towards a voxel, or from far away. The cube
+ * root of a voxel's volume is 10^-2 to 10^5 pixels. */
 static trip_camera_params random_view(int i, const trip_affine *grid, trip_vec3 look)
 {
     const double angles[6] = { 1e-3, 0.1, 10, 90, 150, 170 };
@@ -85,8 +87,8 @@ static void look(fixture *f, const scene *s, int i)
     trip_cpu_layer_view_make(&f->view, &f->frame, 2, true);
 }
 
-/* The pixels whose centres lie in [lo, hi] and in the image: none where the first exceeds the last.
- */
+/* The pixels with centres in [lo, hi] and in the image. The range is empty if `first` exceeds
+ * `last`. */
 typedef struct range {
     double first, last;
 } range;
@@ -96,7 +98,7 @@ static range centres(double lo, double hi, int size)
     return (range){ fmax(0, ceil(lo - 0.5)), fmin(size - 1, floor(hi - 0.5)) };
 }
 
-/* And not many beside them. */
+/* Checks that the bounds contain few other pixels. */
 static bool is_tight(double lo, double hi, int size, int first, int last)
 {
     double room = 3 + 0.003 * (hi - lo) + 1e-5 * fmax(fabs(lo), fabs(hi));
@@ -130,7 +132,7 @@ static void check(fixture *f, const trip_cpu_kernels *k, int u, int v, int sheet
     f->near += drawn && s.near;
 }
 
-/* A list along z: u is x and v is y. */
+/* Checks a list along z, so that u is x and v is y. */
 static void check_some(fixture *f, const trip_cpu_kernels *k, trip_vec3 position)
 {
     check(f, k, (int)position.x + (int)(3 * test_random()) - 1, (int)position.y,

@@ -1,5 +1,5 @@
-/* The instruction sets of this build that this processor runs; those it lacks are skipped by name.
- * The other tests of the processor's renderer take those that run. */
+/* Runs the instruction sets of this build that the processor supports, and skips the others by
+ * name. The other tests of the CPU renderer use the supported ones. */
 #include "cpu/kernels/isa.h"
 #include "test.h"
 

@@ -1,5 +1,5 @@
-/* What counts as occluded: never a voxel with a pixel of its support in an open cell, by the
- * definition of splats in double precision. */
+/* Occlusion culling: an occluded voxel must have no pixel of its support in an open cell. The test
+ * evaluates the definition of splats in double precision. */
 #include "cpu/kernels/isa.h"
 #include "cpu/cpu_view.h"
 #include "cpu/cull.h"
@@ -59,7 +59,7 @@ static bool reaches(const looks *l, const double at[3], unsigned cell_x, unsigne
     return false;
 }
 
-/* The box's voxels, each by itself; true when some reaches the cell. */
+/* Tests each voxel of the box. Returns true if one of them reaches the cell. */
 static bool any_reaches(const looks *l, const trip_cpu_box *box, unsigned x, unsigned y)
 {
     for (double u = -box->half[0]; u <= box->half[0]; u++)
@@ -88,7 +88,7 @@ static void check_boxes(looks *l, unsigned seed, unsigned *occluded, unsigned *r
     }
 }
 
-static void what_is_occluded_reaches_no_open_cell(void **state)
+static void occluded_boxes_reach_no_open_cell(void **state)
 {
     (void)state;
     scene s;
@@ -108,7 +108,7 @@ static void what_is_occluded_reaches_no_open_cell(void **state)
     scene_destroy(&s);
 }
 
-/* Of one voxel, whose bounds have no room but their own; cells are about where it is seen. */
+/* Checks single voxels with tight bounds. Open cells are near the voxel's projection. */
 static void check_voxels(looks *l, int seed, unsigned *occluded, unsigned *reaching)
 {
     for (int i = 0; i < 4000; i++) {
@@ -133,8 +133,9 @@ static void check_voxels(looks *l, int seed, unsigned *occluded, unsigned *reach
     }
 }
 
-/* Near the eye and at wide angles, where supports reach farthest beyond what they do ahead. */
-static void a_voxel_that_is_occluded_reaches_no_open_cell(void **state)
+/* The voxels are near the eye and at wide angles, where supports are largest compared with the
+ * centre of the picture. */
+static void occluded_voxels_reach_no_open_cell(void **state)
 {
     (void)state;
     unsigned occluded = 0, reaching = 0;
@@ -157,7 +158,7 @@ static void a_voxel_that_is_occluded_reaches_no_open_cell(void **state)
     assert_true(reaching > 1000);
 }
 
-static void without_saturated_texels_all_is_visible(void **state)
+static void without_saturated_texels_every_voxel_is_visible(void **state)
 {
     (void)state;
     scene s;
@@ -169,12 +170,10 @@ static void without_saturated_texels_all_is_visible(void **state)
         l.open[i] = UINT64_MAX;
     trip_cpu_box box = { { 15.5, 15.5, 16 }, { 3.5, 3.5, 0 } };
     assert_int_equal(trip_cpu_box_occlusion(&l.view, &l.mask, &box), TRIP_CPU_VISIBLE);
-    l.open[4] = ~(UINT64_C(1) << 36); /* in the image's middle */
+    l.open[4] = ~(UINT64_C(1) << 36); /* in the centre of the image */
     assert_int_equal(trip_cpu_box_occlusion(&l.view, &l.mask, &box), TRIP_CPU_PARTLY);
     scene_destroy(&s);
 }
-
-/* ---- what a run shows ---- */
 
 /* Two by two regions. */
 enum { TILE = 128 };
@@ -185,10 +184,11 @@ typedef struct run_looks {
     uint32_t voxels[TILE * TILE];
     uint64_t bytes[TRIP_BLOCK_WORDS_MAX];
     trip_block block;
-    uint32_t count, occluded, left_in; /* left_in: that reach no open cell */
+    uint32_t count, occluded,
+        left_in; /* left_in counts voxels that remain without reaching an open cell */
 } run_looks;
 
-/* Every third voxel of a tile, in Morton order. */
+/* Fills a tile with every third voxel, in Morton order. */
 static void fill_run(run_looks *r)
 {
     r->count = 0;
@@ -233,7 +233,7 @@ static void check_run(run_looks *r, const trip_cpu_kernels *kernels, int sheet, 
     assert_int_equal(part.voxels, staying);
 }
 
-static void runs_show_all_that_reaches_an_open_cell(void **state)
+static void runs_keep_every_voxel_that_reaches_an_open_cell(void **state)
 {
     (void)state;
     scene s;
@@ -263,10 +263,10 @@ static void runs_show_all_that_reaches_an_open_cell(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_occluded_reaches_no_open_cell),
-        cmocka_unit_test(a_voxel_that_is_occluded_reaches_no_open_cell),
-        cmocka_unit_test(without_saturated_texels_all_is_visible),
-        cmocka_unit_test(runs_show_all_that_reaches_an_open_cell),
+        cmocka_unit_test(occluded_boxes_reach_no_open_cell),
+        cmocka_unit_test(occluded_voxels_reach_no_open_cell),
+        cmocka_unit_test(without_saturated_texels_every_voxel_is_visible),
+        cmocka_unit_test(runs_keep_every_voxel_that_reaches_an_open_cell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

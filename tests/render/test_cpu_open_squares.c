@@ -1,5 +1,5 @@
-/* Which squares of sheets are left out as occluded: never one with a voxel that a ray through an
- * open pixel centre takes, with each ray followed in double precision. */
+/* Occlusion culling of squares in sheets. A square must stay if a ray through an open pixel centre
+ * samples one of its voxels. The test follows each ray in double precision. */
 #include "cpu/sheets/open_squares.h"
 #include "cpu/sheets/pass_view.h"
 #include "scenes.h"
@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Three by three panes, the last of which are not full. */
+/* Three by three panes. The last pane of each row and column is smaller. */
 enum { SIZE = 90, ACROSS = 3, PANES = ACROSS * ACROSS };
 
-/* A grid of two by two rasters, and those around it, for any list. */
+/* A grid of two by two rasters, with the rasters around it. It serves for any list. */
 enum { RASTERS = 4, SHEETS_AT_ONCE = 8 };
 static const int64_t dims[3] = { 90, 70, 100 };
 
@@ -28,7 +28,8 @@ typedef struct fixture {
     _Atomic uint64_t panes[PANES];
     uint8_t layers[PANES];
     uint64_t open[RASTERS * RASTERS];
-    uint64_t taken, closed; /* voxels that rays take; squares left out */
+    uint64_t taken,
+        closed; /* `taken` counts voxels that rays sample, `closed` the squares left out */
 } fixture;
 
 static int set_up(void **state)
@@ -50,7 +51,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-/* One list of a view, whose sheets are passed along `way`. */
+/* Looks at one list of a view. `way` is the order of its sheets along the ray. */
 static void look(fixture *f, const trip_camera_params *params, int axis, int64_t way,
                  trip_kernel kernel)
 {
@@ -74,7 +75,7 @@ static void look(fixture *f, const trip_camera_params *params, int axis, int64_t
     trip_cpu_pass_view_make(&f->sheets.view, &f->frame, axis, way < 0, &function);
 }
 
-/* Panes that are open, saturated, and in which one texel in so many is open. */
+/* Makes each pane open, saturated, or open at one texel in a given number. */
 static void open_some(fixture *f, int seed)
 {
     for (int pane = 0; pane < PANES; pane++) {
@@ -92,8 +93,8 @@ static bool pixel_is_open(const fixture *f, int x, int y)
     return f->panes[y / TRIP_CPU_PANE * ACROSS + x / TRIP_CPU_PANE] >> texel & 1;
 }
 
-/* Where a pixel's ray is at a coordinate along the list; false where that is not before the eye, or
- * the ray is not drawn. */
+/* Finds the point of a pixel's ray at a coordinate along the list. Returns false if that point is
+ * not before the eye, or if the ray is not drawn. */
 static bool ray_at(const fixture *f, int x, int y, double coordinate, double at[2])
 {
     const trip_camera *c = &f->camera;
@@ -115,7 +116,7 @@ static bool ray_at(const fixture *f, int x, int y, double coordinate, double at[
     return along[2] * (double)f->sheets.way > 0 && t > 0;
 }
 
-/* The voxels of a sheet that what lies at (u, v) depends on. */
+/* Checks the voxels of a sheet that an interpolated value at (u, v) reads. */
 static void check_position(fixture *f, const double at[2])
 {
     const int reach = trip_sheet_reach(f->settings.kernel), axis = f->sheets.axis;
@@ -130,7 +131,7 @@ static void check_position(fixture *f, const double at[2])
         }
 }
 
-/* The sheets from `first` on, for which squares are found once. */
+/* Checks sheets from `first` on; open squares are found once for all of them. */
 static void check_sheets(fixture *f, int64_t first)
 {
     const int reach = trip_sheet_reach(f->settings.kernel);
@@ -192,14 +193,14 @@ static void parallel_rays_find_their_voxels_decoded(void **state)
     check_view(f, &view, TRIP_KERNEL_LINEAR);
 }
 
-static void rays_from_within_find_their_voxels_decoded(void **state)
+static void rays_from_inside_find_their_voxels_decoded(void **state)
 {
     fixture *f = *state;
     trip_camera_params view = view_from(f, trip_v3(0.4, -0.8, 0.3), 5, 120);
     check_view(f, &view, TRIP_KERNEL_LINEAR);
 }
 
-static void all_is_decoded_while_nothing_is_saturated(void **state)
+static void everything_is_decoded_while_nothing_is_saturated(void **state)
 {
     fixture *f = *state;
     trip_camera_params view = view_from(f, trip_v3(1, 0.6, -0.4), 200, 40);
@@ -217,8 +218,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_from_afar_find_their_voxels_decoded),
         cmocka_unit_test(parallel_rays_find_their_voxels_decoded),
-        cmocka_unit_test(rays_from_within_find_their_voxels_decoded),
-        cmocka_unit_test(all_is_decoded_while_nothing_is_saturated),
+        cmocka_unit_test(rays_from_inside_find_their_voxels_decoded),
+        cmocka_unit_test(everything_is_decoded_while_nothing_is_saturated),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,5 @@
-/* The renderer's threads: every task of every job runs once, and is over when the wait is. */
+/* The renderer's threads run every task of every job once. All tasks have ended when the wait
+ * returns. */
 #include "cpu/pool.h"
 #include "test.h"
 
@@ -9,7 +10,7 @@
 enum { TASKS = 100 };
 
 typedef struct tally {
-    int runs[TASKS]; /* not atomic: what a task writes must be seen after the wait */
+    int runs[TASKS]; /* not atomic: the waiting thread must see the tasks' writes after the wait */
     unsigned threads;
     _Atomic int busy[64];
     unsigned sleep_task;
@@ -86,7 +87,7 @@ static void threads_that_slept_for_long_are_woken(void **state)
     trip_cpu_pool_destroy(pool);
 }
 
-static void waiting_for_what_was_not_started_returns(void **state)
+static void waiting_for_an_unstarted_job_returns(void **state)
 {
     (void)state;
     trip_cpu_pool *pool;
@@ -102,7 +103,7 @@ int main(void)
         cmocka_unit_test(every_task_runs_once_and_is_over_after_the_wait),
         cmocka_unit_test(two_jobs_may_be_under_way),
         cmocka_unit_test(threads_that_slept_for_long_are_woken),
-        cmocka_unit_test(waiting_for_what_was_not_started_returns),
+        cmocka_unit_test(waiting_for_an_unstarted_job_returns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

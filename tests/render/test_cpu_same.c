@@ -1,5 +1,5 @@
-/* What must not change a bit of the CPU renderer's picture: threads, memory, the data's tile and
- * batch sizes, and whether what is occluded is left out. */
+/* The CPU renderer's picture must have the same bits for any number of threads, memory size, tile
+ * size and batch size, with and without occlusion culling. */
 #include "cpu/kernels/isa.h"
 #include "cpu/cpu_renderer.h"
 #include "cpu_scenes.h"
@@ -13,7 +13,8 @@ static trip_camera_params side_view(const scene *s)
     return scene_view(s, trip_v3(1, 0.7, 0.5), 48, 50, 150);
 }
 
-/* From within, so wide that lists have rays of both ways, in panes of their own and in common. */
+/* Returns a wide view from inside. The rays of a list go in both directions, in separate panes and
+ * within one pane. */
 static trip_camera_params inside_view(const scene *s)
 {
     return scene_view(s, trip_v3(0.3, -0.6, 0.5), 5, 150, 70);
@@ -34,13 +35,13 @@ static trip_settings settings_with(trip_compositing compositing, trip_footprint 
     return s;
 }
 
-/* With every instruction set and target, and by sheets, the picture of `a` by one thread and that
- * of `b` by another number of threads, from batches as `reader` says. */
+/* Compares two pictures with every instruction set and target, and by sheets. The first draws `a`
+ * with one thread. The second draws `b` with several threads, from batches given by `reader`. */
 static void check_view(const scene *a, const scene *b, trip_camera_params view, unsigned threads,
                        const trip_reader_params *reader)
 {
-    enum { TARGETS = TRIP_TARGET_RGBA8 + 1, FORMS }; /* the last is by sheets */
-    static int turn;                                 /* the form, where they are taken by turns */
+    enum { TARGETS = TRIP_TARGET_RGBA8 + 1, FORMS }; /* the last form composites by sheets */
+    static int turn;                                 /* the form, if forms take turns */
     trip_settings settings = settings_with(
         TRIP_COMPOSITING_SPLAT, turn % 3 == 1 ? TRIP_FOOTPRINT_EWA : TRIP_FOOTPRINT_EXACT);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
@@ -106,7 +107,8 @@ static void any_tile_of_the_data_draws_the_same(void **state)
     scene_destroy(&first);
 }
 
-/* Flushes are as large as the memory allows: here 8192 splats, a fraction of the scene's. */
+/* The memory limits the size of a flush. Here a flush holds 8192 splats, a fraction of the scene.
+ */
 static void little_memory_draws_the_same(void **state)
 {
     (void)state;
@@ -119,7 +121,7 @@ static void little_memory_draws_the_same(void **state)
     scene_destroy(&s);
 }
 
-/* All of it in one pane of the picture, which threads share by quarters. */
+/* The scene lies in one pane of the picture. Threads share the pane by quarters. */
 static void a_scene_in_one_pane_draws_the_same(void **state)
 {
     (void)state;
@@ -134,8 +136,6 @@ static void a_scene_in_one_pane_draws_the_same(void **state)
     trip_budget_destroy(small.budget);
     scene_destroy(&s);
 }
-
-/* ---- batches by hand ---- */
 
 typedef struct frame_by_hand {
     trip_camera camera;
@@ -173,7 +173,7 @@ static void end_by_hand(frame_by_hand *f, const scene *s)
     free(f->rgba);
 }
 
-/* Draws a batch in pieces of at most so many runs, leaving out occluded bricks. */
+/* Draws a batch in pieces of at most `piece` runs, without occluded bricks. */
 static void draw_pieces(frame_by_hand *f, const trip_batch *batch, size_t piece, bool skip)
 {
     for (size_t i = 0, n; i < batch->run_count; i += n) {
@@ -256,8 +256,8 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* A body of opaque voxels, filling the view: what lies behind its face, or some radii from an eye
- * within it, is occluded. */
+/* Draws a body of opaque voxels that fills the view. Voxels behind its front face are occluded. If
+ * the eye is inside, voxels some radii away are occluded. */
 static void check_occluded(trip_settings settings, bool inside)
 {
     scene s;
@@ -291,7 +291,7 @@ static void check_occluded(trip_settings settings, bool inside)
     scene_destroy(&s);
 }
 
-static void leaving_out_what_is_occluded_draws_the_same(void **state)
+static void occlusion_culling_draws_the_same(void **state)
 {
     (void)state;
     for (int inside = 0; inside < 2; inside++) {
@@ -312,7 +312,7 @@ static void frames_follow_one_another_on_one_renderer(void **state)
     scene_picture alone = scene_draw(&s, &cpu_scenes_cpu, &view, &settings);
     begin_by_hand(&f, &s, &view, 3, &settings);
     draw_by_hand(&f, &s, 5000, false);
-    /* A frame given up half-way, with splats still on their way, leaves nothing behind. */
+    /* A frame cancelled half-way, with splats still in the buffers, leaves nothing behind. */
     assert_int_equal(f.renderer->ops->begin_frame(f.renderer, &f.frame), 0);
     assert_int_equal(f.renderer->ops->begin_layer(f.renderer, 1), 0);
     for (int i = 0; i < 2; i++) {
@@ -326,8 +326,8 @@ static void frames_follow_one_another_on_one_renderer(void **state)
     scene_destroy(&s);
 }
 
-/* Sweeps of light are tasks of the frame's threads, too. */
-static void light_has_the_same_bits_by_any_threads(void **state)
+/* The threads of a frame also compute the sweeps of light. */
+static void light_has_the_same_bits_with_any_number_of_threads(void **state)
 {
     (void)state;
     scene s;
@@ -361,9 +361,9 @@ int main(void)
         cmocka_unit_test(little_memory_draws_the_same),
         cmocka_unit_test(a_scene_in_one_pane_draws_the_same),
         cmocka_unit_test(batches_cut_anywhere_draw_the_same),
-        cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
+        cmocka_unit_test(occlusion_culling_draws_the_same),
         cmocka_unit_test(frames_follow_one_another_on_one_renderer),
-        cmocka_unit_test(light_has_the_same_bits_by_any_threads),
+        cmocka_unit_test(light_has_the_same_bits_with_any_number_of_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* Which splats every instruction set leaves out over saturated cells: those without an open cell
- * among the pixels of their support, cell by cell. */
+/* Culling of splats over saturated cells, with every instruction set. A splat is left out exactly
+ * if no pixel of its support lies in an open cell. The test checks this cell by cell. */
 #include "cpu/kernels/isa.h"
 #include "cpu/cpu_view.h"
 #include "scenes.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* 4 x 3 panes, the last ones not full. */
+/* 4 x 3 panes. The last pane of each row and column is smaller. */
 enum { WIDTH = 109, HEIGHT = 90, ACROSS = 4, PANES = 12, LEFT_OVER = 16 };
 
 typedef struct fixture {
@@ -60,7 +60,7 @@ static void look(fixture *f, double distance, double ortho_height, int axis)
     f->occluded = f->visible = f->kept_occluded = 0;
 }
 
-/* Voxels from anywhere, and cells open, one in sixteen, in half of the panes. */
+/* Projects voxels from random positions. In half of the panes, one cell in sixteen is open. */
 static uint32_t stage_some(fixture *f, int seed)
 {
     uint32_t count = TRIP_CPU_STAGED - (uint32_t)seed % 40;
@@ -116,7 +116,7 @@ static void check(fixture *f, const trip_cpu_kernels *k, int seed)
     assert_int_equal(next, some);
 }
 
-static void what_has_an_open_cell_stays_and_nothing_else(void **state)
+static void splats_stay_exactly_if_they_have_an_open_cell(void **state)
 {
     fixture *f = *state;
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++)
@@ -130,8 +130,8 @@ static void what_has_an_open_cell_stays_and_nothing_else(void **state)
         }
 }
 
-/* Splats of up to the whole image: those in more than two by two panes may stay. */
-static void large_splats_stay_where_they_show(void **state)
+/* Splats are up to as large as the image. A splat in more than two by two panes may stay. */
+static void large_splats_stay_where_they_are_visible(void **state)
 {
     fixture *f = *state;
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
@@ -146,9 +146,10 @@ static void large_splats_stay_where_they_show(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(what_has_an_open_cell_stays_and_nothing_else, set_up,
+        cmocka_unit_test_setup_teardown(splats_stay_exactly_if_they_have_an_open_cell, set_up,
                                         tear_down),
-        cmocka_unit_test_setup_teardown(large_splats_stay_where_they_show, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(large_splats_stay_where_they_are_visible, set_up,
+                                        tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

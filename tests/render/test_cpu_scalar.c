@@ -1,4 +1,4 @@
-/* The short form of a thin splat's opacity against its definition, in double precision. */
+/* Compares the short formula for a thin splat's opacity with its definition in double precision. */
 #include "cpu/cpu_scalar.h"
 #include "test.h"
 
@@ -29,7 +29,7 @@ static double opacity(double depth, double u)
     return -expm1(-depth * (exp(-k2 * (1 - u) / 2) - exp(-k2 / 2)));
 }
 
-static void short_opacities_are_as_exact_as_stated(void **state)
+static void short_opacities_have_the_stated_accuracy(void **state)
 {
     (void)state;
     for (int n = 0; n <= 60; n++) {
@@ -43,7 +43,7 @@ static void short_opacities_are_as_exact_as_stated(void **state)
     }
 }
 
-/* By Simpson's rule over u. */
+/* Integrates over u by Simpson's rule. */
 static void short_opacities_have_the_integral_of_the_footprint(void **state)
 {
     (void)state;
@@ -63,7 +63,7 @@ static void short_opacities_have_the_integral_of_the_footprint(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(short_opacities_are_as_exact_as_stated),
+        cmocka_unit_test(short_opacities_have_the_stated_accuracy),
         cmocka_unit_test(short_opacities_have_the_integral_of_the_footprint),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,6 @@
-/* Frames of the CPU renderer that classify after interpolation: what must not change a bit of them
- * (threads, memory, tiles, batches, what is occluded), and the kernels that prepare sheets, against
- * sheet.h worked out voxel by voxel. */
+/* Frames of the CPU renderer in `post`. Threads, memory, tiles, batches and occlusion culling must
+ * not change a bit of the picture. The kernels that prepare sheets are compared with sheet.h,
+ * voxel by voxel. */
 #include "cpu/cpu_renderer.h"
 #include "cpu/kernels/isa.h"
 #include "cpu/sheets/integrals.h"
@@ -12,7 +12,7 @@
 
 enum { SIDE_I = 70, SIDE_J = 45, SIDE_K = 40, PIXELS = TEST_BY_TURNS ? 64 : 120 };
 
-/* Waves, of which the crests are kept. */
+/* Waves; the voxels of their crests are kept. */
 static double wave(int i, int j, int k)
 {
     return 0.5 + 0.25 * sin(0.31 * i + 0.2) + 0.25 * sin(0.27 * j) * cos(0.35 * k);
@@ -31,7 +31,7 @@ static bool crest(void *user, int i, int j, int k, unsigned *code, double gradie
     return is_kept(i, j, k);
 }
 
-/* The neighbours of crests, but for a few that are missing. */
+/* Stores the neighbours of crests, except for a few missing ones. */
 static bool beside(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     bool some = false;
@@ -110,8 +110,9 @@ static void check_view(const scene *a, const scene *b, unsigned threads,
     scene_picture_free(&q);
 }
 
-/* Pictures of `a` by one thread and of `b` as said are the same, with every instruction set (one of
- * them, where they are taken by turns); and by kernels of 64 voxels, which have one. */
+/* Draws `a` with one thread and `b` as specified, and compares the bits. It does so with every
+ * instruction set, or with one of them if they take turns. It also uses kernels of 64 voxels,
+ * which have one instruction set. */
 static void check_same(const scene *a, const scene *b, unsigned threads,
                        const trip_reader_params *reader)
 {
@@ -157,7 +158,7 @@ static void any_tile_of_the_data_and_any_batch_draw_the_same(void **state)
     scene_destroy(&first);
 }
 
-/* Draws with so much memory; a negative status where it does not suffice. */
+/* Draws with a limited memory. Returns a negative status if the memory does not suffice. */
 static int draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
                        const trip_camera_params *view, float *rgba)
 {
@@ -190,8 +191,9 @@ static int draw_within(const scene *s, uint64_t bytes, const trip_settings *sett
     return status;
 }
 
-/* From too little upwards, in steps of less than a sheet by the linear kernel: each either fails
- * with a message or draws the same, whether it holds one pair of sheets at a time or all. */
+/* Draws with more and more memory, from too little on, in steps smaller than a sheet of the linear
+ * kernel. Each frame either fails with a message or has the same bits, whether it holds one pair
+ * of sheets at a time or all of them. */
 static void check_memories(trip_kernel kernel, bool clipped, int pixels, uint64_t step)
 {
     scene s;
@@ -221,7 +223,7 @@ static void check_memories(trip_kernel kernel, bool clipped, int pixels, uint64_
     scene_destroy(&s);
 }
 
-static void any_memory_draws_the_same_or_says_that_it_is_too_little(void **state)
+static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
 {
     (void)state;
     check_memories(TRIP_KERNEL_LINEAR, false, PIXELS, TEST_BY_TURNS ? 4000000 : 200000);
@@ -239,8 +241,8 @@ static bool wide(void *user, int i, int j, int k, unsigned *code, double gradien
     return true;
 }
 
-/* Three decoded sheets of the wide grid, 8 bytes a voxel, and a slice between them would take more
- * than there is: the picture, buffers and table need that already. */
+/* The picture, buffers and table use up the memory. Three decoded sheets of the wide grid, at 8
+ * bytes a voxel, and one sample plane would exceed it. */
 static void check_windows(const trip_coordinates *coordinates, trip_kernel kernel, int first)
 {
     enum { LITTLE = 9 << 20, SHEETS = 4 * 8 * WIDE_I * WIDE_J };
@@ -252,14 +254,17 @@ static void check_windows(const trip_coordinates *coordinates, trip_kernel kerne
                                       .voxel = wide });
     scene_colour(&s, 33000, 55000, 0.2, 0.5, 1, 0.1);
     scene_colour(&s, 57000, 65535, 1, 1, 0.6, 0.4);
-    /* The second and the last are from within, where some of the last's first cells show. */
+    /* The second and the last view are from inside. Some of the last view's first cells are
+     * visible. */
     trip_camera_params views[4] = { scene_view(&s, trip_v3(0.6, 0.3, 1), 700, 50, PIXELS),
                                     scene_view(&s, trip_v3(0.2, 0.1, 1), 4.3, 120, PIXELS),
                                     scene_view(&s, trip_v3(0.9, -0.7, 1), 700, 50, PIXELS),
                                     scene_view(&s, trip_v3(-0.3, 0.2, -1), 2.6, 140, PIXELS) };
     views[3].eye.x += 7;
     views[3].look.x += 7;
-    const int end = coordinates || kernel != TRIP_KERNEL_LINEAR ? 3 : 4; /* others take more */
+    const int end = coordinates || kernel != TRIP_KERNEL_LINEAR
+                        ? 3
+                        : 4; /* other kernels and uneven spacing take more */
     for (int i = first; i < end; i++) {
         trip_settings settings = post(2);
         trip_camera_params view = views[i];
@@ -280,7 +285,7 @@ static void check_windows(const trip_coordinates *coordinates, trip_kernel kerne
     scene_destroy(&s);
 }
 
-/* Steps twice as long in the middle as at the ends; rays reach farther in voxels. */
+/* Steps are twice as long in the middle as at the ends, so that rays reach farther in voxels. */
 static void grids_too_wide_for_the_memory_are_drawn_in_windows(void **state)
 {
     static double tables[3][WIDE_I];
@@ -308,8 +313,9 @@ static bool solid(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* A wall that hides what lies behind its face, from the reader's side too. */
-static void leaving_out_what_is_occluded_draws_the_same(void **state)
+/* A wall hides the voxels behind its front face, seen also from the side on which the reader
+ * begins. */
+static void occlusion_culling_draws_the_same(void **state)
 {
     (void)state;
     scene s;
@@ -351,7 +357,7 @@ static void leaving_out_what_is_occluded_draws_the_same(void **state)
     scene_destroy(&s);
 }
 
-/* Other roundings, no more. */
+/* Instruction sets differ only by rounding. */
 static void instruction_sets_agree(void **state)
 {
     (void)state;
@@ -375,8 +381,6 @@ static void instruction_sets_agree(void **state)
     scene_destroy(&s);
 }
 
-/* ---- kernels ---- */
-
 enum { RASTERS = 5 }; /* here, to the left, above, the sheets before and behind */
 
 static trip_cpu_voxels rasters[RASTERS], out;
@@ -386,7 +390,8 @@ static int code_at(int raster, int u, int v)
     return rasters[raster].codes[v * TRIP_CPU_RASTER_STRIDE + u];
 }
 
-/* Few different codes, the greatest and least among them, and missing ones. */
+/* Fills the rasters with few different codes, among them the minimum and maximum, and with missing
+ * ones. */
 static void fill_rasters(void)
 {
     static const int16_t codes[] = { TRIP_CPU_CODE_MIN,    -20000, -1, 0, 1, 2, 300, INT16_MAX,
@@ -407,7 +412,7 @@ static bool is_missing(int code)
     return code == TRIP_CPU_CODE_MISSING;
 }
 
-/* Half of it an index, rounded down (sheets.h). */
+/* Half of the difference is an index, rounded down (sheets.h). */
 static int difference(int below, int here, int above)
 {
     if (!is_missing(below) && !is_missing(above))
@@ -479,7 +484,7 @@ static int64_t between(int a, int b, int w)
     return ((int64_t)a * (16384 - w) + (int64_t)b * w) >> 14;
 }
 
-/* Squares at the right and lower edge have what lies beyond; others are left as they were. */
+/* Squares at the right and lower edge use voxels beyond the edge. All others are left unchanged. */
 static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint64_t squares)
 {
     out = rasters[0];
@@ -503,7 +508,7 @@ static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint
         }
 }
 
-static void kernels_prepare_sheets_as_worked_out_voxel_by_voxel(void **state)
+static void kernels_prepare_sheets_like_plain_code(void **state)
 {
     (void)state;
     fill_rasters();
@@ -536,12 +541,12 @@ static void assert_same_function(const trip_cpu_tf *a, const trip_cpu_tf *b)
     assert_memory_equal(a->next_visible, b->next_visible, 65536 * sizeof *a->next_visible);
 }
 
-/* Of frame after frame, each with one thing changed or nothing. */
-static void kept_integrals_are_those_made_anew(void **state)
+/* Draws frame after frame, each with one change or none. */
+static void kept_integrals_equal_recomputed_ones(void **state)
 {
     static trip_tf_entry table[65536];
     static const struct {
-        int visible; /* code */
+        int visible;
         trip_cpu_codes codes;
         double voxel_world;
     } frames[] = {
@@ -576,8 +581,8 @@ static bool of_few_codes(void *user, int i, int j, int k, unsigned *code, double
     return true;
 }
 
-/* Values between voxels are rounded to less than the voxels' own are. */
-static void what_has_few_codes_is_drawn_as_closely(void **state)
+/* Values between voxels are rounded more finely than the codes of voxels. */
+static void volumes_with_few_codes_are_drawn_as_accurately(void **state)
 {
     (void)state;
     scene s;
@@ -603,7 +608,7 @@ static void what_has_few_codes_is_drawn_as_closely(void **state)
 
 enum { LABEL = 30001, LABELS = 3, LABEL_VOXELS = 20 };
 
-/* Two voxels make the codes of all 16 bits needed. */
+/* Two voxels force the codes to have 16 bits. */
 static bool labelled(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -623,8 +628,8 @@ static double mean_difference(const scene_picture *a, const scene_picture *b)
     return sum / floats;
 }
 
-/* Neighbouring codes may mean what has nothing in common. Only where one label goes over into the
- * next is a value rounded to one of them. */
+/* Neighbouring codes may mean unrelated things. A value is rounded to a code only between two
+ * different labels. */
 static void labels_keep_their_colours(void **state)
 {
     (void)state;
@@ -651,8 +656,9 @@ static bool not_kept(void *user, int i, int j, int k, unsigned *code, double gra
     return !crest(user, i, j, k, code, gradient);
 }
 
-/* From where sheets lie closer together than floats tell distances from the eye apart. */
-static void the_narrowest_views_look_as_in_the_reference(void **state)
+/* The view is so far away that floats cannot distinguish the distances of neighbouring sheets from
+ * the eye. */
+static void the_narrowest_views_agree_with_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -682,7 +688,7 @@ static void the_narrowest_views_look_as_in_the_reference(void **state)
 
 enum { HOLED = 20 };
 
-/* One voxel in so many is missing; codes are smooth. */
+/* One voxel in a given number is missing. Codes are smooth. */
 static bool holed(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const unsigned *one_in = user;
@@ -691,7 +697,7 @@ static bool holed(void *user, int i, int j, int k, unsigned *code, double gradie
     return scene_hash(i, j, k) % *one_in != 0;
 }
 
-/* With every instruction set. */
+/* Compares every instruction set with the reference. */
 static void expect_as_in_the_reference(const scene *s, const trip_camera_params *view,
                                        const trip_settings *settings)
 {
@@ -709,9 +715,9 @@ static void expect_as_in_the_reference(const scene *s, const trip_camera_params 
     unsetenv("TRIPTYCH_ISA");
 }
 
-/* Beside a hole nothing is drawn that would need it, whichever corner it is: without slices between
- * sheets and with them, along both ways of each list, and from within. */
-static void beside_holes_it_is_as_in_the_reference(void **state)
+/* Cells with a missing corner are not drawn, whichever corner is missing. The test draws with one
+ * and with more samples per sheet, along both directions of each list, and from inside. */
+static void cells_beside_holes_agree_with_the_reference(void **state)
 {
     (void)state;
     unsigned seldom = 40, often = 15, *const one_in[] = { &seldom, &often };
@@ -747,7 +753,7 @@ static void beside_holes_it_is_as_in_the_reference(void **state)
     }
 }
 
-/* All or nothing, also where the grid ends. */
+/* Codes are minimum or maximum, also at the border of the grid. */
 static bool mask(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const bool halo = *(const bool *)user, kept = scene_hash(i / 4, j / 3, k / 5) % 3 == 0;
@@ -756,7 +762,7 @@ static bool mask(void *user, int i, int j, int k, unsigned *code, double gradien
     return kept != halo;
 }
 
-/* Steps over the whole range of codes have the light of the reference. */
+/* Steps over the whole range of codes are lit like in the reference. */
 static void masks_are_lit_as_in_the_reference(void **state)
 {
     (void)state;
@@ -781,7 +787,7 @@ static void masks_are_lit_as_in_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* All but the first sheet along Z, which is its halo. */
+/* Keeps all sheets except the first along Z, which is the halo. */
 static bool ramp_to_the_faces(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const bool halo = *(const bool *)user;
@@ -790,8 +796,8 @@ static bool ramp_to_the_faces(void *user, int i, int j, int k, unsigned *code, d
     return (k == 0) == halo;
 }
 
-/* Single voxels that show, none beside another, at all places in squares of eight and rasters of
- * those. */
+/* Single visible voxels, no two adjacent. They cover all positions within squares of eight voxels
+ * and within rasters of squares. */
 static bool sparks(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -803,8 +809,8 @@ static bool sparks(void *user, int i, int j, int k, unsigned *code, double gradi
     return true;
 }
 
-/* A segment about one of them may have an end in a square beside, in which nothing shows. */
-static void what_shows_beside_a_square_is_as_in_the_reference(void **state)
+/* A segment near such a voxel may end in a neighbouring square without visible voxels. */
+static void visible_voxels_beside_a_square_agree_with_the_reference(void **state)
 {
     (void)state;
     const double ways[4][2] = { { 0.96, 0.95 }, { -0.96, 0.3 }, { 0.2, -0.96 }, { -0.95, -0.96 } };
@@ -824,8 +830,8 @@ static void what_shows_beside_a_square_is_as_in_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* What shows reaches the grid's faces. Beyond them is nothing, by whatever kernel. */
-static void nothing_shows_beyond_the_grids_faces(void **state)
+/* Visible voxels reach the grid's faces. Nothing is drawn beyond the faces, with any kernel. */
+static void nothing_is_visible_beyond_the_grids_faces(void **state)
 {
     (void)state;
     static const trip_kernel kernels[] = { TRIP_KERNEL_LINEAR, TRIP_KERNEL_CUBIC,
@@ -857,21 +863,21 @@ static void nothing_shows_beyond_the_grids_faces(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kernels_prepare_sheets_as_worked_out_voxel_by_voxel),
+        cmocka_unit_test(kernels_prepare_sheets_like_plain_code),
         cmocka_unit_test(any_number_of_threads_draws_the_same),
         cmocka_unit_test(any_tile_of_the_data_and_any_batch_draw_the_same),
-        cmocka_unit_test(any_memory_draws_the_same_or_says_that_it_is_too_little),
+        cmocka_unit_test(any_memory_draws_the_same_or_is_reported_as_too_little),
         cmocka_unit_test(grids_too_wide_for_the_memory_are_drawn_in_windows),
-        cmocka_unit_test(leaving_out_what_is_occluded_draws_the_same),
+        cmocka_unit_test(occlusion_culling_draws_the_same),
         cmocka_unit_test(instruction_sets_agree),
-        cmocka_unit_test(kept_integrals_are_those_made_anew),
-        cmocka_unit_test(what_has_few_codes_is_drawn_as_closely),
+        cmocka_unit_test(kept_integrals_equal_recomputed_ones),
+        cmocka_unit_test(volumes_with_few_codes_are_drawn_as_accurately),
         cmocka_unit_test(labels_keep_their_colours),
         cmocka_unit_test(masks_are_lit_as_in_the_reference),
-        cmocka_unit_test(the_narrowest_views_look_as_in_the_reference),
-        cmocka_unit_test(what_shows_beside_a_square_is_as_in_the_reference),
-        cmocka_unit_test(nothing_shows_beyond_the_grids_faces),
-        cmocka_unit_test(beside_holes_it_is_as_in_the_reference),
+        cmocka_unit_test(the_narrowest_views_agree_with_the_reference),
+        cmocka_unit_test(visible_voxels_beside_a_square_agree_with_the_reference),
+        cmocka_unit_test(nothing_is_visible_beyond_the_grids_faces),
+        cmocka_unit_test(cells_beside_holes_agree_with_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

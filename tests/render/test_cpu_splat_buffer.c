@@ -1,5 +1,6 @@
-/* The buffer between projecting and blending threads: what it keeps when it runs full, whoever came
- * first, and in which order panes get their splats back. */
+/* The buffer between the threads that project and the threads that blend. Checks which splats it
+ * keeps when it is full, whatever the order of arrival, and the order in which panes get their
+ * splats back. */
 #include "cpu/splat_buffer.h"
 #include "cpu/cpu_scalar.h"
 #include "test.h"
@@ -52,7 +53,7 @@ static uint32_t reserve(fixture *f, uint32_t count)
     return reserved;
 }
 
-/* Fills a chunk with `count` splats, the i-th in pane i mod PANES; `mark` is theirs alone. */
+/* Fills a chunk with `count` splats, the i-th in pane i mod PANES. `mark` identifies the chunk. */
 static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
 {
     trip_cpu_chunk *chunk = &f->buffer.chunks[number];
@@ -77,8 +78,8 @@ static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state
     assert_int_equal(reserve(f, 1), 1);
 }
 
-/* Over and over the first chunk comes last: it must find room all the same, or a frame would never
- * end. */
+/* The first chunk comes last every time. It must find room eventually, or a frame would never end.
+ */
 static void a_first_chunk_that_always_comes_last_finds_room_in_the_end(void **state)
 {
     fixture *f = *state;
@@ -133,8 +134,8 @@ static void panes_get_their_splats_in_the_chunks_order_whoever_came_first(void *
     }
 }
 
-/* Number `i` of a chunk of splats that lie in the same panes for 1 to 40 at a time: in one pane,
- * two, four or more. */
+/* Returns splat `i` of a chunk. Successive splats lie in the same panes for 1 to 40 splats at a
+ * time: in one pane, two, four or more. */
 static trip_cpu_splat mixed(uint32_t i)
 {
     static const uint16_t sizes[][2] = { { 2, 2 }, { 34, 2 }, { 2, 34 }, { 34, 34 }, { 70, 2 } };

@@ -1,5 +1,5 @@
-/* Squares of blocks: walked, cut into parts, and decoded by the kernels as by trip_block_voxels().
- */
+/* Squares of blocks: iteration, division into parts, and decoding by the kernels.
+ * trip_block_voxels() gives the expected voxels. */
 #include "cpu/squares.h"
 #include "cpu/cpu_view.h"
 
@@ -14,7 +14,7 @@
 
 enum { MAX = TRIP_RUN_RECORDS_MAX };
 
-/* A run's block and what is in it. */
+/* A run's block and its voxels. */
 typedef struct fixture {
     trip_block_form form;
     uint32_t voxels[MAX], normals[MAX], count;
@@ -31,7 +31,7 @@ static fixture *make(void)
     return f;
 }
 
-/* Voxels of a tile: in some squares all, in others few, in others none. */
+/* Fills a tile. Some squares are full, some hold few voxels, some none. */
 static void fill(fixture *f, unsigned tile_log2, unsigned code_bytes, unsigned normal_bytes)
 {
     f->form = (trip_block_form){ .tile_log2 = tile_log2,
@@ -122,7 +122,7 @@ static void parts_of_a_run_hold_every_square_once(void **state)
     free(f);
 }
 
-/* A square and no more than the room behind its bytes that may be read. */
+/* A square, followed by exactly the padding that may be read behind its bytes. */
 typedef struct square_bytes {
     unsigned char *codes, *normals;
 } square_bytes;
@@ -181,7 +181,7 @@ static void check_staged(fixture *f, const trip_cpu_kernels *kernels, const trip
     }
 }
 
-/* What of the codes has extinction. */
+/* The codes with extinction: above a code, between two codes, separate ones, or none. */
 typedef enum shown { ABOVE, BETWEEN, APART, NONE } shown;
 
 static void show(trip_tf_entry *table, shown which)

@@ -1,5 +1,5 @@
-/* Layers of smaller targets, with every instruction set: what a pixel holds there, and how far that
- * takes the picture from the reference. */
+/* Layers of smaller targets, with every instruction set. Checks the contents of a pixel, and the
+ * resulting difference between the picture and the reference. */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "splat.h"
@@ -10,7 +10,7 @@
 
 enum { SIZE = 64, DIM = 12 };
 
-/* Colours by diagonal: one in three of each kind. */
+/* Colours alternate by diagonal, one third each. */
 static bool striped(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -34,7 +34,7 @@ static trip_camera_params side_view(const scene *s)
     return scene_view(s, trip_v3(1, 0.4, 0.6), 26, 45, SIZE);
 }
 
-/* Without lists to merge or anything behind, a picture is its layer. */
+/* Without lists to merge and without background, the picture equals its layer. */
 static trip_settings one_layer(trip_target target)
 {
     trip_settings settings = trip_settings_default();
@@ -44,7 +44,7 @@ static trip_settings one_layer(trip_target target)
     return settings;
 }
 
-/* Half floats with eleven significant bits, or multiples of 2^-24 below 2^-14. */
+/* Returns the nearest half float: eleven significant bits, or a multiple of 2^-24 below 2^-14. */
 static double nearest_half(double a)
 {
     int exponent;
@@ -99,7 +99,7 @@ static void a_layer_holds_what_its_target_can_back_to_front(void **state)
     check_content(TRIP_TRAVERSAL_ASCENDING);
 }
 
-/* How many splats have a pixel centre in their support. */
+/* Returns the number of splats with the pixel centre in their support. */
 static unsigned occlusion_of(const trip_splat_frame *f, double x, double y)
 {
     unsigned n = 0;
@@ -111,10 +111,10 @@ static unsigned occlusion_of(const trip_splat_frame *f, double x, double y)
     return n;
 }
 
-/* A blend rounds a pixel by at most half a step. In colour that adds up to n halves; the same in
- * alpha lets other light through, which again adds up to at most as much: what an error of the
- * transmittance shows is that error times the opacity of all that lies behind. Merging takes
- * averages. The rest is what single precision and closing at TRIP_EARLY_TERMINATION_PRE may do. */
+/* A blend rounds a pixel by at most half a step. n blends add up to n half steps in colour. In
+ * alpha they change the transmittance, which adds at most as much again: an error of the
+ * transmittance is multiplied by the opacity of everything behind. Merging averages the layers.
+ * Single precision and closing at TRIP_EARLY_TERMINATION_PRE add the rest. */
 static void targets_are_off_by_at_most_a_step_a_splat(void **state)
 {
     (void)state;

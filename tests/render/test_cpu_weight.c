@@ -1,4 +1,5 @@
-/* The lists' weights as the kernels merge by them: those of weight.c to the last bit. */
+/* The lists' weights in the kernels that merge must equal the weights of weight.c to the last bit.
+ */
 #include "test.h"
 
 #include <math.h>
@@ -28,8 +29,8 @@ static trip_vec3 any_vector(double length)
     return trip_v3(within(-length, length), within(-length, length), within(-length, length));
 }
 
-/* Views in any direction, of rays of any length; every other one has a ray that is as long along
- * all axes. */
+/* Creates views in any direction, with rays of any length. Every other view has a ray with
+ * components of equal length along all axes. */
 static void make_scene(scene *s, int number, trip_method method)
 {
     const double length = exp2(number % 5 == 4 ? within(-200, 200) : within(-3, 3));
@@ -46,7 +47,7 @@ static void make_scene(scene *s, int number, trip_method method)
     s->view = (trip_cpu_view){ .of = &s->frame };
 }
 
-/* What merging makes of a layer of which all is 1: squares of weights. */
+/* Merging a layer that is 1 everywhere gives the squares of the weights. */
 static void assert_weights_of_pane(const trip_cpu_kernels *k, const scene *s, int x, int y)
 {
     enum { FLOATS = 4 * TRIP_CPU_PANE_PIXELS };
@@ -66,7 +67,7 @@ static void assert_weights_of_pane(const trip_cpu_kernels *k, const scene *s, in
     }
 }
 
-static void weights_are_those_of_the_reference(void **state)
+static void weights_equal_those_of_the_reference(void **state)
 {
     (void)state;
     static const trip_method methods[] = { TRIP_METHOD_MERGE, TRIP_METHOD_MERGE, TRIP_METHOD_MERGE,
@@ -85,7 +86,7 @@ static void weights_are_those_of_the_reference(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(weights_are_those_of_the_reference),
+        cmocka_unit_test(weights_equal_those_of_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,7 +4,7 @@
 
 #include "dataset_metadata.h"
 
-/* A data set of 10 x 20 x 40 voxels without splats, whose text is given. */
+/* Returns a data set of 10 x 20 x 40 voxels without splats and with the given metadata text. */
 static trip_dataset with_text(char *text)
 {
     static char path[] = "a.trip";
@@ -23,7 +23,8 @@ static trip_dataset_metadata *parse(trip_dataset *d)
     return t;
 }
 
-/* The direction from the middle to the eye of the default view, and its up. */
+/* Returns the direction from the centre to the eye in the default view, and the view's up vector.
+ */
 static trip_vec3 view_from(char *text, trip_vec3 *up)
 {
     trip_dataset d = with_text(text);
@@ -37,7 +38,7 @@ static trip_vec3 view_from(char *text, trip_vec3 *up)
     return trip_normalize(trip_sub(p.eye, p.look));
 }
 
-static void text_that_is_no_object_is_refused(void **state)
+static void text_without_an_object_is_refused(void **state)
 {
     (void)state;
     char *const bad[] = { "", "[]", "{", "7", "null" };
@@ -69,7 +70,7 @@ static void keys_of_another_kind_are_taken_as_missing(void **state)
     trip_dataset_metadata_destroy(t);
 }
 
-static void the_stored_function_is_drawn(void **state)
+static void the_stored_transfer_function_is_drawn(void **state)
 {
     (void)state;
     trip_dataset d = with_text("{\"transfer_function\": \"0 0 0 0 0\\n100 1 0.5 0.25 0.8\\n\"}");
@@ -94,7 +95,7 @@ static void each_kind_of_data_is_shown_the_right_way_up(void **state)
     assert_true(up.x == -1 && d.z > 0.5 && d.x < 0);
 }
 
-/* With the right-hand rule for what is on the right of the picture: up x (towards the eye). */
+/* By the right-hand rule, up x (direction towards the eye) points to the right of the picture. */
 static void patients_are_seen_from_the_front_with_their_right_on_the_left(void **state)
 {
     (void)state;
@@ -115,7 +116,7 @@ static void patients_are_seen_from_the_front_with_their_right_on_the_left(void *
     }
 }
 
-static void a_space_that_is_none_counts_as_not_given(void **state)
+static void an_invalid_space_counts_as_not_given(void **state)
 {
     (void)state;
     char *const texts[] = { "{\"space\": \"LAS\"}", "{\"space\": \"\"}", "{\"space\": 7}",
@@ -126,7 +127,7 @@ static void a_space_that_is_none_counts_as_not_given(void **state)
     }
 }
 
-static void thick_samples_per_sheet_of_a_known_orientation_are_not_turned_over(void **state)
+static void thick_slices_of_a_known_orientation_are_not_turned_over(void **state)
 {
     (void)state;
     char *const texts[] = { "{\"space\": \"LPS\"}", "{\"space\": \"RAS\"}",
@@ -142,7 +143,7 @@ static void thick_samples_per_sheet_of_a_known_orientation_are_not_turned_over(v
     }
 }
 
-static void thick_samples_per_sheet_without_an_orientation_are_a_scan_from_above(void **state)
+static void thick_slices_without_an_orientation_are_a_scan_from_above(void **state)
 {
     (void)state;
     trip_dataset d = with_text("{\"format\": \"nrrd\"}");
@@ -151,7 +152,7 @@ static void thick_samples_per_sheet_without_an_orientation_are_a_scan_from_above
     d.index_to_world.m[2][2] = 2;
     trip_dataset_metadata_frame(t, &d, &f);
     assert_close(f.up.z, -1, 0);
-    d.index_to_world.m[2][3] = -300; /* an origin: the file says where it is */
+    d.index_to_world.m[2][3] = -300; /* an origin: the file gives the position */
     trip_dataset_metadata_frame(t, &d, &f);
     assert_close(f.up.z, 1, 0);
     trip_dataset_metadata_destroy(t);
@@ -165,7 +166,7 @@ static void assert_same_view(char *own_text, char *other_text)
     assert_true(trip_length(trip_sub(own_up, other_up)) == 0);
 }
 
-static void samples_per_sheet_of_what_is_mirrored_across_them_are_views_from_the_side(void **state)
+static void slices_with_mirrored_sides_are_views_from_the_side(void **state)
 {
     (void)state;
     trip_vec3 up, d = view_from("{\"mirror\": \"z\"}", &up);
@@ -187,7 +188,7 @@ static void samples_per_sheet_of_what_is_mirrored_across_them_are_views_from_the
         assert_same_view(others[i][0], others[i][1]);
 }
 
-static void what_stands_on_a_side_has_the_other_up(void **state)
+static void the_side_opposite_the_bottom_is_up(void **state)
 {
     (void)state;
     trip_vec3 up;
@@ -195,7 +196,8 @@ static void what_stands_on_a_side_has_the_other_up(void **state)
     assert_true(up.x == 0 && up.y == 1 && up.z == 0);
     view_from("{\"footing\": \"+x\"}", &up);
     assert_true(up.x == -1 && up.y == 0 && up.z == 0);
-    /* What is said, what a format is used for, and slices seen from the side come first. */
+    /* The given orientation, the format's convention and slices seen from the side take
+     * precedence. */
     char *const others[][2] = {
         { "{\"footing\": \"-x\", \"mirror\": \"z\"}", "{\"mirror\": \"z\"}" },
         { "{\"footing\": \"-x\", \"space\": \"RAS\"}", "{\"space\": \"RAS\"}" },
@@ -217,7 +219,8 @@ static void voxels_shown_but_left_out_are_counted_from_the_histogram(void **stat
                   " \"value_max\": 100, \"counts\": [1000, 100, 10, 70, 50, 40, 30, 20, 10, 5]}}");
     trip_dataset_metadata *t = parse(&d);
     const trip_rgba none = { 0 }, some = { 1, 1, 1, 0.5 };
-    /* Shows 35 to 55 and all from 60: the half bin to 40, a whole one, and the half bin to 55. */
+    /* The transfer function shows 35 to 55, and everything from 60. It covers the half bin up to
+     * 40, one whole bin, and the half bin up to 55. */
     const trip_tf_point points[] = { { 35, none }, { 35, some }, { 55, some },
                                      { 55, none }, { 60, none }, { 60, some } };
     trip_tf *tf;
@@ -238,16 +241,16 @@ static void voxels_shown_but_left_out_are_counted_from_the_histogram(void **stat
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(text_that_is_no_object_is_refused),
+        cmocka_unit_test(text_without_an_object_is_refused),
         cmocka_unit_test(keys_of_another_kind_are_taken_as_missing),
-        cmocka_unit_test(the_stored_function_is_drawn),
+        cmocka_unit_test(the_stored_transfer_function_is_drawn),
         cmocka_unit_test(each_kind_of_data_is_shown_the_right_way_up),
         cmocka_unit_test(patients_are_seen_from_the_front_with_their_right_on_the_left),
-        cmocka_unit_test(a_space_that_is_none_counts_as_not_given),
-        cmocka_unit_test(thick_samples_per_sheet_of_a_known_orientation_are_not_turned_over),
-        cmocka_unit_test(thick_samples_per_sheet_without_an_orientation_are_a_scan_from_above),
-        cmocka_unit_test(samples_per_sheet_of_what_is_mirrored_across_them_are_views_from_the_side),
-        cmocka_unit_test(what_stands_on_a_side_has_the_other_up),
+        cmocka_unit_test(an_invalid_space_counts_as_not_given),
+        cmocka_unit_test(thick_slices_of_a_known_orientation_are_not_turned_over),
+        cmocka_unit_test(thick_slices_without_an_orientation_are_a_scan_from_above),
+        cmocka_unit_test(slices_with_mirrored_sides_are_views_from_the_side),
+        cmocka_unit_test(the_side_opposite_the_bottom_is_up),
         cmocka_unit_test(voxels_shown_but_left_out_are_counted_from_the_histogram),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

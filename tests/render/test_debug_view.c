@@ -1,9 +1,9 @@
-/* What is shown in the place of a picture, by weights worked out by hand. */
+/* Pictures that show the layers, lists or levels, compared with weights worked out by hand. */
 #include "debug_view.h"
 
 #include "test.h"
 
-/* A parallel view, whose rays all have one direction. */
+/* Returns a parallel view: all rays have one direction. */
 static trip_camera along(trip_vec3 direction)
 {
     const trip_affine m = trip_affine_identity();
@@ -22,8 +22,8 @@ static void assert_colour(const double rgb[3], double r, double g, double b)
     assert_close(rgb[2], b, 1e-12);
 }
 
-/* With h = 1/2 a list weighs 2 (|r_a| / max - 1/2). */
-static void layers_are_shown_by_what_they_are_of_the_merge(void **state)
+/* With h = 1/2, a list has the weight 2 (|r_a| / max - 1/2). */
+static void layers_are_shown_by_their_share_of_the_merge(void **state)
 {
     (void)state;
     const trip_camera camera = along(trip_v3(-0.75, 1, 0.4));
@@ -60,7 +60,7 @@ static void lists_have_the_colours_of_their_axes_and_levels_their_own(void **sta
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layers_are_shown_by_what_they_are_of_the_merge),
+        cmocka_unit_test(layers_are_shown_by_their_share_of_the_merge),
         cmocka_unit_test(lists_have_the_colours_of_their_axes_and_levels_their_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

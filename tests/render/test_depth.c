@@ -1,12 +1,12 @@
-/* The picture of distances: closed forms for flat objects, and the renderers against the
- * reference. */
+/* Depth pictures. Compares the distances of flat objects with closed forms, and the renderers with
+ * the reference. */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "test.h"
 
 #include <string.h>
 
-/* Sheets of the slabs, which fill the grid across. */
+/* Sheets of the slabs. The slabs fill the grid across the view. */
 enum { N = 24, FRONT = 14, BACK = 5 };
 
 static bool one_slab(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -51,8 +51,8 @@ static trip_settings with_depth(void)
     return s;
 }
 
-/* From the side of the last sheets, along the last axis, `distance` voxel thicknesses from sheet
- * FRONT. */
+/* Returns a view along the last axis, from the side of the last sheets. The eye is `distance`
+ * voxel thicknesses from sheet FRONT. */
 static trip_camera_params head_on(const scene *s, double distance, bool parallel)
 {
     const trip_affine *map = &s->data->index_to_world;
@@ -66,7 +66,7 @@ static trip_camera_params head_on(const scene *s, double distance, bool parallel
     return view;
 }
 
-/* 1 / the cosine between the ray of a pixel and the middle's. */
+/* Returns 1 / cos of the angle between a pixel's ray and the central ray. */
 static double slant(const trip_camera_params *view, int x, int y)
 {
     double per_pixel = 2 * tan(view->fov_degrees / 360 * 3.14159265358979323846) / view->height;
@@ -75,7 +75,7 @@ static double slant(const trip_camera_params *view, int x, int y)
     return view->ortho_height > 0 ? 1 : sqrt(1 + across * across + down * down);
 }
 
-/* `sheets` beyond FRONT is the mean of what is seen, to within `tolerance` sheets. */
+/* The mean visible distance must be `sheets` sheets beyond FRONT, within `tolerance` sheets. */
 static void expect_mean(const scene *s, const trip_camera_params *view, double distance,
                         double sheets, double tolerance)
 {
@@ -102,7 +102,7 @@ static void check_flat(scene_voxel voxel, double opacity, double sheets, double 
                                           .index_to_world = maps[i / 2],
                                           .tile_voxels = 16,
                                           .voxel = voxel });
-        /* Of one voxel thickness, not of the cube root of the volume. */
+        /* The unit is one voxel thickness, not the cube root of the voxel's volume. */
         double thickness =
             trip_length(trip_affine_vector(&s.data->index_to_world, trip_v3(0, 0, 1)));
         double voxel_world = cbrt(fabs(trip_affine_determinant(&s.data->index_to_world)));
@@ -113,14 +113,14 @@ static void check_flat(scene_voxel voxel, double opacity, double sheets, double 
     }
 }
 
-/* Of what one sheet lets through, 1e-4 is seen one sheet further back. */
+/* A sheet lets 1e-4 of the light pass, which comes from one sheet farther back. */
 static void an_opaque_slab_is_as_far_as_its_front_face(void **state)
 {
     (void)state;
     check_flat(one_slab, 0.9999, 0, 2e-3);
 }
 
-/* However opaque it is: splats and sums of them stay numbers. */
+/* Splats and their sums must stay finite, however opaque the slab is. */
 static void a_slab_is_as_far_and_as_bright_however_opaque_it_is(void **state)
 {
     (void)state;
@@ -147,9 +147,9 @@ static void a_slab_is_as_far_and_as_bright_however_opaque_it_is(void **state)
     scene_destroy(&s);
 }
 
-/* The centre of the only splat lies half a voxel behind the eye, or its plane in parallel views; of
- * the rest of it that shows, the distance is none. */
-static void what_has_its_centre_behind_the_eye_is_not_before_it(void **state)
+/* The centre of the only splat lies half a voxel behind the eye, or behind the eye's plane in
+ * parallel views. The visible rest of the splat has no distance. */
+static void splats_centred_behind_the_eye_have_no_distance(void **state)
 {
     (void)state;
     scene s;
@@ -181,14 +181,15 @@ static void what_has_its_centre_behind_the_eye_is_not_before_it(void **state)
     scene_destroy(&s);
 }
 
-/* 0.5 of the front one is seen and 0.25 of the back one; kernels ripple by about a hundredth. */
+/* The front sheet has the share 0.5 and the back sheet 0.25. Kernels have a ripple of about a
+ * hundredth. */
 static void two_half_transparent_sheets_are_at_their_weighted_mean(void **state)
 {
     (void)state;
     check_flat(two_sheets, 0.5, (FRONT - BACK) * 0.25 / 0.75, 0.06);
 }
 
-static void where_nothing_is_seen_is_infinitely_far(void **state)
+static void empty_pixels_are_infinitely_far(void **state)
 {
     (void)state;
     scene s;
@@ -210,7 +211,7 @@ static void where_nothing_is_seen_is_infinitely_far(void **state)
     scene_destroy(&s);
 }
 
-/* Depths times the opacity that they are divided by, in units of the object's size. */
+/* Returns the difference of the distances times their opacity, in units of the object's size. */
 static double depth_difference(const scene_picture *a, const scene_picture *b, double size)
 {
     double max = 0;
@@ -222,8 +223,8 @@ static double depth_difference(const scene_picture *a, const scene_picture *b, d
     return max;
 }
 
-/* No more than 1/255 of the object's size off, and the colours are those of a picture without to
- * within `colours`. */
+/* Distances may differ by 1/255 of the object's size. Colours must equal the picture without
+ * distances within `colours`. */
 static void compare_one(const scene *s, const scene_renderer *renderer, const char *name,
                         const trip_camera_params *view, const trip_settings *settings,
                         const scene_picture *expected, double colours)
@@ -254,7 +255,7 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
     scene_picture_free(&expected);
 }
 
-/* Threads, batches and splat buffers change no bit. */
+/* Threads, batches and splat buffers must not change a bit. */
 static void expect_same_bits(const scene *s, const trip_camera_params *view,
                              const trip_settings *settings)
 {
@@ -282,11 +283,11 @@ static void check_blobs(const trip_affine *map, const trip_settings *settings)
     scene_destroy(&s);
 }
 
-static void renderers_have_the_reference_s_depths_and_their_own_colours(void **state)
+static void renderers_have_the_depths_of_the_reference_and_unchanged_colours(void **state)
 {
     (void)state;
     trip_settings settings = with_depth();
-    settings.background[3] = 0; /* so that alpha is the object's */
+    settings.background[3] = 0; /* so that alpha is the object's alone */
     trip_affine sheared = cpu_scenes_sheared();
     settings.h = 0.3;
     check_blobs(NULL, &settings);
@@ -298,9 +299,9 @@ static void renderers_have_the_reference_s_depths_and_their_own_colours(void **s
     check_blobs(NULL, &settings);
 }
 
-/* So faint that what a sheet takes is rounded away from what is let through: no distance lies
+/* The sheets are so faint that the transmittance rounds their opacity away. No distance may lie
  * before or behind the volume. */
-static void faint_sheets_are_where_they_are(void **state)
+static void faint_sheets_have_the_right_distance(void **state)
 {
     (void)state;
     scene s;
@@ -319,7 +320,7 @@ static void faint_sheets_are_where_they_are(void **state)
     scene_destroy(&s);
 }
 
-static void depths_take_no_rounded_target(void **state)
+static void depths_refuse_rounded_targets(void **state)
 {
     (void)state;
     trip_settings settings = with_depth();
@@ -337,12 +338,12 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_opaque_slab_is_as_far_as_its_front_face),
         cmocka_unit_test(a_slab_is_as_far_and_as_bright_however_opaque_it_is),
-        cmocka_unit_test(what_has_its_centre_behind_the_eye_is_not_before_it),
+        cmocka_unit_test(splats_centred_behind_the_eye_have_no_distance),
         cmocka_unit_test(two_half_transparent_sheets_are_at_their_weighted_mean),
-        cmocka_unit_test(where_nothing_is_seen_is_infinitely_far),
-        cmocka_unit_test(renderers_have_the_reference_s_depths_and_their_own_colours),
-        cmocka_unit_test(faint_sheets_are_where_they_are),
-        cmocka_unit_test(depths_take_no_rounded_target),
+        cmocka_unit_test(empty_pixels_are_infinitely_far),
+        cmocka_unit_test(renderers_have_the_depths_of_the_reference_and_unchanged_colours),
+        cmocka_unit_test(faint_sheets_have_the_right_distance),
+        cmocka_unit_test(depths_refuse_rounded_targets),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

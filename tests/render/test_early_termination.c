@@ -1,5 +1,6 @@
-/* The transmittance below which a pixel takes no more (trip_settings.saturation): where it stops,
- * how far that is from all that there is, and that renderers and instruction sets agree on it. */
+/* Early termination (trip_settings.saturation). Checks at which transmittance a pixel stops, how
+ * far the picture is from one without termination, and that renderers and instruction sets agree.
+ */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "test.h"
@@ -8,7 +9,7 @@
 
 enum { EDGE = 32, PIXELS = 72 };
 
-/* Waves, of which every voxel is there. */
+/* Waves; every voxel is present. */
 static bool waves(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const double at = sin(0.5 * i) + sin(0.4 * j + 1) + sin(0.6 * k + 2);
@@ -18,7 +19,7 @@ static bool waves(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Half of it is empty, so that rays lose as much in many ways. */
+/* Half of the volume is empty, so that rays lose their light in many ways. */
 static void create_waves(scene *s)
 {
     scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = waves });
@@ -38,7 +39,7 @@ static trip_settings with(trip_classify classify, trip_compositing compositing,
     return s;
 }
 
-/* gl blends all splats. */
+/* The gl renderer blends all splats. */
 static bool takes(const scene_renderer *r, const trip_settings *s)
 {
     return strcmp(r->name, "gl") != 0 || s->classify == TRIP_CLASSIFY_POST;
@@ -61,7 +62,7 @@ static const double saturations[] = { TRIP_EARLY_TERMINATION_AUTO, 1.0 / 128, 1.
                                       TRIP_EARLY_TERMINATION_MAX };
 enum { SATURATIONS = sizeof saturations / sizeof *saturations };
 
-/* Of these pictures by one renderer. */
+/* Checks the error bound for one renderer and form. */
 static void check_bound(const scene *s, const scene_renderer *r, int form)
 {
     trip_camera_params view = scene_view(s, trip_v3(1, 0.8, 0.6), 60, 36, PIXELS);
@@ -107,8 +108,8 @@ static double difference_at(const scene_picture *a, const scene_picture *b, int 
     return max;
 }
 
-/* A pixel that all but gets there at some splat or segment may take one more. */
-static void renderers_stop_at_the_same_places(void **state)
+/* A pixel very close to the threshold at some splat or segment may take one more. */
+static void renderers_stop_at_the_same_samples(void **state)
 {
     (void)state;
     scene s;
@@ -159,8 +160,8 @@ static scene_picture draw_two(scene *s, const scene_renderer *r, trip_compositin
     return scene_draw(s, r, &view, &settings);
 }
 
-/* What a splat leaves is that of a picture of it alone. */
-static void splats_behind_are_taken_down_to_the_early_termination_and_not_below(void **state)
+/* A picture of one splat alone gives the transmittance behind the splat. */
+static void splats_are_blended_until_early_termination_and_not_after(void **state)
 {
     (void)state;
     scene s;
@@ -195,8 +196,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_component_is_off_by_more_than_the_early_termination),
-        cmocka_unit_test(renderers_stop_at_the_same_places),
-        cmocka_unit_test(splats_behind_are_taken_down_to_the_early_termination_and_not_below),
+        cmocka_unit_test(renderers_stop_at_the_same_samples),
+        cmocka_unit_test(splats_are_blended_until_early_termination_and_not_after),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

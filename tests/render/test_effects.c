@@ -1,5 +1,5 @@
-/* Shadows, scattering, ambient occlusion and depth cueing: the integral against closed forms, the
- * others against it and one another. */
+/* Shadows, scattering, ambient occlusion and depth cueing. Compares the integral with closed
+ * forms, and the renderers with the integral and with each other. */
 #include "dataset_join.h"
 #include "effects.h"
 #include "light_map.h"
@@ -11,7 +11,7 @@
 enum { EDGE = 20, SIZE = 9 };
 #define FOG 0.05
 
-/* Constant fog, white. */
+/* Creates constant, white fog. */
 static void create_fog(scene *s, float extinction)
 {
     scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
@@ -26,7 +26,7 @@ static trip_camera_params along_z(const scene *s)
     return view;
 }
 
-/* Where the ray of a pixel is along x. */
+/* Returns the x coordinate of a pixel's ray. */
 static double position_x(const scene *s, const trip_camera_params *view, int x, int y)
 {
     trip_vec3 o, d;
@@ -40,7 +40,8 @@ static scene_picture integrate(const scene *s, const trip_camera_params *view,
     return scene_integrate(s, view, settings, &(scene_making){ 0 });
 }
 
-/* The light of a slab that is lit from the side is attenuated by what lies beside. */
+/* The fog beside a point attenuates the light that reaches it, because the slab is lit from the
+ * side. */
 static double lit_from_the_side(double x, double g)
 {
     const double depth = EDGE - 1, phase = (1 - g * g) / pow(1 + g * g, 1.5);
@@ -70,9 +71,9 @@ static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
     scene_destroy(&s);
 }
 
-/* Light passes what is cut away; the lattice has half a voxel of what lies between those on both
- * sides of a cut in the middle. */
-static void what_is_cut_away_casts_no_shadow(void **state)
+/* Light passes through clipped voxels. At a cut in the middle between nodes, the lattice contains
+ * half a voxel of the volume on each side. */
+static void clipped_voxels_cast_no_shadow(void **state)
 {
     (void)state;
     const double at = 8.5;
@@ -99,9 +100,9 @@ static void what_is_cut_away_casts_no_shadow(void **state)
     scene_destroy(&s);
 }
 
-/* Of a segment between two slices a fifth is left: it fades, and is as far, as in the middle of
- * that. */
-static void what_is_left_of_a_segment_fades_where_it_is(void **state)
+/* A fifth of a segment between two sample planes remains. Its cueing and distance are those of its
+ * midpoint. */
+static void the_rest_of_a_clipped_segment_fades_at_its_own_depth(void **state)
 {
     (void)state;
     const double from = 7.1, to = 7.3, middle = 7.2, depth = 50 * (to - from);
@@ -125,7 +126,8 @@ static void what_is_left_of_a_segment_fades_where_it_is(void **state)
     scene_destroy(&s);
 }
 
-/* From the eye's side: light and view pass the same, turned back by 180 degrees. */
+/* The light shines from the eye's side. Light and view cross the same fog, and scattering turns
+ * the light back by 180 degrees. */
 static void fog_lit_from_the_front_scatters_backwards(void **state)
 {
     (void)state;
@@ -153,8 +155,8 @@ static trip_settings with_point_light(trip_vec3 position)
     return s;
 }
 
-/* The length of the way from a point of the box of voxel centres to another that lies in the box.
- */
+/* Returns the length of the path from a point inside the box of voxel centres to another point
+ * that is inside it too. */
 static double length_in_box(trip_vec3 from, trip_vec3 to)
 {
     const trip_vec3 way = trip_sub(to, from);
@@ -166,7 +168,7 @@ static double length_in_box(trip_vec3 from, trip_vec3 to)
     return end * trip_length(way);
 }
 
-/* The integral along a pixel's ray, from above down z: Simpson's rule. */
+/* Integrates along a pixel's ray down the z axis by Simpson's rule. */
 static double lit_from_a_position(double x, double y, trip_vec3 light, double g)
 {
     enum { STEPS = 2000 };
@@ -183,7 +185,7 @@ static double lit_from_a_position(double x, double y, trip_vec3 light, double g)
     return sum * depth / STEPS / 3;
 }
 
-/* The mean difference of a component. */
+/* Returns the mean difference of a component. */
 static double off(const scene_picture *a, const scene_picture *b)
 {
     double sum = 0;
@@ -193,8 +195,8 @@ static double off(const scene_picture *a, const scene_picture *b)
     return sum / (double)count;
 }
 
-/* Beside the fog, above an edge of it, in it, and on a node of the lattice. */
-static void fog_is_lit_from_a_place(void **state)
+/* Lights beside the fog, above an edge of it, inside it, and on a node of the lattice. */
+static void fog_is_lit_from_a_position(void **state)
 {
     (void)state;
     const trip_vec3 lights[] = { { 24, 8, 11 }, { 20, 22, 9.5 }, { 6.3, 8.1, 12.7 }, { 15, 9, 4 } };
@@ -223,7 +225,7 @@ static void fog_is_lit_from_a_place(void **state)
     scene_destroy(&s);
 }
 
-/* Two slabs across x, empty between: voxels 4 to 7 and 13 to 16. */
+/* Two slabs across x with a gap between them: voxels 4 to 7 and 13 to 16. */
 static bool two_slabs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -234,7 +236,8 @@ static bool two_slabs(void *user, int i, int j, int k, unsigned *code, double gr
     return true;
 }
 
-/* Extinction over its maximum at x, and its integral from x on: linear between voxels. */
+/* Returns the extinction at x relative to its maximum, and its integral from x on. Extinction is
+ * linear between voxels. */
 static double slabs_at(double x, double *beyond)
 {
     double here = 0;
@@ -278,7 +281,7 @@ static void a_box_casts_its_shadow_on_the_next(void **state)
 
 enum { BALL = 33 };
 
-/* A ball of fog with a soft rim, and gradients away from its middle. */
+/* A ball of fog with a soft rim. Gradients point away from the centre. */
 static bool ball(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const double c = 0.5 * (BALL - 1), d[3] = { i - c, j - c, k - c };
@@ -301,7 +304,7 @@ static void create_ball(scene *s, double extinction, const trip_affine *map)
         s->table[code] = (trip_tf_entry){ 0.9F, 0.6F, 0.3F, (float)(extinction * code / 65535) };
 }
 
-/* Lights of the ball: in a direction, beside it, above a corner of its box, and in it. */
+/* Lights for the ball: directional, beside the ball, above a corner of its box, and inside it. */
 static trip_settings with_light(int number)
 {
     const trip_vec3 positions[] = { { 40, 8, 14 }, { 36, 36, -2 }, { 20.4, 12, 16 } };
@@ -309,7 +312,8 @@ static trip_settings with_light(int number)
                        : with_point_light(positions[number - 1]);
 }
 
-/* Against the double integral: from a place of the ray, on towards the light. */
+/* The expected value is a double integral: along the view ray, and from each point towards the
+ * light. */
 static void the_error_falls_as_the_lattice_becomes_finer(void **state)
 {
     (void)state;
@@ -388,7 +392,7 @@ static void openness_is_the_mean_over_directions(void **state)
     scene_destroy(&s);
 }
 
-static void every_renderer_draws_them_alike(void **state)
+static void every_renderer_draws_the_effects_alike(void **state)
 {
     (void)state;
     scene s;
@@ -415,7 +419,7 @@ static void every_renderer_draws_them_alike(void **state)
     scene_destroy(&s);
 }
 
-/* From afar, near, and in parallel. */
+/* Views from afar, from near, and in parallel projection. */
 static void every_renderer_fades_with_depth(void **state)
 {
     (void)state;
@@ -475,8 +479,8 @@ static void threads_and_slots_change_no_bit(void **state)
     scene_destroy(&s);
 }
 
-/* What is all but clear neither shades nor hides. */
-static void in_a_clear_volume_effects_change_nothing(void **state)
+/* An almost transparent volume casts no shadow and occludes nothing. */
+static void effects_change_nothing_in_a_transparent_volume(void **state)
 {
     (void)state;
     scene s;
@@ -500,7 +504,7 @@ static void in_a_clear_volume_effects_change_nothing(void **state)
     scene_destroy(&s);
 }
 
-/* A wall across the view, opaque, at voxel *user along z. */
+/* An opaque wall across the view, at voxel *user along z. */
 static bool wall(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)i;
@@ -510,7 +514,7 @@ static bool wall(void *user, int i, int j, int k, unsigned *code, double gradien
     return true;
 }
 
-static void what_is_farther_fades_into_the_background(void **state)
+static void farther_voxels_fade_into_the_background(void **state)
 {
     (void)state;
     for (int at = 3; at < EDGE; at += 6) {
@@ -538,7 +542,7 @@ static void what_is_farther_fades_into_the_background(void **state)
     }
 }
 
-/* How a box of voxels fades with the distance from an eye. */
+/* Returns the depth cueing of a box of voxels for an eye. */
 static trip_effects_view fading(trip_vec3 eye, trip_vec3 look, const uint64_t dims[3])
 {
     const trip_affine map = trip_affine_identity();
@@ -555,8 +559,8 @@ static trip_effects_view fading(trip_vec3 eye, trip_vec3 look, const uint64_t di
     return trip_effects_view_make(&settings, &camera, dims);
 }
 
-/* The eye is in the middle of the box. */
-static void within_the_volume_fading_begins_at_the_eye(void **state)
+/* The eye is in the centre of the box. */
+static void inside_the_volume_fading_begins_at_the_eye(void **state)
 {
     (void)state;
     const uint64_t dims[3] = { 21, 21, 21 };
@@ -565,7 +569,7 @@ static void within_the_volume_fading_begins_at_the_eye(void **state)
         assert_close(e.cue[0] * 3 + e.cue[1] * 4 + e.cue[2] * k + e.cue[3], 1 - k / 10.0, 1e-12);
 }
 
-/* By the lattice's cells, four voxels of 0.5 each. */
+/* The distance depends on the lattice's cells, four voxels of 0.5 each. */
 static void light_is_looked_up_beside_surfaces_by_the_lattices_cells(void **state)
 {
     (void)state;
@@ -588,8 +592,9 @@ static double note_position(const void *user, trip_vec3 voxel)
     return 1;
 }
 
-/* Beside a surface light is looked up three voxels towards it, but not behind it. */
-static void light_at_a_place_is_not_passed(void **state)
+/* Beside a surface, light is looked up three voxels nearer to the light, but not beyond the light.
+ */
+static void light_is_not_looked_up_beyond_its_position(void **state)
 {
     (void)state;
     trip_vec3 asked = { 0, 0, 0 };
@@ -614,7 +619,7 @@ static void light_at_a_place_is_not_passed(void **state)
     }
 }
 
-/* What reaches a place and what is open there, as functions of it. */
+/* Test functions of position: the light that reaches a point, and the openness there. */
 static double test_reached(const void *user, trip_vec3 v)
 {
     (void)user;
@@ -627,7 +632,7 @@ static double test_open(const void *user, trip_vec3 v)
     return 0.5 + 0.45 * sin(2 * v.x - v.y + 1.5 * v.z);
 }
 
-/* The formula of effects.h for a component of a colour, of a light in a direction. */
+/* The formula of effects.h for a component of a colour lit by a directional light. */
 static double lit_component(const trip_effects_view *e, const trip_light *at, trip_vec3 x,
                             const double *gradient, double c)
 {
@@ -655,7 +660,7 @@ static double lit_component(const trip_effects_view *e, const trip_light *at, tr
     return fmin(1, fmax(0, all));
 }
 
-/* Flat, in part and full; with shadows, with occlusion, and with both. */
+/* Without shading, with partial and full shading; with shadows, with occlusion, and with both. */
 static void colours_are_those_of_the_formula(void **state)
 {
     (void)state;
@@ -688,7 +693,8 @@ static void colours_are_those_of_the_formula(void **state)
     assert_true(full > 100 && bright > 100 && changed > 1000);
 }
 
-/* Corner `n` of a box of voxels of three lengths, in index space. */
+/* Returns corner `n` of a box of voxels in index space. The voxels differ in length along the
+ * three axes. */
 static const uint64_t box_dims[3] = { 21, 31, 41 };
 
 static trip_vec3 box_corner(int n)
@@ -696,8 +702,8 @@ static trip_vec3 box_corner(int n)
     return trip_v3(n & 1 ? 20 : 0, n & 2 ? 30 : 0, n & 4 ? 40 : 0);
 }
 
-/* By distances along the gaze in the world: from 0 at the nearest corner before the eye, or at the
- * eye, to 1 at the farthest. */
+/* Cueing depends on the distance along the view direction in world space. It is 0 at the nearest
+ * corner before the eye, or at the eye, and 1 at the farthest corner. */
 static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
 {
     (void)state;
@@ -732,8 +738,8 @@ static void fading_goes_from_the_nearest_corner_to_the_farthest(void **state)
     }
 }
 
-/* Where all of the box lies behind the eye, none of it fades. */
-static void what_lies_behind_the_eye_does_not_fade(void **state)
+/* If the whole box lies behind the eye, no part of it fades. */
+static void volumes_behind_the_eye_do_not_fade(void **state)
 {
     (void)state;
     const trip_effects_view e = fading(trip_v3(10, 15, 50), trip_v3(10, 15, 60), box_dims);
@@ -741,7 +747,7 @@ static void what_lies_behind_the_eye_does_not_fade(void **state)
         assert_true(e.cue[i] == 0);
 }
 
-/* By a form that is below 0 and above 1 in places. */
+/* The linear form is below 0 and above 1 at some positions. */
 static void fading_blends_with_the_background_by_its_share(void **state)
 {
     (void)state;
@@ -789,11 +795,11 @@ static void directions_are_spread_evenly(void **state)
             assert_true(trip_dot(d, trip_effects_direction(m)) < 0.95);
     }
     assert_true(trip_length(sum) / TRIP_OPEN_DIRECTIONS < 0.02);
-    assert_close(sum.z, 0, 1e-12); /* each above has one as far below */
+    assert_close(sum.z, 0, 1e-12); /* every direction above has one equally far below */
 }
 
-/* The second frame reads nothing where the view alone has changed; the light takes a sweep; the
- * function takes all. */
+/* A second frame with another view reads nothing. Another light takes one sweep. Another transfer
+ * function recomputes everything. */
 static void the_lattice_is_kept_until_something_changes(void **state)
 {
     (void)state;
@@ -832,7 +838,7 @@ static void complete(trip_light_map *m, const trip_light_source *source)
     assert_true(trip_light_map_is_complete(m));
 }
 
-/* Of even fog any mean is the same, at nodes beyond its last voxels too. */
+/* Every mean of constant fog is the same, also at nodes beyond the last voxels. */
 static void a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node(void **state)
 {
     (void)state;
@@ -856,7 +862,7 @@ static void a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node(void *
     scene_destroy(&s);
 }
 
-/* The half of the grid along i that *user says, and the sheet of the other half next to it. */
+/* One half of the grid along i, selected by *user, with the adjacent sheet of the other half. */
 static bool half_fog(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)j, (void)k, (void)gradient;
@@ -871,7 +877,7 @@ static bool beside_half_fog(void *user, int i, int j, int k, unsigned *code, dou
     return i == (*(const int *)user == 0 ? EDGE / 2 : EDGE / 2 - 1);
 }
 
-/* What is halo of one data set is kept in the other, and counts once. */
+/* A voxel that is halo in one data set and kept in the other counts once. */
 static void joined_data_sets_make_one_fog(void **state)
 {
     (void)state;
@@ -912,7 +918,7 @@ static void joined_data_sets_make_one_fog(void **state)
     scene_destroy(&halves[1]);
 }
 
-/* On the rim of fog columns beside the node have left it. */
+/* At the rim of the fog, some columns near the node have already left the fog. */
 static bool is_on_rim(trip_vec3 node)
 {
     for (int a = 0; a < 3; a++)
@@ -921,8 +927,9 @@ static bool is_on_rim(trip_vec3 node)
     return false;
 }
 
-/* Between two places of a line that are one apart and `part` of that from the first: by how much
- * the mean of their transmittances by distance differs from that of the place itself. */
+/* Compares the transmittance at `position` with the mean of two points of the line through it,
+ * weighted by distance. The points are one apart, and the first is `part` before `position`.
+ * Returns the difference. */
 static double mean_is_off(trip_vec3 position, trip_vec3 along, double part, trip_vec3 light)
 {
     const trip_vec3 before = trip_sub(position, trip_scale(along, part));
@@ -931,8 +938,9 @@ static double mean_is_off(trip_vec3 position, trip_vec3 along, double part, trip
     return fabs(mean - exp(-FOG * length_in_box(position, light)));
 }
 
-/* What a node in fog may be off: columns are exact there, and at most a node apart in a layer, so
- * it is what linear interpolation between two is off, wherever they lie, along both of its axes. */
+/* Returns the maximum error of a node in fog. Columns are exact, and at most one node apart in a
+ * layer. The error is therefore that of linear interpolation between two columns, wherever they
+ * lie, along both axes of the layer. */
 static double max_off(trip_vec3 node, trip_vec3 light)
 {
     const trip_vec3 way = trip_sub(node, light),
@@ -952,9 +960,9 @@ static double max_off(trip_vec3 node, trip_vec3 light)
     return sum;
 }
 
-/* In even fog the number of a node is known; where there is none it is 1 to the last bit, whichever
- * region the node is of. */
-static void every_node_is_lit_from_a_place_once(void **state)
+/* In constant fog the light at each node is known. Outside the fog it is 1 to the last bit, in
+ * every region. */
+static void every_node_is_lit_from_a_position_once(void **state)
 {
     (void)state;
     const double c = 0.5 * (EDGE - 1), last = EDGE - 1;
@@ -989,7 +997,7 @@ static void every_node_is_lit_from_a_place_once(void **state)
     }
 }
 
-/* The last task first. */
+/* Runs the last task first. */
 static void run_backwards(void *user, void (*task)(void *context, unsigned number), void *context,
                           unsigned count)
 {
@@ -1003,7 +1011,7 @@ static void assert_same_lattice(const trip_light_grid *a, const trip_light_grid 
     assert_memory_equal(a->at, b->at, trip_light_grid_count(a) * sizeof *a->at);
 }
 
-static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
+static void the_lattice_has_the_same_bits_for_any_order_of_tasks(void **state)
 {
     (void)state;
     scene s;
@@ -1033,7 +1041,8 @@ static void whoever_does_the_tasks_the_lattice_has_the_same_bits(void **state)
     scene_destroy(&s);
 }
 
-/* A step does 16384 columns or nodes of a layer or fewer, so that a frame can be given up soon. */
+/* A step computes at most 16384 columns or nodes of a layer, so that a frame can be cancelled
+ * soon. */
 static void a_wide_layer_takes_several_steps(void **state)
 {
     (void)state;
@@ -1065,13 +1074,13 @@ static void a_wide_layer_takes_several_steps(void **state)
     scene_destroy(&s);
 }
 
-/* Means are made and lattices cleared up to so many nodes in a step; what a frame that is given up
- * has left of that, the next one does. */
+/* A step averages or clears a limited number of nodes. If a frame is cancelled, the next one does
+ * the remaining steps. */
 static void a_lattice_of_many_nodes_takes_many_steps(void **state)
 {
     (void)state;
     enum { NODES = 80, COUNT = NODES * NODES * NODES, OPEN_NODES = NODES / 2 + 1 };
-    enum { PIECES = 8, OPEN_PIECES = 2 }; /* of 65536 nodes or so */
+    enum { PIECES = 8, OPEN_PIECES = 2 }; /* of about 65536 nodes each */
     scene s;
     trip_light_map *maps[2];
     const trip_clip none = { 0 };
@@ -1097,7 +1106,7 @@ static void a_lattice_of_many_nodes_takes_many_steps(void **state)
             trip_light_map_await(maps[n], UINT64_MAX);
         }
     }
-    /* The first comes once all has been read. */
+    /* The first step follows the end of reading. */
     assert_int_equal(averages, 1 + PIECES);
     assert_int_equal(sweeps,
                      PIECES + 2 * NODES + OPEN_PIECES + 2 * OPEN_NODES * TRIP_OPEN_DIRECTIONS);
@@ -1177,34 +1186,34 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fog_lit_from_the_side_is_darker_away_from_the_light),
-        cmocka_unit_test(what_is_cut_away_casts_no_shadow),
-        cmocka_unit_test(what_is_left_of_a_segment_fades_where_it_is),
+        cmocka_unit_test(clipped_voxels_cast_no_shadow),
+        cmocka_unit_test(the_rest_of_a_clipped_segment_fades_at_its_own_depth),
         cmocka_unit_test(fog_lit_from_the_front_scatters_backwards),
-        cmocka_unit_test(fog_is_lit_from_a_place),
+        cmocka_unit_test(fog_is_lit_from_a_position),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
         cmocka_unit_test(a_light_far_away_is_one_in_a_direction),
         cmocka_unit_test(a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node),
         cmocka_unit_test(joined_data_sets_make_one_fog),
-        cmocka_unit_test(every_node_is_lit_from_a_place_once),
+        cmocka_unit_test(every_node_is_lit_from_a_position_once),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
         cmocka_unit_test(openness_is_the_mean_over_directions),
-        cmocka_unit_test(every_renderer_draws_them_alike),
+        cmocka_unit_test(every_renderer_draws_the_effects_alike),
         cmocka_unit_test(every_renderer_fades_with_depth),
         cmocka_unit_test(threads_and_slots_change_no_bit),
-        cmocka_unit_test(in_a_clear_volume_effects_change_nothing),
-        cmocka_unit_test(what_is_farther_fades_into_the_background),
-        cmocka_unit_test(within_the_volume_fading_begins_at_the_eye),
+        cmocka_unit_test(effects_change_nothing_in_a_transparent_volume),
+        cmocka_unit_test(farther_voxels_fade_into_the_background),
+        cmocka_unit_test(inside_the_volume_fading_begins_at_the_eye),
         cmocka_unit_test(light_is_looked_up_beside_surfaces_by_the_lattices_cells),
-        cmocka_unit_test(light_at_a_place_is_not_passed),
+        cmocka_unit_test(light_is_not_looked_up_beyond_its_position),
         cmocka_unit_test(colours_are_those_of_the_formula),
         cmocka_unit_test(fading_goes_from_the_nearest_corner_to_the_farthest),
-        cmocka_unit_test(what_lies_behind_the_eye_does_not_fade),
+        cmocka_unit_test(volumes_behind_the_eye_do_not_fade),
         cmocka_unit_test(fading_blends_with_the_background_by_its_share),
         cmocka_unit_test(scattering_keeps_light),
         cmocka_unit_test(directions_are_spread_evenly),
         cmocka_unit_test(the_lattice_is_kept_until_something_changes),
         cmocka_unit_test(a_renderer_without_effects_refuses_them),
-        cmocka_unit_test(whoever_does_the_tasks_the_lattice_has_the_same_bits),
+        cmocka_unit_test(the_lattice_has_the_same_bits_for_any_order_of_tasks),
         cmocka_unit_test(a_wide_layer_takes_several_steps),
         cmocka_unit_test(a_lattice_of_many_nodes_takes_many_steps),
         cmocka_unit_test(a_lattice_that_does_not_fit_is_refused),

@@ -1,5 +1,5 @@
-/* Emission by a second data set: closed forms of slabs, Simpson's rule, and one renderer against
- * another. */
+/* Emission by a second data set. Compares slabs with closed forms and Simpson's rule, and the
+ * renderers with each other. */
 #include "emission.h"
 
 #include "black_body.h"
@@ -11,7 +11,7 @@ enum { EDGE = 20, SIZE = 9, HOTTEST = 65535 };
 
 static const double kelvin[2] = { 300, 2400 };
 
-/* E of emission.h. */
+/* Computes E of emission.h. */
 static void radiance(double heat, double rgb[3])
 {
     const double t = kelvin[0] + (kelvin[1] - kelvin[0]) * heat;
@@ -20,7 +20,7 @@ static void radiance(double heat, double rgb[3])
         rgb[i] = trip_display_of_linear(rgb[i] * pow(t / kelvin[1], 4));
 }
 
-/* Even fog in a cube. */
+/* Creates constant fog in a cube. */
 static void create_fog(scene *s, float grey)
 {
     scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE } });
@@ -28,7 +28,7 @@ static void create_fog(scene *s, float grey)
         s->table[code] = (trip_tf_entry){ grey, grey, grey, (float)FOG };
 }
 
-/* Heat on a grid of its own, for frames of s. */
+/* Adds a heat volume on a grid of its own to the scene `s`. */
 static void heat(scene *s, scene *hot, const scene_params *params, int cells)
 {
     scene_create(hot, params);
@@ -74,7 +74,8 @@ static scene_picture integrate(const scene *s, const trip_camera_params *view,
     return scene_integrate(s, view, settings, &(scene_making){ 0 });
 }
 
-/* The picture's middle against a colour; the integral, then all that classify values. */
+/* Compares the centre of the picture with a colour, for the integral and for all renderers that
+ * support `post`. */
 static void assert_middle(const scene *s, const trip_settings *settings, const double expected[3],
                           double exact, double bound)
 {
@@ -96,7 +97,7 @@ static bool even(void *user, int i, int j, int k, unsigned *code, double gradien
     return true;
 }
 
-/* Grey fog: what it scatters stays. */
+/* The fog is grey, so that scattering keeps the light. */
 static void a_slab_of_even_heat_radiates_as_much_as_it_absorbs(void **state)
 {
     (void)state;
@@ -117,7 +118,7 @@ static void a_slab_of_even_heat_radiates_as_much_as_it_absorbs(void **state)
     }
 }
 
-/* Along z, from 0 to the hottest. */
+/* Heat rises along z from 0 to its maximum. */
 static bool rising(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)i, (void)j, (void)gradient;
@@ -125,7 +126,8 @@ static bool rising(void *user, int i, int j, int k, unsigned *code, double gradi
     return true;
 }
 
-/* From above down z, heat linear over a height from z = 0 on, without end beyond. */
+/* Integrates down the z axis by Simpson's rule. Heat rises linearly from z = 0 over a height and
+ * does not end beyond it. */
 static void rising_radiance(double height, double out[3])
 {
     enum { STEPS = 4000 };
@@ -141,8 +143,9 @@ static void rising_radiance(double height, double out[3])
     }
 }
 
-/* The heat's voxels are 1, or 2, 3 and 2 long, and begin elsewhere; lattices of one voxel. */
-static void heat_lies_where_its_own_grid_has_it(void **state)
+/* Voxels of the heat are 1 long, or 2, 3 and 2, and have another origin. Cells of the lattice are
+ * one voxel. */
+static void heat_lies_at_the_positions_of_its_own_grid(void **state)
 {
     (void)state;
     const scene_params grids[] = {
@@ -166,7 +169,7 @@ static void heat_lies_where_its_own_grid_has_it(void **state)
     }
 }
 
-/* Heat at x up to 7 alone; over the next voxel it falls to 0. */
+/* Heat fills x up to 7 and falls to 0 over the next voxel. */
 static void beyond_its_grid_heat_falls_to_nothing_over_a_voxel(void **state)
 {
     (void)state;
@@ -209,7 +212,7 @@ static double mean_off(const scene_picture *a, const scene_picture *b)
     return sum / (4 * SIZE * SIZE);
 }
 
-/* Against the integral by a lattice of a voxel. */
+/* Compares with the integral that uses a lattice of one voxel. */
 static void the_error_falls_as_the_lattice_becomes_finer(void **state)
 {
     (void)state;
@@ -236,8 +239,9 @@ static void the_error_falls_as_the_lattice_becomes_finer(void **state)
     assert_true(before < 0.02);
 }
 
-/* With all else that effects and classification may be, in a scene_sheared grid. */
-static void every_renderer_draws_it_alike(void **state)
+/* Draws with all other effects and settings of classification, in a grid with the map
+ * scene_sheared. */
+static void every_renderer_draws_emission_alike(void **state)
 {
     (void)state;
     scene s, hot;
@@ -278,10 +282,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slab_of_even_heat_radiates_as_much_as_it_absorbs),
-        cmocka_unit_test(heat_lies_where_its_own_grid_has_it),
+        cmocka_unit_test(heat_lies_at_the_positions_of_its_own_grid),
         cmocka_unit_test(beyond_its_grid_heat_falls_to_nothing_over_a_voxel),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),
-        cmocka_unit_test(every_renderer_draws_it_alike),
+        cmocka_unit_test(every_renderer_draws_emission_alike),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* EWA volume splatting (render/ewa.h, the footprint EWA of splat.h): the algebra against closed
- * forms and quadrature, pictures against sums of Gaussians, renderers against the reference. */
+/* EWA volume splatting (render/ewa.h, the footprint EWA of splat.h). Compares the algebra with
+ * closed forms and quadrature, pictures with sums of Gaussians, and renderers with the reference.
+ */
 #include "cpu_scenes.h"
 #include "ewa.h"
 #include "splat.h"
@@ -45,7 +46,7 @@ static double gaussian2(const trip_covariance2 *s, double x, double y)
     return exp(-0.5 * (c.xx * x * x + 2 * c.xy * x * y + c.yy * y * y)) / (2 * PI * sqrt(s->det));
 }
 
-/* By the inverse's cofactors, independent of ewa.c. */
+/* Evaluates a Gaussian by the cofactors of its inverse, independently of ewa.c. */
 static double gaussian3(const trip_covariance *v, trip_vec3 p)
 {
     double axx = v->yy * v->zz - v->yz * v->yz, axy = v->xz * v->yz - v->xy * v->zz;
@@ -63,7 +64,7 @@ static void the_jacobian_of_a_unit_camera_is_the_papers(void **state)
     (void)state;
     trip_affine map = trip_affine_identity();
     trip_camera_params p = { .look = { 0, 0, 1 }, .up = { 0, -1, 0 }, .width = 200, .height = 200 };
-    p.fov_degrees = 2 * atan(1) * 180 / PI; /* a unit is 100 pixels at depth 1 */
+    p.fov_degrees = 2 * atan(1) * 180 / PI; /* one unit is 100 pixels at depth 1 */
     trip_camera c;
     assert_int_equal(trip_camera_make(&c, &p, &map), 0);
     for (int i = 0; i < 50; i++) {
@@ -87,7 +88,7 @@ static void the_jacobian_of_a_unit_camera_is_the_papers(void **state)
     }
 }
 
-/* Differences of ray space's coordinates themselves. */
+/* Computes finite differences of the coordinates of ray space. */
 static void the_jacobian_is_the_derivative_of_ray_space(void **state)
 {
     (void)state;
@@ -129,7 +130,7 @@ static void a_gaussian_stays_one_under_affine_maps(void **state)
     }
 }
 
-/* Section 4.5, where the map is affine, by quadrature along the ray. */
+/* Section 4.5 for an affine map, by quadrature along the ray. */
 static void integrated_covariances_are_those_of_line_integrals(void **state)
 {
     (void)state;
@@ -149,7 +150,7 @@ static void integrated_covariances_are_those_of_line_integrals(void **state)
     }
 }
 
-/* By quadrature of the convolution. */
+/* Compares with quadrature of the convolution. */
 static void low_passed_covariances_are_those_of_convolutions(void **state)
 {
     (void)state;
@@ -170,13 +171,13 @@ static void uniform_scaling_widens_the_shortest_axis_to_the_filter(void **state)
     (void)state;
     trip_covariance2 thin = { 9, 0, 0.04, 0.36 }, s = trip_covariance2_scaled(&thin, 0.16);
     assert_close(s.yy, 0.16, 1e-12);
-    assert_close(s.xx, 36, 1e-12); /* as much longer, which a convolution is not: 9.16 */
+    assert_close(s.xx, 36, 1e-12); /* scaled by this factor, unlike in a convolution: 9.16 */
     assert_close(s.det, s.xx * s.yy, 1e-12);
     trip_covariance2 large = { 9, 1, 4, 35 };
     assert_close(trip_covariance2_scaled(&large, 0.16).xx, 9, 0);
 }
 
-/* Section 5: as s grows, the footprint is that of a disc with T3 of two tangents: T3 T3^T. */
+/* Section 5: as s grows, the footprint becomes that of a disc with T3 of two tangents: T3 T3^T. */
 static void flat_kernels_become_surface_kernels(void **state)
 {
     (void)state;
@@ -197,8 +198,6 @@ static void flat_kernels_become_surface_kernels(void **state)
     }
 }
 
-/* ---- splats ---- */
-
 static trip_settings ewa_settings(void)
 {
     trip_settings s = trip_settings_default();
@@ -206,8 +205,8 @@ static trip_settings ewa_settings(void)
     return s;
 }
 
-/* What splat.h says: S is the exact form's, and so are the numbers at the centre. */
-static void at_the_centre_and_in_parallel_views_nothing_is_approximated(void **state)
+/* As splat.h states, S equals S of the exact footprint, and so do the numbers at the centre. */
+static void parallel_views_and_splat_centres_are_exact(void **state)
 {
     (void)state;
     int affine = 0;
@@ -269,8 +268,9 @@ static void affine_supports_are_ellipses_within_their_radius(void **state)
     assert_in_range(near, 20, 600);
 }
 
-/* The same of flat kernels that are scaled, which may be larger than round ones by far; in parallel
- * views rays begin in the plane of the eye. */
+/* Every ray of a scaled flat support passes within its radius, and its pixels lie in its bounds.
+ * Such supports may be much larger than round ones. Rays of parallel views begin in the plane of
+ * the eye. */
 static void scaled_flat_supports_are_within_their_radius(void **state)
 {
     (void)state;
@@ -308,9 +308,7 @@ static void scaled_flat_supports_are_within_their_radius(void **state)
     assert_in_range(larger, 100, 16000);
 }
 
-/* ---- pictures ---- */
-
-/* Voxels here and there. */
+/* A few scattered voxels. */
 static bool scattered(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -334,7 +332,8 @@ static trip_affine uneven_map(void)
     return m;
 }
 
-/* Of one pixel: the sum of the voxels' Gaussians, by the formulas of the paper. */
+/* Returns the expected optical depth of a pixel: the sum of the voxels' Gaussians, by the formulas
+ * of the paper. */
 static double expected_depth(const trip_camera *c, const trip_settings *settings, double extinction,
                              double x, double y)
 {
@@ -397,7 +396,7 @@ static void pictures_are_sums_of_gaussians(void **state)
     scene_destroy(&s);
 }
 
-/* Every renderer against the reference. */
+/* Compares every renderer with the reference. */
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
     scene_picture expected = scene_draw(s, scene_renderers(), view, settings);
@@ -413,7 +412,8 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
     scene_picture_free(&expected);
 }
 
-/* Cubes and sheared voxels, from outside, from within, from far away and in parallel. */
+/* Draws cubes and sheared voxels from outside, from inside, from far away and in parallel
+ * projection. */
 static void compare_views(double flatten)
 {
     const trip_affine sheared = cpu_scenes_sheared();
@@ -442,7 +442,7 @@ static void renderers_agree_with_the_reference(void **state)
     compare_views(1);
 }
 
-static void renderers_flatten_as_the_reference_does(void **state)
+static void renderers_flatten_like_the_reference(void **state)
 {
     (void)state;
     compare_views(5);
@@ -459,9 +459,9 @@ static trip_settings flat_and_scaled(void)
     return settings;
 }
 
-/* Clip draws a pixel by the list that axis draws all by, or by another: no splat that reaches it is
- * left out because its middle is weighed elsewhere. */
-static void scaled_flat_splats_reach_over_where_lists_meet(void **state)
+/* With `clip`, the list of a pixel may differ from the list of the splat's centre. A splat that
+ * reaches the pixel must not be left out because its centre has no weight. */
+static void scaled_flat_splats_reach_across_borders_between_lists(void **state)
 {
     (void)state;
     scene s;
@@ -488,8 +488,8 @@ static void scaled_flat_splats_reach_over_where_lists_meet(void **state)
     scene_destroy(&s);
 }
 
-/* A picture is the middle of a larger one; what is seen edge-on lies along the rim. */
-static void scaled_flat_splats_reach_in_from_beside_the_picture(void **state)
+/* The picture is the centre of a larger picture. Objects seen edge-on lie along the rim. */
+static void scaled_flat_splats_reach_in_from_outside_the_picture(void **state)
 {
     (void)state;
     scene s;
@@ -521,7 +521,8 @@ static double conic_det(const trip_splat *s)
     return s->conic_xx * s->conic_yy - s->conic_xy * s->conic_xy;
 }
 
-/* Seen face on a flat kernel looks round; edge on it is thin one way, and holds as much. */
+/* Seen face-on, a flat kernel looks round. Seen edge-on, it is thin in one direction and has the
+ * same mass. */
 static void kernels_are_flattened_along_their_gradients(void **state)
 {
     (void)state;
@@ -556,14 +557,14 @@ int main(void)
         cmocka_unit_test(low_passed_covariances_are_those_of_convolutions),
         cmocka_unit_test(uniform_scaling_widens_the_shortest_axis_to_the_filter),
         cmocka_unit_test(flat_kernels_become_surface_kernels),
-        cmocka_unit_test(at_the_centre_and_in_parallel_views_nothing_is_approximated),
+        cmocka_unit_test(parallel_views_and_splat_centres_are_exact),
         cmocka_unit_test(affine_supports_are_ellipses_within_their_radius),
         cmocka_unit_test(scaled_flat_supports_are_within_their_radius),
         cmocka_unit_test(pictures_are_sums_of_gaussians),
         cmocka_unit_test(renderers_agree_with_the_reference),
-        cmocka_unit_test(renderers_flatten_as_the_reference_does),
-        cmocka_unit_test(scaled_flat_splats_reach_over_where_lists_meet),
-        cmocka_unit_test(scaled_flat_splats_reach_in_from_beside_the_picture),
+        cmocka_unit_test(renderers_flatten_like_the_reference),
+        cmocka_unit_test(scaled_flat_splats_reach_across_borders_between_lists),
+        cmocka_unit_test(scaled_flat_splats_reach_in_from_outside_the_picture),
         cmocka_unit_test(kernels_are_flattened_along_their_gradients),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

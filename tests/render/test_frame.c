@@ -13,10 +13,10 @@ static void make_scene(scene *s)
     scene_colour(s, 0, 65535, 1, 0.8, 0.6, 0.2);
 }
 
-/* A signal to raise once the frame is planned; 0: none. */
+/* The signal to raise once the frame is planned; 0 for none. */
 static int signal_when_planned;
 
-/* One frame with what is given; returns its status. */
+/* Draws one frame with the given renderer and reader, and returns its status. */
 static int draw(const scene *s, trip_renderer *r, trip_reader *reader,
                 const trip_camera_params *view, float *rgba, trip_frame_stats *stats)
 {
@@ -184,7 +184,7 @@ static void a_failed_or_damaged_read_ends_the_frame_with_one_report(void **state
     scene_destroy(&s);
 }
 
-static void without_memory_for_its_pixels_the_reference_says_so(void **state)
+static void the_reference_reports_missing_memory_for_its_pixels(void **state)
 {
     (void)state;
     scene s;
@@ -203,14 +203,14 @@ static void without_memory_for_its_pixels_the_reference_says_so(void **state)
     scene_destroy(&s);
 }
 
-/* A renderer that is done with a batch only when it is waited for, and looks then whether the batch
- * is still what it was. */
+/* A renderer that finishes a batch only when the frame waits for it. Before that, it checks that
+ * the batch is unchanged. */
 typedef struct lazy {
     trip_renderer base;
-    unsigned max, drawn, done; /* batches: that may be held, drawn, done with */
-    unsigned fail_at;          /* the draw that fails; 0: none */
-    bool awaited;              /* since a batch was done with */
-    uint32_t sums[64];         /* of batches, by their number modulo 64 */
+    unsigned max, drawn, done; /* batches: maximum held, drawn, finished */
+    unsigned fail_at;          /* number of the draw that fails; 0 for none */
+    bool awaited;              /* set if a wait occurred since the last batch was finished */
+    uint32_t sums[64];         /* checksums of batches, by their number modulo 64 */
 } lazy;
 
 static uint32_t sum_of(const trip_batch *batch)
@@ -250,7 +250,7 @@ static int lazy_draw(trip_renderer *r, const trip_batch *batch, bool front_to_ba
     return l->drawn == l->fail_at ? trip_fail(TRIP_ERROR, "test", "draw", "fails") : 0;
 }
 
-/* Only what was waited for. */
+/* Reports only the batches that were waited for. */
 static int lazy_is_done(trip_renderer *r, const trip_batch *batch)
 {
     lazy *l = (lazy *)r;
@@ -293,7 +293,7 @@ static const trip_renderer_ops lazy_ops = {
     .stats = lazy_stats,
 };
 
-static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void **state)
+static void batches_stay_unchanged_until_the_renderer_has_finished_them(void **state)
 {
     (void)state;
     scene s;
@@ -310,7 +310,7 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
         assert_int_equal(l.drawn - l.done, l.drawn < held[i] ? l.drawn : held[i]);
         uint64_t splats = stats.reader.splats;
         assert_true(l.drawn > 1 && splats > 0);
-        l.fail_at = l.drawn / 2 + 1; /* a frame given up leaves no slot behind */
+        l.fail_at = l.drawn / 2 + 1; /* a cancelled frame leaves no slot behind */
         test_catch_reports();
         assert_int_equal(draw(&s, &l.base, reader, &view, rgba, &stats), TRIP_ERROR);
         assert_one_report("test: draw: fails");
@@ -322,7 +322,7 @@ static void batches_stay_as_they_are_until_the_renderer_is_done_with_them(void *
     scene_destroy(&s);
 }
 
-/* The last test: nothing takes the signal back. */
+/* This test runs last because nothing clears the signal. */
 static void plan_is_interrupted(const scene *s, const trip_camera_params *view)
 {
     trip_camera camera;
@@ -367,8 +367,8 @@ int main(void)
         cmocka_unit_test(bytes_and_splats_are_counted_for_each_list),
         cmocka_unit_test(progress_rises_to_the_number_of_splats),
         cmocka_unit_test(a_failed_or_damaged_read_ends_the_frame_with_one_report),
-        cmocka_unit_test(without_memory_for_its_pixels_the_reference_says_so),
-        cmocka_unit_test(batches_stay_as_they_are_until_the_renderer_is_done_with_them),
+        cmocka_unit_test(the_reference_reports_missing_memory_for_its_pixels),
+        cmocka_unit_test(batches_stay_unchanged_until_the_renderer_has_finished_them),
         cmocka_unit_test(an_interrupt_ends_plan_and_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-/* Frames in steps: that may be looked at, given up, and drawn side by side. */
+/* Frames drawn in steps. Such frames can be inspected, cancelled, and drawn side by side. */
 #include "desk.h"
 
 #include <pthread.h>
@@ -6,14 +6,15 @@
 #include <string.h>
 #include <time.h>
 
-/* Every component is there, and no pixel more opaque than light can be held back. */
+/* Every component must be in range, and no pixel may be more opaque than early termination allows.
+ */
 static void check_range(const float *rgba)
 {
     for (int i = 0; i < 4 * PIXELS; i++)
         assert_true(rgba[i] >= 0 && rgba[i] <= 1.00001f);
 }
 
-/* What is drawn only ever adds. */
+/* Drawing only ever adds to the picture. */
 static void check_growth(const float *before, const float *after)
 {
     for (int i = 0; i < PIXELS; i++)
@@ -62,7 +63,7 @@ static void take_steps(const scene *s, const scene_renderer *kind, trip_classify
     put_away(&d);
 }
 
-/* Values whose differences to either side are not the same. */
+/* Values with different differences to the two sides. */
 static bool waves(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -72,8 +73,9 @@ static bool waves(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Of lit values, whose gradients are of what was there when it was looked at. */
-static void steps_and_looks_leave_the_picture_the_same(void **state)
+/* Draws with shading in `post`, so that gradients depend on the sheets decoded at the time of
+ * inspection. */
+static void steps_and_inspections_leave_the_picture_the_same(void **state)
 {
     (void)state;
     scene s;
@@ -101,13 +103,14 @@ static void a_batch_is_drawn_in_pieces_when_there_is_a_deadline(void **state)
         set_up(&d, &s, kind, (trip_reader_params){ .engine = TRIP_ENGINE_NULL });
         assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
         while ((status = trip_frame_step(&drawing, 0)) > 0) {
-            /* Nothing is read: a graphics device alone is waited for. */
+            /* Reads have ended: the frame waits for the graphics device alone. */
             assert_true(status == TRIP_FRAME_MORE || d.renderer->ops->await);
             if (status == TRIP_FRAME_WAITS)
                 trip_frame_await(&drawing, UINT64_MAX);
             steps += status == TRIP_FRAME_MORE;
         }
-        /* 24000 splats a layer, which one batch holds; a software GL has pieces of 4096. */
+        /* A layer has 24000 splats, which fit into one batch. A software GL draws pieces of 4096.
+         */
         assert_int_equal(steps, d.renderer->software ? 18 : 6);
         trip_frame_end(&drawing);
         put_away(&d);
@@ -115,8 +118,8 @@ static void a_batch_is_drawn_in_pieces_when_there_is_a_deadline(void **state)
     scene_destroy(&s);
 }
 
-/* Reads wait here until they may go on, but for the first few. A gate that is left closed opens
- * by itself after GATE_SECONDS, and then has failed. */
+/* Reads wait at this gate until it opens, except for the first few. A gate that stays closed opens
+ * by itself after GATE_SECONDS and records a failure. */
 typedef struct gate {
     pthread_mutex_t lock;
     pthread_cond_t opened;
@@ -198,7 +201,7 @@ static void a_step_does_not_wait_for_the_disk(void **state)
     scene_destroy(&s);
 }
 
-/* So slow that no frame is done within 10 ms. */
+/* The read is so slow that no frame ends within 10 ms. */
 static long read_slowly(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
     (void)user;
@@ -209,7 +212,7 @@ static long read_slowly(void *user, void *data, uint64_t offset, size_t bytes, l
     return result;
 }
 
-static void a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is(void **state)
+static void a_frame_cancelled_during_reads_leaves_the_next_one_unchanged(void **state)
 {
     (void)state;
     scene s;
@@ -264,7 +267,7 @@ static double thread_seconds(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-/* Whether a read waits at the gate. */
+/* Returns true if a read waits at the gate. */
 static bool has_come(gate *g)
 {
     pthread_mutex_lock(&g->lock);
@@ -273,8 +276,8 @@ static bool has_come(gate *g)
     return has;
 }
 
-/* Gives a frame up after some of its reads, while others wait at the gate; returns the processor
- * time that it takes. */
+/* Cancels a frame after `reads` reads, while others wait at the gate. Returns the processor time
+ * of the cancellation. */
 static double stop_at_gate(desk *d, gate *g, unsigned reads)
 {
     trip_drawing drawing;
@@ -324,7 +327,7 @@ static void check_stopping(const scene *s, const scene_renderer *kind, trip_read
     assert_false(g.failed);
 }
 
-static void a_frame_that_is_given_up_waits_for_no_read(void **state)
+static void a_cancelled_frame_waits_for_no_read(void **state)
 {
     (void)state;
     scene s;
@@ -341,7 +344,7 @@ static void a_frame_that_is_given_up_waits_for_no_read(void **state)
     scene_destroy(&s);
 }
 
-/* Every read takes another time. */
+/* Each read takes a different time. */
 static long read_unevenly(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
     _Atomic uint32_t *count = user;
@@ -377,7 +380,7 @@ static void check_many_stops(const scene *s, const scene_renderer *kind, trip_re
     put_away(&d);
 }
 
-static void frames_given_up_at_random_leave_the_next_one_as_it_is(void **state)
+static void frames_cancelled_at_random_leave_the_next_one_unchanged(void **state)
 {
     (void)state;
     scene s;
@@ -395,7 +398,7 @@ static void frames_given_up_at_random_leave_the_next_one_as_it_is(void **state)
     scene_destroy(&s);
 }
 
-static void a_cancelled_frame_fails_and_says_so_once(void **state)
+static void a_cancelled_frame_fails_with_one_message(void **state)
 {
     (void)state;
     scene s;
@@ -424,7 +427,8 @@ static void a_cancelled_frame_fails_and_says_so_once(void **state)
     scene_destroy(&s);
 }
 
-/* A batch handed to a renderer is drawn to its end but for what cancelling leaves out. */
+/* Counts batches. A batch handed to a renderer is drawn to its end, unless the frame is cancelled.
+ */
 typedef struct counting {
     trip_renderer base;
     trip_drawing *drawing;
@@ -503,8 +507,9 @@ static int create_cpu(trip_renderer **out, trip_budget *budget)
     return trip_cpu_create(out, budget, 2);
 }
 
-/* Large splats, so that blending what is under way takes long: not so once it is given up. */
-static void cancelling_costs_little_of_what_drawing_costs(void **state)
+/* Splats are large, so that blending takes long. A cancelled frame must not blend the splats under
+ * way. */
+static void cancelling_costs_little_compared_with_drawing(void **state)
 {
     (void)state;
     static const scene_renderer cpu = { "cpu", create_cpu, 0 };
@@ -545,12 +550,12 @@ typedef struct artist {
     const scene_renderer *kind;
     scene scene;
     trip_drawing drawing; /* of the last frame */
-    gate begun;           /* open when that is under way */
+    gate begun;           /* open when the last frame is under way */
     int status, frames;
     bool same;
 } artist;
 
-/* Until a frame is cancelled. */
+/* Draws frames until one is cancelled. */
 static void *draw_until_cancelled(void *user)
 {
     artist *a = user;
@@ -571,7 +576,7 @@ static void *draw_until_cancelled(void *user)
         if (a->status > 0)
             a->status = trip_frame_picture(&a->drawing, rgba, NULL);
     } while (a->status == 0 && !a->drawing.done);
-    while (a->status == 0) /* it was quick: the picture is taken again and again */
+    while (a->status == 0) /* the frame ended before its cancellation: draw again */
         a->status = trip_frame_picture(&a->drawing, rgba, NULL);
     trip_frame_end(&a->drawing);
     trip_report_release(&held);
@@ -631,15 +636,15 @@ static void frames_of_two_data_sets_are_drawn_in_two_threads(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(steps_and_looks_leave_the_picture_the_same),
+        cmocka_unit_test(steps_and_inspections_leave_the_picture_the_same),
         cmocka_unit_test(a_batch_is_drawn_in_pieces_when_there_is_a_deadline),
         cmocka_unit_test(a_step_does_not_wait_for_the_disk),
-        cmocka_unit_test(a_frame_stopped_while_it_is_read_leaves_the_next_one_as_it_is),
-        cmocka_unit_test(a_frame_that_is_given_up_waits_for_no_read),
-        cmocka_unit_test(frames_given_up_at_random_leave_the_next_one_as_it_is),
-        cmocka_unit_test(a_cancelled_frame_fails_and_says_so_once),
+        cmocka_unit_test(a_frame_cancelled_during_reads_leaves_the_next_one_unchanged),
+        cmocka_unit_test(a_cancelled_frame_waits_for_no_read),
+        cmocka_unit_test(frames_cancelled_at_random_leave_the_next_one_unchanged),
+        cmocka_unit_test(a_cancelled_frame_fails_with_one_message),
         cmocka_unit_test(no_batch_is_drawn_after_cancelling),
-        cmocka_unit_test(cancelling_costs_little_of_what_drawing_costs),
+        cmocka_unit_test(cancelling_costs_little_compared_with_drawing),
         cmocka_unit_test(frames_of_two_data_sets_are_drawn_in_two_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -4,7 +4,7 @@
 
 #define DEGREE (3.14159265358979323846 / 180)
 
-/* Anisotropic, rotated and sheared. */
+/* Returns an anisotropic, rotated and sheared map. */
 static trip_affine sheared(void)
 {
     return (trip_affine){ { { 0.5, 0.2, -0.1, 3 }, { -0.3, 1.5, 0.4, -2 }, { 0.1, 0.2, 2.5, 7 } } };
@@ -17,7 +17,7 @@ static trip_camera_params frame(const trip_camera_framing *f, trip_affine m)
     return p;
 }
 
-/* The picture's axes in world space, worked out from the parameters alone. */
+/* Computes the picture's axes in world space from the parameters alone. */
 static void axes_of(const trip_camera_params *p, trip_vec3 *right, trip_vec3 *up,
                     trip_vec3 *view_direction)
 {
@@ -26,7 +26,7 @@ static void axes_of(const trip_camera_params *p, trip_vec3 *right, trip_vec3 *up
     *up = trip_cross(*right, *view_direction);
 }
 
-/* Where a world point is in the picture: half widths to the right, half heights up. */
+/* Computes the picture position of a world point: half widths to the right, half heights up. */
 static void position_of(const trip_camera_params *p, trip_vec3 point, double at[2])
 {
     trip_vec3 right, up, view_direction, d = trip_sub(point, p->eye);
@@ -62,7 +62,7 @@ static void box_bounds(const trip_camera_framing *f, trip_affine m, const trip_c
     }
 }
 
-/* Both ends of the tight direction at the margin, and the other direction in the middle. */
+/* Both ends of the tighter direction must be at the margin. The other direction must be centred. */
 static void assert_fits(const double lo[2], const double hi[2])
 {
     int tight = hi[1] - lo[1] > hi[0] - lo[0];
@@ -72,7 +72,7 @@ static void assert_fits(const double lo[2], const double hi[2])
     assert_true(hi[!tight] <= 0.9 + 1e-9);
 }
 
-static void a_box_fills_all_but_the_margins_and_is_in_the_middle(void **state)
+static void a_box_is_centred_and_fills_the_picture_up_to_the_margins(void **state)
 {
     (void)state;
     const double sizes[][3] = { { 100, 100, 100 }, { 10, 200, 30 }, { 1, 1, 1 } };
@@ -96,7 +96,7 @@ static void a_box_fills_all_but_the_margins_and_is_in_the_middle(void **state)
     }
 }
 
-/* A sphere of radius 4 about (1, -2, 3), in the identity's index space. */
+/* A sphere of radius 4 about (1, -2, 3), in the index space of the identity map. */
 static int reach_of_sphere(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
                            int count, double *values)
 {
@@ -107,8 +107,8 @@ static int reach_of_sphere(void *user, const trip_reach_origin *origin, const tr
     return 0;
 }
 
-/* The cone about a sphere of radius r at distance d has half the angle asin(r / d). */
-static void a_sphere_is_as_far_off_as_its_cone_of_sight_calls_for(void **state)
+/* The cone about a sphere of radius r at distance d has the half angle asin(r / d). */
+static void a_sphere_has_the_distance_of_its_tangent_cone(void **state)
 {
     (void)state;
     int calls = 0;
@@ -130,7 +130,7 @@ static void a_sphere_is_as_far_off_as_its_cone_of_sight_calls_for(void **state)
     to = trip_sub(trip_v3(1, -2, 3), p.eye);
     view_direction = trip_normalize(trip_sub(p.look, p.eye));
     assert_close(trip_length(trip_cross(to, view_direction)), 0, 1e-9);
-    assert_true(trip_dot(to, view_direction) > 4); /* the eye is in front of it */
+    assert_true(trip_dot(to, view_direction) > 4); /* the eye is in front of the sphere */
 }
 
 static int reach_fails(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
@@ -140,7 +140,7 @@ static int reach_fails(void *user, const trip_reach_origin *origin, const trip_r
     return TRIP_ERROR;
 }
 
-static void where_reaches_cannot_be_found_there_is_no_view(void **state)
+static void without_reaches_there_is_no_view(void **state)
 {
     (void)state;
     trip_affine identity = trip_affine_identity();
@@ -156,7 +156,7 @@ static void where_reaches_cannot_be_found_there_is_no_view(void **state)
     }
 }
 
-static void a_given_height_of_a_parallel_view_stays_and_its_object_is_in_the_middle(void **state)
+static void a_parallel_view_keeps_a_given_height_and_centres_its_object(void **state)
 {
     (void)state;
     trip_camera_framing f = {
@@ -170,7 +170,7 @@ static void a_given_height_of_a_parallel_view_stays_and_its_object_is_in_the_mid
         assert_close(lo[a], -hi[a], 1e-9);
 }
 
-/* Of the corners of the box, turned once round in small steps. */
+/* Returns the bounds of the box's corners over one turn in small steps. */
 static void turned_bounds(const trip_camera_framing *f, trip_affine m,
                           const trip_camera_params *first, double lowest[2], double highest[2])
 {
@@ -187,7 +187,7 @@ static void turned_bounds(const trip_camera_framing *f, trip_affine m,
 }
 
 /* The corners touch a margin and never cross one. */
-static void an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margins(void **state)
+static void a_turning_object_stays_in_the_picture_and_touches_its_margins(void **state)
 {
     (void)state;
     const double sizes[][3] = { { 100, 100, 100 }, { 10, 200, 30 }, { 5, 5, 300 } };
@@ -208,14 +208,14 @@ static void an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margin
         double max = fmax(fmax(highest[0], -lowest[0]), fmax(highest[1], -lowest[1]));
         assert_true(max <= 0.9 + 1e-9);
         assert_close(max, 0.9, 1e-4);
-        /* Its axis goes through the middle of the box. */
+        /* The turntable's axis passes through the centre of the box. */
         assert_close(first.look.x, d[0] / 2, 1e-9);
         assert_close(first.look.y, d[1] / 2, 1e-9);
     }
 }
 
-/* A tower, whose top is nearer than its foot. */
-static void a_turntable_leaves_as_much_above_as_below_however_it_is_rolled(void **state)
+/* A tower; its top is nearer than its foot. */
+static void a_rolled_turntable_is_centred_vertically(void **state)
 {
     (void)state;
     for (int i = 0; i < 4; i++) {
@@ -235,7 +235,7 @@ static void a_turntable_leaves_as_much_above_as_below_however_it_is_rolled(void 
     }
 }
 
-/* From the middle to the eye, of the view that frames a cube. */
+/* Returns the direction from the centre to the eye in the view that frames a cube. */
 static trip_vec3 seen_from(trip_camera_framing f, trip_camera_params *p)
 {
     f.hi[0] = f.hi[1] = f.hi[2] = 9;
@@ -258,14 +258,14 @@ static void the_default_view_is_from_the_front_right_and_above(void **state)
     d = seen_from((trip_camera_framing){ .up = { 0, 1, 0 } }, &p);
     assert_true(d.z > d.x && d.x > 0 && d.y > 0 && d.z > d.y);
     d = seen_from((trip_camera_framing){ .front = { 0, 1, 0 } }, &p);
-    /* Facing +y with +z up, the viewer's right is -x. */
+    /* If the viewer faces +y with +z up, -x is on the right. */
     assert_true(d.y > -d.x && -d.x > 0 && d.z > 0);
 }
 
 static void sides_have_names(void **state)
 {
     (void)state;
-    /* Of what faces -y, as patients do where y points to the back: their left is +x. */
+    /* The object faces -y, like a patient with y pointing to the back: +x is the patient's left. */
     const struct {
         trip_view view;
         trip_vec3 from, up;
@@ -282,7 +282,8 @@ static void sides_have_names(void **state)
         trip_camera_framing f = { .view = expected[i].view };
         assert_direction(seen_from(f, &p), expected[i].from);
         assert_direction(p.up, expected[i].up);
-        /* Of what faces +y, as patients do where y points to the front: their left is -x. */
+        /* The object faces +y, like a patient with y pointing to the front: -x is the patient's
+         * left. */
         f.front = trip_v3(0, 1, 0);
         trip_vec3 from = expected[i].from, up = expected[i].up;
         assert_direction(seen_from(f, &p), trip_v3(-from.x, -from.y, from.z));
@@ -309,7 +310,7 @@ static void azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise(void
     assert_true(at[1] < 0);
     f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .roll_degrees = 90 };
     seen_from(f, &p);
-    position_of(&p, trip_v3(4.5, 4.5, 9), at); /* what was at the top is on the right */
+    position_of(&p, trip_v3(4.5, 4.5, 9), at); /* the former top is on the right */
     assert_true(at[0] > 0.5 && fabs(at[1]) < 1e-9);
     f.roll_degrees = 180;
     seen_from(f, &p);
@@ -317,7 +318,7 @@ static void azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise(void
     assert_true(at[1] < -0.5 && fabs(at[0]) < 1e-9);
 }
 
-static void any_direction_can_be_made_up(void **state)
+static void any_direction_can_be_the_up_vector(void **state)
 {
     (void)state;
     const trip_vec3 ups[] = { { 1, 0, 0 }, { -1, 0, 0 }, { 0, 1, 0 },   { 0, -1, 0 },
@@ -327,7 +328,7 @@ static void any_direction_can_be_made_up(void **state)
         trip_camera_framing f = { .view = TRIP_VIEW_FRONT };
         trip_framing_set_up(&f, ups[i]);
         trip_vec3 d = seen_from(f, &p), up = trip_normalize(ups[i]);
-        assert_close(trip_dot(d, up), 0, 1e-9); /* level: the eye moved */
+        assert_close(trip_dot(d, up), 0, 1e-9); /* the eye stayed level and moved */
         assert_direction(p.up, up);
         if (fabs(up.y) < 0.5) /* still from the front */
             assert_direction(d, trip_v3(0, -1, 0));
@@ -342,7 +343,7 @@ static void any_direction_can_be_made_up(void **state)
     assert_direction(seen_from(f, &p), trip_v3(0, 0, 1));
 }
 
-static void a_box_of_no_size_far_out_is_framed(void **state)
+static void an_empty_box_far_from_the_origin_is_framed(void **state)
 {
     (void)state;
     trip_affine m = trip_affine_identity();
@@ -357,17 +358,17 @@ static void a_box_of_no_size_far_out_is_framed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_box_fills_all_but_the_margins_and_is_in_the_middle),
-        cmocka_unit_test(a_sphere_is_as_far_off_as_its_cone_of_sight_calls_for),
-        cmocka_unit_test(where_reaches_cannot_be_found_there_is_no_view),
-        cmocka_unit_test(a_given_height_of_a_parallel_view_stays_and_its_object_is_in_the_middle),
-        cmocka_unit_test(an_object_on_a_turntable_stays_in_the_picture_and_touches_its_margins),
+        cmocka_unit_test(a_box_is_centred_and_fills_the_picture_up_to_the_margins),
+        cmocka_unit_test(a_sphere_has_the_distance_of_its_tangent_cone),
+        cmocka_unit_test(without_reaches_there_is_no_view),
+        cmocka_unit_test(a_parallel_view_keeps_a_given_height_and_centres_its_object),
+        cmocka_unit_test(a_turning_object_stays_in_the_picture_and_touches_its_margins),
         cmocka_unit_test(the_default_view_is_from_the_front_right_and_above),
         cmocka_unit_test(sides_have_names),
-        cmocka_unit_test(a_turntable_leaves_as_much_above_as_below_however_it_is_rolled),
+        cmocka_unit_test(a_rolled_turntable_is_centred_vertically),
         cmocka_unit_test(azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise),
-        cmocka_unit_test(any_direction_can_be_made_up),
-        cmocka_unit_test(a_box_of_no_size_far_out_is_framed),
+        cmocka_unit_test(any_direction_can_be_the_up_vector),
+        cmocka_unit_test(an_empty_box_far_from_the_origin_is_framed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,6 @@
-/* The gl renderer against the reference: forms of submission, methods, targets, the limits of a
- * driver, and what happens when something is missing. Pictures of real data: test_gl_views.c. The
- * order of layers and the opacity of bodies are tested with all renderers in test_reference.c. */
+/* Compares the gl renderer with the reference: forms of submission, methods, targets, limits of a
+ * driver, and missing resources. test_gl_views.c draws real data. test_reference.c tests the order
+ * of layers and the opacity of bodies with all renderers. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,9 +17,7 @@
 static const scene_renderer reference = { "reference", trip_reference_create, 0 };
 static const scene_renderer gl = { "gl", trip_gl_create, 1.0 / 255 };
 
-/* ---- scenes ---- */
-
-/* Shells of changing colour with a hole in them; everything has a gradient. */
+/* Shells of changing colour with a hole in them. Every voxel has a gradient. */
 static bool shells(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -37,7 +35,7 @@ static const trip_affine boxes = { { { 0.7, 0, 0, 5 }, { 0, 1.2, 0, -9 }, { 0, 0
 static const trip_affine sheared = {
     { { 0.8, 0.25, 0.05, 3 }, { -0.1, 1.1, 0.4, -7 }, { 0.1, 0.1, 1.4, 1 } }
 };
-/* A rotated grid of voxels a micrometre wide, in metres: floats must not run out of range. */
+/* A rotated grid of voxels a micrometre wide, in metres. Floats must not overflow or underflow. */
 static const trip_affine tiny = {
     { { 0.6e-6, -0.8e-6, 0, 0.01 }, { 0.8e-6, 0.6e-6, 0, -0.02 }, { 0, 0, 1e-6, 0.03 } }
 };
@@ -53,8 +51,6 @@ static void make_shells(scene *s, const trip_affine *index_to_world)
     scene_colour(s, 20001, 45000, 0.9, 0.4, 0.1, 0.2);
     scene_colour(s, 45001, 65535, 1, 1, 0.6, 0.8);
 }
-
-/* ---- comparison ---- */
 
 static double mean_difference(const scene_picture *a, const scene_picture *b)
 {
@@ -75,7 +71,7 @@ static void assert_same_counts(const scene_picture *a, const scene_picture *b)
     }
 }
 
-/* The bound that a float layer is held to. */
+/* Checks the error bound of a float layer. */
 static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b)
 {
     double max = scene_difference(a, b), mean = mean_difference(a, b);
@@ -95,9 +91,7 @@ static void compare(const char *label, const scene *s, const trip_camera_params 
     scene_picture_free(&b);
 }
 
-/* ---- pictures ---- */
-
-static void every_form_of_submission_gives_the_same_picture_and_counts(void **state)
+static void submission_forms_give_the_same_picture_and_counts(void **state)
 {
     (void)state;
     scene s;
@@ -139,8 +133,8 @@ static void every_method_and_traversal_agrees_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* Its splat covers the picture, and light comes to it from nowhere. */
-static void a_voxel_at_the_eye_is_lit_as_by_the_reference(void **state)
+/* The voxel's splat covers the picture, and its light has no direction. */
+static void a_voxel_at_the_eye_is_lit_like_in_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -229,7 +223,8 @@ static void splats_with_centres_out_of_view_are_drawn(void **state)
     scene s;
     make_shells(&s, &cubes);
     trip_settings settings = trip_settings_default();
-    /* One voxel fills the image: all other splats that reach it have their centres outside. */
+    /* One voxel fills the image. All other splats that reach the image have their centres outside.
+     */
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.3, 0.2), 30, 2, 40);
     compare("within a voxel", &s, &view, &settings);
     scene_destroy(&s);
@@ -254,8 +249,8 @@ static void the_size_of_batches_makes_no_difference(void **state)
     scene_destroy(&s);
 }
 
-/* A few frames by one renderer, its reader's ring in GL memory where there is such and reads land
- * there; true if so. The last frame goes to rgba. */
+/* Draws a few frames with one renderer, the last one to `rgba`. The ring lies in GL memory if the
+ * renderer offers it. Returns true if reads land there. */
 static bool draw_in_place(const scene *s, const trip_camera_params *view, trip_reader_params params,
                           float *rgba)
 {
@@ -305,7 +300,7 @@ static void reads_into_gl_memory_give_the_same_picture_as_copies(void **state)
                                       .slot_bytes = slot_bytes[i % 3],
                                       .engine = (trip_engine)(i / 3) };
         if (params.engine == TRIP_ENGINE_URING)
-            continue; /* what `auto` takes, or refused */
+            continue; /* the form that `auto` selects, or a refused one */
         bool copy = i % 2;
         setenv("TRIPTYCH_GL_SLOTS", copy ? "copy" : "mapped", 1);
         bool in_place = draw_in_place(&s, &view, params, rgba);
@@ -320,7 +315,7 @@ static void reads_into_gl_memory_give_the_same_picture_as_copies(void **state)
     scene_destroy(&s);
 }
 
-static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
+static void coarser_targets_stay_within_their_known_errors(void **state)
 {
     (void)state;
     scene s;
@@ -346,11 +341,9 @@ static void coarser_targets_stay_close_and_their_errors_are_known(void **state)
     scene_destroy(&s);
 }
 
-/* ---- parts ---- */
-
 enum { PARTS_PX = 300 };
 
-/* A renderer with what its frames are drawn from. */
+/* A renderer and the objects that its frames are drawn from. */
 typedef struct bench {
     trip_budget *budget;
     trip_renderer *renderer;
@@ -384,8 +377,8 @@ static void put_away(bench *b)
     b->renderer->ops->destroy(b->renderer);
 }
 
-/* Draws a frame in the shortest steps there are, at most so many; returns their number. One that is
- * not done is given up. */
+/* Draws a frame in the shortest possible steps, at most `max`. Returns their number. Cancels a
+ * frame that has not ended by then. */
 static int draw_in_steps(bench *b, int max, float *rgba)
 {
     trip_drawing drawing;
@@ -405,7 +398,7 @@ static int draw_in_steps(bench *b, int max, float *rgba)
 }
 
 /* Steps are as short for large splats as for small ones. */
-static void a_step_is_of_few_pixels(void **state)
+static void a_step_draws_few_pixels(void **state)
 {
     (void)state;
     static float rgba[4 * PARTS_PX * PARTS_PX];
@@ -422,7 +415,7 @@ static void a_step_is_of_few_pixels(void **state)
     assert_true(steps <= 3 + splats / piece); /* at most three layers */
     put_away(&b);
 
-    /* A splat is 400 px wide, so that any that is drawn covers a quarter of the image. */
+    /* A splat is 400 px wide, so that every splat covers a quarter of the image or more. */
     view.ortho_height = 3;
     set_up(&b, &s, &view, &settings);
     splats = (double)trip_plan_splats(&b.plan);
@@ -450,7 +443,7 @@ static void indexed_lists_are_loaded_in_steps_and_once(void **state)
     set_up(&b, &s, &view, &settings);
     assert_true(s.data->header.kept > TRIP_FRAME_PIECE);
     uint64_t before = trip_budget_left_bytes(s.budget);
-    for (int max = 1; max < 9; max += 2) /* none is done */
+    for (int max = 1; max < 9; max += 2) /* no frame ends */
         assert_int_equal(draw_in_steps(&b, max, rgba), max);
     int first = draw_in_steps(&b, INT_MAX, rgba);
     assert_memory_equal(rgba, whole.rgba, sizeof rgba);
@@ -471,7 +464,7 @@ static bool one_voxel(void *user, int i, int j, int k, unsigned *code, double gr
     return i == 2 && j == 2 && k == 2;
 }
 
-/* Layers of more than 2^24 pixels are made of bands: 2048 rows, and 12. */
+/* A layer of more than 2^24 pixels consists of bands: here 2048 rows, and 12. */
 static void a_splat_across_two_bands_of_a_layer_is_whole(void **state)
 {
     (void)state;
@@ -508,8 +501,6 @@ static void a_splat_across_two_bands_of_a_layer_is_whole(void **state)
     scene_destroy(&s);
 }
 
-/* ---- failures ---- */
-
 static char last_line[512];
 static int line_count;
 
@@ -520,7 +511,8 @@ static void keep_line(const char *line, void *user)
     snprintf(last_line, sizeof last_line, "%s", line);
 }
 
-/* Status of a frame that is expected to report once if it fails; the report is in last_line. */
+/* Draws a frame and returns its status. A frame that fails must report once; last_line holds the
+ * report. */
 static int try_frame(const scene *s, trip_renderer *r, const trip_camera_params *view,
                      const trip_settings *settings)
 {
@@ -548,7 +540,7 @@ static int try_frame(const scene *s, trip_renderer *r, const trip_camera_params 
     return status;
 }
 
-static void what_does_not_fit_is_refused_and_the_next_frame_draws(void **state)
+static void frames_that_do_not_fit_are_refused_and_the_next_draws(void **state)
 {
     (void)state;
     scene s;
@@ -562,7 +554,7 @@ static void what_does_not_fit_is_refused_and_the_next_frame_draws(void **state)
     huge.height = 1;
     assert_true(try_frame(&s, r, &huge, &settings) < 0);
 
-    /* All but a little of the budget is gone. */
+    /* Most of the budget is taken. */
     size_t max = (size_t)trip_budget_left_bytes(s.budget) - (48u << 20);
     void *taken = trip_budget_take(s.budget, max);
     assert_non_null(taken);
@@ -593,7 +585,7 @@ static void append_line(const char *folder, const char *name, const char *line)
     fclose(file);
 }
 
-/* Lines of a file, the one appended last included. */
+/* Counts the lines of a shader file up to and including an appended line. */
 static int count_lines(const char *folder, const char *name)
 {
     char path[128];
@@ -621,7 +613,8 @@ static void a_shader_that_does_not_compile_is_named_with_its_line(void **state)
     setenv("TRIPTYCH_SHADER_DIR", folder, 1);
 
     assert_int_equal(trip_gl_create(&r, s.budget), 0);
-    assert_int_equal(try_frame(&s, r, &view, &settings), 0); /* from disk as from the binary */
+    assert_int_equal(try_frame(&s, r, &view, &settings),
+                     0); /* shaders from disk draw like those in the binary */
     r->ops->destroy(r);
 
     append_line(folder, "project.glsl", "float broken = nothing;");
@@ -670,7 +663,7 @@ static void shaders_are_the_same_in_a_locale_with_decimal_commas(void **state)
     scene_destroy(&s);
 }
 
-/* Exit status 77 where there is no OpenGL 4.5 by EGL; the line printed says why. */
+/* Exits with status 77 on a machine without OpenGL 4.5 by EGL, and prints the reason. */
 static bool has_gl(void)
 {
     trip_gl_context *context;
@@ -684,20 +677,20 @@ static bool has_gl(void)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_form_of_submission_gives_the_same_picture_and_counts),
+        cmocka_unit_test(submission_forms_give_the_same_picture_and_counts),
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
-        cmocka_unit_test(a_voxel_at_the_eye_is_lit_as_by_the_reference),
+        cmocka_unit_test(a_voxel_at_the_eye_is_lit_like_in_the_reference),
         cmocka_unit_test(grids_that_are_not_cubic_agree_with_the_reference),
         cmocka_unit_test(light_and_kernel_settings_agree_with_the_reference),
         cmocka_unit_test(supports_larger_than_sprites_are_drawn_as_triangles),
         cmocka_unit_test(splats_with_centres_out_of_view_are_drawn),
         cmocka_unit_test(the_size_of_batches_makes_no_difference),
         cmocka_unit_test(reads_into_gl_memory_give_the_same_picture_as_copies),
-        cmocka_unit_test(coarser_targets_stay_close_and_their_errors_are_known),
-        cmocka_unit_test(a_step_is_of_few_pixels),
+        cmocka_unit_test(coarser_targets_stay_within_their_known_errors),
+        cmocka_unit_test(a_step_draws_few_pixels),
         cmocka_unit_test(indexed_lists_are_loaded_in_steps_and_once),
         cmocka_unit_test(a_splat_across_two_bands_of_a_layer_is_whole),
-        cmocka_unit_test(what_does_not_fit_is_refused_and_the_next_frame_draws),
+        cmocka_unit_test(frames_that_do_not_fit_are_refused_and_the_next_draws),
         cmocka_unit_test(a_shader_that_does_not_compile_is_named_with_its_line),
         cmocka_unit_test(a_missing_shader_is_reported),
         cmocka_unit_test(shaders_are_the_same_in_a_locale_with_decimal_commas),

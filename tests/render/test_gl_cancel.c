@@ -1,6 +1,6 @@
-/* A frame of the gl renderer that is given up: what the device has under way is waited for by no
- * call, and by no call of the next frame but in picture(). Calls of OpenGL that wait are counted,
- * and a device that is not done is made of one that is. */
+/* Cancels a frame of the gl renderer. No call may wait for the device's work, and in the next
+ * frame only picture() may. The test counts the calls of OpenGL that wait, and makes a finished
+ * device appear busy. */
 #include <epoxy/gl.h>
 #include <string.h>
 
@@ -10,7 +10,7 @@ static struct {
     PFNGLFINISHPROC finish;
     PFNGLCLIENTWAITSYNCPROC client_wait;
     unsigned waits; /* calls that may wait */
-    bool busy;      /* nothing is done yet */
+    bool busy;      /* the device appears busy */
 } device;
 
 static void EPOXY_CALLSPEC counting_finish(void)
@@ -27,7 +27,8 @@ static GLenum EPOXY_CALLSPEC counting_wait(GLsync fence, GLbitfield flags, GLuin
     return device.client_wait(fence, flags, timeout_ns);
 }
 
-/* With the renderer's context current: by now the functions are found. */
+/* Replaces the functions of OpenGL that wait. The renderer's context must be current, so that
+ * epoxy has resolved them. */
 static void watch_device(void)
 {
     GLsync fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -48,7 +49,7 @@ static void stop_watching(void)
     device.busy = false;
 }
 
-/* Takes steps until so many drew something. */
+/* Steps until a given number of steps has drawn something. */
 static void begin_and_draw(desk *d, trip_drawing *drawing, int steps)
 {
     assert_int_equal(trip_frame_begin(drawing, d->renderer, d->reader, &d->frame), 0);
@@ -61,7 +62,7 @@ static void begin_and_draw(desk *d, trip_drawing *drawing, int steps)
     }
 }
 
-/* Gives the frame up while the device is not done. */
+/* Cancels the frame while the device is busy. */
 static void give_up(trip_drawing *drawing)
 {
     device.waits = 0;
@@ -74,7 +75,8 @@ static void give_up(trip_drawing *drawing)
     assert_int_equal(device.waits, 0);
 }
 
-/* The next frame begins, draws nothing while the device is at work, and then all. */
+/* Begins the next frame. It must draw nothing while the device is busy, and everything afterwards.
+ */
 static void draw_next(desk *d, float *rgba)
 {
     trip_drawing drawing;
@@ -120,7 +122,7 @@ static bool lacks_gl(const scene *s)
     return false;
 }
 
-static void giving_up_waits_for_nothing_and_leaves_the_next_frame_as_it_is(void **state)
+static void cancelling_waits_for_nothing_and_keeps_the_next_frame(void **state)
 {
     (void)state;
     scene s;
@@ -135,7 +137,7 @@ static void giving_up_waits_for_nothing_and_leaves_the_next_frame_as_it_is(void 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(giving_up_waits_for_nothing_and_leaves_the_next_frame_as_it_is),
+        cmocka_unit_test(cancelling_waits_for_nothing_and_keeps_the_next_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

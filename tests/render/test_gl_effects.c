@@ -1,6 +1,6 @@
-/* Shadows, occlusion and emission of the gl renderer: every way to submit splats and every kind of
- * sheet against the reference, and its copies of the lattices from frame to frame. What all
- * renderers must show: test_effects.c and test_emission.c. */
+/* Shadows, occlusion and emission of the gl renderer. Compares each form of submission and each
+ * kind of sheet with the reference, and tests the copies of the lattices from frame to frame.
+ * test_effects.c and test_emission.c test all renderers. */
 #include "emission.h"
 #include "gl/shared.h"
 #include "scenes.h"
@@ -27,7 +27,7 @@ static bool ball(void *user, int i, int j, int k, unsigned *code, double gradien
     return value > 0 && !(d[0] > 3 && d[1] > 2);
 }
 
-/* Of level 1, in its own place. */
+/* A block of level 1 beside the voxels of level 0. */
 static bool block(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -41,14 +41,14 @@ static bool rising(void *user, int i, int j, int k, unsigned *code, double gradi
     (void)user;
     (void)gradient;
     *code =
-        (unsigned)(6000 * i + 1200 * j + 100 * k) % 45000; /* the sum of all light stays below 1 */
+        (unsigned)(6000 * i + 1200 * j + 100 * k) % 45000; /* keeps the sum of all light below 1 */
     return true;
 }
 
 static const trip_affine maps[] = {
     { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } },
     { { { 0.8, 0.25, 0.05, 3 }, { -0.1, 1.1, 0.4, -7 }, { 0.1, 0.1, 1.4, 1 } } },
-    /* Voxels a micrometre wide, in metres, and huge ones: floats must not run out of range. */
+    /* Voxels a micrometre wide, in metres, and huge ones. Floats must not overflow or underflow. */
     { { { 0.6e-6, -0.8e-6, 0, 0.01 }, { 0.8e-6, 0.6e-6, 0, -0.02 }, { 0, 0, 1e-6, 0.03 } } },
     { { { 0, 0, 1e9, 0 }, { 0, 1e9, 0, 0 }, { -1e9, 0, 0, 0 } } },
 };
@@ -56,7 +56,7 @@ static const trip_affine maps[] = {
 typedef struct lit_scene {
     scene s, heat;
     const trip_affine *map;
-    double unit; /* of the world, about a voxel */
+    double unit; /* about a voxel, in world units */
 } lit_scene;
 
 static void create(lit_scene *l, const trip_affine *map, int cells)
@@ -129,7 +129,7 @@ static void compare(const char *label, const lit_scene *l, const trip_camera_par
 static const trip_classify both[] = { TRIP_CLASSIFY_PRE, TRIP_CLASSIFY_POST };
 static const char *const class_names[] = { "pre", "post" };
 
-/* Effects alone and together, where there is and is not a surface. */
+/* Effects alone and combined, with and without surfaces. */
 static void every_set_of_effects_agrees_with_the_reference(void **state)
 {
     (void)state;
@@ -167,8 +167,8 @@ static void grids_of_any_shape_agree_with_the_reference(void **state)
     }
 }
 
-/* As far as a thousand million voxels, and within. */
-static void from_within_and_far_away_it_agrees_with_the_reference(void **state)
+/* Views from as far as a thousand million voxels, and from inside. */
+static void inside_and_far_views_agree_with_the_reference(void **state)
 {
     (void)state;
     lit_scene l;
@@ -180,14 +180,14 @@ static void from_within_and_far_away_it_agrees_with_the_reference(void **state)
                        i / 2 == 0 ? 100 : 2 * atan(20 / distance) * 180 / 3.14159265358979, SIZE);
         trip_settings settings = with_all(&l, both[i % 2]);
         if (view.fov_degrees < 1e-5)
-            view.ortho_height = 40; /* from there too */
+            view.ortho_height = 40; /* parallel, also from inside */
         compare(i / 2 == 0 ? "within" : "far away", &l, &view, &settings);
     }
     destroy(&l);
 }
 
-/* Sprites and triangles, lists and one array, splat by splat and by sheets, cut away, levels of
- * detail, flat kernels; slices and kernels of values. */
+/* Sprites and triangles, lists and one array, splat by splat and by sheets, clipping, levels of
+ * detail and flat kernels. In `post`, samples per sheet and kernels of values. */
 static void every_form_agrees_with_the_reference(void **state)
 {
     (void)state;
@@ -218,15 +218,13 @@ static void every_form_agrees_with_the_reference(void **state)
     destroy(&l);
 }
 
-/* ---- from frame to frame ---- */
-
-/* Frames by one renderer, with its reader, light and plan; all of one view. */
+/* Frames of one view, drawn by one renderer with its reader, light and plan. */
 typedef struct desk {
     const lit_scene *l;
     trip_renderer *renderer;
     trip_light_map *light;
     trip_camera camera;
-    uint64_t leave; /* of the memory given, once all but the renderer has its own; 0: all */
+    uint64_t leave; /* memory left once all other objects have theirs; 0 for all */
 } desk;
 
 static int draw(desk *d, const trip_settings *settings, float *rgba)
@@ -276,7 +274,8 @@ static void put_away(desk *d)
     trip_light_map_destroy(d->light);
 }
 
-/* Another light, function, effect or lattice of the same size: never the copy of the one before. */
+/* After a change of light, transfer function, effect or lattice, the renderer must not use the
+ * previous copy, even if the size is the same. */
 static void a_changed_lattice_is_copied_anew(void **state)
 {
     static float kept[4 * SIZE * SIZE], fresh[4 * SIZE * SIZE], before[4 * SIZE * SIZE];
@@ -305,7 +304,7 @@ static void a_changed_lattice_is_copied_anew(void **state)
             settings.effects.shadows = true;
             settings.effects.occlusion = false;
             break;
-        case 6: /* one at the same address, maybe */
+        case 6: /* possibly at the same address */
             trip_light_map_destroy(d.light);
             assert_int_equal(trip_light_map_create(&d.light, l.s.budget), 0);
             settings.light_position.x -= 3;
@@ -333,7 +332,7 @@ static void a_changed_lattice_is_copied_anew(void **state)
     destroy(&l);
 }
 
-/* What goes to the device for effects. */
+/* Counts the copies and bindings on the device for effects. */
 static struct {
     unsigned copies, textures, blocks;
     PFNGLTEXTURESUBIMAGE3DPROC copy;
@@ -374,8 +373,8 @@ static void watch(bool watched)
     epoxy_glBindBufferRange = watched ? counting_bind_block : device.bind_block;
 }
 
-/* A lattice is copied once; without effects nothing is copied and nothing bound. */
-static void what_is_not_called_for_is_not_copied(void **state)
+/* A lattice is copied once. Without effects nothing is copied or bound. */
+static void unneeded_lattices_are_not_copied(void **state)
 {
     static float rgba[4 * SIZE * SIZE];
     (void)state;
@@ -386,7 +385,7 @@ static void what_is_not_called_for_is_not_copied(void **state)
         set_up(&d, &l);
         trip_settings settings = with_all(&l, both[n]), plain = settings;
         plain.effects = (trip_effects){ .cells = 20 };
-        assert_int_equal(draw(&d, &settings, rgba), 0); /* the functions of GL are found */
+        assert_int_equal(draw(&d, &settings, rgba), 0); /* resolves the functions of GL */
         assert_int_equal(draw(&d, &plain, rgba), 0);
         watch(true);
         const unsigned copies[] = { 0, 3, 0, 0, 0, 3, 1 };
@@ -395,7 +394,7 @@ static void what_is_not_called_for_is_not_copied(void **state)
             device.copies = device.textures = device.blocks = 0;
             if (frame == 3) /* another view */
                 d.camera.eye.x += 2;
-            if (frame == 6) { /* heat is as it was */
+            if (frame == 6) { /* heat unchanged */
                 settings.light_direction = trip_v3(0, 1, 0);
                 settings.effects.occlusion = false;
             }
@@ -403,7 +402,7 @@ static void what_is_not_called_for_is_not_copied(void **state)
             assert_int_equal(device.copies, copies[frame]);
             assert_true((device.textures > 0) == runs && (device.blocks > 0) == runs);
         }
-        plain.effects.cueing = 0.5; /* of places alone */
+        plain.effects.cueing = 0.5; /* cueing needs positions alone */
         device.copies = device.textures = 0;
         assert_int_equal(draw(&d, &plain, rgba), 0);
         assert_int_equal(device.copies + device.textures, 0);
@@ -413,15 +412,16 @@ static void what_is_not_called_for_is_not_copied(void **state)
     destroy(&l);
 }
 
-/* Nodes of the lattice over so many voxels along each axis. */
+/* Returns the number of nodes of a lattice with cells of a given number of voxels along each axis.
+ */
 static uint64_t nodes_over(const trip_dataset *data, int cells, int stride)
 {
     const trip_light_grid grid = trip_light_grid_over(data->header.dims, cells, stride);
     return trip_light_grid_count(&grid);
 }
 
-/* 4 bytes a node of each lattice while effects run, and then none. */
-static void lattices_count_against_the_memory_given(void **state)
+/* A node of each lattice takes 4 bytes while effects are on, and none afterwards. */
+static void lattices_count_against_the_memory_limit(void **state)
 {
     static float rgba[4 * SIZE * SIZE];
     (void)state;
@@ -431,7 +431,8 @@ static void lattices_count_against_the_memory_given(void **state)
     set_up(&d, &l);
     trip_settings settings = with_all(&l, TRIP_CLASSIFY_PRE), plain = settings;
     plain.effects = (trip_effects){ .cells = 20 };
-    for (int n = 0; n < 4; n++) /* what batches are copied to is taken one by one */
+    for (int n = 0; n < 4;
+         n++) /* the buffers that batches are copied to are allocated one by one */
         assert_int_equal(draw(&d, &settings, rgba), 0);
     const uint64_t with = trip_budget_left_bytes(l.s.budget);
     assert_int_equal(draw(&d, &plain, rgba), 0);
@@ -453,11 +454,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_set_of_effects_agrees_with_the_reference),
         cmocka_unit_test(grids_of_any_shape_agree_with_the_reference),
-        cmocka_unit_test(from_within_and_far_away_it_agrees_with_the_reference),
+        cmocka_unit_test(inside_and_far_views_agree_with_the_reference),
         cmocka_unit_test(every_form_agrees_with_the_reference),
         cmocka_unit_test(a_changed_lattice_is_copied_anew),
-        cmocka_unit_test(what_is_not_called_for_is_not_copied),
-        cmocka_unit_test(lattices_count_against_the_memory_given),
+        cmocka_unit_test(unneeded_lattices_are_not_copied),
+        cmocka_unit_test(lattices_count_against_the_memory_limit),
     };
     for (const scene_renderer *r = scene_renderers(); r->name; r++)
         if (!strcmp(r->name, "gl"))

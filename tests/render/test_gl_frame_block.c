@@ -1,4 +1,5 @@
-/* What the gl renderer works out for a frame before it draws; needs no OpenGL. */
+/* The values that the gl renderer computes for a frame before it draws. The test needs no OpenGL.
+ */
 #include "gl/frame_block.h"
 #include "splat.h"
 #include "test.h"
@@ -14,7 +15,7 @@ static trip_vec3 random_vector(double size)
     return trip_v3(between(-size, size), between(-size, size), between(-size, size));
 }
 
-/* Any view of a grid of any shape. */
+/* Returns a random view of a grid of any shape. */
 static trip_camera random_camera(bool ortho)
 {
     trip_camera c;
@@ -33,8 +34,8 @@ static trip_camera random_camera(bool ortho)
     return c;
 }
 
-/* A view in the index space of a kernel whose widths differ by up to `ratio` times, the widest
- * being 1. */
+/* Returns a view in the index space of a kernel with widths that differ by up to `ratio` times.
+ * The widest width is 1. */
 static trip_splat_frame random_frame(const trip_camera *c, const trip_settings *settings,
                                      double ratio, trip_vec3 *width)
 {
@@ -60,7 +61,7 @@ static void from_the_sprite_depth_on_every_support_fits_a_sprite(void **state)
         double ratio = i / 2 % 3 ? between(1, 4) : 1, size = between(16, 300);
         double depth = trip_gl_frame_sprite_depth(&settings, &c, ratio, size);
         for (int k = 0; k < 1000 && isfinite(depth); k++) {
-            /* Mostly just beyond the bound, near the image and beside it. */
+            /* Most splats are just beyond the bound, in the image and beside it. */
             double z = fmax(depth, 1e-3) * (1 + test_random() * test_random());
             trip_vec3 ray =
                 trip_camera_ray(&c, between(-1, 2) * c.width, between(-1, 2) * c.height);
@@ -70,8 +71,8 @@ static void from_the_sprite_depth_on_every_support_fits_a_sprite(void **state)
             if (!trip_splat_project(&f, voxel, &s))
                 continue;
             if (s.near && settings.footprint == TRIP_FOOTPRINT_EWA)
-                continue; /* triangles, whatever the depth */
-            /* Pixel centres within: at most the extent plus one. */
+                continue; /* these are triangles at any depth */
+            /* The number of pixel centres inside is at most the extent plus one. */
             double extent = fmax(clipped(s.x0, s.x1, c.width), clipped(s.y0, s.y1, c.height));
             assert_true(fmax(c.width, c.height) <= size || extent + 1 <= size);
             checked++;
@@ -95,7 +96,7 @@ static void from_the_near_depth_on_no_splat_is_near(void **state)
             double z = fmax(depth, 1e-3) * (k % 4 ? 1 + test_random() * test_random() : 0.2);
             trip_vec3 ray = trip_camera_ray(&c, between(0, 1) * c.width, between(0, 1) * c.height);
             trip_vec3 at = trip_add(c.eye, trip_scale(ray, z));
-            if (c.ortho) /* rays begin all over the plane of the eye */
+            if (c.ortho) /* rays begin at every position of the eye's plane */
                 at = trip_add(trip_add(c.eye, trip_scale(c.r0, z)),
                               trip_scale(c.rx, between(0, 1) * c.width));
             trip_splat_frame f = random_frame(&c, &settings, ratio, &width);
@@ -119,7 +120,7 @@ static void a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use(void **
     assert_true(trip_gl_frame_sprite_depth(&settings, &c, 1, 1) == HUGE_VAL);
 }
 
-static void effects_are_asked_for_only_where_the_frame_needs_them(void **state)
+static void effects_are_requested_only_if_the_frame_needs_them(void **state)
 {
     (void)state;
     trip_settings settings = trip_settings_default();
@@ -174,7 +175,7 @@ int main(void)
         cmocka_unit_test(from_the_sprite_depth_on_every_support_fits_a_sprite),
         cmocka_unit_test(from_the_near_depth_on_no_splat_is_near),
         cmocka_unit_test(a_small_image_needs_no_triangles_and_a_tiny_sprite_is_no_use),
-        cmocka_unit_test(effects_are_asked_for_only_where_the_frame_needs_them),
+        cmocka_unit_test(effects_are_requested_only_if_the_frame_needs_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,11 +1,11 @@
-/* The GPU's work in parts: none is begun once the frame is given up. */
+/* The GPU's work in parts. No part begins after the frame is cancelled. */
 #include "gl/queue.h"
 
 #include "gl/gl_context.h"
 #include "report.h"
 #include "test.h"
 
-static void no_part_is_ended_as_if_wanted_when_the_frame_is_given_up(void **state)
+static void a_cancelled_frame_ends_no_part_normally(void **state)
 {
     (void)state;
     trip_gl_context *context;
@@ -28,7 +28,7 @@ static void no_part_is_ended_as_if_wanted_when_the_frame_is_given_up(void **stat
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_part_is_ended_as_if_wanted_when_the_frame_is_given_up),
+        cmocka_unit_test(a_cancelled_frame_ends_no_part_normally),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

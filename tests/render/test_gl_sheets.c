@@ -1,6 +1,6 @@
-/* Frames of the gl renderer that classify after interpolation: against the reference, the same bits
- * for any memory and steps, and what does not fit. What all renderers must show: test_sheets.c;
- * pictures of real data: test_gl_views.c. */
+/* Frames of the gl renderer in `post`. Compares them with the reference and checks that memory and
+ * steps do not change a bit. Frames that exceed the memory are refused. test_sheets.c tests all
+ * renderers; test_gl_views.c draws real data. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 static const scene_renderer reference = { "reference", trip_reference_create, 0 };
 static const scene_renderer gl = { "gl", trip_gl_create, 1.0 / 255 };
 
-/* Shells of changing value with a hole in them, which begin at no whole square. */
+/* Shells of changing value with a hole in them. They do not begin at the border of a square. */
 static bool shells(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -24,7 +24,7 @@ static bool shells(void *user, int i, int j, int k, unsigned *code, double gradi
 static const trip_affine sheared = {
     { { 0.8, 0.25, 0.05, 3 }, { -0.1, 1.1, 0.4, -7 }, { 0.1, 0.1, 1.4, 1 } }
 };
-/* Floats must not run out of range. */
+/* Floats must not overflow or underflow. */
 static const trip_affine huge = { { { 0, 0, 1e30, 0 }, { 0, 1e30, 0, 0 }, { -1e30, 0, 0, 0 } } };
 /* A rotated grid of voxels a micrometre wide, in metres. */
 static const trip_affine tiny = {
@@ -43,7 +43,7 @@ static void make_shells(scene *s, const trip_affine *index_to_world, unsigned co
     scene_colour(s, 50001, 65535, 1, 1, 0.6, 0.8);
 }
 
-/* Codes that a byte stands for. */
+/* Uses codes that one byte can represent. */
 static bool coarse_shells(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     bool there = shells(user, i, j, k, code, gradient);
@@ -87,8 +87,6 @@ static bool has_gl(void)
             return true;
     return false;
 }
-
-/* ---- pictures ---- */
 
 static void grids_of_any_shape_agree_with_the_reference(void **state)
 {
@@ -146,7 +144,7 @@ static void every_method_and_number_of_samples_per_sheet_agrees_with_the_referen
     scene_destroy(&s);
 }
 
-static void from_within_and_far_away_it_agrees_with_the_reference(void **state)
+static void inside_and_far_views_agree_with_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -161,12 +159,12 @@ static void from_within_and_far_away_it_agrees_with_the_reference(void **state)
     view = scene_view(&s, trip_v3(1, 0.9, 0.4), 1e7, 2e-4, 60);
     compare("far away", &s, &view, &settings);
     view = scene_view(&s, trip_v3(1, 0.9, 0.4), 2, 30, 60);
-    view.ortho_height = 30; /* about half of it lies behind the eye's plane */
+    view.ortho_height = 30; /* about half of the grid lies behind the eye's plane */
     compare("parallel, within", &s, &view, &settings);
     scene_destroy(&s);
 }
 
-/* The grid's border, holes, and sheets that are not there. */
+/* The test includes the grid's border, holes, and missing sheets. */
 static void every_kernel_agrees_with_the_reference(void **state)
 {
     (void)state;
@@ -183,7 +181,7 @@ static void every_kernel_agrees_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* Ten codes a voxel along i. */
+/* Codes rise by ten per voxel along i. */
 static bool gentle(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user, (void)j, (void)k, (void)gradient;
@@ -191,9 +189,10 @@ static bool gentle(void *user, int i, int j, int k, unsigned *code, double gradi
     return true;
 }
 
-/* Beside the peak of another code all that shows is a billionth: its segments are differences of
- * sums that are exact. Over the first 99 codes extinction is 0.05, from one more on it is 0.1. */
-static void fog_is_as_dense_whatever_other_codes_are(void **state)
+/* Compared with the peak of another code, all visible extinction is a billionth. Its segments must
+ * be differences of exact sums. Extinction is 0.05 in the first 99 codes and 0.1 from the next
+ * code on. */
+static void the_density_of_fog_does_not_depend_on_other_codes(void **state)
 {
     (void)state;
     enum { EDGE = 20 };
@@ -246,7 +245,7 @@ static void depths_agree_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* Layers of more than 2^24 pixels are made of bands: 2048 rows, and 12. */
+/* A layer of more than 2^24 pixels consists of bands: here 2048 rows, and 12. */
 static void layers_of_two_bands_are_whole(void **state)
 {
     (void)state;
@@ -272,8 +271,6 @@ static void layers_of_two_bands_are_whole(void **state)
     scene_picture_free(&p);
     scene_destroy(&s);
 }
-
-/* ---- parts, memory ---- */
 
 enum { SIZE = 48 };
 
@@ -313,8 +310,8 @@ static void put_away(bench *b)
     b->renderer->ops->destroy(b->renderer);
 }
 
-/* Draws a frame in the shortest steps there are, at most so many; returns their number. One that is
- * not done is given up. */
+/* Draws a frame in the shortest possible steps, at most `max`. Returns their number. Cancels a
+ * frame that has not ended by then. */
 static int draw_in_steps(bench *b, int max, float *rgba)
 {
     trip_drawing drawing;
@@ -333,7 +330,7 @@ static int draw_in_steps(bench *b, int max, float *rgba)
     return steps;
 }
 
-static void frames_given_up_anywhere_leave_the_next_as_it_is(void **state)
+static void frames_cancelled_anywhere_leave_the_next_unchanged(void **state)
 {
     (void)state;
     static float rgba[4 * SIZE * SIZE];
@@ -344,7 +341,7 @@ static void frames_given_up_anywhere_leave_the_next_as_it_is(void **state)
     scene_picture whole = scene_draw(&s, &gl, &b.camera.params, &b.settings);
     int all = draw_in_steps(&b, INT_MAX, rgba);
     assert_memory_equal(rgba, whole.rgba, sizeof rgba);
-    assert_true(all > 40); /* by parts, not at once */
+    assert_true(all > 40); /* in parts, not at once */
     for (int max = 1; max < all; max += all / 8) {
         assert_int_equal(draw_in_steps(&b, max, rgba), max);
         memset(rgba, 0, sizeof rgba);
@@ -364,7 +361,7 @@ static void keep_line(const char *line, void *user)
     snprintf(last_line, sizeof last_line, "%s", line);
 }
 
-/* Draws a frame while all of the budget but so much is taken; its status. */
+/* Draws a frame with `left` bytes of the budget free, and returns its status. */
 static int draw_with(bench *b, uint64_t left, float *rgba)
 {
     trip_frame_stats stats;
@@ -387,8 +384,8 @@ static bool waves(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Sheets take 12 bytes a voxel, almost 2 MiB: eight are at hand at a time where there is memory, or
- * three. */
+/* A sheet takes 12 bytes a voxel, almost 2 MiB. The renderer holds eight sheets at a time, or
+ * three if memory is short. */
 static void memory_changes_no_bit_and_too_little_is_refused(void **state)
 {
     (void)state;
@@ -423,12 +420,12 @@ int main(void)
         cmocka_unit_test(grids_of_any_shape_agree_with_the_reference),
         cmocka_unit_test(codes_of_one_byte_agree_with_the_reference),
         cmocka_unit_test(every_method_and_number_of_samples_per_sheet_agrees_with_the_reference),
-        cmocka_unit_test(from_within_and_far_away_it_agrees_with_the_reference),
+        cmocka_unit_test(inside_and_far_views_agree_with_the_reference),
         cmocka_unit_test(every_kernel_agrees_with_the_reference),
-        cmocka_unit_test(fog_is_as_dense_whatever_other_codes_are),
+        cmocka_unit_test(the_density_of_fog_does_not_depend_on_other_codes),
         cmocka_unit_test(depths_agree_with_the_reference),
         cmocka_unit_test(layers_of_two_bands_are_whole),
-        cmocka_unit_test(frames_given_up_anywhere_leave_the_next_as_it_is),
+        cmocka_unit_test(frames_cancelled_anywhere_leave_the_next_unchanged),
         cmocka_unit_test(memory_changes_no_bit_and_too_little_is_refused),
     };
     if (!has_gl())

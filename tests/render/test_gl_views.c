@@ -1,7 +1,7 @@
-/* Every renderer against the reference on real data: three volumes that come with the project,
- * bricked here, from twelve views that are hard in different ways: the first from each, the others
- * from every second one in turn. No pixel may be off by
- * more than 1/255, nor the mean by 0.05/255. */
+/* Compares every renderer with the reference on real data. The test bricks three volumes that come
+ * with the project and draws them from twelve difficult views. The first volume uses every view,
+ * the others every second one in turn. A pixel may differ by at most 1/255, and the mean by
+ * 0.05/255. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,7 +12,8 @@
 
 enum { SIZE = 96, VIEWS = 12 };
 
-/* Bricks a volume of the project's and opens it as a scene, drawn as it would be by default. */
+/* Bricks one of the project's volumes and opens it as a scene with the settings of a default
+ * render. */
 static void open_volume(scene *s, const char *name, trip_brick_levels_for levels_for)
 {
     char input[512];
@@ -44,7 +45,7 @@ static void open_volume(scene *s, const char *name, trip_brick_levels_for levels
     trip_dataset_metadata_destroy(text);
 }
 
-/* Half the diagonal of the volume in world units. */
+/* Returns half the diagonal of the volume in world units. */
 static double half_diagonal(const scene *s)
 {
     const uint64_t *dims = s->data->header.dims;
@@ -54,11 +55,11 @@ static double half_diagonal(const scene *s)
 
 static const struct {
     const char *name;
-    trip_vec3 direction; /* from the middle to the eye */
+    trip_vec3 direction; /* from the centre to the eye */
     double distance;     /* in half diagonals */
     double fov_degrees;
-    double ortho; /* height in half diagonals; 0: perspective */
-    int size;     /* pixels either way */
+    double ortho; /* height in half diagonals; 0 selects perspective */
+    int size;     /* width and height in pixels */
 } views[VIEWS] = {
     { "along x", { 1, 0, 0 }, 4, 30, 0, SIZE },
     { "along -y", { 0, -1, 0 }, 4, 30, 0, SIZE },
@@ -101,7 +102,7 @@ static void add(tally *t, const scene_picture *a, const scene_picture *b, const 
     t->components += (double)n;
 }
 
-/* With post by gl alone: what others are held to there, test_sheets.c has. */
+/* In `post`, the test draws with gl alone; test_sheets.c tests the other renderers. */
 static void check_view(const scene *s, int i, trip_classify classify, tally *tallies)
 {
     trip_camera_params view = make_view(s, i);
@@ -121,7 +122,7 @@ static void check_view(const scene *s, int i, trip_classify classify, tally *tal
     scene_picture_free(&expected);
 }
 
-/* All that shows becomes nearly opaque, black and white by turns of 256 codes. */
+/* Makes all visible codes nearly opaque, alternately black and white for 256 codes each. */
 static void set_hard_contrast(scene *s)
 {
     double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
@@ -134,7 +135,8 @@ static void set_hard_contrast(scene *s)
     }
 }
 
-/* Views from `first` on, each or every so many; where things are taken by turns, every fourth. */
+/* Draws the views from `first` on, at a given step. If tests run by turns, it draws every fourth.
+ */
 static void check_volume(const char *name, trip_classify classify, bool hard, int first, int step)
 {
     scene s;
@@ -179,8 +181,9 @@ static void nearly_opaque_black_and_white_agrees_with_the_reference(void **state
     check_volume("tooth.nhdr", TRIP_CLASSIFY_PRE, true, 2, 3);
 }
 
-/* The stent is cut off at the border of the grid. In view 6 a ray is within a millionth of a voxel
- * of that at a slice, which single precision cannot distinguish from being there. */
+/* The stent reaches the border of the grid. In view 6 a ray passes a sample plane within a
+ * millionth of a voxel of the border. Single precision cannot tell this position from the border
+ * itself. */
 static void views_classified_after_interpolation_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -188,7 +191,8 @@ static void views_classified_after_interpolation_agree_with_the_reference(void *
     check_volume("stent.nrrd", TRIP_CLASSIFY_POST, false, 1, 3);
 }
 
-/* Of 8 bits and of more: coarse levels, drawn as splats of means, but near the eye. */
+/* Volumes of 8 bits and of more. Far voxels belong to coarse levels, which are drawn as splats of
+ * means. */
 static void means_agree_with_the_reference(void **state)
 {
     (void)state;

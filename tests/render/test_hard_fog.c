@@ -1,11 +1,11 @@
-/* Fog of very many splats, each of very little opacity, against the closed form: what rounding
- * takes of it in each form of layer. */
+/* Fog of very many splats with very little opacity each, against the closed form. The test bounds
+ * the loss by rounding in each form of layer. */
 #include "hard.h"
 #include "test.h"
 
 enum { SIZE = 4 };
 
-/* A body of fog seen along Z; the kernel is wide, so that many splats meet a ray. */
+/* A body of fog seen along Z. The kernel is wide, so that many splats meet a ray. */
 typedef struct fog {
     scene scene;
     trip_camera_params view;
@@ -22,7 +22,7 @@ static void make_fog(fog *f, int side, int deep, double radius)
     f->deep = deep;
 }
 
-/* The opacity seen of fog of an optical depth. */
+/* Returns the visible opacity of fog with a given optical depth. */
 static double opacity_of(fog *f, const scene_renderer *r, double depth,
                          trip_compositing compositing, trip_target target)
 {
@@ -46,9 +46,9 @@ static void expect_off(double alpha, double depth, double max, const char *label
                  255 * max);
 }
 
-/* 720,000 on a ray, at 12.8 of opacity 1e-4 each. Each is rounded once, to 2^-25 at most; pixels
- * take no more below TRIP_EARLY_TERMINATION_PRE. */
-static void a_million_splats_lose_what_roundings_can(void **state)
+/* A ray meets 720,000 splats, 12.8 for each opacity of 1e-4. Each splat is rounded once, by at
+ * most 2^-25. A pixel stops at TRIP_EARLY_TERMINATION_PRE. */
+static void a_million_splats_lose_at_most_their_rounding(void **state)
 {
     (void)state;
     const double n = 3.14159 * 30 * 30 * 256;
@@ -65,7 +65,8 @@ static void a_million_splats_lose_what_roundings_can(void **state)
     scene_destroy(&f.scene);
 }
 
-/* By sheets there is one rounding a sheet, half a step or, where a driver cuts off, a whole. */
+/* By sheets, each sheet is rounded once, by half a step. A driver that truncates rounds by a whole
+ * step. */
 static void by_sheets_layers_are_rounded_once_a_sheet(void **state)
 {
     (void)state;
@@ -83,7 +84,7 @@ static void by_sheets_layers_are_rounded_once_a_sheet(void **state)
     scene_destroy(&f.scene);
 }
 
-/* Nothing, what floats hardly hold, and what counts for opaque. */
+/* Opacities of 0, denormal floats, and values that count as opaque. */
 static void opacities_may_be_zero_denormal_or_one(void **state)
 {
     (void)state;
@@ -106,7 +107,7 @@ static void opacities_may_be_zero_denormal_or_one(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_million_splats_lose_what_roundings_can),
+        cmocka_unit_test(a_million_splats_lose_at_most_their_rounding),
         cmocka_unit_test(by_sheets_layers_are_rounded_once_a_sheet),
         cmocka_unit_test(opacities_may_be_zero_denormal_or_one),
     };

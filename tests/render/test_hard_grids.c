@@ -1,5 +1,5 @@
-/* Grids that are hard on numbers: stretched and sheared ones, far from the world's origin, of one
- * voxel, of none, and of more voxels than 32 bits count. */
+/* Grids that are difficult for numbers: stretched, sheared or far from the world's origin, of one
+ * voxel, of none, and of more voxels than 32 bits can count. */
 #include "hard.h"
 #include "test.h"
 #include "writer.h"
@@ -8,7 +8,7 @@
 
 enum { SIZE = 16 };
 
-/* A view of the middle from `direction` in index space, in which the whole grid is seen. */
+/* Returns a view of the centre that shows the whole grid. `direction` is in index space. */
 static hard_view view_of(const scene *s, const char *label, trip_vec3 direction, bool ortho)
 {
     hard_view v = { .name = label, .settings = hard_settings(), .forms = HARD_ALL, .shows = true };
@@ -57,7 +57,7 @@ static void shear_may_be_nearly_singular(void **state)
 {
     (void)state;
     const int64_t dims[3] = { 12, 11, 10 };
-    /* The second axis is 0.06 and 0.006 degrees from the first. */
+    /* The angle between the first two axes is 0.06 and 0.006 degrees. */
     for (double tilt = 1e-3; tilt > 5e-5; tilt /= 10) {
         trip_affine sheared = { { { 1, 1, 0, 2 }, { 0, tilt, 0.3, -1 }, { 0, 0, 1, 3 } } };
         check_grid("nearly singular", sheared, dims);
@@ -72,7 +72,7 @@ static void far_away_small_voxels_are_told_apart(void **state)
     check_grid("voxels of 1e-3 at 1e10", scaled(1e-3, 1e-3, 1e-3, 1e10), dims);
 }
 
-/* Extinctions are floats: what has no room there is refused. */
+/* Extinctions are floats. A voxel is refused if a float cannot hold its extinction. */
 static void voxels_too_small_or_large_for_floats_are_refused(void **state)
 {
     (void)state;
@@ -112,7 +112,7 @@ static void expect_post_refused(const scene *s, int axis)
     assert_one_report("is one voxel thick along");
 }
 
-/* All voxels of opacity 0.3. Post has no cells there. */
+/* All voxels have opacity 0.3. `post` has no cells in such a grid. */
 static void a_grid_may_be_one_voxel_thick(void **state)
 {
     (void)state;
@@ -146,7 +146,7 @@ static bool none(void *user, int i, int j, int k, unsigned *code, double gradien
     return false;
 }
 
-/* Against one kernel's integral, and nothing. */
+/* Compares with the integral of one kernel, and with an empty picture. */
 static void a_grid_may_be_one_voxel_or_empty(void **state)
 {
     (void)state;

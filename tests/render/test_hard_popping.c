@@ -1,5 +1,5 @@
-/* The camera turned in steps of 0.05 degrees through where the list that rays are most aligned with
- * changes: with one list a frame the picture jumps, with lists by pixel it does not. */
+/* Turns the camera in steps of 0.05 degrees across the direction at which the most aligned list
+ * changes. With one list per frame the picture jumps; with lists per pixel it does not. */
 #include "hard.h"
 #include "test.h"
 
@@ -24,8 +24,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The mean change of a component in the step where it is most, over that of the median step, which
- * is the motion's. */
+/* Returns the largest mean change of a component over all steps, divided by the median step.
+ * Motion causes the median step. */
 static double max_over_median(const scene *s, trip_method method, double h, unsigned form)
 {
     double changes[STEPS];
@@ -50,8 +50,8 @@ static double max_over_median(const scene *s, trip_method method, double h, unsi
     return changes[STEPS - 1] / changes[STEPS / 2];
 }
 
-/* Beyond the median step's, which is 1. By clip the line between two lists passes a column of
- * pixels at a time, of 32, which is what is left there. */
+/* The bounds are above the median step, which is 1. With `clip`, the border between two lists
+ * crosses one of 32 pixel columns at a time, which explains its bound. */
 static void one_list_a_frame_pops_and_lists_by_pixel_do_not(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Random scenes, drawn once as they are and once with the axes of their grid permuted or mirrored,
- * the world scaled, or volume and camera moved together: the same picture, by every form and
- * instruction set. Seeds are fixed. */
+/* Draws random scenes twice: unchanged, and transformed. A transformation permutes or mirrors the
+ * axes of the grid, scales the world, or moves volume and camera together. The picture must be the
+ * same in every form and with every instruction set. Seeds are fixed. */
 #include "cpu/kernels/isa.h"
 #include "hard.h"
 #include "test.h"
@@ -9,21 +9,22 @@
 
 enum { SIZE = 20, SCENES = 5 };
 
-/* What a scene is made of. */
+/* The parameters of a scene. */
 typedef struct field {
     int dims[3];
     double waves[4][4]; /* x, y, z in radians a voxel; phase */
     bool gaps;          /* some voxels are missing */
 } field;
 
-/* From a voxel of the transformed grid to one of the field's, and from its world to the new one. */
+/* Maps a voxel of the transformed grid to a voxel of the field, and the field's world to the new
+ * world. */
 typedef struct transform {
     const char *name;
-    int axis[3]; /* of the field, by the grid's */
+    int axis[3]; /* the field's axis for each axis of the grid */
     bool mirrored[3];
     double scale;
     bool moved;
-    double splats; /* by splats, of 255: where their order within a sheet changes */
+    double splats; /* in 1/255; bound by splats where the order within a sheet changes */
 } transform;
 
 static const transform transforms[] = {
@@ -90,7 +91,7 @@ static bool value_at(void *user, int i, int j, int k, unsigned *code, double gra
     return !f->gaps || scene_hash(at[0], at[1], at[2]) % 97 != 0;
 }
 
-/* The move: a rotation about an axis askew, and a shift. */
+/* Returns the movement: a rotation about an oblique axis, and a translation. */
 static trip_affine move_of(const transform *t)
 {
     const double s = t->scale;
@@ -107,7 +108,7 @@ static trip_affine move_of(const transform *t)
     return m;
 }
 
-/* World of the transformed grid: moved, of the world that the field's own index has. */
+/* Returns the map of the transformed grid: the field's own map, then the movement. */
 static trip_affine world_of(const turned *t, const trip_affine *own)
 {
     trip_affine to_field = { 0 };
@@ -149,8 +150,8 @@ static trip_camera_params move_camera(const trip_camera_params *c, const transfo
     return out;
 }
 
-/* A grid of random spacing, a little sheared, and a view of it: parallel, from outside, from inside
- * the volume. */
+/* Creates a grid of random spacing with a slight shear, and a view of it: parallel, from outside,
+ * or from inside the volume. */
 static void make_view(const field *f, int number, trip_affine *own, hard_view *v)
 {
     for (int r = 0; r < 3; r++)
@@ -178,7 +179,7 @@ static void make_view(const field *f, int number, trip_affine *own, hard_view *v
     v->settings.method = number == 3 ? TRIP_METHOD_CLIP : TRIP_METHOD_MERGE;
 }
 
-/* Of 255. Where no order changes nothing but rounding does. */
+/* Returns the bound in 1/255. If the order of splats stays the same, only rounding differs. */
 static double bound_of(const transform *t, unsigned form, bool reference)
 {
     if (form == HARD_SPLATS && t->splats > 0)

@@ -1,9 +1,12 @@
-/* Views that are hard on numbers: the eye anywhere, rays along axes and diagonals, weights at the
- * border between lists, the widest and narrowest views. */
+/* Views that are difficult for numbers: the eye anywhere, rays along axes and diagonals, weights
+ * at the border between lists, and the widest and narrowest views. */
 #include "hard.h"
 #include "test.h"
 
-enum { EDGE = 12, SIZE = 17 }; /* pixels: odd, so that the middle one's ray is the view's */
+enum {
+    EDGE = 12,
+    SIZE = 17
+}; /* pixels; odd, so that the central pixel's ray is the view direction */
 
 static scene lumps;
 
@@ -34,7 +37,7 @@ static hard_view view_from(const char *name, trip_vec3 eye, trip_vec3 towards, d
     return v;
 }
 
-/* Towards the middle of the grid, from so far. */
+/* Returns a view towards the centre of the grid from a given distance. */
 static hard_view view_of(const char *name, trip_vec3 from, double distance, double fov)
 {
     const double c = 0.5 * (EDGE - 1);
@@ -101,7 +104,8 @@ static void rays_may_lie_along_axes_and_diagonals(void **state)
             v.forms = 1u << (i + (size_t)n) % 3;
             v.gl = n % 4 == 1 ? HARD_ALL : 0;
             v.shows = true;
-            v.tie = i > 3 ? 3.0 / 255 : 0; /* through edges of the grid: a segment more or less */
+            v.tie =
+                i > 3 ? 3.0 / 255 : 0; /* through edges of the grid: one segment more or fewer */
             hard_check(&lumps, &v);
         }
 }
@@ -122,7 +126,7 @@ static void views_may_graze_sheets_and_be_as_wide_as_they_go(void **state)
     };
     for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
         views[i].gl = HARD_POST | (i % 2 ? HARD_SPLATS : HARD_SHEETS);
-        if (i == 1) /* rays in a face are seen or not, by a rounding */
+        if (i == 1) /* rounding decides whether rays in a face are visible */
             views[i].forms = HARD_SPLATS | HARD_SHEETS;
         hard_check(&lumps, &views[i]);
     }

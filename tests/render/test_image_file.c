@@ -51,7 +51,7 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-/* A picture whose colours do not exceed its alpha, different at every pixel. */
+/* Fills a picture with colours that do not exceed its alpha. Every pixel is different. */
 static void fill(float *rgba, int width, int height)
 {
     for (int y = 0; y < height; y++)
@@ -83,14 +83,14 @@ static double round_trip(const char *name, const trip_image_params *params)
 static void float_formats_give_back_the_same_numbers(void **state)
 {
     (void)state;
-    assert_true(round_trip("a.exr", NULL) < 1e-6); /* there and back through a curve */
+    assert_true(round_trip("a.exr", NULL) < 1e-6); /* through a curve and back */
     assert_true(round_trip("a.tif", &(trip_image_params){ .depth = TRIP_IMAGE_FLOAT }) == 0);
 }
 
 static void integer_formats_are_within_half_a_step(void **state)
 {
     (void)state;
-    /* Colour and alpha of a PNG are each rounded: their product is off by at most twice half. */
+    /* A PNG rounds colour and alpha, so that their product differs by at most twice half a step. */
     assert_true(round_trip("a.png", NULL) <= 1.01 / 255);
     assert_true(round_trip("a.png", &(trip_image_params){ .depth = TRIP_IMAGE_U16 }) <=
                 1.01 / 65535);
@@ -106,8 +106,8 @@ static void half_floats_are_within_their_precision(void **state)
     assert_true(worst > 0 && worst <= 0x1p-12);
 }
 
-/* The pixel of an EXR that holds one, and its channels A, B, G, R or B, G, R as floats, stored as
- * they are since there is nothing to gain by zip: they are the file's last bytes. */
+/* Reads the only pixel of an EXR. Its channels A, B, G, R or B, G, R are floats, uncompressed
+ * because zip saves nothing here. They are the last bytes of the file. */
 static void read_exr_pixel(const char *path, int channels, float *values)
 {
     FILE *f = fopen(path, "rb");
@@ -117,8 +117,8 @@ static void read_exr_pixel(const char *path, int channels, float *values)
     fclose(f);
 }
 
-/* 0.5 on a display is ((0.5 + 0.055) / 1.055) ^ 2.4 = 0.214041 of its light; 0.02 is 0.02 / 12.92 =
- * 0.00154799. */
+/* A display value of 0.5 is ((0.5 + 0.055) / 1.055) ^ 2.4 = 0.214041 of the light. A value of 0.02
+ * is 0.02 / 12.92 = 0.00154799. */
 static void exr_holds_linear_light_of_colours_without_their_alpha(void **state)
 {
     (void)state;
@@ -129,13 +129,14 @@ static void exr_holds_linear_light_of_colours_without_their_alpha(void **state)
     assert_true(file[0] == 1 && file[1] == 1);
     assert_close(file[2], 0.00154799, 1e-7);
     assert_close(file[3], 0.21404114, 1e-7);
-    /* Half as opaque: half the light of the same colour. */
+    /* Half the opacity gives half the light of the same colour. */
     assert_int_equal(trip_image_write(&files, path_of("l.exr"), 1, 1, half, NULL), 0);
     read_exr_pixel(path_of("l.exr"), 4, file);
     assert_true(file[0] == 0.5f && file[1] == 0.5f);
     assert_close(file[2], 0.00077399, 1e-7);
     assert_close(file[3], 0.10702057, 1e-7);
-    /* Over black, what is seen is the premultiplied colour: 0.25 is 0.05087609 of light. */
+    /* Over black, the visible colour is the premultiplied colour: 0.25 is 0.05087609 of the light.
+     */
     const trip_image_params over_black = { .drop_alpha = true };
     assert_int_equal(trip_image_write(&files, path_of("l.exr"), 1, 1, half, &over_black), 0);
     read_exr_pixel(path_of("l.exr"), 3, file);
@@ -155,8 +156,8 @@ static void the_curve_of_exr_loses_nothing_outside_its_range(void **state)
     free(back);
 }
 
-/* The bytes of a PNG one pixel wide: its only IDAT inflated, filters undone (there is no left
- * neighbour, so that None, Sub and a zero above are the same). */
+/* Reads the bytes of a PNG one pixel wide. It inflates the only IDAT chunk and undoes the filters.
+ * Without a left neighbour, the filters None, Sub and Up over zero are the same. */
 static void read_narrow_png(const char *path, uint8_t *pixels, int rows, int pixel_bytes)
 {
     uint8_t file[4096], raw[512];
@@ -183,7 +184,7 @@ static void a_png_holds_straight_colour_rounded_to_nearest_and_the_top_row_first
     const float rgba[] = {
         0.25f, 0.1f, 0, 0.5f, /* straight: 0.5, 0.2, 0 */
         -1,    2,    0, 1,    /* clamped */
-        0.5f,  0.5f, 0, 0,    /* colour without alpha cannot be held */
+        0.5f,  0.5f, 0, 0,    /* colour without alpha cannot be represented */
     };
     uint8_t pixels[12];
     assert_int_equal(trip_image_write(&files, path_of("p.png"), 1, 3, rgba, NULL), 0);
@@ -211,7 +212,7 @@ static void every_code_is_reached_from_half_a_step_on_either_side(void **state)
     }
 }
 
-static void distances_come_back_as_they_were(void **state)
+static void distances_are_read_back_unchanged(void **state)
 {
     (void)state;
     const trip_image_params distances = { .distances = true };
@@ -292,7 +293,7 @@ static void wrong_names_and_depths_are_wrong_usage(void **state)
                    "a.exr: a .exr file cannot hold this number type");
 }
 
-static void a_place_that_cannot_be_written_is_a_failure(void **state)
+static void an_unwritable_path_is_a_failure(void **state)
 {
     (void)state;
     expect_refusal(path_of("missing/a.png"), TRIP_IMAGE_DEPTH_DEFAULT, TRIP_ERROR,
@@ -302,9 +303,9 @@ static void a_place_that_cannot_be_written_is_a_failure(void **state)
     rmdir(path_of("folder.png"));
 }
 
-/* A limit on file size stands for a full disk: both make write(2) fail or fall short, where the
- * signal about it is ignored, as the program does. The helper has it from its start, and is started
- * anew after any failure, here the first. */
+/* A limit on file size simulates a full disk. In both cases write(2) fails or writes less, because
+ * the program ignores the signal. The helper process inherits the limit at its start. It restarts
+ * after every failure, here after the first one. */
 static void a_full_disk_is_reported_and_leaves_nothing(void **state)
 {
     (void)state;
@@ -364,11 +365,11 @@ int main(void)
         cmocka_unit_test(the_curve_of_exr_loses_nothing_outside_its_range),
         cmocka_unit_test(a_png_holds_straight_colour_rounded_to_nearest_and_the_top_row_first),
         cmocka_unit_test(every_code_is_reached_from_half_a_step_on_either_side),
-        cmocka_unit_test(distances_come_back_as_they_were),
+        cmocka_unit_test(distances_are_read_back_unchanged),
         cmocka_unit_test(jpeg_is_the_picture_over_black),
         cmocka_unit_test(a_pixel_that_is_no_number_is_refused_and_the_old_file_stays),
         cmocka_unit_test(wrong_names_and_depths_are_wrong_usage),
-        cmocka_unit_test(a_place_that_cannot_be_written_is_a_failure),
+        cmocka_unit_test(an_unwritable_path_is_a_failure),
         cmocka_unit_test(a_full_disk_is_reported_and_leaves_nothing),
         cmocka_unit_test(a_broken_picture_is_refused_when_read),
     };

@@ -1,5 +1,5 @@
-/* The integral against closed forms that are worked out here from the geometry alone, and the
- * reference's splats against it. */
+/* Compares the integral with closed forms computed here from the geometry alone, and the
+ * reference's splats with the integral. */
 #include "scenes.h"
 #include "test.h"
 
@@ -9,7 +9,7 @@
 
 #include <string.h>
 
-enum { EDGE = 20 }; /* voxels of most volumes here; between their centres EDGE - 1 */
+enum { EDGE = 20 }; /* voxels of most volumes; EDGE - 1 between the outermost centres */
 
 static scene_picture integrate(const scene *s, const trip_camera_params *view,
                                const trip_settings *settings)
@@ -62,7 +62,7 @@ static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
     }
 }
 
-/* Along i by 3000 codes a voxel. */
+/* Codes rise by 3000 per voxel along i. */
 static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -79,7 +79,7 @@ static void a_ramp_is_integrated_in_extinction_and_in_colour(void **state)
     scene s;
     scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = ramp });
     for (int i = 0; i < 12; i++) {
-        /* First both linear in the value, then the colour alone. */
+        /* First both are linear in the value, then the colour alone. */
         bool both = i % 2;
         for (int code = 0; code < 65536; code++)
             s.table[code] = (trip_tf_entry){ both ? 1 : (float)code / 65535, 0, 0,
@@ -120,7 +120,7 @@ static bool two_halves(void *user, int i, int j, int k, unsigned *code, double g
     return true;
 }
 
-static void what_is_nearer_covers_what_is_behind(void **state)
+static void nearer_voxels_cover_those_behind(void **state)
 {
     (void)state;
     scene s;
@@ -144,7 +144,7 @@ static void what_is_nearer_covers_what_is_behind(void **state)
     scene_destroy(&s);
 }
 
-/* Steep: from 0 to 65535 between i = 9 and 10. */
+/* The value jumps from 0 to 65535 between i = 9 and 10. */
 static bool cliff(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -155,7 +155,7 @@ static bool cliff(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-static void a_narrow_peak_of_the_function_is_not_missed(void **state)
+static void a_narrow_peak_of_the_transfer_function_is_not_missed(void **state)
 {
     (void)state;
     scene s;
@@ -165,7 +165,8 @@ static void a_narrow_peak_of_the_function_is_not_missed(void **state)
     view.ortho_height = 0.1;
     const int peaks[] = { 1, 300, 11111, 32768, 65533 };
     for (int i = 0; i < 5; i++) {
-        /* A triangle two codes wide, of area 65535 codes: on its way a ray has depth 1. */
+        /* A triangle two codes wide, with area 65535 codes. A ray that crosses it has optical
+         * depth 1. */
         s.table[peaks[i]] = (trip_tf_entry){ 0.5F, 0, 0, 65535 };
         scene_picture p = integrate(&s, &view, &settings);
         assert_close(p.rgba[3], 1 - exp(-1), 1e-4);
@@ -175,7 +176,7 @@ static void a_narrow_peak_of_the_function_is_not_missed(void **state)
     scene_destroy(&s);
 }
 
-/* All but (9, 9, 9). */
+/* Every voxel except (9, 9, 9) is present. */
 static bool all_but_one(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -194,7 +195,7 @@ static void a_cell_without_a_corner_is_empty(void **state)
     const trip_settings settings = exact(1e-6);
     trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 60, 20, 1);
     view.ortho_height = 0.1;
-    for (int i = 0; i < 3; i++) { /* through the cells around it, then beside them */
+    for (int i = 0; i < 3; i++) { /* through the cells around the missing voxel, then beside them */
         view.eye.x = view.look.x = 8.2 + i;
         view.eye.y = view.look.y = 9.4;
         scene_picture p = integrate(&s, &view, &settings);
@@ -241,11 +242,12 @@ static void cubic_goes_through_a_parabola_and_linear_through_its_chords(void **s
     scene_destroy(&s);
 }
 
-/* By their differences, so that it does not matter whether there are normals for splats. */
+/* Gradients are differences of values, so that it does not matter whether normals are stored for
+ * splats. */
 static void values_are_lit_without_stored_normals(void **state)
 {
     (void)state;
-    scene_picture pictures[3]; /* of the last light is off */
+    scene_picture pictures[3]; /* the last picture is unlit */
     for (int i = 0; i < 3; i++) {
         scene s;
         scene_create(&s, &(scene_params){
@@ -264,8 +266,8 @@ static void values_are_lit_without_stored_normals(void **state)
         scene_picture_free(&pictures[i]);
 }
 
-/* A ball of radius *user in the middle of a cube: values fall outwards by 0.05 a voxel, the surface
- * at one half. */
+/* A ball of radius *user in the centre of a cube. Values fall outwards by 0.05 per voxel; the
+ * surface is at one half. */
 static double ball(const double *radius, int i, int j, int k, double gradient[3])
 {
     double middle = *radius + 4;
@@ -283,7 +285,8 @@ static bool ball_voxel(void *user, int i, int j, int k, unsigned *code, double g
     return true;
 }
 
-/* The greatest error within 0.8 of a ball's radius: its surface is opaque, and lit from the eye. */
+/* Returns the maximum error within 0.8 of the ball's radius. The surface is opaque and lit from
+ * the eye. */
 static double error_of_ball(const scene *s, double radius, const scene_making *how)
 {
     enum { SIZE = 31 };
@@ -297,7 +300,8 @@ static double error_of_ball(const scene *s, double radius, const scene_making *h
         double x = (n % SIZE + 0.5) / SIZE * 2 - 1, y = (n / SIZE + 0.5) / SIZE * 2 - 1;
         if (x * x + y * y > 0.64)
             continue;
-        double facing = sqrt(1 - x * x - y * y); /* of normal, light and half vector alike */
+        double facing =
+            sqrt(1 - x * x - y * y); /* cosine for normal, light and half vector alike */
         double red = 0.6 * (TRIP_AMBIENT + TRIP_DIFFUSE * facing) +
                      TRIP_SPECULAR * pow(facing, TRIP_SHININESS);
         max = fmax(max, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));
@@ -306,8 +310,9 @@ static double error_of_ball(const scene *s, double radius, const scene_making *h
     return max;
 }
 
-/* Light at so many degrees from the eye: what is lit is seen, and does not shine, from behind. */
-static void a_ball_shines_where_the_light_falls_on_what_is_seen(void **state)
+/* The light is at a given angle from the eye. Lit and visible parts shine, except if the light is
+ * behind the surface. */
+static void a_ball_shines_where_lit_and_visible(void **state)
 {
     (void)state;
     enum { SIZE = 31 };
@@ -366,8 +371,8 @@ static void put_ball(trip_field *f, double radius)
         0);
 }
 
-/* Normals stored in 4 bytes and in 3, and by differences of the values. */
-static void a_lit_ball_has_its_colours_the_closer_the_finer_it_is(void **state)
+/* Normals are stored in 4 bytes or in 3, or computed as differences of values. */
+static void the_colours_of_a_lit_ball_converge_with_resolution(void **state)
 {
     (void)state;
     for (int form = 0; form < 3; form++) {
@@ -393,7 +398,7 @@ static void a_lit_ball_has_its_colours_the_closer_the_finer_it_is(void **state)
             trip_field_destroy(field);
             scene_destroy(&s);
         }
-        /* Of normals in 3 bytes an error is left that no resolution lessens: normal.h. */
+        /* Normals in 3 bytes keep an error that no resolution reduces, see normal.h. */
         double left = form == 1 ? 0.5 / 255 : 0;
         assert_true(errors[0] < 0.005);
         assert_true(errors[1] < left + 0.4 * errors[0]);
@@ -434,7 +439,7 @@ static void a_splat_is_a_gaussian_cut_off_and_lowered(void **state)
             trip_vec3 across = trip_cross(trip_sub(trip_v3(9, 10, 8), o), d);
             double d2 = trip_dot(across, across);
             double footprint = d2 < k * k * sigma * sigma ? exp(-d2 / twice) - edge : 0;
-            /* Of unit integral over the plane. */
+            /* The footprint has unit integral over the plane. */
             footprint /= 3.14159265358979323846 * twice * (1 - edge * (1 + k * k / 2));
             double alpha = 1 - exp(-3 * scene_ray_stretch(&s, d) * footprint);
             covered += alpha > 0.01;
@@ -447,7 +452,7 @@ static void a_splat_is_a_gaussian_cut_off_and_lowered(void **state)
     }
 }
 
-static void of_a_splat_at_the_eye_the_half_in_front_counts(void **state)
+static void half_of_a_splat_at_the_eye_counts(void **state)
 {
     (void)state;
     scene s;
@@ -467,8 +472,8 @@ static void of_a_splat_at_the_eye_the_half_in_front_counts(void **state)
     scene_destroy(&s);
 }
 
-/* The integral counts the splat's own density from the eye on, front() that of a Gaussian. */
-static void one_splat_about_the_eye_comes_to_its_integral(void **state)
+/* The integral counts the splat's own density from the eye on; front() counts a Gaussian. */
+static void one_splat_about_the_eye_has_its_integral(void **state)
 {
     (void)state;
     enum { SIZE = 24 };
@@ -506,7 +511,7 @@ static bool noise(void *user, int i, int j, int k, unsigned *code, double gradie
     return scene_hash(j, k, i) % 7 != 0;
 }
 
-/* Many hues, thin and dense by turns. */
+/* Sets stripes of many hues, alternately thin and dense. */
 static void set_stripes(scene *s)
 {
     for (int code = 0; code < 65536; code++) {
@@ -623,9 +628,9 @@ static void samples_are_the_mean_of_a_finer_picture(void **state)
     scene_destroy(&s);
 }
 
-/* Values that a data set rounds to whole codes: with extinction linear in the code the depth of a
- * path is off by at most half a code along it. */
-static void codes_lose_what_rounding_to_them_can(void **state)
+/* A data set rounds values to whole codes. If extinction is linear in the code, the optical depth
+ * of a path differs by at most half a code along the path. */
+static void codes_lose_at_most_their_rounding(void **state)
 {
     (void)state;
     scene s;
@@ -651,9 +656,9 @@ static void codes_lose_what_rounding_to_them_can(void **state)
     scene_destroy(&s);
 }
 
-/* Of one colour the order of splats does not matter, and their opacity is that of the integral, but
- * for the low-pass of the screen, which counts less the finer the pixels are. */
-static void the_reference_comes_to_the_integral_of_its_splats(void **state)
+/* Splats of one colour do not depend on their order, and their opacity equals the integral. The
+ * low-pass filter adds a difference that shrinks with the pixel size. */
+static void the_reference_converges_to_the_integral_of_its_splats(void **state)
 {
     (void)state;
     enum { SIZE = 12 };
@@ -681,14 +686,14 @@ static void the_reference_comes_to_the_integral_of_its_splats(void **state)
         scene_picture_free(&splats);
     }
     scene_picture_free(&truth);
-    /* The low-pass adds a variance that falls with the square of the pixel. */
+    /* The low-pass filter adds a variance that falls with the square of the pixel size. */
     assert_true(errors[0] > 1e-3);
     assert_close(errors[1] / errors[0], 1.0 / 9, 0.05);
     assert_close(errors[2] / errors[1], 1.0 / 9, 0.05);
     scene_destroy(&s);
 }
 
-static void what_does_not_fit_the_memory_is_refused(void **state)
+static void integrals_that_exceed_the_memory_are_refused(void **state)
 {
     (void)state;
     trip_budget *budget;
@@ -715,23 +720,23 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_constant_body_has_the_opacity_of_the_path_in_it),
         cmocka_unit_test(a_ramp_is_integrated_in_extinction_and_in_colour),
-        cmocka_unit_test(what_is_nearer_covers_what_is_behind),
-        cmocka_unit_test(a_narrow_peak_of_the_function_is_not_missed),
+        cmocka_unit_test(nearer_voxels_cover_those_behind),
+        cmocka_unit_test(a_narrow_peak_of_the_transfer_function_is_not_missed),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
         cmocka_unit_test(values_are_lit_without_stored_normals),
         cmocka_unit_test(cubic_goes_through_a_parabola_and_linear_through_its_chords),
-        cmocka_unit_test(a_ball_shines_where_the_light_falls_on_what_is_seen),
-        cmocka_unit_test(a_lit_ball_has_its_colours_the_closer_the_finer_it_is),
+        cmocka_unit_test(a_ball_shines_where_lit_and_visible),
+        cmocka_unit_test(the_colours_of_a_lit_ball_converge_with_resolution),
         cmocka_unit_test(a_splat_is_a_gaussian_cut_off_and_lowered),
-        cmocka_unit_test(one_splat_about_the_eye_comes_to_its_integral),
-        cmocka_unit_test(of_a_splat_at_the_eye_the_half_in_front_counts),
+        cmocka_unit_test(one_splat_about_the_eye_has_its_integral),
+        cmocka_unit_test(half_of_a_splat_at_the_eye_counts),
         cmocka_unit_test(the_error_is_within_the_tolerance),
         cmocka_unit_test(threads_and_panes_change_no_bit),
         cmocka_unit_test(progress_rises_to_the_number_of_pixels),
         cmocka_unit_test(samples_are_the_mean_of_a_finer_picture),
-        cmocka_unit_test(codes_lose_what_rounding_to_them_can),
-        cmocka_unit_test(the_reference_comes_to_the_integral_of_its_splats),
-        cmocka_unit_test(what_does_not_fit_the_memory_is_refused),
+        cmocka_unit_test(codes_lose_at_most_their_rounding),
+        cmocka_unit_test(the_reference_converges_to_the_integral_of_its_splats),
+        cmocka_unit_test(integrals_that_exceed_the_memory_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

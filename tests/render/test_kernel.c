@@ -1,11 +1,11 @@
-/* The kernels' weights by what they must reproduce. */
+/* Tests the kernels' weights by the functions they must reproduce. */
 #include "kernel.h"
 
 #include <math.h>
 
 #include "test.h"
 
-/* The sum of weights times the voxel's coordinate to a power. */
+/* Returns the sum of the weights times a power of the voxel's coordinate. */
 static double moment(trip_kernel kernel, double position, int power)
 {
     double weights[TRIP_KERNEL_TAPS], sum = 0;
@@ -27,7 +27,7 @@ static void constants_lines_and_parabolas_are_reproduced(void **state)
     }
 }
 
-/* Hermite's cubic between two values whose slopes are central differences. */
+/* Hermite's cubic between two values with central differences as slopes. */
 static void cubic_is_the_curve_through_values_with_their_central_differences(void **state)
 {
     (void)state;

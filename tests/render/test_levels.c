@@ -9,9 +9,9 @@
 #include "visible.h"
 #include "weight.h"
 
-/* Data sets of two levels. Most are one object in cubes of 4 x 4 x 4 voxels of level 0, every other
- * one drawn by its voxels, the rest by those of level 1, so that the levels alternate along every
- * ray and each hides much of the other. */
+/* Data sets of two levels. Most are one object made of cubes of 4 x 4 x 4 voxels of level 0. Level
+ * 0 draws every second cube, level 1 the others. The levels alternate along every ray, and each
+ * hides much of the other. */
 
 enum { N = 24, CELL = 4, SIZE_PX = 44, CHANNELS = 5 };
 
@@ -24,13 +24,13 @@ typedef enum parting {
     COARSE_ALONE, /* level 0 is empty */
 } parting;
 
-/* Voxels of level 0 in one of level 1, and which of the two draws what. */
+/* The number of voxels of level 0 in one of level 1, and the cubes that each level draws. */
 typedef struct coarseness {
     int by[3];
     parting parting;
 } coarseness;
 
-/* Whether a place is drawn by a level. */
+/* Returns true if `level` draws the position. */
 static bool is_drawn_by(const coarseness *c, int level, const double at[3])
 {
     int sum = 0;
@@ -93,11 +93,9 @@ static void destroy(levels *l)
     scene_destroy(&l->drawn);
 }
 
-/* ---- by brute force ---- */
-
 typedef struct item {
     double coordinate;
-    trip_vec3 position; /* in the world */
+    trip_vec3 position; /* in world space */
     int level;
     uint64_t morton;
     const trip_tf_entry *entry;
@@ -161,8 +159,8 @@ static void collect(brute *b, int axis)
     qsort(b->items, b->count, sizeof *b->items, by_position);
 }
 
-/* Along the ray of a pixel to the plane of the splat's centre that faces the eye's; not behind it.
- */
+/* Returns the distance along a pixel's ray to the plane through the splat's centre that faces the
+ * eye. It is never negative. */
 static double distance_of(const brute *b, const item *i, double x, double y)
 {
     const trip_camera *c = &b->frames[0].camera;
@@ -190,7 +188,7 @@ static void put_behind(const brute *b, const item *i, double x, double y, double
     layer[4] += distance_of(b, i, x, y) * add;
 }
 
-/* As the ray meets their sheets: up the axis or down it. */
+/* Composites the sheets in the order in which the ray meets them, up or down the axis. */
 static void composite(const brute *b, int axis, double x, double y, double layer[CHANNELS])
 {
     const bool up = trip_component(trip_camera_ray(&b->frames[0].camera, x, y), axis) > 0;
@@ -198,7 +196,7 @@ static void composite(const brute *b, int axis, double x, double y, double layer
         put_behind(b, &b->items[up ? i : b->count - 1 - i], x, y, layer);
 }
 
-/* CHANNELS floats a pixel. */
+/* Returns CHANNELS floats per pixel. */
 static float *draw_by_hand(brute *b)
 {
     const trip_camera *c = &b->frames[0].camera;
@@ -225,8 +223,6 @@ static float *draw_by_hand(brute *b)
     return merged;
 }
 
-/* ---- views ---- */
-
 static double largest_difference(const scene_picture *p, const float *merged)
 {
     double max = 0;
@@ -236,7 +232,7 @@ static double largest_difference(const scene_picture *p, const float *merged)
     return max;
 }
 
-/* Of depths times opacity, as parts of the object's size. */
+/* Returns the largest difference of distance times opacity, relative to the object's size. */
 static double largest_depth_difference(const scene_picture *p, const float *merged)
 {
     double max = 0;
@@ -312,7 +308,8 @@ static void two_levels_are_drawn_in_one_order(void **state)
     destroy(&l);
 }
 
-/* Their rays differ from pixel to pixel, and sheets along the last axis coincide. */
+/* The rays of these views differ from pixel to pixel. Sheets of both levels coincide along the
+ * last axis. */
 static void levels_of_voxels_of_other_shapes_are_drawn_in_one_order(void **state)
 {
     (void)state;
@@ -331,7 +328,7 @@ static void levels_with_other_boxes_are_drawn_in_one_order(void **state)
     destroy(&l);
 }
 
-/* Framing goes by level 0: where that is empty, by the grid. */
+/* Framing uses level 0, or the grid if level 0 is empty. */
 static void expect_bounds_of_the_grid(const levels *l)
 {
     double lo[3], hi[3];
@@ -398,7 +395,7 @@ static void a_plan_names_lists_by_axis_and_level(void **state)
     destroy(&l);
 }
 
-/* Along an axis all voxels of its two lists are in the picture, and no others are read. */
+/* Along an axis, all voxels of the axis's two lists are in the picture. No other list is read. */
 static void every_list_has_counts_of_its_own(void **state)
 {
     (void)state;

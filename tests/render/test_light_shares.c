@@ -1,4 +1,4 @@
-/* What voxels count at the nodes of a light's lattice where spacing is uneven. */
+/* The share of each voxel at the nodes of a light's lattice, for uneven spacing. */
 #include "light_shares.h"
 #include "test.h"
 
@@ -11,7 +11,8 @@ static trip_budget *open_budget(uint64_t bytes)
     return b;
 }
 
-/* Steps that differ by up to `most` times, along the first axis; the others have one voxel. */
+/* Creates steps that differ by up to `most` times along the first axis. The other axes have one
+ * voxel. */
 static trip_coordinates random_coordinates(double table[MAX], int64_t voxels, double max)
 {
     static const double one[] = { 0 };
@@ -38,7 +39,7 @@ static double share_of(const trip_light_shares *s, int64_t voxel, int node)
     return at >= 0 && (size_t)at < count ? s->shares[s->begin[voxel] + (size_t)at] : 0;
 }
 
-static void with_even_steps_a_voxel_counts_where_it_is_near(void **state)
+static void even_steps_give_weight_by_distance(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
@@ -58,10 +59,9 @@ static void with_even_steps_a_voxel_counts_where_it_is_near(void **state)
     trip_budget_destroy(b);
 }
 
-/* A voxel's shares are what lies about it, half of the way to its neighbours; at the ends of the
- * grid as much again as the point there has. Points are as many steps apart as are 1 long at most.
- */
-static void shares_make_what_lies_about_a_voxel(void **state)
+/* A voxel's shares cover half the way to each neighbour. At the ends of the grid, a point counts
+ * once more. Points are at most 1 apart. */
+static void shares_add_up_to_the_surroundings_of_a_voxel(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
@@ -86,7 +86,7 @@ static void shares_make_what_lies_about_a_voxel(void **state)
             all += found;
         }
         for (int n = 0; n < nodes; n++) {
-            assert_true(s.sums[n] > 0); /* no node is without a value */
+            assert_true(s.sums[n] > 0); /* every node has a value */
             sums += s.sums[n];
         }
         assert_close(sums, all, 1e-9 * all);
@@ -95,10 +95,9 @@ static void shares_make_what_lies_about_a_voxel(void **state)
     trip_budget_destroy(b);
 }
 
-/* What is linear among places has at a node the value of the place there, but for points lying
- * unevenly about it, which are no farther than the spacing, and for as much as a step at the ends.
- */
-static void a_ramp_stays_near_to_itself(void **state)
+/* A function linear in the position has at each node its value there. Two effects cause an error:
+ * points lie unevenly about a node, by at most the spacing, and the ends add up to one step. */
+static void a_ramp_stays_close_to_its_values(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
@@ -118,7 +117,7 @@ static void a_ramp_stays_near_to_itself(void **state)
     trip_budget_destroy(b);
 }
 
-static void what_does_not_fit_is_refused_and_nothing_kept(void **state)
+static void lattices_that_do_not_fit_are_refused_and_keep_nothing(void **state)
 {
     (void)state;
     trip_budget *b = open_budget(1 << 20);
@@ -138,10 +137,10 @@ static void what_does_not_fit_is_refused_and_nothing_kept(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(with_even_steps_a_voxel_counts_where_it_is_near),
-        cmocka_unit_test(shares_make_what_lies_about_a_voxel),
-        cmocka_unit_test(a_ramp_stays_near_to_itself),
-        cmocka_unit_test(what_does_not_fit_is_refused_and_nothing_kept),
+        cmocka_unit_test(even_steps_give_weight_by_distance),
+        cmocka_unit_test(shares_add_up_to_the_surroundings_of_a_voxel),
+        cmocka_unit_test(a_ramp_stays_close_to_its_values),
+        cmocka_unit_test(lattices_that_do_not_fit_are_refused_and_keep_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

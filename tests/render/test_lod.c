@@ -1,5 +1,6 @@
-/* Levels chosen by the width of their voxels: each place is drawn once, a body of one value looks
- * the same at every level and where levels meet, and pictures do not depend on how it is cut up. */
+/* Levels chosen by the width of their voxels. Each position is drawn once. A body of one value
+ * looks the same at every level and where levels meet. Pictures do not depend on the size of
+ * tiles. */
 #include "scenes.h"
 
 #include "test.h"
@@ -24,7 +25,7 @@ static bool all(void *user, int i, int j, int k, unsigned *code, double gradient
     return true;
 }
 
-/* Fog of one value, and its levels. */
+/* Creates fog of one value with its levels. */
 static void create(scene *s, unsigned tile, double opacity)
 {
     const scene_part parts[LEVELS] = {
@@ -58,8 +59,6 @@ static const scene_renderer *renderer_named(const char *name)
     return r->name ? r : NULL;
 }
 
-/* ---- the choice ---- */
-
 static void levels_are_the_coarsest_that_are_narrow_enough(void **state)
 {
     (void)state;
@@ -70,7 +69,7 @@ static void levels_are_the_coarsest_that_are_narrow_enough(void **state)
     assert_int_equal(trip_lod_level(HUGE_VAL, 1000, 5), 0);
 }
 
-/* A voxel at distance d, seen under 2 atan(1/2) from top to bottom, is SIZE_PX / d pixels wide. */
+/* At a field of view of 2 atan(1/2), a voxel at distance d is SIZE_PX / d pixels wide. */
 static void width_is_that_of_similar_triangles(void **state)
 {
     (void)state;
@@ -102,7 +101,7 @@ static trip_lod make_lod(const scene *s, const trip_camera_params *view,
     return lod;
 }
 
-/* Their faces that are turned to the eye lie half a voxel before them. */
+/* The face that is turned to the eye lies half a voxel before the voxel's centre. */
 static void cubes_are_as_wide_as_their_nearest_voxels(void **state)
 {
     (void)state;
@@ -133,7 +132,8 @@ static trip_camera_params view_along(const scene *s)
     return scene_view(s, trip_v3(1, 0.3, 0.2), 260, 40, SIZE_PX);
 }
 
-/* Whatever list it is looked for in; by square and by itself. */
+/* Returns true if the voxel is drawn. The answer must be the same for every list, by square and by
+ * single voxel. */
 static bool is_drawn(const trip_lod *lod, const trip_list *list, const int64_t voxel[3])
 {
     int64_t sheet = voxel[list->axis] >> list->level;
@@ -145,7 +145,7 @@ static bool is_drawn(const trip_lod *lod, const trip_list *list, const int64_t v
     return drawn;
 }
 
-static void each_place_is_drawn_at_one_level(void **state)
+static void each_position_is_drawn_at_one_level(void **state)
 {
     (void)state;
     scene s;
@@ -175,7 +175,7 @@ static void each_place_is_drawn_at_one_level(void **state)
     scene_destroy(&s);
 }
 
-/* Widths are in pixels of the picture, of which more are drawn. */
+/* Widths are in pixels of the picture, even if more samples per pixel are drawn. */
 static void levels_do_not_depend_on_samples(void **state)
 {
     (void)state;
@@ -191,14 +191,14 @@ static void levels_do_not_depend_on_samples(void **state)
         view.height *= i + 1;
         lods[i] = make_lod(&s, &view, &settings, &c);
     }
-    assert_true(lods[0].chosen & (lods[0].chosen - 1)); /* several */
+    assert_true(lods[0].chosen & (lods[0].chosen - 1)); /* several levels */
     assert_memory_equal(lods[0].level, lods[1].level, lods[0].bytes);
     for (int i = 0; i < 2; i++)
         trip_lod_release(&lods[i], s.budget);
     scene_destroy(&s);
 }
 
-/* Of the coarse levels of large grids, whose cubes are but a few voxels wide. */
+/* Coarse levels of large grids have cubes that are a few voxels wide. */
 static void squares_have_the_voxels_of_cubes_smaller_than_they_are(void **state)
 {
     (void)state;
@@ -228,9 +228,7 @@ static void squares_have_the_voxels_of_cubes_smaller_than_they_are(void **state)
     }
 }
 
-/* ---- pictures ---- */
-
-/* Seen along z by parallel rays: 64 voxels of one extinction. */
+/* 64 voxels of one extinction, seen along z by parallel rays. */
 static void fog_is_as_thick_at_every_level(void **state)
 {
     (void)state;
@@ -251,8 +249,9 @@ static void fog_is_as_thick_at_every_level(void **state)
     scene_destroy(&s);
 }
 
-/* Cells of several levels in one picture: the same as the finest alone but for a bound, which the
- * wider kernels beyond a border need, and that does not grow with what is added up. */
+/* Cells of several levels in one picture must look like the finest level alone, within a bound.
+ * The wider kernels beyond a border need the bound, which does not grow with the number of splats.
+ */
 static void no_seam_shows_where_levels_meet(void **state)
 {
     (void)state;
@@ -317,7 +316,7 @@ static void tiles_make_no_difference(void **state)
     scene_picture_free(&p[1]);
 }
 
-/* Post draws one level, between the outermost centres of its voxels. */
+/* `post` draws one level, between the outermost voxel centres. */
 static void interpolated_fog_is_as_thick_at_a_coarse_level(void **state)
 {
     (void)state;
@@ -360,7 +359,8 @@ static void interpolated_fog_is_as_thick_at_a_coarse_level(void **state)
     scene_destroy(&s);
 }
 
-/* Values that rise along z by so much of their range a voxel, half of what full shading takes. */
+/* The rise of values along z per voxel, as a share of their range: half of the gradient at which
+ * shading is full. */
 #define RISE (0.5 * TRIP_GRADIENT_FULL)
 
 static bool rising(void *user, int i, int j, int k, unsigned *code, double gradient[3])
@@ -374,7 +374,8 @@ static bool rising(void *user, int i, int j, int k, unsigned *code, double gradi
     return true;
 }
 
-/* What faces the light has the highlight of its steepness, which is the same at every level. */
+/* A surface that faces the light has a highlight that depends on its steepness. Steepness is the
+ * same at every level. */
 static void shading_is_as_strong_at_a_coarse_level(void **state)
 {
     (void)state;
@@ -418,8 +419,8 @@ static bool is_chosen(const trip_lod *lod, unsigned level)
     return false;
 }
 
-/* A code of means that covers a half shows a half, and where it is thin as much as was kept. Lists
- * of levels that no cube has need no table. */
+/* A mean code that covers one half shows one half. Where the volume is thin, it shows as much as
+ * was kept. Lists of levels without cubes need no table. */
 static void check_tables(const scene *s, const trip_plan *plan, bool seen[LEVELS + 1])
 {
     const trip_mean_scale scale = { 0, 65535 };
@@ -461,8 +462,9 @@ static void tables_of_means_have_their_opacity(void **state)
     scene_destroy(&s);
 }
 
-/* One for the three axes, whose cubes are as long; the next frame has the same. */
-static void tables_are_kept_where_the_caller_keeps_them(void **state)
+/* The three axes share one table, because their cubes have equal length. The next frame uses the
+ * same table. */
+static void tables_are_kept_by_the_caller(void **state)
 {
     (void)state;
     scene s;
@@ -494,9 +496,8 @@ static void tables_are_kept_where_the_caller_keeps_them(void **state)
     scene_destroy(&s);
 }
 
-/* ---- bounds ---- */
-
-/* Codes of 2 bytes in the three lists or fewer, of dense fog: an eighth as many at each level. */
+/* Returns the bytes of dense fog with 2-byte codes in up to three lists. Each level has an eighth
+ * of the voxels. */
 static double bytes_of(const trip_lod *lod, const scene *s, int lists)
 {
     double bytes = 0;
@@ -527,7 +528,7 @@ static trip_lod bounded(scene *s, double max_bytes)
     return lod;
 }
 
-static void bounds_are_kept_and_what_is_nearest_is_finest(void **state)
+static void bounds_hold_and_the_nearest_cubes_are_finest(void **state)
 {
     (void)state;
     scene s;
@@ -555,7 +556,7 @@ static void bounds_are_kept_and_what_is_nearest_is_finest(void **state)
     scene_destroy(&s);
 }
 
-/* However the data set is cut up: tiles of 16 or 128 voxels. */
+/* The size of tiles, 16 or 128 voxels, must not matter. */
 static void tiles_make_no_difference_to_bounds(void **state)
 {
     (void)state;
@@ -614,7 +615,7 @@ int main(void)
         cmocka_unit_test(cubes_are_as_wide_as_their_nearest_voxels),
         cmocka_unit_test(levels_do_not_depend_on_samples),
         cmocka_unit_test(squares_have_the_voxels_of_cubes_smaller_than_they_are),
-        cmocka_unit_test(each_place_is_drawn_at_one_level),
+        cmocka_unit_test(each_position_is_drawn_at_one_level),
         cmocka_unit_test(fog_is_as_thick_at_every_level),
         cmocka_unit_test(no_seam_shows_where_levels_meet),
         cmocka_unit_test(renderers_agree_on_mixed_levels),
@@ -622,8 +623,8 @@ int main(void)
         cmocka_unit_test(interpolated_fog_is_as_thick_at_a_coarse_level),
         cmocka_unit_test(shading_is_as_strong_at_a_coarse_level),
         cmocka_unit_test(tables_of_means_have_their_opacity),
-        cmocka_unit_test(tables_are_kept_where_the_caller_keeps_them),
-        cmocka_unit_test(bounds_are_kept_and_what_is_nearest_is_finest),
+        cmocka_unit_test(tables_are_kept_by_the_caller),
+        cmocka_unit_test(bounds_hold_and_the_nearest_cubes_are_finest),
         cmocka_unit_test(tiles_make_no_difference_to_bounds),
         cmocka_unit_test(values_of_a_level_are_an_eighth),
     };

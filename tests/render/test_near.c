@@ -1,10 +1,10 @@
-/* What is drawn of splats about the eye: pictures from inside fog, against the closed form. */
+/* Splats about the eye. Compares pictures from inside fog with the closed form. */
 #include "scenes.h"
 #include "test.h"
 
-enum { EDGE = 30 }; /* voxels of a cube of fog */
+enum { EDGE = 30 }; /* edge of a cube of fog in voxels */
 
-/* Optical depth a voxel. */
+/* Optical depth of one voxel. */
 #define EXTINCTION 0.08
 
 static void make_fog(scene *s)
@@ -21,8 +21,9 @@ static trip_settings unlit(void)
     return s;
 }
 
-/* From the eye to where the ray of a pixel leaves the cube, whose faces are half a voxel beyond the
- * outermost voxels; negative where that is within `margin` of an edge of it. */
+/* Returns the distance from the eye to the point where a pixel's ray leaves the cube. The cube's
+ * faces are half a voxel beyond the outermost voxels. The result is negative if that point is
+ * within `margin` of an edge of the cube. */
 static double path(const trip_camera *c, double x, double y, double margin)
 {
     trip_vec3 ray = trip_normalize(trip_camera_ray(c, x, y));
@@ -57,7 +58,7 @@ static double optical_depth(const scene_picture *p, int n)
     return -log1p(-(double)p->rgba[4 * n + 3]);
 }
 
-/* The greatest difference of optical depth from that of the path, over that; where the ray leaves
+/* Returns the largest relative error of the optical depth along the path, over all rays that leave
  * the cube away from its edges. */
 static double worst_of(const scene_picture *p, const trip_camera_params *view, int *pixels)
 {
@@ -73,8 +74,9 @@ static double worst_of(const scene_picture *p, const trip_camera_params *view, i
     return worst;
 }
 
-/* From pictures of a pixel on. What is left is the kernel's ripple and, by the square of a pixel's
- * width, the low-pass: a footprint is filtered by what a pixel is at its centre. */
+/* Pictures begin at a size of one pixel. The remaining error is the kernel's ripple and the
+ * low-pass filter, which adds the square of a pixel's width. The filter uses the pixel width at
+ * the footprint's centre. */
 static void fog_about_the_eye_has_the_opacity_of_the_path_in_it(void **state)
 {
     (void)state;
@@ -106,7 +108,7 @@ static void fog_about_the_eye_has_the_opacity_of_the_path_in_it(void **state)
     scene_destroy(&s);
 }
 
-/* Every step of the eye changes the optical depth by that of the step, but for the ripple. */
+/* Each step of the eye changes the optical depth by the step's share, apart from the ripple. */
 static void fog_thins_out_evenly_on_the_way_through_it(void **state)
 {
     (void)state;
@@ -143,7 +145,7 @@ static void fog_thins_out_evenly_on_the_way_through_it(void **state)
     scene_destroy(&s);
 }
 
-/* The plane of the eye of a parallel view goes through the fog likewise. */
+/* The eye's plane of a parallel view passes through the fog. */
 static void a_parallel_view_begins_at_the_plane_of_the_eye(void **state)
 {
     (void)state;

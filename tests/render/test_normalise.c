@@ -1,4 +1,4 @@
-/* The mean colour of what is covered, and the background elsewhere, worked out by hand. */
+/* The mean colour of covered pixels and the background of the others, computed by hand. */
 #include "normalise.h"
 
 #include "test.h"
@@ -12,7 +12,7 @@ static void assert_pixel(const float *rgba, double r, double g, double b, double
         assert_close((double)rgba[c], expected[c], 1e-6);
 }
 
-static void what_is_covered_has_its_mean_colour_and_is_opaque(void **state)
+static void covered_pixels_have_their_mean_colour_and_are_opaque(void **state)
 {
     (void)state;
     float rgba[8] = { 0.1F, 0.2F, 0.05F, 0.25F, 4e-4F, 2e-4F, 0, 5e-4F };
@@ -21,7 +21,7 @@ static void what_is_covered_has_its_mean_colour_and_is_opaque(void **state)
     assert_pixel(rgba + 4, 0.8, 0.4, 0, 1);
 }
 
-static void what_is_not_covered_is_the_background_premultiplied(void **state)
+static void uncovered_pixels_show_the_premultiplied_background(void **state)
 {
     (void)state;
     float rgba[8] = { 0, 0, 0, 0, 4e-5F, 4e-5F, 4e-5F, 5e-5F };
@@ -30,7 +30,7 @@ static void what_is_not_covered_is_the_background_premultiplied(void **state)
     assert_pixel(rgba + 4, 0.4, 0.2, 0.1, 0.5);
 }
 
-static void the_background_shows_through_what_is_left_open(void **state)
+static void the_background_is_visible_through_open_pixels(void **state)
 {
     (void)state;
     float rgba[8] = { 0.1F, 0.2F, 0.05F, 0.25F, 0.3F, 0.6F, 0.9F, 1 };
@@ -42,9 +42,9 @@ static void the_background_shows_through_what_is_left_open(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_covered_has_its_mean_colour_and_is_opaque),
-        cmocka_unit_test(what_is_not_covered_is_the_background_premultiplied),
-        cmocka_unit_test(the_background_shows_through_what_is_left_open),
+        cmocka_unit_test(covered_pixels_have_their_mean_colour_and_are_opaque),
+        cmocka_unit_test(uncovered_pixels_show_the_premultiplied_background),
+        cmocka_unit_test(the_background_is_visible_through_open_pixels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

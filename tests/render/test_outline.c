@@ -47,8 +47,8 @@ static trip_outline *make(const scene *s, const trip_camera_params *view, double
     return o;
 }
 
-/* How far it reaches to the right and up, and, where `cone` is not zero, within cones of that
- * tangent; in voxels from the middle. */
+/* Computes how far the outline reaches to the right and up, in voxels from the centre. If `cone`
+ * is not zero, it also computes the reach within cones of that tangent. */
 static void reaches(const trip_outline *o, const trip_camera_params *view, double scale,
                     double cone, double values[2])
 {
@@ -64,9 +64,9 @@ static void reaches(const trip_outline *o, const trip_camera_params *view, doubl
         values[i] /= scale;
 }
 
-/* A ray that passes the middle of the ball at a distance d meets 2 sqrt(R^2 - d^2) of it. Where
- * that is TRIP_OUTLINE_OPACITY, the ball ends. */
-static void faint_things_end_where_their_rays_are_too_faint_to_see(void **state)
+/* A ray that passes the centre of the ball at distance d crosses 2 sqrt(R^2 - d^2) of it. The ball
+ * ends where the opacity of this path is TRIP_OUTLINE_OPACITY. */
+static void faint_objects_end_where_their_rays_are_too_faint_to_see(void **state)
 {
     (void)state;
     const double wanted[] = { 12, 18, 23 }, scales[] = { 1, 1e-12, 1e12 };
@@ -88,9 +88,9 @@ static void faint_things_end_where_their_rays_are_too_faint_to_see(void **state)
     }
 }
 
-/* The farthest point of a ball of radius R along a vector v is at R |v|: from any distance, though
- * seen from one. */
-static void dense_things_reach_as_far_from_other_distances(void **state)
+/* The farthest point of a ball of radius R along a vector v is at R |v|. This holds from every
+ * distance, although the outline was seen from one. */
+static void dense_objects_reach_as_far_from_other_distances(void **state)
 {
     (void)state;
     scene s;
@@ -108,7 +108,7 @@ static void dense_things_reach_as_far_from_other_distances(void **state)
     scene_destroy(&s);
 }
 
-static void it_is_the_same_for_any_tiles_and_slots(void **state)
+static void outlines_are_the_same_for_any_tiles_and_slots(void **state)
 {
     (void)state;
     const unsigned tiles[][2] = { { 16, 4 }, { 64, 8 }, { 128, 1 } };
@@ -134,8 +134,8 @@ static bool one(void *user, int i, int j, int k, unsigned *code, double gradient
     return i == 4 && j == 4 && k == 4;
 }
 
-/* From its middle half of it to each side, but for a pixel. */
-static void a_voxel_is_as_wide_as_it_is(void **state)
+/* The voxel reaches half its width to each side of its centre, within a pixel. */
+static void the_outline_of_a_voxel_has_its_width(void **state)
 {
     (void)state;
     scene s;
@@ -165,7 +165,7 @@ static void a_voxel_is_as_wide_as_it_is(void **state)
     scene_destroy(&s);
 }
 
-/* Voxels 10 to 133 along x at the finest level, 2 * 20 to 2 * 59 + 1 at the next. */
+/* Voxels 10 to 133 along x at the finest level, and 2 * 20 to 2 * 59 + 1 at the next level. */
 static bool rod(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user, (void)j, (void)k, (void)gradient;
@@ -211,7 +211,7 @@ static trip_outline *rod_outline(const scene *s, trip_camera_params *view)
     return o;
 }
 
-static void of_large_data_sets_a_coarse_level_is_read(void **state)
+static void a_coarse_level_of_large_data_sets_is_read(void **state)
 {
     (void)state;
     scene s;
@@ -230,7 +230,7 @@ static void of_large_data_sets_a_coarse_level_is_read(void **state)
     scene_destroy(&s);
 }
 
-static void without_that_level_or_where_nothing_shows_there_is_none(void **state)
+static void without_the_level_or_visible_voxels_there_is_no_outline(void **state)
 {
     (void)state;
     scene s;
@@ -247,12 +247,12 @@ static void without_that_level_or_where_nothing_shows_there_is_none(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(faint_things_end_where_their_rays_are_too_faint_to_see),
-        cmocka_unit_test(dense_things_reach_as_far_from_other_distances),
-        cmocka_unit_test(a_voxel_is_as_wide_as_it_is),
-        cmocka_unit_test(it_is_the_same_for_any_tiles_and_slots),
-        cmocka_unit_test(of_large_data_sets_a_coarse_level_is_read),
-        cmocka_unit_test(without_that_level_or_where_nothing_shows_there_is_none),
+        cmocka_unit_test(faint_objects_end_where_their_rays_are_too_faint_to_see),
+        cmocka_unit_test(dense_objects_reach_as_far_from_other_distances),
+        cmocka_unit_test(the_outline_of_a_voxel_has_its_width),
+        cmocka_unit_test(outlines_are_the_same_for_any_tiles_and_slots),
+        cmocka_unit_test(a_coarse_level_of_large_data_sets_is_read),
+        cmocka_unit_test(without_the_level_or_visible_voxels_there_is_no_outline),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Codes of one byte and normals of three, drawn by every renderer. */
+/* Codes of one byte and normals of three bytes, drawn by every renderer. */
 #include "scenes.h"
 
 #include "test.h"
@@ -9,8 +9,8 @@ enum { N = 30, SIZE_PX = 56 };
 
 static const trip_affine grid = { { { 0, -0.5, 0.1, 3 }, { 0.7, 0, 0, -2 }, { 0, 0.1, 0.6, 5 } } };
 
-/* A ball whose gradients point outwards, or inwards, with lengths from nothing to twice that of
- * full shading. */
+/* A ball with gradients that point outwards or inwards. Their lengths go from zero to twice the
+ * gradient of full shading. */
 static bool ball(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -66,7 +66,7 @@ static void compare(const scene *a, const scene *b, const scene_renderer *r, dou
     }
 }
 
-static void every_renderer_lights_normals_of_three_bytes_as_the_reference(void **state)
+static void every_renderer_shades_three_byte_normals_like_the_reference(void **state)
 {
     (void)state;
     scene s;
@@ -76,8 +76,8 @@ static void every_renderer_lights_normals_of_three_bytes_as_the_reference(void *
     scene_destroy(&s);
 }
 
-/* Those of four bytes are the coarser ones. */
-static void normals_of_three_bytes_light_as_those_of_four(void **state)
+/* Normals of four bytes have the coarser scale here. */
+static void normals_of_three_bytes_shade_like_normals_of_four(void **state)
 {
     (void)state;
     scene four, three;
@@ -111,8 +111,8 @@ static void codes_of_one_byte_draw_the_same_bits(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_renderer_lights_normals_of_three_bytes_as_the_reference),
-        cmocka_unit_test(normals_of_three_bytes_light_as_those_of_four),
+        cmocka_unit_test(every_renderer_shades_three_byte_normals_like_the_reference),
+        cmocka_unit_test(normals_of_three_bytes_shade_like_normals_of_four),
         cmocka_unit_test(codes_of_one_byte_draw_the_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

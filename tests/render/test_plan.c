@@ -10,7 +10,7 @@
 #include "splat.h"
 #include "weight.h"
 
-/* Random ones, fewer where everything is slower. */
+/* The number of random cameras, reduced if everything is slower. */
 enum { CAMERAS = TEST_BY_TURNS ? 75 : 300, CAMERAS_DRAWN = TEST_BY_TURNS ? 10 : 40 };
 
 static trip_settings unlit(trip_method method, double h)
@@ -22,7 +22,7 @@ static trip_settings unlit(trip_method method, double h)
     return s;
 }
 
-/* Sparse, with codes that differ from place to place. */
+/* Sparse clumps with codes that depend on the position. */
 static bool clumps(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     uint32_t x = scene_hash(i, j, k);
@@ -61,7 +61,7 @@ static trip_vec3 random_direction(void)
     return trip_v3(test_random() * 2 - 1, test_random() * 2 - 1, test_random() * 2 - 1);
 }
 
-/* From inside, outside, near and far, narrow and wide. */
+/* Returns a view from inside or outside, near or far, narrow or wide. */
 static trip_camera random_camera(const scene *s, int i)
 {
     trip_camera_params p =
@@ -124,7 +124,7 @@ static void a_parallel_view_along_an_axis_uses_that_list_alone(void **state)
     scene_destroy(&s);
 }
 
-static void inside_the_volume_each_list_is_read_from_the_eye_outwards(void **state)
+static void from_inside_each_list_is_read_from_the_eye_outwards(void **state)
 {
     (void)state;
     scene s;
@@ -155,9 +155,9 @@ static void inside_the_volume_each_list_is_read_from_the_eye_outwards(void **sta
     scene_destroy(&s);
 }
 
-/* Values about the eye are interpolated from sheets on both sides of it, and gradients from one
- * sheet more, if there are some. */
-static void between_values_what_lies_behind_the_eye_has_no_pass(void **state)
+/* Values near the eye are interpolated from sheets on both sides of it. Gradients read one more
+ * sheet if there is one. */
+static void in_post_voxels_behind_the_eye_have_no_pass(void **state)
 {
     (void)state;
     scene s;
@@ -183,9 +183,9 @@ static void between_values_what_lies_behind_the_eye_has_no_pass(void **state)
     scene_destroy(&s);
 }
 
-/* Of rays that go the other way too, but have no weight, nothing is drawn; and where nothing of the
- * volume is that a way's rays may meet, no pixel is masked. */
-static void a_way_that_no_ray_with_weight_goes_has_no_pass(void **state)
+/* Rays in the opposite direction have no weight, so that the plan has no pass for them. If they
+ * could not meet the volume anyway, no pixel is masked. */
+static void a_direction_without_weighted_rays_has_no_pass(void **state)
 {
     (void)state;
     scene s;
@@ -234,8 +234,9 @@ ascending_traversal_reads_forwards_and_takes_the_blend_from_the_view_direction(v
     scene_destroy(&s);
 }
 
-/* The splats of a list that touch a pixel with weight, counted from the whole list: in perspective
- * once for each way of rays along the axis, since a pass of its own draws these. */
+/* Counts the splats of a list that touch a pixel with weight, from the whole list. In perspective,
+ * a splat counts once for each direction of the rays along the axis, because each direction has
+ * its own pass. */
 static uint64_t count_touching(const scene *s, const trip_camera *c, const trip_settings *settings,
                                int axis_of_view, int axis, bool (*counts)(const scene *s, int code))
 {
@@ -273,7 +274,8 @@ static bool any_code(const scene *s, int code)
     return true;
 }
 
-/* The reference counts what it was given; nothing that touches a pixel may have been left out. */
+/* The reference counts the splats it receives. The plan must not leave out a splat that touches a
+ * pixel. */
 static void no_splat_that_touches_a_pixel_is_left_out(void **state)
 {
     (void)state;
@@ -295,11 +297,11 @@ static void no_splat_that_touches_a_pixel_is_left_out(void **state)
         scene_picture_free(&p);
     }
     assert_true(left_out >
-                CAMERAS_DRAWN / 2 * s.data->header.kept); /* the bounds are of some use */
+                CAMERAS_DRAWN / 2 * s.data->header.kept); /* the bounds must leave out something */
     scene_destroy(&s);
 }
 
-/* One voxel that shows, in a box of others or by itself. */
+/* One visible voxel, either surrounded by others or alone. */
 static bool middle_and_corners(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -318,7 +320,8 @@ static void make_voxel(scene *s, unsigned tile, unsigned slab)
     scene_colour(s, 65535, 65535, 1, 1, 1, 0.5);
 }
 
-/* Rays that miss a voxel before the eye may be near it behind the eye, where it is so near. */
+/* A ray can miss a voxel before the eye and still pass near it behind the eye, if the voxel is
+ * this close. */
 static void a_voxel_about_the_eye_is_never_left_out(void **state)
 {
     (void)state;
@@ -375,7 +378,7 @@ static void bricks_that_the_transfer_function_hides_are_not_read(void **state)
     scene_destroy(&s);
 }
 
-/* A few codes with extinction, and ranges of all lengths about them. */
+/* A few codes with extinction, and ranges of all lengths around them. */
 static void a_brick_is_transparent_when_no_code_of_its_range_has_extinction(void **state)
 {
     (void)state;
@@ -454,7 +457,7 @@ static char *explain(const scene *s, const trip_camera *c, const trip_settings *
     return text;
 }
 
-static void the_plan_explains_what_runs_and_why(void **state)
+static void the_plan_explains_its_passes_and_their_reasons(void **state)
 {
     (void)state;
     scene s;
@@ -477,8 +480,8 @@ static void the_plan_explains_what_runs_and_why(void **state)
     scene_destroy(&s);
 }
 
-/* Of splats it is an entry a voxel; between values it is integrals. */
-static void the_plan_says_whether_the_function_is_looked_up(void **state)
+/* Splats look up one entry per voxel; `post` looks up integrals. */
+static void the_plan_tells_whether_the_transfer_function_is_looked_up(void **state)
 {
     (void)state;
     static const char form[] = "integrals   have a closed form: extinction is ";
@@ -509,9 +512,9 @@ static void the_plan_says_whether_the_function_is_looked_up(void **state)
     scene_destroy(&s);
 }
 
-/* What is known is not looked for again, in a table that is another by now, until it is forgotten.
- */
-static void what_is_known_of_a_function_is_kept_from_plan_to_plan(void **state)
+/* A plan keeps its knowledge of a transfer function and does not look again, even if the table has
+ * changed, until the caller forgets it. */
+static void knowledge_of_a_transfer_function_is_kept_between_plans(void **state)
 {
     (void)state;
     scene s;
@@ -523,7 +526,7 @@ static void what_is_known_of_a_function_is_kept_from_plan_to_plan(void **state)
     trip_classification known = { 0 };
     for (int i = 0; i < 6; i++) {
         trip_plan plan;
-        if (i == 1) /* it is constant, and now a step */
+        if (i == 1) /* constant before, a step now */
             scene_colour(&s, 7000, 65535, 1, 1, 1, 0.5);
         if (i == 4)
             trip_classification_forget_table(&known);
@@ -572,9 +575,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_list_is_used_exactly_when_some_pixel_has_weight_in_it),
         cmocka_unit_test(a_parallel_view_along_an_axis_uses_that_list_alone),
-        cmocka_unit_test(inside_the_volume_each_list_is_read_from_the_eye_outwards),
-        cmocka_unit_test(between_values_what_lies_behind_the_eye_has_no_pass),
-        cmocka_unit_test(a_way_that_no_ray_with_weight_goes_has_no_pass),
+        cmocka_unit_test(from_inside_each_list_is_read_from_the_eye_outwards),
+        cmocka_unit_test(in_post_voxels_behind_the_eye_have_no_pass),
+        cmocka_unit_test(a_direction_without_weighted_rays_has_no_pass),
         cmocka_unit_test(
             ascending_traversal_reads_forwards_and_takes_the_blend_from_the_view_direction),
         cmocka_unit_test(no_splat_that_touches_a_pixel_is_left_out),
@@ -583,9 +586,9 @@ int main(void)
         cmocka_unit_test(a_brick_is_transparent_when_no_code_of_its_range_has_extinction),
         cmocka_unit_test(normals_are_planned_only_for_shading),
         cmocka_unit_test(flattened_kernels_take_normals_without_shading_too),
-        cmocka_unit_test(the_plan_explains_what_runs_and_why),
-        cmocka_unit_test(the_plan_says_whether_the_function_is_looked_up),
-        cmocka_unit_test(what_is_known_of_a_function_is_kept_from_plan_to_plan),
+        cmocka_unit_test(the_plan_explains_its_passes_and_their_reasons),
+        cmocka_unit_test(the_plan_tells_whether_the_transfer_function_is_looked_up),
+        cmocka_unit_test(knowledge_of_a_transfer_function_is_kept_between_plans),
         cmocka_unit_test(grids_one_voxel_thick_have_no_values_between_voxels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

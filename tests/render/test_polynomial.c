@@ -1,8 +1,9 @@
-/* Turns and places of polynomials that are made of what they are to be found at. */
+/* Turning points and positions of values of polynomials that are built from the expected results.
+ */
 #include "polynomial.h"
 #include "test.h"
 
-/* Times (x - root). */
+/* Multiplies a polynomial by (x - root). */
 static void multiply(trip_polynomial *p, double root)
 {
     p->c[++p->degree] = 0;
@@ -19,10 +20,10 @@ static trip_polynomial integral(const trip_polynomial *p)
     return out;
 }
 
-static void it_turns_where_its_slope_changes_sign(void **state)
+static void polynomials_turn_where_their_slope_changes_sign(void **state)
 {
     (void)state;
-    /* The slope's roots, those in (0, 1) ascending and first. */
+    /* The roots of the slope. Roots in (0, 1) come first, in ascending order. */
     static const struct {
         double roots[8];
         int inside, count;
@@ -47,7 +48,7 @@ static void it_turns_where_its_slope_changes_sign(void **state)
     }
 }
 
-static void what_does_not_turn_has_no_turns(void **state)
+static void monotonic_polynomials_have_no_turns(void **state)
 {
     (void)state;
     static const trip_polynomial all[] = {
@@ -62,10 +63,10 @@ static void what_does_not_turn_has_no_turns(void **state)
         assert_int_equal(trip_polynomial_turns(&all[n], turns), 0);
 }
 
-static void a_value_is_found_where_it_is(void **state)
+static void the_position_of_a_value_is_found(void **state)
 {
     (void)state;
-    /* x^3, whose slope is 0 at one end, rising; and falling. */
+    /* x^3 and -x^3: the slope is 0 at one end. */
     for (int sign = -1; sign <= 1; sign += 2) {
         const trip_polynomial cube = { .degree = 3, .c = { 2, 0, 0, sign } };
         for (int i = 0; i <= 10; i++) {
@@ -76,7 +77,7 @@ static void a_value_is_found_where_it_is(void **state)
                 assert_close(found, 0.1 * i, 1e-9);
         }
     }
-    /* Steep in the middle alone: 3 x^2 - 2 x^3 of itself. */
+    /* Steep in the centre alone: 3 x^2 - 2 x^3, applied twice. */
     const trip_polynomial s = { .degree = 9, .c = { 0, 0, 0, 0, 27, -36, -42, 108, -72, 16 } };
     for (int i = 0; i <= 20; i++) {
         double x = 0.05 * i, once = x * x * (3 - 2 * x), twice = once * once * (3 - 2 * once);
@@ -89,9 +90,9 @@ static void a_value_is_found_where_it_is(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_turns_where_its_slope_changes_sign),
-        cmocka_unit_test(what_does_not_turn_has_no_turns),
-        cmocka_unit_test(a_value_is_found_where_it_is),
+        cmocka_unit_test(polynomials_turn_where_their_slope_changes_sign),
+        cmocka_unit_test(monotonic_polynomials_have_no_turns),
+        cmocka_unit_test(the_position_of_a_value_is_found),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,15 @@
-/* The integral along a ray against closed forms where the integrand is not smooth. */
+/* Compares the integral along a ray with closed forms for integrands that are not smooth. */
 #include "quadrature.h"
 #include "test.h"
 
 #include <math.h>
 
-/* Extinction a before a place and b behind it, or falling and rising from there; of colour 1
- * before, and of `behind` there. */
+/* Extinction is `before` up to a position and `after` behind it, or falls and rises from there.
+ * The colour is 1 before the position and `colour_behind` behind it. */
 typedef struct broken {
     double at, before, after, colour_behind;
     bool steps;
-    int samples; /* taken so far */
+    int samples; /* samples taken so far */
 } broken;
 
 static void sample(void *user, double t, trip_ray_sample *out)
@@ -22,7 +22,7 @@ static void sample(void *user, double t, trip_ray_sample *out)
         out->rgb[i] = t < b->at ? 1 : b->colour_behind;
 }
 
-/* What passes both parts: exp(-integral of the extinction). */
+/* Returns the colour, and the transmittance of both parts: exp(-integral of the extinction). */
 static void closed_form(const broken *b, double *colour, double *through)
 {
     const double first = b->at, last = 1 - b->at;
@@ -32,7 +32,7 @@ static void closed_form(const broken *b, double *colour, double *through)
     *through = front * back;
 }
 
-/* Over a ray in one piece. */
+/* Returns the error of a ray computed as one piece. */
 static double error_of(broken *b, double tolerance)
 {
     double colour, through;
@@ -43,9 +43,9 @@ static double error_of(broken *b, double tolerance)
     return fmax(fabs(sum.rgb[0] - colour), fabs(sum.transmittance - through));
 }
 
-/* A kink or a step anywhere: also where by chance the rule over a piece and over its halves are
- * wrong by the same. */
-static void it_is_within_the_tolerance_wherever_it_breaks(void **state)
+/* A kink or a step may lie anywhere. At some positions, the rules over a piece and over its halves
+ * have the same error by chance. */
+static void breaks_anywhere_keep_the_error_within_the_tolerance(void **state)
 {
     (void)state;
     enum { PLACES = 1999 };
@@ -76,8 +76,8 @@ static void it_is_within_the_tolerance_wherever_it_breaks(void **state)
         }
 }
 
-/* However little of the light a piece changes, and however close it is to be: an error of rounding
- * would be halved to no end. */
+/* The integrand changes little and the tolerance is tiny. An integrator that mistakes rounding for
+ * an error would subdivide without end. */
 static void the_smallest_tolerance_takes_no_more_samples_than_it_needs(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void the_smallest_tolerance_takes_no_more_samples_than_it_needs(void **st
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_is_within_the_tolerance_wherever_it_breaks),
+        cmocka_unit_test(breaks_anywhere_keep_the_error_within_the_tolerance),
         cmocka_unit_test(the_smallest_tolerance_takes_no_more_samples_than_it_needs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -51,7 +51,7 @@ static trip_ray_hit find(const scene *s, trip_vec3 origin, trip_vec3 direction, 
 }
 
 /* A wall of constant extinction: light is lost exponentially from its face on. */
-static void a_wall_is_hit_where_half_of_what_it_takes_is_lost(void **state)
+static void a_wall_is_hit_where_half_of_its_opacity_is_reached(void **state)
 {
     (void)state;
     scene s;
@@ -64,7 +64,7 @@ static void a_wall_is_hit_where_half_of_what_it_takes_is_lost(void **state)
     assert_close(hit.first_z, 14.5, 1e-12);
     assert_close(hit.z, 14.5 + half, 1e-12);
     assert_close(hit.code, 50000, 0);
-    /* From the other side, twice as fast. */
+    /* From the other side, with a direction twice as long. */
     hit = find(&s, trip_v3(50, 12.3, 7.6), trip_v3(-2, 0, 0), 1);
     assert_close(hit.first_z, 30.5 / 2, 1e-12);
     assert_close(hit.z, 30.5 / 2 + half / 2, 1e-12);
@@ -75,7 +75,8 @@ static void a_wall_is_hit_where_half_of_what_it_takes_is_lost(void **state)
     scene_destroy(&s);
 }
 
-/* A ramp is interpolated exactly. The piece of a sheet reaches half a sheet to both sides. */
+/* A ramp is interpolated exactly. The part that belongs to a sheet reaches half a sheet to both
+ * sides. */
 static void values_are_interpolated_whatever_the_tiles(void **state)
 {
     (void)state;
@@ -123,8 +124,8 @@ static void a_lone_voxel_reaches_half_way_to_its_neighbours(void **state)
     scene_destroy(&s);
 }
 
-/* Voxels whose distances grow in proportion along x, halve along y and are even along z. */
-static void voxels_lie_where_the_tables_say(void **state)
+/* Voxel distances grow linearly along x, halve along y and are constant along z. */
+static void voxels_lie_at_the_coordinates_of_the_tables(void **state)
 {
     (void)state;
     double x[NX], y[NY], z[NZ];
@@ -153,7 +154,7 @@ static void voxels_lie_where_the_tables_say(void **state)
     assert_close(hit.opacity, opacity, 1e-12);
     assert_close(hit.first_z, 5 + from, 1e-12);
     assert_close(hit.z, 5 + from - log(1 - opacity / 2) / (tau * 0.5), 1e-12);
-    /* Aslant, by sheets along y. */
+    /* Obliquely, with sheets along y. */
     hit = find(&s, trip_v3(-1, -4, 7.6), trip_v3(0.5, 1, 0.1), 1);
     assert_true(hit.opacity > 0);
     assert_close(-1 + 0.5 * hit.first_z, from, 0.5 * (y[1] - y[0]));
@@ -178,10 +179,10 @@ static void nothing_is_behind_the_eye_or_beside_the_grid(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_wall_is_hit_where_half_of_what_it_takes_is_lost),
+        cmocka_unit_test(a_wall_is_hit_where_half_of_its_opacity_is_reached),
         cmocka_unit_test(values_are_interpolated_whatever_the_tiles),
         cmocka_unit_test(a_lone_voxel_reaches_half_way_to_its_neighbours),
-        cmocka_unit_test(voxels_lie_where_the_tables_say),
+        cmocka_unit_test(voxels_lie_at_the_coordinates_of_the_tables),
         cmocka_unit_test(nothing_is_behind_the_eye_or_beside_the_grid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-/* What every renderer must show, run over all of them: order, opacity, counts, geometry. */
+/* Tests that every renderer must pass: order, opacity, counts and geometry. */
 #include "scenes.h"
 #include "splat.h"
 #include "test.h"
@@ -64,8 +64,8 @@ static void the_nearest_sheet_is_in_front_for_every_axis_side_and_method(void **
     }
 }
 
-/* Through voxels and between them, of a body of one extinction; pixels so small that the low-pass
- * does not count. */
+/* Rays pass through voxels and between them, in a body of one extinction. Pixels are so small that
+ * the low-pass filter has no effect. */
 static void small_kernels_leave_the_ripple_that_the_formula_gives(void **state)
 {
     (void)state;
@@ -106,8 +106,8 @@ static bool lone_voxel(void *user, int i, int j, int k, unsigned *code, double g
     return i == 3 && j == 3 && k == 3;
 }
 
-/* The integral over the plane of the opacity of a splat without low-pass, by Simpson's rule over
- * the squared radius, which area is in proportion to. */
+/* Integrates the opacity of a splat without low-pass filter over the plane. It uses Simpson's rule
+ * over the squared radius, because area is proportional to it. */
 static double area_covered(double extinction)
 {
     enum { STEPS = 20000 };
@@ -146,7 +146,7 @@ static void a_lone_voxel_covers_its_area_where_it_is_a_few_pixels_wide(void **st
     scene_destroy(&s);
 }
 
-/* However small it is drawn. */
+/* The picture of the sheet may be very small. */
 static void a_sheet_of_voxels_has_its_opacity_at_any_zoom(void **state)
 {
     (void)state;
@@ -182,8 +182,8 @@ static bool double_walls(void *user, int i, int j, int k, unsigned *code, double
     return nearest == 2 || nearest == 6 || nearest == 7;
 }
 
-/* Share of the pixels in which the outer, red walls are seen. In the corners of the room, where
- * kernels of two walls overlap, some of them shines through the inner ones, below 0.1. */
+/* Returns the share of pixels that show the outer, red walls. In the corners of the room, where
+ * kernels of two walls overlap, the red walls shine through the inner ones with less than 0.1. */
 static double red_share(const scene_picture *p)
 {
     int red = 0;
@@ -240,8 +240,8 @@ static int max_aligned_axis(const trip_camera *c, int x, int y)
     return 2;
 }
 
-/* Mean step between pixels beside one another where the most aligned axis changes, over the mean
- * step elsewhere. */
+/* Returns the mean step between neighbouring pixels where the most aligned axis changes, divided
+ * by the mean step elsewhere. */
 static double step_across_lines(const scene_picture *p, const trip_camera *c)
 {
     double sum[2] = { 0, 0 };
@@ -258,8 +258,8 @@ static double step_across_lines(const scene_picture *p, const trip_camera *c)
     return sum[1] / count[1] / (sum[0] / count[0]);
 }
 
-/* Hofsetz & Max 2005, section 5.2 and Figure 10: clipping shows a line where the region of one list
- * meets another's once large kernels overlap, zoomed in; merging does not. */
+/* Hofsetz & Max 2005, section 5.2 and Figure 10: once large kernels overlap in a zoomed view,
+ * `clip` shows a line where the regions of two lists meet. `merge` does not. */
 static void large_kernels_show_lines_when_clipped_and_none_when_merged(void **state)
 {
     (void)state;
@@ -283,7 +283,7 @@ static void large_kernels_show_lines_when_clipped_and_none_when_merged(void **st
     scene_destroy(&s);
 }
 
-static void from_outside_ascending_order_gives_the_same_picture(void **state)
+static void from_outside_ascending_order_draws_the_same_picture(void **state)
 {
     (void)state;
     scene s;
@@ -301,7 +301,7 @@ static void from_outside_ascending_order_gives_the_same_picture(void **state)
         for (const scene_renderer *r = scene_renderers(); r->name; r++) {
             scene_picture a = scene_draw(&s, r, &view, &outward);
             scene_picture b = scene_draw(&s, r, &view, &ascending);
-            /* Saturation stops front-to-back drawing only. */
+            /* Early termination affects front-to-back drawing only. */
             assert_true(scene_difference(&a, &b) < 2 * TRIP_EARLY_TERMINATION_PRE + r->tolerance);
             scene_picture_free(&a);
             scene_picture_free(&b);
@@ -317,8 +317,7 @@ static const trip_affine grids[] = {
     { { { -1, 0, 0, 0 }, { 0, 0, 1, 0 }, { 0, 1, 0, 0 } } },
 };
 
-/* World length of the part of a line (through the body's middle) inside the body of `dims`
- * voxels. */
+/* Returns the world length of a line through the body's centre inside the body of `dims` voxels. */
 static double length_inside(const trip_affine *grid, const int64_t dims[3], trip_vec3 direction)
 {
     trip_affine inverse;
@@ -330,7 +329,7 @@ static double length_inside(const trip_affine *grid, const int64_t dims[3], trip
     return t;
 }
 
-/* Opacity 1 - (1 - o)^L of a constant body, L in voxel lengths. */
+/* Checks the opacity 1 - (1 - o)^L of a constant body, with L in voxel lengths. */
 static void check_body(const int64_t dims[3], const trip_affine *grid, trip_vec3 direction,
                        double distance, bool ortho, trip_method method)
 {
@@ -366,7 +365,7 @@ static void a_constant_body_has_its_opacity_from_any_side_at_any_zoom(void **sta
     };
     for (int i = 0; i < 24; i++) {
         const trip_affine *grid = &grids[i % 4];
-        /* Only directions through opposite faces: edges and corners blur. */
+        /* The directions pass through opposite faces only, because edges and corners blur. */
         trip_vec3 d = trip_affine_vector(grid, directions[i % 3]);
         check_body(flat, grid, d, distances[i / 2 % 4], i % 2, (trip_method)(i % 3));
         d = trip_affine_vector(grid, directions[i % 5]);
@@ -464,7 +463,7 @@ static void fewer_splats_are_drawn_as_h_rises_fewer_by_clip_and_fewest_by_axis(v
     scene_destroy(&s);
 }
 
-/* A ball in world space, whatever the grid. */
+/* A ball in world space on any grid. */
 typedef struct ball {
     const trip_affine *grid;
     trip_vec3 centre;
@@ -506,7 +505,7 @@ static moments measure(const scene_picture *p)
     return m;
 }
 
-/* What one kernel adds to the covariance, in world units: sigma^2 J J^T seen along a and b. */
+/* Returns the covariance that one kernel adds, in world units: sigma^2 J J^T seen along a and b. */
 static double kernel_covariance(const trip_affine *grid, trip_vec3 a, trip_vec3 b)
 {
     double sigma = TRIP_KERNEL_RADIUS_VOXELS / TRIP_CUTOFF;
@@ -582,9 +581,11 @@ static void two_splats_in_line_composite_front_over_back_over_background(void **
                                 .ortho_height = 4,
                                 .width = 401,
                                 .height = 401 };
-    /* On the line through both centres, 100 px to a voxel: the low-pass hardly matters. */
+    /* The ray passes through both centres. At 100 px per voxel the low-pass filter hardly matters.
+     */
     double sigma = 2 / TRIP_CUTOFF, k2 = TRIP_CUTOFF * TRIP_CUTOFF, edge = exp(-k2 / 2);
-    /* The Gaussian of which a disk of radius k sigma is cut and lowered to 0 at its rim. */
+    /* The splat is a Gaussian that is cut off at a radius of k sigma and lowered to reach 0 there.
+     */
     double volume = 6.28318530717958647692 * sigma * sigma * (1 - edge * (1 + k2 / 2));
     double peak = (1 - edge) / volume;
     double red = 1 - pow(0.3, peak), green = 1 - pow(0.1, peak);
@@ -596,7 +597,7 @@ static void two_splats_in_line_composite_front_over_back_over_background(void **
         assert_close(c[1], (1 - red) * green, 1e-4);
         assert_close(c[2], behind * 0.5 * 0.8, 1e-4);
         assert_close(c[3], 1 - behind + behind * 0.8, 1e-4);
-        /* One voxel's radius off. */
+        /* One voxel radius beside the centre. */
         c = scene_pixel(&p, 300, 200);
         double beside = (exp(-1 / (2 * sigma * sigma)) - edge) / volume;
         assert_close(c[0], 1 - pow(0.3, beside), 1e-3);
@@ -606,10 +607,10 @@ static void two_splats_in_line_composite_front_over_back_over_background(void **
     scene_destroy(&s);
 }
 
-static void lists_not_drawn_still_take_their_share_of_the_merge(void **state)
+static void undrawn_lists_keep_their_share_of_the_merge(void **state)
 {
     (void)state;
-    /* All bricks are transparent: the picture is the background. */
+    /* All bricks are transparent, so that the picture is the background. */
     scene s;
     scene_create(&s, &(scene_params){ .dims = { 20, 20, 20 }, .voxel = half_random });
     trip_settings settings = unlit(TRIP_METHOD_MERGE, 0);
@@ -630,7 +631,7 @@ static void lists_not_drawn_still_take_their_share_of_the_merge(void **state)
     scene_destroy(&s);
 }
 
-/* Pictures of one scene, shaded and translucent, from views that read all lists and both sides. */
+/* Draws a scene, shaded and translucent, from views that read all lists from both sides. */
 static scene_picture draw_variant(unsigned tile, unsigned slab, const trip_reader_params *reader,
                                   int view_number)
 {
@@ -688,7 +689,7 @@ int main(void)
         cmocka_unit_test(the_nearest_sheet_is_in_front_for_every_axis_side_and_method),
         cmocka_unit_test(inside_a_room_outward_order_is_right_and_ascending_order_fails),
         cmocka_unit_test(large_kernels_show_lines_when_clipped_and_none_when_merged),
-        cmocka_unit_test(from_outside_ascending_order_gives_the_same_picture),
+        cmocka_unit_test(from_outside_ascending_order_draws_the_same_picture),
         cmocka_unit_test(a_constant_body_has_its_opacity_from_any_side_at_any_zoom),
         cmocka_unit_test(a_larger_kernel_blurs_but_keeps_the_opacity),
         cmocka_unit_test(
@@ -696,7 +697,7 @@ int main(void)
         cmocka_unit_test(fewer_splats_are_drawn_as_h_rises_fewer_by_clip_and_fewest_by_axis),
         cmocka_unit_test(a_ball_is_round_and_in_place_on_anisotropic_and_sheared_grids),
         cmocka_unit_test(two_splats_in_line_composite_front_over_back_over_background),
-        cmocka_unit_test(lists_not_drawn_still_take_their_share_of_the_merge),
+        cmocka_unit_test(undrawn_lists_keep_their_share_of_the_merge),
         cmocka_unit_test(
             the_reference_picture_is_the_same_to_the_bit_however_it_is_stored_and_read),
     };

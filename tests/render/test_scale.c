@@ -1,6 +1,6 @@
-/* Projection knows no scale: volumes of any unit, far from the world's origin, in narrow and in
- * wide views, by every renderer and with every instruction set, against the reference; and bit for
- * bit where the scale is a power of two. */
+/* Projection does not depend on scale. Tests volumes in any unit, far from the world's origin, in
+ * narrow and wide views. Every renderer and instruction set must agree with the reference. If the
+ * scale is a power of two, every bit must be the same. */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "splat.h"
@@ -22,7 +22,7 @@ static bool blob(void *user, int i, int j, int k, unsigned *code, double gradien
     return r < 6.5 && (r > 3 || (i + j + k) % 3 == 0);
 }
 
-/* `place` has voxels of about this length. Gradients grow as voxels shrink. */
+/* `position` has voxels of about this length. Gradients grow as voxels shrink. */
 static void create(scene *s, trip_affine position, double voxel)
 {
     scene_create(s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
@@ -44,7 +44,7 @@ static trip_affine grid(double spacing, double offset)
     };
 }
 
-/* A sixth of the picture's height is left above and below. */
+/* A margin of one sixth of the picture's height remains above and below. */
 static trip_camera_params view_of(const scene *s, double voxel, double fov_degrees, bool ortho)
 {
     double half = 0.75 * EDGE * voxel, slope = tan(fov_degrees * 3.14159265358979323846 / 360);
@@ -78,7 +78,7 @@ static void expect_alike(const scene *s, const trip_camera_params *view, const c
     scene_picture_free(&expected);
 }
 
-static void voxels_of_any_size_look_as_in_the_reference(void **state)
+static void voxels_of_any_size_agree_with_the_reference(void **state)
 {
     (void)state;
     for (int power = -12; power <= 12; power += power == -4 || power == 2 ? 2 : 4) {
@@ -96,7 +96,7 @@ static void voxels_of_any_size_look_as_in_the_reference(void **state)
     }
 }
 
-static void voxels_of_any_shape_and_size_look_as_in_the_reference(void **state)
+static void voxels_of_any_shape_and_size_agree_with_the_reference(void **state)
 {
     (void)state;
     for (int power = -12; power <= 12; power += 6) {
@@ -114,7 +114,7 @@ static void voxels_of_any_shape_and_size_look_as_in_the_reference(void **state)
     }
 }
 
-static void views_of_any_width_look_as_in_the_reference(void **state)
+static void views_of_any_width_agree_with_the_reference(void **state)
 {
     (void)state;
     const double degrees[] = { 1e-6, 1e-4, 0.01, 0.1, 1, 10, 90, 150, 175 };
@@ -132,7 +132,7 @@ static void views_of_any_width_look_as_in_the_reference(void **state)
     }
 }
 
-static void one_voxel_may_be_larger_than_the_picture_by_far(void **state)
+static void a_voxel_may_be_much_larger_than_the_picture(void **state)
 {
     (void)state;
     scene s;
@@ -146,7 +146,7 @@ static void one_voxel_may_be_larger_than_the_picture_by_far(void **state)
     scene_destroy(&s);
 }
 
-static void far_from_the_worlds_origin_volumes_look_as_in_the_reference(void **state)
+static void volumes_far_from_the_origin_agree_with_the_reference(void **state)
 {
     (void)state;
     const double positions[][2] = { { 1, 1e15 }, { 0.1, 1e12 }, { 1e-3, 1e11 }, { 1e9, 1e15 } };
@@ -161,7 +161,7 @@ static void far_from_the_worlds_origin_volumes_look_as_in_the_reference(void **s
     }
 }
 
-/* Draws the blob with voxels of 2^power and the camera alike; `offset` in voxels. */
+/* Draws the blob with voxel size and camera scaled by 2^power. `offset` is in voxels. */
 static scene_picture draw_scaled(const scene_renderer *r, int power, double offset, bool ortho)
 {
     double voxel = ldexp(1, power);
@@ -201,8 +201,9 @@ static void a_power_of_two_changes_no_bit(void **state)
     }
 }
 
-/* 2^49 and the eye's coordinates there are doubles: nothing may be lost on the way. */
-static void a_place_far_from_the_worlds_origin_changes_no_bit(void **state)
+/* Doubles represent 2^49 and the eye's coordinates there exactly, so that no step may lose
+ * precision. */
+static void a_position_far_from_the_worlds_origin_changes_no_bit(void **state)
 {
     (void)state;
     for (const scene_renderer *r = scene_renderers(); r->name; r++) {
@@ -214,7 +215,7 @@ static void a_place_far_from_the_worlds_origin_changes_no_bit(void **state)
     }
 }
 
-/* Draws with a camera that trip_camera_make() would not make: the frame has to fail, once. */
+/* Draws with a camera that trip_camera_make() would refuse. The frame must fail and report once. */
 static void expect_refused(const scene *s, const scene_renderer *renderer, trip_camera *camera)
 {
     static float rgba[4 * SIZE_PX * SIZE_PX];
@@ -256,7 +257,7 @@ static void a_footprint_that_is_not_finite_ends_the_frame(void **state)
         endless = none;
         none.to_y.z = NAN;
         expect_refused(&s, r, &none);
-        endless.rx.x = 1e200; /* its square is no number, and so are all footprints */
+        endless.rx.x = 1e200; /* its square overflows, and so do all footprints */
         if (strcmp(r->name, "gl") != 0)
             expect_refused(&s, r, &endless);
     }
@@ -272,7 +273,7 @@ static void expect_no_view(const trip_camera_params *view, const trip_affine *gr
     assert_one_report(says);
 }
 
-static void views_beyond_what_doubles_tell_apart_are_refused(void **state)
+static void views_beyond_double_precision_are_refused(void **state)
 {
     (void)state;
     trip_camera_params view = { .look = { 5, 5, 5 },
@@ -286,23 +287,23 @@ static void views_beyond_what_doubles_tell_apart_are_refused(void **state)
     view.eye.z = 100;
     expect_no_view(&view, &small, "voxels from the first voxel");
     view.ortho_height = 1e-20;
-    expect_no_view(&view, &one, "a pixel would be");
+    expect_no_view(&view, &one, "a pixel is");
     view.ortho_height = 1e30;
-    expect_no_view(&view, &one, "a pixel would be");
+    expect_no_view(&view, &one, "a pixel is");
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(voxels_of_any_size_look_as_in_the_reference),
-        cmocka_unit_test(voxels_of_any_shape_and_size_look_as_in_the_reference),
-        cmocka_unit_test(views_of_any_width_look_as_in_the_reference),
-        cmocka_unit_test(one_voxel_may_be_larger_than_the_picture_by_far),
-        cmocka_unit_test(far_from_the_worlds_origin_volumes_look_as_in_the_reference),
+        cmocka_unit_test(voxels_of_any_size_agree_with_the_reference),
+        cmocka_unit_test(voxels_of_any_shape_and_size_agree_with_the_reference),
+        cmocka_unit_test(views_of_any_width_agree_with_the_reference),
+        cmocka_unit_test(a_voxel_may_be_much_larger_than_the_picture),
+        cmocka_unit_test(volumes_far_from_the_origin_agree_with_the_reference),
         cmocka_unit_test(a_power_of_two_changes_no_bit),
-        cmocka_unit_test(a_place_far_from_the_worlds_origin_changes_no_bit),
+        cmocka_unit_test(a_position_far_from_the_worlds_origin_changes_no_bit),
         cmocka_unit_test(a_footprint_that_is_not_finite_ends_the_frame),
-        cmocka_unit_test(views_beyond_what_doubles_tell_apart_are_refused),
+        cmocka_unit_test(views_beyond_double_precision_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Segments of transfer functions against closed forms and against sums of many small steps. */
+/* Compares segments of transfer functions with closed forms and with sums of many small steps. */
 #include "test.h"
 
 #include "segments.h"
@@ -15,7 +15,7 @@ static void make(trip_tf_entry (*entry)(int code))
     trip_segments_make(&segments, table);
 }
 
-/* Two codes as far apart as `decades` says. */
+/* Picks two codes. `decades` sets their distance. */
 static void pick(int decades, double *a, double *b)
 {
     double length = LAST * pow(10, -decades) * (0.1 + 0.9 * test_random());
@@ -29,7 +29,7 @@ static trip_tf_entry constant(int code)
     return (trip_tf_entry){ 0.25F, 0.5F, 1, 0.375F };
 }
 
-static void a_constant_function_is_itself(void **state)
+static void a_constant_function_has_its_own_mean(void **state)
 {
     (void)state;
     make(constant);
@@ -69,18 +69,19 @@ static void a_ramp_has_the_means_of_polynomials_however_near_the_codes_are(void 
     }
 }
 
-/* Red below 1000, nothing from 1001 to 2000, blue from 2001 on. */
+/* Red below 1000, transparent from 1001 to 2000, blue from 2001 on. */
 static trip_tf_entry steps(int code)
 {
     return (trip_tf_entry){ code <= 1000, 0, code > 1000, code <= 1000 ? 2 : code > 2000 ? 4 : 0 };
 }
 
-static void a_step_counts_for_what_is_beyond_it(void **state)
+static void a_step_counts_for_the_part_beyond_it(void **state)
 {
     (void)state;
     make(steps);
-    /* From 1000 to 1001 extinction falls by 2 and red by 1: integrals 1 and 2/3. Blue rises there,
-     * times extinction 1/3; from 2000 to 2001 it is 1, and extinction rises by 4. */
+    /* From 1000 to 1001 extinction falls by 2 and red by 1, with integrals 1 and 2/3. Blue rises
+     * there, and its product with extinction has the integral 1/3. From 2000 to 2001 blue is 1 and
+     * extinction rises by 4. */
     trip_segment s = trip_segment_of(&segments, 400.5, 1500);
     assert_close(s.extinction, (2 * 599.5 + 1) / 1099.5, 1e-13);
     assert_close(s.rgb[0], (2 * 599.5 + 2.0 / 3) / (2 * 599.5 + 1), 1e-13);
@@ -123,7 +124,7 @@ static trip_tf_entry rough(int code)
                             (float)fmax(0, 3 * test_random() - 1) };
 }
 
-/* By the middles of `steps` steps between each two codes. */
+/* Sums the midpoints of `steps` steps between neighbouring codes. */
 static trip_segment sum_up(double a, double b)
 {
     enum { STEPS = 200 };
@@ -146,7 +147,7 @@ static trip_segment sum_up(double a, double b)
     return s;
 }
 
-static void a_rough_function_is_what_many_small_steps_add_up_to(void **state)
+static void a_rough_function_equals_the_sum_of_many_small_steps(void **state)
 {
     (void)state;
     make(rough);
@@ -187,11 +188,11 @@ static void one_code_is_the_function_between_entries(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_constant_function_is_itself),
+        cmocka_unit_test(a_constant_function_has_its_own_mean),
         cmocka_unit_test(a_ramp_has_the_means_of_polynomials_however_near_the_codes_are),
-        cmocka_unit_test(a_step_counts_for_what_is_beyond_it),
+        cmocka_unit_test(a_step_counts_for_the_part_beyond_it),
         cmocka_unit_test(a_peak_of_one_code_is_counted_whole_wherever_it_is),
-        cmocka_unit_test(a_rough_function_is_what_many_small_steps_add_up_to),
+        cmocka_unit_test(a_rough_function_equals_the_sum_of_many_small_steps),
         cmocka_unit_test(products_of_linear_functions_are_integrated_exactly),
         cmocka_unit_test(one_code_is_the_function_between_entries),
     };

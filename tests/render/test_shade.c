@@ -17,7 +17,7 @@ static trip_camera camera(bool ortho)
     return c;
 }
 
-/* The grey of a splat at the origin of colour 0.5, gradient_full 2. */
+/* Returns the grey of a splat at the origin with colour 0.5 and gradient_full 2. */
 static double lit(const trip_settings *s, double gx, double gy, double gz)
 {
     trip_camera c = camera(false);
@@ -66,7 +66,7 @@ static void a_given_light_shines_from_its_direction(void **state)
     s.light_direction = trip_v3(1, 0, 0);
     assert_close(lit(&s, 9, 0, 0), 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE), 1e-12);
     assert_close(lit(&s, 0, 7, 0), 0.5 * TRIP_AMBIENT, 1e-12);
-    /* Half way between the light and the eye. */
+    /* The normal is half-way between the light and the eye. */
     double matt = 0.5 * (TRIP_AMBIENT + TRIP_DIFFUSE * sqrt(0.5));
     assert_close(lit(&s, 7, 0, 7), matt + TRIP_SPECULAR, 1e-12);
 }
@@ -85,8 +85,8 @@ static void a_light_at_a_place_shines_from_there(void **state)
     assert_close(lit(&s, 0, 9, 0), 0.5 * TRIP_AMBIENT, 1e-12);
 }
 
-/* Normals of a sphere at an angle from the eye in the plane of eye and light, these `light` degrees
- * apart. */
+/* Normals of a sphere at an angle from the eye, in the plane of eye and light. `light` is the
+ * angle between eye and light in degrees. */
 static void a_sphere_shines_on_the_side_that_light_and_eye_share(void **state)
 {
     (void)state;
@@ -134,7 +134,7 @@ static void a_parallel_view_is_lit_alike_everywhere(void **state)
     }
 }
 
-/* Of a light from +x, gradient_full 2. */
+/* The light shines from +x, and gradient_full is 2. */
 static unsigned form_of(double gx, double gz, double grey)
 {
     trip_settings s = trip_settings_default();
@@ -151,9 +151,9 @@ static void colours_by_another_formula_have_another_number(void **state)
 {
     (void)state;
     assert_int_equal(form_of(5, 1, 0.5), form_of(4, 1.5, 0.5));
-    assert_int_not_equal(form_of(5, 1, 0.5), form_of(1, 0.2, 0.5)); /* not at full strength */
+    assert_int_not_equal(form_of(5, 1, 0.5), form_of(1, 0.2, 0.5)); /* below full strength */
     assert_int_not_equal(form_of(5, 1, 0.5), form_of(-5, 1, 0.5));  /* lit from behind */
-    assert_int_not_equal(form_of(6, 5, 0.5), form_of(6, 5, 1));     /* as bright as can be */
+    assert_int_not_equal(form_of(6, 5, 0.5), form_of(6, 5, 1));     /* at full brightness */
     assert_int_not_equal(form_of(0, 0, 0.5), form_of(1, 0.2, 0.5)); /* flat */
 }
 
@@ -187,9 +187,8 @@ static trip_vec3 random_direction(uint64_t *state)
     return trip_normalize(v);
 }
 
-/* ---- what normals are rounded for ---- */
-
-/* Shading as shade.h has it, of a grey, with gradients in units of the one at which it is full. */
+/* Computes the shading of shade.h for a grey. Gradients are in units of the gradient of full
+ * shading. */
 static double shaded(trip_vec3 g, trip_vec3 light, trip_vec3 eye, double grey)
 {
     double length = trip_length(g), strength = fmin(1, length);
@@ -205,7 +204,7 @@ static double shaded(trip_vec3 g, trip_vec3 light, trip_vec3 eye, double grey)
 typedef struct rounding {
     bool compact;
     trip_compact_normals how;
-    double worst, sum; /* in 1/255: of the worst of some greys */
+    double worst, sum; /* in 1/255, for the worst of some greys */
     long count;
 } rounding;
 
@@ -229,7 +228,8 @@ static double error_of(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec3 e
     return worst;
 }
 
-/* Light and eye are moved to where the error is larger, as long as that seems worth it. */
+/* Moves light and eye towards larger errors, as long as the error may exceed `max`. Returns the
+ * largest error found. */
 static double worst_about(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec3 eye,
                           bool headlight, double max, uint64_t *random)
 {
@@ -248,7 +248,7 @@ static double worst_about(trip_vec3 g, trip_vec3 back, trip_vec3 light, trip_vec
     return error;
 }
 
-/* Directions from all round; lengths up to `longest`, half of them near the end of that. */
+/* Tries gradients in all directions. Lengths go up to `longest`, half of them near that end. */
 static void try_gradients(rounding *r, double shortest, double longest, int count)
 {
     uint64_t random = 1;
@@ -293,7 +293,7 @@ static void three_bytes_of_a_strong_gradient_change_no_colour_by_half_a_step(voi
     assert_true(r.worst < 0.5 && r.sum / (double)r.count < 0.1);
 }
 
-/* Where values have no smallest difference; what is made only where it is wanted. */
+/* Values here have no smallest difference. */
 static void three_bytes_of_any_gradient_change_a_colour_by_less_than_three_steps(void **state)
 {
     (void)state;
@@ -302,7 +302,7 @@ static void three_bytes_of_any_gradient_change_a_colour_by_less_than_three_steps
     assert_true(r.worst < 3 && r.worst > 0.5 && r.sum / (double)r.count < 0.4);
 }
 
-/* Multiples of 1/2 where shading is full at 10.2, as of volumes of 8 bits. */
+/* Gradients are multiples of 1/2 and shading is full at 10.2, as in volumes of 8 bits. */
 static void three_bytes_of_bytes_change_no_colour(void **state)
 {
     (void)state;

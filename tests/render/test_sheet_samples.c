@@ -1,4 +1,4 @@
-/* How many slices views call for, by slopes and sizes worked out by hand. */
+/* The samples per sheet that views need, computed by hand from slopes and sizes. */
 #include "sheet_samples.h"
 
 #include "test.h"
@@ -7,8 +7,8 @@ enum { WIDTH = 64 };
 
 static const uint64_t dims[3] = { 40, 50, 60 };
 
-/* Of a grid whose voxels are so wide along each axis; pictures are WIDTH wide and high, and up is
- * z, unless the view says so. */
+/* Computes the samples for a grid with the given voxel widths along each axis. Pictures are WIDTH
+ * wide and high and z is up, unless the view sets another size or up vector. */
 static trip_view_samples_per_sheet
 samples_per_sheet_of_grid(trip_camera_params view, const double spacing[3], trip_method method)
 {
@@ -25,14 +25,14 @@ samples_per_sheet_of_grid(trip_camera_params view, const double spacing[3], trip
     return trip_sheet_samples_of_view(&camera, &settings, dims);
 }
 
-/* Of a grid whose voxels are `spacing` wide. */
+/* Computes the samples for a grid with voxels of width `spacing`. */
 static trip_view_samples_per_sheet samples_per_sheet_of(trip_camera_params view, double spacing,
                                                         trip_method method)
 {
     return samples_per_sheet_of_grid(view, (double[3]){ spacing, spacing, spacing }, method);
 }
 
-/* Along (slope, 1, 0); a pixel is `pixel` voxels. */
+/* Views along (slope, 1, 0). A pixel is `pixel` voxels wide. */
 static trip_view_samples_per_sheet parallel(double slope, double pixel, double spacing)
 {
     const trip_camera_params view = { .eye = { 20 - 100 * slope, -100, 30 },
@@ -45,7 +45,7 @@ static trip_view_samples_per_sheet parallel(double slope, double pixel, double s
     return samples_per_sheet_of(scaled, spacing, TRIP_METHOD_MERGE);
 }
 
-static void rays_along_an_axis_take_one_slice_and_oblique_ones_two(void **state)
+static void axis_rays_take_one_sample_per_sheet_and_oblique_rays_two(void **state)
 {
     (void)state;
     const double slopes[] = { 0, 0.1, 0.12, 0.13, 0.5, 0.8 };
@@ -56,11 +56,11 @@ static void rays_along_an_axis_take_one_slice_and_oblique_ones_two(void **state)
             assert_close(v.voxel_px, 1, 1e-9);
             assert_int_equal(v.samples_per_sheet, slopes[i] <= 0.125 ? 1 : 2);
         }
-    assert_true(parallel(0.125, 1, 1).slope == 0.125); /* an eighth rounds as the whole does */
+    assert_true(parallel(0.125, 1, 1).slope == 0.125); /* an eighth rounds like the whole */
     assert_int_equal(parallel(0.125, 1, 1).samples_per_sheet, 1);
 }
 
-/* A pixel is a world unit, and voxels are two along one axis of the picture. */
+/* A pixel is one world unit. Voxels are two units wide along one axis of the picture. */
 static void the_wider_side_of_a_voxel_counts(void **state)
 {
     (void)state;
@@ -75,7 +75,7 @@ static void the_wider_side_of_a_voxel_counts(void **state)
         1e-9);
 }
 
-static void large_voxels_take_more_but_along_an_axis(void **state)
+static void large_voxels_take_more_samples_except_along_an_axis(void **state)
 {
     (void)state;
     for (double px = 0.25; px < 40; px *= 2) {
@@ -86,10 +86,10 @@ static void large_voxels_take_more_but_along_an_axis(void **state)
     }
 }
 
-/* The pixel at the middle is 2 tan(fov / 2) / WIDTH wide at distance 1, and the grid's nearest
- * voxel is so far off; within the grid voxels have no greatest size, and count as 16 voxels off.
- * Corners are the steepest. */
-static void perspective_views_go_by_the_nearest_voxel_and_the_steepest_ray(void **state)
+/* At distance 1, the central pixel is 2 tan(fov / 2) / WIDTH wide. The grid's nearest voxel gives
+ * the distance. Inside the grid, the size of voxels has no maximum, and the distance counts as 16
+ * voxels. Rays at corners are the steepest. */
+static void perspective_views_use_the_nearest_voxel_and_steepest_ray(void **state)
 {
     (void)state;
     const double half = tan(10 * acos(-1) / 180);
@@ -118,9 +118,9 @@ static trip_vec3 from_eye(trip_vec3 eye, double x, double y, double z)
     return trip_add(eye, trip_v3(x, y, z));
 }
 
-/* In a view along an axis, of a picture four times as wide as it is high or as high as it is wide,
- * from which the ray at a corner is the steepest. */
-static void rays_of_wide_and_high_pictures_are_as_steep_as_at_their_longer_sides(void **state)
+/* Views along an axis, with pictures four times as wide as high or four times as high as wide. The
+ * ray at a corner is the steepest. */
+static void the_longer_side_of_a_picture_has_its_steepest_rays(void **state)
 {
     (void)state;
     const double half = tan(10 * acos(-1) / 180);
@@ -137,8 +137,8 @@ static void rays_of_wide_and_high_pictures_are_as_steep_as_at_their_longer_sides
     }
 }
 
-/* Turned by 15 degrees, of 10 to either side those at 25 are the steepest, at one edge of the
- * picture alone. */
+/* The view is turned by 15 degrees and covers 10 degrees to either side. The steepest rays are at
+ * 25 degrees, at one edge of the picture. */
 static void the_steepest_ray_may_be_at_any_edge(void **state)
 {
     (void)state;
@@ -152,8 +152,8 @@ static void the_steepest_ray_may_be_at_any_edge(void **state)
     }
 }
 
-/* From beyond a face, an edge and a corner of the box of voxels, on either side, 120, 150 and 170
- * voxels off. */
+/* The eye is beyond a face, an edge or a corner of the box of voxels, on either side. The distance
+ * is 120, 150 or 170 voxels. */
 static void the_nearest_voxel_may_be_at_a_face_an_edge_or_a_corner(void **state)
 {
     (void)state;
@@ -175,8 +175,8 @@ static void the_nearest_voxel_may_be_at_a_face_an_edge_or_a_corner(void **state)
     }
 }
 
-/* At 100 degrees, rays of slope 1 and more: by the list that they are most aligned with they are at
- * most 1, by that of the middle ray alone they are as steep as they are. */
+/* At 100 degrees some rays have slope 1 and more. With the list that each ray is most aligned
+ * with, slopes are at most 1. With the list of the central ray alone, slopes are larger. */
 static void the_steepest_ray_is_among_those_with_weight(void **state)
 {
     (void)state;
@@ -192,11 +192,11 @@ static void the_steepest_ray_is_among_those_with_weight(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_along_an_axis_take_one_slice_and_oblique_ones_two),
+        cmocka_unit_test(axis_rays_take_one_sample_per_sheet_and_oblique_rays_two),
         cmocka_unit_test(the_wider_side_of_a_voxel_counts),
-        cmocka_unit_test(large_voxels_take_more_but_along_an_axis),
-        cmocka_unit_test(perspective_views_go_by_the_nearest_voxel_and_the_steepest_ray),
-        cmocka_unit_test(rays_of_wide_and_high_pictures_are_as_steep_as_at_their_longer_sides),
+        cmocka_unit_test(large_voxels_take_more_samples_except_along_an_axis),
+        cmocka_unit_test(perspective_views_use_the_nearest_voxel_and_steepest_ray),
+        cmocka_unit_test(the_longer_side_of_a_picture_has_its_steepest_rays),
         cmocka_unit_test(the_steepest_ray_may_be_at_any_edge),
         cmocka_unit_test(the_nearest_voxel_may_be_at_a_face_an_edge_or_a_corner),
         cmocka_unit_test(the_steepest_ray_is_among_those_with_weight),

@@ -164,7 +164,7 @@ class InBrowser(program.ProgramTest):
             time.sleep(0.01)
         return shown
 
-    def test_each_input_changes_the_picture(self):
+    def test_drags_keys_and_functions_change_the_picture(self):
         before = self.exact()
         cameras = [self.status()["camera"]]
 

@@ -1,4 +1,4 @@
-"""Tests of `triptych serve` by HTTP requests like those of a browser."""
+"""Tests `triptych serve` by HTTP requests such as a browser makes."""
 import http.client
 import json
 import os

@@ -11,7 +11,7 @@ uint64_t fixture_random(uint64_t *state)
     return z ^ z >> 31;
 }
 
-/* Bit by bit, unlike the code under test. */
+/* Interleaves bit by bit, independently of the code under test. */
 static uint64_t plain_morton(uint32_t u, uint32_t v)
 {
     uint64_t m = 0;
@@ -20,7 +20,7 @@ static uint64_t plain_morton(uint32_t u, uint32_t v)
     return m;
 }
 
-/* A voxel and its place in a list: by sheet, and by Morton order there. */
+/* A voxel with its rank in a list, which is ordered by sheet and then by Morton code. */
 typedef struct ranked {
     uint64_t rank;
     fixture_voxel voxel;

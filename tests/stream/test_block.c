@@ -1,12 +1,12 @@
-/* Blocks: what is packed is decoded, from any record on; bytes are those that FORMAT.md says; a
- * block that does not agree with its run or its brick is found out. */
+/* Tests of blocks. Packed records decode from any record on, with the bytes that FORMAT.md defines.
+ * The check finds blocks that contradict their run or brick. */
 #include "fixture.h"
 
 #include "block.h"
 
 enum { ROOM = TRIP_RUN_RECORDS_MAX };
 
-/* Bit by bit, unlike the code under test. */
+/* Interleaves bit by bit, independently of the code under test. */
 static uint32_t plain_morton(uint32_t u, uint32_t v)
 {
     uint32_t m = 0;
@@ -19,12 +19,12 @@ typedef struct run {
     trip_block_form form;
     uint32_t voxels[ROOM], count, words;
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
-    trip_file_brick brick; /* exact bounds */
+    trip_file_brick brick; /* has exact bounds */
 } run;
 
 static run shared; /* large */
 
-/* Codes of a byte, of two, and of whole steps in two. */
+/* Forms with codes of one byte, of two bytes, and of two bytes with whole steps. */
 enum { BYTES, CODES, STEPS, FORMS };
 
 static trip_block_form form_of(unsigned tile_log2, int form)
@@ -41,7 +41,7 @@ static uint32_t random_code(const trip_block_form *f, uint64_t random)
                               : random & 65535;
 }
 
-/* Each voxel of the tile with that chance, in Morton order, and the block of those. */
+/* Makes a run with each voxel of the tile at probability `density`, and packs its block. */
 static run *make_run(trip_block_form form, double density, uint64_t seed)
 {
     static uint32_t by_number[ROOM];
@@ -76,7 +76,7 @@ static trip_block block_of(const run *r)
     return trip_block_make(&r->form, r->count, r->words, r->block, NULL);
 }
 
-static void what_is_packed_is_decoded_from_any_record_on(void **state)
+static void packed_records_are_decoded_from_any_record_on(void **state)
 {
     static uint32_t out[ROOM];
     const double densities[] = { 0, 0.001, 0.1, 0.7, 1.1 };
@@ -123,29 +123,30 @@ static void squares_hold_the_records_of_their_block(void **state)
         }
 }
 
-static void a_block_has_the_bytes_that_the_format_says(void **state)
+static void a_block_has_the_bytes_that_the_format_defines(void **state)
 {
     (void)state;
-    /* (1, 0) is voxel 1 of square 0; (9, 8) is voxel 1 of square 3, (15, 15) voxel 63. */
+    /* (1, 0) is voxel 1 of square 0. (9, 8) and (15, 15) are voxels 1 and 63 of square 3. */
     const uint32_t voxels[] = { trip_voxel_pack(1, 0, 21930), trip_voxel_pack(9, 8, 22015),
                                 trip_voxel_pack(15, 15, 43605) };
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     const trip_block_form bytes = form_of(4, BYTES), codes = form_of(7, CODES);
     assert_int_equal(trip_block_pack(&bytes, voxels, 3, block), 4);
     assert_true(block[0] == 9 && block[1] == 2 && block[2] == (UINT64_C(1) << 63 | 2));
-    assert_true(block[3] == 0xff0100); /* 85 (258 + c) */
+    assert_true(block[3] == 0xff0100); /* code 85 (258 + c) is stored as c */
     assert_int_equal(trip_block_pack(&codes, voxels, 3, block), 8);
     assert_true(block[0] == 9 && !block[1] && !block[2] && !block[3] && block[4] == 2);
-    assert_true(block[6] == 0x1055aa);                 /* one group: from 21930 on, 16 bits */
-    assert_true(block[7] == UINT64_C(0x54ab00550000)); /* above 21930 */
+    assert_true(block[6] == 0x1055aa); /* one group with minimum 21930 and 16 bits */
+    assert_true(block[7] == UINT64_C(0x54ab00550000)); /* codes minus 21930 */
     const trip_block_form steps = form_of(7, STEPS);
     assert_int_equal(trip_block_pack(&steps, voxels, 3, block), 8);
-    assert_true(block[6] == 0x80102);  /* one group: from step 258 on, 8 bits */
-    assert_true(block[7] == 0xff0100); /* above that */
+    assert_true(block[6] == 0x80102);  /* one group with minimum step 258 and 8 bits */
+    assert_true(block[7] == 0xff0100); /* steps minus 258 */
 }
 
-/* A square of 32 records is a group, whose codes span 31; what is left is another, of one code. */
-static void codes_are_packed_by_groups_of_squares(void **state)
+/* A square of 32 records with codes over a range of 31 forms the first group. One other record
+ * forms the second group. */
+static void codes_are_packed_in_groups_of_squares(void **state)
 {
     uint32_t voxels[33];
     const trip_block_form form = form_of(4, CODES);
@@ -155,7 +156,7 @@ static void codes_are_packed_by_groups_of_squares(void **state)
         const uint32_t above = 5 * i % 32;
         voxels[i] = trip_voxel_pack((i & 1) | (i >> 1 & 2) | (i >> 2 & 4),
                                     (i >> 1 & 1) | (i >> 2 & 2), 1000 + above);
-        for (uint32_t bit = 0; bit < 6; bit++) /* 5 would do, but widths are even */
+        for (uint32_t bit = 0; bit < 6; bit++) /* 5 bits suffice, but widths are even */
             codes[(6 * i + bit) / 64] |= (uint64_t)(above >> bit & 1) << (6 * i + bit) % 64;
     }
     voxels[32] = trip_voxel_pack(8, 8, 7);
@@ -165,7 +166,7 @@ static void codes_are_packed_by_groups_of_squares(void **state)
     assert_memory_equal(block + 4, codes, sizeof codes);
 }
 
-static void what_is_no_run_is_not_packed(void **state)
+static void invalid_runs_are_not_packed(void **state)
 {
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     const trip_block_form small = form_of(4, CODES), bytes = form_of(4, BYTES),
@@ -187,10 +188,11 @@ static void what_is_no_run_is_not_packed(void **state)
     assert_int_equal(trip_block_pack(&small, &odd, 1, block), 3);
 }
 
-static void a_number_of_words_fits_where_squares_can_hold_the_records(void **state)
+static void a_number_of_words_fits_if_squares_can_hold_the_records(void **state)
 {
-    const trip_block_form bytes = form_of(4, BYTES); /* a word of presence, four squares */
-    const trip_block_form f = form_of(4, CODES); /* two groups a word, of no bits to four codes */
+    const trip_block_form bytes = form_of(4, BYTES); /* one presence word, four squares */
+    /* A word holds two groups. Codes have no bits, or a word holds at least four codes. */
+    const trip_block_form f = form_of(4, CODES);
     (void)state;
     assert_false(trip_block_words_fit(&bytes, 0, 2));
     assert_false(trip_block_words_fit(&bytes, 1, 2));
@@ -216,14 +218,14 @@ static void a_number_of_words_fits_where_squares_can_hold_the_records(void **sta
     assert_false(trip_block_words_fit(&f, UINT32_MAX, 65535));
 }
 
-/* As much as the words determine, part after part, until all is there. */
-static void how_far_a_block_goes_follows_from_what_is_there(void **state)
+/* The words present determine the end of the next part, until the block is complete. */
+static void the_words_present_determine_the_end_of_a_block(void **state)
 {
     (void)state;
     for (unsigned log2 = 4; log2 <= 7; log2++)
         for (int form = 0; form < FORMS; form++) {
             const run *r = make_run(form_of(log2, form), 0.1, log2);
-            uint64_t *part = calloc(r->words, sizeof *part); /* of which no more is read */
+            uint64_t *part = calloc(r->words, sizeof *part); /* sanitizers check reads */
             uint32_t words = 0, end, parts = 0;
             assert_non_null(part);
             for (; (end = trip_block_end(&r->form, part, words)) > words; words = end, parts++) {
@@ -243,7 +245,7 @@ static void expect_fault(const run *r, const char *why)
         fail_msg("wanted \"%s\", not \"%s\"", why, fault ? fault : "nothing");
 }
 
-/* Bounds one less on any side leave out the records there: all bounds are exact. */
+/* All bounds are exact, so bounds smaller by one on any side exclude a record. */
 static void records_outside_their_brick_are_found(void **state)
 {
     (void)state;
@@ -272,7 +274,7 @@ static void records_outside_their_brick_are_found(void **state)
             }
 }
 
-/* Codes that span so many bits, and the most of them. */
+/* Makes a run with codes over a range of `bits` bits. Sets *max to the maximum code. */
 static run *make_narrow_run(unsigned bits, double density, uint64_t seed, uint32_t *max)
 {
     run *r = make_run(form_of(5, CODES), density, seed);
@@ -288,7 +290,7 @@ static run *make_narrow_run(unsigned bits, double density, uint64_t seed, uint32
     return r;
 }
 
-static void bounds_of_codes_are_exact_whatever_their_width(void **state)
+static void bounds_of_codes_are_exact_for_every_width(void **state)
 {
     uint64_t random = 5;
     (void)state;
@@ -309,7 +311,7 @@ static void bounds_of_codes_are_exact_whatever_their_width(void **state)
         }
 }
 
-static void masks_that_do_not_agree_with_the_run_are_found(void **state)
+static void masks_that_contradict_the_run_are_found(void **state)
 {
     const trip_block_form f = form_of(6, CODES);
     (void)state;
@@ -322,7 +324,7 @@ static void masks_that_do_not_agree_with_the_run_are_found(void **state)
     r = make_run(f, 0.3, 3);
     r->block[1] &= r->block[1] - 1;
     expect_fault(r, "as many voxels");
-    r = make_run(f, 0.3, 3); /* the first mask's bits go to the second, as far as there is room */
+    r = make_run(f, 0.3, 3); /* moves the bits of the first mask to the second */
     uint64_t both[2] = { r->block[1], r->block[2] };
     int bits = __builtin_popcountll(both[0]);
     for (int n = 0; n < 64 && bits > 0; n++)
@@ -334,20 +336,20 @@ static void masks_that_do_not_agree_with_the_run_are_found(void **state)
     r->block[1] = 0;
     r->block[2] = both[1];
     expect_fault(r, "a mask is empty");
-    r = make_run(form_of(4, CODES), 0.3, 3); /* squares 0 to 3; bit 63 is none of it */
+    r = make_run(form_of(4, CODES), 0.3, 3); /* squares 0 to 3 exist, bit 63 does not */
     r->block[0] ^= UINT64_C(1) << 3 | UINT64_C(1) << 63;
     expect_fault(r, "outside its brick's bounds");
 }
 
-/* The first form of a block of 64 squares. */
+/* Returns the first form of a block of 64 squares. */
 static uint32_t *first_form(run *r)
 {
     return (uint32_t *)(r->block + 1 + 64);
 }
 
-/* Widths that there are not, or by which codes do not end where the block does; and codes beyond 16
- * bits. */
-static void forms_that_lead_astray_are_found(void **state)
+/* Tries invalid widths, widths that contradict the length of the block, and codes beyond 16 bits.
+ */
+static void invalid_forms_are_found(void **state)
 {
     const trip_block_form f = form_of(6, CODES);
     const uint32_t widths[] = { 15, 1, 17, 18, 32, 65535 };
@@ -366,7 +368,7 @@ static void forms_that_lead_astray_are_found(void **state)
     r->words--;
     expect_fault(r, "length");
     *first_form(r) = 17u << 16;
-    r->words = 1 + 64; /* ends before the forms, which are not looked at */
+    r->words = 1 + 64; /* the block ends before the forms, so the check must not read them */
     expect_fault(r, "length");
     r = make_run(f, 1.1, 3);
     r->brick.code_max = UINT16_MAX;
@@ -374,7 +376,7 @@ static void forms_that_lead_astray_are_found(void **state)
     expect_fault(r, "outside its brick's range");
 }
 
-static void padding_that_is_not_zero_is_found(void **state)
+static void nonzero_padding_is_found(void **state)
 {
     (void)state;
     run *r = make_run(form_of(5, BYTES), 0.1, 5);
@@ -384,18 +386,18 @@ static void padding_that_is_not_zero_is_found(void **state)
     assert_true(trip_block_is_padded(&b));
     r->block[r->words - 1] |= UINT64_C(1) << 63;
     assert_false(trip_block_is_padded(&b));
-    r = make_run(form_of(4, CODES), 0, 5); /* one group, of one code */
+    r = make_run(form_of(4, CODES), 0, 5); /* one group of one code */
     const trip_block one = block_of(r);
     assert_true(r->words == 3 && trip_block_is_padded(&one));
     r->block[2] |= UINT64_C(1) << 32;
     assert_false(trip_block_is_padded(&one));
 }
 
-/* Between a square's last code and the next byte. */
-static void bits_behind_a_squares_codes_are_padding_too(void **state)
+/* Padding fills the bits between the last code of a square and the next byte. */
+static void bits_behind_the_codes_of_a_square_are_padding(void **state)
 {
     (void)state;
-    run *r = make_run(form_of(4, STEPS), 0.3, 5); /* of 10 bits */
+    run *r = make_run(form_of(4, STEPS), 0.3, 5); /* codes have 10 bits */
     trip_square squares[TRIP_BLOCK_SQUARES_MAX];
     const trip_block b = block_of(r);
     const uint32_t count = trip_block_squares(&b, squares);
@@ -410,8 +412,8 @@ static void bits_behind_a_squares_codes_are_padding_too(void **state)
     assert_false(trip_block_is_padded(&b));
 }
 
-/* Three codes of 2 bits, and behind them what would be one more that is out of range. */
-static void what_is_behind_the_last_code_is_none(void **state)
+/* Sets bits behind three codes of 2 bits. As a fourth code they would be out of range. */
+static void bits_behind_the_last_code_are_no_code(void **state)
 {
     (void)state;
     run *r = &shared;
@@ -421,7 +423,7 @@ static void what_is_behind_the_last_code_is_none(void **state)
                 .count = 3,
                 .brick = { .code_min = 100, .code_max = 102, .u_max = 1, .v_max = 1 } };
     r->words = trip_block_pack(&r->form, r->voxels, r->count, r->block);
-    assert_int_equal(r->words, 4); /* presence, a mask, a form, codes */
+    assert_int_equal(r->words, 4); /* presence word, mask, form and codes */
     r->block[3] |= 3 << 6;
     const trip_block b = block_of(r);
     assert_null(trip_block_check(&b, &r->brick));
@@ -450,20 +452,20 @@ static void normals_are_packed_and_decoded(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_packed_is_decoded_from_any_record_on),
+        cmocka_unit_test(packed_records_are_decoded_from_any_record_on),
         cmocka_unit_test(squares_hold_the_records_of_their_block),
-        cmocka_unit_test(a_block_has_the_bytes_that_the_format_says),
-        cmocka_unit_test(codes_are_packed_by_groups_of_squares),
-        cmocka_unit_test(what_is_no_run_is_not_packed),
-        cmocka_unit_test(a_number_of_words_fits_where_squares_can_hold_the_records),
-        cmocka_unit_test(how_far_a_block_goes_follows_from_what_is_there),
+        cmocka_unit_test(a_block_has_the_bytes_that_the_format_defines),
+        cmocka_unit_test(codes_are_packed_in_groups_of_squares),
+        cmocka_unit_test(invalid_runs_are_not_packed),
+        cmocka_unit_test(a_number_of_words_fits_if_squares_can_hold_the_records),
+        cmocka_unit_test(the_words_present_determine_the_end_of_a_block),
         cmocka_unit_test(records_outside_their_brick_are_found),
-        cmocka_unit_test(bounds_of_codes_are_exact_whatever_their_width),
-        cmocka_unit_test(masks_that_do_not_agree_with_the_run_are_found),
-        cmocka_unit_test(forms_that_lead_astray_are_found),
-        cmocka_unit_test(padding_that_is_not_zero_is_found),
-        cmocka_unit_test(bits_behind_a_squares_codes_are_padding_too),
-        cmocka_unit_test(what_is_behind_the_last_code_is_none),
+        cmocka_unit_test(bounds_of_codes_are_exact_for_every_width),
+        cmocka_unit_test(masks_that_contradict_the_run_are_found),
+        cmocka_unit_test(invalid_forms_are_found),
+        cmocka_unit_test(nonzero_padding_is_found),
+        cmocka_unit_test(bits_behind_the_codes_of_a_square_are_padding),
+        cmocka_unit_test(bits_behind_the_last_code_are_no_code),
         cmocka_unit_test(normals_are_packed_and_decoded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

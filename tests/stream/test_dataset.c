@@ -1,5 +1,5 @@
-/* Data sets that are damaged, cut, mixed up or missing: an error that names the file, or the same
- * voxels, never anything else. */
+/* Tests of data sets that are damaged, truncated, mixed up or missing. Reading returns the same
+ * voxels or fails with an error that names the file. */
 #include "fixture.h"
 
 #include <fcntl.h>
@@ -41,7 +41,7 @@ static char *file_path(int file)
     return path;
 }
 
-/* Sums all records of a list, so that any other picture would be noticed. */
+/* Sums all records of a list, so that any change of the picture shows. */
 static int sum_list(const trip_dataset *d, trip_reader *r, int axis, uint64_t *sum)
 {
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
@@ -66,7 +66,7 @@ static int sum_list(const trip_dataset *d, trip_reader *r, int axis, uint64_t *s
     return status;
 }
 
-/* 0 and the sum of everything, or the status of the first failure. */
+/* Sums the records of all lists. Returns 0 or the status of the first failure. */
 static int read_everything(const char *path, uint64_t *sum)
 {
     trip_dataset *d;
@@ -90,7 +90,7 @@ static int read_everything(const char *path, uint64_t *sum)
     return status;
 }
 
-/* What is read now must be an error of one line that names the file. */
+/* Checks that reading fails with one line that names the file. */
 static void expect_error_in(const char *name)
 {
     uint64_t sum;
@@ -135,7 +135,7 @@ static void a_flipped_byte_anywhere_is_an_error_that_names_the_file(void **state
     assert_int_equal(read_everything(shared.path, &sum), TRIP_OK);
 }
 
-static void a_file_cut_or_grown_at_any_length_is_an_error(void **state)
+static void a_file_of_any_other_length_is_an_error(void **state)
 {
     (void)state;
     for (int file = 0; file < FILES; file++) {
@@ -171,8 +171,8 @@ static void a_missing_file_or_folder_is_an_error(void **state)
     assert_non_null(strstr(fixture_reports(), "no-such.trip"));
 }
 
-/* The same positions with other values: all sizes agree, only the checksums do not. */
-static void files_of_another_data_set_are_noticed(void **state)
+/* Other values at the same positions leave all sizes equal. Only the checksums differ. */
+static void files_of_another_data_set_are_detected(void **state)
 {
     char other[128];
     (void)state;
@@ -195,7 +195,7 @@ static void files_of_another_data_set_are_noticed(void **state)
     }
 }
 
-/* A child without root's rights opens a file that it may not read. */
+/* A child process without root privileges opens a file without read permission. */
 static void a_file_without_permission_is_an_error(void **state)
 {
     (void)state;
@@ -219,7 +219,7 @@ static void a_file_without_permission_is_an_error(void **state)
     assert_int_equal(WEXITSTATUS(status), 0);
 }
 
-/* An index whose checksums are right whatever its bytes are. */
+/* An index with arbitrary bytes and valid checksums. */
 typedef struct crafted {
     unsigned char bytes[65536];
     size_t count;
@@ -275,7 +275,7 @@ static void expect_refused(crafted *c, const char *why)
         expect_refused(&c, why);                                                                   \
     } while (0)
 
-static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_right(void **state)
+static void an_invalid_header_with_valid_checksum_is_refused(void **state)
 {
     static crafted c;
     (void)state;
@@ -335,7 +335,7 @@ static void a_header_that_makes_no_sense_is_refused_although_its_checksum_is_rig
     REFUSE(c.header->lists_offset += 4, "lists lie outside");
 }
 
-static void tables_that_make_no_sense_are_refused_although_their_checksums_are_right(void **state)
+static void invalid_tables_with_valid_checksums_are_refused(void **state)
 {
     static crafted c;
     (void)state;
@@ -394,7 +394,7 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE(BRICK[0].u_min = 16, "not inside the grid");
     REFUSE(BRICK[1].u_max = 2, "bounds are not inside the grid"); /* z = 16 + 2 of 18 */
     REFUSE(BRICK[4].v_max = 2, "bounds are not inside the grid"); /* x = 32 + 2 of 34 */
-    REFUSE(BRICK[0].u_min = 15, "runs do not agree");             /* a column holds 16 */
+    REFUSE(BRICK[0].u_min = 15, "runs do not agree"); /* a column holds at most 16 records */
     REFUSE(BRICK[0].v_min = 15, "runs do not agree");
     REFUSE(BRICK[0].sheet_max = 8, "sheets are not inside");
     REFUSE(BRICK[SLAB[2].first_brick].sheet_max = 4,
@@ -415,14 +415,14 @@ static void tables_that_make_no_sense_are_refused_although_their_checksums_are_r
     REFUSE((BRICK[1].tile_u = BRICK[0].tile_u, BRICK[1].tile_v = BRICK[0].tile_v), "Morton");
 }
 
-static void verify_finds_records_that_do_not_agree_with_the_index(void **state)
+static void verify_finds_records_that_contradict_the_index(void **state)
 {
     trip_dataset *d;
     (void)state;
     assert_int_equal(trip_dataset_open(&d, shared.path, shared.budget), TRIP_OK);
     assert_int_equal(trip_dataset_verify(d, shared.budget), TRIP_OK);
-    /* The dataset's own index in memory is changed instead of the file: same effect, no resealing.
-     */
+    /* Changes the index in memory instead of the file. This has the same effect and needs no new
+     * checksums. */
     trip_file_brick *b = (trip_file_brick *)(uintptr_t)&d->lists[1].bricks[0];
     uint16_t code_max = b->code_max;
     b->code_max = (uint16_t)(code_max - 1);
@@ -438,7 +438,7 @@ static void verify_finds_records_that_do_not_agree_with_the_index(void **state)
     trip_dataset_close(d);
 }
 
-/* Of a list's first block that has padding, the place of its last byte in the file. */
+/* Returns the file offset of the last byte of the list's first block with padding. */
 static off_t find_padding(const trip_dataset *d, trip_list *list)
 {
     static uint64_t block[TRIP_BLOCK_WORDS_MAX];
@@ -460,8 +460,8 @@ static off_t find_padding(const trip_dataset *d, trip_list *list)
     return at;
 }
 
-/* The checksum of its page is right, in the index as it is in memory. */
-static void verify_finds_padding_that_is_not_zero(void **state)
+/* The index in memory gets the valid checksum of the changed page. */
+static void verify_finds_nonzero_padding(void **state)
 {
     static unsigned char page[4096];
     trip_dataset *d;
@@ -486,8 +486,8 @@ static void *replace_often(void *stop)
     return NULL;
 }
 
-/* Runs after the values have been changed by another test, which both data sets then have. */
-static void a_data_set_being_replaced_can_be_opened_at_every_moment(void **state)
+/* An earlier test changed the values, so the test writes the data set first. */
+static void a_data_set_opens_at_any_moment_of_its_replacement(void **state)
 {
     pthread_t thread;
     _Atomic bool stop = false;
@@ -506,8 +506,8 @@ static void a_data_set_being_replaced_can_be_opened_at_every_moment(void **state
     shared.params.replace = false;
 }
 
-/* Of a data set with tables, each number of which is checked. */
-static void coordinates_are_read_as_written_and_bad_ones_refused(void **state)
+/* The data set has tables of coordinates. Reading checks every number. */
+static void coordinates_are_read_as_written_or_refused(void **state)
 {
     (void)state;
     static double tables[34 + 20 + 18];
@@ -547,16 +547,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_flipped_byte_anywhere_is_an_error_that_names_the_file),
-        cmocka_unit_test(a_file_cut_or_grown_at_any_length_is_an_error),
+        cmocka_unit_test(a_file_of_any_other_length_is_an_error),
         cmocka_unit_test(a_missing_file_or_folder_is_an_error),
         cmocka_unit_test(a_file_without_permission_is_an_error),
-        cmocka_unit_test(a_header_that_makes_no_sense_is_refused_although_its_checksum_is_right),
-        cmocka_unit_test(coordinates_are_read_as_written_and_bad_ones_refused),
-        cmocka_unit_test(tables_that_make_no_sense_are_refused_although_their_checksums_are_right),
-        cmocka_unit_test(verify_finds_records_that_do_not_agree_with_the_index),
-        cmocka_unit_test(verify_finds_padding_that_is_not_zero),
-        cmocka_unit_test(files_of_another_data_set_are_noticed),
-        cmocka_unit_test(a_data_set_being_replaced_can_be_opened_at_every_moment),
+        cmocka_unit_test(an_invalid_header_with_valid_checksum_is_refused),
+        cmocka_unit_test(coordinates_are_read_as_written_or_refused),
+        cmocka_unit_test(invalid_tables_with_valid_checksums_are_refused),
+        cmocka_unit_test(verify_finds_records_that_contradict_the_index),
+        cmocka_unit_test(verify_finds_nonzero_padding),
+        cmocka_unit_test(files_of_another_data_set_are_detected),
+        cmocka_unit_test(a_data_set_opens_at_any_moment_of_its_replacement),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

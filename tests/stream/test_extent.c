@@ -1,7 +1,9 @@
-/* The planner's packing, on a data set of dense lists: along X 8 sheets of 16 tiles. A run has 256
- * records, whose codes are anywhere in 16 bits, so its block has a word of presence, 4 masks, 2
- * words of forms and 64 words of codes: 568 bytes. So run n of a list lies at byte 568 n, its
- * normals at 1024 n; pages have 4096 bytes. */
+/* Tests of the planner's packing, on a data set of dense lists. The X list has 8 sheets of 16
+ * tiles.
+ *
+ * A run has 256 records with codes of 16 bits. Its block has a presence word, 4 masks, 2 words of
+ * forms and 64 words of codes: 568 bytes. So run n of a list starts at byte 568 n, and its normals
+ * at byte 1024 n. Pages have 4096 bytes. */
 #include "fixture.h"
 
 #include "extent.h"
@@ -72,13 +74,13 @@ static void expect_range(const plan_test *t, unsigned i, uint64_t offset, size_t
     assert_int_equal(t->extent.ranges[i].slot_offset, slot_offset);
 }
 
-/* Pages from the one with the first byte to the one with the last. */
+/* Returns the bytes of all pages that [first, end) touches. */
 static size_t paged(size_t first, size_t end)
 {
     return (end + 4095) / 4096 * 4096 - first / 4096 * 4096;
 }
 
-static void the_whole_list_is_cut_between_runs(void **state)
+static void the_whole_list_is_split_between_runs(void **state)
 {
     plan_test t;
     size_t next = 0;
@@ -102,7 +104,7 @@ static void the_whole_list_is_cut_between_runs(void **state)
     finish(&t);
 }
 
-static void planes_follow_one_another_in_a_slot(void **state)
+static void planes_are_contiguous_in_a_slot(void **state)
 {
     plan_test t;
     (void)state;
@@ -125,14 +127,15 @@ static void planes_follow_one_another_in_a_slot(void **state)
     finish(&t);
 }
 
-static void large_gaps_part_pieces_and_small_ones_do_not(void **state)
+static void large_gaps_separate_pieces_and_small_gaps_do_not(void **state)
 {
     plan_test t;
     (void)state;
     start(&t, false, 1 << 16, 1);
-    trip_selection_add(&t.s[0], 1); /* from byte 568 of a sheet, which has 9088 */
-    trip_selection_add(&t.s[0], 6); /* from byte 3408, after a gap of 2272 */
-    t.s[0].sheet_last = 1; /* where they start at 9656, after a gap of 5680, and at 12496 */
+    trip_selection_add(&t.s[0], 1); /* starts at byte 568 of a sheet of 9088 bytes */
+    trip_selection_add(&t.s[0], 6); /* starts at byte 3408, after a gap of 2272 */
+    /* The runs of the second sheet start at 9656, after a gap of 5680, and at 12496. */
+    t.s[0].sheet_last = 1;
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.range_count, 2);
@@ -146,14 +149,15 @@ static void large_gaps_part_pieces_and_small_ones_do_not(void **state)
     finish(&t);
 }
 
-static void a_descending_pass_places_pieces_from_the_files_end(void **state)
+static void a_descending_pass_orders_pieces_from_the_end_of_the_file(void **state)
 {
     plan_test t;
     (void)state;
     start(&t, true, 1 << 16, 1);
     trip_selection_add(&t.s[0], 1);
     trip_selection_add(&t.s[0], 15);
-    t.s[0].sheet_last = 1; /* runs from bytes 17608, 9656, 8520 and 568: the middle ones are near */
+    /* The runs start at bytes 17608, 9656, 8520 and 568. The middle two are close. */
+    t.s[0].sheet_last = 1;
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.range_count, 3);
@@ -184,8 +188,8 @@ static void a_descending_pass_takes_the_whole_list_backwards(void **state)
     finish(&t);
 }
 
-/* Sheets of X and of Y come in turn, eight of each; Y goes on alone. */
-static void lists_that_come_in_turn_have_pieces_of_their_own(void **state)
+/* Eight sheets of X and of Y alternate, then the other sheets of Y follow. */
+static void alternating_lists_have_separate_pieces(void **state)
 {
     plan_test t;
     (void)state;
@@ -226,8 +230,8 @@ static void a_full_table_of_runs_ends_the_extent(void **state)
     finish(&t);
 }
 
-/* A block of 568 bytes and 1024 bytes of normals may each begin at the end of a page. */
-static void the_least_slot_holds_the_largest_run(void **state)
+/* A block of 568 bytes and 1024 bytes of normals may each cross into a second page. */
+static void the_minimum_slot_holds_the_largest_run(void **state)
 {
     plan_test t;
     (void)state;
@@ -237,8 +241,9 @@ static void the_least_slot_holds_the_largest_run(void **state)
     finish(&t);
 }
 
-/* Of 64 x 64 records a block of codes of a byte has 577 words, of means, which have two, 1121. */
-static void the_least_slot_holds_a_run_of_any_kind(void **state)
+/* For 64 x 64 records, a block with one-byte codes has 577 words. A block of means has two-byte
+ * codes and 1121 words. */
+static void the_minimum_slot_holds_a_run_of_any_kind(void **state)
 {
     plan_test t = { 0 };
     (void)state;
@@ -254,15 +259,15 @@ static void the_least_slot_holds_a_run_of_any_kind(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_whole_list_is_cut_between_runs),
-        cmocka_unit_test(planes_follow_one_another_in_a_slot),
-        cmocka_unit_test(large_gaps_part_pieces_and_small_ones_do_not),
-        cmocka_unit_test(a_descending_pass_places_pieces_from_the_files_end),
+        cmocka_unit_test(the_whole_list_is_split_between_runs),
+        cmocka_unit_test(planes_are_contiguous_in_a_slot),
+        cmocka_unit_test(large_gaps_separate_pieces_and_small_gaps_do_not),
+        cmocka_unit_test(a_descending_pass_orders_pieces_from_the_end_of_the_file),
         cmocka_unit_test(a_descending_pass_takes_the_whole_list_backwards),
-        cmocka_unit_test(lists_that_come_in_turn_have_pieces_of_their_own),
+        cmocka_unit_test(alternating_lists_have_separate_pieces),
         cmocka_unit_test(a_full_table_of_runs_ends_the_extent),
-        cmocka_unit_test(the_least_slot_holds_the_largest_run),
-        cmocka_unit_test(the_least_slot_holds_a_run_of_any_kind),
+        cmocka_unit_test(the_minimum_slot_holds_the_largest_run),
+        cmocka_unit_test(the_minimum_slot_holds_a_run_of_any_kind),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,11 +1,11 @@
-/* The example of stream/FORMAT.md is what the writer writes. */
+/* Checks that the writer writes the example of stream/FORMAT.md. */
 #include "fixture.h"
 
 #include <stdio.h>
 #include <unistd.h>
 
 #include "normal.h"
-/* The four voxels of the example, by list. Tiles have 16 x 16 voxels. */
+/* The four voxels of the example, and their order in each list. Tiles have 16 x 16 voxels. */
 typedef struct example_voxel {
     uint32_t p[3];
     uint32_t code;
@@ -19,7 +19,7 @@ static const example_voxel example[] = {
     { { 3, 2, 1 }, 5, { 0, 0, 0 } },
 };
 
-/* And a transparent neighbour, in a list of the halo along Z alone. */
+/* A transparent neighbour. The halo has only the Z list. */
 static const uint32_t halo_voxel[3] = { 18, 1, 0 };
 enum { HALO_CODE = 33000, HALO_LIST = 3 };
 
@@ -33,7 +33,8 @@ static void append_example(trip_writer *w, int axis)
         uint32_t voxels[2] = { trip_voxel_pack(u % 16, v % 16, x->code) };
         uint32_t normals[2] = { trip_normal_pack(x->gradient, 2) };
         uint32_t count = 1;
-        /* Along z the first two voxels share a tile and a sheet, along x none do. */
+        /* The first two voxels share a tile and a sheet of the Z list. No two voxels do in the X
+         * list. */
         if (axis == 2 && n == 0) {
             x = &example[example_order[axis][++n]];
             voxels[1] = trip_voxel_pack(x->p[0], x->p[1], x->code);
@@ -90,7 +91,7 @@ typedef struct page_file {
     unsigned char content[8192];
 } page_file;
 
-/* A line "00000010  54 52 49 ...  words" of the page. */
+/* Parses a line "00000010  54 52 49 ...  words" of the page. */
 static void take_hex_line(page_file *f, const char *line)
 {
     unsigned offset, byte;
@@ -105,8 +106,8 @@ static void take_hex_line(page_file *f, const char *line)
     }
 }
 
-/* The files of the example: each starts with "#### `NAME`, N bytes", bytes that are not shown are
- * zero. */
+/* Parses the files of the example. Each starts with "#### `NAME`, N bytes". Bytes that the page
+ * omits are zero. */
 static int parse_page(page_file *files, int room)
 {
     char line[512];
@@ -142,7 +143,7 @@ static void check_file(const char *path, const page_file *f)
     assert_int_equal(n, f->bytes);
 }
 
-static void the_example_of_the_page_is_what_is_written(void **state)
+static void the_writer_writes_the_example_of_the_page(void **state)
 {
     static page_file files[9];
     char path[] = "/tmp/trip-format-XXXXXX", name[64];
@@ -165,7 +166,7 @@ static void the_example_of_the_page_is_what_is_written(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_example_of_the_page_is_what_is_written),
+        cmocka_unit_test(the_writer_writes_the_example_of_the_page),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,11 +1,12 @@
-/* `triptych info`, as a user or a program sees it. */
+/* Tests the output of `triptych info` for users and programs. */
 #include "fixture.h"
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <sys/wait.h>
 
-/* Runs the program and takes its output (stdout, or stderr by redirection in `arguments`). */
+/* Runs the program and stores its stdout, or its stderr if `arguments` redirect it. Returns the
+ * exit status. */
 static int run(const char *arguments, char *output, size_t room)
 {
     char command[512];
@@ -31,7 +32,7 @@ static double element(const cJSON *root, const char *key, int i, int k)
     return cJSON_IsArray(item) ? cJSON_GetArrayItem(item, k)->valuedouble : item->valuedouble;
 }
 
-static void json_has_what_programs_rely_on(void **state)
+static void json_has_the_fields_that_programs_use(void **state)
 {
     fixture f;
     char arguments[160], output[8192];
@@ -56,7 +57,7 @@ static void json_has_what_programs_rely_on(void **state)
     fixture_free(&f);
 }
 
-static void people_get_one_screen(void **state)
+static void text_output_fits_one_screen(void **state)
 {
     fixture f;
     char arguments[160], output[8192];
@@ -73,7 +74,7 @@ static void people_get_one_screen(void **state)
     fixture_free(&f);
 }
 
-static void verify_fails_on_a_damaged_file_that_is_not_read_otherwise(void **state)
+static void verify_fails_on_a_damaged_file_that_info_does_not_read(void **state)
 {
     fixture f;
     char arguments[160], output[8192];
@@ -90,7 +91,7 @@ static void verify_fails_on_a_damaged_file_that_is_not_read_otherwise(void **sta
     fixture_free(&f);
 }
 
-static void wrong_usage_is_exit_status_2_and_one_line(void **state)
+static void wrong_usage_gives_exit_status_2_and_one_line(void **state)
 {
     const char *const arguments[] = { "2>&1", "--no-such-option a 2>&1", "a b 2>&1" };
     char output[8192];
@@ -106,10 +107,10 @@ static void wrong_usage_is_exit_status_2_and_one_line(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(json_has_what_programs_rely_on),
-        cmocka_unit_test(people_get_one_screen),
-        cmocka_unit_test(verify_fails_on_a_damaged_file_that_is_not_read_otherwise),
-        cmocka_unit_test(wrong_usage_is_exit_status_2_and_one_line),
+        cmocka_unit_test(json_has_the_fields_that_programs_use),
+        cmocka_unit_test(text_output_fits_one_screen),
+        cmocka_unit_test(verify_fails_on_a_damaged_file_that_info_does_not_read),
+        cmocka_unit_test(wrong_usage_gives_exit_status_2_and_one_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

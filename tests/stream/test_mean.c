@@ -4,10 +4,10 @@
 
 #include "mean.h"
 
-/* Values 0 to 65535, and as many codes. */
+/* Values 0 to 65535 with one code each. */
 static const trip_mean_scale whole = { 0, 65535 };
 
-static void a_cube_that_is_full_keeps_its_extinction(void **state)
+static void a_full_cube_keeps_its_extinction(void **state)
 {
     (void)state;
     unsigned code = trip_mean_pack(&whole, 65535, 1, 1);
@@ -16,7 +16,7 @@ static void a_cube_that_is_full_keeps_its_extinction(void **state)
     assert_true(trip_mean_extinction(code % TRIP_MEAN_SHARES, 3.5, 0.25) == 3.5);
 }
 
-static void shares_of_two_by_two_by_two_are_exact(void **state)
+static void shares_of_two_voxels_along_each_axis_are_exact(void **state)
 {
     (void)state;
     for (int columns = 1; columns <= 4; columns++)
@@ -24,12 +24,12 @@ static void shares_of_two_by_two_by_two_are_exact(void **state)
             double cover = columns / 4.0, depth = kept / (2.0 * columns);
             unsigned shares = trip_mean_pack(&whole, 0, cover, depth) % TRIP_MEAN_SHARES;
             assert_true(trip_mean_cover(shares) == cover);
-            /* Thirds alone have no eighths. */
+            /* Depths in sixths have no exact code, all others do. */
             assert_true(fabs(trip_mean_depth(shares) - depth) <= (columns == 3 ? 1 / 23.9 : 0));
         }
 }
 
-static void covers_and_depths_are_the_nearest_that_there_are(void **state)
+static void covers_and_depths_are_the_nearest_available(void **state)
 {
     (void)state;
     for (double x = 1.0 / 1000; x <= 1; x += 1.0 / 1000) {
@@ -43,7 +43,7 @@ static void covers_and_depths_are_the_nearest_that_there_are(void **state)
     }
 }
 
-static void values_are_the_nearest_of_1024(void **state)
+static void values_are_the_nearest_of_1024_steps(void **state)
 {
     (void)state;
     for (unsigned value = 0; value < 65536; value++) {
@@ -52,9 +52,9 @@ static void values_are_the_nearest_of_1024(void **state)
     }
 }
 
-/* 1300 values of a type that has 65536 all have means of their own, within the half of a step that
- * rounding takes, and so that the ends are exact. */
-static void steps_are_of_the_range_of_values(void **state)
+/* The means cover the 1300 values present, not the 65536 values of the type. Errors are at most
+ * half a step, and both ends are exact. */
+static void steps_cover_the_range_of_values(void **state)
 {
     (void)state;
     const trip_mean_scale scale = trip_mean_scale_make(100, 1400, 0, 65535);
@@ -65,16 +65,16 @@ static void steps_are_of_the_range_of_values(void **state)
         if (value == 100 || value == 1400)
             assert_int_equal(back, value);
     }
-    /* Values beyond the codes are stored as the nearest code. */
+    /* Values beyond the range of codes get the nearest code. */
     const trip_mean_scale cut = trip_mean_scale_make(-10, 20, 0, 10);
     assert_true(cut.lo == 0 && cut.width == 65535);
     const trip_mean_scale one = trip_mean_scale_make(5, 5, 0, 10);
     assert_int_equal(trip_mean_value(&one, trip_mean_pack(&one, 32768, 1, 1)), 32768);
 }
 
-/* Columns of the same depth side by side: what shows through is the mean of what each lets through.
- */
-static void opacity_is_the_mean_over_the_columns(void **state)
+/* Columns of the same depth stand side by side. The transmittance is the mean of the transmittances
+ * of all columns. */
+static void opacity_is_the_mean_over_columns(void **state)
 {
     (void)state;
     const double length = 1.5;
@@ -94,12 +94,12 @@ static void opacity_is_the_mean_over_the_columns(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_cube_that_is_full_keeps_its_extinction),
-        cmocka_unit_test(shares_of_two_by_two_by_two_are_exact),
-        cmocka_unit_test(covers_and_depths_are_the_nearest_that_there_are),
-        cmocka_unit_test(values_are_the_nearest_of_1024),
-        cmocka_unit_test(steps_are_of_the_range_of_values),
-        cmocka_unit_test(opacity_is_the_mean_over_the_columns),
+        cmocka_unit_test(a_full_cube_keeps_its_extinction),
+        cmocka_unit_test(shares_of_two_voxels_along_each_axis_are_exact),
+        cmocka_unit_test(covers_and_depths_are_the_nearest_available),
+        cmocka_unit_test(values_are_the_nearest_of_1024_steps),
+        cmocka_unit_test(steps_cover_the_range_of_values),
+        cmocka_unit_test(opacity_is_the_mean_over_columns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

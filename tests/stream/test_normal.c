@@ -22,14 +22,14 @@ static double random_coordinate(uint64_t *state)
     return (double)(fixture_random(state) >> 11) * 0x1p-52 - 1;
 }
 
-/* Any of all directions, those along axes and diagonals first. */
+/* Returns direction i. The first directions are along axes and diagonals, all others are random. */
 static void direction_of(int i, uint64_t *random, double a[3])
 {
     for (int k = 0; k < 3; k++)
         a[k] = i < 27 ? (int[]){ i, i / 3, i / 9 }[k] % 3 - 1 : random_coordinate(random);
 }
 
-static void directions_come_back_within_six_hundredths_of_a_degree(void **state)
+static void directions_are_exact_within_six_hundredths_of_a_degree(void **state)
 {
     uint64_t random = 1;
     double worst = 0, worst_alone = 0;
@@ -48,9 +48,9 @@ static void directions_come_back_within_six_hundredths_of_a_degree(void **state)
     assert_true(worst < 0.06 && worst_alone < 0.004);
 }
 
-/* No point is further from a body-centred cubic lattice than sqrt(5) / 4 of its cubes' edge; from
- * one of corners alone some are half of sqrt(3) away. */
-static void weak_gradients_come_back_within_the_lattice_of_cubes_and_centres(void **state)
+/* No point is further from a body-centred cubic lattice than sqrt(5) / 4 of the edge. From a simple
+ * cubic lattice, some points are sqrt(3) / 2 of the edge away. */
+static void weak_gradients_are_exact_within_a_body_centred_lattice(void **state)
 {
     uint64_t random = 5;
     double worst = 0;
@@ -68,8 +68,9 @@ static void weak_gradients_come_back_within_the_lattice_of_cubes_and_centres(voi
     assert_true(worst <= sqrt(5) / 4 + 1e-9 && worst > 0.54);
 }
 
-/* The root of the length is rounded to steps of 1/32: off by half a step at most. */
-static void long_gradients_come_back_within_half_a_step_of_their_root(void **state)
+/* The square root of the length is rounded to steps of 1/32, so the error is at most half a step.
+ */
+static void long_gradients_are_exact_within_half_a_step_of_the_root(void **state)
 {
     (void)state;
     for (double m = 2; m <= 49; m += 0.001) {
@@ -80,7 +81,7 @@ static void long_gradients_come_back_within_half_a_step_of_their_root(void **sta
     }
 }
 
-static void what_has_no_direction_is_zero(void **state)
+static void gradients_without_direction_are_zero(void **state)
 {
     const double none[][3] = { { 0, 0, 0 }, { NAN, 1, 0 }, { INFINITY, 0, 0 }, { 1e-9, 0, 0 } };
     double b[3];
@@ -94,7 +95,7 @@ static void what_has_no_direction_is_zero(void **state)
     assert_true(b[0] == 0 && b[1] == 0 && b[2] == 0);
 }
 
-static void the_longest_gradients_are_cut(void **state)
+static void the_longest_gradients_are_clamped(void **state)
 {
     double b[3], max = 3 * (1 + 127.0 / 32) * (1 + 127.0 / 32);
     (void)state;
@@ -111,14 +112,14 @@ static trip_affine stretched(double x, double y, double z)
     return m;
 }
 
-/* The sign of the whole is not kept. */
+/* Compares two gradients up to their sign, which normals do not store. */
 static bool is_same_or_opposite(const double a[3], const double b[3])
 {
     return (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) ||
            (a[0] == -b[0] && a[1] == -b[1] && a[2] == -b[2]);
 }
 
-/* Voxels of 1 x 2 x 4: all factors are powers of two, so that equality is exact. */
+/* The voxels have 1 x 2 x 4. All factors are powers of two, so equality is exact. */
 static void central_differences_of_bytes_are_exact_below_full(void **state)
 {
     (void)state;
@@ -127,7 +128,7 @@ static void central_differences_of_bytes_are_exact_below_full(void **state)
     double step[3];
     unsigned weak = 0;
     assert_true(trip_compact_normals_choose(&m, full, 0.5, step));
-    /* As fine as 127 of them reach. */
+    /* 127 steps cover the range, and 127 half steps do not. */
     for (int a = 0; a < 3; a++)
         assert_true(step[a] * 127 >= full * (1 << a) && step[a] / 2 * 127 < full * (1 << a));
     trip_compact_normals c = trip_compact_normals_make(&m, full, step);
@@ -145,8 +146,8 @@ static void central_differences_of_bytes_are_exact_below_full(void **state)
     assert_true(weak > 30000);
 }
 
-/* Factors of 1 and 8: the eighth as fine steps as along the other axes do not reach far enough. */
-static void gradients_are_exact_only_where_they_are_along_each_axis(void **state)
+/* The factors are 1 and 8. Eight times finer steps along one axis do not cover its range. */
+static void gradients_are_exact_only_if_every_axis_is(void **state)
 {
     (void)state;
     double step[3];
@@ -157,8 +158,8 @@ static void gradients_are_exact_only_where_they_are_along_each_axis(void **state
     }
 }
 
-/* To 127 of them, of gradients that are below full. */
-static void parts_are_cut_where_steps_do_not_reach(void **state)
+/* Components of gradients below full are limited to 127 steps. */
+static void components_beyond_the_steps_are_clamped(void **state)
 {
     (void)state;
     const trip_affine m = trip_affine_identity();
@@ -174,7 +175,7 @@ static void parts_are_cut_where_steps_do_not_reach(void **state)
     }
 }
 
-static void other_weak_gradients_come_back_within_half_a_step(void **state)
+static void other_weak_gradients_are_exact_within_half_a_step(void **state)
 {
     uint64_t random = 7;
     (void)state;
@@ -202,7 +203,7 @@ static void other_weak_gradients_come_back_within_half_a_step(void **state)
     }
 }
 
-static void strong_gradients_keep_their_direction_within_a_tenth_of_a_degree(void **state)
+static void strong_gradients_keep_direction_within_a_tenth_of_a_degree(void **state)
 {
     uint64_t random = 1;
     double worst = 0;
@@ -224,7 +225,7 @@ static void strong_gradients_keep_their_direction_within_a_tenth_of_a_degree(voi
     assert_true(worst < 0.1);
 }
 
-static void compact_normals_of_what_is_not_finite_are_zero(void **state)
+static void compact_normals_of_non_finite_gradients_are_zero(void **state)
 {
     const double none[][3] = { { NAN, 1, 0 }, { 0, INFINITY, 0 }, { 0, 0, 0 } };
     double b[3];
@@ -237,7 +238,7 @@ static void compact_normals_of_what_is_not_finite_are_zero(void **state)
     assert_true(b[0] == 0 && b[1] == 0 && b[2] == 0);
 }
 
-static void morton_codes_interleave_all_bits_and_give_them_back(void **state)
+static void morton_codes_interleave_all_bits_reversibly(void **state)
 {
     uint64_t random = 3;
     (void)state;
@@ -257,18 +258,18 @@ static void morton_codes_interleave_all_bits_and_give_them_back(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(directions_come_back_within_six_hundredths_of_a_degree),
-        cmocka_unit_test(weak_gradients_come_back_within_the_lattice_of_cubes_and_centres),
-        cmocka_unit_test(long_gradients_come_back_within_half_a_step_of_their_root),
-        cmocka_unit_test(what_has_no_direction_is_zero),
-        cmocka_unit_test(the_longest_gradients_are_cut),
+        cmocka_unit_test(directions_are_exact_within_six_hundredths_of_a_degree),
+        cmocka_unit_test(weak_gradients_are_exact_within_a_body_centred_lattice),
+        cmocka_unit_test(long_gradients_are_exact_within_half_a_step_of_the_root),
+        cmocka_unit_test(gradients_without_direction_are_zero),
+        cmocka_unit_test(the_longest_gradients_are_clamped),
         cmocka_unit_test(central_differences_of_bytes_are_exact_below_full),
-        cmocka_unit_test(gradients_are_exact_only_where_they_are_along_each_axis),
-        cmocka_unit_test(parts_are_cut_where_steps_do_not_reach),
-        cmocka_unit_test(other_weak_gradients_come_back_within_half_a_step),
-        cmocka_unit_test(strong_gradients_keep_their_direction_within_a_tenth_of_a_degree),
-        cmocka_unit_test(compact_normals_of_what_is_not_finite_are_zero),
-        cmocka_unit_test(morton_codes_interleave_all_bits_and_give_them_back),
+        cmocka_unit_test(gradients_are_exact_only_if_every_axis_is),
+        cmocka_unit_test(components_beyond_the_steps_are_clamped),
+        cmocka_unit_test(other_weak_gradients_are_exact_within_half_a_step),
+        cmocka_unit_test(strong_gradients_keep_direction_within_a_tenth_of_a_degree),
+        cmocka_unit_test(compact_normals_of_non_finite_gradients_are_zero),
+        cmocka_unit_test(morton_codes_interleave_all_bits_reversibly),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

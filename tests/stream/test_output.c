@@ -1,5 +1,5 @@
-/* Unnamed files: none stands on the disk before the buffer is full, and what is read back is the
- * same before and after. Several outputs of a folder overflow at once. */
+/* Tests of unnamed output files. The file appears on the disk only when the buffer is full. Reads
+ * return the same bytes before and after. Several outputs of a folder may overflow at once. */
 #include "fixture.h"
 
 #include <errno.h>
@@ -41,7 +41,7 @@ static int begin(void **state)
     return 0;
 }
 
-/* Whatever was written, the folder is empty, or gone. */
+/* Checks that the folder is empty or gone. */
 static int finish(void **state)
 {
     output_test *t = *state;
@@ -52,7 +52,7 @@ static int finish(void **state)
     return removed ? 0 : -1;
 }
 
-/* Byte i of what all outputs are filled with. */
+/* Returns byte i of the pattern that fills all outputs. */
 static unsigned char pattern(size_t i)
 {
     return (unsigned char)(i * 7 + i / 251);
@@ -82,7 +82,7 @@ static bool holds(const trip_output *o, size_t at, size_t bytes)
     return same;
 }
 
-static void what_the_buffer_holds_is_no_file(void **state)
+static void buffered_data_needs_no_file(void **state)
 {
     trip_output *o = &((output_test *)*state)->output;
     assert_int_equal(append(o, BUFFER_BYTES - 1), 0);
@@ -92,7 +92,7 @@ static void what_the_buffer_holds_is_no_file(void **state)
     assert_true(holds(o, 1000, 3095));
 }
 
-static void more_goes_to_a_file_and_reads_the_same(void **state)
+static void overflowing_data_goes_to_a_file_and_reads_the_same(void **state)
 {
     trip_output *o = &((output_test *)*state)->output;
     assert_int_equal(append(o, BUFFER_BYTES - 1), 0);
@@ -105,7 +105,7 @@ static void more_goes_to_a_file_and_reads_the_same(void **state)
     assert_true(holds(o, BUFFER_BYTES - 5, 10));
 }
 
-static void what_was_not_written_cannot_be_read(void **state)
+static void bytes_never_written_cannot_be_read(void **state)
 {
     trip_output *o = &((output_test *)*state)->output;
     unsigned char read[2];
@@ -114,7 +114,7 @@ static void what_was_not_written_cannot_be_read(void **state)
     assert_true(trip_output_read(o, UINT64_MAX, read, 2) < 0);
 }
 
-static void a_folder_that_is_gone_is_a_failure(void **state)
+static void a_missing_folder_is_a_failure(void **state)
 {
     output_test *t = *state;
     assert_int_equal(rmdir(t->folder), 0);
@@ -157,10 +157,10 @@ static void outputs_of_a_folder_may_overflow_at_once(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(what_the_buffer_holds_is_no_file),
-        TEST(more_goes_to_a_file_and_reads_the_same),
-        TEST(what_was_not_written_cannot_be_read),
-        TEST(a_folder_that_is_gone_is_a_failure),
+        TEST(buffered_data_needs_no_file),
+        TEST(overflowing_data_goes_to_a_file_and_reads_the_same),
+        TEST(bytes_never_written_cannot_be_read),
+        TEST(a_missing_folder_is_a_failure),
         TEST(outputs_of_a_folder_may_overflow_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

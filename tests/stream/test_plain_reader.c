@@ -1,4 +1,5 @@
-/* The plain second reader, written from FORMAT.md alone, sees in a data set what was written. */
+/* Compares the data set with the output of plain_reader.py, a second reader written from FORMAT.md
+ * alone. */
 #include "fixture.h"
 
 #include <stdio.h>
@@ -43,7 +44,7 @@ static void check_line(const char *line, int axis, const fixture_voxel *x,
         assert_true(fabs(g[i] - wanted[i]) < 1e-7);
 }
 
-/* False when the modules that the reader needs are missing. */
+/* Returns false if Python modules of the reader are missing. */
 static bool check_output(const fixture *f)
 {
     char line[256];
@@ -62,7 +63,7 @@ static bool check_output(const fixture *f)
     return true;
 }
 
-static void the_plain_reader_sees_what_was_written(void **state)
+static void the_plain_reader_reads_the_written_data(void **state)
 {
     const double x[3] = { 0, 0.5, 2 }, y[2] = { 0, 1 }, z[9] = { 0, 1.5, 2, 2.25, 3, 4, 5, 6, 8 };
     const trip_coordinates uneven =
@@ -87,7 +88,7 @@ static void the_plain_reader_sees_what_was_written(void **state)
         skip();
 }
 
-static void the_plain_reader_notices_a_changed_byte(void **state)
+static void the_plain_reader_detects_a_changed_byte(void **state)
 {
     static const char *const files[] = { "index.trip", "y0.voxels", "z0.normals" };
     fixture f;
@@ -115,8 +116,8 @@ static void the_plain_reader_notices_a_changed_byte(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_plain_reader_sees_what_was_written),
-        cmocka_unit_test(the_plain_reader_notices_a_changed_byte),
+        cmocka_unit_test(the_plain_reader_reads_the_written_data),
+        cmocka_unit_test(the_plain_reader_detects_a_changed_byte),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

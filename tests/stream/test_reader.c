@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Index of the brick that holds a voxel, found by trying all of the list. */
+/* Returns the index of the brick that holds a voxel, found by trying all bricks of the list. */
 static uint64_t brick_of(const trip_dataset *d, int axis, const fixture_voxel *x)
 {
     const trip_list *l = &d->lists[axis];
@@ -30,7 +30,7 @@ static uint64_t brick_of(const trip_dataset *d, int axis, const fixture_voxel *x
     return 0;
 }
 
-/* The voxels of a selection in draw order, without the code under test. */
+/* Lists the voxels of a selection in draw order, without the code under test. */
 static size_t expect(const fixture *f, const trip_selection *s, fixture_voxel *out)
 {
     size_t n = 0;
@@ -65,8 +65,8 @@ static size_t decode(const trip_batch *batch, fixture_voxel *out)
     return n;
 }
 
-/* Passes one behind the other; batches are held for a while, up to one less than there are slots.
- */
+/* Reads the same pass several times in a row. Keeps up to `hold` batches before it releases them,
+ * fewer than there are slots. */
 static int read_passes(trip_reader *r, const trip_selection *s, int passes, unsigned hold,
                        fixture_voxel *out, size_t *count)
 {
@@ -114,7 +114,7 @@ static void select_some(trip_selection *s, const trip_dataset *d, uint64_t *stat
             trip_selection_add(s, b);
 }
 
-/* Random delays, short reads, interruptions and calls to try again, on any engine. */
+/* Disturbs reads of any engine with random delays, short reads, EINTR and EAGAIN. */
 static long disturb(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
     _Atomic uint64_t *counter = user;
@@ -176,7 +176,7 @@ static bool uring_works(const trip_dataset *d)
     return status == TRIP_OK;
 }
 
-/* A data set on a real disk, so that direct reads are part of it. */
+/* Makes and opens a data set on a real disk, which allows direct reads. */
 static void open_fixture(fixture *f, trip_dataset **d)
 {
     fixture_make(f, &(fixture_params){ .dims = { 90, 70, 80 },
@@ -193,8 +193,8 @@ static void close_fixture(fixture *f, trip_dataset *d)
     fixture_free(f);
 }
 
-/* Where bricks are left out, the gap may be read through in one plane and not in another, so that
- * pieces of a file share a page. */
+/* At a skipped brick, the reader may read through the gap in one plane but not in another.
+ * Two pieces of a file may then share a page. */
 static void gaps_may_be_small_in_one_plane_and_large_in_another(void **state)
 {
     fixture f;
@@ -230,7 +230,7 @@ static void gaps_may_be_small_in_one_plane_and_large_in_another(void **state)
     close_fixture(&f, d);
 }
 
-static void every_engine_and_ring_hands_out_the_same_runs(void **state)
+static void every_engine_and_ring_returns_the_same_runs(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -265,7 +265,7 @@ static void select_all(trip_selection *s, const trip_dataset *d, int axis, bool 
         trip_selection_add(s, b);
 }
 
-static void the_callers_own_memory_is_read_into(void **state)
+static void the_reader_reads_into_memory_of_the_caller(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -301,7 +301,7 @@ static void the_callers_own_memory_is_read_into(void **state)
     close_fixture(&f, d);
 }
 
-static void memory_that_reads_do_not_land_in_is_found_out(void **state)
+static void the_probe_finds_memory_that_reads_do_not_reach(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -321,13 +321,14 @@ static void memory_that_reads_do_not_land_in_is_found_out(void **state)
     }
     fixture_run_command("printf x | dd of=%s/x0.voxels bs=1 seek=99 conv=notrunc 2>/dev/null",
                         f.path);
-    assert_false(trip_reader_probe(d, TRIP_ENGINE_PREAD, memory)); /* what lands is not the page */
+    /* The read does not return the page. */
+    assert_false(trip_reader_probe(d, TRIP_ENGINE_PREAD, memory));
     assert_string_equal(fixture_reports(), "");
     munmap(memory, 4096);
     close_fixture(&f, d);
 }
 
-/* Counts its calls, and skips no brick. */
+/* Counts the calls and skips no brick. */
 static bool count_calls(void *user, const trip_selection *s, const trip_run *run)
 {
     (void)s;
@@ -336,7 +337,7 @@ static bool count_calls(void *user, const trip_selection *s, const trip_run *run
     return false;
 }
 
-static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
+static void a_data_set_in_memory_is_returned_in_place(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -359,8 +360,8 @@ static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
     assert_int_equal(trip_reader_next(r, &batch), 1);
     unsigned first = calls;
     assert_int_equal(trip_reader_next(r, &next), 1);
-    assert_true(calls > first);               /* only now: by then more may be occluded */
-    for (int plane = 0; plane < 2; plane++) { /* they may share a page */
+    assert_true(calls > first); /* the reader asks late, when more bricks may be occluded */
+    for (int plane = 0; plane < 2; plane++) { /* two batches may share a page */
         size_t bytes = (size_t)(next.planes[plane] - batch.planes[plane]);
         assert_true(bytes > 0 && bytes <= batch.plane_bytes[plane]);
     }
@@ -377,7 +378,7 @@ static void a_data_set_in_memory_is_handed_out_where_it_lies(void **state)
     close_fixture(&f, d);
 }
 
-/* Posts the semaphore when a read has ended. */
+/* Posts the semaphore after each read. */
 static long post_read(void *user, void *data, uint64_t offset, size_t bytes, long result)
 {
     (void)data;
@@ -387,7 +388,7 @@ static long post_read(void *user, void *data, uint64_t offset, size_t bytes, lon
     return result;
 }
 
-static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
+static void a_pass_is_read_while_the_previous_pass_is_drawn(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -409,7 +410,7 @@ static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
     assert_int_equal(trip_reader_then(r, &passes[2]), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
     assert_ptr_equal(batch.pass, &passes[0]);
-    for (int i = 0; i < 3; i++) /* every list is one slot; the first one is still held */
+    for (int i = 0; i < 3; i++) /* every list fits a slot; the first slot is still held */
         sem_wait(&reads);
     trip_reader_release(r, &batch);
     bytes = d->lists[0].plane_bytes[0];
@@ -428,7 +429,7 @@ static void a_pass_is_read_while_the_one_before_it_is_drawn(void **state)
     close_fixture(&f, d);
 }
 
-static void with_runs_alone_nothing_is_read(void **state)
+static void runs_only_passes_read_nothing(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -454,7 +455,7 @@ static void with_runs_alone_nothing_is_read(void **state)
     while (trip_reader_next(r, &batch) == 1) {
         assert_null(batch.planes[0]);
         assert_null(batch.planes[1]);
-        for (size_t i = 0; i < batch.run_count; i++) { /* a list is one slot: runs are whole */
+        for (size_t i = 0; i < batch.run_count; i++) { /* a slot holds whole runs */
             assert_true(trip_run_next(&it, &run));
             assert_int_equal(batch.runs[i].brick, run.brick);
             assert_int_equal(batch.runs[i].sheet, run.sheet);
@@ -477,7 +478,7 @@ static void with_runs_alone_nothing_is_read(void **state)
     close_fixture(&f, d);
 }
 
-static void more_passes_than_there_is_room_for_are_refused(void **state)
+static void too_many_passes_are_refused(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -499,7 +500,7 @@ static void more_passes_than_there_is_room_for_are_refused(void **state)
     close_fixture(&f, d);
 }
 
-/* A fault at the n-th read of a pass. */
+/* A fault in the read of a pass that `countdown` reads precede. */
 typedef struct sabotage {
     _Atomic int countdown;
     enum { FAIL_EIO, FAIL_END, FAIL_BYTE, FAIL_EINVAL, FAIL_SHORT } kind;
@@ -544,14 +545,15 @@ static void check_sabotage(const fixture *f, const trip_dataset *d, trip_engine 
         fixture_catch_reports();
         int status = read_pass(r, &s, 1, out, &n);
         assert_int_equal(status, TRIP_ERROR);
-        assert_memory_equal(out, f->lists[2], n * sizeof *out); /* what came before is right */
+        /* The batches before the fault are correct. */
+        assert_memory_equal(out, f->lists[2], n * sizeof *out);
         trip_batch batch;
         assert_int_equal(trip_reader_next(r, &batch), TRIP_ERROR);
         const char *reports = fixture_reports();
         assert_non_null(strstr(reports, "/z0."));
         assert_non_null(strstr(reports, why));
         assert_int_equal(strchr(reports, '\n')[1], 0);
-        assert_int_equal(read_pass(r, &s, 0, out, &n_after), 0); /* the next pass is whole again */
+        assert_int_equal(read_pass(r, &s, 0, out, &n_after), 0); /* the next pass is complete */
         assert_int_equal(n_after, f->count);
         assert_memory_equal(out, f->lists[2], n_after * sizeof *out);
     }
@@ -560,7 +562,7 @@ static void check_sabotage(const fixture *f, const trip_dataset *d, trip_engine 
     free(out);
 }
 
-static void a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line(void **state)
+static void a_failed_read_ends_the_pass_with_one_line(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -585,7 +587,7 @@ static void run_backwards(void *user, void (*task)(void *context, unsigned numbe
         task(context, count);
 }
 
-/* What is reported of a pass that some bricks of the index do not agree with. */
+/* Stores the report of a pass in which blocks contradict some bricks of the index. */
 static void report_of_pass(const fixture *f, trip_dataset *d, trip_task_runner runner, char *report,
                            size_t room)
 {
@@ -605,8 +607,8 @@ static void report_of_pass(const fixture *f, trip_dataset *d, trip_task_runner r
     free(out);
 }
 
-/* The second and the last brick of list z have codes that they should not have. */
-static void of_blocks_at_fault_the_first_is_reported_whoever_checks_them(void **state)
+/* The second and the last brick of the Z list have codes outside their ranges. */
+static void the_first_faulty_block_is_reported_by_any_checker(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -628,8 +630,8 @@ static void of_blocks_at_fault_the_first_is_reported_whoever_checks_them(void **
     close_fixture(&f, d);
 }
 
-/* Of two pieces of a file in one slot the second has the fault. */
-static void the_place_of_a_block_at_fault_is_where_it_lies_in_its_file(void **state)
+/* A slot has two pieces of a file. The second piece has the fault. */
+static void a_report_gives_the_file_offset_of_a_faulty_block(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -662,7 +664,7 @@ static void the_place_of_a_block_at_fault_is_where_it_lies_in_its_file(void **st
     close_fixture(&f, d);
 }
 
-static void refused_direct_reads_go_on_through_the_page_cache(void **state)
+static void refused_direct_reads_continue_through_the_page_cache(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -691,8 +693,8 @@ static void refused_direct_reads_go_on_through_the_page_cache(void **state)
     close_fixture(&f, d);
 }
 
-/* What is left of the read begins in mid sector, where direct reads would be refused. */
-static void a_direct_read_that_is_cut_short_is_no_reason_to_have_none(void **state)
+/* The rest of a short read begins inside a sector, where the system refuses direct reads. */
+static void a_short_direct_read_does_not_disable_direct_reads(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -727,7 +729,7 @@ static uint64_t read_bytes(trip_reader *r, const trip_selection *s, fixture_voxe
     return trip_reader_get_stats(r).bytes_read;
 }
 
-static void a_second_pass_reads_only_what_the_cache_has_no_room_for(void **state)
+static void a_second_pass_reads_only_uncached_pages(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -745,7 +747,7 @@ static void a_second_pass_reads_only_what_the_cache_has_no_room_for(void **state
         for (int again = 0; again < 10; again++) {
             uint64_t left = cached >= pages ? 0 : whole - cached * 4096;
             uint64_t bytes = read_bytes(r, &s, out);
-            /* The short last page may be among those kept. */
+            /* The cache may hold the short last page. */
             assert_in_range(bytes, left, left ? left + 4096 : 0);
             assert_int_equal(trip_reader_get_stats(r).bytes_cached, whole - bytes);
         }
@@ -756,7 +758,7 @@ static void a_second_pass_reads_only_what_the_cache_has_no_room_for(void **state
     close_fixture(&f, d);
 }
 
-static void a_cache_follows_when_other_lists_are_read(void **state)
+static void a_cache_adapts_when_other_lists_are_read(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -781,7 +783,8 @@ static void a_cache_follows_when_other_lists_are_read(void **state)
     close_fixture(&f, d);
 }
 
-/* Either reads take long, or planning does, so that what is planned is stored before the next. */
+/* Delays of a read and of a planning step. With slow planning, each read ends before the next plan.
+ */
 typedef struct pace {
     unsigned read_us, plan_us;
 } pace;
@@ -803,7 +806,8 @@ static bool pace_plan(void *user, const trip_selection *s, const trip_run *run)
     return false;
 }
 
-/* Frames of two passes on either side of a sheet, which share the pages there. */
+/* Reads frames of two passes, one on each side of a sheet. Both passes share the pages at the
+ * border. */
 static void count_frames(const fixture *f, const trip_dataset *d, pace *speed, size_t cache_bytes,
                          trip_reader_stats stats[4])
 {
@@ -812,7 +816,7 @@ static void count_frames(const fixture *f, const trip_dataset *d, pace *speed, s
     fixture_voxel *out = calloc(f->count, sizeof *out);
     size_t n;
     trip_reader_params params = { .slots = 3,
-                                  .slot_bytes = 1, /* the least */
+                                  .slot_bytes = 1, /* rounds up to the minimum */
                                   .planes = 3,
                                   .cache_bytes = cache_bytes,
                                   .skip = pace_plan,
@@ -839,7 +843,7 @@ static void count_frames(const fixture *f, const trip_dataset *d, pace *speed, s
     free(out);
 }
 
-static void counts_of_bytes_do_not_depend_on_how_long_reads_take(void **state)
+static void byte_counts_do_not_depend_on_read_times(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -848,7 +852,7 @@ static void counts_of_bytes_do_not_depend_on_how_long_reads_take(void **state)
     (void)state;
     open_fixture(&f, &d);
     for (int i = 0; i < 2; i++) {
-        size_t cache_bytes = i ? 8 << 20 : 100000; /* room for all; for some of one list */
+        size_t cache_bytes = i ? 8 << 20 : 100000; /* holds both lists, or part of one list */
         count_frames(&f, d, &slow_reads, cache_bytes, a);
         count_frames(&f, d, &slow_plans, cache_bytes, b);
         for (int frame = 0; frame < 4; frame++) {
@@ -861,7 +865,7 @@ static void counts_of_bytes_do_not_depend_on_how_long_reads_take(void **state)
     close_fixture(&f, d);
 }
 
-/* How often each page of a file was read. */
+/* Counts the reads of each page of a file. */
 typedef struct page_counts {
     _Atomic unsigned times[4096];
 } page_counts;
@@ -882,7 +886,7 @@ static void check_pages_once(const fixture *f, const trip_dataset *d, unsigned s
     fixture_voxel *out = calloc(f->count, sizeof *out), *wanted = calloc(f->count, sizeof *out);
     size_t n;
     trip_reader_params params = { .slots = slots,
-                                  .slot_bytes = 1, /* the least */
+                                  .slot_bytes = 1, /* rounds up to the minimum */
                                   .gap_bytes = 4096,
                                   .fault = count_pages,
                                   .fault_user = &counts };
@@ -914,7 +918,7 @@ static void pages_at_the_borders_of_slots_are_read_once(void **state)
     fixture_voxel *out = calloc(f.count, sizeof *out);
     for (unsigned slots = 2; slots <= 8; slots += 3)
         check_pages_once(&f, d, slots);
-    for (int i = 0; i < 6; i++) { /* both planes, in every direction */
+    for (int i = 0; i < 6; i++) { /* both planes of all lists, in both directions */
         trip_reader *r;
         trip_selection s;
         trip_reader_params params = { .slots = 3, .slot_bytes = 1, .planes = 3 };
@@ -972,7 +976,7 @@ static void skipped_bricks_are_left_out_and_counted(void **state)
     close_fixture(&f, d);
 }
 
-static void gaps_are_read_through_only_when_they_are_small(void **state)
+static void only_small_gaps_are_read_through(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -993,7 +997,7 @@ static void gaps_are_read_through_only_when_they_are_small(void **state)
         trip_selection_destroy(&s, f.budget);
         trip_reader_destroy(r);
     }
-    /* Two bricks of some kilobytes at either end of the list. */
+    /* The two bricks at the ends of the list have a few kilobytes each. */
     uint64_t whole = d->lists[0].plane_bytes[0];
     assert_true(bytes[0] < whole / 4);
     assert_int_equal(bytes[1], whole);
@@ -1001,7 +1005,7 @@ static void gaps_are_read_through_only_when_they_are_small(void **state)
     close_fixture(&f, d);
 }
 
-static void a_pass_given_up_leaves_the_reader_ready_for_the_next(void **state)
+static void an_abandoned_pass_leaves_the_reader_ready(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -1027,20 +1031,18 @@ static void a_pass_given_up_leaves_the_reader_ready_for_the_next(void **state)
     assert_int_equal(n, f.count);
     assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
     trip_selection_destroy(&s, f.budget);
-    trip_reader_destroy(r); /* with reads under way */
+    trip_reader_destroy(r); /* reads still run */
     free(out);
     close_fixture(&f, d);
 }
 
-/* Reads wait at a gate. One that is left closed opens by itself after GATE_SECONDS, and then has
- * failed. */
+/* A gate at which reads wait. After GATE_SECONDS it opens by itself and has failed. */
 typedef struct gate {
     pthread_mutex_t lock;
     pthread_cond_t changed;
     unsigned waiting, times_opened;
     bool open, failed;
-    int kind; /* what comes of reads that have waited: 0 what was read, else -kind, or a bit flipped
-               */
+    int kind; /* outcome of reads that waited: 0, FLIP_A_BIT or an errno value */
 } gate;
 
 enum { GATE_SECONDS = 20, FLIP_A_BIT = -1 };
@@ -1081,7 +1083,7 @@ static void close_gate(gate *g, int kind)
     pthread_mutex_unlock(&g->lock);
 }
 
-/* Until a read waits there. */
+/* Waits until a read waits at the gate. */
 static void meet_at_gate(gate *g)
 {
     pthread_mutex_lock(&g->lock);
@@ -1090,7 +1092,7 @@ static void meet_at_gate(gate *g)
     pthread_mutex_unlock(&g->lock);
 }
 
-/* Nothing went through; reads that come from here on are unharmed. */
+/* Checks that no read passed the gate. Reads that arrive from here on have no fault. */
 static void assert_closed(gate *g)
 {
     pthread_mutex_lock(&g->lock);
@@ -1111,8 +1113,8 @@ static void *open_later(void *user)
     return NULL;
 }
 
-/* Passes are given up in the middle of their reads; one that is read to its end begins while these
- * go on. */
+/* Abandons two passes during their reads. Then reads a third pass to its end while the reads of the
+ * first two still run. */
 static void give_up_and_read(trip_reader *r, gate *g, const trip_selection *s, int kind,
                              const fixture *f, fixture_voxel *out)
 {
@@ -1125,7 +1127,7 @@ static void give_up_and_read(trip_reader *r, gate *g, const trip_selection *s, i
     assert_int_equal(trip_reader_begin(r, &other), TRIP_OK);
     assert_false(trip_reader_await(r, 0));
     assert_int_equal(trip_reader_begin(r, NULL), TRIP_OK);
-    assert_true(trip_reader_await(r, 0)); /* there is nothing to wait for */
+    assert_true(trip_reader_await(r, 0)); /* no pass is left to wait for */
     assert_closed(g);
     assert_int_equal(pthread_create(&opener, NULL, open_later, g), 0);
     assert_int_equal(read_pass(r, s, 1, out, &n), 0);
@@ -1150,7 +1152,7 @@ static void check_giving_up(const fixture *f, const trip_dataset *d, trip_reader
         select_all(&s[axis], d, axis, false);
     fixture_catch_reports();
     assert_int_equal(trip_reader_create(&r, d, &params, f->budget), TRIP_OK);
-    for (int first = 0; first < 2; first++) /* a list of which nothing is cached */
+    for (int first = 0; first < 2; first++) /* a list with no page in the cache */
         give_up_and_read(r, &g, &s[first], kind, f, out);
     assert_string_equal(fixture_reports(), "");
     const trip_pass pass = trip_pass_of(&s[2]);
@@ -1158,7 +1160,7 @@ static void check_giving_up(const fixture *f, const trip_dataset *d, trip_reader
     assert_int_equal(trip_reader_begin(r, &pass), TRIP_OK);
     meet_at_gate(&g);
     assert_int_equal(pthread_create(&opener, NULL, open_later, &g), 0);
-    trip_reader_destroy(r); /* waits for what is read into its memory */
+    trip_reader_destroy(r); /* waits for the reads into its memory */
     pthread_join(opener, NULL);
     assert_false(g.failed);
     for (int axis = 0; axis < 3; axis++)
@@ -1166,7 +1168,7 @@ static void check_giving_up(const fixture *f, const trip_dataset *d, trip_reader
     free(out);
 }
 
-/* The caller's memory is read into until the reader is destroyed, and no longer. */
+/* The reader must not write to the caller's memory once it is destroyed. */
 static void check_giving_up_in_place(const fixture *f, const trip_dataset *d, trip_engine engine)
 {
     void *memory[4];
@@ -1181,7 +1183,7 @@ static void check_giving_up_in_place(const fixture *f, const trip_dataset *d, tr
         free(memory[i]);
 }
 
-static void giving_up_waits_for_no_read(void **state)
+static void abandoning_a_pass_waits_for_no_read(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -1192,7 +1194,7 @@ static void giving_up_waits_for_no_read(void **state)
     for (int i = 0; i < 18; i++) {
         trip_reader_params params = { .engine = i % 2 ? TRIP_ENGINE_PREAD : TRIP_ENGINE_URING,
                                       .slots = i % 3 ? 3 : 8,
-                                      .slot_bytes = 1, /* the least */
+                                      .slot_bytes = 1, /* rounds up to the minimum */
                                       .cache_bytes = i / 2 % 3 == 0   ? 0
                                                      : i / 2 % 3 == 1 ? 300000
                                                                       : 8 << 20 };
@@ -1205,7 +1207,7 @@ static void giving_up_waits_for_no_read(void **state)
     close_fixture(&f, d);
 }
 
-/* Passes given up at random, some of which are read to the end and compared. */
+/* Abandons passes at random. Reads every seventh pass to its end and compares it. */
 static void check_random_giving_up(const fixture *f, const trip_dataset *d,
                                    const trip_reader_params *params)
 {
@@ -1238,7 +1240,7 @@ static void check_random_giving_up(const fixture *f, const trip_dataset *d,
     free(got);
 }
 
-static void passes_given_up_at_random_leave_those_after_them_whole(void **state)
+static void passes_after_abandoned_passes_are_complete(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -1250,7 +1252,7 @@ static void passes_given_up_at_random_leave_those_after_them_whole(void **state)
         trip_reader_params params = { .engine = i % 2 ? TRIP_ENGINE_PREAD : TRIP_ENGINE_URING,
                                       .planes = 3,
                                       .slots = i % 3 ? 8 : 2,
-                                      .slot_bytes = 1, /* the least */
+                                      .slot_bytes = 1, /* rounds up to the minimum */
                                       .cache_bytes = i / 2 ? (size_t)100000 << i : 0,
                                       .fault = disturb,
                                       .fault_user = &counter };
@@ -1260,7 +1262,7 @@ static void passes_given_up_at_random_leave_those_after_them_whole(void **state)
     close_fixture(&f, d);
 }
 
-static void holding_every_slot_is_an_error_and_not_a_hang(void **state)
+static void holding_every_slot_is_an_error(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -1311,11 +1313,11 @@ static void parameters_out_of_range_are_refused(void **state)
     close_fixture(&f, d);
 }
 
-/* From here on the kernel refuses to set up rings, as containers' filters do. */
+/* Makes the kernel refuse io_uring from here on, as filters of containers do. */
 static void refuse_uring(void)
 {
     struct sock_filter code[] = {
-        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, 0 /* number of the call */),
+        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, 0 /* number of the system call */),
         BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_io_uring_setup, 0, 1),
         BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM),
         BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
@@ -1344,7 +1346,7 @@ static int read_without_uring(const fixture *f, const trip_dataset *d)
     return status;
 }
 
-static void where_io_uring_is_refused_threads_read(void **state)
+static void threads_read_if_io_uring_is_refused(void **state)
 {
     fixture f;
     trip_dataset *d;
@@ -1366,31 +1368,31 @@ static void where_io_uring_is_refused_threads_read(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_engine_and_ring_hands_out_the_same_runs),
+        cmocka_unit_test(every_engine_and_ring_returns_the_same_runs),
         cmocka_unit_test(gaps_may_be_small_in_one_plane_and_large_in_another),
-        cmocka_unit_test(the_callers_own_memory_is_read_into),
-        cmocka_unit_test(memory_that_reads_do_not_land_in_is_found_out),
-        cmocka_unit_test(a_pass_is_read_while_the_one_before_it_is_drawn),
-        cmocka_unit_test(with_runs_alone_nothing_is_read),
-        cmocka_unit_test(more_passes_than_there_is_room_for_are_refused),
-        cmocka_unit_test(a_read_that_fails_in_mid_pass_ends_the_pass_with_one_line),
-        cmocka_unit_test(of_blocks_at_fault_the_first_is_reported_whoever_checks_them),
-        cmocka_unit_test(the_place_of_a_block_at_fault_is_where_it_lies_in_its_file),
-        cmocka_unit_test(refused_direct_reads_go_on_through_the_page_cache),
-        cmocka_unit_test(a_direct_read_that_is_cut_short_is_no_reason_to_have_none),
-        cmocka_unit_test(a_second_pass_reads_only_what_the_cache_has_no_room_for),
-        cmocka_unit_test(a_data_set_in_memory_is_handed_out_where_it_lies),
-        cmocka_unit_test(a_cache_follows_when_other_lists_are_read),
-        cmocka_unit_test(counts_of_bytes_do_not_depend_on_how_long_reads_take),
+        cmocka_unit_test(the_reader_reads_into_memory_of_the_caller),
+        cmocka_unit_test(the_probe_finds_memory_that_reads_do_not_reach),
+        cmocka_unit_test(a_pass_is_read_while_the_previous_pass_is_drawn),
+        cmocka_unit_test(runs_only_passes_read_nothing),
+        cmocka_unit_test(too_many_passes_are_refused),
+        cmocka_unit_test(a_failed_read_ends_the_pass_with_one_line),
+        cmocka_unit_test(the_first_faulty_block_is_reported_by_any_checker),
+        cmocka_unit_test(a_report_gives_the_file_offset_of_a_faulty_block),
+        cmocka_unit_test(refused_direct_reads_continue_through_the_page_cache),
+        cmocka_unit_test(a_short_direct_read_does_not_disable_direct_reads),
+        cmocka_unit_test(a_second_pass_reads_only_uncached_pages),
+        cmocka_unit_test(a_data_set_in_memory_is_returned_in_place),
+        cmocka_unit_test(a_cache_adapts_when_other_lists_are_read),
+        cmocka_unit_test(byte_counts_do_not_depend_on_read_times),
         cmocka_unit_test(pages_at_the_borders_of_slots_are_read_once),
         cmocka_unit_test(skipped_bricks_are_left_out_and_counted),
-        cmocka_unit_test(gaps_are_read_through_only_when_they_are_small),
-        cmocka_unit_test(a_pass_given_up_leaves_the_reader_ready_for_the_next),
-        cmocka_unit_test(giving_up_waits_for_no_read),
-        cmocka_unit_test(passes_given_up_at_random_leave_those_after_them_whole),
-        cmocka_unit_test(holding_every_slot_is_an_error_and_not_a_hang),
+        cmocka_unit_test(only_small_gaps_are_read_through),
+        cmocka_unit_test(an_abandoned_pass_leaves_the_reader_ready),
+        cmocka_unit_test(abandoning_a_pass_waits_for_no_read),
+        cmocka_unit_test(passes_after_abandoned_passes_are_complete),
+        cmocka_unit_test(holding_every_slot_is_an_error),
         cmocka_unit_test(parameters_out_of_range_are_refused),
-        cmocka_unit_test(where_io_uring_is_refused_threads_read),
+        cmocka_unit_test(threads_read_if_io_uring_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,13 @@
-/* Passes over several lists: runs come by list coordinate, whatever the lists' steps, and
- * descending exactly the other way round; what the reader hands out is that, with the lists' own
- * records. */
+/* Tests of passes over several lists. Runs come in order of list coordinate, whatever the steps of
+ * the lists, and in reverse order in a descending pass. The reader returns the same order with the
+ * records of each list. */
 #include "fixture.h"
 
 #include "selection.h"
 
 enum { RUNS_MAX = 4096 };
 
-/* Two data sets' lists along X as the lists of one: level 0, and level 1 of half the size. */
+/* Combines the X lists of two data sets as level 0 and level 1. Level 1 has half the size. */
 typedef struct two_levels {
     fixture f[2];
     trip_dataset *d[2];
@@ -81,7 +81,8 @@ static bool same_run(const trip_run *a, const trip_run *b)
            a->sheet == b->sheet && a->u == b->u && a->v == b->v;
 }
 
-/* Every selection's runs are those of its own iterator, all of them. */
+/* Checks that the runs of each selection equal the runs of an iterator over that selection alone.
+ */
 static void check_each(two_levels *t, const trip_run *runs, size_t count)
 {
     select_both(t, false);
@@ -106,12 +107,12 @@ static void check_order(const trip_run *runs, size_t count, double sheet_first)
         assert_true(at_a < at_b || (at_a == at_b && a->selection <= b->selection));
         changes += a->selection != b->selection;
     }
-    assert_true(changes > 20); /* the levels do interleave */
+    assert_true(changes > 20); /* the levels interleave */
 }
 
 static void levels_are_merged_by_list_coordinate(void **state)
 {
-    const double firsts[] = { 0.5, 0, 1, -7.25 }; /* between the sheets; upon them; half outside */
+    const double firsts[] = { 0.5, 0, 1, -7.25 }; /* between sheets, at sheets, and half outside */
     static trip_run up[RUNS_MAX], down[RUNS_MAX];
     (void)state;
     for (int i = 0; i < 4; i++) {
@@ -129,7 +130,8 @@ static void levels_are_merged_by_list_coordinate(void **state)
     }
 }
 
-/* Takes a batch's voxels from those that the levels have left, in draw order. */
+/* Compares the voxels of a batch with the next voxels of each level in draw order, and advances
+ * `taken`. */
 static void check_batch(const two_levels *t, const trip_batch *b, size_t taken[2])
 {
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
@@ -152,7 +154,7 @@ static void check_batch(const two_levels *t, const trip_batch *b, size_t taken[2
     }
 }
 
-/* The reader's runs, whole and in the iterator's order. */
+/* Checks that the reader returns complete runs in the order of the iterator. */
 static void check_reader(two_levels *t, const trip_reader_params *params, bool descending)
 {
     static trip_run runs[RUNS_MAX];
@@ -179,7 +181,7 @@ static void check_reader(two_levels *t, const trip_reader_params *params, bool d
     unselect(t);
 }
 
-static void a_reader_hands_out_merged_lists_in_order(void **state)
+static void a_reader_returns_merged_lists_in_order(void **state)
 {
     const trip_reader_params params[] = {
         { .planes = 3 },
@@ -218,7 +220,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(levels_are_merged_by_list_coordinate),
-        cmocka_unit_test(a_reader_hands_out_merged_lists_in_order),
+        cmocka_unit_test(a_reader_returns_merged_lists_in_order),
         cmocka_unit_test(more_selections_than_lists_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,7 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* Decodes a whole list through the iterator and a plain read of the plane files. */
+/* Decodes a whole list with the iterator and direct reads of the plane files. */
 static void read_list(const trip_dataset *d, int axis, bool descending, fixture_voxel *out,
                       size_t room)
 {
@@ -61,7 +61,7 @@ static void check_round_trip(const fixture_params *params)
     fixture_free(&f);
 }
 
-static void what_is_written_is_read_in_both_directions(void **state)
+static void written_lists_are_read_in_both_directions(void **state)
 {
     (void)state;
     check_round_trip(&(fixture_params){ .normals = true });
@@ -80,7 +80,7 @@ static void the_voxels_of_a_list_do_not_depend_on_tiles_slabs_or_pages(void **st
                                                 .page_bytes = 4096u << s });
 }
 
-/* 24 x 24 tiles of a sheet, each with a brick. */
+/* A sheet has 24 x 24 tiles, each with one brick. */
 static void a_slab_has_as_many_bricks_as_there_are_tiles(void **state)
 {
     (void)state;
@@ -88,7 +88,7 @@ static void a_slab_has_as_many_bricks_as_there_are_tiles(void **state)
         .dims = { 384, 384, 2 }, .density = 0.02, .tile_voxels = 16, .slab_sheets = 2 });
 }
 
-static void an_empty_and_a_full_volume_are_written(void **state)
+static void empty_and_full_volumes_are_written(void **state)
 {
     (void)state;
     check_round_trip(&(fixture_params){ .empty = true });
@@ -96,7 +96,7 @@ static void an_empty_and_a_full_volume_are_written(void **state)
     check_round_trip(&(fixture_params){ .density = 1.1, .dims = { 1, 1, 1 } });
 }
 
-/* A fixture in memory and a report catcher for what the writer refuses. */
+/* Makes a small fixture in memory. */
 static void make_small(fixture *f)
 {
     fixture_make(f, &(fixture_params){ .dims = { 20, 20, 20 }, .in_memory = true });
@@ -126,7 +126,7 @@ static bool is_there(const char *path)
     return lstat(path, &st) == 0;
 }
 
-static void an_existing_data_set_is_kept_unless_it_may_be_replaced(void **state)
+static void an_existing_data_set_is_kept_without_replace(void **state)
 {
     fixture f;
     char partial[128];
@@ -161,7 +161,7 @@ static void only_a_data_set_is_replaced(void **state)
     fixture_free(&f);
 }
 
-static void what_an_interrupted_run_left_is_removed(void **state)
+static void leftovers_of_an_interrupted_run_are_removed(void **state)
 {
     fixture f;
     char path[128];
@@ -179,7 +179,7 @@ static void what_an_interrupted_run_left_is_removed(void **state)
     fixture_free(&f);
 }
 
-static void a_replacement_cut_off_between_its_two_renames_is_undone(void **state)
+static void a_replacement_killed_between_its_renames_is_undone(void **state)
 {
     fixture f;
     (void)state;
@@ -190,8 +190,8 @@ static void a_replacement_cut_off_between_its_two_renames_is_undone(void **state
     fixture_free(&f);
 }
 
-/* As where two folders cannot be exchanged in one step. */
-static void what_a_replacement_cut_off_after_them_left_is_in_nobodys_way(void **state)
+/* File systems that cannot exchange two folders in one step leave this state. */
+static void leftovers_of_a_replacement_killed_later_do_no_harm(void **state)
 {
     fixture f;
     (void)state;
@@ -232,7 +232,7 @@ static void codes_and_normals_of_every_length_are_read_as_written(void **state)
                                                 .normals = true });
 }
 
-/* X, Y and Z of the voxels at level 0, their halo along Z, and level 1 along X and Y. */
+/* The lists are X, Y and Z of level 0, its halo along Z, and X and Y of level 1. */
 enum { MANY = 6 };
 
 static const trip_writer_list *many_lists(void)
@@ -257,7 +257,8 @@ static const trip_writer_list *many_lists(void)
     return lists;
 }
 
-/* One voxel in each list: (1, 2, 3) at level 0, `halo` around it, (7, 8, `k`) at level 1. */
+/* Writes one voxel to each list: (1, 2, 3) at level 0, `halo` as its halo, (7, 8, `k`) at level 1.
+ */
 static void write_many(const char *path, const uint32_t halo[3], uint32_t k, trip_budget *budget)
 {
     trip_writer *w;
@@ -335,8 +336,8 @@ static void lists_of_other_levels_and_kinds_are_kept_and_verified(void **state)
     fixture_free(&f);
 }
 
-/* One voxel of the list along y has another value, or another normal. */
-static void lists_of_the_same_places_with_other_voxels_are_found(void **state)
+/* One voxel has a different value or normal in the Y list. */
+static void lists_with_equal_positions_and_other_voxels_are_found(void **state)
 {
     fixture f;
     (void)state;
@@ -354,7 +355,7 @@ static void lists_of_the_same_places_with_other_voxels_are_found(void **state)
     fixture_free(&f);
 }
 
-/* Points of a tile, at most four of a sheet, to a list of theirs. */
+/* Appends four points of one tile to a list. */
 static void append_points(trip_writer *w, unsigned list, const uint32_t points[4][3])
 {
     const int axis = (int)list % 3, u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -368,9 +369,9 @@ static void append_points(trip_writer *w, unsigned list, const uint32_t points[4
     }
 }
 
-/* Whatever the axis, one of the first three points of either is in a square before that of the
- * fourth, which both have. */
-static void a_voxel_of_two_kinds_is_found_in_any_square(void **state)
+/* Both kinds share the fourth point. Along every axis, one of the first three points is in an
+ * earlier square than the fourth. */
+static void a_voxel_in_two_kinds_is_found_in_any_square(void **state)
 {
     const uint32_t kept[4][3] = { { 10, 1, 1 }, { 1, 10, 1 }, { 1, 1, 10 }, { 10, 10, 10 } };
     const uint32_t shared[4][3] = { { 10, 0, 0 }, { 0, 10, 0 }, { 0, 0, 10 }, { 10, 10, 10 } };
@@ -396,7 +397,7 @@ static void a_voxel_of_two_kinds_is_found_in_any_square(void **state)
     fixture_free(&f);
 }
 
-/* FORMAT.md has none of them: what reads them need not take uneven steps of a level. */
+/* FORMAT.md allows no coarse levels of uneven grids, so readers need not handle them. */
 static void coarse_levels_of_uneven_grids_are_refused(void **state)
 {
     fixture f;
@@ -424,7 +425,7 @@ static void coarse_levels_of_uneven_grids_are_refused(void **state)
     fixture_free(&f);
 }
 
-static void lists_that_make_no_sense_are_refused(void **state)
+static void invalid_lists_are_refused(void **state)
 {
     trip_budget *budget;
     trip_writer *w;
@@ -480,7 +481,7 @@ static void two_writers_of_one_name_do_not_mix(void **state)
     fixture_free(&f);
 }
 
-static void runs_out_of_order_or_place_are_refused(void **state)
+static void runs_out_of_order_or_position_are_refused(void **state)
 {
     fixture f;
     char path[128];
@@ -510,8 +511,9 @@ static void runs_out_of_order_or_place_are_refused(void **state)
     fixture_free(&f);
 }
 
-/* A grid of one voxel that is kept, and, as it cannot be, around what is kept. */
-static void numbers_of_voxels_that_cannot_be_are_refused(void **state)
+/* The grid has one voxel. The lists hold it as kept, and in one case also as its own halo, which is
+ * impossible. */
+static void impossible_numbers_of_voxels_are_refused(void **state)
 {
     fixture f;
     char path[128];
@@ -568,9 +570,9 @@ static void parameters_out_of_range_are_refused(void **state)
     trip_budget_destroy(budget);
 }
 
-/* Writers in child processes, killed at random moments: under the name is a whole data set, and the
- * next writer is not in the way of what they left. */
-static void a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set(void **state)
+/* Kills writers in child processes at random moments. The name must always refer to a complete data
+ * set, and the next writer must succeed. */
+static void a_writer_killed_anytime_leaves_the_old_or_new_data_set(void **state)
 {
     fixture f;
     uint64_t random = 11;
@@ -597,8 +599,8 @@ static void a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set(voi
     fixture_free(&f);
 }
 
-/* Needs the right to mount; the file system is of 1 MiB. */
-static void a_full_disk_is_one_line_and_leaves_nothing(void **state)
+/* Mounts a file system of 1 MiB, which needs permission to mount. */
+static void a_full_disk_reports_one_line_and_leaves_no_files(void **state)
 {
     fixture f;
     char path[128];
@@ -625,28 +627,28 @@ static void a_full_disk_is_one_line_and_leaves_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_written_is_read_in_both_directions),
+        cmocka_unit_test(written_lists_are_read_in_both_directions),
         cmocka_unit_test(the_voxels_of_a_list_do_not_depend_on_tiles_slabs_or_pages),
         cmocka_unit_test(a_slab_has_as_many_bricks_as_there_are_tiles),
-        cmocka_unit_test(an_empty_and_a_full_volume_are_written),
-        cmocka_unit_test(an_existing_data_set_is_kept_unless_it_may_be_replaced),
+        cmocka_unit_test(empty_and_full_volumes_are_written),
+        cmocka_unit_test(an_existing_data_set_is_kept_without_replace),
         cmocka_unit_test(only_a_data_set_is_replaced),
-        cmocka_unit_test(what_an_interrupted_run_left_is_removed),
-        cmocka_unit_test(a_replacement_cut_off_between_its_two_renames_is_undone),
-        cmocka_unit_test(what_a_replacement_cut_off_after_them_left_is_in_nobodys_way),
+        cmocka_unit_test(leftovers_of_an_interrupted_run_are_removed),
+        cmocka_unit_test(a_replacement_killed_between_its_renames_is_undone),
+        cmocka_unit_test(leftovers_of_a_replacement_killed_later_do_no_harm),
         cmocka_unit_test(a_data_set_behind_a_link_is_replaced_and_the_link_stays),
         cmocka_unit_test(two_writers_of_one_name_do_not_mix),
-        cmocka_unit_test(runs_out_of_order_or_place_are_refused),
+        cmocka_unit_test(runs_out_of_order_or_position_are_refused),
         cmocka_unit_test(codes_and_normals_of_every_length_are_read_as_written),
         cmocka_unit_test(lists_of_other_levels_and_kinds_are_kept_and_verified),
-        cmocka_unit_test(lists_of_the_same_places_with_other_voxels_are_found),
-        cmocka_unit_test(a_voxel_of_two_kinds_is_found_in_any_square),
+        cmocka_unit_test(lists_with_equal_positions_and_other_voxels_are_found),
+        cmocka_unit_test(a_voxel_in_two_kinds_is_found_in_any_square),
         cmocka_unit_test(coarse_levels_of_uneven_grids_are_refused),
-        cmocka_unit_test(lists_that_make_no_sense_are_refused),
-        cmocka_unit_test(numbers_of_voxels_that_cannot_be_are_refused),
+        cmocka_unit_test(invalid_lists_are_refused),
+        cmocka_unit_test(impossible_numbers_of_voxels_are_refused),
         cmocka_unit_test(parameters_out_of_range_are_refused),
-        cmocka_unit_test(a_writer_killed_at_any_moment_leaves_the_old_or_the_new_data_set),
-        cmocka_unit_test(a_full_disk_is_one_line_and_leaves_nothing),
+        cmocka_unit_test(a_writer_killed_anytime_leaves_the_old_or_new_data_set),
+        cmocka_unit_test(a_full_disk_reports_one_line_and_leaves_no_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
