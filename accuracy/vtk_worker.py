@@ -34,7 +34,7 @@ from vtkmodules.vtkRenderingCore import (vtkColorTransferFunction, vtkLight, vtk
                                          vtkVolume, vtkVolumeProperty, vtkWindowToImageFilter)
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 
-# Triptych's light, render/shade.h.
+# Triptych's light, render/light/shade.h.
 AMBIENT, DIFFUSE, SPECULAR, SHININESS = 0.3, 0.7, 0.2, 24
 
 

@@ -2,7 +2,7 @@
 // double precision like the reference renderer, and one invocation for each splat. Runs only in
 // frames that count.
 // In: the batch's storage blocks and draw positions. Out: the counters of the list.
-// Mirrors the counting in render/reference.c.
+// Mirrors the counting in render/reference/reference.c.
 #include "fetch.glsl"
 #include "project.glsl"
 #include "weight.glsl"

@@ -1,8 +1,8 @@
-// Computes the light and emission at a position, from the lattices of render/light_grid.h as
+// Computes the light and emission at a position, from the lattices of render/light/light_grid.h as
 // textures. Positions are in the index space of level 0, directions in world space. SHADOWS,
 // OCCLUSION, EMISSION and CUED select the effects; LIT is set if SHADOWS or OCCLUSION is.
 // In: lattices and constants. Out: colours.
-// Mirrors trip_effects_colour() in render/effects.c and trip_emission_at() in render/emission.c.
+// Mirrors trip_effects_colour() in render/light/effects.c and trip_emission_at() in render/light/emission.c.
 #include "shared.h"
 
 #if defined(SHADOWS) || defined(OCCLUSION)

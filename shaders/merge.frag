@@ -2,7 +2,7 @@
 // section 5.2; 2008, section 4.2). Adds the background behind it. With DEPTH it also computes the
 // mean distance of the visible matter. LAYERS has bit a set if list a was drawn.
 // In: a band of the layers. Out: premultiplied colour, and distance in world units.
-// Mirrors the merging in render/reference.c and render/layer.h.
+// Mirrors the merging in render/reference/reference.c and render/layer.h.
 #include "weight.glsl"
 
 layout(binding = TRIP_GL_LAYER) uniform sampler2D layers[3];

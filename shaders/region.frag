@@ -1,7 +1,7 @@
 // Selects the pixels where the current list has weight and the ray has the direction of the pass.
 // Other pixels are discarded; the selected ones set the stencil, and only they are drawn.
 // In: pixel positions. Out: the stencil. Mirrors trip_weight() > 0 and trip_ray_goes() in
-// render/weight.h.
+// render/camera/weight.h.
 #include "weight.glsl"
 
 layout(location = TRIP_GL_ROW) uniform int row; // row of the image at row 0 of the fragments

@@ -1,8 +1,8 @@
 // Computes colour and extinction of a segment between two codes. Extinction is per voxel length.
 // In: two codes and the sums of the transfer function. Out: colour and extinction.
-// Mirrors trip_segment_of() in render/segments.c. All terms of a sum have the same sign, and
+// Mirrors trip_segment_of() in render/classification/segments.c. All terms of a sum have the same sign, and
 // differences of the integrals between whole codes are exact. With CLOSED it mirrors
-// render/closed_form.h.
+// render/classification/closed_form.h.
 #include "shared.h"
 
 #ifdef CLOSED

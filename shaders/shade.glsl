@@ -1,8 +1,8 @@
 // Lights a splat or a segment.
 // In: colour, gradient, and directions to the eye and the light. Out: the lit colour.
-// Mirrors trip_shade() in render/shade.c and trip_normal_unpack() in stream/normal.c, or
+// Mirrors trip_shade() in render/light/shade.c and trip_normal_unpack() in stream/normal.c, or
 // trip_compact_normal_unpack() with COMPACT. AMBIENT, DIFFUSE, SPECULAR, SHININESS and FACING come
-// from render/shade.h.
+// from render/light/shade.h.
 #include "real.glsl"
 #include "effects.glsl"
 

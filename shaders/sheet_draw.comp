@@ -2,7 +2,7 @@
 // pixel (render/sheet.h).
 // In: codes and gradients of the sheets, segment ends in draw order. In and out: the layer, and
 // with DEPTH its depths (render/layer.h).
-// Mirrors render/reference_sheets.c.
+// Mirrors render/reference/reference_sheets.c.
 #include "segments.glsl"
 #include "effects.glsl"
 #include "shade.glsl"

@@ -1,7 +1,7 @@
 // Computes the gradients of a sheet's voxels by differences of codes (render/sheet.h).
 // In: the codes of the sheet and of the sheets below and above it. Out: codes per index along the
 // list, u and v; with UNEVEN, codes per unit of position.
-// Mirrors difference() in render/reference_sheets.c.
+// Mirrors difference() in render/reference/reference_sheets.c.
 #include "shared.h"
 
 layout(local_size_x = TRIP_GL_SQUARE_GROUP, local_size_y = TRIP_GL_SQUARE_GROUP) in;

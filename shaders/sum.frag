@@ -2,7 +2,7 @@
 // In: the sheet's sums of optical depth times colour and of optical depth, and with DEPTH of
 // optical depth times distance. Out: premultiplied colour for blending in list order, and with
 // DEPTH the distance, also premultiplied.
-// Mirrors composite_sheet() in render/reference.c.
+// Mirrors composite_sheet() in render/reference/reference.c.
 #include "real.glsl"
 #include "opacity.glsl"
 

@@ -1,5 +1,5 @@
 // Computes the weights of the layers at a pixel.
-// In: a pixel position. Out: the weight of a list. Mirrors render/weight.c. METHOD is 0 for merge,
+// In: a pixel position. Out: the weight of a list. Mirrors render/camera/weight.c. METHOD is 0 for merge,
 // 1 for clip and 2 for axis, as in trip_method.
 #include "real.glsl"
 

@@ -27,7 +27,7 @@ enum trip_gl_effect {
     TRIP_GL_WIDE = 8192,      /* values are interpolated from 64 voxels (render/kernel.h) */
     TRIP_GL_FIXED = 16384, /* footprints have one size; in perspective set together with AFFINE */
     TRIP_GL_UNEVEN = 65536,
-    /* Effects of render/effects.h. The shader computes the position that it shades. */
+    /* Effects of render/light/effects.h. The shader computes the position that it shades. */
     TRIP_GL_CUED = 32768,
     TRIP_GL_SHADOWS = 131072,
     TRIP_GL_OCCLUSION = 262144,

@@ -1,4 +1,4 @@
-/* The GPU data of a frame's effects (render/effects.h, render/emission.h). The lattices of light
+/* The GPU data of a frame's effects (render/light/effects.h, render/light/emission.h). The lattices of light
  * and heat are textures, kept until their values change. Uniform blocks hold the constants by which
  * shaders find positions in the lattices and along the view. Owned by one renderer; the context
  * must be current. The textures count against the budget. */

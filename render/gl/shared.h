@@ -121,8 +121,8 @@
     /* rgb: replaces all colours before lighting, unless w is 0. */                                \
     R4 debug_colour;
 
-/* Constants of the effects of a list, or of a layer of sheets (render/effects.h,
- * render/emission.h). */
+/* Constants of the effects of a list, or of a layer of sheets (render/light/effects.h,
+ * render/light/emission.h). */
 #define TRIP_GL_EFFECTS_FIELDS(R4)                                                                 \
     /* The eye's position in the list's grid, list axes: rounded to float, and the rest. */        \
     R4 eye_high, eye_low;                                                                          \
@@ -257,7 +257,7 @@ struct trip_gl_sum {
     TRIP_GL_FLOAT entry[4];
 };
 
-/* Replaces the sums if segments have a closed form. render/closed_form.h defines the terms; k is
+/* Replaces the sums if segments have a closed form. render/classification/closed_form.h defines the terms; k is
  * per voxel length. */
 struct trip_gl_closed {
     TRIP_GL_FLOAT scale, offset, ramp, unused;

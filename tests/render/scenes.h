@@ -36,8 +36,8 @@ typedef struct scene_params {
     const trip_coordinates *coordinates; /* NULL selects even spacing */
     unsigned tile_voxels, slab_sheets;
     bool normals;
-    unsigned code_bytes,
-        normal_bytes;      /* 0 selects 2 for codes, and 4 for normals if there are any */
+    /* 0 selects 2 for codes, and 4 for normals if there are any. */
+    unsigned code_bytes, normal_bytes;
     double gradient_scale; /* factor of the gradients in 4-byte normals; 0 selects 1 */
     scene_voxel voxel;     /* NULL stores every voxel with code 65535 */
     void *user;
@@ -51,8 +51,8 @@ typedef struct scene {
     trip_dataset *data;
     unsigned level;       /* the level of `data`, see trip_dataset_level_open() */
     trip_tf_entry *table; /* 65536 entries, initially transparent black */
-    struct trip_emission
-        *emission; /* heat to draw; its owner has called trip_emission_begin(); NULL for none */
+    /* Heat to draw, after trip_emission_begin() by the test that owns it. NULL for none. */
+    struct trip_emission *emission;
 } scene;
 
 /* A map with shear, unequal steps and an offset. */

@@ -367,8 +367,8 @@ static void check_same(const scene_renderer *renderer, void *user)
 }
 
 /* Compares the picture with the reference. It also compares the picture with one drawn through the
- * table. For that, a voxel that is not drawn has a code at which the transfer function has no
- * closed form. */
+ * table. For that, an extra voxel, which is not drawn, has a code beyond the linear part of the
+ * transfer function. */
 static void closed_form_and_table_draw_the_same_picture(void **state)
 {
     (void)state;

@@ -92,7 +92,7 @@ static void inside_and_wide_views_agree_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* Draws EWA footprints, round and flat, from outside and inside, with both compositing settings. */
+/* Draws EWA footprints, round and flat, from outside and inside, with both traversals. */
 static void affine_footprints_agree_with_the_reference(void **state)
 {
     (void)state;

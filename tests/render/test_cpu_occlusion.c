@@ -184,8 +184,8 @@ typedef struct run_looks {
     uint32_t voxels[TILE * TILE];
     uint64_t bytes[TRIP_BLOCK_WORDS_MAX];
     trip_block block;
-    uint32_t count, occluded,
-        left_in; /* left_in counts voxels that remain without reaching an open cell */
+    /* left_in counts voxels that remain without reaching an open cell. */
+    uint32_t count, occluded, left_in;
 } run_looks;
 
 /* Fills a tile with every third voxel, in Morton order. */

@@ -28,8 +28,7 @@ typedef struct fixture {
     _Atomic uint64_t panes[PANES];
     uint8_t layers[PANES];
     uint64_t open[RASTERS * RASTERS];
-    uint64_t taken,
-        closed; /* `taken` counts voxels that rays sample, `closed` the squares left out */
+    uint64_t taken, closed; /* sampled voxels, and squares left out */
 } fixture;
 
 static int set_up(void **state)

@@ -131,7 +131,7 @@ static void splats_stay_exactly_if_they_have_an_open_cell(void **state)
 }
 
 /* Splats are up to as large as the image. A splat in more than two by two panes may stay. */
-static void large_splats_stay_where_they_are_visible(void **state)
+static void large_splats_stay_where_visible(void **state)
 {
     fixture *f = *state;
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
@@ -148,8 +148,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(splats_stay_exactly_if_they_have_an_open_cell, set_up,
                                         tear_down),
-        cmocka_unit_test_setup_teardown(large_splats_stay_where_they_are_visible, set_up,
-                                        tear_down),
+        cmocka_unit_test_setup_teardown(large_splats_stay_where_visible, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

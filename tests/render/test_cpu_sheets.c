@@ -262,9 +262,8 @@ static void check_windows(const trip_coordinates *coordinates, trip_kernel kerne
                                     scene_view(&s, trip_v3(-0.3, 0.2, -1), 2.6, 140, PIXELS) };
     views[3].eye.x += 7;
     views[3].look.x += 7;
-    const int end = coordinates || kernel != TRIP_KERNEL_LINEAR
-                        ? 3
-                        : 4; /* other kernels and uneven spacing take more */
+    /* Other kernels and uneven spacing take more memory. */
+    const int end = coordinates || kernel != TRIP_KERNEL_LINEAR ? 3 : 4;
     for (int i = first; i < end; i++) {
         trip_settings settings = post(2);
         trip_camera_params view = views[i];

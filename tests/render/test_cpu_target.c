@@ -87,13 +87,13 @@ static void check_content(trip_traversal traversal)
     scene_destroy(&s);
 }
 
-static void a_layer_holds_what_its_target_can_front_to_back(void **state)
+static void layers_hold_values_of_their_target_front_to_back(void **state)
 {
     (void)state;
     check_content(TRIP_TRAVERSAL_OUTWARD);
 }
 
-static void a_layer_holds_what_its_target_can_back_to_front(void **state)
+static void layers_hold_values_of_their_target_back_to_front(void **state)
 {
     (void)state;
     check_content(TRIP_TRAVERSAL_ASCENDING);
@@ -154,8 +154,8 @@ static void targets_are_off_by_at_most_a_step_a_splat(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_layer_holds_what_its_target_can_front_to_back),
-        cmocka_unit_test(a_layer_holds_what_its_target_can_back_to_front),
+        cmocka_unit_test(layers_hold_values_of_their_target_front_to_back),
+        cmocka_unit_test(layers_hold_values_of_their_target_back_to_front),
         cmocka_unit_test(targets_are_off_by_at_most_a_step_a_splat),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -100,8 +100,8 @@ static void clipped_voxels_cast_no_shadow(void **state)
     scene_destroy(&s);
 }
 
-/* A fifth of a segment between two sample planes remains. Its cueing and distance are those of its
- * midpoint. */
+/* A fifth of a segment between two sample planes remains. The midpoint determines the segment's
+ * cueing and distance. */
 static void the_rest_of_a_clipped_segment_fades_at_its_own_depth(void **state)
 {
     (void)state;
@@ -939,8 +939,8 @@ static double mean_is_off(trip_vec3 position, trip_vec3 along, double part, trip
 }
 
 /* Returns the maximum error of a node in fog. Columns are exact, and at most one node apart in a
- * layer. The error is therefore that of linear interpolation between two columns, wherever they
- * lie, along both axes of the layer. */
+ * layer. Linear interpolation between two columns causes the error, wherever they lie, along both
+ * axes of the layer. */
 static double max_off(trip_vec3 node, trip_vec3 light)
 {
     const trip_vec3 way = trip_sub(node, light),

@@ -177,7 +177,8 @@ static void uniform_scaling_widens_the_shortest_axis_to_the_filter(void **state)
     assert_close(trip_covariance2_scaled(&large, 0.16).xx, 9, 0);
 }
 
-/* Section 5: as s grows, the footprint becomes that of a disc with T3 of two tangents: T3 T3^T. */
+/* Section 5: as s grows, the footprint approaches the footprint of a disc, T3 T3^T, with T3 of two
+ * tangents. */
 static void flat_kernels_become_surface_kernels(void **state)
 {
     (void)state;
@@ -269,7 +270,7 @@ static void affine_supports_are_ellipses_within_their_radius(void **state)
 }
 
 /* Every ray of a scaled flat support passes within its radius, and its pixels lie in its bounds.
- * Such supports may be much larger than round ones. Rays of parallel views begin in the plane of
+ * These supports may be much larger than round ones. Rays of parallel views begin in the plane of
  * the eye. */
 static void scaled_flat_supports_are_within_their_radius(void **state)
 {

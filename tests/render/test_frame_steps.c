@@ -1,4 +1,4 @@
-/* Frames drawn in steps. Such frames can be inspected, cancelled, and drawn side by side. */
+/* Tests of frames drawn in steps, which are inspected, cancelled, and drawn side by side. */
 #include "desk.h"
 
 #include <pthread.h>

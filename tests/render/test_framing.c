@@ -310,7 +310,7 @@ static void azimuth_goes_to_the_right_elevation_up_and_roll_turns_clockwise(void
     assert_true(at[1] < 0);
     f = (trip_camera_framing){ .view = TRIP_VIEW_FRONT, .roll_degrees = 90 };
     seen_from(f, &p);
-    position_of(&p, trip_v3(4.5, 4.5, 9), at); /* the former top is on the right */
+    position_of(&p, trip_v3(4.5, 4.5, 9), at); /* the top has turned to the right */
     assert_true(at[0] > 0.5 && fabs(at[1]) < 1e-9);
     f.roll_degrees = 180;
     seen_from(f, &p);

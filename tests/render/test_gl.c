@@ -1,6 +1,6 @@
 /* Compares the gl renderer with the reference: forms of submission, methods, targets, limits of a
- * driver, and missing resources. test_gl_views.c draws real data. test_reference.c tests the order
- * of layers and the opacity of bodies with all renderers. */
+ * driver, and missing resources. The file test_gl_views.c draws real data. The file
+ * test_reference.c tests the order of layers and the opacity of bodies with all renderers. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -613,8 +613,7 @@ static void a_shader_that_does_not_compile_is_named_with_its_line(void **state)
     setenv("TRIPTYCH_SHADER_DIR", folder, 1);
 
     assert_int_equal(trip_gl_create(&r, s.budget), 0);
-    assert_int_equal(try_frame(&s, r, &view, &settings),
-                     0); /* shaders from disk draw like those in the binary */
+    assert_int_equal(try_frame(&s, r, &view, &settings), 0); /* shaders read from disk */
     r->ops->destroy(r);
 
     append_line(folder, "project.glsl", "float broken = nothing;");

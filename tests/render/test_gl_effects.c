@@ -1,6 +1,6 @@
 /* Shadows, occlusion and emission of the gl renderer. Compares each form of submission and each
  * kind of sheet with the reference, and tests the copies of the lattices from frame to frame.
- * test_effects.c and test_emission.c test all renderers. */
+ * The files test_effects.c and test_emission.c test all renderers. */
 #include "emission.h"
 #include "gl/shared.h"
 #include "scenes.h"
@@ -224,7 +224,7 @@ typedef struct desk {
     trip_renderer *renderer;
     trip_light_map *light;
     trip_camera camera;
-    uint64_t leave; /* memory left once all other objects have theirs; 0 for all */
+    uint64_t leave; /* memory left after all other allocations; 0 for all */
 } desk;
 
 static int draw(desk *d, const trip_settings *settings, float *rgba)
@@ -431,8 +431,7 @@ static void lattices_count_against_the_memory_limit(void **state)
     set_up(&d, &l);
     trip_settings settings = with_all(&l, TRIP_CLASSIFY_PRE), plain = settings;
     plain.effects = (trip_effects){ .cells = 20 };
-    for (int n = 0; n < 4;
-         n++) /* the buffers that batches are copied to are allocated one by one */
+    for (int n = 0; n < 4; n++) /* each allocates one buffer for batches */
         assert_int_equal(draw(&d, &settings, rgba), 0);
     const uint64_t with = trip_budget_left_bytes(l.s.budget);
     assert_int_equal(draw(&d, &plain, rgba), 0);

@@ -1,6 +1,6 @@
 /* Frames of the gl renderer in `post`. Compares them with the reference and checks that memory and
- * steps do not change a bit. Frames that exceed the memory are refused. test_sheets.c tests all
- * renderers; test_gl_views.c draws real data. */
+ * steps do not change a bit. Frames that exceed the memory are refused. The file test_sheets.c
+ * tests all renderers, and test_gl_views.c draws real data. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>

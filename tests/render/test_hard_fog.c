@@ -65,8 +65,8 @@ static void a_million_splats_lose_at_most_their_rounding(void **state)
     scene_destroy(&f.scene);
 }
 
-/* By sheets, each sheet is rounded once, by half a step. A driver that truncates rounds by a whole
- * step. */
+/* Compositing by sheets rounds each sheet once, by half a step. A driver that truncates rounds by a
+ * whole step. */
 static void by_sheets_layers_are_rounded_once_a_sheet(void **state)
 {
     (void)state;

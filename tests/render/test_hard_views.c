@@ -3,10 +3,8 @@
 #include "hard.h"
 #include "test.h"
 
-enum {
-    EDGE = 12,
-    SIZE = 17
-}; /* pixels; odd, so that the central pixel's ray is the view direction */
+/* SIZE is in pixels. It is odd, so that the central ray is the view direction. */
+enum { EDGE = 12, SIZE = 17 };
 
 static scene lumps;
 
@@ -104,8 +102,8 @@ static void rays_may_lie_along_axes_and_diagonals(void **state)
             v.forms = 1u << (i + (size_t)n) % 3;
             v.gl = n % 4 == 1 ? HARD_ALL : 0;
             v.shows = true;
-            v.tie =
-                i > 3 ? 3.0 / 255 : 0; /* through edges of the grid: one segment more or fewer */
+            /* Rays through edges of the grid take one segment more or fewer. */
+            v.tie = i > 3 ? 3.0 / 255 : 0;
             hard_check(&lumps, &v);
         }
 }

@@ -300,8 +300,8 @@ static double error_of_ball(const scene *s, double radius, const scene_making *h
         double x = (n % SIZE + 0.5) / SIZE * 2 - 1, y = (n / SIZE + 0.5) / SIZE * 2 - 1;
         if (x * x + y * y > 0.64)
             continue;
-        double facing =
-            sqrt(1 - x * x - y * y); /* cosine for normal, light and half vector alike */
+        /* The cosine is the same for the normal, the light and the half vector. */
+        double facing = sqrt(1 - x * x - y * y);
         double red = 0.6 * (TRIP_AMBIENT + TRIP_DIFFUSE * facing) +
                      TRIP_SPECULAR * pow(facing, TRIP_SHININESS);
         max = fmax(max, fabs(red - (double)scene_pixel(&p, n % SIZE, n / SIZE)[0]));

@@ -308,8 +308,8 @@ static void two_levels_are_drawn_in_one_order(void **state)
     destroy(&l);
 }
 
-/* The rays of these views differ from pixel to pixel. Sheets of both levels coincide along the
- * last axis. */
+/* Every pixel of these views has a ray of its own direction. Sheets of both levels coincide along
+ * the last axis. */
 static void levels_of_voxels_of_other_shapes_are_drawn_in_one_order(void **state)
 {
     (void)state;

@@ -59,8 +59,8 @@ static void even_steps_give_weight_by_distance(void **state)
     trip_budget_destroy(b);
 }
 
-/* A voxel's shares cover half the way to each neighbour. At the ends of the grid, a point counts
- * once more. Points are at most 1 apart. */
+/* A voxel's shares cover half the way to each neighbour. The last point at each end of the grid
+ * counts double. Points are at most 1 apart. */
 static void shares_add_up_to_the_surroundings_of_a_voxel(void **state)
 {
     (void)state;

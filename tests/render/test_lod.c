@@ -419,8 +419,8 @@ static bool is_chosen(const trip_lod *lod, unsigned level)
     return false;
 }
 
-/* A mean code that covers one half shows one half. Where the volume is thin, it shows as much as
- * was kept. Lists of levels without cubes need no table. */
+/* A mean code that covers one half shows one half. Thin parts show as much as was kept. Lists of
+ * levels without cubes need no table. */
 static void check_tables(const scene *s, const trip_plan *plan, bool seen[LEVELS + 1])
 {
     const trip_mean_scale scale = { 0, 65535 };

@@ -48,7 +48,7 @@ static trip_outline *make(const scene *s, const trip_camera_params *view, double
 }
 
 /* Computes how far the outline reaches to the right and up, in voxels from the centre. If `cone`
- * is not zero, it also computes the reach within cones of that tangent. */
+ * is not zero, it also computes the reach within cones with this tangent. */
 static void reaches(const trip_outline *o, const trip_camera_params *view, double scale,
                     double cone, double values[2])
 {

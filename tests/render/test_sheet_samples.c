@@ -118,8 +118,7 @@ static trip_vec3 from_eye(trip_vec3 eye, double x, double y, double z)
     return trip_add(eye, trip_v3(x, y, z));
 }
 
-/* Views along an axis, with pictures four times as wide as high or four times as high as wide. The
- * ray at a corner is the steepest. */
+/* Views along an axis. Pictures are square or four times as wide as high. */
 static void the_longer_side_of_a_picture_has_its_steepest_rays(void **state)
 {
     (void)state;

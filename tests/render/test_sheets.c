@@ -1,5 +1,5 @@
-/* What every renderer that classifies after interpolation must show: closed forms, order, and the
- * integral, which it comes closer to as slices go up. */
+/* Tests that every renderer with post-classification must pass: closed forms, order, and
+ * convergence to the integral with more samples per sheet. */
 #include "scenes.h"
 #include "test.h"
 
@@ -8,7 +8,7 @@
 #include "shade.h"
 #include "sheet.h"
 
-enum { EDGE = 20 }; /* voxels of most volumes here; between their centres EDGE - 1 */
+enum { EDGE = 20 }; /* voxels of most volumes; EDGE - 1 between the outermost centres */
 
 static void fill_table(scene *s, double r, double g, double b, double extinction)
 {
@@ -16,7 +16,7 @@ static void fill_table(scene *s, double r, double g, double b, double extinction
         s->table[code] = (trip_tf_entry){ (float)r, (float)g, (float)b, (float)extinction };
 }
 
-/* From a direction in index space. */
+/* Returns a view from a direction in index space. */
 static trip_camera_params view_along(const scene *s, trip_vec3 direction, double fov, int size)
 {
     return scene_view(s, trip_affine_vector(&s->data->index_to_world, direction), 80, fov, size);
@@ -67,9 +67,9 @@ static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
     }
 }
 
-enum { RISE = 3000 }; /* codes a voxel */
+enum { RISE = 3000 }; /* codes per voxel */
 
-/* Along the axis *user. */
+/* Codes rise along the axis *user. */
 static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)gradient;
@@ -77,9 +77,10 @@ static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradien
     return true;
 }
 
-/* A peak much narrower than a slice counts whole, wherever it lies between slices: its depth is its
- * integral over codes, by how fast the ray passes codes. */
-static void a_narrow_peak_is_seen_whole_at_any_samples_per_sheet(void **state)
+/* A peak much narrower than the distance between samples counts fully, wherever it lies between
+ * them. Its optical depth is its integral over codes, divided by the codes that the ray passes per
+ * unit length. */
+static void a_narrow_peak_counts_fully_at_any_samples_per_sheet(void **state)
 {
     (void)state;
     enum { HALF = 20 };
@@ -102,7 +103,7 @@ static void a_narrow_peak_is_seen_whole_at_any_samples_per_sheet(void **state)
                 trip_vec3 o, d;
                 double from, to;
                 scene_ray(&s, &view, n % 5, n / 5, &o, &d);
-                /* Where it meets the peak, which must lie well within the grid. */
+                /* The ray's position at the peak, which must lie well inside the grid. */
                 double t =
                     ((double)peak / RISE - trip_component(o, axis)) / trip_component(d, axis);
                 if (!scene_ray_in_grid(&s, o, d, &from, &to) || t < from + 3 || t > to - 3 ||
@@ -139,7 +140,7 @@ static bool around_body(void *user, int i, int j, int k, unsigned *code, double 
     return is_within(i, j, k, 5, 14) && !is_within(i, j, k, 6, 13);
 }
 
-static void values_fall_to_those_of_the_halo_and_end_without_it(void **state)
+static void values_fall_to_the_halo_and_end_without_it(void **state)
 {
     (void)state;
     const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_body };
@@ -166,7 +167,7 @@ static void values_fall_to_those_of_the_halo_and_end_without_it(void **state)
     }
 }
 
-/* All but (9, 9, 9). */
+/* Every voxel except (9, 9, 9) is present. */
 static bool all_but_one(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -181,7 +182,8 @@ static void a_cell_without_a_corner_is_empty(void **state)
     scene s;
     scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .voxel = all_but_one });
     fill_table(&s, 1, 1, 1, 0.1);
-    for (int i = 0; i < 36; i++) { /* through the cells around it, then beside them */
+    /* Rays pass through the cells around the missing voxel, then beside them. */
+    for (int i = 0; i < 36; i++) {
         int axis = i % 3, beside = i / 3 % 3;
         double at[3], d[3] = { 0 };
         at[axis] = 9.5;
@@ -203,10 +205,10 @@ static void a_cell_without_a_corner_is_empty(void **state)
     scene_destroy(&s);
 }
 
-static void from_within_what_lies_before_the_eye_is_seen(void **state)
+static void inside_the_volume_voxels_before_the_eye_are_visible(void **state)
 {
     (void)state;
-    /* The last looks along an axis from between two bricks. */
+    /* The last eye looks along an axis from between two bricks. */
     const trip_vec3 eyes[] = { { 7.3, 9.1, 12.7 }, { 7, 9, 12 }, { 7.5, 7.6, 7.4 } };
     scene s;
     scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE }, .slab_sheets = 8 });
@@ -237,7 +239,8 @@ static void from_within_what_lies_before_the_eye_is_seen(void **state)
     scene_destroy(&s);
 }
 
-/* A pixel of a parallel view along an axis, its ray at `u` and `v` along the two next ones. */
+/* Returns a parallel view of one pixel along an axis. The ray is at `u` and `v` along the next two
+ * axes. */
 static trip_camera_params pixel_along(int axis, double sign, double at, double u, double v)
 {
     double eye[3], look[3];
@@ -253,8 +256,8 @@ static trip_camera_params pixel_along(int axis, double sign, double at, double u
                                  .height = 1 };
 }
 
-/* The segment that the plane of the eye is in begins behind it. */
-static void a_parallel_view_from_within_begins_at_the_next_slice(void **state)
+/* The segment that contains the eye's plane begins behind it. */
+static void a_parallel_view_from_inside_begins_at_the_next_sample(void **state)
 {
     (void)state;
     scene s;
@@ -275,8 +278,8 @@ static void a_parallel_view_from_within_begins_at_the_next_slice(void **state)
     scene_destroy(&s);
 }
 
-/* Rays along an axis, a hundredth of a voxel on either side of the box of voxel centres. */
-static void rays_beside_the_grid_meet_nothing(void **state)
+/* Rays along an axis, a hundredth of a voxel inside and outside the box of voxel centres. */
+static void rays_beside_the_grid_are_empty(void **state)
 {
     (void)state;
     const double last = EDGE - 1, beside[] = { -0.01, 0.01, last - 0.01, last + 0.01, last + 0.9 };
@@ -297,7 +300,7 @@ static void rays_beside_the_grid_meet_nothing(void **state)
     scene_destroy(&s);
 }
 
-/* Opaque walls in a ramp. */
+/* Colours opaque walls in a ramp. */
 static void colour_walls(scene *s)
 {
     for (int code = 4 * RISE; code < 5 * RISE; code++)
@@ -341,7 +344,7 @@ static void the_nearest_wall_hides_those_behind_it(void **state)
     }
 }
 
-static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
+static void walls_on_both_sides_of_the_eye_are_visible(void **state)
 {
     (void)state;
     for (int i = 0; i < 12; i++) {
@@ -367,8 +370,8 @@ static void walls_are_seen_on_both_sides_of_an_eye_between_them(void **state)
     }
 }
 
-/* Of bodies one is a little below the transmittance at which pixels are saturated, and one far
- * below that of a frame in which none is. */
+/* One body is a little below the transmittance of early termination. The other is far below the
+ * transmittance of a frame without early termination. */
 static void a_saturated_pixel_is_opaque(void **state)
 {
     (void)state;
@@ -396,7 +399,7 @@ static void a_saturated_pixel_is_opaque(void **state)
     }
 }
 
-static void light_comes_by_differences_of_values(void **state)
+static void shading_uses_differences_of_values(void **state)
 {
     double max = 0;
     (void)state;
@@ -438,11 +441,11 @@ static void light_comes_by_differences_of_values(void **state)
         }
         scene_destroy(&s);
     }
-    assert_true(max > 0.1); /* by light, not by nothing */
+    assert_true(max > 0.1); /* lit, not zero */
 }
 
-/* Far to the left two cells with a gap between them, one below what shows and one above; far to the
- * right what shows. */
+/* On the far left are two cells with a gap between them, one below the visible codes and one
+ * above. Visible voxels are on the far right. */
 static bool gap(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     static const unsigned left[] = { 1000, 20000, 0, 45000, 64000 };
@@ -453,9 +456,10 @@ static bool gap(void *user, int i, int j, int k, unsigned *code, double gradient
     return true;
 }
 
-/* With one slice a sheet, rays far aside pass from one of the cells to the other in one segment, in
- * which all between both is seen: lit by gradients of cells that show nothing. */
-static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
+/* With one sample per sheet, a steep ray passes from one cell to the other in one segment. Every
+ * value between the two cells is visible. The gradients that light it come from transparent cells.
+ */
+static void voxels_skipped_by_a_segment_are_visible_and_lit(void **state)
 {
     (void)state;
     scene s;
@@ -473,7 +477,7 @@ static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
             if (!expected.rgba) {
-                expected = turn.picture;                              /* the reference's */
+                expected = turn.picture; /* the picture of the reference */
                 assert_true(scene_pixel(&expected, 6, 4)[3] > 0.01F); /* between the cells */
                 turn.picture = (scene_picture){ 0 };
                 continue;
@@ -485,8 +489,8 @@ static void what_a_segment_leaps_over_is_seen_and_lit(void **state)
     scene_destroy(&s);
 }
 
-/* The mean distance of what a constant body shows. */
-static void depth_is_the_mean_distance_of_what_is_seen(void **state)
+/* Returns the mean distance of the visible part of a constant body. */
+static void depth_is_the_mean_visible_distance(void **state)
 {
     (void)state;
     for (int i = 0; i < 12; i++) {
@@ -510,7 +514,7 @@ static void depth_is_the_mean_distance_of_what_is_seen(void **state)
                 assert_true(scene_ray_in_grid(&s, o, ray, &from, &to));
                 double unit = scene_ray_stretch(&s, ray), k = 0.1F, length = (to - from) * unit;
                 double expected = from * unit + 1 / k - length / expm1(k * length);
-                /* Segments count from their middles. */
+                /* A segment counts with the distance of its centre. */
                 assert_close(turn.picture.depth[n] - expected, 0,
                              0.01 + 40 * turn.renderer->tolerance);
             }
@@ -519,15 +523,15 @@ static void depth_is_the_mean_distance_of_what_is_seen(void **state)
     }
 }
 
-/* A volume with one of its axes reversed, its axes in turn, or turned and moved in the world. */
+/* A volume with one axis mirrored, with permuted axes, or turned and moved in world space. */
 typedef struct arrangement {
-    int64_t dims[3]; /* as first arranged */
-    int mirrored;    /* axis; -1: none */
-    int turned;      /* axis a is what axis a + turned was */
+    int64_t dims[3]; /* before mirroring and turning */
+    int mirrored;    /* axis; -1 for none */
+    int turned;      /* axis a of the arrangement is axis a + turned of the volume */
     bool moved;
 } arrangement;
 
-/* A rotation and a shift. */
+/* A rotation and a translation. */
 static const trip_affine elsewhere = {
     { { 0.36, 0.48, -0.8, 300 }, { -0.8, 0.6, 0, -90 }, { 0.48, 0.64, 0.6, 40 } }
 };
@@ -580,7 +584,7 @@ static void create_lumps(scene *s, arrangement *as)
                                       : (trip_tf_entry){ 0.2F, 0.6F, 1, 0.8F };
 }
 
-/* A view of it, arranged likewise. */
+/* Draws a view of the arranged volume. The camera is arranged in the same way. */
 static scene_picture draw_lumps(const scene_renderer *r, arrangement as, bool parallel)
 {
     scene s;
@@ -622,7 +626,7 @@ static double mean_apart(const scene_picture *a, const scene_picture *b)
     return sum / count;
 }
 
-static void mirrored_turned_and_moved_it_is_the_same_picture(void **state)
+static void mirrored_turned_and_moved_volumes_look_the_same(void **state)
 {
     (void)state;
     for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
@@ -645,7 +649,7 @@ static void mirrored_turned_and_moved_it_is_the_same_picture(void **state)
     }
 }
 
-/* Three lumps, of nothing at the border. */
+/* Three lumps. Values at the border are 0. */
 static bool blobs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const double at[3][3] = { { 11, 12, 9 }, { 17, 14, 15 }, { 12, 18, 18 } };
@@ -676,8 +680,8 @@ static void put_blobs(trip_field **field, const scene *s)
     assert_int_equal(trip_field_finish(*field, &map), 0);
 }
 
-/* Of 1, 4 and 16 slices: the integral is of the same field, by the same light. Translucent, so that
- * nothing is saturated. */
+/* Compares 1, 4 and 16 samples per sheet with the integral of the same field with the same light.
+ * The volume is translucent, so that no pixel terminates early. */
 static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, trip_vec3 direction)
 {
     trip_field *field;
@@ -725,14 +729,14 @@ static void the_error_falls_with_the_square_of_the_samples_per_sheet(void **stat
     compare_with_integral(linear, true, true, trip_v3(0.2, 0.1, -1));
 }
 
-static void by_the_cubic_kernel_it_is_the_cubic_integral(void **state)
+static void the_cubic_kernel_gives_the_cubic_integral(void **state)
 {
     (void)state;
     compare_with_integral(TRIP_KERNEL_CUBIC, false, true, trip_v3(-1, 0.9, 0.8));
     compare_with_integral(TRIP_KERNEL_CUBIC, true, false, trip_v3(0.3, 1, -0.9));
 }
 
-/* Any values, sheet by sheet along an axis. */
+/* Random values, one per sheet along an axis. */
 typedef struct layers {
     int axis;
     unsigned codes[EDGE];
@@ -746,8 +750,8 @@ static bool layer_code(void *user, int i, int j, int k, unsigned *code, double g
     return true;
 }
 
-/* A spline by Hermite's form, the profile of a splat by its formula; beyond the ends they repeat.
- */
+/* Evaluates a spline in Hermite's form, and the profile of a splat by its formula. Values repeat
+ * beyond the ends. */
 static double value_at(const layers *l, trip_kernel kernel, double z)
 {
     int cell = (int)fmin(floor(z), EDGE - 2);
@@ -765,9 +769,9 @@ static double value_at(const layers *l, trip_kernel kernel, double z)
     return sum / weights;
 }
 
-/* Rays along the axis; extinction that is linear in the code has the depth of the trapezoids
- * between slices. */
-static void along_the_sheets_samples_per_sheet_have_the_values_of_the_kernel(void **state)
+/* Rays follow the axis. Extinction is linear in the code, so that the optical depth is the sum of
+ * the trapezoids between samples. */
+static void samples_between_sheets_have_the_values_of_the_kernel(void **state)
 {
     (void)state;
     for (int i = 0; i < 12; i++) {
@@ -799,8 +803,8 @@ static void along_the_sheets_samples_per_sheet_have_the_values_of_the_kernel(voi
     }
 }
 
-/* Between two sheets with unlike gradients, of 300 and 1250 codes a voxel, a segment is lit by
- * their mean; all the others are cut away. */
+/* Clipping leaves one segment between two sheets with different gradients, 300 and 1250 codes a
+ * voxel. The mean of the two gradients lights the segment. */
 static void a_segment_is_lit_by_the_mean_of_both_gradients(void **state)
 {
     (void)state;
@@ -844,7 +848,7 @@ static bool is_inside(double x, double y, double z)
     return x * x + y * y + z * z < 50;
 }
 
-/* A ball of rising values, and the voxels next to it. */
+/* A ball of rising values, and its adjacent voxels. */
 static bool ball(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const double x = i - 10.2, y = j - 9.7, z = k - 9.9;
@@ -862,8 +866,9 @@ static bool around_ball(void *user, int i, int j, int k, unsigned *code, double 
     return !ball(user, i, j, k, code, gradient) && some;
 }
 
-/* Of voxels that a halo of one lacks the integral of the data set has the same rule. */
-static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
+/* A halo of one voxel lacks some voxels. The integral of the data set uses the same rule for them.
+ */
+static void voxels_beyond_the_halo_repeat_their_neighbours(void **state)
 {
     (void)state;
     const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_ball };
@@ -896,7 +901,7 @@ static void beyond_the_halo_voxels_count_as_those_next_to_them(void **state)
     scene_destroy(&s);
 }
 
-/* Noise, in which a cell goes from what shows to what does not on every side. */
+/* Noise. Each cell borders on visible and transparent voxels on every side. */
 enum { NOISE_MIN = 30000, NOISE_MAX = 38000 };
 
 static unsigned noise_code(int i, int j, int k)
@@ -927,8 +932,9 @@ static bool around_noise(void *user, int i, int j, int k, unsigned *code, double
     return some && !kept;
 }
 
-/* Rays leave the halo at any place of a sheet: all draw the same pieces of them. */
-static void what_lies_beyond_the_halo_is_left_out_alike(void **state)
+/* Rays leave the halo at any position of a sheet. All renderers must draw the same part of each
+ * ray. */
+static void renderers_leave_out_the_same_voxels_beyond_the_halo(void **state)
 {
     (void)state;
     const scene_part halo = { .kind = TRIP_KIND_HALO, .by = { 1, 1, 1 }, .voxel = around_noise };
@@ -963,9 +969,9 @@ static bool one_value(void *user, int i, int j, int k, unsigned *code, double gr
     return true;
 }
 
-/* However weights are rounded: where all is one value, at which the function begins, or ends. Other
- * voxels, which are not in the picture, hold another. */
-static void one_value_is_that_value_by_every_kernel(void **state)
+/* Rounded weights must not matter in a region of one value, at the first or last visible code of
+ * the transfer function. Voxels outside the picture hold another value. */
+static void every_kernel_preserves_a_constant_value(void **state)
 {
     (void)state;
     scene s;
@@ -990,8 +996,8 @@ static void one_value_is_that_value_by_every_kernel(void **state)
     scene_destroy(&s);
 }
 
-/* The largest change of a pixel from one picture to the next while the camera is turned in steps of
- * 0.1 degrees across 45 degrees, where the layer of most weight changes. */
+/* Returns the largest change of a pixel between successive pictures. The camera turns in steps of
+ * 0.1 degrees across 45 degrees, where the layer with the largest weight changes. */
 static double max_change(const scene *s, const scene_renderer *r, const trip_settings *settings)
 {
     scene_picture last = { 0 };
@@ -1009,8 +1015,8 @@ static double max_change(const scene *s, const scene_renderer *r, const trip_set
     return max;
 }
 
-/* Edges of one slice a sheet, the worst case. */
-static void turning_across_45_degrees_nothing_pops(void **state)
+/* Edges with one sample per sheet are the worst case. */
+static void turning_across_45_degrees_does_not_pop(void **state)
 {
     (void)state;
     scene s;
@@ -1025,7 +1031,7 @@ static void turning_across_45_degrees_nothing_pops(void **state)
         settings.method = TRIP_METHOD_AXIS;
         double popped = max_change(&s, r, &settings);
         assert_true(popped > 0.5);
-        assert_true(merged < 0.15 + r->tolerance); /* as much as the object's own motion makes */
+        assert_true(merged < 0.15 + r->tolerance); /* as much as the object's own motion causes */
     }
     scene_destroy(&s);
 }
@@ -1042,7 +1048,7 @@ static bool coarse(void *user, int i, int j, int k, unsigned *code, double gradi
     return true;
 }
 
-/* Bricks that a plan leaves out change nothing, nor do lists of other levels. */
+/* Bricks that a plan leaves out change nothing, and neither do lists of other levels. */
 static void bricks_and_coarser_levels_change_no_bit(void **state)
 {
     (void)state;
@@ -1086,27 +1092,27 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slab_has_the_opacity_of_the_path_through_it),
-        cmocka_unit_test(a_narrow_peak_is_seen_whole_at_any_samples_per_sheet),
-        cmocka_unit_test(values_fall_to_those_of_the_halo_and_end_without_it),
+        cmocka_unit_test(a_narrow_peak_counts_fully_at_any_samples_per_sheet),
+        cmocka_unit_test(values_fall_to_the_halo_and_end_without_it),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
-        cmocka_unit_test(from_within_what_lies_before_the_eye_is_seen),
-        cmocka_unit_test(a_parallel_view_from_within_begins_at_the_next_slice),
-        cmocka_unit_test(rays_beside_the_grid_meet_nothing),
+        cmocka_unit_test(inside_the_volume_voxels_before_the_eye_are_visible),
+        cmocka_unit_test(a_parallel_view_from_inside_begins_at_the_next_sample),
+        cmocka_unit_test(rays_beside_the_grid_are_empty),
         cmocka_unit_test(the_nearest_wall_hides_those_behind_it),
-        cmocka_unit_test(walls_are_seen_on_both_sides_of_an_eye_between_them),
+        cmocka_unit_test(walls_on_both_sides_of_the_eye_are_visible),
         cmocka_unit_test(a_saturated_pixel_is_opaque),
-        cmocka_unit_test(light_comes_by_differences_of_values),
+        cmocka_unit_test(shading_uses_differences_of_values),
         cmocka_unit_test(a_segment_is_lit_by_the_mean_of_both_gradients),
-        cmocka_unit_test(what_a_segment_leaps_over_is_seen_and_lit),
-        cmocka_unit_test(depth_is_the_mean_distance_of_what_is_seen),
-        cmocka_unit_test(mirrored_turned_and_moved_it_is_the_same_picture),
+        cmocka_unit_test(voxels_skipped_by_a_segment_are_visible_and_lit),
+        cmocka_unit_test(depth_is_the_mean_visible_distance),
+        cmocka_unit_test(mirrored_turned_and_moved_volumes_look_the_same),
         cmocka_unit_test(the_error_falls_with_the_square_of_the_samples_per_sheet),
-        cmocka_unit_test(by_the_cubic_kernel_it_is_the_cubic_integral),
-        cmocka_unit_test(along_the_sheets_samples_per_sheet_have_the_values_of_the_kernel),
-        cmocka_unit_test(beyond_the_halo_voxels_count_as_those_next_to_them),
-        cmocka_unit_test(what_lies_beyond_the_halo_is_left_out_alike),
-        cmocka_unit_test(one_value_is_that_value_by_every_kernel),
-        cmocka_unit_test(turning_across_45_degrees_nothing_pops),
+        cmocka_unit_test(the_cubic_kernel_gives_the_cubic_integral),
+        cmocka_unit_test(samples_between_sheets_have_the_values_of_the_kernel),
+        cmocka_unit_test(voxels_beyond_the_halo_repeat_their_neighbours),
+        cmocka_unit_test(renderers_leave_out_the_same_voxels_beyond_the_halo),
+        cmocka_unit_test(every_kernel_preserves_a_constant_value),
+        cmocka_unit_test(turning_across_45_degrees_does_not_pop),
         cmocka_unit_test(bricks_and_coarser_levels_change_no_bit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* The order of splats about the eye: a ray meets the sheets of a list as it goes, those that lie
- * behind the eye and reach before it first. */
+/* The order of splats about the eye. A ray meets the sheets of a list in its direction. It first
+ * meets splats with centres behind the eye that reach before the eye. */
 #include "cpu_scenes.h"
 #include "splat.h"
 #include "test.h"
@@ -18,7 +18,8 @@ static trip_settings unlit(trip_compositing compositing)
     return s;
 }
 
-/* Wide enough for rays of both ways along every axis, each way with weight. */
+/* Returns a view wide enough for rays in both directions along every axis, each direction with
+ * weight. */
 static trip_camera_params view_from(trip_vec3 eye, trip_vec3 towards)
 {
     return (trip_camera_params){ .eye = eye,
@@ -36,7 +37,7 @@ static trip_camera camera_of(const scene *s, const trip_camera_params *view)
     return c;
 }
 
-/* Within twice what a renderer may be off by. */
+/* The difference must be within twice the renderer's tolerance. */
 static void expect_same(const scene_renderer *r, const scene_picture *p, const scene_picture *q,
                         const char *label)
 {
@@ -46,9 +47,7 @@ static void expect_same(const scene_renderer *r, const scene_picture *p, const s
         fail_msg("%s, %s: %.4f of 255 apart, at most %.4f", r->name, label, 255 * apart, 255 * max);
 }
 
-/* ---- a picture does not jump ---- */
-
-/* Dense fog of one extinction, its sheets of many colours. */
+/* Dense fog of one extinction. Its sheets have many colours. */
 static bool colourful(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -75,7 +74,8 @@ static void make_fog(scene *s, const trip_coordinates *coordinates)
     make_colours(s);
 }
 
-/* The views on both sides of sheet `sheet` of an axis, by so little that no pixel may tell. */
+/* Compares views from the two sides of sheet `sheet` of an axis. They are so close that no pixel
+ * may differ. */
 static void compare_sides(const scene *s, const scene_renderer *r, int axis, double sheet,
                           const trip_settings *settings)
 {
@@ -94,7 +94,7 @@ static void compare_sides(const scene *s, const scene_renderer *r, int axis, dou
     expect_same(r, &p, &q, label);
     scene_picture_free(&q);
     q = scene_draw(s, scene_renderers(), &above, settings);
-    if (!trip_coordinates_uneven(&s->data->coordinates)) /* near ones, summed, are not cpu's best */
+    if (!trip_coordinates_uneven(&s->data->coordinates)) /* cpu sums near splats less accurately */
         expect_same(r, &p, &q, "as the reference");
     scene_picture_free(&p);
     scene_picture_free(&q);
@@ -108,7 +108,7 @@ static void compare_all_sides(const scene *s, const trip_settings *settings, con
             compare_sides(s, r, axis, sheets[axis], settings);
 }
 
-static void nothing_jumps_as_the_eye_passes_a_sheet(void **state)
+static void pictures_do_not_jump_as_the_eye_passes_a_sheet(void **state)
 {
     (void)state;
     const double sheets[3] = { 8, 7, 8 };
@@ -123,9 +123,9 @@ static void nothing_jumps_as_the_eye_passes_a_sheet(void **state)
     scene_destroy(&s);
 }
 
-/* They are as wide in pixels at any depth, and so reach the farther over the eye the deeper they
- * lie. */
-static void nothing_jumps_with_fixed_footprints(void **state)
+/* Fixed footprints have the same width in pixels at any depth. Deeper splats therefore reach
+ * farther across the eye's plane. */
+static void pictures_do_not_jump_with_fixed_footprints(void **state)
 {
     (void)state;
     const double sheets[3] = { 8, 7, 8 };
@@ -141,8 +141,8 @@ static void nothing_jumps_with_fixed_footprints(void **state)
     scene_destroy(&s);
 }
 
-/* Where a splat is as wide as its voxel. */
-static void nothing_jumps_where_spacing_is_uneven(void **state)
+/* In such grids, a splat is as wide as its voxel. */
+static void pictures_do_not_jump_with_uneven_spacing(void **state)
 {
     (void)state;
     double tables[3][EDGE], sheets[3];
@@ -168,9 +168,7 @@ static void nothing_jumps_where_spacing_is_uneven(void **state)
     scene_destroy(&s);
 }
 
-/* ---- a picture is what its splats come to one behind the other ---- */
-
-/* Voxels of which no two have a coordinate in common, each with a colour of its own. */
+/* Voxels that share no coordinate, each with its own colour. */
 typedef struct few {
     int count;
     int at[SPLATS_MAX][3];
@@ -186,7 +184,7 @@ static bool one_of_few(void *user, int i, int j, int k, unsigned *code, double g
     return false;
 }
 
-/* About the middle of the grid, within two voxels of it. */
+/* Returns voxels around the centre of the grid, within two voxels of it. */
 static few random_few(int count)
 {
     few f = { .count = count };
@@ -204,7 +202,7 @@ static few random_few(int count)
     return f;
 }
 
-/* The splat of an axis that a ray meets as number n. */
+/* Returns the n-th splat that a ray meets along an axis. */
 static const int *met_as(const few *f, int axis, bool up, int n)
 {
     for (int i = 0; i < f->count; i++) {
@@ -228,7 +226,7 @@ static double opacity_at(const trip_splat_frame *f, const trip_splat *s, double 
     return -expm1(-depth);
 }
 
-/* All splats, in the order in which the ray meets their sheets. */
+/* Composites all splats in the order in which the ray meets their sheets. */
 static void composite(const scene *s, const few *all, const trip_splat_frame *f, int axis, double x,
                       double y, double layer[4])
 {
@@ -291,8 +289,8 @@ static double between(double lo, double hi)
     return lo + (hi - lo) * test_random();
 }
 
-/* One splat, too: its sheet is in the passes of both ways. */
-static void splats_about_the_eye_lie_as_the_ray_meets_them(void **state)
+/* The test includes a single splat. Its sheet is in the passes of both directions. */
+static void splats_about_the_eye_are_in_the_order_of_the_ray(void **state)
 {
     (void)state;
     for (int i = 0; i < 24; i++) {
@@ -318,10 +316,10 @@ static void splats_about_the_eye_lie_as_the_ray_meets_them(void **state)
     }
 }
 
-/* A red splat under the eye, by 0.3 of a voxel, and a blue one over it: straight up the red one is
- * before the blue one, and straight down it is alone, but for what of the blue one reaches there.
- */
-static void a_splat_just_behind_the_eye_is_seen_before_those_beyond(void **state)
+/* The red splat lies 0.3 voxel below the eye and the blue one above it. Looking straight up, red
+ * is before blue. Looking straight down, only red is visible, apart from the part of blue that
+ * reaches below the eye. */
+static void a_splat_just_behind_the_eye_covers_farther_ones(void **state)
 {
     (void)state;
     few f = { .count = 2, .at = { { 8, 8, 8 }, { 8, 8, 10 } } };
@@ -338,8 +336,8 @@ static void a_splat_just_behind_the_eye_is_seen_before_those_beyond(void **state
                                 .height = 15 };
     trip_settings settings = unlit(TRIP_COMPOSITING_SPLAT);
     settings.low_pass = TRIP_LOW_PASS_NONE;
-    /* Of the Gaussian on its axis, which is cut off at k and lowered to end at 0 there, what lies
-     * above the eye. */
+    /* The share above the eye of the Gaussian on its axis. The Gaussian is cut off at k and
+     * lowered to end at 0 there. */
     const double sigma = settings.kernel_radius / TRIP_CUTOFF, k = TRIP_CUTOFF;
     const double edge = exp(-0.5 * k * k), t = 0.3 / sigma;
     const double whole =
@@ -360,11 +358,11 @@ static void a_splat_just_behind_the_eye_is_seen_before_those_beyond(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_jumps_as_the_eye_passes_a_sheet),
-        cmocka_unit_test(nothing_jumps_with_fixed_footprints),
-        cmocka_unit_test(nothing_jumps_where_spacing_is_uneven),
-        cmocka_unit_test(splats_about_the_eye_lie_as_the_ray_meets_them),
-        cmocka_unit_test(a_splat_just_behind_the_eye_is_seen_before_those_beyond),
+        cmocka_unit_test(pictures_do_not_jump_as_the_eye_passes_a_sheet),
+        cmocka_unit_test(pictures_do_not_jump_with_fixed_footprints),
+        cmocka_unit_test(pictures_do_not_jump_with_uneven_spacing),
+        cmocka_unit_test(splats_about_the_eye_are_in_the_order_of_the_ray),
+        cmocka_unit_test(a_splat_just_behind_the_eye_covers_farther_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,7 +2,8 @@
 
 #include "splat.h"
 
-/* A view of the origin from `distance` along a random direction, over a random grid map. */
+/* Returns a view of the origin from `distance` in a random direction, with a random map of the
+ * grid. */
 static trip_splat_frame random_frame(double distance, double fov, bool ortho)
 {
     trip_camera_params p = { .look = { 0, 0, 0 },
@@ -23,7 +24,8 @@ static trip_splat_frame random_frame(double distance, double fov, bool ortho)
     return trip_splat_frame_make(&c, &s);
 }
 
-/* Distance in index space from v to the ray of a pixel position, by the plain formula. */
+/* Returns the distance in index space from v to the ray of a pixel position, by the plain formula.
+ */
 static double distance_to_ray(const trip_camera *c, trip_vec3 v, double x, double y)
 {
     trip_vec3 origin = c->eye, ray = trip_camera_ray(c, x, y);
@@ -95,8 +97,9 @@ static void every_ray_of_the_support_passes_within_the_radius(void **state)
     }
 }
 
-/* Over the ray's perpendicular plane the footprint's integral is the mass of the splat, one voxel's
- * volume; in pixels of a parallel view, whatever the zoom, the low-pass keeps it. */
+/* Over the plane perpendicular to the ray, the footprint's integral is the mass of the splat, the
+ * volume of one voxel. In a parallel view the low-pass filter keeps this integral in pixels at any
+ * zoom. */
 static void the_footprint_integrates_to_one_voxel_at_any_zoom(void **state)
 {
     (void)state;
@@ -113,7 +116,7 @@ static void the_footprint_integrates_to_one_voxel_at_any_zoom(void **state)
             if (m <= f.cutoff2)
                 sum += s.amplitude * (exp(-m / 2) - exp(-f.cutoff2 / 2)) * sx * sy;
         }
-        /* Index-space area of a pixel, perpendicular to the ray. */
+        /* The index-space area of a pixel, perpendicular to the ray. */
         trip_vec3 pixel = trip_cross(f.camera.rx, f.camera.ry);
         double area = fabs(trip_dot(pixel, trip_normalize(f.camera.r0)));
         assert_close(sum * area, 1, 2e-3);
@@ -144,7 +147,7 @@ static void a_round_splat_before_an_upright_grid_is_a_circle_of_known_size(void 
     f.low_pass2 = 0;
     trip_splat s;
     assert_true(trip_splat_project(&f, trip_v3(0, 0, 0), &s));
-    /* A ball of radius 2 at distance 10, seen under asin(0.2); 1000 px is tan 45 degrees. */
+    /* A ball of radius 2 at distance 10 has the half angle asin(0.2). 1000 px is tan 45 degrees. */
     double half = 1000 * tan(asin(0.2));
     assert_close(s.x0, 1000 - half, 1e-9);
     assert_close(s.x1, 1000 + half, 1e-9);
@@ -153,7 +156,7 @@ static void a_round_splat_before_an_upright_grid_is_a_circle_of_known_size(void 
     assert_close(s.z, 10, 1e-12);
 }
 
-/* Formulas of splat.h for z > 0, whether or not the support is an ellipse. */
+/* Evaluates the formulas of splat.h for z > 0, whether or not the support is an ellipse. */
 static double radius2_by_covariance(const trip_splat_frame *f, trip_vec3 voxel, double x, double y)
 {
     const trip_camera *c = &f->camera;
@@ -170,7 +173,7 @@ static double radius2_by_covariance(const trip_splat_frame *f, trip_vec3 voxel, 
     return q * trip_dot(ray, ray) / trip_dot(p, p);
 }
 
-static void near_splats_have_the_numbers_of_the_others(void **state)
+static void near_splats_have_the_numbers_of_far_splats(void **state)
 {
     (void)state;
     int near = 0;
@@ -198,8 +201,8 @@ static void near_splats_have_the_numbers_of_the_others(void **state)
     assert_in_range(near, 100, 400);
 }
 
-/* Whatever is in front of the eye or behind it, without low-pass. */
-static void near_splats_are_as_far_from_a_ray_as_it_passes(void **state)
+/* Splats lie in front of the eye and behind it, without low-pass filter. */
+static void near_splats_have_the_distance_at_which_a_ray_passes(void **state)
 {
     (void)state;
     int behind = 0;
@@ -230,7 +233,8 @@ static void near_splats_are_as_far_from_a_ray_as_it_passes(void **state)
     assert_in_range(behind, 50, 400);
 }
 
-/* At every pixel of pictures of any size and angle; `drawn` is false only when there is none. */
+/* Checks every pixel of pictures of any size and angle. `drawn` may be false only if no pixel is
+ * in the support. */
 static void no_pixel_of_a_support_lies_out_of_its_bounds(void **state)
 {
     (void)state;
@@ -270,8 +274,8 @@ static void no_pixel_of_a_support_lies_out_of_its_bounds(void **state)
     assert_true(covered > 10000);
 }
 
-/* On the way of the eye through a voxel no number jumps. */
-static void what_is_drawn_of_a_splat_changes_gradually_on_the_way_through_it(void **state)
+/* While the eye moves through a voxel, no value may jump. */
+static void a_splat_changes_gradually_as_the_eye_moves_through_it(void **state)
 {
     (void)state;
     trip_affine identity = trip_affine_identity();
@@ -295,7 +299,7 @@ static void what_is_drawn_of_a_splat_changes_gradually_on_the_way_through_it(voi
             double m = drawn ? trip_splat_radius2(&f, &s, x, y) : INFINITY;
             if (m <= f.cutoff2)
                 now = trip_splat_front(&f, &s, x, y) * s.amplitude * (exp(-m / 2) - f.edge);
-            /* The greatest change of a Gaussian's share is that of its middle. */
+            /* A Gaussian's share changes most quickly at its centre. */
             assert_true(i == 0 || fabs(now - before[j]) < 1.1 * f.amplitude * step / f.sigma);
             before[j] = now;
             first[j] = fmax(first[j], now);
@@ -305,7 +309,7 @@ static void what_is_drawn_of_a_splat_changes_gradually_on_the_way_through_it(voi
         assert_true(before[j] == 0 && first[j] > 0.05);
 }
 
-static void what_is_behind_or_beside_the_picture_is_not_drawn(void **state)
+static void splats_behind_the_eye_or_beside_the_picture_are_not_drawn(void **state)
 {
     (void)state;
     trip_camera_params p = {
@@ -316,7 +320,7 @@ static void what_is_behind_or_beside_the_picture_is_not_drawn(void **state)
     assert_int_equal(trip_camera_make(&c, &p, &m), 0);
     trip_settings settings = trip_settings_default();
     trip_splat_frame f = trip_splat_frame_make(&c, &settings);
-    f.low_pass2 = 0; /* then the support is the cone round a ball of radius 2 */
+    f.low_pass2 = 0; /* then the support is the cone around a ball of radius 2 */
     trip_splat s;
     assert_true(trip_splat_project(&f, trip_v3(0, -11, 0), &s));
     assert_false(trip_splat_project(&f, trip_v3(0, -13, 0), &s));
@@ -378,11 +382,11 @@ int main(void)
         cmocka_unit_test(the_footprint_integrates_to_one_voxel_at_any_zoom),
         cmocka_unit_test(minified_splats_are_as_wide_as_the_low_pass),
         cmocka_unit_test(a_round_splat_before_an_upright_grid_is_a_circle_of_known_size),
-        cmocka_unit_test(near_splats_have_the_numbers_of_the_others),
-        cmocka_unit_test(near_splats_are_as_far_from_a_ray_as_it_passes),
+        cmocka_unit_test(near_splats_have_the_numbers_of_far_splats),
+        cmocka_unit_test(near_splats_have_the_distance_at_which_a_ray_passes),
         cmocka_unit_test(no_pixel_of_a_support_lies_out_of_its_bounds),
-        cmocka_unit_test(what_is_drawn_of_a_splat_changes_gradually_on_the_way_through_it),
-        cmocka_unit_test(what_is_behind_or_beside_the_picture_is_not_drawn),
+        cmocka_unit_test(a_splat_changes_gradually_as_the_eye_moves_through_it),
+        cmocka_unit_test(splats_behind_the_eye_or_beside_the_picture_are_not_drawn),
         cmocka_unit_test(a_voxel_in_the_plane_of_the_eye_has_finite_numbers),
         cmocka_unit_test(the_stretch_is_the_world_length_of_an_index_step_along_the_ray),
     };

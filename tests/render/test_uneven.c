@@ -1,5 +1,5 @@
-/* Grids with uneven spacing (coordinates.h): the integral against closed forms, sheets by all
- * renderers against the integral, and splats by the others against the reference. */
+/* Grids with uneven spacing (coordinates.h). Compares the integral with closed forms, sheets of
+ * all renderers with the integral, and splats of the renderers with the reference. */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
 #include "test.h"
@@ -8,7 +8,7 @@
 
 enum { EDGE = 20 };
 
-/* Steps that differ by up to `most` times, along each axis others. */
+/* A grid with steps that differ by up to a given ratio. Each axis has its own steps. */
 typedef struct uneven {
     double tables[3][EDGE];
     trip_coordinates coordinates;
@@ -73,7 +73,7 @@ static trip_camera_params view_of(const scene *s, int number, int size)
     return view;
 }
 
-/* The grid fills the same box whatever the spacing within. */
+/* The grid fills the same box, whatever the spacing inside. */
 static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
 {
     (void)state;
@@ -107,7 +107,7 @@ static void a_constant_body_has_the_opacity_of_the_path_in_it(void **state)
     }
 }
 
-/* Proportional to the place along i. */
+/* Codes are proportional to the position along i. */
 static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const uneven *u = user;
@@ -118,9 +118,9 @@ static bool ramp(void *user, int i, int j, int k, unsigned *code, double gradien
     return true;
 }
 
-/* What is linear among places stays so between voxels, at whatever places these lie; but for the
+/* A function linear in the position stays linear between voxels at any positions, apart from the
  * rounding of codes. */
-static void a_ramp_is_as_steep_wherever_it_was_sampled(void **state)
+static void a_ramp_is_equally_steep_for_any_voxel_positions(void **state)
 {
     (void)state;
     uneven u;
@@ -152,8 +152,8 @@ static void a_ramp_is_as_steep_wherever_it_was_sampled(void **state)
     scene_destroy(&s);
 }
 
-/* Light falls on a ramp as on a plane, at every voxel: differences are divided by how far the
- * voxels are apart. */
+/* A ramp is lit like a plane at every voxel, because differences are divided by the distance of
+ * the voxels. */
 static void a_ramp_has_one_gradient(void **state)
 {
     (void)state;
@@ -174,7 +174,7 @@ static void a_ramp_has_one_gradient(void **state)
     scene_picture p = integrate(&s, &view, &lit);
     scene_picture q = scene_draw(&s, &cpu_scenes_reference, &view, &sheets);
     double first = (double)p.rgba[0] / (double)p.rgba[3];
-    assert_in_range(lround(1000 * fabs(first - 0.5)), 10, 500); /* it is lit */
+    assert_in_range(lround(1000 * fabs(first - 0.5)), 10, 500); /* the ramp is lit */
     for (int n = 0; n < 25; n++) {
         assert_close(p.rgba[4 * n] / p.rgba[4 * n + 3], first, 2e-4);
         assert_close(q.rgba[4 * n] / q.rgba[4 * n + 3], first, 2e-4);
@@ -184,7 +184,7 @@ static void a_ramp_has_one_gradient(void **state)
     scene_destroy(&s);
 }
 
-/* A blob about the grid's middle with a standard deviation of WIDTH. */
+/* A blob about the grid's centre with a standard deviation of WIDTH. */
 #define WIDTH 3.0
 static bool blob(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -213,8 +213,8 @@ static void create_blob(scene *s, uneven *u, const trip_affine *map)
         s->table[code] = (trip_tf_entry){ 1, (float)code / 65535, 0.25F, (float)code / 65535 };
 }
 
-/* The integral of a Gaussian along a line, but for the interpolation between voxels: linear over a
- * step h it is off by h^2 / 8 times the second derivative, which is at most 1 / WIDTH^2. */
+/* The line integral of a Gaussian. Linear interpolation over a step h has an error of h^2 / 8
+ * times the second derivative, which is at most 1 / WIDTH^2. */
 static void a_gaussian_has_its_line_integral(void **state)
 {
     (void)state;
@@ -233,7 +233,8 @@ static void a_gaussian_has_its_line_integral(void **state)
             trip_vec3 to = trip_sub(trip_v3(middle, middle, middle), o), across = trip_cross(to, d);
             double r2 = trip_dot(across, across), along = sqrt(2 * 3.14159265358979) * WIDTH;
             double depth = 60000.0 / 65535 * along * exp(-r2 / (2 * WIDTH * WIDTH));
-            double slack = 3 * h * h / (8 * WIDTH * WIDTH) * along + 0.01; /* and the box's end */
+            /* The constant allows for the end of the box. */
+            double slack = 3 * h * h / (8 * WIDTH * WIDTH) * along + 0.01;
             double alpha = (double)scene_pixel(&p, n % 7, n / 7)[3];
             assert_true(alpha >= -expm1(-depth + slack) && alpha <= -expm1(-depth - slack));
         }
@@ -252,7 +253,7 @@ static double away_from(const scene_picture *truth, const scene *s, const scene_
     return away;
 }
 
-static void samples_per_sheet_come_to_the_integral(void **state)
+static void more_samples_per_sheet_converge_to_the_integral(void **state)
 {
     (void)state;
     for (int i = 0; i < 20; i++) {
@@ -261,7 +262,7 @@ static void samples_per_sheet_come_to_the_integral(void **state)
         make_uneven(&u, i < 10 ? 6 : 20);
         create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = view_of(&s, i % 10, 12);
-        if (i % 10 >= 8) /* from within */
+        if (i % 10 >= 8) /* from inside */
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
         trip_settings fine = post(8), coarse = post(1), exact = plain(1e-6);
         fine.shading = coarse.shading = exact.shading = i / 2 % 2;
@@ -275,8 +276,8 @@ static void samples_per_sheet_come_to_the_integral(void **state)
     }
 }
 
-/* Where no ray is cut off the optical depths of all splats add up to their masses, of which each is
- * the extinction times the voxel's own volume. */
+/* If no ray is cut off, the optical depths of all splats add up to their masses. The mass of a
+ * splat is its extinction times the volume of its own voxel. */
 static void splats_have_the_mass_of_their_voxels(void **state)
 {
     (void)state;
@@ -290,7 +291,7 @@ static void splats_have_the_mass_of_their_voxels(void **state)
     trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.5, 0.2), 60, 30, SIZE);
     view.ortho_height = 60;
     trip_settings settings = splats();
-    settings.field = TRIP_FIELD_SPLATS; /* of the integral */
+    settings.field = TRIP_FIELD_SPLATS; /* selects the splats for the integral */
     double mass = 0;
     for (int n = 0; n < EDGE * EDGE * EDGE; n++) {
         const int at[3] = { n % EDGE, n / EDGE % EDGE, n / EDGE / EDGE };
@@ -326,7 +327,7 @@ static bool one_voxel(void *user, int i, int j, int k, unsigned *code, double gr
     return i == lone[0] && j == lone[1] && k == lone[2];
 }
 
-/* The kernel of even spacing, stretched along each axis as the voxel is. */
+/* The splat has the kernel of even spacing, stretched along each axis like the voxel. */
 static void a_splat_is_as_wide_as_its_voxel(void **state)
 {
     (void)state;
@@ -388,9 +389,9 @@ static bool noise(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Of one colour, so that their order does not matter; but for the low-pass of the screen, which
- * adds a variance that falls with the square of the pixel. */
-static void splats_of_one_colour_come_to_their_integral(void **state)
+/* Splats have one colour, so that their order does not matter. The low-pass filter adds a variance
+ * that falls with the square of the pixel size. */
+static void splats_of_one_colour_converge_to_their_integral(void **state)
 {
     (void)state;
     enum { SIZE = 12, FINENESSES = 3 };
@@ -448,7 +449,7 @@ static void compare(const scene *s, const trip_camera_params *view, const trip_s
     scene_picture_free(&p);
 }
 
-static void all_draw_the_splats_of_the_reference(void **state)
+static void renderers_draw_the_splats_of_the_reference(void **state)
 {
     (void)state;
     uneven u;
@@ -469,8 +470,8 @@ static void all_draw_the_splats_of_the_reference(void **state)
     }
 }
 
-/* Exact kernels, whatever they are drawn as, and near ones, whose rays each have their own length
- * in each kernel's index space. */
+/* The test draws exact kernels in every form, and kernels near the eye. Each ray has its own
+ * length in the index space of each near kernel. */
 static bool in_the_middle(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user;
@@ -479,8 +480,8 @@ static bool in_the_middle(void *user, int i, int j, int k, unsigned *code, doubl
     return i == EDGE / 2 && j == EDGE / 2 && k == EDGE / 2;
 }
 
-/* However thick a splat is. */
-static void nothing_is_left_outside_a_support(void **state)
+/* Splats may be of any thickness. */
+static void splats_are_zero_outside_their_support(void **state)
 {
     (void)state;
     uneven u;
@@ -523,7 +524,7 @@ static void gl_draws_exact_and_near_kernels(void **state)
         make_uneven(&u, i % 3 ? 6 : 20);
         create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = view_of(&s, i % 8, 40);
-        if (i >= 16) /* from within */
+        if (i >= 16) /* from inside */
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
         trip_settings settings = splats();
         settings.footprint = i / 2 % 2 ? TRIP_FOOTPRINT_EXACT : TRIP_FOOTPRINT_EWA;
@@ -543,7 +544,7 @@ static void gl_draws_exact_and_near_kernels(void **state)
     }
 }
 
-/* By the reference and by others. */
+/* Compares the renderers with the reference. */
 static void compare_sheets(const scene *s, const trip_camera_params *view,
                            const trip_settings *settings, double max)
 {
@@ -553,13 +554,13 @@ static void compare_sheets(const scene *s, const trip_camera_params *view,
         if (p.rgba) {
             assert_true(scene_difference(&p, &turn.picture) <= max);
         } else {
-            p = turn.picture; /* the reference's */
+            p = turn.picture; /* the picture of the reference */
             turn.picture = (scene_picture){ 0 };
         }
     scene_picture_free(&p);
 }
 
-static void all_draw_the_sheets_of_the_reference(void **state)
+static void renderers_draw_the_sheets_of_the_reference(void **state)
 {
     (void)state;
     for (int i = 0; i < 20; i++) {
@@ -568,7 +569,7 @@ static void all_draw_the_sheets_of_the_reference(void **state)
         make_uneven(&u, i % 3 ? 20 : 6);
         create_blob(&s, &u, i % 2 ? &scene_sheared : NULL);
         trip_camera_params view = view_of(&s, i / 2, 40);
-        if (i >= 16) /* from within */
+        if (i >= 16) /* from inside */
             view.eye = trip_affine_point(&s.data->index_to_world, trip_v3(9.3, 7.7, 12.1));
         trip_settings settings = post(1 + i % 4);
         settings.shading = i % 3 == 0;
@@ -579,8 +580,8 @@ static void all_draw_the_sheets_of_the_reference(void **state)
     }
 }
 
-/* Two layers across i with nothing between them, where voxels lie near to one another; the second
- * is seen faintly. */
+/* Two layers across i with a gap between them. Voxels are close together there, and the second
+ * layer is faintly visible. */
 static bool gap(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user, (void)j, (void)k;
@@ -589,9 +590,9 @@ static bool gap(void *user, int i, int j, int k, unsigned *code, double gradient
     return i < 5 || i >= 16;
 }
 
-/* Between two sheets that are far apart segments pass many cells, from the first layer to the
- * second, and all that lies between their ends is seen. */
-static void what_a_segment_leaps_over_is_seen(void **state)
+/* Between two distant sheets, a segment passes many cells from the first layer to the second.
+ * Every value between its ends is visible. */
+static void voxels_skipped_by_a_segment_are_visible(void **state)
 {
     (void)state;
     uneven u;
@@ -621,10 +622,10 @@ static void what_a_segment_leaps_over_is_seen(void **state)
     scene_destroy(&s);
 }
 
-/* Where the eye is among the splats, those about it have rays whose lengths in their own index
- * space differ; where splats are summed the CPU renderer takes these from the one through the
+/* The eye is among the splats. The lengths of rays differ in the index spaces of the splats near
+ * the eye. When the CPU renderer sums splats, it takes these lengths from the ray through each
  * centre. */
-static void from_within_all_draw_the_splats_of_the_reference(void **state)
+static void from_inside_renderers_draw_the_splats_of_the_reference(void **state)
 {
     (void)state;
     for (int i = 0; i < 16; i++) {
@@ -654,8 +655,9 @@ static void create_body(scene *s, const uneven *u, unsigned tile, unsigned slab)
     scene_colour(s, 65535, 65535, 1, 0.5, 0.25, 0.05);
 }
 
-/* One brick is read whole; of many those that narrow views from anywhere call for. */
-static void bricks_that_are_left_out_show_nothing(void **state)
+/* A single brick is always read completely. Narrow views from anywhere need only some of many
+ * bricks. */
+static void culled_bricks_contain_nothing_visible(void **state)
 {
     (void)state;
     uneven u;
@@ -688,7 +690,7 @@ static void bricks_that_are_left_out_show_nothing(void **state)
     scene_destroy(&parts);
 }
 
-/* Tables of even steps draw what no tables draw. */
+/* A grid with tables of even steps must draw the same picture as a grid without tables. */
 static void even_coordinates_change_nothing(void **state)
 {
     (void)state;
@@ -723,8 +725,8 @@ static void even_coordinates_change_nothing(void **state)
     }
 }
 
-/* A voxel is cut away by its place. */
-static void voxels_are_clipped_where_they_lie(void **state)
+/* Clipping uses the position of a voxel. */
+static void voxels_are_clipped_by_position(void **state)
 {
     (void)state;
     uneven u;
@@ -750,22 +752,22 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_constant_body_has_the_opacity_of_the_path_in_it),
-        cmocka_unit_test(a_ramp_is_as_steep_wherever_it_was_sampled),
+        cmocka_unit_test(a_ramp_is_equally_steep_for_any_voxel_positions),
         cmocka_unit_test(a_ramp_has_one_gradient),
         cmocka_unit_test(a_gaussian_has_its_line_integral),
-        cmocka_unit_test(samples_per_sheet_come_to_the_integral),
+        cmocka_unit_test(more_samples_per_sheet_converge_to_the_integral),
         cmocka_unit_test(splats_have_the_mass_of_their_voxels),
         cmocka_unit_test(a_splat_is_as_wide_as_its_voxel),
-        cmocka_unit_test(splats_of_one_colour_come_to_their_integral),
-        cmocka_unit_test(all_draw_the_splats_of_the_reference),
-        cmocka_unit_test(nothing_is_left_outside_a_support),
+        cmocka_unit_test(splats_of_one_colour_converge_to_their_integral),
+        cmocka_unit_test(renderers_draw_the_splats_of_the_reference),
+        cmocka_unit_test(splats_are_zero_outside_their_support),
         cmocka_unit_test(gl_draws_exact_and_near_kernels),
-        cmocka_unit_test(all_draw_the_sheets_of_the_reference),
-        cmocka_unit_test(what_a_segment_leaps_over_is_seen),
-        cmocka_unit_test(from_within_all_draw_the_splats_of_the_reference),
-        cmocka_unit_test(bricks_that_are_left_out_show_nothing),
+        cmocka_unit_test(renderers_draw_the_sheets_of_the_reference),
+        cmocka_unit_test(voxels_skipped_by_a_segment_are_visible),
+        cmocka_unit_test(from_inside_renderers_draw_the_splats_of_the_reference),
+        cmocka_unit_test(culled_bricks_contain_nothing_visible),
         cmocka_unit_test(even_coordinates_change_nothing),
-        cmocka_unit_test(voxels_are_clipped_where_they_lie),
+        cmocka_unit_test(voxels_are_clipped_by_position),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

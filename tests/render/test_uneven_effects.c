@@ -1,21 +1,20 @@
-/* Effects in grids with uneven spacing (coordinates.h): against closed forms, and against an even
- * grid that holds the same field: its voxels lie at all places at which those of the uneven one
- * may.
- */
+/* Effects in grids with uneven spacing (coordinates.h). Compares them with closed forms, and with
+ * an even grid of the same field. The even grid has voxels at all positions that the uneven grid
+ * can use. */
 #include "effects.h"
 #include "emission.h"
 #include "scenes.h"
 #include "test.h"
 
-/* Steps of 1, 2 and 3 fine voxels, half as many in each axis as the fine grid has. */
+/* Steps are 1, 2 and 3 fine voxels. Each axis has half as many voxels as the fine grid. */
 enum { EDGE = 20, FINE = 2 * EDGE - 1, SIZE = 9 };
 #define FOG 0.05
 
 typedef struct uneven {
-    int at[3][EDGE]; /* fine voxels */
+    int at[3][EDGE]; /* in fine voxels */
     double tables[3][EDGE];
     trip_coordinates coordinates;
-    bool hot; /* the first voxel, where nothing is, is the hottest */
+    bool hot; /* the first voxel, which is empty, is the hottest */
 } uneven;
 
 static void make_uneven(uneven *u)
@@ -58,7 +57,7 @@ static int renderers(void)
     return count;
 }
 
-/* By one of them, and then the integral. */
+/* Draws with one of the renderers; the number after the last one selects the integral. */
 static scene_picture draw(int number, const scene *s, const trip_camera_params *view,
                           const trip_settings *settings)
 {
@@ -80,9 +79,9 @@ static double position_x(const scene *s, const trip_camera_params *view, int x)
     return o.x;
 }
 
-/* The light of a slab is attenuated by as much of it as lies in the way, however many voxels that
- * is. */
-static void fog_lit_from_the_side_is_as_dark_as_it_is_thick(void **state)
+/* The light of a slab is attenuated by the thickness of slab in its way, whatever the number of
+ * voxels. */
+static void fog_lit_from_the_side_darkens_with_its_thickness(void **state)
 {
     (void)state;
     uneven u;
@@ -108,7 +107,7 @@ static void fog_lit_from_the_side_is_as_dark_as_it_is_thick(void **state)
     scene_destroy(&s);
 }
 
-/* Two boxes across x, empty between: voxels 3 to 6, and 12 to 15. */
+/* Two boxes across x with a gap between them: voxels 3 to 6, and 12 to 15. */
 static bool two_boxes(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user, (void)j, (void)k, (void)gradient;
@@ -116,7 +115,8 @@ static bool two_boxes(void *user, int i, int j, int k, unsigned *code, double gr
     return true;
 }
 
-/* Extinction over its maximum at x, and its integral from x on: linear between voxels. */
+/* Returns the extinction at x relative to its maximum, and its integral from x on. Extinction is
+ * linear between voxels. */
 static double boxes_at(const uneven *u, double x, double *beyond)
 {
     const double *t = u->tables[0];
@@ -134,7 +134,8 @@ static double boxes_at(const uneven *u, double x, double *beyond)
     return here;
 }
 
-/* The lattice blurs edges by its cells, a mean spacing, of an optical depth of 0.4 each. */
+/* The lattice blurs edges by its cells. A cell is as long as the mean spacing and has an optical
+ * depth of 0.4. */
 static void a_box_casts_its_shadow_on_the_next(void **state)
 {
     (void)state;
@@ -164,7 +165,8 @@ static void a_box_casts_its_shadow_on_the_next(void **state)
     scene_destroy(&s);
 }
 
-/* Of the uneven grid's voxel (i, j, k): a blob with a hard core, off the middle. */
+/* Returns the value of voxel (i, j, k) of the uneven grid: a blob with a hard core, off the
+ * centre. */
 static double value_of(const uneven *u, int i, int j, int k)
 {
     const double x = u->tables[0][i] - 8, y = u->tables[1][j] - 10.5, z = u->tables[2][k] - 9;
@@ -183,7 +185,7 @@ static bool uneven_voxel(void *user, int i, int j, int k, unsigned *code, double
     return true;
 }
 
-/* Of a voxel of the fine grid: linear between the uneven ones. */
+/* Returns a voxel of the fine grid, linearly interpolated between uneven voxels. */
 static bool fine_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     const uneven *u = user;
@@ -217,7 +219,7 @@ static void create_blob(scene *s, uneven *u, bool fine, bool normals, const trip
         s->table[code] = (trip_tf_entry){ 0.3F, 0.2F, 0.4F, 0.5F * (float)code / 65535 };
 }
 
-/* With no emission to come. */
+/* Colours the scene for frames without emission. */
 static void brighten(scene *s)
 {
     for (int code = 0; code < 65536; code++) {
@@ -235,8 +237,8 @@ static double off(const scene_picture *a, const scene_picture *b)
     return sum / count;
 }
 
-/* The lattice's cells, a mean spacing and more, are two of the fine grid's or more. Voxels taken to
- * lie evenly are off by more than these bounds. */
+/* Cells of the lattice are at least as long as the mean spacing, or two voxels of the fine grid. A
+ * renderer that assumed even spacing would exceed these bounds. */
 static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
 {
     (void)state;
@@ -282,7 +284,7 @@ static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
     }
 }
 
-/* Heat lies on a grid of its own, which may be uneven, too. */
+/* Heat has a grid of its own, which may be uneven, too. */
 static void begin_heat(scene *s, const scene *hot)
 {
     assert_int_equal(trip_emission_create(&s->emission, hot->path, s->budget), 0);
@@ -294,7 +296,7 @@ static void begin_heat(scene *s, const scene *hot)
         0);
 }
 
-static void heat_of_uneven_spacing_lies_where_its_voxels_do(void **state)
+static void heat_of_uneven_spacing_lies_at_its_voxels(void **state)
 {
     (void)state;
     const trip_affine identity = trip_affine_identity();
@@ -344,7 +346,7 @@ static trip_settings some_effects(int n)
     return settings;
 }
 
-static void every_renderer_draws_them_alike(void **state)
+static void every_renderer_draws_the_effects_alike(void **state)
 {
     (void)state;
     uneven u;
@@ -375,9 +377,9 @@ static void every_renderer_draws_them_alike(void **state)
     scene_destroy(&s);
 }
 
-/* What is cut away, a voxel where it lies: of the boxes the first, whose voxels are near to one
- * another, though some of their numbers are on the other side. */
-static void what_is_cut_away_casts_no_shadow(void **state)
+/* Clipping uses positions of voxels. It removes the first box, which has voxels close together. By
+ * their indices, some of the box's voxels would be on the other side. */
+static void clipped_voxels_cast_no_shadow(void **state)
 {
     (void)state;
     const double cut = 4;
@@ -453,12 +455,12 @@ static void even_coordinates_change_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(fog_lit_from_the_side_is_as_dark_as_it_is_thick),
+        cmocka_unit_test(fog_lit_from_the_side_darkens_with_its_thickness),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
         cmocka_unit_test(an_even_grid_with_the_same_field_has_the_same_light),
-        cmocka_unit_test(heat_of_uneven_spacing_lies_where_its_voxels_do),
-        cmocka_unit_test(every_renderer_draws_them_alike),
-        cmocka_unit_test(what_is_cut_away_casts_no_shadow),
+        cmocka_unit_test(heat_of_uneven_spacing_lies_at_its_voxels),
+        cmocka_unit_test(every_renderer_draws_the_effects_alike),
+        cmocka_unit_test(clipped_voxels_cast_no_shadow),
         cmocka_unit_test(even_coordinates_change_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

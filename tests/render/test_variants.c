@@ -1,6 +1,6 @@
-/* Forms of splatting that the papers compare with: footprints of a fixed size, weights of vertices,
- * image-aligned sheets, colours over their opacity. Against closed forms, and gl to the reference.
- */
+/* Forms of splatting for comparison with the papers: footprints of a fixed size, weights of
+ * vertices, image-aligned sheets, and colours divided by their opacity. Compares them with closed
+ * forms, and gl with the reference. */
 #include "cpu_scenes.h"
 #include "normalise.h"
 #include "splat.h"
@@ -56,8 +56,6 @@ static const scene_renderer *next_with(const scene_renderer *r, const char *firs
     return r;
 }
 
-/* ---- a fixed size ---- */
-
 static void a_sprite_is_as_large_as_the_sphere_in_the_middle(void **state)
 {
     (void)state;
@@ -78,8 +76,9 @@ static void a_sprite_is_as_large_as_the_sphere_in_the_middle(void **state)
     scene_destroy(&s);
 }
 
-/* W b |v'c - E| / |vc - E| in world space, of a point that the view does not look at; of cubes, and
- * of cells that are longer one way, across which all rays here run. */
+/* W b |v'c - E| / |vc - E| in world space, for a point away from the view's target. Voxels are
+ * cubes, or cells that are longer in one direction. All rays here are perpendicular to the long
+ * direction. */
 static void off_the_axis_a_sprite_has_the_papers_size(void **state)
 {
     (void)state;
@@ -108,8 +107,9 @@ static void off_the_axis_a_sprite_has_the_papers_size(void **state)
     }
 }
 
-/* Near and far voxels are as large, and as deep in their middle as the exact ones would be. */
-static void every_sprite_has_that_size(void **state)
+/* Near and far voxels are equally large. The depth at their centre equals the depth of exact
+ * footprints. */
+static void every_sprite_has_the_papers_size(void **state)
 {
     (void)state;
     const double width = 12, k2 = TRIP_CUTOFF * TRIP_CUTOFF, edge = exp(-k2 / 2);
@@ -162,8 +162,8 @@ static void in_parallel_views_of_cubes_nothing_changes(void **state)
     scene_destroy(&s);
 }
 
-/* Sprites and triangles, from afar, near and within, of cubes and of sheared cells. */
-static void gl_draws_the_references_sprites(void **state)
+/* Sprites and triangles, from afar, near and inside, of cubes and of sheared cells. */
+static void gl_draws_the_sprites_of_the_reference(void **state)
 {
     (void)state;
     const scene_renderer *gl = next_with(scene_renderers(), "gl", "gl");
@@ -193,7 +193,7 @@ static void gl_draws_the_references_sprites(void **state)
     }
 }
 
-/* Of which the eye will be at the first, or a little behind it. */
+/* The eye will be at the first voxel or a little behind it. */
 static const pair about_the_eye = { { 11, 13, 9 }, { 20, 17, 14 } };
 
 static trip_settings sprites(double width_px)
@@ -204,7 +204,7 @@ static trip_settings sprites(double width_px)
     return settings;
 }
 
-/* A voxel at the eye has no depth and no place in the picture. */
+/* A voxel at the eye has no depth and no position in the picture. */
 static void a_sprite_at_the_eye_is_not_drawn(void **state)
 {
     (void)state;
@@ -229,9 +229,9 @@ static void a_sprite_at_the_eye_is_not_drawn(void **state)
     scene_destroy(&s);
 }
 
-/* The eye a little behind the voxel, which lies on the ray through (30, 40): the sprite is there.
- */
-static void a_sprite_just_before_the_eye_is_drawn_where_it_lies(void **state)
+/* The eye is a little behind the voxel, which lies on the ray through (30, 40). The sprite is
+ * drawn there. */
+static void a_sprite_just_before_the_eye_is_drawn_at_its_position(void **state)
 {
     (void)state;
     scene s;
@@ -260,9 +260,7 @@ static void a_sprite_just_before_the_eye_is_drawn_where_it_lies(void **state)
     scene_destroy(&s);
 }
 
-/* ---- weights of vertices ---- */
-
-/* Whether a voxel that dense is opaque there. */
+/* Tests whether a voxel of this density is opaque at (x, y). */
 static bool covers(const trip_camera *c, const trip_settings *settings, const int at[3], double x,
                    double y)
 {
@@ -272,7 +270,7 @@ static bool covers(const trip_camera *c, const trip_settings *settings, const in
     return trip_splat_radius2(&f, &s, x, y) < 9;
 }
 
-/* Of the pixel at (x, y) in list `axis`: from the corners of the
+/* Returns the weight of the pixel at (x, y) in list `axis`, interpolated from the corners of the
  * bounds of the voxel's footprint. */
 static double weight_by_corners(const trip_camera *c, const trip_settings *settings, int axis,
                                 const int at[3], double x, double y)
@@ -294,7 +292,8 @@ static double weight_by_corners(const trip_camera *c, const trip_settings *setti
     return fmax(0, u + v <= 1 ? low : high);
 }
 
-/* Along X the red voxel is the first, along Y the blue one; each list's weight is from its last. */
+/* The red voxel comes first along X, the blue one along Y. The last voxel of each list gives the
+ * weight. */
 static void weights_are_interpolated_between_the_corners_of_the_last_splat(void **state)
 {
     (void)state;
@@ -332,7 +331,8 @@ static void weights_are_interpolated_between_the_corners_of_the_last_splat(void 
     scene_destroy(&s);
 }
 
-/* In dense fog no pixel is left empty by a layer whose weight comes from corners far beside it. */
+/* In dense fog, a layer with weights from corners far beside a pixel must not leave the pixel
+ * empty. */
 static void weights_of_splats_about_the_eye_leave_no_holes(void **state)
 {
     (void)state;
@@ -352,8 +352,6 @@ static void weights_of_splats_about_the_eye_leave_no_holes(void **state)
     scene_destroy(&s);
 }
 
-/* ---- image-aligned sheets ---- */
-
 static trip_settings by_image(void)
 {
     trip_settings s = plain();
@@ -361,7 +359,7 @@ static trip_settings by_image(void)
     return s;
 }
 
-/* A splat's parts add up to it, in front of the eye. */
+/* The parts of a splat in front of the eye add up to the splat. */
 static void the_sheets_of_one_splat_add_up_to_it(void **state)
 {
     (void)state;
@@ -386,7 +384,8 @@ static void the_sheets_of_one_splat_add_up_to_it(void **state)
     }
 }
 
-/* Depths to the planes n d; the share of a Gaussian between two, by Simpson's rule. */
+/* Planes have the depths n d. Integrates the share of a Gaussian between two planes by Simpson's
+ * rule. */
 static double share_between(double from, double to, double middle, double sigma)
 {
     const double reach = TRIP_CUTOFF * sigma;
@@ -401,7 +400,8 @@ static double share_between(double from, double to, double middle, double sigma)
     return to > from ? sum * (to - from) / (3 * STEPS) / (sqrt(2 * PI) * sigma * all) : 0;
 }
 
-/* Two that overlap along the ray through both: sheet by sheet, each sheet mixed. */
+/* Two splats overlap along the ray through both. They are composited sheet by sheet and mixed
+ * within each sheet. */
 static void splats_are_cut_by_planes_of_equal_depth(void **state)
 {
     (void)state;
@@ -443,9 +443,9 @@ static void splats_are_cut_by_planes_of_equal_depth(void **state)
     scene_destroy(&s);
 }
 
-/* Whichever list is read: a turn by a hundredth of a degree over the change of the axis changes
- * next to nothing, where one list alone jumps. */
-static void no_list_shows(void **state)
+/* Any list may be read. A turn by a hundredth of a degree across the change of the axis changes
+ * almost nothing. With one list alone, the picture jumps. */
+static void no_list_is_visible_in_image_aligned_sheets(void **state)
 {
     (void)state;
     scene s;
@@ -470,9 +470,7 @@ static void no_list_shows(void **state)
     scene_destroy(&s);
 }
 
-/* ---- what they go with ---- */
-
-static void forms_are_of_splats_and_exclude_others(void **state)
+static void forms_require_splats_and_exclude_each_other(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
@@ -494,8 +492,6 @@ static void forms_are_of_splats_and_exclude_others(void **state)
     }
 }
 
-/* ---- colours over their opacity ---- */
-
 static void colours_are_divided_by_their_opacity(void **state)
 {
     (void)state;
@@ -511,17 +507,17 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sprite_is_as_large_as_the_sphere_in_the_middle),
         cmocka_unit_test(off_the_axis_a_sprite_has_the_papers_size),
-        cmocka_unit_test(every_sprite_has_that_size),
+        cmocka_unit_test(every_sprite_has_the_papers_size),
         cmocka_unit_test(in_parallel_views_of_cubes_nothing_changes),
-        cmocka_unit_test(gl_draws_the_references_sprites),
+        cmocka_unit_test(gl_draws_the_sprites_of_the_reference),
         cmocka_unit_test(a_sprite_at_the_eye_is_not_drawn),
-        cmocka_unit_test(a_sprite_just_before_the_eye_is_drawn_where_it_lies),
+        cmocka_unit_test(a_sprite_just_before_the_eye_is_drawn_at_its_position),
         cmocka_unit_test(weights_are_interpolated_between_the_corners_of_the_last_splat),
         cmocka_unit_test(weights_of_splats_about_the_eye_leave_no_holes),
         cmocka_unit_test(the_sheets_of_one_splat_add_up_to_it),
         cmocka_unit_test(splats_are_cut_by_planes_of_equal_depth),
-        cmocka_unit_test(no_list_shows),
-        cmocka_unit_test(forms_are_of_splats_and_exclude_others),
+        cmocka_unit_test(no_list_is_visible_in_image_aligned_sheets),
+        cmocka_unit_test(forms_require_splats_and_exclude_each_other),
         cmocka_unit_test(colours_are_divided_by_their_opacity),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

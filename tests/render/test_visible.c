@@ -5,7 +5,7 @@
 
 enum { NX = 70, NY = 45, NZ = 37 };
 
-/* An oblique cigar of random codes in scattered faint voxels. */
+/* An oblique cigar of random codes among scattered faint voxels. */
 static bool cigar(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
     (void)user, (void)gradient;
@@ -28,7 +28,7 @@ static void make(scene *s, unsigned tile_voxels, unsigned slab_sheets)
     scene_colour(s, 41000, 65535, 1, 1, 1, 0.3);
 }
 
-/* Greatest values over the voxels with codes [first, last], one by one. */
+/* Checks the maximum values over the voxels with codes [first, last], one voxel at a time. */
 static void expect(const scene *s, unsigned first, unsigned last, const trip_reach_origin *origin,
                    const trip_reach *wanted, int count, double *values)
 {
@@ -73,7 +73,7 @@ static void any_reaches(trip_reach_origin *origin, trip_reach *wanted)
                                   i % 2 ? 0 : test_random() };
 }
 
-static void reaches_are_those_of_the_visible_voxels_whatever_the_tiles_and_slots(void **state)
+static void reaches_of_visible_voxels_do_not_depend_on_tiles_and_slots(void **state)
 {
     (void)state;
     const unsigned tiles[][2] = { { 16, 4 }, { 64, 8 }, { 32, 1 }, { 128, 64 } };
@@ -101,7 +101,7 @@ static void reaches_are_those_of_the_visible_voxels_whatever_the_tiles_and_slots
     }
 }
 
-/* Whatever is known before, and however the searches before have ended. */
+/* The result does not depend on values known before or on the end of earlier searches. */
 static void values_are_raised_where_visible_voxels_reach_farther(void **state)
 {
     (void)state;
@@ -172,7 +172,8 @@ static void most_of_a_list_is_not_looked_at(void **state)
     scene_destroy(&s);
 }
 
-/* A splat of radius r about a voxel reaches r times the normal's length in index space farther. */
+/* A splat of radius r about a voxel reaches farther by r times the normal's length in index space.
+ */
 static void kernels_reach_beyond_their_voxels(void **state)
 {
     (void)state;
@@ -189,7 +190,7 @@ static void kernels_reach_beyond_their_voxels(void **state)
     scene_destroy(&s);
 }
 
-static void where_nothing_is_visible_all_bounds_count(void **state)
+static void without_visible_voxels_all_bounds_count(void **state)
 {
     (void)state;
     scene s;
@@ -205,9 +206,9 @@ static void where_nothing_is_visible_all_bounds_count(void **state)
     scene_destroy(&s);
 }
 
-/* A sixteenth of the diagonal is 6 or so: 0.5/255 per unit of it counts, a thousandth of that not.
- */
-static void what_is_too_faint_to_see_does_not_count(void **state)
+/* A sixteenth of the diagonal is about 6. An opacity of 0.5/255 over this length counts, a
+ * thousandth of it does not. */
+static void voxels_too_faint_to_see_do_not_count(void **state)
 {
     (void)state;
     trip_reach_origin origin = { .index = { 0, 0, 0 } };
@@ -229,13 +230,13 @@ static void what_is_too_faint_to_see_does_not_count(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reaches_are_those_of_the_visible_voxels_whatever_the_tiles_and_slots),
+        cmocka_unit_test(reaches_of_visible_voxels_do_not_depend_on_tiles_and_slots),
         cmocka_unit_test(values_are_raised_where_visible_voxels_reach_farther),
         cmocka_unit_test(bounds_are_those_of_the_visible_voxels),
         cmocka_unit_test(most_of_a_list_is_not_looked_at),
         cmocka_unit_test(kernels_reach_beyond_their_voxels),
-        cmocka_unit_test(where_nothing_is_visible_all_bounds_count),
-        cmocka_unit_test(what_is_too_faint_to_see_does_not_count),
+        cmocka_unit_test(without_visible_voxels_all_bounds_count),
+        cmocka_unit_test(voxels_too_faint_to_see_do_not_count),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

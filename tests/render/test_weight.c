@@ -71,7 +71,7 @@ static void axis_takes_the_list_of_the_image_centre(void **state)
         assert_close(trip_weight(&s, 0, trip_v3(0, 0, 1), a), a == 0, 0);
 }
 
-static void at_every_pixel_of_any_camera_a_weight_is_one(void **state)
+static void at_every_pixel_of_any_camera_one_weight_is_1(void **state)
 {
     (void)state;
     for (int i = 0; i < 600; i++) {
@@ -90,7 +90,8 @@ static void at_every_pixel_of_any_camera_a_weight_is_one(void **state)
     }
 }
 
-/* Rays through points of the ball about a centre: none has weight where the bound says so. */
+/* Rays pass through points of the ball about a centre. If the bound excludes the ball, no ray may
+ * have weight. */
 static void a_ball_is_left_out_only_when_no_ray_through_it_has_weight(void **state)
 {
     (void)state;
@@ -139,7 +140,7 @@ static void in_a_parallel_view_the_one_direction_decides(void **state)
 
 typedef struct weighing {
     bool some, all;
-    bool way[TRIP_WAY_DOWN + 1]; /* some, by ways */
+    bool way[TRIP_WAY_DOWN + 1]; /* whether some ray has weight, by direction */
 } weighing;
 
 static weighing weigh_every_pixel(const trip_settings *s, const trip_camera *c, int view, int axis)
@@ -224,7 +225,7 @@ int main(void)
         cmocka_unit_test(merge_weights_follow_the_papers_formula),
         cmocka_unit_test(clip_takes_the_axis_most_aligned_with_the_ray),
         cmocka_unit_test(axis_takes_the_list_of_the_image_centre),
-        cmocka_unit_test(at_every_pixel_of_any_camera_a_weight_is_one),
+        cmocka_unit_test(at_every_pixel_of_any_camera_one_weight_is_1),
         cmocka_unit_test(a_ball_is_left_out_only_when_no_ray_through_it_has_weight),
         cmocka_unit_test(without_a_band_every_ball_is_kept_and_far_ones_beyond_it_are_not),
         cmocka_unit_test(in_a_parallel_view_the_one_direction_decides),
