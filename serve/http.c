@@ -238,9 +238,11 @@ static int listen_here(server *s, int port)
         s->daemon ? MHD_get_daemon_info(s->daemon, MHD_DAEMON_INFO_BIND_PORT) : NULL;
     s->port = info ? info->port : 0;
     snprintf(text, sizeof text, "127.0.0.1:%d", port);
-    return s->port ? 0
-                   : trip_fail(TRIP_ERROR, "serve", text,
-                               "cannot listen on this port; choose another with --port, or 0 for a free one");
+    return s->port
+               ? 0
+               : trip_fail(
+                     TRIP_ERROR, "serve", text,
+                     "cannot listen on this port; choose another with --port, or 0 for a free one");
 }
 
 static void say_address(const server *s, const trip_serve_params *params)

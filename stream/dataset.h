@@ -64,8 +64,8 @@ void trip_dataset_close(trip_dataset *d);
 int trip_dataset_verify(const trip_dataset *d, trip_budget *budget);
 
 /* Returns the first and last kept voxel along each index axis, or the grid's bounds if no voxel was
- * kept. Considers level 0 only, as all framing does (render/camera/visible.h). This is right for levels
- * that each show the same whole object. */
+ * kept. Considers level 0 only, as all framing does (render/camera/visible.h). This is right for
+ * levels that each show the same whole object. */
 void trip_dataset_kept_bounds(const trip_dataset *d, double lo[3], double hi[3]);
 
 /* Returns a list, or NULL if the data set has no such list. If data sets are joined, returns the

@@ -1,6 +1,6 @@
 /* The viewer's camera and its controls: plain values in world space, with the geometry of
- * render/camera/camera.h. A change that would make the view invalid is ignored: the eye at the point
- * looked at, or a number that is not finite. Pure functions. */
+ * render/camera/camera.h. A change that would make the view invalid is ignored: the eye at the
+ * point looked at, or a number that is not finite. Pure functions. */
 #ifndef TRIP_VIEW_NAVIGATION_H
 #define TRIP_VIEW_NAVIGATION_H
 

@@ -1,7 +1,7 @@
-/* The GPU data of a frame's effects (render/light/effects.h, render/light/emission.h). The lattices of light
- * and heat are textures, kept until their values change. Uniform blocks hold the constants by which
- * shaders find positions in the lattices and along the view. Owned by one renderer; the context
- * must be current. The textures count against the budget. */
+/* The GPU data of a frame's effects (render/light/effects.h, render/light/emission.h). The lattices
+ * of light and heat are textures, kept until their values change. Uniform blocks hold the constants
+ * by which shaders find positions in the lattices and along the view. Owned by one renderer; the
+ * context must be current. The textures count against the budget. */
 #ifndef TRIP_GL_LATTICES_H
 #define TRIP_GL_LATTICES_H
 

@@ -257,8 +257,8 @@ struct trip_gl_sum {
     TRIP_GL_FLOAT entry[4];
 };
 
-/* Replaces the sums if segments have a closed form. render/classification/closed_form.h defines the terms; k is
- * per voxel length. */
+/* Replaces the sums if segments have a closed form. render/classification/closed_form.h defines the
+ * terms; k is per voxel length. */
 struct trip_gl_closed {
     TRIP_GL_FLOAT scale, offset, ramp, unused;
     TRIP_GL_FLOAT k[4], q0[4], q1[4];
