@@ -16,8 +16,7 @@ typedef struct hard_view {
     trip_settings settings; /* the form sets classify and compositing */
     unsigned forms;
     unsigned gl; /* forms that gl draws too; slow on a machine without a GPU */
-    double tie;  /* tolerance of `post` for rays exactly on the grid's border; 0 selects the
-                    renderer's */
+    double tie;  /* tolerance of `post` at the grid's border; 0 selects the renderer's */
     bool shows;  /* the picture must contain something opaque */
 } hard_view;
 

@@ -53,7 +53,7 @@ static void any_temperature_has_a_colour(void **state)
     }
 }
 
-static void a_screen_shows_half_of_the_light_by_three_quarters(void **state)
+static void half_of_the_light_is_three_quarters_on_a_screen(void **state)
 {
     (void)state;
     assert_close(trip_display_of_linear(0), 0, 0);
@@ -68,7 +68,7 @@ int main(void)
         cmocka_unit_test(chromaticity_is_that_of_the_planckian_locus),
         cmocka_unit_test(hotter_bodies_are_less_red_and_more_blue),
         cmocka_unit_test(any_temperature_has_a_colour),
-        cmocka_unit_test(a_screen_shows_half_of_the_light_by_three_quarters),
+        cmocka_unit_test(half_of_the_light_is_three_quarters_on_a_screen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

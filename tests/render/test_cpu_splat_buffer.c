@@ -66,7 +66,7 @@ static void fill(fixture *f, uint32_t number, uint32_t count, float mark)
     trip_cpu_sort_chunk(&f->buffer, chunk, f->mask.grid, &f->sorting);
 }
 
-static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state)
+static void chunks_before_the_first_without_room_are_kept(void **state)
 {
     fixture *f = *state;
     assert_int_equal(reserve(f, 4), 4);
@@ -80,7 +80,7 @@ static void the_chunks_before_the_first_that_found_no_room_are_kept(void **state
 
 /* The first chunk comes last every time. It must find room eventually, or a frame would never end.
  */
-static void a_first_chunk_that_always_comes_last_finds_room_in_the_end(void **state)
+static void a_first_chunk_that_always_comes_last_finds_room(void **state)
 {
     fixture *f = *state;
     uint32_t kept = 0, rounds = 0;
@@ -116,7 +116,7 @@ static void take(void *user, const trip_cpu_chunk *chunk, const trip_cpu_splat *
     }
 }
 
-static void panes_get_their_splats_in_the_chunks_order_whoever_came_first(void **state)
+static void panes_get_their_splats_in_the_order_of_chunks(void **state)
 {
     fixture *f = *state;
     const uint32_t order[3] = { 2, 0, 1 };
@@ -173,7 +173,7 @@ static void take_mixed(void *user, const trip_cpu_chunk *chunk, const trip_cpu_s
     }
 }
 
-static void every_pane_that_a_splat_lies_in_gets_it_once(void **state)
+static void every_pane_of_a_splat_gets_it_once(void **state)
 {
     fixture *f = *state;
     enum { SPLATS = 3000 };
@@ -201,10 +201,10 @@ int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
     const struct CMUnitTest tests[] = {
-        TEST(the_chunks_before_the_first_that_found_no_room_are_kept),
-        TEST(a_first_chunk_that_always_comes_last_finds_room_in_the_end),
-        TEST(panes_get_their_splats_in_the_chunks_order_whoever_came_first),
-        TEST(every_pane_that_a_splat_lies_in_gets_it_once),
+        TEST(chunks_before_the_first_without_room_are_kept),
+        TEST(a_first_chunk_that_always_comes_last_finds_room),
+        TEST(panes_get_their_splats_in_the_order_of_chunks),
+        TEST(every_pane_of_a_splat_gets_it_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -113,7 +113,7 @@ static void check_flat(scene_voxel voxel, double opacity, double sheets, double 
     }
 }
 
-/* A sheet lets 1e-4 of the light pass, which comes from one sheet farther back. */
+/* A sheet lets 1e-4 of the light pass. This share is visible one sheet farther back. */
 static void an_opaque_slab_is_as_far_as_its_front_face(void **state)
 {
     (void)state;
@@ -121,7 +121,7 @@ static void an_opaque_slab_is_as_far_as_its_front_face(void **state)
 }
 
 /* Splats and their sums must stay finite, however opaque the slab is. */
-static void a_slab_is_as_far_and_as_bright_however_opaque_it_is(void **state)
+static void a_slab_keeps_its_distance_and_brightness_at_any_opacity(void **state)
 {
     (void)state;
     const float rgb[3] = { 1, 0.5F, 0.2F };
@@ -337,7 +337,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_opaque_slab_is_as_far_as_its_front_face),
-        cmocka_unit_test(a_slab_is_as_far_and_as_bright_however_opaque_it_is),
+        cmocka_unit_test(a_slab_keeps_its_distance_and_brightness_at_any_opacity),
         cmocka_unit_test(splats_centred_behind_the_eye_have_no_distance),
         cmocka_unit_test(two_half_transparent_sheets_are_at_their_weighted_mean),
         cmocka_unit_test(empty_pixels_are_infinitely_far),

@@ -71,8 +71,8 @@ static void fog_lit_from_the_side_is_darker_away_from_the_light(void **state)
     scene_destroy(&s);
 }
 
-/* Light passes through clipped voxels. At a cut in the middle between nodes, the lattice contains
- * half a voxel of the volume on each side. */
+/* Light passes through clipped voxels. The cut lies midway between two voxels, and the lattice
+ * counts half of the fog between them. */
 static void clipped_voxels_cast_no_shadow(void **state)
 {
     (void)state;
@@ -343,7 +343,7 @@ static void the_error_falls_as_the_lattice_becomes_finer(void **state)
     }
 }
 
-static void a_light_far_away_is_one_in_a_direction(void **state)
+static void a_distant_light_equals_a_directional_light(void **state)
 {
     (void)state;
     scene s;
@@ -1191,7 +1191,7 @@ int main(void)
         cmocka_unit_test(fog_lit_from_the_front_scatters_backwards),
         cmocka_unit_test(fog_is_lit_from_a_position),
         cmocka_unit_test(a_box_casts_its_shadow_on_the_next),
-        cmocka_unit_test(a_light_far_away_is_one_in_a_direction),
+        cmocka_unit_test(a_distant_light_equals_a_directional_light),
         cmocka_unit_test(a_coarse_lattice_has_the_extinction_of_even_fog_at_every_node),
         cmocka_unit_test(joined_data_sets_make_one_fog),
         cmocka_unit_test(every_node_is_lit_from_a_position_once),

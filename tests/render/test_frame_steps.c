@@ -14,7 +14,7 @@ static void check_range(const float *rgba)
         assert_true(rgba[i] >= 0 && rgba[i] <= 1.00001f);
 }
 
-/* Drawing only ever adds to the picture. */
+/* The opacity of a pixel must never decrease. */
 static void check_growth(const float *before, const float *after)
 {
     for (int i = 0; i < PIXELS; i++)
@@ -73,7 +73,7 @@ static bool waves(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-/* Draws with shading in `post`, so that gradients depend on the sheets decoded at the time of
+/* In `post`, values are lit. Their gradients depend on the sheets decoded at the time of
  * inspection. */
 static void steps_and_inspections_leave_the_picture_the_same(void **state)
 {

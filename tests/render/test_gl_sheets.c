@@ -190,8 +190,8 @@ static bool gentle(void *user, int i, int j, int k, unsigned *code, double gradi
 }
 
 /* Compared with the peak of another code, all visible extinction is a billionth. Its segments must
- * be differences of exact sums. Extinction is 0.05 in the first 99 codes and 0.1 from the next
- * code on. */
+ * be differences of exact sums. On a ray, extinction is 0.05 over the first 99 codes and 0.1 from
+ * the next code on. */
 static void the_density_of_fog_does_not_depend_on_other_codes(void **state)
 {
     (void)state;

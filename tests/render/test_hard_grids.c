@@ -64,7 +64,7 @@ static void shear_may_be_nearly_singular(void **state)
     }
 }
 
-static void far_away_small_voxels_are_told_apart(void **state)
+static void small_voxels_far_away_are_distinguished(void **state)
 {
     (void)state;
     const int64_t dims[3] = { 12, 11, 10 };
@@ -181,7 +181,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spacings_may_differ_a_thousandfold),
         cmocka_unit_test(shear_may_be_nearly_singular),
-        cmocka_unit_test(far_away_small_voxels_are_told_apart),
+        cmocka_unit_test(small_voxels_far_away_are_distinguished),
         cmocka_unit_test(voxels_too_small_or_large_for_floats_are_refused),
         cmocka_unit_test(a_grid_may_be_one_voxel_thick),
         cmocka_unit_test(a_grid_may_be_one_voxel_or_empty),

@@ -50,8 +50,8 @@ static double max_over_median(const scene *s, trip_method method, double h, unsi
     return changes[STEPS - 1] / changes[STEPS / 2];
 }
 
-/* The bounds are above the median step, which is 1. With `clip`, the border between two lists
- * crosses one of 32 pixel columns at a time, which explains its bound. */
+/* The median step is 1 in these ratios, so that 1 means no jump. With `clip`, the border between
+ * two lists crosses one of 32 pixel columns at a time, which leaves a small jump. */
 static void one_list_a_frame_pops_and_lists_by_pixel_do_not(void **state)
 {
     (void)state;

@@ -305,7 +305,7 @@ static void an_unwritable_path_is_a_failure(void **state)
 
 /* A limit on file size simulates a full disk. In both cases write(2) fails or writes less, because
  * the program ignores the signal. The helper process inherits the limit at its start. It restarts
- * after every failure, here after the first one. */
+ * after every failure, so that the failing read below restarts it. */
 static void a_full_disk_is_reported_and_leaves_nothing(void **state)
 {
     (void)state;

@@ -77,7 +77,7 @@ static void a_wall_is_hit_where_half_of_its_opacity_is_reached(void **state)
 
 /* A ramp is interpolated exactly. The part that belongs to a sheet reaches half a sheet to both
  * sides. */
-static void values_are_interpolated_whatever_the_tiles(void **state)
+static void values_are_interpolated_for_any_tile_size(void **state)
 {
     (void)state;
     const unsigned tiles[][2] = { { 16, 4 }, { 64, 8 }, { 32, 1 }, { 128, 64 } };
@@ -162,7 +162,7 @@ static void voxels_lie_at_the_coordinates_of_the_tables(void **state)
     scene_destroy(&s);
 }
 
-static void nothing_is_behind_the_eye_or_beside_the_grid(void **state)
+static void rays_hit_nothing_behind_the_eye_or_beside_the_grid(void **state)
 {
     (void)state;
     scene s;
@@ -180,10 +180,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_wall_is_hit_where_half_of_its_opacity_is_reached),
-        cmocka_unit_test(values_are_interpolated_whatever_the_tiles),
+        cmocka_unit_test(values_are_interpolated_for_any_tile_size),
         cmocka_unit_test(a_lone_voxel_reaches_half_way_to_its_neighbours),
         cmocka_unit_test(voxels_lie_at_the_coordinates_of_the_tables),
-        cmocka_unit_test(nothing_is_behind_the_eye_or_beside_the_grid),
+        cmocka_unit_test(rays_hit_nothing_behind_the_eye_or_beside_the_grid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

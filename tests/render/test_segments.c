@@ -51,7 +51,7 @@ static trip_tf_entry ramp(int code)
 }
 
 /* Means over [a, b] of v and of v squared. */
-static void a_ramp_has_the_means_of_polynomials_however_near_the_codes_are(void **state)
+static void a_ramp_has_the_means_of_polynomials_at_any_code_distance(void **state)
 {
     (void)state;
     make(ramp);
@@ -101,7 +101,7 @@ static trip_tf_entry triangle(int code)
     return (trip_tf_entry){ 1, 0, 0, code == peak ? 3 : 0 };
 }
 
-static void a_peak_of_one_code_is_counted_whole_wherever_it_is(void **state)
+static void a_peak_of_one_code_counts_fully_at_any_position(void **state)
 {
     (void)state;
     const int peaks[] = { 1, 2, 255, 256, 32767, 32768, 40000, 65533, 65534 };
@@ -172,7 +172,7 @@ static void products_of_linear_functions_are_integrated_exactly(void **state)
     assert_close(trip_segment_product(2, 2, 1, 4), 5, 1e-15);
 }
 
-static void one_code_is_the_function_between_entries(void **state)
+static void one_code_has_the_transfer_function_between_entries(void **state)
 {
     (void)state;
     make(ramp);
@@ -189,12 +189,12 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_constant_function_has_its_own_mean),
-        cmocka_unit_test(a_ramp_has_the_means_of_polynomials_however_near_the_codes_are),
+        cmocka_unit_test(a_ramp_has_the_means_of_polynomials_at_any_code_distance),
         cmocka_unit_test(a_step_counts_for_the_part_beyond_it),
-        cmocka_unit_test(a_peak_of_one_code_is_counted_whole_wherever_it_is),
+        cmocka_unit_test(a_peak_of_one_code_counts_fully_at_any_position),
         cmocka_unit_test(a_rough_function_equals_the_sum_of_many_small_steps),
         cmocka_unit_test(products_of_linear_functions_are_integrated_exactly),
-        cmocka_unit_test(one_code_is_the_function_between_entries),
+        cmocka_unit_test(one_code_has_the_transfer_function_between_entries),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

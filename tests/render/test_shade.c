@@ -71,7 +71,7 @@ static void a_given_light_shines_from_its_direction(void **state)
     assert_close(lit(&s, 7, 0, 7), matt + TRIP_SPECULAR, 1e-12);
 }
 
-static void a_light_at_a_place_shines_from_there(void **state)
+static void a_light_at_a_position_shines_from_there(void **state)
 {
     (void)state;
     trip_settings s = trip_settings_default();
@@ -327,7 +327,7 @@ int main(void)
         cmocka_unit_test(at_the_silhouette_only_ambient_light_is_left),
         cmocka_unit_test(weak_gradients_are_shaded_in_proportion),
         cmocka_unit_test(a_given_light_shines_from_its_direction),
-        cmocka_unit_test(a_light_at_a_place_shines_from_there),
+        cmocka_unit_test(a_light_at_a_position_shines_from_there),
         cmocka_unit_test(a_sphere_shines_on_the_side_that_light_and_eye_share),
         cmocka_unit_test(the_result_stays_within_the_colours_range),
         cmocka_unit_test(a_parallel_view_is_lit_alike_everywhere),

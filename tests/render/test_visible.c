@@ -158,7 +158,7 @@ static void bounds_are_those_of_the_visible_voxels(void **state)
     scene_destroy(&s);
 }
 
-static void most_of_a_list_is_not_looked_at(void **state)
+static void most_of_a_list_is_not_visited(void **state)
 {
     (void)state;
     scene s;
@@ -233,7 +233,7 @@ int main(void)
         cmocka_unit_test(reaches_of_visible_voxels_do_not_depend_on_tiles_and_slots),
         cmocka_unit_test(values_are_raised_where_visible_voxels_reach_farther),
         cmocka_unit_test(bounds_are_those_of_the_visible_voxels),
-        cmocka_unit_test(most_of_a_list_is_not_looked_at),
+        cmocka_unit_test(most_of_a_list_is_not_visited),
         cmocka_unit_test(kernels_reach_beyond_their_voxels),
         cmocka_unit_test(without_visible_voxels_all_bounds_count),
         cmocka_unit_test(voxels_too_faint_to_see_do_not_count),

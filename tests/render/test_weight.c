@@ -204,7 +204,7 @@ static void bounds_over_a_rectangle_hold_for_every_ray_in_it(void **state)
     assert_true(ruled_out > 1000);
 }
 
-static void pixels_are_those_whose_centres_lie_within_the_bounds(void **state)
+static void pixels_have_their_centres_within_the_bounds(void **state)
 {
     (void)state;
     enum { SIZE = 9 };
@@ -231,7 +231,7 @@ int main(void)
         cmocka_unit_test(in_a_parallel_view_the_one_direction_decides),
         cmocka_unit_test(a_list_is_used_if_some_pixel_has_weight_in_it_and_whole_only_if_all_have),
         cmocka_unit_test(bounds_over_a_rectangle_hold_for_every_ray_in_it),
-        cmocka_unit_test(pixels_are_those_whose_centres_lie_within_the_bounds),
+        cmocka_unit_test(pixels_have_their_centres_within_the_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
