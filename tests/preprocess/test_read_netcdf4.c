@@ -152,7 +152,7 @@ static void a_variable_is_chosen_by_name(void **state)
     assert_holds_sample(path, &(trip_volume_params){ .grid = "g/t" }, TRIP_I16);
     assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "t" }, "no variable \"t\"");
     assert_refused_as(TRIP_ERROR, path, &(trip_volume_params){ .grid = "x" },
-                      "not three dimensions");
+                      "does not have three dimensions");
 }
 
 /* Tries a file with only the signature of HDF5, and a file cut in half. */
@@ -273,7 +273,7 @@ static void answers_of_the_helper_are_not_trusted(void **state)
                                        "coordinates of a wrong size",
                                        "",
                                        "impossible size",
-                                       "not finite",
+                                       "not all are finite",
                                        "a variable without a name" };
     const char *path = write_bytes("i.nc", "\x89HDF\r\n\x1a\n", 8);
     for (int n = 0; n < (int)(sizeof why / sizeof *why); n++) {
