@@ -99,7 +99,8 @@ static const struct argp_option options[] = {
       "Sets how long the eye moves, 0.1 to 600 seconds (default: 12)", 3 },
     { NULL, 0, NULL, 0, "Variants of the papers:", 4 },
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
-      "Selects what pre composites, as in `triptych render` (default: splat); renderers, stream, "
+      "Selects the unit of compositing of pre, as in `triptych render` (default: splat); "
+      "renderers, stream, "
       "popping and levels only",
       4 },
     { "kernel-radius", KEY_KERNEL_RADIUS, "VOXELS", 0,

@@ -547,7 +547,7 @@ static void print_text(const options *o, const triptych_brick_summary *s)
            s->spacing[2]);
     printf("%-9s %llu read, values %.7g to %.7g\n", "voxels", (unsigned long long)s->voxels,
            s->value_min, s->value_max);
-    printf("%-9s %s\n", "taken for", s->kind_title);
+    printf("%-9s %s\n", "kind", s->kind_title);
     printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
     if (s->halo)
         printf("%-9s %llu neighbours of kept voxels, %s\n", "halo", (unsigned long long)s->halo,

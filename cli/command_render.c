@@ -294,13 +294,13 @@ static int draw_image(drawing *d, int index)
  * uses all processors or reads the source. */
 static int contexts_of(const drawing *d)
 {
-    enum { USUAL = 2 };
+    enum { DEFAULT = 2 };
     const render_options *o = &d->o;
     bool slow = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ||
                 o->renderer == TRIPTYCH_RENDERER_REFERENCE || o->engine == TRIPTYCH_ENGINE_NULL;
     if (d->sequence.frames < 2 || o->stats || o->explain || o->field == RENDER_FIELD_SOURCE)
         return 1;
-    return o->in_flight ? o->in_flight : slow ? 1 : USUAL;
+    return o->in_flight ? o->in_flight : slow ? 1 : DEFAULT;
 }
 
 /* Opens the data again with all of the memory, after frames in flight. */

@@ -147,9 +147,11 @@ int trip_option_size(const char *option, const char *text, int *width, int *heig
 {
     int used = 0;
     if (sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && !text[used] && *width > 0 &&
-        *height > 0 && strspn(text, "0123456789x") == strlen(text))
+        *height > 0 && *width <= 65536 && *height <= 65536 &&
+        strspn(text, "0123456789x") == strlen(text))
         return 0;
-    return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a size like 1024x768", text);
+    return trip_fail(TRIP_USAGE, "usage", option,
+                     "\"%s\" is not a size like 1024x768, with 1 to 65536 pixels a side", text);
 }
 
 const char *const trip_levels_for_names[] = { "auto", "post", "pre", "both", NULL };

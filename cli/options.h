@@ -20,7 +20,7 @@ int trip_option_numbers(const char *option, const char *text, int min, int max, 
 int trip_option_range(const char *option, const char *text, double *lo, double *hi);
 /* Parses a size with a binary suffix, for example "256M". */
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
-/* Parses a picture size, 1 to 99999 pixels a side, for example "1024x768". */
+/* Parses a picture size, 1 to 65536 pixels a side, for example "1024x768". */
 int trip_option_size(const char *option, const char *text, int *width, int *height);
 /* Names of triptych_levels_for, terminated by NULL. */
 extern const char *const trip_levels_for_names[];

@@ -99,7 +99,7 @@ static const struct argp_option options[] = {
       ".mov, .mkv or .webm, which needs ffmpeg",
       1 },
     { "size", KEY_SIZE, "WxH", 0,
-      "Sets the picture size in pixels, 1 to 99999 a side (default: 1024x1024)", 1 },
+      "Sets the picture size in pixels, 1 to 65536 a side (default: 1024x1024)", 1 },
     { NULL, 0, NULL, 0, "View:", 2 },
     { "azimuth", KEY_AZIMUTH, "DEGREES", 0,
       "Turns the eye around the object, to your right (default: 0)", 2 },
@@ -227,14 +227,15 @@ static const struct argp_option options[] = {
     TRIP_OPTIONS_VOLUME(10),
     { NULL, 0, NULL, 0, "Integral (--renderer integral):", 11 },
     { "field", KEY_FIELD, "NAME", 0,
-      "Selects what is integrated: stored values, the values of the source (requires a volume, not "
+      "Selects the integrand: stored values, the values of the source (requires a volume, not "
       "a data set) or splats (default: stored)",
       11 },
     { "tolerance", KEY_TOLERANCE, "E", 0,
       "Bounds the error of each component of a pixel, 1e-12 to 0.1 (default: 1e-4)", 11 },
     { NULL, 0, NULL, 0, "Variants of the papers:", 12 },
     { "compositing", KEY_COMPOSITING, "splat|sheet", 0,
-      "Selects what is composited: each splat in list order, or the sum of the splats of a sheet "
+      "Selects the unit of compositing: each splat in list order, or the sum of the splats of a "
+      "sheet "
       "(default: splat); pre only",
       12 },
     { "flatten", KEY_FLATTEN, "S", 0,

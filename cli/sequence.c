@@ -98,9 +98,9 @@ int sequence_find_shown(sequence *s)
 
 double sequence_frames_per_second(const sequence *s)
 {
-    enum { USUAL = 30 };
+    enum { DEFAULT = 30 };
     double own = s->path.frames_per_second;
-    return s->o->fps > 0 ? s->o->fps : own > 0 ? own : USUAL;
+    return s->o->fps > 0 ? s->o->fps : own > 0 ? own : DEFAULT;
 }
 
 /* ---- views ---- */

@@ -463,7 +463,7 @@ typedef struct triptych_settings {
  * - integral: values, linear kernel, tolerance 1e-4
  * - no effects; if set: anisotropy 0, cueing 0.6, 0 to 2500 K, 128 cells */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
-/* How close a picture comes to the integral, against the time that takes. triptych-accuracy(1) has
+/* Trades closeness to the integral for time; docs/quality.md has the figures. triptych-accuracy(1) has
  * the errors, measured by `triptych accuracy`. */
 typedef enum triptych_quality {
     TRIPTYCH_DRAFT,

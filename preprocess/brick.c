@@ -258,8 +258,8 @@ static int check_tally(brick *b)
                   (unsigned long long)(t->voxels - t->finite));
     if (b->summary->kept == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input,
-                         "no voxel is visible: the values are from %g to %g, and the transfer "
-                         "functions and ranges show none of these%s",
+                         "no voxel is visible: the values are from %g to %g, outside of all "
+                         "transfer functions and ranges%s",
                          t->value_min, t->value_max,
                          trip_region_is_whole(&b->params->region) ? "" : " in the region");
     if (t->value_min == t->value_max)
