@@ -90,14 +90,14 @@ static void add_targets(sweep *w)
 }
 
 /* Adds early termination below and above the defaults. */
-static void add_saturations(sweep *w)
+static void add_early_terminations(sweep *w)
 {
-    static const double saturations[] = { 0, 1.0 / 128, 1.0 / 32 };
-    for (size_t i = 0; i < sizeof saturations / sizeof *saturations; i++) {
+    static const double thresholds[] = { 0, 1.0 / 128, 1.0 / 32 };
+    for (size_t i = 0; i < sizeof thresholds / sizeof *thresholds; i++) {
         triptych_settings pre = w->pre, post = w->post;
-        pre.early_termination = post.early_termination = saturations[i];
-        add(w, TRIPTYCH_RENDERER_CPU, post, "post-early-termination-%g", saturations[i]);
-        add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-early-termination-%g", saturations[i]);
+        pre.early_termination = post.early_termination = thresholds[i];
+        add(w, TRIPTYCH_RENDERER_CPU, post, "post-early-termination-%g", thresholds[i]);
+        add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-early-termination-%g", thresholds[i]);
     }
 }
 
@@ -168,7 +168,7 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
     add_pre(&w, TRIPTYCH_BY_SPLAT);
     add_targets(&w);
     add_pre(&w, TRIPTYCH_BY_SHEET);
-    add_saturations(&w);
+    add_early_terminations(&w);
     add_levels(&w);
     add_kernels(&w);
     add_renderers(&w);

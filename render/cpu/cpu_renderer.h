@@ -6,7 +6,7 @@
 #include "renderer.h"
 
 /* Returns true only if no voxel of the run's brick can change the current layer. Then every pixel
- * in reach is saturated, has no weight or lies outside the image. So the picture is the same, bit
+ * in reach is terminated, has no weight or lies outside the image. So the picture is the same, bit
  * for bit, with or without the brick.
  *
  * Use it as trip_reader_params.skip with the renderer as skip_user. Called on the thread that

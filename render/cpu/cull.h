@@ -1,4 +1,4 @@
-/* Occlusion culling of the runs of a batch. Leaves out a square if all its pixels are saturated.
+/* Occlusion culling of the runs of a batch. Leaves out a square if all its pixels are terminated.
  * Any thread may call it while others blend. */
 #ifndef TRIP_CPU_CULL_H
 #define TRIP_CPU_CULL_H

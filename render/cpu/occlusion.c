@@ -73,7 +73,7 @@ static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px
     static_assert(TEXELS == 8, "a byte for a row");
     trip_pixels x = { px.first / TEXEL, px.last / TEXEL },
                 y = { py.first / TEXEL, py.last / TEXEL };
-    bool open = false, saturated = false;
+    bool open = false, terminated = false;
     if (px.first > px.last || py.first > py.last)
         return TRIP_CPU_OCCLUDED;
     for (int ty = y.first / TEXELS; ty <= y.last / TEXELS; ty++)
@@ -85,8 +85,8 @@ static trip_cpu_occlusion occlusion_of(const trip_cpu_mask *mask, trip_pixels px
                 atomic_load_explicit(&mask->panes[(uint32_t)ty * mask->grid.across + (uint32_t)tx],
                                      memory_order_relaxed);
             open |= rest != 0;
-            saturated |= rest != bits;
-            if (open && saturated)
+            terminated |= rest != bits;
+            if (open && terminated)
                 return TRIP_CPU_PARTLY;
         }
     return open ? TRIP_CPU_VISIBLE : TRIP_CPU_OCCLUDED;

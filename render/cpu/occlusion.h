@@ -1,6 +1,6 @@
 /* Tests whether a box of voxels can still change a pixel. The result lets the renderer skip runs
  * before projection and bricks before reading. Any thread may call these functions while others
- * blend, because a saturated texel never opens again in a layer. */
+ * blend, because a terminated texel never opens again in a layer. */
 #ifndef TRIP_CPU_OCCLUSION_H
 #define TRIP_CPU_OCCLUSION_H
 
@@ -14,14 +14,14 @@ typedef struct trip_cpu_grid {
 } trip_cpu_grid;
 
 /* An occlusion map with one bit for each texel of 4 x 4 pixels. The bit is 1 if a pixel is open and
- * 0 if all are saturated. A pane has eight rows of eight texels; the first row is in the lowest
+ * 0 if all are terminated. A pane has eight rows of eight texels; the first row is in the lowest
  * byte. */
 typedef struct trip_cpu_mask {
     trip_cpu_grid grid;
     _Atomic uint64_t *panes;
 } trip_cpu_mask;
 
-static inline bool trip_cpu_pane_is_saturated(const trip_cpu_mask *mask, uint32_t pane)
+static inline bool trip_cpu_pane_is_terminated(const trip_cpu_mask *mask, uint32_t pane)
 {
     return atomic_load_explicit(&mask->panes[pane], memory_order_relaxed) == 0;
 }
@@ -33,9 +33,9 @@ typedef struct trip_cpu_box {
 
 typedef enum trip_cpu_occlusion {
     TRIP_CPU_OCCLUDED, /* no splat of the box can change a pixel: all pixels of its support are in
-                          saturated texels or outside the image */
+                          terminated texels or outside the image */
     TRIP_CPU_PARTLY,   /* parts of the box may be occluded */
-    TRIP_CPU_VISIBLE,  /* no texel of the box's outline is saturated */
+    TRIP_CPU_VISIBLE,  /* no texel of the box's outline is terminated */
 } trip_cpu_occlusion;
 
 trip_cpu_occlusion trip_cpu_box_occlusion(const trip_cpu_view *view, const trip_cpu_mask *mask,

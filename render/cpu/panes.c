@@ -182,7 +182,7 @@ static void make_portions(trip_cpu *r, const trip_cpu_buffer *f)
     uint64_t large = all / trip_cpu_pool_threads(r->pool) * 2;
     for (uint32_t t = 0; t < trip_cpu_pane_count(r); t++) {
         uint32_t n = f->pane_lists[t].splats;
-        if (n == 0 || trip_cpu_pane_is_saturated(&r->mask, t))
+        if (n == 0 || trip_cpu_pane_is_terminated(&r->mask, t))
             continue;
         if (n > large && trip_cpu_pool_threads(r->pool) > 1 && r->states[t] & TRIP_CPU_PANE_BEGUN) {
             for (unsigned q = 0; q < 4; q++)

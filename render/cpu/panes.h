@@ -11,7 +11,7 @@ void trip_cpu_release_panes(trip_cpu *r);
 
 /* Empties all panes at the start of a frame. */
 void trip_cpu_begin_panes(trip_cpu *r);
-/* Opens every pane in which the current layer may have weight; marks the others as saturated. */
+/* Opens every pane in which the current layer may have weight; marks the others as terminated. */
 void trip_cpu_begin_pane_layer(trip_cpu *r);
 
 /* Returns the depths of the buffer's splats from `splat` on, or NULL if the buffer has none. */

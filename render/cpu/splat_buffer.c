@@ -344,7 +344,7 @@ void trip_cpu_link_pane_lists(trip_cpu_buffer *f, const trip_cpu_mask *mask)
             f->unsorted[f->unsorted_count++] = c;
         for (uint32_t i = 0; i < chunk->buckets; i++) {
             uint32_t bucket = chunk->first_bucket + i;
-            if (!trip_cpu_pane_is_saturated(mask, f->buckets[bucket].pane))
+            if (!trip_cpu_pane_is_terminated(mask, f->buckets[bucket].pane))
                 append(f, bucket);
         }
     }

@@ -104,7 +104,7 @@ typedef struct trip_cpu_sorting {
 void trip_cpu_sort_chunk(trip_cpu_buffer *f, trip_cpu_chunk *chunk, trip_cpu_grid grid,
                          trip_cpu_sorting *sorting);
 
-/* Links the buckets of all chunks by pane. Leaves out saturated panes. */
+/* Links the buckets of all chunks by pane. Leaves out terminated panes. */
 void trip_cpu_link_pane_lists(trip_cpu_buffer *f, const trip_cpu_mask *mask);
 
 /* Calls `take` with pieces of a pane's splats, in draw order. If `order` is NULL, `take` must look

@@ -82,15 +82,15 @@ class Look(program.ProgramTest):
     def test_opacity_scale_multiplies_extinction(self):
         view = ["--eye=9.5,-60,9.5", "--look=9.5,9.5,9.5", "--ortho=24", "--size=32x32"]
         view += ["--renderer", "reference", "--method", "axis", "--tf", "viridis"]
-        for classify, saturated in ("pre", 1 / 8192), ("post", 1 / 512), ("post", 1 / 50):
-            by = [*view, "--classify", classify, "--early-termination", saturated]
+        for classify, terminated in ("pre", 1 / 8192), ("post", 1 / 512), ("post", 1 / 50):
+            by = [*view, "--classify", classify, "--early-termination", terminated]
             once = self.picture("ball.trip", *by)[..., 3].astype(float)
             self.assertGreater(once.max(), 0.5)
             for scale in (0.25, 1, 3):
                 scaled = self.picture("ball.trip", *by, "--opacity-scale", scale)[..., 3]
                 expected = 1 - (1 - once) ** scale
                 # The expected opacity of a pixel is unknown after early termination.
-                open_still = (1 - once > saturated) & (1 - expected > saturated)
+                open_still = (1 - once > terminated) & (1 - expected > terminated)
                 self.assertGreater(open_still.mean(), 0.4, (classify, scale))
                 off = abs(scaled - expected)
                 self.assertLess(off[open_still].max(), 2e-4, (classify, scale))

@@ -158,7 +158,7 @@ static void occluded_voxels_reach_no_open_cell(void **state)
     assert_true(reaching > 1000);
 }
 
-static void without_saturated_texels_every_voxel_is_visible(void **state)
+static void without_terminated_texels_every_voxel_is_visible(void **state)
 {
     (void)state;
     scene s;
@@ -265,7 +265,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(occluded_boxes_reach_no_open_cell),
         cmocka_unit_test(occluded_voxels_reach_no_open_cell),
-        cmocka_unit_test(without_saturated_texels_every_voxel_is_visible),
+        cmocka_unit_test(without_terminated_texels_every_voxel_is_visible),
         cmocka_unit_test(runs_keep_every_voxel_that_reaches_an_open_cell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

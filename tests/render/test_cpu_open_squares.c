@@ -74,7 +74,7 @@ static void look(fixture *f, const trip_camera_params *params, int axis, int64_t
     trip_cpu_pass_view_make(&f->sheets.view, &f->frame, axis, way < 0, &function);
 }
 
-/* Makes each pane open, saturated, or open at one texel in a given number. */
+/* Makes each pane open, terminated, or open at one texel in a given number. */
 static void open_some(fixture *f, int seed)
 {
     for (int pane = 0; pane < PANES; pane++) {
@@ -199,7 +199,7 @@ static void rays_from_inside_find_their_voxels_decoded(void **state)
     check_view(f, &view, TRIP_KERNEL_LINEAR);
 }
 
-static void everything_is_decoded_while_nothing_is_saturated(void **state)
+static void everything_is_decoded_while_nothing_is_terminated(void **state)
 {
     fixture *f = *state;
     trip_camera_params view = view_from(f, trip_v3(1, 0.6, -0.4), 200, 40);
@@ -218,7 +218,7 @@ int main(void)
         cmocka_unit_test(rays_from_afar_find_their_voxels_decoded),
         cmocka_unit_test(parallel_rays_find_their_voxels_decoded),
         cmocka_unit_test(rays_from_inside_find_their_voxels_decoded),
-        cmocka_unit_test(everything_is_decoded_while_nothing_is_saturated),
+        cmocka_unit_test(everything_is_decoded_while_nothing_is_terminated),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,4 @@
-/* Early termination (trip_settings.saturation). Checks at which transmittance a pixel stops, how
+/* Early termination (trip_settings.early_termination). Checks at which transmittance a pixel stops, how
  * far the picture is from one without termination, and that renderers and instruction sets agree.
  */
 #include "cpu/kernels/isa.h"
@@ -58,9 +58,9 @@ static const scene_renderer *renderers_of(int form)
     return forms[form].classify == TRIP_CLASSIFY_POST ? scene_renderers_post() : scene_renderers();
 }
 
-static const double saturations[] = { TRIP_EARLY_TERMINATION_AUTO, 1.0 / 128, 1.0 / 32,
-                                      TRIP_EARLY_TERMINATION_MAX };
-enum { SATURATIONS = sizeof saturations / sizeof *saturations };
+static const double thresholds[] = { TRIP_EARLY_TERMINATION_AUTO, 1.0 / 128, 1.0 / 32,
+                                     TRIP_EARLY_TERMINATION_MAX };
+enum { THRESHOLDS = sizeof thresholds / sizeof *thresholds };
 
 /* Checks the error bound for one renderer and form. */
 static void check_bound(const scene *s, const scene_renderer *r, int form)
@@ -68,9 +68,9 @@ static void check_bound(const scene *s, const scene_renderer *r, int form)
     trip_camera_params view = scene_view(s, trip_v3(1, 0.8, 0.6), 60, 36, PIXELS);
     const trip_settings all = with(forms[form].classify, forms[form].compositing, 0);
     scene_picture wanted = scene_draw(s, r, &view, &all);
-    for (int i = 0; i < SATURATIONS; i++) {
+    for (int i = 0; i < THRESHOLDS; i++) {
         trip_settings settings = all;
-        settings.early_termination = saturations[i];
+        settings.early_termination = thresholds[i];
         if (!takes(r, &settings))
             continue;
         scene_picture p = scene_draw(s, r, &view, &settings);
@@ -116,9 +116,9 @@ static void renderers_stop_at_the_same_samples(void **state)
     create_waves(&s);
     trip_camera_params view = scene_view(&s, trip_v3(-0.4, 1, 0.7), 60, 36, PIXELS);
     for (int form = 0; form < FORMS; form++)
-        for (int i = 0; i < SATURATIONS; i++) {
+        for (int i = 0; i < THRESHOLDS; i++) {
             const trip_settings settings =
-                with(forms[form].classify, forms[form].compositing, saturations[i]);
+                with(forms[form].classify, forms[form].compositing, thresholds[i]);
             scene_picture wanted = scene_draw(&s, &cpu_scenes_reference, &view, &settings);
             for (const scene_renderer *r = renderers_of(form); r->name; r++) {
                 if (!takes(r, &settings))

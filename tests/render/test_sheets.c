@@ -372,7 +372,7 @@ static void walls_on_both_sides_of_the_eye_are_visible(void **state)
 
 /* One body is a little below the transmittance of early termination. The other is far below the
  * transmittance of a frame without early termination. */
-static void a_saturated_pixel_is_opaque(void **state)
+static void a_terminated_pixel_is_opaque(void **state)
 {
     (void)state;
     for (int i = 0; i < 5; i++) {
@@ -1100,7 +1100,7 @@ int main(void)
         cmocka_unit_test(rays_beside_the_grid_are_empty),
         cmocka_unit_test(the_nearest_wall_hides_those_behind_it),
         cmocka_unit_test(walls_on_both_sides_of_the_eye_are_visible),
-        cmocka_unit_test(a_saturated_pixel_is_opaque),
+        cmocka_unit_test(a_terminated_pixel_is_opaque),
         cmocka_unit_test(shading_uses_differences_of_values),
         cmocka_unit_test(a_segment_is_lit_by_the_mean_of_both_gradients),
         cmocka_unit_test(voxels_skipped_by_a_segment_are_visible_and_lit),

@@ -405,8 +405,8 @@ INLINE void blend_any(patch *p, const trip_cpu_splat *splat, float depth, trip_c
         put_over(p, splat, depth, optical_depth(p, splat, rays), target);
 }
 
-/* Blends splats of which none is thick. Returns false, without any change, if a pixel is saturated
- * or would become saturated. */
+/* Blends splats of which none is thick. Returns false, without any change, if a pixel is terminated
+ * or would become terminated. */
 INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 {
     patch q = *p;
@@ -420,7 +420,7 @@ INLINE bool blend_open(patch *p, const touching *t, trip_cpu_rays rays)
 }
 
 /* Blends all splats of the group that may touch a stamp, in order. Returns false if all its pixels
- * are saturated. A late test is no error, since saturated pixels never change. */
+ * are terminated. A late test is no error, since terminated pixels never change. */
 INLINE bool blend_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays rays,
                         bool front_to_back, trip_target target)
 {
@@ -600,7 +600,7 @@ typedef struct gathering {
     int4 corner;    /* of the pane: x, y, x, y */
 } gathering;
 
-/* Adds splats[i] to the group, unless all its stamps are saturated. */
+/* Adds splats[i] to the group, unless all its stamps are terminated. */
 INLINE void add(trip_cpu_scratch *s, gathering *g, const trip_cpu_splat *splats,
                 const float *depths, uint32_t i)
 {

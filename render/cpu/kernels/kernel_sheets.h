@@ -16,7 +16,7 @@
 struct trip_frame;
 
 /* Returns trip_settings_early_termination(), but at least 2^-60. A positive threshold makes pixels
- * without weight saturated and keeps numbers normal. Light behind a transmittance below 2^-60
+ * without weight terminated and keeps numbers normal. Light behind a transmittance below 2^-60
  * changes no float of a picture. */
 static inline float trip_cpu_early_termination(const trip_settings *s)
 {

@@ -14,12 +14,12 @@
 #include "splat.h"
 #include "weight.h"
 
-/* A pixel is saturated in three cases:
+/* A pixel is terminated in three cases:
  * - its transmittance is below trip_cpu_view.early_termination;
  * - its layer has no weight there;
  * - the layer draws only rays in the opposite direction.
  *
- * All other pixels are open. A saturated pixel takes no more splats, front to back.
+ * All other pixels are open. A terminated pixel takes no more splats, front to back.
  *
  * A pane is an aligned square of the picture; TRIP_CPU_PANE is its edge in pixels. A stamp is a
  * V-lane vector of four columns times V / 4 rows of it, so that a small footprint meets few
@@ -289,12 +289,12 @@ typedef struct trip_cpu_kernels {
     uint32_t (*stage)(const trip_cpu_view *view, const trip_cpu_square *square, bool reversed,
                       trip_cpu_staged *staged, uint32_t filled);
     /* Projects the first `count` staged voxels. Voxels with pixels in the image become splats, in
-     * order. `open` holds the words of trip_cpu_mask. Splats that lie only over saturated texels
+     * order. `open` holds the words of trip_cpu_mask. Splats that lie only over terminated texels
      * may then be left out. NULL keeps them. `out` and `depths` must have room for count + 1.
      * Returns the number of splats. project_effects is for frames with effects. */
     trip_cpu_project_kernel *project, *project_effects;
 
-    /* Clears a pane's pixels: transparent where the list has weight, saturated elsewhere. `alone`
+    /* Clears a pane's pixels: transparent where the list has weight, terminated elsewhere. `alone`
      * means that its weight is 1 in the whole pane. */
     void (*pane_clear)(const trip_cpu_view *view, int x, int y, bool alone, float *pixels);
     /* Begins to blend into a pane. `quarters` has a bit for each of its 16 x 16 quarters to draw.

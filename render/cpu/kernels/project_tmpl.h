@@ -8,7 +8,7 @@
 #ifndef TRIP_CPU_PROJECT_H
 #define TRIP_CPU_PROJECT_H
 
-#include "cpu/kernels/saturated_tmpl.h"
+#include "cpu/kernels/terminated_tmpl.h"
 #include "cpu/kernels/exp_tmpl.h"
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/rays_tmpl.h"
@@ -947,7 +947,7 @@ static uint32_t store_splats(const trip_cpu_view *view, const trip_cpu_staged *s
 }
 
 /* Projects in three loops. Each is short enough that the processor works on several vectors at
- * once. In a single loop it would wait for the chain of divisions and roots. Splats over saturated
+ * once. In a single loop it would wait for the chain of divisions and roots. Splats over terminated
  * texels are left out before they are coloured, stored, sorted and gathered.
  *
  * `common` means round kernels in perspective with exact footprints; `uneven` is then

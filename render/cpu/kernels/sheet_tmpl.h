@@ -1050,16 +1050,17 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
 
 /* Ends pixels with a transmittance below early_termination. Divides their colour by their opacity
  * and makes them opaque (sheet.h). */
-INLINE void finish_saturated(const trip_cpu_sheet_view *view, vf pixel[CHANNELS])
+INLINE void finish_terminated(const trip_cpu_sheet_view *view, vf pixel[CHANNELS])
 {
-    vm saturated = vm_and(v_gt(v_set(view->early_termination), pixel[3]), v_gt(pixel[3], v_set(0)));
-    if (!vm_any(saturated))
+    vm terminated =
+        vm_and(v_gt(v_set(view->early_termination), pixel[3]), v_gt(pixel[3], v_set(0)));
+    if (!vm_any(terminated))
         return;
     vf whole = v_set(1) / (v_set(1) - pixel[3]);
     for (int k = 0; k < CHANNELS; k++)
         if (k != 3)
-            pixel[k] = v_select(saturated, pixel[k] * whole, pixel[k]);
-    pixel[3] = v_select(saturated, v_set(0), pixel[3]);
+            pixel[k] = v_select(terminated, pixel[k] * whole, pixel[k]);
+    pixel[3] = v_select(terminated, v_set(0), pixel[3]);
 }
 
 /* ---- stamps ---- */
@@ -1172,7 +1173,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         sampled = next;
         if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
             continue;
-        finish_saturated(view, pixel);
+        finish_terminated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
             break;
     }

@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_SQUARES_H
 #define TRIP_CPU_SQUARES_H
 
-#include "cpu/kernels/saturated_tmpl.h"
+#include "cpu/kernels/terminated_tmpl.h"
 #include "cpu/occlusion.h"
 #include "cpu/kernels/project_tmpl.h"
 

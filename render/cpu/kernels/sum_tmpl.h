@@ -163,7 +163,7 @@ INLINE uint64_t sheet_key(const trip_cpu_view *view, int32_t sheet)
 }
 
 /* Adds all splats of the group that may touch a stamp, in order. They belong to one list. Returns
- * false if all its pixels are saturated. */
+ * false if all its pixels are terminated. */
 INLINE bool sum_stamp(trip_cpu_scratch *s, unsigned number, trip_cpu_rays kind)
 {
     patch p = load_stamp(s, number, kind, s->sums);

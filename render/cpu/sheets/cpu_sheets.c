@@ -442,7 +442,7 @@ static void draw_pane(void *context, unsigned task, unsigned thread)
     trip_cpu *r = s->of;
     (void)thread;
     if (trip_interrupted() || !(r->layers[task] & trip_cpu_layer_bit(s->axis, TRIP_WAY_ANY)) ||
-        trip_cpu_pane_is_saturated(&r->mask, task))
+        trip_cpu_pane_is_terminated(&r->mask, task))
         return;
     float *pixels = trip_cpu_pane_pixels(r, task);
     int x = trip_cpu_pane_x(r, task), y = trip_cpu_pane_y(r, task);

@@ -143,9 +143,9 @@ static uint64_t open_texels(const trip_cpu *r, uint32_t pane)
     return atomic_load_explicit(&r->mask.panes[pane], memory_order_relaxed);
 }
 
-/* Returns whether a pixel is saturated in a pane of the layer. Panes without the layer do not
+/* Returns whether a pixel is terminated in a pane of the layer. Panes without the layer do not
  * count. */
-static bool some_is_saturated(const trip_cpu *r, int axis)
+static bool some_is_terminated(const trip_cpu *r, int axis)
 {
     for (uint32_t i = 0; i < trip_cpu_pane_count(r); i++)
         if (r->layers[i] & trip_cpu_layer_bit(axis, TRIP_WAY_ANY) &&
@@ -187,7 +187,7 @@ void trip_cpu_open_squares_of_sheet(trip_cpu_sheets *s, int64_t number)
         return;
     }
     s->open_sheets = SHEETS - 1;
-    const bool some = !s->view.coordinates && some_is_saturated(s->of, s->axis);
+    const bool some = !s->view.coordinates && some_is_terminated(s->of, s->axis);
     memset(s->store.open, some ? 0 : 0xff, bytes);
     if (some)
         find_open_squares(s, number);

@@ -1,8 +1,8 @@
-/* Finds projected splats that lie over saturated texels (trip_cpu_mask) only, V at a time. Included
- * by project_tmpl.h. The renderer can leave out these splats, because saturated pixels never
- * change. Texels may become saturated at the same time, but never open again. */
-#ifndef TRIP_CPU_SATURATED_H
-#define TRIP_CPU_SATURATED_H
+/* Finds projected splats that lie over terminated texels (trip_cpu_mask) only, V at a time.
+ * Included by project_tmpl.h. The renderer can leave out these splats, because terminated pixels
+ * never change. Texels may become terminated at the same time, but never open again. */
+#ifndef TRIP_CPU_TERMINATED_H
+#define TRIP_CPU_TERMINATED_H
 
 #include "cpu/kernels/kernels.h"
 #include "cpu/kernels/simd_tmpl.h"

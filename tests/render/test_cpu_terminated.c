@@ -1,4 +1,4 @@
-/* Culling of splats over saturated cells, with every instruction set. A splat is left out exactly
+/* Culling of splats over terminated cells, with every instruction set. A splat is left out exactly
  * if no pixel of its support lies in an open cell. The test checks this cell by cell. */
 #include "cpu/kernels/isa.h"
 #include "cpu/cpu_view.h"
