@@ -32,7 +32,8 @@ int trip_option_choice(const char *option, const char *text, const char *const *
 #define TRIP_OPTION_MEMORY(key, group)                                                             \
     {                                                                                              \
         "memory", key, "SIZE", 0,                                                                  \
-            "Limits the memory for data, for example 256M or 2G (default: a quarter of the "       \
+            "Limits the memory for data, for example 256M (MiB) or 2G (GiB) (default: a quarter "  \
+            "of the "                                                                              \
             "memory that the process may use)",                                                    \
             group                                                                                  \
     }

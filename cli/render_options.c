@@ -124,7 +124,7 @@ static const struct argp_option options[] = {
       2 },
     { "view", KEY_VIEW, "SIDE", 0,
       "Selects the side that you see: front, back, left, right, top, bottom or iso; left is the "
-      "own left of the object (default: front, a little from the left and from above)",
+      "object's own left side (default: front, a little from the left and from above)",
       2 },
     { "zoom", KEY_ZOOM, "FACTOR", 0, "Magnifies the picture, as a longer lens does (default: 1)",
       2 },
@@ -132,7 +132,7 @@ static const struct argp_option options[] = {
     { "fps", KEY_FPS, "N", 0,
       "Sets the frames per second of a video, 0.001 to 1000 (default: from the path, else 30)", 3 },
     { "in-flight", KEY_IN_FLIGHT, "N", 0,
-      "Draws N pictures at once, 1 to 16; they share the memory (default: 2; with --stats or "
+      "Draws N pictures at once, 1 to 16; all of them share --memory (default: 2; with --stats or "
       "--explain 1)",
       3 },
     { "orbit", KEY_ORBIT, "N", 0,
