@@ -313,7 +313,7 @@ int render_stats_explain_plan(triptych *t, FILE *out)
     if (!status) {
         fprintf(out, "camera      %s\n", options);
         if (view.splats)
-            fprintf(out, "fitted      to the visible part, found among %" PRIu64 " splats\n",
+            fprintf(out, "fitted      to the visible part, found among %" PRIu64 " voxels\n",
                     view.splats);
         fputs(plan, out);
     }

@@ -392,7 +392,7 @@ typedef struct triptych_settings {
     /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
      * opaque. */
     int normalise;
-    /* EWA footprints: how many times flatter kernels are along full gradients, 1 (round) to 100.
+    /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1 (round) to 100.
      * Not with count. */
     double flatten;
     /* Post: 1 to 16. More samples come closer to the integral. 0 selects the number by the view. */

@@ -805,11 +805,12 @@ static void explain_list(const trip_plan *plan, const trip_settings *s, const tr
         bytes_read += plan->planes >> plane & 1 ? planned->bytes_selected[plane] : 0;
     bool read = is_read(plan, list);
     fprintf(out,
-            "%s: %" PRIu64 " of %" PRIu64 " bricks, %" PRIu64 " splats, %s (left out: %" PRIu64
+            "%s: %" PRIu64 " of %" PRIu64 " bricks, %" PRIu64 " %s, %s (left out: %" PRIu64
             " transparent, %" PRIu64 " out of view, %" PRIu64 " without weight%s)\n",
             read ? "read" : "empty", planned->bricks_selected, planned->bricks,
-            planned->splats_selected, trip_format_bytes(bytes_read, bytes),
-            planned->bricks_transparent, planned->bricks_outside, planned->bricks_without_weight,
+            planned->splats_selected, s->classify == TRIP_CLASSIFY_POST ? "voxels" : "splats",
+            trip_format_bytes(bytes_read, bytes), planned->bricks_transparent,
+            planned->bricks_outside, planned->bricks_without_weight,
             rarer_reasons(planned, others));
     if (read)
         explain_passes(plan, list, out);
