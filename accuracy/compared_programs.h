@@ -1,6 +1,6 @@
 /* Runs another program that draws the same views, in a process of its own.
- * accuracy/vtk_worker.py is such a program, for VTK's ray caster. The first lines of that file
- * describe the protocol. One thread. */
+ * accuracy/vtk_worker.py is such a program, for VTK's ray caster. Its first lines describe the
+ * protocol. One thread. */
 #ifndef TRIP_ACCURACY_COMPARED_PROGRAMS_H
 #define TRIP_ACCURACY_COMPARED_PROGRAMS_H
 

@@ -27,9 +27,9 @@ trip_vec3 trip_anatomy_direction(const char *space, char end);
     "three letters, where x, y and z point to: one of R and L, one of A and P, one of S and I"
 bool trip_anatomy_axes_valid(const char *axes);
 
-/* Whether a grid without orientation in its file is taken for a scan from the top of the head down,
- * with the face in the first rows, as is most common. Its axes must be the axes of world space, and
- * its voxels clearly longer along one axis than along another. */
+/* Returns whether a grid without orientation counts as a scan from the top of the head down. The
+ * face is then in the first rows, as in most such scans. Its axes must be the axes of world space,
+ * and its voxels clearly longer along one axis than along another. */
 bool trip_anatomy_is_scan_from_above(const trip_affine *index_to_world);
 
 /* Returns "right", "left", "anterior", "posterior", "superior" or "inferior", or "" for other

@@ -59,7 +59,8 @@ static void put_where(line *l, const char *where)
     put(l, ": ", 2);
 }
 
-/* On a terminal the line may replace a longer progress line, so the rest of that line is cleared.
+/* On a terminal the line can replace a longer progress line. So the rest of the terminal's line is
+ * cleared.
  */
 static void end_line(line *l, bool terminal)
 {

@@ -62,7 +62,7 @@ int trip_tf_parse_xml(trip_tf **out, const char *name, const char *text, size_t 
                       const char *preset);
 /* Parses a volume property of Slicer in text form. */
 int trip_tf_parse_vp(trip_tf **out, const char *name, const char *text, size_t bytes);
-/* Parses any of these formats or a `.tf`, recognised by the content. */
+/* Parses a `.tf` or another format. Recognises the format by the content. */
 int trip_tf_parse_any(trip_tf **out, const char *name, const char *text, size_t bytes,
                       const char *preset);
 

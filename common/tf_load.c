@@ -104,7 +104,8 @@ static int load_file(trip_tf **out, const char *path, const char *preset)
     return status;
 }
 
-/* Loads "FILE#NAME", or the file of that whole name if it exists. */
+/* Loads preset NAME of FILE from "FILE#NAME". A file with the complete name "FILE#NAME" has
+ * precedence. */
 static int load_path(trip_tf **out, const char *path)
 {
     const char *hash = strrchr(path, '#');

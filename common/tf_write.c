@@ -19,7 +19,7 @@ typedef struct writer {
     double unit_world;
 } writer;
 
-/* Whether point i can be left out. Of several points with one value, only the first and the last
+/* Whether point i can be left out. If several points share a value, only the first and the last
  * matter. */
 static bool is_idle(const trip_tf *tf, size_t i)
 {

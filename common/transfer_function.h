@@ -67,7 +67,7 @@ typedef struct trip_tf_origin {
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
 
 /* Loads a transfer function. `path_or_preset` may be:
- * - the name of a preset ("bone", "preset:bone"), even if a file of that name exists
+ * - the name of a preset ("bone", "preset:bone"), even if there is a file with this name
  * - a file, recognised by its content: `.tf` text, JSON of ParaView or 3D Slicer, a .vp, or XML
  *   of Slicer, VTK or ParaView
  * - "FILE#NAME" for one of several functions in a file

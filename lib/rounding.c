@@ -24,7 +24,7 @@ double trip_rounding_opacity(const session *s, const trip_settings *settings)
     return -expm1(-max * voxel * share);
 }
 
-/* A splat of opacity a changes an opacity of 3/4 by a / 4. Rounding to steps of that size u adds an
+/* A splat of opacity a changes an opacity of 3/4 by a / 4. Rounding to steps of size u adds an
  * error of up to u / 2 to each constant splat. Float layers store transmittance, which starts near
  * 1, where steps are 2^-24. */
 double trip_rounding_min(trip_target target)

@@ -12,9 +12,8 @@
  * threads. Contexts share nothing, so different threads may use different contexts.
  *
  * Errors: unless a comment says otherwise, functions that return int return 0 or a negative
- * triptych_status. triptych_error() then gives the reason. Each of these functions may return
- * TRIPTYCH_USAGE (invalid arguments, or a call in the wrong order) and TRIPTYCH_ERROR (files,
- * memory, devices).
+ * triptych_status. triptych_error() then gives the reason. Possible failures are TRIPTYCH_USAGE
+ * (invalid arguments, or a call in the wrong order) and TRIPTYCH_ERROR (files, memory, devices).
  *
  * Parameters: structs, in which 0 or NULL selects the default. The exception is triptych_settings,
  * which starts from triptych_default_settings(). The library does not use pointers in these structs
@@ -392,8 +391,8 @@ typedef struct triptych_settings {
     /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
      * opaque. */
     int normalise;
-    /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1 (round) to 100.
-     * Not with count. */
+    /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1
+     * (round) to 100. Not with count. */
     double flatten;
     /* Post: 1 to 16. More samples come closer to the integral. 0 selects the number by the view. */
     int samples_per_sheet;
@@ -463,8 +462,8 @@ typedef struct triptych_settings {
  * - integral: values, linear kernel, tolerance 1e-4
  * - no effects; if set: anisotropy 0, cueing 0.6, 0 to 2500 K, 128 cells */
 TRIPTYCH_API triptych_settings triptych_default_settings(void);
-/* Trades closeness to the integral for time; docs/quality.md has the figures. triptych-accuracy(1) has
- * the errors, measured by `triptych accuracy`. */
+/* Trades closeness to the integral for time; docs/quality.md has the figures. triptych-accuracy(1)
+ * has the errors, measured by `triptych accuracy`. */
 typedef enum triptych_quality {
     TRIPTYCH_DRAFT,
     TRIPTYCH_NORMAL, /* the default settings */
@@ -603,7 +602,7 @@ typedef struct triptych_frame_stats {
     uint64_t runs_occluded, bytes_occluded; /* not read, because they lie behind opaque matter */
     uint64_t bytes_unused; /* not read, because the planes have no effect on the picture */
     uint64_t memory_bytes, peak_memory_bytes; /* limit, and maximum since the data set was opened */
-    /* Such as "cpu", "8 threads, AVX2" and "io_uring+O_DIRECT". */
+    /* Examples: "cpu", "8 threads, AVX2" and "io_uring+O_DIRECT". */
     const char *renderer, *device, *engine;
     const char *ring;             /* memory into which blocks are read, in words */
     triptych_classify classify;   /* pre or post, as drawn */

@@ -53,9 +53,9 @@ trip_covariance2 trip_covariance_integrated(const trip_covariance *v, const trip
  * (section 4.5). */
 trip_covariance2 trip_covariance2_low_passed(const trip_covariance2 *s, double h2);
 
-/* Returns S times max(1, h^2 / minimum eigenvalue), so that no axis is shorter than h: the uniform
- * scaling of Swan, Mueller, Moeller, Shareef, Crawfis and Yagel 1997, which section 7 compares
- * with. */
+/* Returns S times max(1, h^2 / minimum eigenvalue), so that no axis is shorter than h. This is the
+ * uniform scaling of Swan, Mueller, Moeller, Shareef, Crawfis and Yagel 1997, which section 7
+ * compares with. */
 trip_covariance2 trip_covariance2_scaled(const trip_covariance2 *s, double h2);
 
 /* Returns the conic matrix S^-1 (section 6). */

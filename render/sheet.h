@@ -20,11 +20,11 @@
  * -------
  * Along a list's axis the samples lie in planes at the coordinates n / S, S =
  * settings.samples_per_sheet. In perspective the eye's own coordinate is one more. The planes cut a
- * layer's ray into segments. Only the field at the planes is used: each end of a segment is a
- * sample (c, g). A segment lies in the cell layer between two sheets. It is empty if one end lies
- * in an empty cell of the layer, or beyond the grid. Linear samples at a sheet (n / S is whole)
- * are interpolated from the four voxels around them there, and need no others. Rays begin at the
- * eye, or at its plane in parallel views. Everything behind is left out.
+ * layer's ray into segments. Each end of a segment is a sample (c, g) of the field at a plane. A
+ * segment lies in the cell layer between two sheets. It is empty if one end lies in an empty cell
+ * of the layer, or beyond the grid. Linear samples at a sheet (n / S is whole) are interpolated
+ * from the four voxels around them there, and need no others. Rays begin at the eye, or at its
+ * plane in parallel views. Everything behind is left out.
  *
  * Segments
  * --------

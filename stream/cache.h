@@ -13,7 +13,7 @@
 typedef struct trip_cache trip_cache;
 
 /* Creates a cache for the planes in the bit mask. A page is identified by its index in a table of
- * all pages of these planes. */
+ * all pages. */
 int trip_cache_create(trip_cache **out, const trip_dataset *d, unsigned planes, size_t bytes,
                       trip_budget *budget);
 void trip_cache_destroy(trip_cache *c);

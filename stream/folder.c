@@ -184,7 +184,7 @@ static bool same_folder(int fd, const char *path)
 }
 
 /* Opens and locks the partial folder. Another writer may rename it in between. The lock then
- * belongs to that writer's finished data set, and a new folder must be created. */
+ * belongs to the other writer's finished data set. A new folder must be created. */
 static int open_partial(trip_folder *f)
 {
     do {

@@ -63,7 +63,7 @@ typedef struct trip_read {
 
 void trip_request_start(trip_request *q);
 trip_read trip_request_read(const trip_request *q);
-/* Takes the result of that read, a count or -errno. Returns true if another read is needed. Returns
+/* Takes the read's result, a count or -errno. Returns true if another read is needed. Returns
  * false if the request is over: it has been checked, `done` was called, and it belongs to the
  * reader. */
 bool trip_request_step(trip_request *q, long result);

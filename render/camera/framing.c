@@ -123,10 +123,10 @@ static void roll(fitting *t)
     t->up = trip_sub(trip_scale(up, t->cos_roll), trip_scale(right, t->sin_roll));
 }
 
-/* The fit along one axis of the picture: the visible centre of the object, and the minimum distance
- * at which the object stays within the half angle with tangent `half`. A point at t along the axis
- * and d deeper than the origin satisfies |t - middle| <= half (distance + d). In a parallel view
- * half is 0, and the distance is the needed half height or width. */
+/* The fit along one axis of the picture: the visible centre of the object, and a minimum distance.
+ * From this distance the object stays within the half angle with tangent `half`. A point at t along
+ * the axis and d deeper than the origin satisfies |t - middle| <= half (distance + d). In a
+ * parallel view half is 0, and the distance is the needed half height or width. */
 typedef struct fit {
     double half, middle, distance;
 } fit;

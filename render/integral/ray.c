@@ -77,7 +77,7 @@ static pace make_pace(const trip_ray *r, int axis, int64_t edge)
                    .to_face = d > 0 ? edge : 0 };
 }
 
-/* Finds where the ray leaves a cube, at most `to`. Returns the axis of that face, or -1. */
+/* Finds where the ray leaves a cube, at most `to`. Returns the face's axis, or -1. */
 static int find_exit(const pace paces[3], const trip_ray_boxes *b, const int64_t at[3], double *to)
 {
     int axis = -1;

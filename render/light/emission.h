@@ -1,8 +1,8 @@
 /* Light from hot matter. A second data set, on any grid, holds temperatures. Matter radiates as a
  * black body, as much as it absorbs (Kirchhoff). Before depth cueing, its colour c becomes
  *     c' = c + E(T),   linear light of E = (T / HI)^4 black body of T   (black_body.h).
- * E is a display colour, like all colours. A value v of the data set means the temperature
- * LO + (HI - LO) v / V, where V is the maximum value; negative values count as 0.
+ * E is a display colour, like all colours. A value v of the data set means the temperature LO + (HI
+ * - LO) v / V. V is the maximum value. Negative values count as 0.
  *
  * The values lie on a coarse lattice (light_grid.h). One pass over a list gathers it (light_map.h),
  * and it is kept from frame to frame. Between nodes, values are interpolated linearly. Outside the

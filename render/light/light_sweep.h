@@ -3,10 +3,10 @@
  * light's rays from layer to layer and hold the remaining light, so that nothing blurs. At each
  * layer, the nodes interpolate linearly between the columns around them.
  *
- * A directional light needs one sweep. Around a point light the nodes fall into six regions, by the
- * axis and direction in which they are farthest from the light, like the lists of a view. Each
- * region has one sweep, outward from the light, with columns that spread. One thread calls. Other
- * threads may do rows of a layer as independent tasks; the results have the same bits. */
+ * A directional light needs one sweep. Around a point light the nodes fall into six regions. The
+ * region of a node is the axis and direction in which it is farthest from the light. Each region
+ * has one sweep, outward from the light, with columns that spread. One thread calls. Other threads
+ * may do rows of a layer as independent tasks; the results have the same bits. */
 #ifndef TRIP_LIGHT_SWEEP_H
 #define TRIP_LIGHT_SWEEP_H
 

@@ -115,6 +115,15 @@ class Look(program.ProgramTest):
                 self.assertEqual(json.load(f)["early_termination"], saturation)
             os.unlink("a.json")
 
+
+    def test_the_old_names_of_two_options_draw_the_same(self):
+        view = ["render", "ball.trip", "--size", "40x40", "--renderer", "cpu", "--classify", "post"]
+        self.works(*view, "-o", "new.exr", "--samples-per-sheet=3", "--early-termination=0.05")
+        self.works(*view, "-o", "old.exr", "--slices=3", "--saturation=0.05")
+        self.works(*view, "-o", "default.exr")
+        new, old, default = map(program.read_exr, ("new.exr", "old.exr", "default.exr"))
+        self.assertTrue((new == old).all())
+        self.assertFalse((new == default).all())
     def test_a_window_moves_the_transfer_function(self):
         shape = [(0, 0.1, 0.2, 0.9, 0), (0.5, 0.2, 0.9, 0.3, 0.1), (1, 1, 0.5, 0.1, 0.6)]
 

@@ -1,6 +1,6 @@
 /* Samples sheets with kernels of 64 voxels (kernel.h), one ray after the other. Included by
  * sheet_tmpl.h. Both ends of a segment are sampled in the segment's own cells (sheet.h). A missing
- * voxel has the value of the nearest corner of that cell. */
+ * voxel has the value of the cell's nearest corner. */
 #ifndef TRIP_CPU_WIDE_H
 #define TRIP_CPU_WIDE_H
 
