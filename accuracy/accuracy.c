@@ -15,7 +15,7 @@
 static int print_settings(void)
 {
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
-    const triptych_settings defaults = triptych_default_settings();
+    const draw_settings defaults = { 0 };
     int count = accuracy_settings(all, &defaults);
     for (int i = 0; i < count; i++) {
         printf("%-20s ", all[i].name);
@@ -26,7 +26,7 @@ static int print_settings(void)
     for (int i = 0; i < ACCURACY_POPPINGS; i++)
         printf("%-20s --classify %s, popping of each method and h in a turning view\n",
                accuracy_poppings[i].name,
-               accuracy_poppings[i].classify == TRIPTYCH_POST ? "post" : "pre");
+               accuracy_poppings[i].classify == TRIPTYCH_CLASSIFY_POST ? "post" : "pre");
     return 0;
 }
 

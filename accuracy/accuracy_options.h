@@ -15,14 +15,15 @@ typedef struct accuracy_options {
     const char *
         program[ACCURACY_COMPARED_PROGRAMS_MAX]; /* commands of programs that draw the same views */
     int program_count;
-    bool no_programs; /* leaves out VTK, which is measured by default if it is installed */
+    int no_programs; /* leaves out VTK, which is measured by default if it is installed */
     const char *output;
     const char *source;   /* volume that the data set was made of, or NULL */
     const char *tf;       /* NULL selects the transfer function in the data set */
     const char *settings; /* patterns joined by commas; NULL selects all */
     int width, height, views, repeat, samples;
     double tolerance, budget_seconds;
-    bool shading, ladder, force, quiet, list, pictures;
+    bool shading, ladder;
+    int no_shading, no_ladder, force, quiet, list, pictures;
     unsigned threads; /* 0 selects one per processor */
     uint64_t memory_bytes;
 } accuracy_options;

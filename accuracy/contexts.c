@@ -97,13 +97,13 @@ static double now_ms(void)
 }
 
 int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
-                           const triptych_settings *settings, float *rgba, double *ms)
+                           const draw_settings *settings, float *rgba, double *ms)
 {
     triptych *t;
     int status = accuracy_contexts_open(c, data, renderer, &t);
     if (status)
         return status;
-    status = triptych_set_settings(t, settings);
+    status = draw_settings_use(t, settings);
     double begin = now_ms();
     if (!status)
         status = triptych_draw(t, rgba);

@@ -34,6 +34,6 @@ int accuracy_contexts_look(accuracy_contexts *c, const accuracy_view *view);
 /* Draws a frame. *ms is the time from its beginning to the complete picture. Returns errors like
  * accuracy_contexts_open(). */
 int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
-                           const triptych_settings *settings, float *rgba, double *ms);
+                           const draw_settings *settings, float *rgba, double *ms);
 
 #endif

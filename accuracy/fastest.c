@@ -12,7 +12,7 @@
 
 #include "input_file.h"
 #include "json.h"
-#include "options.h"
+#include "command_line.h"
 #include "report.h"
 
 enum { MAX_BYTES = 16 << 20, VERSION = 1 };
@@ -81,7 +81,7 @@ static bool read_row(const cJSON *row, const char *data_set, accuracy_found *out
 /* ---- the report ---- */
 
 static void warn_of_differences(const cJSON *root, const char *path, const accuracy_wanted *w,
-                                const triptych_settings *s)
+                                const draw_settings *s)
 {
     const char *function = text_of(root, "transfer_function");
     if (!is_same(function, w->function))
@@ -89,9 +89,9 @@ static void warn_of_differences(const cJSON *root, const char *path, const accur
                   function ? "--tf " : "the data set's own transfer function",
                   function ? function : "", w->function ? "--tf " : "the data set's own",
                   w->function ? w->function : "");
-    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(root, "shading")) != !!s->shading)
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(root, "shading")) != !s->light.no_shading)
         trip_warn(path, "was measured %s; errors and times differ",
-                  s->shading ? "without light" : "with light");
+                  s->light.no_shading ? "with light" : "without light");
 }
 
 int accuracy_check_data(const char *measured, const char *drawn, const char *path)
@@ -126,7 +126,7 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
                   accuracy_found *out)
 {
     const cJSON *row;
-    const triptych_settings defaults = out->setting.settings;
+    const draw_settings defaults = out->setting.settings;
     const char *data_set = text_of(root, "data_set");
     accuracy_found best = { .ms = INFINITY }, closest = { .error = INFINITY };
     cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "rows"))

@@ -13,7 +13,7 @@
 #include "contexts.h"
 #include "flip.h"
 #include "json.h"
-#include "options.h"
+#include "command_line.h"
 #include "picture_data.h"
 #include "report.h"
 #include "ssim.h"
@@ -36,7 +36,7 @@ typedef struct sweep {
     accuracy_measured *m;
     const accuracy_options *o;
     accuracy_contexts contexts;
-    triptych_settings defaults;
+    draw_settings defaults;
     bench_progress *progress;
     float *pictures[PICTURES];
     size_t picture_bytes;
@@ -44,8 +44,8 @@ typedef struct sweep {
     /* Data set and settings of the pictures STORED, FIELD and REFERENCE; -1 if there is no
      * picture. */
     int stored_data, field_data, reference_data;
-    triptych_settings field; /* only the settings that change the integral */
-    triptych_settings reference;
+    draw_settings field; /* only the settings that change the integral */
+    draw_settings reference;
     accuracy_error view; /* scratch memory */
 } sweep;
 
@@ -105,14 +105,14 @@ static int add_row(accuracy_measured *m, int data, const accuracy_setting *setti
 }
 
 /* Adds rows for the other data sets, by post and by pre. */
-static int add_others(accuracy_measured *m, const triptych_settings *defaults)
+static int add_others(accuracy_measured *m, const draw_settings *defaults)
 {
     int status = 0;
     for (int d = 1; d < m->options->data_count && !status; d++)
         for (int pre = 0; pre < 2 && !status; pre++) {
             accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU, .settings = *defaults };
             const char *slash = strrchr(m->options->data[d], '/');
-            one.settings.classify = pre ? TRIPTYCH_PRE : TRIPTYCH_POST;
+            one.settings.all.classify = pre ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
             snprintf(one.name, sizeof one.name, "%s-%.30s", pre ? "pre" : "post",
                      slash && slash[1] ? slash + 1 : m->options->data[d]);
             if (is_wanted(m->options->settings, one.name))
@@ -153,7 +153,7 @@ static int add_programs(accuracy_measured *m)
     return status;
 }
 
-static int add_rows(accuracy_measured *m, const triptych_settings *defaults)
+static int add_rows(accuracy_measured *m, const draw_settings *defaults)
 {
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
     int count = accuracy_settings(all, defaults), status = 0;
@@ -187,10 +187,10 @@ __attribute__((format(printf, 2, 3))) static void leave_out(accuracy_row *row, c
 }
 
 /* Returns whether the data set has coarse levels for a setting. */
-static bool has_levels(triptych *t, const triptych_settings *settings)
+static bool has_levels(triptych *t, const draw_settings *settings)
 {
     unsigned levels;
-    return triptych_count_levels(t, settings->classify, &levels) == 0 && levels > 0;
+    return triptych_count_levels(t, draw_settings_classify(settings), &levels) == 0 && levels > 0;
 }
 
 /* Reads the --levels-for of the data set from its notes. */
@@ -233,23 +233,23 @@ static int leave_out_idle(sweep *s)
                            "it nevertheless");
         if (row->program)
             continue;
-        if (row->setting.settings.lod_px > 0 && !has_levels(t, &row->setting.settings))
+        if (row->setting.settings.lod.voxel_px > 0 && !has_levels(t, &row->setting.settings))
             leave_out(row, "the data set has no coarse levels for this setting");
-        else if (row->setting.settings.samples > s->o->samples)
+        else if (row->setting.settings.all.samples > s->o->samples)
             leave_out(row,
                       "the integral has %d x %d rays per pixel; --samples %d compares this setting",
-                      s->o->samples, s->o->samples, row->setting.settings.samples);
+                      s->o->samples, s->o->samples, row->setting.settings.all.samples);
     }
     return 0;
 }
 
 /* ---- pictures of the steps ---- */
 
-static int draw_integral(sweep *s, int data, int renderer, triptych_settings settings, float *rgba)
+static int draw_integral(sweep *s, int data, int renderer, draw_settings settings, float *rgba)
 {
     double ms;
-    settings.tolerance = s->o->tolerance;
-    settings.samples = s->o->samples;
+    settings.integral.tolerance = s->o->tolerance;
+    settings.all.samples = s->o->samples;
     bench_progress_step(s->progress, "integral");
     int status = accuracy_contexts_draw(&s->contexts, data, renderer, &settings, rgba, &ms);
     return status == TRIP_ERROR
@@ -260,10 +260,10 @@ static int draw_integral(sweep *s, int data, int renderer, triptych_settings set
 }
 
 /* Returns the settings for the integral of values with the default interpolation. */
-static triptych_settings default_field(const sweep *s)
+static draw_settings default_field(const sweep *s)
 {
-    triptych_settings settings = s->defaults;
-    settings.field = TRIPTYCH_VALUES;
+    draw_settings settings = s->defaults;
+    settings.integral.field = TRIPTYCH_FIELD_VALUES;
     return settings;
 }
 
@@ -280,17 +280,15 @@ static int need_stored(sweep *s, int data)
  * kernel. */
 static int need_field(sweep *s, const accuracy_row *row, bool splats)
 {
-    const triptych_settings *drawn = &row->setting.settings;
-    triptych_settings field = default_field(s);
+    const draw_settings *drawn = &row->setting.settings;
+    draw_settings field = default_field(s);
     if (splats) {
-        field.field = TRIPTYCH_SPLATS;
-        field.classify = TRIPTYCH_PRE;
-        field.kernel_radius = drawn->kernel_radius;
+        field.integral.field = TRIPTYCH_FIELD_SPLATS;
+        field.splat.kernel_radius = drawn->splat.kernel_radius;
     } else {
-        field.kernel = drawn->kernel;
+        field.all.kernel = drawn->all.kernel;
     }
-    if (s->field_data == row->data && s->field.field == field.field &&
-        s->field.kernel_radius == field.kernel_radius && s->field.kernel == field.kernel)
+    if (s->field_data == row->data && draw_settings_same(&s->field, &field))
         return 0;
     s->field_data = row->data;
     s->field = field;
@@ -301,19 +299,19 @@ static int need_field(sweep *s, const accuracy_row *row, bool splats)
  * ones. */
 static int need_reference(sweep *s, const accuracy_row *row)
 {
-    triptych_settings settings = row->setting.settings;
+    draw_settings settings = row->setting.settings;
     double ms;
     if (s->reference_data == row->data && accuracy_setting_same_reference(&settings, &s->reference))
         return 0;
     s->reference_data = -1;
     s->reference = settings;
-    settings.target = TRIPTYCH_RGBA32F;
+    draw_settings_drop_excluded(&settings, TRIPTYCH_RENDERER_REFERENCE);
     bench_progress_step(s->progress, "reference");
     int status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
                                         &settings, s->pictures[REFERENCE], &ms);
     memcpy(s->pictures[FINE], s->pictures[REFERENCE], s->picture_bytes);
-    settings.lod_px = 0;
-    if (!status && row->setting.settings.lod_px > 0)
+    settings.lod.voxel_px = 0;
+    if (!status && row->setting.settings.lod.voxel_px > 0)
         status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
                                         &settings, s->pictures[FINE], &ms);
     s->reference_data = status ? -1 : row->data;
@@ -329,7 +327,7 @@ static void compare(sweep *s, accuracy_row *row, accuracy_step step, which a, wh
 /* Returns whether the frame was drawn by pre-classification. */
 static bool is_pre(const triptych_frame_stats *stats)
 {
-    return stats->classify == TRIPTYCH_PRE;
+    return stats->classify == TRIPTYCH_CLASSIFY_PRE;
 }
 
 static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
@@ -345,7 +343,8 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
     }
     /* The integral has no Gaussian interpolation. The smoothing by that kernel counts as a
      * method error. */
-    const bool pre = is_pre(stats), cubic = row->setting.settings.kernel == TRIPTYCH_CUBIC;
+    const bool pre = is_pre(stats),
+               cubic = row->setting.settings.all.kernel == TRIPTYCH_KERNEL_CUBIC;
     which drawn = pre || cubic ? FIELD : STORED;
     if (drawn == FIELD)
         status = need_field(s, row, pre);
@@ -356,7 +355,7 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
     if (status) /* the reference renderer lacks some settings */
         return status == TRIP_ERROR ? 0 : status;
     compare(s, row, ACCURACY_METHOD, FINE, drawn);
-    if (row->setting.settings.lod_px > 0)
+    if (row->setting.settings.lod.voxel_px > 0)
         compare(s, row, ACCURACY_LEVEL, REFERENCE, FINE);
     compare(s, row, ACCURACY_PRECISION, RAN, REFERENCE);
     return 0;
@@ -404,12 +403,12 @@ static int compare_with_truth(sweep *s, accuracy_row *row)
 /* Counts splats in a frame of its own, so that counting changes no timing. */
 static int count_splats(sweep *s, accuracy_row *row, float *rgba)
 {
-    triptych_settings settings = row->setting.settings;
+    draw_settings settings = row->setting.settings;
     triptych *t = s->contexts.contexts[row->data][row->setting.renderer];
     triptych_info info;
     triptych_list_stats list;
     double ms;
-    settings.count = 1;
+    settings.all.count_exactly = 1;
     int status = accuracy_contexts_draw(&s->contexts, row->data, row->setting.renderer, &settings,
                                         rgba, &ms);
     if (status == TRIP_ERROR)
@@ -569,12 +568,10 @@ static int take_pictures(sweep *s)
     return 0;
 }
 
-static triptych_settings default_settings(const accuracy_options *o)
+static draw_settings default_settings(const accuracy_options *o)
 {
-    triptych_settings s = triptych_default_settings();
-    s.shading = o->shading;
-    memset(s.background, 0, sizeof s.background);
-    return s;
+    /* transparent */
+    return (draw_settings){ .light.no_shading = !o->shading, .has_background = 1 };
 }
 
 static int measure_popping(sweep *s)

@@ -6,8 +6,8 @@
 #include "report.h"
 
 const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS] = {
-    { .name = "popping-post", .classify = TRIPTYCH_POST },
-    { .name = "popping-pre", .classify = TRIPTYCH_PRE },
+    { .name = "popping-post", .classify = TRIPTYCH_CLASSIFY_POST },
+    { .name = "popping-pre", .classify = TRIPTYCH_CLASSIFY_PRE },
 };
 
 /* ---- the turn ---- */
@@ -61,7 +61,7 @@ static void turn_to(orbit *turn, double degrees)
 
 /* ---- pictures of the turn ---- */
 
-static int draw_steps(accuracy_contexts *contexts, triptych *t, const triptych_settings *settings,
+static int draw_steps(accuracy_contexts *contexts, triptych *t, const draw_settings *settings,
                       orbit *turn, float *rgba, bench_popping_changes *changes)
 {
     int status = 0;
@@ -81,16 +81,18 @@ static int draw_steps(accuracy_contexts *contexts, triptych *t, const triptych_s
 /* Measures all settings. If a frame fails, its message becomes the reason for leaving out the
  * table. */
 static int measure_settings(accuracy_popping *p, accuracy_contexts *contexts, triptych *t,
-                            const triptych_settings *defaults, bench_progress *progress,
-                            orbit *turn, float *rgba, bench_popping_changes *changes)
+                            const draw_settings *defaults, bench_progress *progress, orbit *turn,
+                            float *rgba, bench_popping_changes *changes)
 {
     int status = 0;
     for (int i = 0; i < ACCURACY_POPPING_ROWS && !status; i++) {
         const bench_popping_setting *one = &bench_popping_settings[i];
-        triptych_settings settings = *defaults;
-        settings.classify = p->classify;
-        settings.method = one->method;
-        settings.h = one->h;
+        draw_settings settings = *defaults;
+        settings.all.classify = p->classify;
+        settings.all.method = one->method;
+        settings.all.h = one->method != TRIPTYCH_METHOD_MERGE ? 0
+                         : one->h > 0                         ? one->h
+                                                              : TRIPTYCH_ZERO;
         bench_progress_step(progress, p->name);
         status = draw_steps(contexts, t, &settings, turn, rgba, changes);
         if (!status)
@@ -103,8 +105,7 @@ static int measure_settings(accuracy_popping *p, accuracy_contexts *contexts, tr
 }
 
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const triptych_settings *defaults, bench_progress *progress,
-                             float *rgba)
+                             const draw_settings *defaults, bench_progress *progress, float *rgba)
 {
     const accuracy_options *o = contexts->options;
     triptych *t = contexts->contexts[0][TRIPTYCH_RENDERER_CPU];

@@ -2,15 +2,18 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
+
+#include "scope.h"
 
 typedef struct sweep {
     accuracy_setting *out;
     int count;
-    triptych_settings pre, post;
+    draw_settings pre, post;
 } sweep;
 
 __attribute__((format(printf, 4, 5))) static void add(sweep *w, triptych_renderer renderer,
-                                                      triptych_settings s, const char *name, ...)
+                                                      draw_settings s, const char *name, ...)
 {
     va_list arguments;
     accuracy_setting *one = &w->out[w->count++];
@@ -21,12 +24,12 @@ __attribute__((format(printf, 4, 5))) static void add(sweep *w, triptych_rendere
     one->settings = s;
 }
 
-static void add_qualities(sweep *w, const triptych_settings *defaults)
+static void add_qualities(sweep *w, const draw_settings *defaults)
 {
     static const char *const names[] = { "draft", "normal", "high", "exact" };
     for (int i = 0; i < 4; i++) {
-        triptych_settings s = *defaults;
-        triptych_set_quality(&s, (triptych_quality)(TRIPTYCH_DRAFT + i));
+        draw_settings s = *defaults;
+        s.all.quality = (triptych_quality)(TRIPTYCH_QUALITY_DRAFT + i);
         add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", names[i]);
     }
 }
@@ -37,23 +40,23 @@ static void add_post(sweep *w)
 {
     static const int samples_per_sheet[] = { 1, 2, 3, 4, 6, 8, 16 };
     static const double h[] = { 0, 0.5, 0.7, 0.85, 0.95 };
-    triptych_settings s = w->post;
+    draw_settings s = w->post;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post");
     for (size_t i = 0; i < sizeof samples_per_sheet / sizeof *samples_per_sheet; i++) {
-        s.samples_per_sheet = samples_per_sheet[i];
+        s.sheet.samples = samples_per_sheet[i];
         add(w, TRIPTYCH_RENDERER_CPU, s, "post-samples-per-sheet-%d", samples_per_sheet[i]);
     }
     s = w->post;
-    s.method = TRIPTYCH_CLIP;
+    s.all.method = TRIPTYCH_METHOD_CLIP;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip");
-    s.samples_per_sheet = 1;
+    s.sheet.samples = 1;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-clip-samples-per-sheet-1");
     s = w->post;
-    s.method = TRIPTYCH_AXIS;
+    s.all.method = TRIPTYCH_METHOD_AXIS;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-axis");
     s = w->post;
     for (size_t i = 0; i < sizeof h / sizeof *h; i++) {
-        s.h = h[i];
+        s.all.h = h[i] > 0 ? h[i] : TRIPTYCH_ZERO;
         add(w, TRIPTYCH_RENDERER_CPU, s, "post-h-%g", h[i]);
     }
 }
@@ -61,30 +64,30 @@ static void add_post(sweep *w)
 static void add_pre(sweep *w, triptych_compositing compositing)
 {
     static const double h[] = { 0, 0.5, 0.95, 0.99 };
-    const char *name = compositing == TRIPTYCH_BY_SHEET ? "pre-sheet" : "pre";
-    triptych_settings s = w->pre;
-    s.compositing = compositing;
+    const char *name = compositing == TRIPTYCH_COMPOSITING_SHEET ? "pre-sheet" : "pre";
+    draw_settings s = w->pre;
+    s.splat.compositing = compositing;
     add(w, TRIPTYCH_RENDERER_CPU, s, "%s", name);
     for (size_t i = 0; i < sizeof h / sizeof *h; i++) {
-        s.h = h[i];
+        s.all.h = h[i] > 0 ? h[i] : TRIPTYCH_ZERO;
         add(w, TRIPTYCH_RENDERER_CPU, s, "%s-h-%g", name, h[i]);
     }
-    s.h = w->pre.h;
-    s.method = TRIPTYCH_CLIP;
+    s.all.h = 0;
+    s.all.method = TRIPTYCH_METHOD_CLIP;
     add(w, TRIPTYCH_RENDERER_CPU, s, "%s-clip", name);
-    s.method = TRIPTYCH_AXIS;
+    s.all.method = TRIPTYCH_METHOD_AXIS;
     add(w, TRIPTYCH_RENDERER_CPU, s, "%s-axis", name);
 }
 
 static void add_targets(sweep *w)
 {
     for (int sheets = 0; sheets < 2; sheets++) {
-        triptych_settings s = w->pre;
+        draw_settings s = w->pre;
         const char *name = sheets ? "pre-sheet" : "pre";
-        s.compositing = sheets ? TRIPTYCH_BY_SHEET : TRIPTYCH_BY_SPLAT;
-        s.target = TRIPTYCH_RGBA16F;
+        s.splat.compositing = sheets ? TRIPTYCH_COMPOSITING_SHEET : TRIPTYCH_COMPOSITING_SPLAT;
+        s.splat.target = TRIPTYCH_TARGET_RGBA16F;
         add(w, TRIPTYCH_RENDERER_CPU, s, "%s-rgba16f", name);
-        s.target = TRIPTYCH_RGBA8;
+        s.splat.target = TRIPTYCH_TARGET_RGBA8;
         add(w, TRIPTYCH_RENDERER_CPU, s, "%s-rgba8", name);
     }
 }
@@ -94,8 +97,9 @@ static void add_early_terminations(sweep *w)
 {
     static const double thresholds[] = { 0, 1.0 / 128, 1.0 / 32 };
     for (size_t i = 0; i < sizeof thresholds / sizeof *thresholds; i++) {
-        triptych_settings pre = w->pre, post = w->post;
-        pre.early_termination = post.early_termination = thresholds[i];
+        draw_settings pre = w->pre, post = w->post;
+        pre.all.early_termination = post.all.early_termination =
+            thresholds[i] > 0 ? thresholds[i] : TRIPTYCH_ZERO;
         add(w, TRIPTYCH_RENDERER_CPU, post, "post-early-termination-%g", thresholds[i]);
         add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-early-termination-%g", thresholds[i]);
     }
@@ -105,23 +109,23 @@ static void add_early_terminations(sweep *w)
 static void add_kernels(sweep *w)
 {
     static const double radii[] = { 1.5, 2.5, 3 };
-    triptych_settings s = w->pre;
-    s.footprint = TRIPTYCH_FOOTPRINT_EWA;
+    draw_settings s = w->pre;
+    s.splat.footprint = TRIPTYCH_FOOTPRINT_EWA;
     add(w, TRIPTYCH_RENDERER_CPU, s, "pre-ewa");
-    s.flatten = 3;
+    s.splat.flatten = 3;
     add(w, TRIPTYCH_RENDERER_CPU, s, "pre-ewa-flatten-3");
     s = w->pre;
-    s.low_pass = TRIPTYCH_LOW_PASS_NONE;
+    s.splat.low_pass = TRIPTYCH_LOW_PASS_NONE;
     add(w, TRIPTYCH_RENDERER_CPU, s, "pre-low-pass-none");
     s = w->pre;
     for (size_t i = 0; i < sizeof radii / sizeof *radii; i++) {
-        s.kernel_radius = radii[i];
+        s.splat.kernel_radius = radii[i];
         add(w, TRIPTYCH_RENDERER_CPU, s, "pre-radius-%g", radii[i]);
     }
     s = w->post;
-    s.kernel = TRIPTYCH_CUBIC;
+    s.all.kernel = TRIPTYCH_KERNEL_CUBIC;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-cubic");
-    s.kernel = TRIPTYCH_GAUSSIAN;
+    s.all.kernel = TRIPTYCH_KERNEL_GAUSSIAN;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-gaussian");
 }
 
@@ -129,8 +133,8 @@ static void add_levels(sweep *w)
 {
     static const double widths[] = { 1, 2, 4 };
     for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
-        triptych_settings pre = w->pre, post = w->post;
-        pre.lod_px = post.lod_px = widths[i];
+        draw_settings pre = w->pre, post = w->post;
+        pre.lod.voxel_px = post.lod.voxel_px = widths[i];
         add(w, TRIPTYCH_RENDERER_CPU, post, "post-lod-%g", widths[i]);
         add(w, TRIPTYCH_RENDERER_CPU, pre, "pre-lod-%g", widths[i]);
     }
@@ -138,12 +142,12 @@ static void add_levels(sweep *w)
 
 static void add_renderers(sweep *w)
 {
-    triptych_settings s = w->post;
+    draw_settings s = w->post;
     add(w, TRIPTYCH_RENDERER_GL, w->post, "gl-post");
     add(w, TRIPTYCH_RENDERER_GL, w->pre, "gl-pre");
     add(w, TRIPTYCH_RENDERER_REFERENCE, w->post, "reference-post");
     add(w, TRIPTYCH_RENDERER_REFERENCE, w->pre, "reference-pre");
-    s.tolerance = 1e-2;
+    s.integral.tolerance = 1e-2;
     add(w, TRIPTYCH_RENDERER_INTEGRAL, s, "integral-0.01");
 }
 
@@ -151,23 +155,22 @@ static void add_samples(sweep *w)
 {
     static const int samples[] = { 2, 4 };
     for (size_t i = 0; i < sizeof samples / sizeof *samples; i++) {
-        triptych_settings s = w->post;
-        s.samples = samples[i];
+        draw_settings s = w->post;
+        s.all.samples = samples[i];
         add(w, TRIPTYCH_RENDERER_CPU, s, "post-samples-%d", samples[i]);
     }
 }
 
-int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
-                      const triptych_settings *defaults)
+int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_settings *defaults)
 {
     sweep w = { .out = out, .pre = *defaults, .post = *defaults };
-    w.pre.classify = TRIPTYCH_PRE;
-    w.post.classify = TRIPTYCH_POST;
+    w.pre.all.classify = TRIPTYCH_CLASSIFY_PRE;
+    w.post.all.classify = TRIPTYCH_CLASSIFY_POST;
     add_qualities(&w, defaults);
     add_post(&w);
-    add_pre(&w, TRIPTYCH_BY_SPLAT);
+    add_pre(&w, TRIPTYCH_COMPOSITING_SPLAT);
     add_targets(&w);
-    add_pre(&w, TRIPTYCH_BY_SHEET);
+    add_pre(&w, TRIPTYCH_COMPOSITING_SHEET);
     add_early_terminations(&w);
     add_levels(&w);
     add_kernels(&w);
@@ -176,15 +179,48 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
     return w.count;
 }
 
-bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b)
+/* Target and submission differ in rounding only. The reference renderer does not round. */
+bool accuracy_setting_same_reference(const draw_settings *a, const draw_settings *b)
 {
-    if (a->classify != b->classify || a->method != b->method || a->lod_px != b->lod_px ||
-        a->early_termination != b->early_termination || a->samples != b->samples ||
-        (a->method == TRIPTYCH_MERGE && a->h != b->h))
-        return false;
-    if (a->classify == TRIPTYCH_PRE)
-        return a->compositing == b->compositing && a->kernel_radius == b->kernel_radius &&
-               a->footprint == b->footprint && a->low_pass == b->low_pass &&
-               a->flatten == b->flatten;
-    return a->samples_per_sheet == b->samples_per_sheet && a->kernel == b->kernel;
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (i != DRAW_TARGET && i != DRAW_LISTS && i != DRAW_PRIMITIVES &&
+            !trip_option_same(&draw_settings_table.rows[i], a, b))
+            return false;
+    return a->all.quality == b->all.quality;
+}
+
+int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[ACCURACY_OPTIONS_MAX])
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral" };
+    char value[TRIP_OPTION_TEXT_BYTES];
+    int count = 1;
+    out[0].name = "renderer";
+    snprintf(out[0].value, sizeof out[0].value, "%s", renderers[one->renderer]);
+    for (int i = 0; i < DRAW_OPTIONS && count < ACCURACY_OPTIONS_MAX; i++) {
+        const trip_option *row = &draw_settings_table.rows[i];
+        if (!(row->measured || i == DRAW_QUALITY) || !trip_option_is_set(row, &one->settings))
+            continue;
+        trip_option_print(row, &one->settings, value);
+        out[count].name = row->name;
+        snprintf(out[count++].value, sizeof out->value, "%.31s", value);
+    }
+    return count;
+}
+
+static void drop_line(const char *line, void *user)
+{
+    (void)line, (void)user;
+}
+
+bool accuracy_setting_read_option(accuracy_setting *one, const char *name, const char *value)
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral" };
+    uint64_t given = 0;
+    for (int i = 0; i < 5 && !strcmp(name, "renderer"); i++)
+        if (!strcmp(value, renderers[i]))
+            return one->renderer = (triptych_renderer)i, true;
+    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    const int status = trip_option_read(&draw_settings_table, name, value, &one->settings, &given);
+    trip_scope_enter(before);
+    return status == 0;
 }

@@ -5,14 +5,14 @@
 
 #include <stdbool.h>
 
-#include "triptych.h"
+#include "draw_settings.h"
 
 enum { ACCURACY_NAME_BYTES = 48, ACCURACY_SETTINGS_MAX = 96, ACCURACY_OPTIONS_MAX = 14 };
 
 typedef struct accuracy_setting {
     char name[ACCURACY_NAME_BYTES];
     triptych_renderer renderer;
-    triptych_settings settings;
+    draw_settings settings;
 } accuracy_setting;
 
 /* State of a setting that was selected. */
@@ -24,11 +24,10 @@ typedef enum accuracy_state {
 
 /* Lists all settings, the most important first. `defaults` has the settings that all share, such as
  * shading and background. Returns their number. */
-int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX],
-                      const triptych_settings *defaults);
+int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_settings *defaults);
 
 /* Returns whether the reference renderer draws the same picture for both settings. */
-bool accuracy_setting_same_reference(const triptych_settings *a, const triptych_settings *b);
+bool accuracy_setting_same_reference(const draw_settings *a, const draw_settings *b);
 
 typedef struct accuracy_option {
     const char *name; /* without dashes, such as "classify" */

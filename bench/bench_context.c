@@ -28,17 +28,24 @@ triptych_renderer bench_context_renderer(const bench_options *o)
     }
 }
 
-static triptych_settings settings_of(const trip_settings *s)
+static draw_settings settings_of(const trip_settings *s)
 {
-    triptych_settings to = triptych_default_settings();
-    to.classify = s->classify == TRIP_CLASSIFY_POST ? TRIPTYCH_POST : TRIPTYCH_PRE;
-    to.compositing =
-        s->compositing == TRIP_COMPOSITING_SHEET ? TRIPTYCH_BY_SHEET : TRIPTYCH_BY_SPLAT;
-    to.samples_per_sheet = s->samples_per_sheet;
-    to.early_termination = s->early_termination;
-    to.shading = s->shading;
-    to.kernel_radius = s->kernel_radius;
-    memset(to.background, 0, sizeof to.background);
+    const bool post = s->classify == TRIP_CLASSIFY_POST;
+    draw_settings to = {
+        .all = { .classify = post ? TRIPTYCH_CLASSIFY_POST : TRIPTYCH_CLASSIFY_PRE,
+                 .early_termination = s->early_termination < 0    ? 0
+                                      : s->early_termination == 0 ? TRIPTYCH_ZERO
+                                                                  : s->early_termination },
+        .sheet = { .samples = post ? s->samples_per_sheet : 0 },
+        .light = { .no_shading = !s->shading },
+        .has_background = 1, /* transparent */
+    };
+    if (!post)
+        to.splat =
+            (triptych_splat_settings){ .compositing = s->compositing == TRIP_COMPOSITING_SHEET
+                                                          ? TRIPTYCH_COMPOSITING_SHEET
+                                                          : TRIPTYCH_COMPOSITING_SPLAT,
+                                       .kernel_radius = s->kernel_radius };
     return to;
 }
 
@@ -79,9 +86,9 @@ int bench_context_look(bench_context *c, const triptych_camera *camera)
 int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba, double *ms)
 {
     bench_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");
-    c->settings.lod_px = lod_px;
-    c->settings.samples = samples;
-    int status = triptych_set_settings(c->t, &c->settings);
+    c->settings.lod.voxel_px = lod_px;
+    c->settings.all.samples = samples;
+    int status = draw_settings_use(c->t, &c->settings);
     const double start = bench_now_ms();
     if (!status)
         status = triptych_draw(c->t, rgba);
@@ -103,6 +110,6 @@ int bench_context_voxel(bench_context *c, double *width)
 
 int bench_context_levels(bench_context *c, unsigned *levels)
 {
-    int status = triptych_count_levels(c->t, c->settings.classify, levels);
+    int status = triptych_count_levels(c->t, c->settings.all.classify, levels);
     return check(c, status);
 }

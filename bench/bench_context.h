@@ -6,11 +6,12 @@
 #include <triptych.h>
 
 #include "bench_options.h"
+#include "draw_settings.h"
 
 typedef struct bench_context {
     triptych *t;
-    triptych_settings settings; /* from the options, without background */
-    bench_progress *progress;   /* each picture is a step */
+    draw_settings settings;   /* from the options, without background */
+    bench_progress *progress; /* each picture is a step */
 } bench_context;
 
 /* Returns the first renderer of the options. */

@@ -142,7 +142,8 @@ static int take_turns(pair *p)
     for (int i = -1; i < p->options->repeat && !status; i++)
         for (int ewa = 0; ewa < 2 && !status; ewa++) {
             double ms;
-            p->context.settings.footprint = ewa ? TRIPTYCH_FOOTPRINT_EWA : TRIPTYCH_FOOTPRINT_EXACT;
+            p->context.settings.splat.footprint =
+                ewa ? TRIPTYCH_FOOTPRINT_EWA : TRIPTYCH_FOOTPRINT_EXACT;
             status = bench_context_draw(&p->context, 0, 1, p->pictures[ewa], &ms);
             if (i >= 0)
                 p->ms[ewa][i] = ms;

@@ -122,7 +122,6 @@ static int byte_of(float x)
 static int draw_alone(const flying *m, triptych *t, int *differ)
 {
     const bench_options *o = m->options;
-    const triptych_settings settings = triptych_default_settings();
     const int width = o->sizes[0][0], height = o->sizes[0][1];
     const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
     float *rgba = NULL;
@@ -134,7 +133,7 @@ static int draw_alone(const flying *m, triptych *t, int *differ)
     if (!status)
         status = triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = o->tf });
     if (!status)
-        status = triptych_set_settings(t, &settings);
+        status = triptych_set_settings(t, NULL);
     if (!status)
         status = triptych_set_view(t, &view);
     if (!status)
@@ -233,8 +232,7 @@ static int fly(flying *m)
                                  .width = o->sizes[0][0],
                                  .height = o->sizes[0][1],
                                  .function = o->tf,
-                                 .opacity_scale = 1,
-                                 .settings = triptych_default_settings() };
+                                 .opacity_scale = 1 };
     int status = flyer_fly(&m->flyer, &params, &wanted, o->seconds);
     if (m->flyer.frames)
         m->status = trip_frames_get_status(m->flyer.frames);

@@ -28,9 +28,9 @@ typedef struct bench_options {
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0 selects the default */
-    bool draw_occluded;    /* whether bricks behind opaque ones are drawn */
-    bool no_counts;        /* measures only times */
-    bool json;
+    int draw_occluded;     /* whether bricks behind opaque ones are drawn */
+    int no_counts;         /* measures only times */
+    int json;
     bench_progress *progress; /* shows the progress of the table; not an option; may be NULL */
 } bench_options;
 

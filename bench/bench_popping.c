@@ -54,7 +54,7 @@ static int measure(const session *s, const bench_scene *scene, const bench_optio
         const bench_popping_setting *one = &bench_popping_settings[i];
         trip_settings drawn = o->settings;
         drawn.background[3] = 0;
-        drawn.method = (trip_method)one->method;
+        drawn.method = (trip_method)(one->method - TRIPTYCH_METHOD_MERGE);
         drawn.h = one->h;
         status = draw_steps(s, scene, &drawn, p);
         if (status)

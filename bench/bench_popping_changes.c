@@ -6,14 +6,14 @@
 #include <string.h>
 
 const bench_popping_setting bench_popping_settings[BENCH_POPPING_SETTINGS] = {
-    { "merge, h 0", "0", TRIPTYCH_MERGE, 0 },
-    { "merge, h 0.5", "0.5", TRIPTYCH_MERGE, 0.5 },
-    { "merge, h 0.85", "0.85", TRIPTYCH_MERGE, 0.85 },
-    { "merge, h 0.95", "0.95", TRIPTYCH_MERGE, 0.95 },
-    { "merge, h 0.99", "0.99", TRIPTYCH_MERGE, 0.99 },
-    { "clip", "clip", TRIPTYCH_CLIP, 0 },
-    { "axis", "axis", TRIPTYCH_AXIS, 0 },
-    { "image", "image", TRIPTYCH_IMAGE, 0 },
+    { "merge, h 0", "0", TRIPTYCH_METHOD_MERGE, 0 },
+    { "merge, h 0.5", "0.5", TRIPTYCH_METHOD_MERGE, 0.5 },
+    { "merge, h 0.85", "0.85", TRIPTYCH_METHOD_MERGE, 0.85 },
+    { "merge, h 0.95", "0.95", TRIPTYCH_METHOD_MERGE, 0.95 },
+    { "merge, h 0.99", "0.99", TRIPTYCH_METHOD_MERGE, 0.99 },
+    { "clip", "clip", TRIPTYCH_METHOD_CLIP, 0 },
+    { "axis", "axis", TRIPTYCH_METHOD_AXIS, 0 },
+    { "image", "image", TRIPTYCH_METHOD_IMAGE, 0 },
 };
 
 enum { STEPS = BENCH_POPPING_STEPS };
@@ -89,7 +89,7 @@ static size_t take_motion(bench_popping_changes *p, double *mean)
 void bench_popping_find(bench_popping_changes *p, const bench_popping_setting *of,
                         bench_popping_row *f)
 {
-    *f = (bench_popping_row){ .label = of->label, .has_h = of->method == TRIPTYCH_MERGE };
+    *f = (bench_popping_row){ .label = of->label, .has_h = of->method == TRIPTYCH_METHOD_MERGE };
     size_t count = take_motion(p, &f->motion);
     f->motion *= 255;
     for (int i = 0; i < STEPS && count > 0; i++) {

@@ -53,6 +53,15 @@ bool cached_volume_wanted(const char *input)
     return !named && !has_index(input);
 }
 
+int cached_volume_check_options(const char *input)
+{
+    return cached_volume_wanted(input)
+               ? 0
+               : trip_fail(TRIP_USAGE, "usage", input,
+                           "is a data set; --grid, --level-set, --spacing, --coordinates, --axes "
+                           "and --allow-gaps apply to volumes only");
+}
+
 /* Shows on a terminal that another process is bricking the same volume. */
 static void on_wait(void *user)
 {

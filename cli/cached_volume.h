@@ -20,6 +20,8 @@ typedef struct cached_volume {
 /* Returns whether a command has to brick its input first: the input is not named NAME.trip, and is
  * not a folder with a data set. */
 bool cached_volume_wanted(const char *input);
+/* Fails if options for reading a volume were given for a data set. */
+int cached_volume_check_options(const char *input);
 
 /* Finds or makes the data set of `volume` for the options. The context has no data set open before
  * the call or after it. The caller closes *v even after a failure. */

@@ -12,44 +12,12 @@
 #include "budget.h"
 #include "json.h"
 #include "library.h"
-#include "options.h"
+#include "draw_options.h"
 #include "plain_disk.h"
 #include "report.h"
 #include "text.h"
-#include "volume_options.h"
 
 enum { MAX_FUNCTIONS = 64, MAX_RANGES = 64 };
-
-enum key {
-    KEY_GRID = 256,
-    KEY_LEVEL_SET,
-    KEY_SIZE,
-    KEY_TYPE,
-    KEY_SPACING,
-    KEY_AXES,
-    KEY_COORDINATES,
-    KEY_ENDIAN,
-    KEY_OFFSET,
-    KEY_ALLOW_GAPS,
-    KEY_TF,
-    KEY_RANGE,
-    KEY_KEEP_ALL,
-    KEY_REGION,
-    KEY_CODE_BITS,
-    KEY_NORMALS,
-    KEY_HALO,
-    KEY_LEVELS,
-    KEY_LEVELS_FOR,
-    KEY_TILE,
-    KEY_SLAB_SHEETS,
-    KEY_MEMORY,
-    KEY_THREADS,
-    KEY_FORCE,
-    KEY_RESUME,
-    KEY_DRY_RUN,
-    KEY_LIMITS,
-    KEY_JSON,
-};
 
 typedef struct options {
     const char *volume, *output;
@@ -57,104 +25,17 @@ typedef struct options {
     const char *functions[MAX_FUNCTIONS];
     triptych_range ranges[MAX_RANGES];
     char *default_output; /* freed at the end */
-    bool quiet, json, dry_run, limits;
+    int quiet, json, dry_run, limits;
 } options;
 
-static const struct argp_option option_table[] = {
-    { NULL, 0, NULL, 0, "Input:", 1 },
-    { "grid", KEY_GRID, "NAME", 0,
-      "Selects a grid of an OpenVDB file or a variable of a netCDF file (default: density, else "
-      "the first fog volume or grid of scalars; the netCDF variable with the most numbers)",
-      1 },
-    { "level-set", KEY_LEVEL_SET, "HOW", 0,
-      "Selects how an OpenVDB level set becomes a density: filled or band (default: filled)", 1 },
-    { "spacing", KEY_SPACING, "X,Y,Z", 0,
-      "Sets the distance of neighbouring voxels along each axis (default: the distance in the "
-      "file, else 1)",
-      1 },
-    { "axes", KEY_AXES, "PIR", 0,
-      "Gives the orientation of a patient if the file does not: where x, y and z point to, here "
-      "posterior, inferior and right",
-      1 },
-    { "coordinates", KEY_COORDINATES, "X.txt,Y.txt,Z.txt", 0,
-      "Reads the position of each voxel along each axis from files of numbers; an axis without a "
-      "file is even",
-      1 },
-    { "allow-gaps", KEY_ALLOW_GAPS, NULL, 0,
-      "Accepts a stack with missing slices, as if the neighbours of a gap touched", 1 },
-    { NULL, 0, NULL, 0, "Raw data:", 2 },
-    { "endian", KEY_ENDIAN, "little|big", 0,
-      "Sets the byte order (default: the order of this machine)", 2 },
-    { "offset", KEY_OFFSET, "BYTES", 0,
-      "Sets the position of the first voxel in the file (default: 0)", 2 },
-    { "size", KEY_SIZE, "X,Y,Z", 0,
-      "Sets the number of voxels along each axis, the fastest axis first (default: from the name "
-      "of the file)",
-      2 },
-    { "type", KEY_TYPE, "TYPE", 0,
-      "Sets the type of a voxel: uint8, int16, float, ... (default: from the name of the file)",
-      2 },
-    { NULL, 0, NULL, 0,
-      "Kept voxels (default: the voxels that an automatic transfer function shows):", 3 },
-    { "keep-all", KEY_KEEP_ALL, NULL, 0, "Keeps every finite value; excludes --range", 3 },
-    { "range", KEY_RANGE, "LO:HI", 0,
-      "Keeps the values from LO to HI; an empty side is open; several ranges add up", 3 },
-    { "region", KEY_REGION, "I0:I1,J0:J1,K0:K1", 0,
-      "Keeps only the voxels from I0 to before I1 along the first axis, and so on; an empty side "
-      "is open. `triptych render A.trip B.trip` draws regions of one volume together",
-      3 },
-    { "tf", KEY_TF, "NAME|FILE", 0,
-      "Keeps the values that this transfer function shows; several transfer functions add up", 3 },
-    { NULL, 0, NULL, 0, "Output:", 4 },
-    { "dry-run", KEY_DRY_RUN, NULL, 0,
-      "Only estimates size and time, from parts of the input; excludes --resume", 4 },
-    { "force", KEY_FORCE, NULL, 0, "Replaces an existing data set", 4 },
-    { "json", KEY_JSON, NULL, 0, "Prints the summary as JSON", 4 },
-    { "limits", KEY_LIMITS, NULL, 0,
-      "Prints the time of each stage beside a plain read and a plain write of the same bytes; "
-      "excludes --quiet and --dry-run",
-      4 },
-    { "output", 'o', "NAME.trip", 0,
-      "Names the data set (default: the name of the input, in the current folder)", 4 },
-    { "quiet", 'q', NULL, 0, "Prints no progress and no summary; excludes --json", 4 },
-    { "resume", KEY_RESUME, NULL, 0, "Continues the same command after it was killed", 4 },
-    { NULL, 0, NULL, 0, "Memory and threads:", 5 },
-    TRIP_OPTION_MEMORY(KEY_MEMORY, 5),
-    { "threads", KEY_THREADS, "N", 0,
-      "Sets the number of threads, 1 to 256 (default: one per processor)", 5 },
-    { NULL, 0, NULL, 0, "Stored form:", 6 },
-    { "code-bits", KEY_CODE_BITS, "8|16|auto", 0,
-      "Sets the bits that store a value; 8 rounds to 256 codes; auto is 8 if these are exact, else "
-      "16 (default: auto)",
-      6 },
-    { "halo", KEY_HALO, "0|1", 0,
-      "Keeps the transparent neighbours of kept voxels, for interpolation (default: 1)", 6 },
-    { "levels", KEY_LEVELS, "N|auto", 0,
-      "Sets the number of coarse levels, 0 to 24, each with half the resolution of the one before; "
-      "auto goes down to one brick (default: auto)",
-      6 },
-    { "levels-for", KEY_LEVELS_FOR, "post|pre|both|auto", 0,
-      "Selects the classification that can draw the coarse levels; auto is post, or pre with "
-      "--halo 0 (default: auto)",
-      6 },
-    { "normals", KEY_NORMALS, "HOW", 0,
-      "Selects how normals are stored, for the shading of splats: compact (3 bytes), full (4 "
-      "bytes), none or auto, which is compact if no colour changes by half of 1/255 (default: "
-      "auto)",
-      6 },
-    { "slab-sheets", KEY_SLAB_SHEETS, "N", 0,
-      "Sets the number of sheets per brick, 1 to 64 (default: 8)", 6 },
-    { "tile", KEY_TILE, "N", 0,
-      "Sets the edge of a tile in voxels: 16, 32, 64 or 128 (default: 64)", 6 },
-    { 0 },
-};
-
 /* Parses "256,256,128" or "256x256x128". */
-static int parse_size(const char *text, int64_t dims[3])
+static int read_size(const trip_option *row, const char *text, void *base)
 {
+    int64_t *dims = ((options *)base)->brick.raw_dims;
     char commas[128];
     double numbers[3];
     int count;
+    (void)row;
     snprintf(commas, sizeof commas, "%s", text);
     for (char *x = commas; (x = strchr(x, 'x'));)
         *x = ',';
@@ -168,22 +49,25 @@ static int parse_size(const char *text, int64_t dims[3])
     return status;
 }
 
-static int parse_offset(const char *text, uint64_t *bytes)
+static int read_offset(const trip_option *row, const char *text, void *base)
 {
     double number;
+    (void)row;
     if (!trip_text_to_double(text, &number) || number != floor(number) || number < 0 ||
         number > 0x1p62)
         return trip_option_fail("--offset", "takes a whole number of bytes, 0 or more");
-    *bytes = (uint64_t)number;
+    ((options *)base)->brick.raw_offset_bytes = (uint64_t)number;
     return 0;
 }
 
 /* Parses "LO:HI"; an empty side is open. */
-static int parse_range(options *o, const char *text)
+static int read_range(const trip_option *row, const char *text, void *base)
 {
+    options *o = base;
     triptych_range *r = &o->ranges[o->brick.range_count];
     const char *colon = strchr(text, ':');
     char lo[64] = "";
+    (void)row;
     if (o->brick.range_count == MAX_RANGES)
         return trip_option_fail("--range", "given too often; at most 64 ranges are possible");
     if (!colon || colon - text >= (int)sizeof lo)
@@ -228,9 +112,11 @@ static bool parse_side(const char **text, int64_t *first, int64_t *past)
 }
 
 /* Parses "I0:I1,J0:J1,K0:K1"; an empty side is open. */
-static int parse_region(const char *text, triptych_brick_options *o)
+static int read_region(const trip_option *row, const char *text, void *base)
 {
+    triptych_brick_options *o = &((options *)base)->brick;
     bool good = true;
+    (void)row;
     for (int a = 0; a < 3 && good; a++) {
         o->region_first[a] = o->region_past[a] = 0;
         good = parse_side(&text, &o->region_first[a], &o->region_past[a]) &&
@@ -243,8 +129,10 @@ static int parse_region(const char *text, triptych_brick_options *o)
                                    "voxel to before the second; empty sides are open");
 }
 
-static int add_function(options *o, const char *path)
+static int read_tf(const trip_option *row, const char *path, void *base)
 {
+    options *o = base;
+    (void)row;
     if (o->brick.function_count == MAX_FUNCTIONS)
         return trip_option_fail("--tf",
                                 "given too often; at most 64 transfer functions are possible");
@@ -252,154 +140,130 @@ static int add_function(options *o, const char *path)
     return 0;
 }
 
-static int parse_tile(const char *text, unsigned *tile)
+static int read_tile(const trip_option *row, const char *text, void *base)
 {
     static const char *const names[] = { "16", "32", "64", "128", NULL };
-    int choice;
-    int status = trip_option_choice("--tile", text, names, &choice);
-    if (status == 0)
-        *tile = 16u << choice;
+    int choice = 0, status = trip_option_choice("--tile", text, names, &choice);
+    (void)row;
+    ((options *)base)->brick.tile_voxels = 16u << choice;
     return status;
 }
 
-static int parse_code_bits(const char *text, triptych_code_bits *bits)
+static int read_levels(const trip_option *row, const char *text, void *base)
 {
-    static const char *const names[] = { "auto", "8", "16", NULL };
-    int choice = 0;
-    int status = trip_option_choice("--code-bits", text, names, &choice);
-    *bits = (triptych_code_bits)choice; /* names[] has the order of the enum */
+    const bool automatic = !strcmp(text, "auto");
+    int number = 0, status = automatic ? 0 : trip_option_integer("--levels", text, 0, 24, &number);
+    (void)row;
+    ((options *)base)->brick.levels = automatic ? 0 : number ? number : -1;
     return status;
 }
 
-static int parse_normals(const char *text, triptych_normals *normals)
+static int read_type(const trip_option *row, const char *text, void *base)
 {
-    static const char *const names[] = { "auto", "compact", "full", "none", NULL };
-    int choice = 0;
-    int status = trip_option_choice("--normals", text, names, &choice);
-    *normals = (triptych_normals)choice; /* names[] has the order of the enum */
-    return status;
+    (void)row;
+    ((options *)base)->brick.raw_type = text;
+    return triptych_is_raw_type(text)
+               ? 0
+               : trip_option_fail("--type", "unknown type; use for example uint8, int16 or float");
 }
 
-static int parse_halo(const char *text, int *no_halo)
-{
-    static const char *const names[] = { "0", "1", NULL };
-    int choice = 1;
-    int status = trip_option_choice("--halo", text, names, &choice);
-    *no_halo = choice == 0;
-    return status;
-}
+/* ---- the table ---- */
 
-static int parse_levels(const char *text, int *levels)
-{
-    int number = 0;
-    int status = strcmp(text, "auto") ? trip_option_integer("--levels", text, 0, 24, &number) : 0;
-    if (status == 0)
-        *levels = !strcmp(text, "auto") ? 0 : number ? number : -1;
-    return status;
-}
+static const char *const endians[] = { "little", "big", NULL };
+static const char *const code_bits[] = { "auto", "8", "16", NULL };
+static const char *const normals[] = { "auto", "compact", "full", "none", NULL };
+static const char *const halos[] = { "1", "0", NULL };
 
-static int parse_levels_for(const char *text, triptych_levels_for *levels_for)
-{
-    int choice = 0;
-    int status = trip_option_choice("--levels-for", text, trip_levels_for_names, &choice);
-    *levels_for = (triptych_levels_for)choice;
-    return status;
-}
+/* The names are in the order of the library's values. */
+_Static_assert(TRIPTYCH_CODE_BITS_AUTO == 0 && TRIPTYCH_CODE_BITS_16 == 2, "code_bits");
+_Static_assert(TRIPTYCH_NORMALS_AUTO == 0 && TRIPTYCH_NORMALS_NONE == 3, "normals");
+_Static_assert(TRIPTYCH_LEVELS_FOR_AUTO == 0 && TRIPTYCH_LEVELS_FOR_BOTH == 3, "levels_for");
 
-static int parse_unsigned(const char *option, const char *text, int hi, unsigned *out)
-{
-    int number;
-    int status = trip_option_integer(option, text, 1, hi, &number);
-    if (status == 0)
-        *out = (unsigned)number;
-    return status;
-}
+#define AT(member) .at = offsetof(options, member)
+#define CUSTOM(function) .type = TRIP_OPTION_CUSTOM, .read = (function)
+#define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names)
+#define FLAG .type = TRIP_OPTION_FLAG
 
-static int parse_endian(const char *text, triptych_endian *endian)
-{
-    static const char *const names[] = { "little", "big", NULL };
-    int choice = 0;
-    int status = trip_option_choice("--endian", text, names, &choice);
-    *endian = choice ? TRIPTYCH_ENDIAN_BIG : TRIPTYCH_ENDIAN_LITTLE;
-    return status;
-}
+static const trip_option rows[] = {
+    { "endian", "little|big", "Sets the byte order", "the order of this machine",
+      .group = DRAW_GROUP_RAW, AT(brick.raw_endian), CHOICE(endians),
+      .first = TRIPTYCH_ENDIAN_LITTLE },
+    { "offset", "BYTES", "Sets the position of the first voxel in the file", "0",
+      .group = DRAW_GROUP_RAW, AT(brick.raw_offset_bytes), CUSTOM(read_offset) },
+    { "size", "X,Y,Z", "Sets the number of voxels along each axis, the fastest axis first",
+      "from the name of the file", .brief = "Sets the voxels along each axis of raw data",
+      .group = DRAW_GROUP_RAW, AT(brick.raw_dims), CUSTOM(read_size) },
+    { "type", "TYPE", "Sets the type of a voxel: uint8, int16, float, ...",
+      "from the name of the file", .brief = "Sets the type of a voxel: uint8, int16, float, ...",
+      .group = DRAW_GROUP_RAW, AT(brick.raw_type), CUSTOM(read_type) },
+    { "keep-all", NULL, "Keeps every finite value", NULL, "excludes --range",
+      .brief = "Keeps every finite value", .group = DRAW_GROUP_KEPT, FLAG, AT(brick.keep_all) },
+    { "range", "LO:HI",
+      "Keeps the values from LO to HI; an empty side is open; several ranges add up",
+      .brief = "Keeps the values from LO to HI", .group = DRAW_GROUP_KEPT, AT(brick.range_count),
+      CUSTOM(read_range) },
+    { "region", "I0:I1,J0:J1,K0:K1",
+      "Keeps only the voxels from I0 to before I1 along the first axis, and so on; an empty side "
+      "is open. `triptych render A.trip B.trip` draws regions of one volume together",
+      .group = DRAW_GROUP_KEPT, AT(brick.region_past), CUSTOM(read_region) },
+    { "tf", "NAME|FILE",
+      "Keeps the values that this transfer function shows; several transfer functions add up",
+      .brief = "Keeps the values that this transfer function shows", .group = DRAW_GROUP_KEPT,
+      AT(brick.function_count), CUSTOM(read_tf) },
+    { "dry-run", NULL, "Only estimates size and time, from parts of the input", NULL,
+      "excludes --resume", .brief = "Only estimates size and time", .group = DRAW_GROUP_OUTPUT,
+      FLAG, AT(dry_run) },
+    { "force", NULL, "Replaces an existing data set", .brief = "Replaces an existing data set",
+      .group = DRAW_GROUP_OUTPUT, FLAG, AT(brick.replace) },
+    { "json", NULL, "Prints the summary as JSON", .group = DRAW_GROUP_OUTPUT, FLAG, AT(json) },
+    { "limits", NULL,
+      "Prints the time of each stage beside a plain read and a plain write of the same bytes", NULL,
+      "excludes --quiet and --dry-run", .group = DRAW_GROUP_OUTPUT, FLAG, AT(limits) },
+    { "output", "NAME.trip", "Names the data set", "the name of the input, in the current folder",
+      .brief = "Names the data set", .short_name = 'o', .group = DRAW_GROUP_OUTPUT,
+      .type = TRIP_OPTION_TEXT, AT(output) },
+    { "quiet", NULL, "Prints no progress and no summary", NULL, "excludes --json",
+      .brief = "Prints no progress and no summary", .short_name = 'q', .group = DRAW_GROUP_OUTPUT,
+      FLAG, AT(quiet) },
+    { "resume", NULL, "Continues the same command after it was killed",
+      .brief = "Continues the same command after it was killed", .group = DRAW_GROUP_OUTPUT, FLAG,
+      AT(brick.resume) },
+    { "memory", "SIZE", "Limits the memory for data, for example 256M (MiB) or 2G (GiB)",
+      "a quarter of the memory that the process may use",
+      .brief = "Limits the memory for data, for example 2G", .group = DRAW_GROUP_RENDERER,
+      .type = TRIP_OPTION_BYTES_64, AT(brick.memory_bytes) },
+    { "threads", "N", "Sets the number of threads", "one per processor",
+      .brief = "Sets the number of threads (default: all processors)", .group = DRAW_GROUP_RENDERER,
+      .type = TRIP_OPTION_INTEGER, AT(brick.threads), .lo = 1, .hi = 256 },
+    { "code-bits", "8|16|auto",
+      "Sets the bits that store a value; 8 rounds to 256 codes; auto is 8 if these are exact, else "
+      "16",
+      "auto", .group = DRAW_GROUP_STORED, AT(brick.code_bits), CHOICE(code_bits) },
+    { "halo", "0|1", "Keeps the transparent neighbours of kept voxels, for interpolation", "1",
+      .group = DRAW_GROUP_STORED, AT(brick.no_halo), CHOICE(halos) },
+    { "levels", "N|auto",
+      "Sets the number of coarse levels, 0 to 24, each with half the resolution of the one before; "
+      "auto goes down to one brick",
+      "auto", .group = DRAW_GROUP_STORED, AT(brick.levels), CUSTOM(read_levels) },
+    { "levels-for", "post|pre|both|auto",
+      "Selects the classification that can draw the coarse levels; auto is post, or pre with "
+      "--halo 0",
+      "auto", .group = DRAW_GROUP_STORED, AT(brick.levels_for), CHOICE(trip_levels_for_names) },
+    { "normals", "HOW",
+      "Selects how normals are stored, for the shading of splats: compact (3 bytes), full (4 "
+      "bytes), none or auto, which is compact if no colour changes by half of 1/255",
+      "auto", .group = DRAW_GROUP_STORED, AT(brick.normals), CHOICE(normals) },
+    { "slab-sheets", "N", "Sets the number of sheets per brick", "8", .group = DRAW_GROUP_STORED,
+      .type = TRIP_OPTION_INTEGER, AT(brick.slab_sheets), .lo = 1, .hi = 64 },
+    { "tile", "N", "Sets the edge of a tile in voxels: 16, 32, 64 or 128", "64",
+      .group = DRAW_GROUP_STORED, AT(brick.tile_voxels), CUSTOM(read_tile) },
+};
 
-static error_t parse_input_option(int key, char *argument, triptych_brick_options *v)
-{
-    switch (key) {
-    case KEY_GRID:
-        return trip_option_grid(argument, &v->grid);
-    case KEY_LEVEL_SET:
-        return trip_option_level_set(argument, &v->level_set);
-    case KEY_SIZE:
-        return parse_size(argument, v->raw_dims);
-    case KEY_TYPE:
-        v->raw_type = argument;
-        return triptych_is_raw_type(argument)
-                   ? 0
-                   : trip_option_fail("--type",
-                                      "unknown type; use for example uint8, int16 or float");
-    case KEY_SPACING:
-        return trip_option_spacing(argument, v->spacing);
-    case KEY_AXES:
-        return trip_option_axes(argument, &v->axes);
-    case KEY_ENDIAN:
-        return parse_endian(argument, &v->raw_endian);
-    case KEY_OFFSET:
-        return parse_offset(argument, &v->raw_offset_bytes);
-    case KEY_COORDINATES:
-        v->coordinates = argument;
-        return 0;
-    case KEY_ALLOW_GAPS:
-        v->allow_gaps = true;
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+static const trip_option_table brick_table = { rows, sizeof rows / sizeof *rows };
 
-static error_t parse_output_option(int key, char *argument, options *o)
+static int check_options(void *user)
 {
-    switch (key) {
-    case 'o':
-        o->output = argument;
-        return 0;
-    case KEY_FORCE:
-        o->brick.replace = true;
-        return 0;
-    case KEY_RESUME:
-        o->brick.resume = true;
-        return 0;
-    case KEY_CODE_BITS:
-        return parse_code_bits(argument, &o->brick.code_bits);
-    case KEY_NORMALS:
-        return parse_normals(argument, &o->brick.normals);
-    case KEY_HALO:
-        return parse_halo(argument, &o->brick.no_halo);
-    case KEY_LEVELS:
-        return parse_levels(argument, &o->brick.levels);
-    case KEY_LEVELS_FOR:
-        return parse_levels_for(argument, &o->brick.levels_for);
-    case KEY_TILE:
-        return parse_tile(argument, &o->brick.tile_voxels);
-    case KEY_SLAB_SHEETS:
-        return parse_unsigned("--slab-sheets", argument, 64, &o->brick.slab_sheets);
-    case KEY_LIMITS:
-        o->limits = true;
-        return 0;
-    case KEY_JSON:
-        o->json = true;
-        return 0;
-    case 'q':
-        o->quiet = true;
-        return 0;
-    default:
-        return parse_input_option(key, argument, &o->brick);
-    }
-}
-
-static error_t check_options(const options *o)
-{
+    const options *o = user;
     const triptych_brick_options *p = &o->brick;
     if (!o->volume)
         return trip_option_fail("INPUT",
@@ -417,36 +281,13 @@ static error_t check_options(const options *o)
     return 0;
 }
 
-static error_t parse_option(int key, char *argument, struct argp_state *state)
+static int add_input(void *user, char *path)
 {
-    options *o = state->input;
-    switch (key) {
-    case KEY_TF:
-        return add_function(o, argument);
-    case KEY_RANGE:
-        return parse_range(o, argument);
-    case KEY_KEEP_ALL:
-        o->brick.keep_all = true;
-        return 0;
-    case KEY_REGION:
-        return parse_region(argument, &o->brick);
-    case KEY_DRY_RUN:
-        o->dry_run = true;
-        return 0;
-    case KEY_MEMORY:
-        return trip_option_memory(argument, &o->brick.memory_bytes);
-    case KEY_THREADS:
-        return parse_unsigned("--threads", argument, 256, &o->brick.threads);
-    case ARGP_KEY_ARG:
-        if (o->volume)
-            return trip_option_fail(argument, TRIP_ONE_VOLUME);
-        o->volume = argument;
-        return 0;
-    case ARGP_KEY_END:
-        return check_options(o);
-    default:
-        return parse_output_option(key, argument, o);
-    }
+    options *o = user;
+    if (o->volume)
+        return trip_option_fail(path, TRIP_ONE_VOLUME);
+    o->volume = path;
+    return 0;
 }
 
 /* The default output is the input's name up to its first dot, with .trip, in the current folder. */
@@ -648,15 +489,20 @@ static int run(options *o)
 
 int trip_command_brick(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse_option,
+    options o = { 0 };
+    option_set sets[] = { { .table = &volume_options_table, .base = &o.brick },
+                          { .table = &brick_table, .base = &o } };
+    const command_line c = {
         .args_doc = "INPUT",
         .doc = "Converts a volume into a data set that is drawn from disk: three lists of its "
                "visible voxels, sorted along X, Y and Z.",
+        .sets = sets,
+        .set_count = 2,
+        .argument = add_input,
+        .end = check_options,
+        .user = &o,
     };
-    options o = { 0 };
-    int status = trip_options_parse(&argp, argc, argv, &o);
+    int status = command_line_parse(&c, argc, argv);
     if (status == 0)
         status = choose_output(&o);
     if (status == 0)

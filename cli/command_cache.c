@@ -11,7 +11,7 @@
 #include "budget.h"
 #include "library.h"
 #include "json.h"
-#include "options.h"
+#include "command_line.h"
 #include "report.h"
 #include "text.h"
 

@@ -12,7 +12,7 @@
 #include "geometry.h"
 #include "json.h"
 #include "library.h"
-#include "options.h"
+#include "command_line.h"
 #include "report.h"
 #include "text.h"
 

@@ -13,7 +13,6 @@
 #include "render_files.h"
 #include "render_options.h"
 #include "render_stats.h"
-#include "render_view.h"
 #include "report.h"
 #include "sequence.h"
 #include "video.h"
@@ -42,7 +41,6 @@ typedef struct drawing {
  * window finds its voxels in the cache. */
 static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
 {
-    enum { THREAD_LIMIT = 256 };
     triptych_brick_options options = o->volume;
     options.keep_all = shown && o->function.window > 0;
     if (shown && !options.keep_all) {
@@ -53,8 +51,8 @@ static triptych_brick_options brick_options(const render_options *o, const seque
     }
     options.automatic = 1;
     options.levels_for = o->levels_for;
-    options.memory_bytes = o->memory_bytes;
-    options.threads = (unsigned)(o->threads < THREAD_LIMIT ? o->threads : THREAD_LIMIT);
+    options.memory_bytes = o->resources.memory_bytes;
+    options.threads = o->resources.threads;
     return options;
 }
 
@@ -72,15 +70,10 @@ static int brick_volume(drawing *d)
 static int open_data(drawing *d, const char *path)
 {
     const render_options *o = &d->o;
-    int status =
-        triptych_open(d->t, path,
-                      &(triptych_resources){ .memory_bytes = o->memory_bytes,
-                                             .threads = (unsigned)o->threads,
-                                             .renderer = o->renderer,
-                                             .engine = o->engine,
-                                             .keep_pages = d->sequence.frames > 1,
-                                             .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
-                                             .name = o->input });
+    triptych_resources resources = o->resources;
+    resources.keep_pages = d->sequence.frames > 1;
+    resources.name = o->input;
+    int status = triptych_open(d->t, path, &resources);
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
@@ -92,17 +85,17 @@ static int open_default(drawing *d)
     triptych_transfer_function look = d->o.function;
     const triptych_brick_options defaults = brick_options(&d->o, NULL);
     const bool other = look.name || look.window > 0;
-    int missing = 0, status = other && !sequence_has_functions(&d->sequence)
-                                  ? cached_volume_find(&d->volume, d->t, d->o.input, &defaults)
-                                  : 0;
+    int status = other && !sequence_has_functions(&d->sequence)
+                     ? cached_volume_find(&d->volume, d->t, d->o.input, &defaults)
+                     : 0;
     trip_progress_end(&d->progress);
     if (status != 1)
         return status;
-    look.left_out = &missing;
+    look.all_values = 1;
     status = open_data(d, d->volume.path);
     if (!status)
         status = triptych_set_transfer_function(d->t, &look);
-    if (!missing || status < 0)
+    if (status != TRIPTYCH_LEFT_OUT)
         return status < 0 ? status : 1;
     triptych_close(d->t);
     cached_volume_close(&d->volume);
@@ -125,7 +118,7 @@ static int open_volume(drawing *d)
 {
     int status = open_from_cache(d);
     if (!status)
-        status = quality_options_check_data(d->o.measured, d->t, d->o.input);
+        status = quality_options_check_data(d->o.quality.measured, d->t, d->o.input);
     if (!status && d->o.field == RENDER_FIELD_SOURCE)
         status = triptych_set_source(d->t, d->o.input, &d->o.volume);
     char *note = status == 0 ? library_note(d->t, "note") : NULL;
@@ -159,15 +152,15 @@ static const char *data_path(const drawing *d)
 static int take_pictures(drawing *d)
 {
     const render_options *o = &d->o;
-    int status = triptych_new_picture(d->t, o->width, o->height, 4, &d->rgba);
+    int status = triptych_new_picture(d->t, o->view.view.width, o->view.view.height, 4, &d->rgba);
     if (!status && o->depth)
-        status = triptych_new_picture(d->t, o->width, o->height, 1, &d->depth);
-    return status ? status : triptych_set_settings(d->t, &o->settings);
+        status = triptych_new_picture(d->t, o->view.view.width, o->view.view.height, 1, &d->depth);
+    return status ? status : draw_settings_use(d->t, &o->settings);
 }
 
 static int open_drawing(drawing *d)
 {
-    const triptych_view view = render_view(&d->o);
+    const triptych_view view = render_options_view(&d->o);
     int status = sequence_find_shown(&d->sequence);
     if (!status)
         status = open_input(d);
@@ -205,7 +198,7 @@ static int draw_frame(drawing *d)
     enum { LOOK_NS = 20000000 };
     int status = 0;
     d->progress = trip_progress_start(false);
-    while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_WAITS)
+    while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_STEP_WAITS)
         status = triptych_await(d->t, LOOK_NS);
     if (!status)
         status = d->depth ? triptych_picture_and_depth(d->t, d->rgba, d->depth)
@@ -237,19 +230,19 @@ static int write_image(void *user, triptych *t, int index, const float *rgba, co
     char path[RENDER_FILE_BYTES];
     int status = d->video ? 0 : render_file_name(&d->o, d->o.output, index, path);
     if (!status && !d->video)
-        status = triptych_write(t, path, d->o.width, d->o.height, rgba);
+        status = triptych_write(t, path, d->o.view.view.width, d->o.view.view.height, rgba);
     if (!status && depth)
         status = render_file_name(&d->o, d->o.depth, index, path);
     if (!status && depth)
-        status = triptych_write_depth(t, path, d->o.width, d->o.height, depth);
+        status = triptych_write_depth(t, path, d->o.view.view.width, d->o.view.view.height, depth);
     return status;
 }
 
 /* Returns whether the picture shows only the background. */
 static bool is_empty(const render_options *o, const float *rgba)
 {
-    const double *ground = o->settings.background;
-    const size_t pixels = (size_t)o->width * (size_t)o->height;
+    const double *ground = draw_settings_background(&o->settings);
+    const size_t pixels = (size_t)o->view.view.width * (size_t)o->view.view.height;
     double max = 0;
     for (size_t i = 0; i < 4 * pixels && max < 1e-6; i++)
         max = fabs((double)rgba[i] - (i % 4 < 3 ? ground[i % 4] : 1) * ground[3]);
@@ -296,8 +289,9 @@ static int contexts_of(const drawing *d)
 {
     enum { DEFAULT = 2 };
     const render_options *o = &d->o;
-    bool slow = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ||
-                o->renderer == TRIPTYCH_RENDERER_REFERENCE || o->engine == TRIPTYCH_ENGINE_NULL;
+    bool slow = o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ||
+                o->resources.renderer == TRIPTYCH_RENDERER_REFERENCE ||
+                o->resources.engine == TRIPTYCH_ENGINE_NULL;
     if (d->sequence.frames < 2 || o->stats || o->explain || o->field == RENDER_FIELD_SOURCE)
         return 1;
     return o->in_flight ? o->in_flight : slow ? 1 : DEFAULT;
@@ -336,7 +330,7 @@ static int start_video(drawing *d)
     const render_options *o = &d->o;
     if (!video_is_named(o->output))
         return 0;
-    return video_create(&d->video, o->output, o->width, o->height,
+    return video_create(&d->video, o->output, o->view.view.width, o->view.view.height,
                         sequence_frames_per_second(&d->sequence));
 }
 
@@ -377,9 +371,9 @@ static int count_image(drawing *d, int index)
  * timing. */
 static int count_images(drawing *d, int images)
 {
-    triptych_settings counted = d->o.settings;
-    counted.count = 1;
-    int status = triptych_set_settings(d->t, &counted);
+    draw_settings counted = d->o.settings;
+    counted.all.count_exactly = 1;
+    int status = draw_settings_use(d->t, &counted);
     for (int i = 0; i < images && !status; i++)
         status = count_image(d, i);
     return status;
@@ -390,7 +384,7 @@ static int check_kinds(drawing *d)
 {
     const render_options *o = &d->o;
     bool is_video = video_is_named(o->output);
-    return is_video ? video_check(o->output, o->width, o->height)
+    return is_video ? video_check(o->output, o->view.view.width, o->view.view.height)
                     : triptych_prepare_write(d->t, o->output, o->depth);
 }
 

@@ -11,7 +11,7 @@
 
 #include "library.h"
 #include "new_file.h"
-#include "options.h"
+#include "command_line.h"
 #include "read_data.h"
 #include "report.h"
 #include "text.h"

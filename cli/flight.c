@@ -44,7 +44,8 @@ static void fail(flying *all, int status, const char *line)
 
 static uint64_t memory_of_each(const flight *f)
 {
-    uint64_t all = f->o->memory_bytes ? f->o->memory_bytes : trip_memory_available_bytes() / 4;
+    uint64_t all = f->o->resources.memory_bytes ? f->o->resources.memory_bytes
+                                                : trip_memory_available_bytes() / 4;
     return all / (uint64_t)f->contexts;
 }
 
@@ -53,32 +54,28 @@ static int open_data(pilot *p)
     const flight *f = p->all->f;
     const render_options *o = f->o;
     int status = triptych_create(&p->t);
+    triptych_resources resources = o->resources;
+    resources.memory_bytes = memory_of_each(f);
+    resources.keep_pages = 1;
+    resources.name = o->input;
     if (!status)
-        status = triptych_open(
-            p->t, f->data,
-            &(triptych_resources){ .memory_bytes = memory_of_each(f),
-                                   .threads = (unsigned)o->threads,
-                                   .renderer = o->renderer,
-                                   .engine = o->engine,
-                                   .keep_pages = 1,
-                                   .read_occluded = o->occluded == RENDER_OCCLUDED_DRAW,
-                                   .name = o->input });
+        status = triptych_open(p->t, f->data, &resources);
     if (!status)
         status = library_add(p->t, o->more, o->more_count, o->heat);
     if (!status)
         status = triptych_set_transfer_function(p->t, &o->function);
     if (!status)
-        status = triptych_new_picture(p->t, o->width, o->height, 4, &p->rgba);
+        status = triptych_new_picture(p->t, o->view.view.width, o->view.view.height, 4, &p->rgba);
     if (!status && o->depth)
-        status = triptych_new_picture(p->t, o->width, o->height, 1, &p->depth);
-    return status ? status : triptych_set_settings(p->t, &o->settings);
+        status = triptych_new_picture(p->t, o->view.view.width, o->view.view.height, 1, &p->depth);
+    return status ? status : draw_settings_use(p->t, &o->settings);
 }
 
 static int draw(pilot *p)
 {
     enum { LOOK_NS = 20000000 };
     int status = triptych_begin(p->t);
-    while (!status && (status = triptych_step(p->t, UINT64_MAX)) == TRIPTYCH_WAITS)
+    while (!status && (status = triptych_step(p->t, UINT64_MAX)) == TRIPTYCH_STEP_WAITS)
         status = triptych_await(p->t, LOOK_NS);
     if (!status)
         status = p->depth ? triptych_picture_and_depth(p->t, p->rgba, p->depth)

@@ -6,30 +6,43 @@
 #include "cached_volume.h"
 #include "fastest.h"
 #include "library.h"
-#include "options.h"
 #include "report.h"
 
-int quality_option_quality(const char *text, quality_options *q)
+#define AT(member) .at = offsetof(quality_options, member)
+
+static const trip_option rows[] = {
+    { "error", "E",
+      "Selects the fastest settings that keep 99 % of the pixels within E of 255, as `triptych "
+      "accuracy` measured for this data",
+      NULL, "excludes --quality", .brief = "Keeps the measured error below E of 255",
+      .group = DRAW_GROUP_ACCURACY, .type = TRIP_OPTION_NUMBER, AT(error), .lo = 1e-6, .hi = 255 },
+    { "report", "REPORT/", "Names the report that --error reads", "NAME.accuracy beside the data",
+      .group = DRAW_GROUP_ACCURACY, .type = TRIP_OPTION_TEXT, AT(report) },
+};
+
+const trip_option_table quality_table = { rows, sizeof rows / sizeof *rows };
+
+/* Returns the name of a given setting that a report measures, or NULL. */
+static const char *find_measured(const draw_settings *given)
 {
-    static const char *const names[] = { "draft", "normal", "high", "exact", NULL };
-    int which = 0, status = trip_option_choice("--quality", text, names, &which);
-    q->given = true;
-    q->quality = (triptych_quality)(TRIPTYCH_DRAFT + which);
-    return status;
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (draw_settings_table.rows[i].measured &&
+            trip_option_is_set(&draw_settings_table.rows[i], given))
+            return draw_settings_table.rows[i].name;
+    return NULL;
 }
 
-int quality_option_error(const char *text, quality_options *q)
+int quality_options_check(const quality_options *q, const draw_settings *given,
+                          triptych_renderer renderer)
 {
-    return trip_option_number("--error", text, 1e-6, 255, &q->error);
-}
-
-int quality_options_check(const quality_options *q)
-{
-    if (q->given && q->error > 0)
+    const char *measured = find_measured(given);
+    if (q->error > 0 && given->all.quality)
         return trip_option_fail("--error", "excludes --quality; give one of them");
-    if (q->measurable && q->error > 0)
+    if (q->error > 0 && renderer == TRIPTYCH_RENDERER_INTEGRAL)
+        return trip_option_fail("--error", "does not apply to --renderer integral, which is exact");
+    if (q->error > 0 && measured)
         return trip_fail(TRIP_USAGE, "usage", "--error",
-                         "excludes --%s, because --error selects that setting too", q->measurable);
+                         "excludes --%s, because --error selects that setting too", measured);
     if (q->report && !(q->error > 0))
         return trip_option_fail("--report", "requires --error E");
     return 0;
@@ -72,7 +85,15 @@ triptych_levels_for quality_options_levels(const quality_options *q, bool coarse
                            : TRIPTYCH_LEVELS_FOR_AUTO;
 }
 
-static int use_report(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
+static void take_measured(draw_settings *s, const draw_settings *found)
+{
+    s->all.quality = found->all.quality;
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (draw_settings_table.rows[i].measured)
+            trip_option_copy(&draw_settings_table.rows[i], s, found);
+}
+
+static int use_report(quality_options *q, const quality_drawn *drawn, draw_settings *s,
                       triptych_renderer *renderer, bool slow_too)
 {
     char checksum[ACCURACY_CHECKSUM_BYTES];
@@ -94,7 +115,7 @@ static int use_report(quality_options *q, const quality_drawn *drawn, triptych_s
     status = path ? accuracy_fastest(path, &wanted, &found)
                   : trip_fail(TRIP_ERROR, "--error", drawn->input, "out of memory");
     if (!status) {
-        *s = found.setting.settings;
+        take_measured(s, &found.setting.settings);
         *renderer = found.setting.renderer;
         snprintf(q->measured, sizeof q->measured, "%s", checksum[0] ? "" : found.checksum);
         q->says_levels = found.says_levels;
@@ -106,12 +127,8 @@ static int use_report(quality_options *q, const quality_drawn *drawn, triptych_s
     return status;
 }
 
-int quality_options_use(quality_options *q, const quality_drawn *drawn, triptych_settings *s,
+int quality_options_use(quality_options *q, const quality_drawn *drawn, draw_settings *s,
                         triptych_renderer *renderer, bool slow_too)
 {
-    if (q->error > 0)
-        return use_report(q, drawn, s, renderer, slow_too);
-    if (q->given && triptych_set_quality(s, q->quality))
-        return trip_option_fail("--quality", "unknown quality");
-    return 0;
+    return q->error > 0 ? use_report(q, drawn, s, renderer, slow_too) : 0;
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "new_file.h"
-#include "options.h"
+#include "command_line.h"
 #include "read_data.h"
 #include "render_stats.h"
 #include "report.h"

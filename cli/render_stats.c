@@ -21,7 +21,6 @@ struct render_stats {
 };
 
 static const char *const footprint_names[] = { "exact", "ewa", "fixed" };
-static const char *const method_names[] = { "merge", "clip", "axis", "image" };
 
 static int out_of_memory(void)
 {
@@ -99,7 +98,7 @@ static bool is_drawn_from(const triptych_list *list, const triptych_frame_stats 
 {
     if (s->splats_read > 0)
         return true;
-    if (list->level == 0 || frame->classify == TRIPTYCH_PRE)
+    if (list->level == 0 || frame->classify == TRIPTYCH_CLASSIFY_PRE)
         return list->drawn;
     return !strcmp(list->kind, "values");
 }
@@ -232,31 +231,34 @@ static int write_file(const char *path, const char *text)
 
 static void add_method(cJSON *root, const render_options *o, const triptych_frame_stats *frame)
 {
-    if (o->renderer == TRIPTYCH_RENDERER_INTEGRAL) {
+    if (o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL) {
         static const char *const fields[] = { [RENDER_FIELD_UNSET] = "stored",
                                               [RENDER_FIELD_STORED] = "stored",
                                               [RENDER_FIELD_SOURCE] = "source",
                                               [RENDER_FIELD_SPLATS] = "splats" };
+        const double tolerance = o->settings.integral.tolerance;
         cJSON_AddStringToObject(root, "field", fields[o->field]);
-        cJSON_AddNumberToObject(root, "tolerance", o->settings.tolerance);
+        cJSON_AddNumberToObject(root, "tolerance", tolerance > 0 ? tolerance : 1e-4);
         return;
     }
-    cJSON_AddStringToObject(root, "classify", frame->classify == TRIPTYCH_POST ? "post" : "pre");
-    if (frame->classify == TRIPTYCH_POST) {
+    cJSON_AddStringToObject(root, "classify",
+                            frame->classify == TRIPTYCH_CLASSIFY_POST ? "post" : "pre");
+    if (frame->classify == TRIPTYCH_CLASSIFY_POST) {
         cJSON_AddNumberToObject(root, "samples_per_sheet", frame->samples_per_sheet);
         cJSON_AddBoolToObject(root, "closed_form", frame->closed_form);
     } else {
         cJSON_AddStringToObject(root, "compositing",
-                                o->settings.compositing == TRIPTYCH_BY_SHEET ? "sheet" : "splat");
-        cJSON_AddStringToObject(root, "kernel", footprint_names[frame->footprint]);
+                                draw_settings_choice(&o->settings, DRAW_COMPOSITING));
+        cJSON_AddStringToObject(root, "kernel",
+                                footprint_names[frame->footprint - TRIPTYCH_FOOTPRINT_EXACT]);
     }
-    cJSON_AddStringToObject(root, "method", method_names[o->settings.method]);
+    cJSON_AddStringToObject(root, "method", draw_settings_choice(&o->settings, DRAW_METHOD));
 }
 
 int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
 {
     cJSON *root = s->root;
-    const int size[2] = { o->width, o->height };
+    const int size[2] = { o->view.view.width, o->view.view.height };
     triptych_frame_stats frame;
     int status = triptych_get_frame_stats(t, &frame);
     if (status)
@@ -264,8 +266,8 @@ int render_stats_describe(render_stats *s, const render_options *o, triptych *t)
     cJSON_AddStringToObject(root, "renderer", frame.renderer);
     cJSON_AddStringToObject(root, "device", frame.device);
     add_method(root, o, &frame);
-    if (o->settings.lod_px > 0)
-        cJSON_AddNumberToObject(root, "lod_px", o->settings.lod_px);
+    if (o->settings.lod.voxel_px > 0)
+        cJSON_AddNumberToObject(root, "lod_px", o->settings.lod.voxel_px);
     if (frame.effects) {
         cJSON *effects = cJSON_AddArrayToObject(root, "effects");
         static const char *const names[] = { "shadows", "occlusion", "cueing", NULL, "emission" };
@@ -325,8 +327,9 @@ int render_stats_explain_plan(triptych *t, FILE *out)
 /* Returns the name for the records that were read. */
 static const char *things_read(const render_options *o, const triptych_frame_stats *frame)
 {
-    const bool splats = o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? o->field == RENDER_FIELD_SPLATS
-                                                                  : frame->classify == TRIPTYCH_PRE;
+    const bool splats = o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
+                            ? o->field == RENDER_FIELD_SPLATS
+                            : frame->classify == TRIPTYCH_CLASSIFY_PRE;
     return splats ? "splats" : "voxels";
 }
 
@@ -372,7 +375,8 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
     fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, %s %.1f\n",
             frame.ms, frame.wait_ms, frame.draw_ms,
-            o->renderer == TRIPTYCH_RENDERER_INTEGRAL ? "integrating" : "merging", frame.merge_ms);
+            o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? "integrating" : "merging",
+            frame.merge_ms);
     return 0;
 }
 
@@ -396,8 +400,8 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
     if (status)
         return status;
     trip_text_write(out, path);
-    fprintf(out, ": %d x %d, %.2f million %s, %s read, %.2f s\n", o->width, o->height,
-            (double)frame.splats * 1e-6, things_read(o, &frame),
+    fprintf(out, ": %d x %d, %.2f million %s, %s read, %.2f s\n", o->view.view.width,
+            o->view.view.height, (double)frame.splats * 1e-6, things_read(o, &frame),
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     return 0;
 }

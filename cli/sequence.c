@@ -111,8 +111,8 @@ static triptych_camera camera_of(const sequence *s, int frame)
     trip_navigation n = trip_camera_path_view(&s->path, seconds);
     triptych_camera camera = { .fov_degrees = n.fov_degrees,
                                .ortho_height = n.ortho_height,
-                               .width = s->o->width,
-                               .height = s->o->height };
+                               .width = s->o->view.view.width,
+                               .height = s->o->view.view.height };
     memcpy(camera.eye, n.eye, sizeof camera.eye);
     memcpy(camera.look, n.look, sizeof camera.look);
     memcpy(camera.up, n.up, sizeof camera.up);
@@ -219,10 +219,10 @@ static int set_function(const sequence *s, triptych *t, int frame, bool quiet)
 /* Applies the clipping of the path, if it has any, instead of the clipping on the command line. */
 static int set_clip(const sequence *s, triptych *t, int frame)
 {
-    triptych_settings settings = s->o->settings;
+    draw_settings settings = s->o->settings;
     if (!trip_camera_path_clip(&s->path, trip_camera_path_seconds(&s->path, frame), &settings.clip))
         return 0;
-    return triptych_set_settings(t, &settings);
+    return draw_settings_use(t, &settings);
 }
 
 /* ---- frames ---- */

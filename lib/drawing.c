@@ -16,7 +16,7 @@
 static void show_progress(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     triptych *t = user;
-    t->show(t->show_user, t->counting ? "count" : stage, done, total);
+    t->show(t->show_user, t->given.all.count_exactly ? "count" : stage, done, total);
 }
 
 void trip_context_drop_reader(triptych *t)
@@ -67,22 +67,22 @@ static int make_reader(triptych *t, unsigned planes)
 {
     const triptych_resources *r = &t->resources;
     bool finds_occluded = !strcmp(t->renderer->ops->name, "cpu");
-    bool draws_all = r->read_occluded || t->counting;
+    bool draws_all = r->read_occluded || t->given.all.count_exactly;
     const session_reader wanted = {
         .engine = (trip_engine)r->engine,
         .planes = planes,
         .threads = (int)trip_context_threads(r->threads),
-        .cache = r->keep_pages && !t->counting && !t->plan.gathers,
+        .cache = r->keep_pages && !t->given.all.count_exactly && !t->plan.gathers,
         .renderer = t->renderer,
         .skip = finds_occluded && !draws_all ? trip_cpu_occluded : NULL,
         .skip_user = t->renderer,
     };
     const bool reads = wanted.cache ? !(planes & ~t->planes) : planes == t->planes;
-    if (t->reader && reads && t->counting == t->reader_counts)
+    if (t->reader && reads && t->given.all.count_exactly == t->reader_counts)
         return 0;
     trip_context_drop_reader(t);
     t->planes = planes;
-    t->reader_counts = t->counting;
+    t->reader_counts = t->given.all.count_exactly;
     return session_make_reader(&t->session, &t->reader, &wanted);
 }
 
@@ -109,8 +109,8 @@ static trip_settings bounded_settings(const triptych *t)
 {
     trip_settings s = t->settings;
     const double rate = t->bytes_per_ms > 0 ? t->bytes_per_ms : DEFAULT_BYTES_PER_MS;
-    const double bytes = fmax(t->max_ms * rate, 1);
-    if (t->max_ms > 0)
+    const double bytes = fmax(t->given.lod.max_ms * rate, 1);
+    if (t->given.lod.max_ms > 0)
         s.max_bytes = s.max_bytes > 0 ? fmin(s.max_bytes, bytes) : bytes;
     return s;
 }
@@ -128,27 +128,15 @@ static int use_level(triptych *t, unsigned level)
     return status;
 }
 
-/* Returns why the frame must be drawn by splats, or NULL if post can draw it. */
-static const char *needs_splats(const triptych *t)
+/* Writes why the frame must be drawn by splats. Returns NULL if post can draw it. */
+static const char *needs_splats(triptych *t)
 {
-    const trip_settings *s = &t->drawn_settings;
+    const char *option = draw_settings_of_splats(&t->given);
     const trip_file_header *h = &t->session.data->header;
-    if (t->counting)
-        return "splats are counted";
-    if (s->traversal != TRIP_TRAVERSAL_OUTWARD)
-        return "traversal is ascending";
-    if (s->target != TRIP_TARGET_RGBA32F)
-        return "the target is not rgba32f";
-    if (s->indexed || s->triangles)
-        return "indexed or triangles is set";
-    if (s->compositing != TRIP_COMPOSITING_SPLAT)
-        return "compositing is by sheet";
-    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
-        return "a footprint or low-pass filter of splats is set";
-    if (s->method == TRIP_METHOD_IMAGE || s->vertex_weights)
-        return "image-aligned sheets and vertex weights need splats";
-    if (s->kernel_radius != TRIP_KERNEL_RADIUS_VOXELS)
-        return "a kernel radius is set";
+    if (option) {
+        snprintf(t->why_splats, sizeof t->why_splats, "--%s is for splats", option);
+        return t->why_splats;
+    }
     if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
         return "the grid is one voxel thick";
     if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
@@ -159,18 +147,20 @@ static const char *needs_splats(const triptych *t)
 /* Chooses the settings that do not depend on the level, and the classification. */
 static void choose_settings(triptych *t)
 {
-    bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    const bool automatic = draw_settings_classify(&t->given) == TRIPTYCH_CLASSIFY_AUTO;
     t->drawn_settings = bounded_settings(t);
-    t->why_pre = t->classify_auto && !integral ? needs_splats(t) : NULL;
-    if (t->why_pre || (t->classify_auto && integral))
+    t->why_pre = automatic && !integral ? needs_splats(t) : NULL;
+    if (t->why_pre || integral)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
         trip_settings_sum_sheets(&t->drawn_settings) &&
         t->drawn_settings.footprint ==
             TRIP_FOOTPRINT_EXACT) /* exact footprints are not summed with uneven spacing */
         t->drawn_settings.footprint = TRIP_FOOTPRINT_EWA;
-    if (t->normalise) /* normalising adds the background later; depth cueing still uses its colour
-                       */
+    if (t->given.all
+            .normalise) /* normalising adds the background later; depth cueing still uses its colour
+                         */
         t->drawn_settings.background[3] = 0;
 }
 
@@ -179,8 +169,8 @@ static void choose_settings(triptych *t)
 static int choose_parts(triptych *t)
 {
     const trip_settings *s = &t->drawn_settings;
-    const bool one =
-        t->counting || s->depth || s->effects.emission || trip_effects_light(&s->effects);
+    const bool one = t->given.all.count_exactly || s->depth || s->effects.emission ||
+                     trip_effects_light(&s->effects);
     trip_dataset *before = t->at_level;
     t->at_level = NULL;
     int status = make_camera(t);
@@ -249,16 +239,22 @@ static int prepare(triptych *t)
 {
     session *s = &t->session;
     const triptych_resources *r = &t->resources;
+    triptych_renderer renderer = r->renderer;
     int status = trip_context_check_idle(t, true);
+    if (!status)
+        status = draw_settings_check(&t->given, &renderer, false);
     if (status)
         return status;
+    if (t->renderer && t->required != renderer)
+        trip_context_drop_renderer(t);
+    t->required = renderer;
     if (!t->has_function)
         status = trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
     if (!status && !t->renderer)
-        status = trip_renderer_create(&t->renderer, (trip_renderer_kind)r->renderer, r->threads,
-                                      s->budget);
+        status =
+            trip_renderer_create(&t->renderer, (trip_renderer_kind)renderer, r->threads, s->budget);
     return status;
 }
 
@@ -266,9 +262,6 @@ static int prepare(triptych *t)
 static int plan_field(triptych *t)
 {
     session *s = &t->session;
-    if (t->settings.kernel == TRIP_KERNEL_GAUSSIAN)
-        return trip_fail(TRIP_USAGE, "render", "kernel",
-                         "the integral renderer has no gaussian kernel; use linear or cubic");
     unsigned kinds = 1u << TRIP_KIND_VOXELS;
     if (t->settings.field == TRIP_FIELD_VALUES)
         kinds = t->source ? 0 : kinds | 1u << TRIP_KIND_HALO;
@@ -280,19 +273,10 @@ static int plan_field(triptych *t)
                                 s->budget);
 }
 
-/* Fails for settings of splats that the renderer or the data set does not support. */
+/* Fails for settings of splats that the data set does not support. */
 static int check_splats(const triptych *t)
 {
     const trip_settings *s = &t->settings;
-    triptych_renderer renderer = t->resources.renderer;
-    bool splats = s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA;
-    if (splats && renderer == TRIPTYCH_RENDERER_INTEGRAL)
-        return trip_fail(TRIP_USAGE, "render", "kernel",
-                         "the integral renderer has no footprints and no low-pass filter; leave "
-                         "both at their defaults");
-    if (s->low_pass == TRIP_LOW_PASS_UNIFORM && renderer != TRIPTYCH_RENDERER_REFERENCE)
-        return trip_fail(TRIP_USAGE, "render", "low-pass",
-                         "the uniform low-pass filter requires --renderer reference");
     if (s->flatten > 1 && !(t->session.data->header.planes >> TRIP_PLANE_NORMALS & 1))
         return trip_fail(TRIP_USAGE, "render", t->name,
                          "has no normals, which flattened kernels need; brick it with normals");
@@ -324,13 +308,8 @@ static int plan_frame(triptych *t)
         status = choose_sprites(t);
     if (status)
         return status;
-    if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL && t->settings.show)
-        return trip_fail(TRIP_USAGE, "render", "show",
-                         "the integral renderer has no lists and no levels to show");
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return plan_field(t);
-    if (t->settings.samples > 1 && t->settings.depth)
-        return trip_fail(TRIP_USAGE, "render", "samples", "--depth requires --samples 1");
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST ||
         !trip_settings_has_levels(&t->drawn_settings)) /* these frames get all the memory */
         trip_mean_tables_release(&s->mean_tables, s->budget);
@@ -445,7 +424,7 @@ static int start(triptych *t)
         .field = t->source,
         .light = t->light,
         .emission = t->drawn_settings.effects.emission ? t->heat : NULL,
-        .count = t->counting,
+        .count = t->given.all.count_exactly,
         .progress = t->show ? show_progress : NULL,
         .progress_user = t,
     };
@@ -530,7 +509,7 @@ static int take_drawn(triptych *t, float *rgba, float *depth)
         return status;
     if (t->part > 0)
         trip_lod_parts_add(&t->parts, t->before, rgba, t->drawing.done, pixels, rgba);
-    if (t->normalise)
+    if (t->given.all.normalise)
         trip_normalise(rgba, pixels, behind);
     else if (t->parts.count > 1)
         trip_put_behind(rgba, pixels, behind);
@@ -654,7 +633,7 @@ int triptych_draw(triptych *t, float *rgba)
     int status = triptych_begin(t);
     if (status)
         return status;
-    while (!status && (status = triptych_step(t, UINT64_MAX)) == TRIPTYCH_WAITS)
+    while (!status && (status = triptych_step(t, UINT64_MAX)) == TRIPTYCH_STEP_WAITS)
         status = triptych_await(t, LOOK_NS);
     if (!status)
         status = triptych_picture(t, rgba);

@@ -22,18 +22,18 @@ static uint64_t in_10_ms(void)
 
 static int set_up(triptych *t, const char *data, const char *function)
 {
-    triptych_settings settings = triptych_default_settings();
+    const double dark_blue[4] = { 0, 0, 0.25, 1 };
     int status = triptych_open(t, data, &(triptych_resources){ .memory_bytes = 256u << 20 });
     if (!status)
         status = triptych_set_transfer_function(
             t, &(triptych_transfer_function){ .name = *function ? function : NULL });
-    settings.background[2] = 0.25; /* dark blue */
     if (!status)
-        status = triptych_set_settings(t, &settings);
+        status = triptych_set_settings(t, &(triptych_settings){ .background = dark_blue });
     if (!status)
-        status = triptych_set_view(
-            t, &(triptych_view){
-                   .width = WIDTH, .height = HEIGHT, .side = TRIPTYCH_ISO, .azimuth_degrees = 30 });
+        status = triptych_set_view(t, &(triptych_view){ .width = WIDTH,
+                                                        .height = HEIGHT,
+                                                        .side = TRIPTYCH_SIDE_ISO,
+                                                        .azimuth_degrees = 30 });
     return status;
 }
 
@@ -42,7 +42,7 @@ static int draw(triptych *t, float *rgba)
     int steps = 0, status = triptych_begin(t);
     while (!status && (status = triptych_step(t, in_10_ms())) > 0) {
         steps++;
-        if (status == TRIPTYCH_WAITS)
+        if (status == TRIPTYCH_STEP_WAITS)
             triptych_await(t, 10000000);
         status = triptych_picture(t, rgba); /* unfinished; a program would show it here */
     }

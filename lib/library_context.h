@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <stdio.h>
 
+#include "draw_settings.h"
 #include "emission.h"
 #include "frame.h"
 #include "field.h"
@@ -19,6 +20,9 @@
 
 enum { TRIP_CONTEXT_MAX_THREADS = 256 };
 
+/* Default temperature of the greatest heat. */
+#define TRIP_HOTTEST_KELVIN 2500.0
+
 /* Memory of a picture, taken from the budget. */
 typedef struct trip_context_picture {
     struct trip_context_picture *next;
@@ -30,9 +34,9 @@ struct triptych {
     trip_scope scope;
     pthread_mutex_t lock;
     char error[4096]; /* guarded by lock */
-    void (*take)(void *user, const char *line);
+    triptych_message_callback take;
     void *take_user;
-    void (*show)(void *user, const char *stage, uint64_t done, uint64_t total);
+    triptych_progress_callback show;
     void *show_user;
 
     triptych_resources resources;
@@ -42,6 +46,8 @@ struct triptych {
     trip_context_picture *pictures;
     trip_field *source;      /* values of the volume itself; NULL: the data set's values */
     trip_renderer *renderer; /* NULL until a frame begins */
+    /* The kind of `renderer`: as in `resources`, unless the settings require another. */
+    triptych_renderer required;
     /* Reads `planes`. NULL until a frame begins. */
     trip_reader *reader;
     unsigned planes;
@@ -55,33 +61,27 @@ struct triptych {
     /* Size of `before`, which may be kept for the next frame. */
     size_t before_bytes;
     triptych_frame_stats before_stats; /* of the parts before `part` */
-    trip_settings settings;            /* samples_per_sheet is 0 if the view determines it */
-    triptych_clip clip;                /* as set; frames use drawn_settings.clip */
-    double max_ms;                     /* 0 sets no bound */
+    draw_settings given;               /* as set */
+    trip_settings settings;            /* of `given`; samples_per_sheet is 0 if the view selects */
     double bytes_per_ms;               /* measured in bounded frames; 0 if none was drawn */
     bool kernel_warned;                /* warned about the halo for the kernel */
     bool levels_warned;                /* warned about missing levels for the classification */
-    bool classify_auto;                /* drawn_settings.classify has the choice */
-    double kelvin[2];                  /* of emission, as set */
-    int effects;                       /* as set; frames use drawn_settings.effects */
-    /* Reason for the choice of TRIPTYCH_EFFECTS_AUTO; NULL without it. */
+    double kelvin[2];                  /* of emission */
+    /* Reason for the choice of TRIPTYCH_EFFECT_AUTO; NULL without it. */
     const char *why_effects;
     /* For shadows and occlusion. NULL if the last frames had neither. */
     trip_light_map *light;
     trip_emission *heat; /* NULL if no data set of heat is open */
-    bool normalise;      /* divides colours by opacity */
-    /* If true, frames count exactly and draw occluded bricks too. reader_counts says whether
-     * `reader` was made for counting. */
-    bool counting;
-    bool reader_counts;
+    bool reader_counts;  /* `reader` was made for exact counts */
 
     bool has_view;
     trip_camera_params view, turned;
     trip_vec3 axis;      /* axis of triptych_turn() */
     uint64_t fit_splats; /* splats examined to fit the view */
 
-    trip_settings drawn_settings;                  /* of the begun frame, with all choices made */
-    const char *why_pre;                           /* reason if auto chose pre, otherwise NULL */
+    trip_settings drawn_settings; /* of the begun frame, with all choices made */
+    const char *why_pre;          /* reason if auto chose pre, otherwise NULL */
+    char why_splats[64];
     trip_view_samples_per_sheet samples_per_sheet; /* for the view */
     /* `begun`: camera and plan exist. `drawn`: the drawing exists, too. */
     bool begun, drawn;
@@ -119,6 +119,8 @@ int trip_context_check_list(const triptych *t, unsigned number);
 
 /* Like the public functions of the same name, but inside the context's scope, and with checked
  * parameters. */
+/* Returns the settings of the renderers. Levels, effects and clipping follow for each frame. */
+trip_settings trip_settings_of(const draw_settings *s);
 int trip_context_use_transfer_function(triptych *t, const triptych_transfer_function *f);
 int trip_context_find_view(triptych *t, const triptych_view *given);
 void trip_context_drop_reader(triptych *t);

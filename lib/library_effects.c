@@ -28,11 +28,11 @@ static int choose(triptych *t)
                              ? "smoke, clouds or fog would scatter the light, but it comes from "
                                "the eye; give it a direction or position"
                              : "smoke, clouds or fog scatter the light";
-        return t->settings.headlight ? 0 : TRIPTYCH_SHADOWS;
+        return t->settings.headlight ? 0 : TRIPTYCH_EFFECT_SHADOWS;
     case TRIP_TF_LABELS:
         t->why_effects =
             surfaces ? "labels are drawn as surfaces" : "transparent labels keep their colours";
-        return surfaces ? TRIPTYCH_OCCLUSION : 0;
+        return surfaces ? TRIPTYCH_EFFECT_OCCLUSION : 0;
     case TRIP_TF_CT:
     case TRIP_TF_MR:
         t->why_effects = "measured values keep the colours of the transfer function";
@@ -47,7 +47,7 @@ static int check_effects(const triptych *t, int effects)
 {
     if (!TRIP_HAS_EFFECTS && effects)
         return trip_fail(TRIP_USAGE, "render", "effects", "this build has no effects");
-    if (effects & TRIPTYCH_EMISSION && !t->heat)
+    if (effects & TRIPTYCH_EFFECT_EMISSION && !t->heat)
         return trip_fail(TRIP_USAGE, "render", "emission",
                          "emission needs a data set of heat; give one");
     return 0;
@@ -56,21 +56,21 @@ static int check_effects(const triptych *t, int effects)
 int trip_context_choose_effects(triptych *t)
 {
     trip_effects *e = &t->drawn_settings.effects;
-    int effects = t->effects & ~TRIPTYCH_EFFECTS_AUTO, status = 0;
+    int effects = t->given.effects.which & ~TRIPTYCH_EFFECT_AUTO, status = 0;
     t->why_effects = NULL;
-    if (t->effects & TRIPTYCH_EFFECTS_AUTO) {
+    if (t->given.effects.which & TRIPTYCH_EFFECT_AUTO) {
         status = session_read_text(&t->session);
         effects |= status ? 0 : choose(t);
-        effects |= t->heat ? TRIPTYCH_EMISSION : 0;
+        effects |= t->heat ? TRIPTYCH_EFFECT_EMISSION : 0;
     }
     if (t->settings.show == TRIP_SHOW_MERGE) /* the merge map shows nothing of the volume */
         effects = 0;
     if (!status)
         status = check_effects(t, effects);
-    e->shadows = effects & TRIPTYCH_SHADOWS;
-    e->occlusion = effects & TRIPTYCH_OCCLUSION;
-    e->emission = effects & TRIPTYCH_EMISSION;
-    e->cueing = effects & TRIPTYCH_CUEING ? t->settings.effects.cueing : 0;
+    e->shadows = effects & TRIPTYCH_EFFECT_SHADOWS;
+    e->occlusion = effects & TRIPTYCH_EFFECT_OCCLUSION;
+    e->emission = effects & TRIPTYCH_EFFECT_EMISSION;
+    e->cueing = effects & TRIPTYCH_EFFECT_CUEING ? t->settings.effects.cueing : 0;
     return status;
 }
 
@@ -145,16 +145,16 @@ int trip_context_begin_light(triptych *t)
 
 static void explain(const triptych *t, const char *name, int effect, bool runs, FILE *out)
 {
-    const bool automatic = t->effects & TRIPTYCH_EFFECTS_AUTO;
-    const char *why = t->effects & effect ? "asked for" : "not asked for";
-    if (t->settings.show == TRIP_SHOW_MERGE && (automatic || t->effects & effect))
+    const bool automatic = t->given.effects.which & TRIPTYCH_EFFECT_AUTO;
+    const char *why = t->given.effects.which & effect ? "asked for" : "not asked for";
+    if (t->settings.show == TRIP_SHOW_MERGE && (automatic || t->given.effects.which & effect))
         why = "the merge map does not show the volume";
     /* for fog, why_effects is about shadows, whether or not they run */
-    else if (automatic && !(t->effects & effect) && effect == TRIPTYCH_EMISSION)
+    else if (automatic && !(t->given.effects.which & effect) && effect == TRIPTYCH_EFFECT_EMISSION)
         why = runs ? "a data set of heat is given" : "no data set of heat is given";
-    else if (automatic && !(t->effects & effect))
-        why = runs || effect == TRIPTYCH_SHADOWS ? t->why_effects
-                                                 : "the kind of data does not call for it";
+    else if (automatic && !(t->given.effects.which & effect))
+        why = runs || effect == TRIPTYCH_EFFECT_SHADOWS ? t->why_effects
+                                                        : "the kind of data does not call for it";
     fprintf(out, "%-11s %s: %s\n", name, runs ? "runs" : "does not run", why);
 }
 
@@ -187,10 +187,10 @@ static void explain_heat(const triptych *t, FILE *out)
 void trip_context_explain_effects(const triptych *t, FILE *out)
 {
     const trip_effects *e = &t->drawn_settings.effects;
-    explain(t, "shadows", TRIPTYCH_SHADOWS, e->shadows, out);
-    explain(t, "occlusion", TRIPTYCH_OCCLUSION, e->occlusion, out);
-    explain(t, "emission", TRIPTYCH_EMISSION, e->emission, out);
-    explain(t, "cueing", TRIPTYCH_CUEING, e->cueing > 0, out);
+    explain(t, "shadows", TRIPTYCH_EFFECT_SHADOWS, e->shadows, out);
+    explain(t, "occlusion", TRIPTYCH_EFFECT_OCCLUSION, e->occlusion, out);
+    explain(t, "emission", TRIPTYCH_EFFECT_EMISSION, e->emission, out);
+    explain(t, "cueing", TRIPTYCH_EFFECT_CUEING, e->cueing > 0, out);
     if (trip_effects_light(e))
         explain_lattice(t, out);
     if (e->emission)

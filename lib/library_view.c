@@ -249,7 +249,7 @@ static int check(const triptych_view *o)
     else if (o->fov_degrees != 0 && !(o->fov_degrees >= TRIPTYCH_FOV_MIN_DEGREES &&
                                       o->fov_degrees <= TRIPTYCH_FOV_MAX_DEGREES))
         why = "the angle of view must be 1e-6 to 179.999 degrees";
-    else if (o->side < TRIPTYCH_SIDE_DEFAULT || o->side > TRIPTYCH_ISO)
+    else if (o->side < TRIPTYCH_SIDE_DEFAULT || o->side > TRIPTYCH_SIDE_ISO)
         why = "unknown side";
     else if (o->eye && o->ortho_fit)
         why = "a parallel view with an eye needs a height";

@@ -6,6 +6,8 @@
 
 enum { DEFAULT_SIZE = 1024 };
 
+#define DEFAULT_CUEING 0.6
+
 int trip_context_use_transfer_function(triptych *t, const triptych_transfer_function *f)
 {
     bool missing = false;
@@ -14,13 +16,16 @@ int trip_context_use_transfer_function(triptych *t, const triptych_transfer_func
                                 .opacity_scale = f->opacity_scale,
                                 .window = f->window,
                                 .level = f->level,
-                                .missing = f->left_out ? &missing : NULL };
+                                .missing = f->all_values ? &missing : NULL };
     int status = session_use_function(&t->session, &look);
-    if (f->left_out)
-        *f->left_out = missing;
     t->rounding_checked = false;
     t->has_function |= !status && !missing;
-    return status;
+    if (missing)
+        snprintf(t->error, sizeof t->error,
+                 "triptych: render: %s: lacks values that the transfer "
+                 "function shows",
+                 t->name);
+    return missing ? TRIPTYCH_LEFT_OUT : status;
 }
 
 /* A larger scale could make extinctions infinite. */
@@ -51,202 +56,111 @@ int triptych_set_transfer_function(triptych *t, const triptych_transfer_function
     return trip_context_leave(before, status ? status : trip_context_use_transfer_function(t, f));
 }
 
-triptych_settings triptych_default_settings(void)
+/* ---- settings ---- */
+
+/* The library's values follow the renderers' values, after a default. */
+#define SAME_ORDER(of_library, of_renderers)                                                       \
+    _Static_assert((int)(of_library) == (int)(of_renderers) + 1, #of_library)
+SAME_ORDER(TRIPTYCH_CLASSIFY_PRE, TRIP_CLASSIFY_PRE);
+SAME_ORDER(TRIPTYCH_CLASSIFY_POST, TRIP_CLASSIFY_POST);
+SAME_ORDER(TRIPTYCH_METHOD_MERGE, TRIP_METHOD_MERGE);
+SAME_ORDER(TRIPTYCH_METHOD_CLIP, TRIP_METHOD_CLIP);
+SAME_ORDER(TRIPTYCH_METHOD_AXIS, TRIP_METHOD_AXIS);
+SAME_ORDER(TRIPTYCH_METHOD_IMAGE, TRIP_METHOD_IMAGE);
+SAME_ORDER(TRIPTYCH_TRAVERSAL_OUTWARD, TRIP_TRAVERSAL_OUTWARD);
+SAME_ORDER(TRIPTYCH_TRAVERSAL_ASCENDING, TRIP_TRAVERSAL_ASCENDING);
+SAME_ORDER(TRIPTYCH_KERNEL_LINEAR, TRIP_KERNEL_LINEAR);
+SAME_ORDER(TRIPTYCH_KERNEL_CUBIC, TRIP_KERNEL_CUBIC);
+SAME_ORDER(TRIPTYCH_KERNEL_GAUSSIAN, TRIP_KERNEL_GAUSSIAN);
+SAME_ORDER(TRIPTYCH_SHOW_PICTURE, TRIP_SHOW_PICTURE);
+SAME_ORDER(TRIPTYCH_SHOW_LISTS, TRIP_SHOW_LISTS);
+SAME_ORDER(TRIPTYCH_SHOW_MERGE, TRIP_SHOW_MERGE);
+SAME_ORDER(TRIPTYCH_SHOW_LEVELS, TRIP_SHOW_LEVELS);
+SAME_ORDER(TRIPTYCH_COMPOSITING_SPLAT, TRIP_COMPOSITING_SPLAT);
+SAME_ORDER(TRIPTYCH_COMPOSITING_SHEET, TRIP_COMPOSITING_SHEET);
+SAME_ORDER(TRIPTYCH_FOOTPRINT_EXACT, TRIP_FOOTPRINT_EXACT);
+SAME_ORDER(TRIPTYCH_FOOTPRINT_EWA, TRIP_FOOTPRINT_EWA);
+SAME_ORDER(TRIPTYCH_FOOTPRINT_FIXED, TRIP_FOOTPRINT_FIXED);
+SAME_ORDER(TRIPTYCH_LOW_PASS_EWA, TRIP_LOW_PASS_EWA);
+SAME_ORDER(TRIPTYCH_LOW_PASS_UNIFORM, TRIP_LOW_PASS_UNIFORM);
+SAME_ORDER(TRIPTYCH_LOW_PASS_NONE, TRIP_LOW_PASS_NONE);
+SAME_ORDER(TRIPTYCH_TARGET_RGBA32F, TRIP_TARGET_RGBA32F);
+SAME_ORDER(TRIPTYCH_TARGET_RGBA16F, TRIP_TARGET_RGBA16F);
+SAME_ORDER(TRIPTYCH_TARGET_RGBA8, TRIP_TARGET_RGBA8);
+SAME_ORDER(TRIPTYCH_FIELD_VALUES, TRIP_FIELD_VALUES);
+SAME_ORDER(TRIPTYCH_FIELD_SPLATS, TRIP_FIELD_SPLATS);
+
+static double number_or(double given, double standard)
 {
-    const trip_settings s = trip_settings_default();
-    return (triptych_settings){
-        .classify = TRIPTYCH_CLASSIFY_AUTO,
-        .compositing = (triptych_compositing)s.compositing,
-        .footprint = (triptych_footprint)s.footprint,
-        .low_pass = (triptych_low_pass)s.low_pass,
-        .flatten = s.flatten,
-        .method = (triptych_method)s.method,
-        .traversal = (triptych_traversal)s.traversal,
-        .target = (triptych_target)s.target,
-        .shading = s.shading,
-        .headlight = s.headlight,
-        .light = { s.light_direction.x, s.light_direction.y, s.light_direction.z },
-        .h = s.h,
-        .early_termination = s.early_termination,
-        .kernel_radius = s.kernel_radius,
-        .background = { s.background[0], s.background[1], s.background[2], s.background[3] },
-        .lod_px = s.lod_px,
-        .field = (triptych_field)s.field,
-        .kernel = (triptych_kernel)s.kernel,
-        .tolerance = s.tolerance,
-        .samples = s.samples,
-        .anisotropy = s.effects.anisotropy,
-        .cueing = 0.6,
-        .kelvin = { 0, 2500 },
-        .light_cells = s.effects.cells,
-    };
+    return given == 0 ? standard : given == TRIPTYCH_ZERO ? 0 : given;
 }
 
-int triptych_set_quality(triptych_settings *s, triptych_quality quality)
+/* The number of samples per sheet; 0 lets the view select. */
+static int samples_per_sheet(const draw_settings *s)
 {
-    const triptych_settings defaults = triptych_default_settings();
-    if (quality < TRIPTYCH_DRAFT || quality > TRIPTYCH_EXACT)
-        return TRIPTYCH_USAGE;
-    s->classify = quality == TRIPTYCH_NORMAL ? defaults.classify : TRIPTYCH_POST;
-    s->compositing = defaults.compositing;
-    s->footprint = defaults.footprint;
-    s->low_pass = defaults.low_pass;
-    s->flatten = defaults.flatten;
-    s->vertex_weights = defaults.vertex_weights;
-    s->samples_per_sheet = quality == TRIPTYCH_DRAFT ? 1 : quality == TRIPTYCH_HIGH ? 8 : 0;
-    s->samples_per_sheet = quality == TRIPTYCH_EXACT ? 16 : s->samples_per_sheet;
-    s->method = defaults.method;
-    s->h = defaults.h;
-    s->early_termination =
-        quality == TRIPTYCH_EXACT ? TRIP_EARLY_TERMINATION_PRE : defaults.early_termination;
-    s->target = defaults.target;
-    s->kernel_radius = defaults.kernel_radius;
-    s->lod_px = defaults.lod_px;
-    s->max_bytes = s->max_ms = 0;
-    s->samples = defaults.samples;
-    return TRIPTYCH_OK;
+    const int of_quality = s->all.quality == TRIPTYCH_QUALITY_DRAFT   ? 1
+                           : s->all.quality == TRIPTYCH_QUALITY_HIGH  ? 8
+                           : s->all.quality == TRIPTYCH_QUALITY_EXACT ? 16
+                                                                      : 0;
+    return s->sheet.samples < 0 ? 0 : s->sheet.samples ? s->sheet.samples : of_quality;
 }
 
-static const char *fault_of_integral(const triptych_settings *s)
+static void set_light(trip_settings *out, const triptych_light *light)
 {
-    if (s->field < TRIPTYCH_VALUES || s->field > TRIPTYCH_SPLATS || s->kernel < TRIPTYCH_LINEAR ||
-        s->kernel > TRIPTYCH_GAUSSIAN)
-        return "unknown field or kernel";
-    if (!(s->tolerance >= 1e-12 && s->tolerance <= 0.1))
-        return "the tolerance must be 1e-12 to 0.1";
-    if (!(s->samples >= 1 && s->samples <= 64))
-        return "the samples along each side of a pixel must be 1 to 64";
-    return NULL;
+    const trip_vec3 toward = trip_v3(light->toward[0], light->toward[1], light->toward[2]);
+    out->shading = !light->no_shading;
+    out->headlight = light->kind < TRIPTYCH_LIGHT_DIRECTION;
+    out->point_light = light->kind == TRIPTYCH_LIGHT_POINT;
+    if (out->point_light)
+        out->light_position = toward;
+    else if (!out->headlight)
+        out->light_direction = trip_normalize(toward);
 }
 
-static const char *fault_of_splats(const triptych_settings *s)
-{
-    if (s->compositing < TRIPTYCH_BY_SPLAT || s->compositing > TRIPTYCH_BY_SHEET)
-        return "unknown compositing";
-    if (s->footprint < TRIPTYCH_FOOTPRINT_EXACT || s->footprint > TRIPTYCH_FOOTPRINT_FIXED ||
-        s->low_pass < TRIPTYCH_LOW_PASS_EWA || s->low_pass > TRIPTYCH_LOW_PASS_NONE)
-        return "unknown footprint or low-pass filter";
-    if (!(s->kernel_radius >= 0.1 && s->kernel_radius <= 100))
-        return "the kernel radius must be 0.1 to 100 voxels";
-    if (!(s->flatten >= 1 && s->flatten <= 100))
-        return "the flattening of kernels must be 1 to 100";
-    return s->flatten > 1 && s->count ? "count requires round kernels; set the flattening to 1"
-                                      : NULL;
-}
+/* A choice of the renderers: the library's value without the default. */
+#define CHOSEN(type, value) ((type)((value) ? (int)(value)-1 : 0))
 
-static bool is_a_box(const double lo[3], const double hi[3])
+trip_settings trip_settings_of(const draw_settings *s)
 {
-    for (int a = 0; a < 3; a++)
-        if (!(lo[a] < hi[a]))
-            return false;
-    return true;
-}
-
-static const char *fault_of_clip(const triptych_clip *c)
-{
-    if (c->box && !is_a_box(c->box_lo, c->box_hi))
-        return "the clipping box has its minimum not below its maximum";
-    if (!(c->planes >= 0 && c->planes <= TRIP_CLIP_GIVEN_PLANES))
-        return "the number of clipping planes must be 0 to 6";
-    for (int i = 0; i < c->planes; i++) {
-        const double *p = c->plane[i];
-        double length = trip_length(trip_v3(p[0], p[1], p[2]));
-        if (!(length > 0 && isfinite(length) && isfinite(p[3])))
-            return "the normal of a clipping plane is zero or not finite";
-    }
-    return NULL;
-}
-
-static const char *fault_of_effects(const triptych_settings *s)
-{
-    const int all = TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION | TRIPTYCH_CUEING |
-                    TRIPTYCH_EFFECTS_AUTO | TRIPTYCH_EMISSION;
-    if (s->effects & ~all)
-        return "unknown effect";
-    if (s->effects & TRIPTYCH_SHADOWS && s->headlight)
-        return "light from the eye casts no visible shadows; give the light a direction or "
-               "position";
-    if (!(s->anisotropy >= -0.95 && s->anisotropy <= 0.95))
-        return "the anisotropy must be -0.95 to 0.95";
-    if (s->effects & TRIPTYCH_CUEING && !(s->cueing > 0 && s->cueing <= 1))
-        return "depth cueing must be above 0 and at most 1";
-    if (!(s->kelvin[0] >= 0 && s->kelvin[0] < s->kelvin[1] && s->kelvin[1] <= 100000))
-        return "the temperatures of emission must be 0 to 100000 K in ascending order";
-    if (s->effects && !(s->light_cells >= 8 && s->light_cells <= TRIP_LIGHT_CELLS_MAX))
-        return "the light lattice must have 8 to 1024 cells";
-    return NULL;
-}
-
-static const char *fault_of_settings(const triptych_settings *s)
-{
-    trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
-    double length = trip_length(light);
-    if (s->method < TRIPTYCH_MERGE || s->method > TRIPTYCH_IMAGE ||
-        s->traversal < TRIPTYCH_OUTWARD || s->traversal > TRIPTYCH_ASCENDING ||
-        s->target < TRIPTYCH_RGBA32F || s->target > TRIPTYCH_RGBA8)
-        return "unknown method, traversal or target";
-    if (s->classify < TRIPTYCH_PRE || s->classify > TRIPTYCH_CLASSIFY_AUTO)
-        return "unknown classification";
-    if (!(s->samples_per_sheet >= 0 && s->samples_per_sheet <= TRIP_SHEET_SAMPLES_MAX))
-        return "the samples per sheet must be 1 to 16, or 0 to let the view decide";
-    if (s->depth && s->target != TRIPTYCH_RGBA32F)
-        return "depth requires the target rgba32f";
-    if (!(s->h >= 0 && s->h < 1) && s->h != TRIPTYCH_H_AUTO)
-        return "h must be 0 to below 1, or -1 to let the classification decide";
-    if (!(s->early_termination >= 0 && s->early_termination <= TRIP_EARLY_TERMINATION_MAX) &&
-        s->early_termination != TRIPTYCH_EARLY_TERMINATION_AUTO)
-        return "early termination must be 0 to 0.1, or -1 to let the classification decide";
-    if ((s->shading || s->effects) && !s->headlight && !isfinite(length))
-        return "the light is too far away or not finite";
-    if ((s->shading || s->effects) && !s->headlight && !s->point_light && !(length > 0))
-        return "the direction to the light is zero";
+    static const double black[4] = { 0, 0, 0, 1 };
+    const double *background = s->has_background ? s->background : black;
+    const triptych_splat_settings *splat = &s->splat;
+    const bool exact = s->all.quality == TRIPTYCH_QUALITY_EXACT;
+    trip_settings out = trip_settings_default();
+    out.classify =
+        draw_settings_classify(s) == TRIPTYCH_CLASSIFY_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST;
+    out.compositing = CHOSEN(trip_compositing, splat->compositing);
+    out.footprint = CHOSEN(trip_footprint, splat->footprint);
+    out.low_pass = CHOSEN(trip_low_pass, splat->low_pass);
+    out.flatten = number_or(splat->flatten, out.flatten);
+    out.vertex_weights = splat->weights == TRIPTYCH_WEIGHTS_VERTEX;
+    out.samples_per_sheet = samples_per_sheet(s);
+    out.method = CHOSEN(trip_method, s->all.method);
+    out.traversal = CHOSEN(trip_traversal, s->all.traversal);
+    out.target = CHOSEN(trip_target, splat->target);
+    out.indexed = splat->lists == TRIPTYCH_SUBMIT_INDEXED;
+    out.triangles = splat->primitives == TRIPTYCH_SUBMIT_TRIANGLES;
+    out.depth = s->all.depth;
+    out.h = number_or(s->all.h, TRIP_H_AUTO);
+    out.early_termination = number_or(
+        s->all.early_termination, exact ? TRIP_EARLY_TERMINATION_PRE : TRIP_EARLY_TERMINATION_AUTO);
+    out.kernel_radius = number_or(splat->kernel_radius, out.kernel_radius);
     for (int i = 0; i < 4; i++)
-        if (!(s->background[i] >= 0 && s->background[i] <= 1))
-            return "the components of the background must be 0 to 1";
-    if (!(s->lod_px >= 0 && s->lod_px <= 1000))
-        return "the voxel width that selects levels must be 0 to 1000 pixels";
-    if (!(s->max_bytes >= 0 && s->max_bytes <= 1e18 && s->max_ms >= 0 && s->max_ms <= 1e9))
-        return "the bound of bytes must be 0 (none) to 1e18, the bound of milliseconds 0 (none) to "
-               "1e9";
-    if (s->show < TRIPTYCH_SHOW_PICTURE || s->show > TRIPTYCH_SHOW_LEVELS)
-        return "unknown value to show";
-    const char *fault = fault_of_splats(s);
-    fault = fault ? fault : fault_of_clip(&s->clip);
-    fault = fault ? fault : fault_of_effects(s);
-    return fault ? fault : fault_of_integral(s);
-}
-
-typedef struct positions {
-    double at[3];
-} positions;
-
-/* Converts indices to positions. Infinite bounds stay infinite. */
-static positions positions_of(const triptych *t, const double voxels[3])
-{
-    positions out;
-    for (int a = 0; a < 3; a++)
-        out.at[a] = isfinite(voxels[a])
-                        ? trip_coordinates_position(&t->session.data->coordinates, a, voxels[a])
-                        : voxels[a];
+        out.background[i] = background[i];
+    out.lod_px = s->lod.voxel_px;
+    out.max_bytes = s->lod.max_bytes;
+    out.field = CHOSEN(trip_field_kind, s->integral.field);
+    out.kernel = CHOSEN(trip_kernel, s->all.kernel);
+    out.tolerance = number_or(s->integral.tolerance, out.tolerance);
+    out.samples = s->all.samples ? s->all.samples : 1;
+    out.show = CHOSEN(trip_show, s->all.show);
+    out.effects = (trip_effects){
+        .cueing = number_or(s->effects.cueing, DEFAULT_CUEING),
+        .anisotropy = s->effects.anisotropy,
+        .cells = s->effects.light_cells ? s->effects.light_cells : TRIP_LIGHT_CELLS,
+    };
+    set_light(&out, &s->light);
     return out;
-}
-
-trip_clip trip_context_clip(const triptych *t)
-{
-    const triptych_clip *c = &t->clip;
-    trip_affine to_box = trip_affine_identity();
-    trip_clip clip = { 0 };
-    if (c->box && c->box_of_voxels) /* the map was checked on opening */
-        trip_affine_invert(&t->session.data->index_to_world, &to_box);
-    if (c->box && c->box_of_voxels)
-        trip_clip_add_box(&clip, positions_of(t, c->box_lo).at, positions_of(t, c->box_hi).at,
-                          &to_box);
-    else if (c->box)
-        trip_clip_add_box(&clip, c->box_lo, c->box_hi, &to_box);
-    for (int i = 0; i < c->planes; i++)
-        trip_clip_add(&clip, trip_v3(c->plane[i][0], c->plane[i][1], c->plane[i][2]),
-                      c->plane[i][3]);
-    return clip;
 }
 
 /* Splats with a smaller radius leave a visible pattern. */
@@ -265,72 +179,79 @@ static void warn_of_ripple(double kernel_radius)
               100 * (defaults.between - 1));
 }
 
-static void set_light(trip_settings *out, const triptych_settings *s)
+static void use_settings(triptych *t, const draw_settings *s)
 {
-    const trip_vec3 light = trip_v3(s->light[0], s->light[1], s->light[2]);
-    out->headlight = s->headlight;
-    out->point_light = s->point_light && !s->headlight;
-    if (out->point_light)
-        out->light_position = light;
-    else if (!s->headlight)
-        out->light_direction = trip_normalize(light);
+    const trip_settings next = trip_settings_of(s);
+    const bool has_heat = s->effects.kelvin[1] > 0;
+    if (next.kernel_radius < SMOOTH_KERNEL_VOXELS &&
+        next.kernel_radius != t->settings.kernel_radius)
+        warn_of_ripple(next.kernel_radius);
+    t->rounding_checked &=
+        next.target == t->settings.target && next.compositing == t->settings.compositing;
+    t->kernel_warned &= next.kernel == t->settings.kernel;
+    /* The memory of earlier frames may be needed for the light map. */
+    if (s->effects.which != t->given.effects.which ||
+        next.effects.cells != t->settings.effects.cells)
+        trip_context_drop_renderer(t);
+    t->given = *s;
+    t->kelvin[0] = s->effects.kelvin[0];
+    t->kelvin[1] = has_heat ? s->effects.kelvin[1] : TRIP_HOTTEST_KELVIN;
+    t->settings = next;
 }
 
-int triptych_set_settings(triptych *t, const triptych_settings *s)
+int triptych_set_settings(triptych *t, const triptych_settings *settings)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    const char *fault = fault_of_settings(s);
+    const draw_settings given = draw_settings_of(settings);
     int status = trip_context_check_idle(t, false);
-    if (!status && fault)
-        status = trip_fail(TRIP_USAGE, "render", "settings", "%s", fault);
-    if (status)
-        return trip_context_leave(before, status);
-    if (s->kernel_radius < SMOOTH_KERNEL_VOXELS && s->kernel_radius != t->settings.kernel_radius)
-        warn_of_ripple(s->kernel_radius);
-    t->rounding_checked &= (trip_target)s->target == t->settings.target &&
-                           (trip_compositing)s->compositing == t->settings.compositing;
-    t->kernel_warned &= (trip_kernel)s->kernel == t->settings.kernel;
-    /* The memory of earlier frames may be needed for the light map. */
-    if (s->effects != t->effects || s->light_cells != t->settings.effects.cells)
-        trip_context_drop_renderer(t);
-    t->effects = s->effects;
-    for (int i = 0; i < 2; i++)
-        t->kelvin[i] = s->kelvin[i];
-    t->classify_auto = s->classify == TRIPTYCH_CLASSIFY_AUTO;
-    t->settings = (trip_settings){
-        .classify = s->classify == TRIPTYCH_PRE ? TRIP_CLASSIFY_PRE : TRIP_CLASSIFY_POST,
-        .compositing = (trip_compositing)s->compositing,
-        .footprint = (trip_footprint)s->footprint,
-        .low_pass = (trip_low_pass)s->low_pass,
-        .flatten = s->flatten,
-        .vertex_weights = s->vertex_weights,
-        .samples_per_sheet = s->samples_per_sheet,
-        .method = (trip_method)s->method,
-        .traversal = (trip_traversal)s->traversal,
-        .target = (trip_target)s->target,
-        .indexed = s->indexed,
-        .triangles = s->triangles,
-        .depth = s->depth,
-        .shading = s->shading,
-        .h = s->h,
-        .early_termination = s->early_termination,
-        .kernel_radius = s->kernel_radius,
-        .background = { s->background[0], s->background[1], s->background[2], s->background[3] },
-        .lod_px = s->lod_px,
-        .max_bytes = s->max_bytes,
-        .field = (trip_field_kind)s->field,
-        .kernel = (trip_kernel)s->kernel,
-        .tolerance = s->tolerance,
-        .samples = s->samples,
-        .show = (trip_show)s->show,
-        .effects = { .cueing = s->cueing, .anisotropy = s->anisotropy, .cells = s->light_cells },
-    };
-    t->max_ms = s->max_ms;
-    t->clip = s->clip;
-    t->counting = s->count;
-    t->normalise = s->normalise;
-    set_light(&t->settings, s);
-    return trip_context_leave(before, 0);
+    if (!status)
+        status = draw_settings_check_ranges(&given);
+    if (!status)
+        use_settings(t, &given);
+    return trip_context_leave(before, status);
+}
+
+int triptych_check_settings(triptych *t, const triptych_settings *settings,
+                            triptych_renderer *renderer)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const draw_settings given = draw_settings_of(settings);
+    return trip_context_leave(before, draw_settings_check(&given, renderer, true));
+}
+
+/* ---- clipping ---- */
+
+typedef struct positions {
+    double at[3];
+} positions;
+
+/* Converts indices to positions. Infinite bounds stay infinite. */
+static positions positions_of(const triptych *t, const double voxels[3])
+{
+    positions out;
+    for (int a = 0; a < 3; a++)
+        out.at[a] = isfinite(voxels[a])
+                        ? trip_coordinates_position(&t->session.data->coordinates, a, voxels[a])
+                        : voxels[a];
+    return out;
+}
+
+trip_clip trip_context_clip(const triptych *t)
+{
+    const triptych_clip *c = &t->given.clip;
+    trip_affine to_box = trip_affine_identity();
+    trip_clip clip = { 0 };
+    if (c->box && c->box_of_voxels) /* the map was checked on opening */
+        trip_affine_invert(&t->session.data->index_to_world, &to_box);
+    if (c->box && c->box_of_voxels)
+        trip_clip_add_box(&clip, positions_of(t, c->box_lo).at, positions_of(t, c->box_hi).at,
+                          &to_box);
+    else if (c->box)
+        trip_clip_add_box(&clip, c->box_lo, c->box_hi, &to_box);
+    for (int i = 0; i < c->planes; i++)
+        trip_clip_add(&clip, trip_v3(c->plane[i][0], c->plane[i][1], c->plane[i][2]),
+                      c->plane[i][3]);
+    return clip;
 }
 
 int trip_context_find_view(triptych *t, const triptych_view *given)

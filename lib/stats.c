@@ -103,8 +103,10 @@ void trip_context_drop_stats(triptych *t)
 
 static int effects_of(const trip_effects *e)
 {
-    return (e->shadows ? TRIPTYCH_SHADOWS : 0) | (e->occlusion ? TRIPTYCH_OCCLUSION : 0) |
-           (e->cueing > 0 ? TRIPTYCH_CUEING : 0) | (e->emission ? TRIPTYCH_EMISSION : 0);
+    return (e->shadows ? TRIPTYCH_EFFECT_SHADOWS : 0) |
+           (e->occlusion ? TRIPTYCH_EFFECT_OCCLUSION : 0) |
+           (e->cueing > 0 ? TRIPTYCH_EFFECT_CUEING : 0) |
+           (e->emission ? TRIPTYCH_EFFECT_EMISSION : 0);
 }
 
 static trip_light_stats stats_of(const trip_light_map *map)
@@ -135,11 +137,11 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .renderer = t->renderer->ops->name,
         .device = t->renderer->ops->device(t->renderer),
         .engine = trip_reader_engine_name(t->reader),
-        .classify = (triptych_classify)t->drawn_settings.classify,
+        .classify = (triptych_classify)(t->drawn_settings.classify + 1),
         .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
                                  ? t->drawn_settings.samples_per_sheet
                                  : 0,
-        .footprint = (triptych_footprint)t->drawn_settings.footprint,
+        .footprint = (triptych_footprint)(t->drawn_settings.footprint + 1),
         .early_termination =
             t->plan.gathers ? -1 : trip_settings_early_termination(&t->drawn_settings),
         .ring = ring_text(t->renderer, t->reader),

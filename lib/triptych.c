@@ -32,20 +32,20 @@ static void pass_line(const char *line, void *user)
         t->take(t->take_user, line);
 }
 
-int triptych_create(triptych **out)
+int triptych_create_version(triptych **out, unsigned header_version)
 {
-    triptych *t = calloc(1, sizeof *t);
-    *out = t;
+    triptych *t = *out = NULL;
+    if (header_version != TRIPTYCH_HEADER_VERSION)
+        return TRIPTYCH_USAGE;
+    *out = t = calloc(1, sizeof *t);
     if (!t)
         return TRIPTYCH_ERROR;
     t->scope = (trip_scope){
         .failed = keep_failure, .sink = pass_line, .user = t, .signalled = trip_scope_signal()
     };
     pthread_mutex_init(&t->lock, NULL);
-    t->settings = trip_settings_default();
-    t->settings.classify = TRIP_CLASSIFY_POST;
-    t->settings.samples_per_sheet = 0;
-    t->classify_auto = true;
+    t->settings = trip_settings_of(&t->given);
+    t->kelvin[1] = TRIP_HOTTEST_KELVIN;
     return TRIPTYCH_OK;
 }
 
@@ -424,7 +424,7 @@ int triptych_get_list(triptych *t, unsigned number, triptych_list *out)
 int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *levels)
 {
     trip_scope *before = trip_context_enter(t);
-    const trip_kind kind = classify == TRIPTYCH_PRE ? TRIP_KIND_MEANS : TRIP_KIND_VALUES;
+    const trip_kind kind = classify == TRIPTYCH_CLASSIFY_PRE ? TRIP_KIND_MEANS : TRIP_KIND_VALUES;
     int status = trip_context_check_open(t);
     *levels = status ? 0 : trip_dataset_levels(t->session.data, kind);
     return trip_context_leave(before, status);

@@ -15,9 +15,13 @@
  * triptych_status. triptych_error() then gives the reason. Possible failures are TRIPTYCH_USAGE
  * (invalid arguments, or a call in the wrong order) and TRIPTYCH_ERROR (files, memory, devices).
  *
- * Parameters: structs, in which 0 or NULL selects the default. The exception is triptych_settings,
- * which starts from triptych_default_settings(). The library does not use pointers in these structs
- * after a call returns.
+ * Parameters: structs, in which 0 or NULL selects the default of every field. TRIPTYCH_ZERO selects
+ * the number 0 where 0 selects another default. The library does not use pointers in these structs
+ * after a call returns. Structs grow at their end. triptych_create() tells the library which
+ * version of the structs the caller has.
+ *
+ * Messages name a setting as the program's option does: settings.splat->kernel_radius is
+ * --kernel-radius.
  *
  * Coordinates: world space has the length units of the volume's file (millimetres, metres, ...).
  * Index space has voxel (i, j, k) at (i, j, k).
@@ -41,42 +45,57 @@
 extern "C" {
 #endif
 
+/* Version of the structs below. */
+#define TRIPTYCH_HEADER_VERSION 1u
+
+/* The number 0, for fields in which 0 selects another default. */
+#define TRIPTYCH_ZERO (-1.0)
+
 typedef enum triptych_status {
     TRIPTYCH_OK = 0,
     TRIPTYCH_ERROR = -1,
     TRIPTYCH_USAGE = -2,     /* invalid arguments or a call in the wrong order */
     TRIPTYCH_CANCELLED = -3, /* triptych_cancel() stopped the call */
+    TRIPTYCH_LEFT_OUT = -4,  /* the data set lacks values; triptych_transfer_function.all_values */
 } triptych_status;
 
 typedef struct triptych triptych;
 
 /* ---- contexts ---- */
 
-/* Creates a context without a data set. Returns TRIPTYCH_ERROR if memory is exhausted; *out is then
- * NULL. Free it with triptych_destroy(). */
-TRIPTYCH_API int triptych_create(triptych **out);
+/* Creates a context without a data set, for a caller with this version of the structs. Returns
+ * TRIPTYCH_ERROR if memory is exhausted, and TRIPTYCH_USAGE for an unknown version; *out is then
+ * NULL. Free the context with triptych_destroy(). */
+TRIPTYCH_API int triptych_create_version(triptych **out, unsigned header_version);
+/* Creates a context for the structs of this header. */
+static inline int triptych_create(triptych **out)
+{
+    return triptych_create_version(out, TRIPTYCH_HEADER_VERSION);
+}
 /* Ends the frame, closes the data set and frees the context. Does nothing if `t` is NULL. */
 TRIPTYCH_API void triptych_destroy(triptych *t);
 /* Returns the reason why the last call failed, or "" if it succeeded. The reason is one line
  * without a line feed, such as "triptych: read: head.trip: ...". It is valid until the next call
  * with this context. */
 TRIPTYCH_API const char *triptych_error(const triptych *t);
-/* Sets a function that receives each message for people: warnings, notes and failures, one line
- * each. NULL, the default, discards messages. The library may call `take` from other threads, but
- * only during a call with this context. */
-TRIPTYCH_API void triptych_set_messages(triptych *t, void (*take)(void *user, const char *line),
-                                        void *user);
-/* Sets a function that receives progress during long work: `done` of `total` units of a stage. The
- * library calls `show` on the calling thread. NULL, the default, reports no progress. Drawing has
+/* Receives a message for people, one line. */
+typedef void (*triptych_message_callback)(void *user, const char *line);
+/* Receives progress: `done` of `total` units of a stage. */
+typedef void (*triptych_progress_callback)(void *user, const char *stage, uint64_t done,
+                                           uint64_t total);
+
+/* Sets the function that receives warnings, notes and failures. NULL, the default, discards
+ * messages. The library may call `take` from other threads, but only during a call with this
+ * context. */
+TRIPTYCH_API void triptych_set_messages(triptych *t, triptych_message_callback take, void *user);
+/* Sets the function that receives progress during long work. The library calls `show` on the
+ * calling thread. NULL, the default, reports no progress. Drawing has
  * these stages; triptych_brick.h lists the stages of bricking.
  * - "draw": voxels, in post
  * - "splat": splats, in pre
- * - "count": splats, with triptych_settings.count
+ * - "count": splats, with triptych_settings.count_exactly
  * - "integrate": pixels, with the integral renderer */
-TRIPTYCH_API void triptych_set_progress(triptych *t,
-                                        void (*show)(void *user, const char *stage, uint64_t done,
-                                                     uint64_t total),
-                                        void *user);
+TRIPTYCH_API void triptych_set_progress(triptych *t, triptych_progress_callback show, void *user);
 /* Returns the version, such as "0.1.0". */
 TRIPTYCH_API const char *triptych_version(void);
 
@@ -126,8 +145,9 @@ TRIPTYCH_API int triptych_open(triptych *t, const char *path, const triptych_res
  * - A voxel in several data sets counts once in post, and once for each of them in pre.
  * If it fails, the data sets that were open stay open. */
 TRIPTYCH_API int triptych_add(triptych *t, const char *path);
-/* Opens a data set of heat for TRIPTYCH_EMISSION, on any grid. It replaces an earlier one and stays
- * open until triptych_close() or triptych_open(). NULL for `path` closes the data set of heat. */
+/* Opens a data set of heat for TRIPTYCH_EFFECT_EMISSION, on any grid. It replaces an earlier one
+ * and stays open until triptych_close() or triptych_open(). NULL for `path` closes the data set of
+ * heat. */
 TRIPTYCH_API int triptych_set_heat(triptych *t, const char *path);
 /* Ends the frame and closes the data set, the data set of heat and all pictures of
  * triptych_new_picture(). The settings stay. Does nothing if no data set is open. */
@@ -215,11 +235,10 @@ typedef struct triptych_transfer_function {
     /* If window > 0, the function is stretched over level - window / 2 to level + window / 2, in
      * data units. */
     double window, level;
-    /* If not NULL, replaces the warning about visible values that bricking dropped. The call then
-     * sets *left_out to 1 and leaves the transfer function unchanged. Otherwise it sets *left_out
-     * to 0. */
-    int *left_out;
     const char *text; /* the function as the text of a `.tf` file; excludes `name` */
+    /* If not 0, the call fails with TRIPTYCH_LEFT_OUT for a function that shows values that
+     * bricking dropped, and the transfer function stays. If 0, a warning names the values. */
+    int all_values;
 } triptych_transfer_function;
 
 /* Sets the transfer function for later frames. NULL selects the default. Fails with TRIPTYCH_USAGE
@@ -263,69 +282,81 @@ typedef struct triptych_conversion {
  * free(). *text is NULL after a failure. */
 TRIPTYCH_API int triptych_convert(triptych *t, const triptych_conversion *wanted, char **text);
 
-typedef enum triptych_method {
-    TRIPTYCH_MERGE, /* blends the layers of up to three lists */
-    TRIPTYCH_CLIP,  /* draws each pixel from one list */
-    TRIPTYCH_AXIS,  /* draws the whole picture from one list */
-    /* Cuts splats into sheets parallel to the image plane (Mueller & Crawfis 1998). Needs pre and
-     * the reference renderer. */
-    TRIPTYCH_IMAGE,
-} triptych_method;
-
-typedef enum triptych_traversal {
-    TRIPTYCH_OUTWARD,   /* from the eye outward, front to back */
-    TRIPTYCH_ASCENDING, /* in file order */
-} triptych_traversal;
-
-typedef enum triptych_target {
-    TRIPTYCH_RGBA32F,
-    TRIPTYCH_RGBA16F,
-    TRIPTYCH_RGBA8,
-} triptych_target;
-
-typedef enum triptych_field {
-    TRIPTYCH_VALUES, /* values interpolated between voxels, then classified */
-    TRIPTYCH_SPLATS, /* the sum of the splats */
-} triptych_field;
-
-typedef enum triptych_kernel {
-    TRIPTYCH_LINEAR, /* between the 8 nearest voxels */
-    TRIPTYCH_CUBIC,  /* Catmull-Rom, between 64 voxels */
-    /* The profile of a splat over 64 voxels, which smooths. Not for the integral. */
-    TRIPTYCH_GAUSSIAN,
-} triptych_kernel;
+/* Trades closeness to the integral for time; docs/quality.md has the figures. triptych-accuracy(1)
+ * has the errors, measured by `triptych accuracy`. */
+typedef enum triptych_quality {
+    TRIPTYCH_QUALITY_DEFAULT, /* normal */
+    TRIPTYCH_QUALITY_DRAFT,   /* post, with 1 sample per sheet */
+    TRIPTYCH_QUALITY_NORMAL,  /* the defaults of all other settings */
+    TRIPTYCH_QUALITY_HIGH,    /* post, with 8 samples per sheet */
+    TRIPTYCH_QUALITY_EXACT,   /* post, with 16 samples per sheet and early termination at 1/8192 */
+} triptych_quality;
 
 /* The order of classification and interpolation. */
 typedef enum triptych_classify {
-    TRIPTYCH_PRE,  /* voxels are classified, then drawn as splats */
-    TRIPTYCH_POST, /* values are interpolated in sheets, then classified at each pixel */
-    /* Uses post unless a setting exists only for splats or the data cannot be interpolated.
-     * Settings that exist only for splats:
-     * - ascending traversal, method image, vertex_weights, indexed, triangles, count
-     * - a target other than rgba32f, a kernel_radius other than 2
-     * - compositing by sheet, footprints other than exact, low-pass filters other than EWA
-     * Data that cannot be interpolated:
+    /* Post, unless a setting of triptych_splat_settings is given, the traversal is ascending, the
+     * method is image, splats are counted, or the data cannot be interpolated:
      * - a grid one voxel thick
      * - a data set without a halo from which bricking dropped voxels
      * triptych_explain() gives the reason. Memory has no influence: if post does not fit, the frame
      * fails, and the error names a remedy. */
     TRIPTYCH_CLASSIFY_AUTO,
+    TRIPTYCH_CLASSIFY_PRE,  /* voxels are classified, then drawn as splats */
+    TRIPTYCH_CLASSIFY_POST, /* values are interpolated in sheets, then classified at each pixel */
 } triptych_classify;
 
 /* Sets *levels to the number of coarse levels for a classification: levels of values for post and
  * auto, levels of means for pre. */
 TRIPTYCH_API int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *levels);
 
-/* The unit of compositing for splats (pre). */
+typedef enum triptych_method {
+    TRIPTYCH_METHOD_DEFAULT, /* merge */
+    TRIPTYCH_METHOD_MERGE,   /* blends the layers of up to three lists */
+    TRIPTYCH_METHOD_CLIP,    /* draws each pixel from one list */
+    TRIPTYCH_METHOD_AXIS,    /* draws the whole picture from one list */
+    /* Cuts splats into sheets parallel to the image plane (Mueller & Crawfis 1998). Needs pre and
+     * the reference renderer. */
+    TRIPTYCH_METHOD_IMAGE,
+} triptych_method;
+
+typedef enum triptych_traversal {
+    TRIPTYCH_TRAVERSAL_DEFAULT,   /* outward */
+    TRIPTYCH_TRAVERSAL_OUTWARD,   /* from the eye outward, front to back */
+    TRIPTYCH_TRAVERSAL_ASCENDING, /* in file order; pre only */
+} triptych_traversal;
+
+/* Interpolation of values, in post and the integral. */
+typedef enum triptych_kernel {
+    TRIPTYCH_KERNEL_DEFAULT, /* linear */
+    TRIPTYCH_KERNEL_LINEAR,  /* between the 8 nearest voxels */
+    TRIPTYCH_KERNEL_CUBIC,   /* Catmull-Rom, between 64 voxels */
+    /* The profile of a splat over 64 voxels, which smooths. Not for the integral. */
+    TRIPTYCH_KERNEL_GAUSSIAN,
+} triptych_kernel;
+
+/* The colours of a picture. */
+typedef enum triptych_show {
+    TRIPTYCH_SHOW_DEFAULT, /* picture */
+    TRIPTYCH_SHOW_PICTURE, /* by the transfer function */
+    TRIPTYCH_SHOW_LISTS,   /* by list: x red, y green, z blue */
+    TRIPTYCH_SHOW_MERGE,   /* weights of the lists at each pixel; reads no data */
+    /* By level of detail. From the finest level on: white, blue, green, yellow, orange, red, then
+     * violet for all others. */
+    TRIPTYCH_SHOW_LEVELS,
+} triptych_show;
+
+/* The unit of compositing for splats. */
 typedef enum triptych_compositing {
-    TRIPTYCH_BY_SPLAT, /* each splat, in list order */
+    TRIPTYCH_COMPOSITING_DEFAULT, /* splat */
+    TRIPTYCH_COMPOSITING_SPLAT,   /* each splat, in list order */
     /* The sum of the splats of a sheet. Their order within the sheet then does not matter. */
-    TRIPTYCH_BY_SHEET,
+    TRIPTYCH_COMPOSITING_SHEET,
 } triptych_compositing;
 
-/* How the footprint of a splat is computed (pre). */
+/* How the footprint of a splat is computed. */
 typedef enum triptych_footprint {
-    TRIPTYCH_FOOTPRINT_EXACT, /* from the distance of each pixel's ray */
+    TRIPTYCH_FOOTPRINT_DEFAULT, /* exact */
+    TRIPTYCH_FOOTPRINT_EXACT,   /* from the distance of each pixel's ray */
     /* By the affine approximation at the centre (EWA, Zwicker et al. 2001). */
     TRIPTYCH_FOOTPRINT_EWA,
     /* A circle of one size in pixels, computed for a splat in the middle of the volume. Reference
@@ -333,13 +364,137 @@ typedef enum triptych_footprint {
     TRIPTYCH_FOOTPRINT_FIXED,
 } triptych_footprint;
 
-/* The low-pass filter that keeps splats from falling between pixels (pre). */
+/* The low-pass filter that keeps splats from falling between pixels. */
 typedef enum triptych_low_pass {
-    TRIPTYCH_LOW_PASS_EWA, /* convolution with a Gaussian */
+    TRIPTYCH_LOW_PASS_DEFAULT, /* EWA */
+    TRIPTYCH_LOW_PASS_EWA,     /* convolution with a Gaussian */
     /* Swan's scaling. Needs EWA footprints and the reference renderer. */
     TRIPTYCH_LOW_PASS_UNIFORM,
     TRIPTYCH_LOW_PASS_NONE,
 } triptych_low_pass;
+
+/* The weights of the lists, in merge. */
+typedef enum triptych_weights {
+    TRIPTYCH_WEIGHTS_DEFAULT, /* of pixels */
+    TRIPTYCH_WEIGHTS_PIXEL,   /* of the ray of each pixel */
+    /* Interpolated between the corners of each splat; near splats use the weights of pixels. Needs
+     * compositing by splat and the reference renderer. */
+    TRIPTYCH_WEIGHTS_VERTEX,
+} triptych_weights;
+
+/* The pixel format of layers. The reference renderer ignores it. */
+typedef enum triptych_target {
+    TRIPTYCH_TARGET_DEFAULT, /* rgba32f */
+    TRIPTYCH_TARGET_RGBA32F,
+    TRIPTYCH_TARGET_RGBA16F,
+    TRIPTYCH_TARGET_RGBA8,
+} triptych_target;
+
+/* The vertices that the GL renderer draws. */
+typedef enum triptych_submit_lists {
+    TRIPTYCH_SUBMIT_DEFAULT,    /* replicated */
+    TRIPTYCH_SUBMIT_REPLICATED, /* a vertex array for each list */
+    TRIPTYCH_SUBMIT_INDEXED,    /* one vertex array with an index for each list; no coarse levels */
+} triptych_submit_lists;
+
+/* The primitives that the GL renderer draws. */
+typedef enum triptych_submit_primitives {
+    TRIPTYCH_SUBMIT_PRIMITIVES_DEFAULT, /* sprites */
+    TRIPTYCH_SUBMIT_SPRITES,
+    TRIPTYCH_SUBMIT_TRIANGLES,
+} triptych_submit_primitives;
+
+/* Settings of splats (pre). */
+typedef struct triptych_splat_settings {
+    triptych_compositing compositing;
+    triptych_footprint footprint;
+    triptych_low_pass low_pass;
+    triptych_weights weights;
+    /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1
+     * (round, the default) to 100. Not with count_exactly. */
+    double flatten;
+    /* Radius of a splat in voxels, 0.1 to 100; default 2. Below 1.5 a warning says that a pattern
+     * of voxels is visible. */
+    double kernel_radius;
+    triptych_target target;
+    triptych_submit_lists lists;
+    triptych_submit_primitives primitives;
+} triptych_splat_settings;
+
+/* Settings of sheets of interpolated values (post). */
+typedef struct triptych_sheet_settings {
+    /* Samples per sheet, 1 to 16. More samples come closer to the integral. By default the view
+     * selects 1 to 6, unless the quality selects a number. -1 always lets the view select. */
+    int samples;
+} triptych_sheet_settings;
+
+/* The field that the integral renderer integrates. */
+typedef enum triptych_field {
+    TRIPTYCH_FIELD_DEFAULT, /* values */
+    TRIPTYCH_FIELD_VALUES,  /* values interpolated between voxels, then classified */
+    TRIPTYCH_FIELD_SPLATS,  /* the sum of the splats */
+} triptych_field;
+
+/* Settings of the integral renderer. */
+typedef struct triptych_integral_settings {
+    triptych_field field;
+    double tolerance; /* of each component of a pixel, 1e-12 to 0.1; default 1e-4 */
+} triptych_integral_settings;
+
+/* Levels of detail. The data set needs coarse levels for the classification
+ * (triptych_levels_for); without them a warning says so. 0 sets no bound. */
+typedef struct triptych_lod_settings {
+    /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
+     * wide, up to 1000. 0 draws the finest level only. */
+    double voxel_px;
+    /* Bounds the bytes of codes and normals in view. The parts that are widest in the picture get
+     * the finest levels first. Positions are not counted; they add 10 to 30 %. Never finer than
+     * voxel_px asks for. */
+    double max_bytes;
+    /* Bounds the time of a frame in ms in the same way as max_bytes, by the speed of earlier frames
+     * of this context. The picture then depends on the machine. */
+    double max_ms;
+} triptych_lod_settings;
+
+typedef enum triptych_light_kind {
+    TRIPTYCH_LIGHT_DEFAULT,   /* head */
+    TRIPTYCH_LIGHT_HEAD,      /* at the eye */
+    TRIPTYCH_LIGHT_DIRECTION, /* from the direction `toward` */
+    TRIPTYCH_LIGHT_POINT,     /* at the position `toward`; equally bright at any distance */
+} triptych_light_kind;
+
+typedef struct triptych_light {
+    int no_shading; /* if not 0, gradients do not shade the colours; effects still use the light */
+    triptych_light_kind kind;
+    double toward[3]; /* world space: direction to the light, not zero, or its position */
+} triptych_light;
+
+/* Effects beyond shading. An effect that is off costs nothing. */
+enum {
+    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with a
+     * light at the eye. */
+    TRIPTYCH_EFFECT_SHADOWS = 1,
+    TRIPTYCH_EFFECT_OCCLUSION = 2, /* matter around a point attenuates the light from everywhere */
+    TRIPTYCH_EFFECT_CUEING = 4,    /* distant matter fades into the background */
+    /* Adds the effects that suit the kind of data and the transfer function. */
+    TRIPTYCH_EFFECT_AUTO = 8,
+    /* Hot matter radiates as a black body; needs triptych_set_heat(). */
+    TRIPTYCH_EFFECT_EMISSION = 16,
+};
+
+typedef struct triptych_effects {
+    int which; /* sum of TRIPTYCH_EFFECT_SHADOWS, ... */
+    /* Scattering in fog: -0.95 (backwards) to 0.95 (forwards); 0 is the same in all directions. */
+    double anisotropy;
+    /* Share of the background in the farthest colours, above 0 and up to 1; default 0.6. */
+    double cueing;
+    /* Emission: temperatures in kelvin where the heat is 0 and where it is greatest, ascending, up
+     * to 100000. The default of both is 0 and 2500. */
+    double kelvin[2];
+    /* Shadows, occlusion and emission: cells of the lattice along its longest side, 8 to 1024;
+     * default 128. A cell is at least one voxel long. */
+    int light_cells;
+} triptych_effects;
 
 /* Clipping. Post and the integral cut rays exactly. Pre drops whole splats by the position of their
  * voxel, so remaining splats reach over the cut by their radius. */
@@ -352,144 +507,63 @@ typedef struct triptych_clip {
     double plane[6][4];
 } triptych_clip;
 
-/* The colours of a picture. */
-typedef enum triptych_show {
-    TRIPTYCH_SHOW_PICTURE, /* by the transfer function */
-    TRIPTYCH_SHOW_LISTS,   /* by list: x red, y green, z blue */
-    TRIPTYCH_SHOW_MERGE,   /* weights of the lists at each pixel; reads no data */
-    /* By level of detail. From the finest level on: white, blue, green, yellow, orange, red, then
-     * violet for all others. */
-    TRIPTYCH_SHOW_LEVELS,
-} triptych_show;
-
-/* Effects beyond shading. An effect that is off costs nothing. */
-enum {
-    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with the
-     * headlight. */
-    TRIPTYCH_SHADOWS = 1,
-    TRIPTYCH_OCCLUSION = 2, /* matter around a point attenuates the light from everywhere */
-    TRIPTYCH_CUEING = 4,    /* distant matter fades into the background */
-    /* Adds the effects that suit the kind of data and the transfer function. */
-    TRIPTYCH_EFFECTS_AUTO = 8,
-    TRIPTYCH_EMISSION = 16, /* hot matter radiates as a black body; needs triptych_set_heat() */
-};
-
-/* Selects h by classification: 0.85 for pre, 0.99 for post. */
-#define TRIPTYCH_H_AUTO (-1.0)
-
-/* Selects the early termination by classification: 1/8192 for pre, 1/512 for post. */
-#define TRIPTYCH_EARLY_TERMINATION_AUTO (-1.0)
-
+/* The settings of a picture. NULL selects the defaults of a group. */
 typedef struct triptych_settings {
+    triptych_quality quality;
     triptych_classify classify;
-    triptych_compositing compositing; /* pre only */
-    triptych_footprint footprint;     /* pre only */
-    triptych_low_pass low_pass;       /* pre only */
-    /* If not 0, merge interpolates the weights between the corners of each splat; near splats use
-     * the weights of pixels. Needs pre, compositing by splat and the reference renderer. */
-    int vertex_weights;
+    triptych_method method;
+    triptych_traversal traversal;
+    triptych_kernel kernel;
+    triptych_show show; /* not with the integral, which has no lists and no levels */
+    /* Merge: weight at which layers begin to blend, 0 (TRIPTYCH_ZERO) to below 1. The default is
+     * 0.85 for pre and 0.99 for post. */
+    double h;
+    /* Transmittance below which a pixel takes no more samples or splats: 0 (TRIPTYCH_ZERO, never)
+     * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for
+     * pre and 1/512 for post. GL uses at most the default in pre. */
+    double early_termination;
+    /* Rays along each side of a pixel, 1 (the default) to 64. Other renderers than the integral
+     * draw a picture this many times wider and higher, and average it. Above 1 not with depth. */
+    int samples;
     /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
      * opaque. */
     int normalise;
-    /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1
-     * (round) to 100. Not with count. */
-    double flatten;
-    /* Post: 1 to 16. More samples come closer to the integral. 0 selects the number by the view. */
-    int samples_per_sheet;
-    triptych_method method;
-    triptych_traversal traversal;
-    triptych_target target; /* format of the layers; ignored by the reference renderer */
-    /* GL, splats: one vertex array for all lists; quads instead of point sprites. */
-    int indexed, triangles;
-    int shading;   /* if not 0, shades by gradients */
-    int headlight; /* if not 0, light comes from the eye, otherwise from light[] */
-    /* If not 0, light[] is the position of the light, which is equally bright at any distance. */
-    int point_light;
-    /* World space: direction to the light, not zero, or the position of the light. */
-    double light[3];
-    /* Merge: weight at which layers begin to blend, 0 <= h < 1, or TRIPTYCH_H_AUTO. */
-    double h;
-    /* Transmittance below which a pixel takes no more samples or splats: 0 (never) to 0.1, or
-     * TRIPTYCH_EARLY_TERMINATION_AUTO. No component of a pixel changes by more than this number. GL
-     * uses at most the default in pre. */
-    double early_termination;
-    /* Radius of a splat in voxels, 0.1 to 100. Below 1.5 a warning says that a pattern of voxels is
-     * visible. */
-    double kernel_radius;
-    double background[4]; /* red, green, blue, alpha, 0 to 1; not multiplied by alpha */
-    /* Each part of the picture is drawn at the coarsest level with voxels at most this many pixels
-     * wide, 0 to 1000. 0 draws the finest level only. The data set needs coarse levels for the
-     * classification (triptych_levels_for); without them a warning says so. Not with indexed. */
-    double lod_px;
-    /* If > 0, bounds the bytes of codes and normals in view. The parts that are widest in the
-     * picture get the finest levels first. Positions are not counted; they add 10 to 30 %. Never
-     * finer than lod_px asks for. */
-    double max_bytes;
-    /* If > 0, bounds the time of a frame in ms in the same way as max_bytes, by the speed of
-     * earlier frames of this context. The picture then depends on the machine. */
-    double max_ms;
     /* If not 0, frames have distances too. Needs the target rgba32f; not with the integral. */
     int depth;
-    /* The integral renderer alone uses field and tolerance. */
-    triptych_field field;   /* the field to integrate */
-    triptych_kernel kernel; /* of values, in post and the integral */
-    double tolerance;       /* of each component of a pixel, 1e-12 to 0.1 */
-    /* Rays along each side of a pixel, 1 to 64. Other renderers than the integral draw a picture
-     * this many times wider and higher, and average it. Above 1 not with depth. */
-    int samples;
     /* If not 0, triptych_list_stats has exact counts. Takes time, and draws occluded bricks too. */
-    int count;
-    triptych_clip clip;
-    triptych_show show; /* not with the integral, which has no lists and no levels */
-    int effects;        /* sum of TRIPTYCH_SHADOWS, ...; 0 is none */
-    /* Scattering in fog: -0.95 (backwards) to 0.95 (forwards), 0 in all directions alike. */
-    double anisotropy;
-    double cueing; /* share of the background in the farthest colours, above 0 and up to 1 */
-    /* Emission: temperatures in kelvin where the heat is 0 and where it is greatest, ascending, 0
-     * to 100000. */
-    double kelvin[2];
-    /* Shadows, occlusion and emission: cells of the lattice along its longest side, 8 to 1024. A
-     * cell is at least one voxel long. */
-    int light_cells;
+    int count_exactly;
+    /* Red, green, blue, alpha, 0 to 1, not multiplied by alpha. NULL selects opaque black. */
+    const double *background;
+    const triptych_splat_settings *splat;
+    const triptych_sheet_settings *sheet;
+    const triptych_integral_settings *integral;
+    const triptych_lod_settings *lod;
+    const triptych_light *light;
+    const triptych_effects *effects;
+    const triptych_clip *clip;
 } triptych_settings;
 
-/* Returns the default settings:
- * - classify auto, compositing by splat, exact footprints with the EWA low-pass filter
- * - samples per sheet by the view, h and early termination by the classification
- * - method merge, traversal outward, target rgba32f, kernel radius 2
- * - shading with the headlight, black background, picture without distances
- * - finest level only, one ray per pixel
- * - integral: values, linear kernel, tolerance 1e-4
- * - no effects; if set: anisotropy 0, cueing 0.6, 0 to 2500 K, 128 cells */
-TRIPTYCH_API triptych_settings triptych_default_settings(void);
-/* Trades closeness to the integral for time; docs/quality.md has the figures. triptych-accuracy(1)
- * has the errors, measured by `triptych accuracy`. */
-typedef enum triptych_quality {
-    TRIPTYCH_DRAFT,
-    TRIPTYCH_NORMAL, /* the default settings */
-    TRIPTYCH_HIGH,
-    TRIPTYCH_EXACT, /* early termination is 1/8192, also in post */
-} triptych_quality;
-
-/* Sets the settings that trade accuracy for time: classify, compositing, footprint, low_pass,
- * flatten, vertex_weights, samples_per_sheet, method, h, early_termination, target, kernel_radius,
- * lod_px, max_bytes, max_ms and samples. Leaves all other settings unchanged. Returns
- * TRIPTYCH_USAGE if `quality` is invalid. */
-TRIPTYCH_API int triptych_set_quality(triptych_settings *s, triptych_quality quality);
-/* Sets the settings for later frames. Fails with TRIPTYCH_USAGE if a value is out of range or while
- * a frame is begun. triptych_begin() checks settings that exclude one another. */
+/* Sets the settings for later frames. NULL selects the defaults. Fails with TRIPTYCH_USAGE if a
+ * value is out of range or while a frame is begun. triptych_begin() checks settings that exclude
+ * one another. */
 TRIPTYCH_API int triptych_set_settings(triptych *t, const triptych_settings *settings);
+/* Checks settings for a renderer, without data. Fails with TRIPTYCH_USAGE for values out of range,
+ * for settings that exclude one another, and for settings without effect, which drawing ignores.
+ * The message names the setting and the reason. If the renderer is auto and a setting requires a
+ * certain renderer, sets *renderer to it. */
+TRIPTYCH_API int triptych_check_settings(triptych *t, const triptych_settings *settings,
+                                         triptych_renderer *renderer);
 
 /* Sides by the orientation of the data. Left and right are the object's own. */
 typedef enum triptych_side {
     TRIPTYCH_SIDE_DEFAULT, /* the front, seen a little from the left and from above */
-    TRIPTYCH_FRONT,
-    TRIPTYCH_BACK,
-    TRIPTYCH_LEFT,
-    TRIPTYCH_RIGHT,
-    TRIPTYCH_TOP,
-    TRIPTYCH_BOTTOM,
-    TRIPTYCH_ISO,
+    TRIPTYCH_SIDE_FRONT,
+    TRIPTYCH_SIDE_BACK,
+    TRIPTYCH_SIDE_LEFT,
+    TRIPTYCH_SIDE_RIGHT,
+    TRIPTYCH_SIDE_TOP,
+    TRIPTYCH_SIDE_BOTTOM,
+    TRIPTYCH_SIDE_ISO,
 } triptych_side;
 
 /* The view. All zero shows all visible voxels in a picture of 1024 x 1024 pixels. */
@@ -553,24 +627,25 @@ TRIPTYCH_API int triptych_draw(triptych *t, float *rgba);
 
 /* Results of triptych_step(). */
 enum {
-    TRIPTYCH_DONE = 0,
-    TRIPTYCH_MORE = 1,  /* the deadline passed before the frame was complete */
-    TRIPTYCH_WAITS = 2, /* nothing can be drawn until the disk or the graphics device delivers */
+    TRIPTYCH_STEP_DONE = 0,
+    TRIPTYCH_STEP_MORE = 1, /* the deadline passed before the frame was complete */
+    TRIPTYCH_STEP_WAITS =
+        2, /* nothing can be drawn until the disk or the graphics device delivers */
 };
 
 /* Begins a frame that triptych_step() draws in steps, for programs with other things to do. Call
- * triptych_begin(), triptych_step() until it returns TRIPTYCH_DONE, triptych_picture(), and
+ * triptych_begin(), triptych_step() until it returns TRIPTYCH_STEP_DONE, triptych_picture(), and
  * triptych_end(). Functions that change the data set, settings or view fail until then. */
 TRIPTYCH_API int triptych_begin(triptych *t);
 /* Draws data that has been read, until the deadline, and at least one piece. The deadline is in ns
- * of CLOCK_MONOTONIC; UINT64_MAX sets none. Returns TRIPTYCH_DONE, TRIPTYCH_MORE, TRIPTYCH_WAITS or
- * a failure. Never waits for the disk. Waits for a graphics device at most for one picture or
- * piece. */
+ * of CLOCK_MONOTONIC; UINT64_MAX sets none. Returns TRIPTYCH_STEP_DONE, TRIPTYCH_STEP_MORE,
+ * TRIPTYCH_STEP_WAITS or a failure. Never waits for the disk. Waits for a graphics device at most
+ * for one picture or piece. */
 TRIPTYCH_API int triptych_step(triptych *t, uint64_t deadline_ns);
 /* Waits until triptych_step() has something to draw, at most `timeout_ns`. */
 TRIPTYCH_API int triptych_await(triptych *t, uint64_t timeout_ns);
-/* Copies the picture drawn so far; after TRIPTYCH_DONE it is complete. `rgba` takes 4 floats per
- * pixel. */
+/* Copies the picture drawn so far; after TRIPTYCH_STEP_DONE it is complete. `rgba` takes 4 floats
+ * per pixel. */
 TRIPTYCH_API int triptych_picture(triptych *t, float *rgba);
 /* Copies the picture and its distances, for frames with triptych_settings.depth. `depth` takes
  * width * height floats. A distance is the mean in world units from the eye to the visible matter;
@@ -634,7 +709,7 @@ typedef struct triptych_list_stats {
      * pixel. */
     uint64_t bricks_transparent, bricks_outside, bricks_without_weight;
     uint64_t splats_read, bytes_read;
-    int counted; /* 1 with triptych_settings.count; otherwise the next two are 0 */
+    int counted; /* 1 with triptych_settings.count_exactly; otherwise the next two are 0 */
     uint64_t splats_projected, splats_drawn; /* splats in view; splats that cover a pixel centre */
     uint64_t bricks_clipped, bricks_of_other_levels; /* also left out */
 } triptych_list_stats;

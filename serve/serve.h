@@ -16,7 +16,7 @@ typedef struct trip_serve_params {
     triptych_engine engine;
     const char *function;
     const char *heat; /* heat data set; may be NULL */
-    triptych_settings settings;
+    draw_settings settings;
     /* Called once with the address to open. */
     void (*ready)(void *user, const char *address);
     void *user;

@@ -237,17 +237,13 @@ static bool choose(const char *text, const char *const *names, int *out)
     return false;
 }
 
-static const char *const classes[] = { "pre", "post", "auto", NULL };
-static const char *const methods[] = { "merge", "clip", "axis", NULL };
-static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
-
 /* Parses "head" or "AZIMUTH,ELEVATION,DISTANCE" of trip_light_control. */
 static bool set_light(trip_document *d, const char *value)
 {
     char copy[64], *rest = copy;
     double numbers[3];
     if (!strcmp(value, "head")) {
-        d->settings.headlight = 1;
+        trip_light_set_head(&d->settings, true);
         return true;
     }
     if (!d->opened || strlen(value) >= sizeof copy)
@@ -274,33 +270,25 @@ static bool set_number(double *out, const char *value, double lo, double hi)
     return true;
 }
 
-/* Sets one of the page's settings. */
-static bool set_setting(triptych_settings *s, const char *name, const char *value)
+/* Sets a setting by its option. An empty value selects the default. */
+static bool set_setting(draw_settings *s, const char *name, const char *value)
 {
-    static const char *const no_yes[] = { "0", "1", NULL };
-    int which = 0;
-    bool good = true;
-    if (!strcmp(name, "classify")) {
-        good = choose(value, classes, &which);
-        s->classify = good ? (triptych_classify)which : s->classify;
-    } else if (!strcmp(name, "method")) {
-        good = choose(value, methods, &which);
-        s->method = good ? (triptych_method)which : s->method;
-    } else if (!strcmp(name, "show")) {
-        good = choose(value, shows, &which);
-        s->show = good ? (triptych_show)which : s->show;
-    } else if (!strcmp(name, "shading")) {
-        good = choose(value, no_yes, &which);
-        s->shading = good ? which : s->shading;
-    } else if (!strcmp(name, "early_termination")) {
-        good = set_number(&s->early_termination, value, TRIPTYCH_EARLY_TERMINATION_AUTO, 0.1);
-        s->early_termination =
-            s->early_termination >= 0 ? s->early_termination : TRIPTYCH_EARLY_TERMINATION_AUTO;
-    } else {
-        good = !strcmp(name, "h") && set_number(&s->h, value, TRIPTYCH_H_AUTO, 0.999);
-        s->h = s->h >= 0 ? s->h : TRIPTYCH_H_AUTO;
-    }
-    return good;
+    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    uint64_t given = 0;
+    bool known = false;
+    int status = 0;
+    draw_settings next = *s;
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (!strcmp(draw_settings_table.rows[i].name, name)) {
+            draw_settings_unset(&next, i);
+            known = i != DRAW_DEPTH && i != DRAW_COUNT;
+        }
+    if (known && *value)
+        status = trip_option_read(&draw_settings_table, name, value, &next, &given);
+    trip_scope_enter(before);
+    if (known && !status)
+        *s = next;
+    return known && !status;
 }
 
 static bool set_switch(trip_document *d, const trip_effect_switch *e, const char *value)
@@ -334,7 +322,7 @@ bool trip_session_set(trip_session *s, const char *name, const char *value)
     else if (d && !strcmp(name, "light"))
         good = set_light(d, value);
     else if (d)
-        good = set_setting(&d->settings, name, value) || set_effect(d, name, value);
+        good = set_effect(d, name, value) || set_setting(&d->settings, name, value);
     s->viewer.changed |= good;
     trip_viewer_tick(&s->viewer, 0);
     pthread_mutex_unlock(&s->lock);
@@ -400,18 +388,20 @@ bool trip_session_await(trip_session *s, uint64_t number, double seconds, trip_s
 }
 
 /* Writes the settings as trip_session_set() takes them. */
-static void add_settings(cJSON *root, const triptych_settings *s)
+static void add_settings(cJSON *root, const draw_settings *s)
 {
     cJSON *settings = cJSON_AddObjectToObject(root, "settings");
-    cJSON_AddStringToObject(settings, "classify", classes[s->classify]);
-    cJSON_AddStringToObject(settings, "method", methods[s->method]);
-    cJSON_AddStringToObject(settings, "show", shows[s->show]);
-    cJSON_AddNumberToObject(settings, "shading", s->shading != 0);
-    cJSON_AddNumberToObject(settings, "h", s->h);
-    cJSON_AddNumberToObject(settings, "early_termination", s->early_termination);
+    char value[TRIP_OPTION_TEXT_BYTES];
+    for (int i = 0; i < DRAW_OPTIONS; i++) {
+        const trip_option *row = &draw_settings_table.rows[i];
+        if (!trip_option_is_set(row, s))
+            continue;
+        trip_option_print(row, s, value);
+        cJSON_AddStringToObject(settings, row->name, value[0] ? value : "1");
+    }
 }
 
-static void add_numbers(cJSON *to, const trip_effect_switch *below, const triptych_settings *s)
+static void add_numbers(cJSON *to, const trip_effect_switch *below, const draw_settings *s)
 {
     cJSON *numbers = cJSON_AddArrayToObject(to, "numbers");
     for (int i = 0; i < TRIP_EFFECT_NUMBERS; i++) {
@@ -433,7 +423,7 @@ static void add_numbers(cJSON *to, const trip_effect_switch *below, const tripty
 /* Writes the state of the page's effect controls. */
 static void add_switches(cJSON *root, const trip_document *d)
 {
-    const triptych_settings *s = &d->settings;
+    const draw_settings *s = &d->settings;
     cJSON *switches = cJSON_AddArrayToObject(root, "switches");
     for (int i = 0; i < TRIP_EFFECT_SWITCHES; i++) {
         const trip_effect_switch *e = &trip_effect_switches[i];
@@ -441,7 +431,7 @@ static void add_switches(cJSON *root, const trip_document *d)
         cJSON *to = cJSON_CreateObject();
         cJSON_AddStringToObject(to, "name", e->name);
         cJSON_AddStringToObject(to, "label", e->label);
-        cJSON_AddBoolToObject(to, "on", s->effects & e->bit && !lacks);
+        cJSON_AddBoolToObject(to, "on", s->effects.which & e->bit && !lacks);
         cJSON_AddStringToObject(to, "lacks", lacks ? lacks : "");
         add_numbers(to, e, s);
         cJSON_AddItemToArray(switches, to);
@@ -453,7 +443,7 @@ static void add_light(cJSON *root, const trip_document *d)
 {
     const trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     cJSON *light = cJSON_AddObjectToObject(root, "light");
-    cJSON_AddBoolToObject(light, "head", d->settings.headlight);
+    cJSON_AddBoolToObject(light, "head", trip_light_is_head(&d->settings));
     cJSON_AddNumberToObject(light, "round", c.round);
     cJSON_AddNumberToObject(light, "up", c.up);
     cJSON_AddNumberToObject(light, "distance", c.distance);
@@ -476,7 +466,7 @@ char *trip_session_status(trip_session *s)
     trip_frames_status status = trip_frames_get_status(s->frames);
     char *camera = trip_viewer_options(&s->viewer);
     const trip_document *d = trip_viewer_document(&s->viewer);
-    const triptych_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
+    const draw_settings settings = d ? trip_viewer_settings(d) : s->viewer.settings;
     char effects[256];
     trip_effects_say(&settings, d ? trip_viewer_heat(d) : NULL, effects, sizeof effects);
     if (d && d->opened)

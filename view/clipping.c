@@ -1,11 +1,7 @@
 #include "clipping.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#include "text.h"
 
 void trip_clipping_box_of_all(triptych_clip *c, const triptych_info *info)
 {
@@ -125,35 +121,4 @@ triptych_clip trip_clipping_mix(const triptych_clip *a, const triptych_clip *b, 
         for (int k = 0; k < 4; k++)
             mix.plane[i][k] += t * (b->plane[i][k] - a->plane[i][k]);
     return trip_clipping_is_sound(&mix) ? mix : *a; /* opposite planes have no mean */
-}
-
-static void put_numbers(FILE *out, const double *numbers, int count)
-{
-    char text[32];
-    for (int i = 0; i < count; i++)
-        fprintf(out, "%s%s", i ? "," : "", trip_text_from_double(numbers[i], text));
-}
-
-char *trip_clipping_text(const triptych_clip *c)
-{
-    char *text = NULL;
-    size_t bytes;
-    FILE *out = open_memstream(&text, &bytes);
-    if (!out)
-        return NULL;
-    if (c->box) {
-        fprintf(out, " --clip-box %s", c->box_of_voxels ? "voxels:" : "");
-        put_numbers(out, c->box_lo, 3);
-        fputc(',', out);
-        put_numbers(out, c->box_hi, 3);
-    }
-    for (int i = 0; i < c->planes; i++) {
-        fprintf(out, " --clip-plane ");
-        put_numbers(out, c->plane[i], 4);
-    }
-    if (fclose(out)) {
-        free(text);
-        return NULL;
-    }
-    return text;
 }

@@ -34,10 +34,6 @@ bool trip_clipping_is_sound(const triptych_clip *c);
  * for t < 1. */
 triptych_clip trip_clipping_mix(const triptych_clip *a, const triptych_clip *b, double t);
 
-/* Returns the clipping as options of `triptych render`, each after a space, exact to the last bit,
- * for free(). Returns "" without clipping, and NULL if memory is exhausted. */
-char *trip_clipping_text(const triptych_clip *c);
-
 #ifdef __cplusplus
 }
 #endif

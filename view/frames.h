@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #include "navigation.h"
-#include "triptych.h"
+#include "draw_settings.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -57,7 +57,7 @@ typedef struct trip_wanted {
     const char *function;       /* preset or file; NULL means the data set's default */
     const char *text;           /* a transfer function as text, in place of `function` */
     double opacity_scale;
-    triptych_settings settings;
+    draw_settings settings;
 } trip_wanted;
 
 /* Replaces the wanted view. */
@@ -95,7 +95,7 @@ typedef struct trip_frames_status {
     char stage[16];             /* "draw", "read", "merge", ...; "" if idle */
     double done;                /* share of the stage, 0 to 1 */
     double scale;               /* resolution of the last moving frame, up to 1 */
-    double lod_px;              /* its level of detail, as triptych_settings.lod_px */
+    double lod_px;              /* its level of detail, as triptych_lod_settings.voxel_px */
     double moving_ms;           /* its time */
     double whole_ms;            /* time of the last full picture */
     uint64_t frames;            /* drawn since the start */

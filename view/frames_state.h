@@ -52,8 +52,8 @@ struct trip_frames {
     char *function;      /* key of the context's transfer function */
     bool other_function; /* the window does not have its text yet */
     bool has_settings;
-    triptych_settings settings; /* of the context */
-    float *rgba;                /* width * height pixels */
+    draw_settings settings; /* of the context */
+    float *rgba;            /* width * height pixels */
     int width, height;
     uint8_t *shown;             /* pixels of `picture` */
     trip_pace pace, whole_pace; /* of moving frames; of full pictures */

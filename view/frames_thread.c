@@ -7,7 +7,6 @@
 
 #include "frames_state.h"
 #include "report.h"
-#include "same_settings.h"
 
 static double now_ms(void)
 {
@@ -24,7 +23,7 @@ static void wake(trip_frames *f)
 /* Level of detail of moving frames: the maximum width of a coarse level's voxels, in frame pixels.
  */
 #define MOVING_LOD_PX 1.0
-#define MOVING_SLICES 1
+#define MOVING_SAMPLES 1
 /* Moving frames aim at this share of their time on average, because some take longer. They only
  * reduce detail. If a frame would exceed its time by this factor, near parts become coarse too. */
 #define MOVING_SHARE 0.85
@@ -215,7 +214,8 @@ static int open_data(trip_frames *f)
     if (!status && w->heat)
         status = open_heat(f);
     f->open = status == 0;
-    f->by_values = f->open && has_levels(f->t, TRIPTYCH_POST) && !has_levels(f->t, TRIPTYCH_PRE);
+    f->by_values = f->open && has_levels(f->t, TRIPTYCH_CLASSIFY_POST) &&
+                   !has_levels(f->t, TRIPTYCH_CLASSIFY_PRE);
     return status;
 }
 
@@ -232,14 +232,14 @@ static int use_function(trip_frames *f)
         free(key);
         return 0;
     }
-    int left_out = 0;
     triptych_transfer_function wanted = { .name = w->text ? NULL : w->function,
                                           .text = w->text,
                                           .opacity_scale = w->opacity_scale,
-                                          .left_out = &left_out };
+                                          .all_values = 1 };
     int status = triptych_set_transfer_function(f->t, &wanted);
-    wanted.left_out = NULL;
-    if (!status && left_out) /* the warning names the command to brick again */
+    const bool left_out = status == TRIPTYCH_LEFT_OUT;
+    wanted.all_values = 0;
+    if (left_out) /* the warning names the command to brick again */
         status = triptych_set_transfer_function(f->t, &wanted);
     pthread_mutex_lock(&f->lock);
     f->status.left_out = !status && left_out;
@@ -254,24 +254,24 @@ static int use_function(trip_frames *f)
 
 /* Returns the wanted settings with levels at least as coarse as lod_px. Short memory keeps the
  * finest level: pictures of several levels take more. */
-static triptych_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
+static draw_settings with_levels(const trip_frames *f, double lod_px, double max_ms)
 {
-    triptych_settings s = f->now.settings;
+    draw_settings s = f->now.settings;
     if (f->plain)
         return s;
     /* Use post, unless a setting requires splats. */
-    if (f->by_values && s.classify == TRIPTYCH_PRE)
-        s.classify = TRIPTYCH_CLASSIFY_AUTO;
-    s.lod_px = fmax(s.lod_px, lod_px);
-    s.max_ms = s.max_ms > 0 ? fmin(s.max_ms, max_ms) : max_ms;
+    if (f->by_values && s.all.classify == TRIPTYCH_CLASSIFY_PRE)
+        s.all.classify = TRIPTYCH_CLASSIFY_AUTO;
+    s.lod.voxel_px = fmax(s.lod.voxel_px, lod_px);
+    s.lod.max_ms = s.lod.max_ms > 0 ? fmin(s.lod.max_ms, max_ms) : max_ms;
     return s;
 }
 
-static int use_settings(trip_frames *f, const triptych_settings *wanted)
+static int use_settings(trip_frames *f, const draw_settings *wanted)
 {
     int status = 0;
-    if (!f->has_settings || !trip_same_settings(&f->settings, wanted))
-        status = triptych_set_settings(f->t, wanted);
+    if (!f->has_settings || !draw_settings_same(&f->settings, wanted))
+        status = draw_settings_use(f->t, wanted);
     f->settings = *wanted;
     f->has_settings = status == 0;
     return status;
@@ -414,7 +414,7 @@ static void show(trip_frames *f, int width, int height, bool whole)
 typedef struct frame {
     int width, height;
     bool whole; /* full size and detail */
-    triptych_settings settings;
+    draw_settings settings;
     double detail; /* share of the width and height that has voxels of its own */
     bool first;    /* first picture of this view: shown in parts, and always finished */
     double begun_ms;
@@ -434,7 +434,7 @@ static int step(trip_frames *f, const frame *d)
     clock_gettime(CLOCK_MONOTONIC, &t);
     const uint64_t ns = (uint64_t)t.tv_sec * 1000000000 + (uint64_t)t.tv_nsec;
     int status = triptych_step(f->t, ns + STEP_NS);
-    if (status == TRIPTYCH_WAITS)
+    if (status == TRIPTYCH_STEP_WAITS)
         triptych_await(f->t, STEP_NS);
     if (status > 0 && d->first && now_ms() - f->shown_ms > PART_MS) {
         int taken = triptych_picture(f->t, f->rgba);
@@ -447,7 +447,7 @@ static int step(trip_frames *f, const frame *d)
 
 static int draw_steps(trip_frames *f, const frame *d)
 {
-    int status = TRIPTYCH_MORE;
+    int status = TRIPTYCH_STEP_MORE;
     while (status > 0) {
         if (gives_up(f, d))
             return TRIPTYCH_CANCELLED;
@@ -495,7 +495,7 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
         f->times[s->moving++ % TRIP_FRAMES_TIMES] = (float)ms;
         s->moving_ms = ms;
         s->scale = (double)d->width / f->now.width;
-        s->lod_px = d->settings.lod_px;
+        s->lod_px = d->settings.lod.voxel_px;
     }
     if (d->whole)
         s->whole_ms = ms;
@@ -512,13 +512,13 @@ static void note_frame(trip_frames *f, const frame *d, double ms)
     pthread_mutex_unlock(&f->lock);
 }
 
-static int draw(trip_frames *f, double scale, double detail, const triptych_settings *settings,
+static int draw(trip_frames *f, double scale, double detail, const draw_settings *settings,
                 bool first)
 {
     const trip_wanted *w = &f->now;
     frame d = { .width = (int)ceil(w->width * scale),
                 .height = (int)ceil(w->height * scale),
-                .whole = scale == 1 && trip_same_settings(settings, &w->settings),
+                .whole = scale == 1 && draw_settings_same(settings, &w->settings),
                 .settings = *settings,
                 .detail = detail,
                 .first = first,
@@ -552,10 +552,9 @@ static int draw_moving(trip_frames *f, double target_ms)
 {
     const double detail = trip_pace_scale(&f->pace, wanted_pixels(f), MOVING_SHARE * target_ms);
     const double scale = sqrt(detail);
-    triptych_settings settings =
-        with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
-    if (settings.samples_per_sheet == 0)
-        settings.samples_per_sheet = MOVING_SLICES;
+    draw_settings settings = with_levels(f, MOVING_LOD_PX * scale / detail, MOVING_MAX * target_ms);
+    if (settings.sheet.samples <= 0 && draw_settings_may_use_sheets(&settings))
+        settings.sheet.samples = MOVING_SAMPLES;
     return draw(f, scale, detail, &settings, true);
 }
 
@@ -564,7 +563,7 @@ static int draw_moving(trip_frames *f, double target_ms)
 static int draw_coarse(trip_frames *f, double whole_ms)
 {
     enum { PART = 5 };
-    const triptych_settings settings = with_levels(f, MOVING_LOD_PX, whole_ms / PART);
+    const draw_settings settings = with_levels(f, MOVING_LOD_PX, whole_ms / PART);
     return draw(f, 1, 1, &settings, false);
 }
 
@@ -573,7 +572,7 @@ static int draw_coarse(trip_frames *f, double whole_ms)
 static int draw_wanted(trip_frames *f)
 {
     enum { LONG_MS = 1500 };
-    const triptych_settings *whole = &f->now.settings;
+    const draw_settings *whole = &f->now.settings;
     const double wanted = f->params.frames_per_second;
     const double target_ms = 1000 / (wanted > 0 ? wanted : DEFAULT_FPS);
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, wanted_pixels(f));
@@ -595,7 +594,7 @@ static int prepare(trip_frames *f)
         status = open_data(f);
     }
     if (f->cold)
-        f->now.settings.effects &= ~TRIPTYCH_EMISSION;
+        f->now.settings.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;
     if (!status)
         status = take_pictures(f);
     if (!status)

@@ -109,6 +109,18 @@ bool choose(trip_panel *p, const char *label, Choice *value, const char *const *
     return changed;
 }
 
+// A choice of a setting: 0 selects the default, and `names` start at 1.
+template <typename Choice>
+bool choose_setting(trip_panel *p, const char *label, Choice *value, const char *const *names,
+                    int count, int standard)
+{
+    int chosen = (*value ? static_cast<int>(*value) : standard) - 1;
+    const bool changed = choose(p, label, &chosen, names, count);
+    if (changed)
+        *value = static_cast<Choice>(chosen + 1);
+    return changed;
+}
+
 std::string bytes_text(double bytes)
 {
     char text[32];
@@ -156,7 +168,7 @@ void draw_sides(trip_panel *p, trip_viewer *v)
             ImGui::SameLine();
         if (mark(p, names[i],
                  ImGui::Button(names[i], ImVec2(76 * static_cast<float>(p->scale), 0))))
-            trip_viewer_see_side(v, static_cast<triptych_side>(TRIPTYCH_FRONT + i));
+            trip_viewer_see_side(v, static_cast<triptych_side>(TRIPTYCH_SIDE_FRONT + i));
     }
 }
 
@@ -452,7 +464,7 @@ bool draw_light_position(trip_panel *p, trip_document *d)
     return changed;
 }
 
-bool draw_effect_numbers(trip_panel *p, triptych_settings *s, const trip_effect_switch &below)
+bool draw_effect_numbers(trip_panel *p, draw_settings *s, const trip_effect_switch &below)
 {
     bool changed = false;
     for (const trip_effect_number &n : trip_effect_numbers) {
@@ -467,14 +479,14 @@ bool draw_effect_numbers(trip_panel *p, triptych_settings *s, const trip_effect_
 
 bool draw_effects(trip_panel *p, trip_document *d)
 {
-    triptych_settings *s = &d->settings;
+    draw_settings *s = &d->settings;
     const char *heat = trip_viewer_heat(d);
-    const triptych_settings shown = trip_viewer_settings(d);
+    const draw_settings shown = trip_viewer_settings(d);
     char text[256];
     bool changed = false;
     for (const trip_effect_switch &e : trip_effect_switches) {
         const char *lacks = trip_effect_lacks(&e, s, heat);
-        bool on = (s->effects & e.bit) != 0;
+        bool on = (s->effects.which & e.bit) != 0;
         if (lacks) {
             ImGui::TextDisabled("%s: %s.", e.label, lacks);
             continue;
@@ -492,21 +504,27 @@ bool draw_effects(trip_panel *p, trip_document *d)
 
 bool draw_light(trip_panel *p, trip_document *d)
 {
-    triptych_settings *s = &d->settings;
-    bool changed = false;
-    if (d->info.normal_bytes || s->classify != TRIPTYCH_PRE)
-        changed |= check(p, "Shading", &s->shading);
+    draw_settings *s = &d->settings;
+    bool changed = false, shading = !s->light.no_shading, head = trip_light_is_head(s);
+    if (d->info.normal_bytes || s->all.classify != TRIPTYCH_CLASSIFY_PRE)
+        changed |= check(p, "Shading", &shading);
     else
         ImGui::TextDisabled("The data set has no normals: splats cannot be shaded.");
-    changed |= check(p, "Light from the eye", &s->headlight); /* also lights effects */
-    if (!s->headlight)
+    s->light.no_shading = !shading;
+    if (check(p, "Light from the eye", &head)) { // also lights effects
+        trip_light_set_head(s, head);
+        changed = true;
+    }
+    if (!head)
         changed |= draw_light_position(p, d);
     float rgb[3];
     for (int i = 0; i < 3; i++)
-        rgb[i] = static_cast<float>(s->background[i]);
+        rgb[i] = static_cast<float>(draw_settings_background(s)[i]);
     if (mark_beside(p, "Background", ImGui::ColorEdit3("Background", rgb))) {
+        s->background[3] = draw_settings_background(s)[3];
         for (int i = 0; i < 3; i++)
             s->background[i] = static_cast<double>(rgb[i]);
+        s->has_background = 1;
         changed = true;
     }
     return changed;
@@ -514,36 +532,57 @@ bool draw_light(trip_panel *p, trip_document *d)
 
 bool draw_quality(trip_panel *p, trip_document *d)
 {
-    triptych_settings *s = &d->settings;
-    static const char *const classes[] = { "Pre (splats)", "Post (interpolation)", "Automatic" };
+    draw_settings *s = &d->settings;
+    static const char *const qualities[] = { "Draft", "Normal", "High", "Exact" };
+    static const char *const classes[] = { "Automatic", "Pre (splats)", "Post (interpolation)" };
+    static const int normal = TRIPTYCH_QUALITY_NORMAL;
+    bool changed = choose_setting(p, "Quality preset", &s->all.quality, qualities, 4, normal);
+    changed |= choose(p, "Classification", &s->all.classify, classes, 3);
+    if (draw_settings_may_use_sheets(s)) {
+        int samples = s->sheet.samples > 0 ? s->sheet.samples : 0;
+        changed |= mark_beside(
+            p, "Samples per sheet",
+            ImGui::SliderInt("Samples per sheet", &samples, 0, 16, samples ? "%d" : "automatic"));
+        s->sheet.samples = samples;
+    }
+    changed |= slide(p, "Level of detail", &s->lod.voxel_px, 0, 8, "%.1f px");
+    int samples = s->all.samples ? s->all.samples : 1;
+    changed |= mark_beside(p, "Antialiasing", ImGui::SliderInt("Antialiasing", &samples, 1, 4));
+    s->all.samples = samples > 1 ? samples : 0;
+    return changed;
+}
+
+// A number whose leftmost position selects the default.
+bool slide_or_default(trip_panel *p, const char *label, double *value, double step, double hi,
+                      const char *format)
+{
+    double shown = *value == 0 ? -step : *value == TRIPTYCH_ZERO ? 0 : *value;
+    const bool changed = slide(p, label, &shown, -step, hi, shown < 0 ? "automatic" : format);
+    if (changed)
+        *value = shown < 0 ? 0 : shown > 0 ? shown : TRIPTYCH_ZERO;
+    return changed;
+}
+
+// Settings by which the papers' methods differ.
+bool draw_papers(trip_panel *p, trip_document *d)
+{
+    draw_settings *s = &d->settings;
     static const char *const methods[] = { "Merge", "Clip", "Axis" };
-    bool changed = choose(p, "Classification", &s->classify, classes, 3);
-    if (s->classify != TRIPTYCH_PRE) {
-        changed |= mark_beside(p, "Samples per sheet",
-                               ImGui::SliderInt("Samples per sheet", &s->samples_per_sheet, 0, 16,
-                                                s->samples_per_sheet ? "%d" : "automatic"));
-    } else {
-        static const char *const sums[] = { "Per splat", "Per sheet" };
-        changed |= choose(p, "Compositing", &s->compositing, sums, 2);
-        changed |= slide(p, "Kernel radius", &s->kernel_radius, 1.5, 6, "%.2f voxels");
+    static const char *const sums[] = { "Per splat", "Per sheet" };
+    static const int merge = TRIPTYCH_METHOD_MERGE, by_splat = TRIPTYCH_COMPOSITING_SPLAT;
+    bool changed = choose_setting(p, "Method", &s->all.method, methods, 3, merge);
+    if (s->all.method <= TRIPTYCH_METHOD_MERGE)
+        changed |= slide_or_default(p, "Blend start (h)", &s->all.h, 0.01, 0.99, "%.2f");
+    changed |=
+        slide_or_default(p, "Early termination", &s->all.early_termination, 0.001, 0.1, "%.3f");
+    if (draw_settings_classify(s) != TRIPTYCH_CLASSIFY_POST) {
+        double radius = s->splat.kernel_radius > 0 ? s->splat.kernel_radius : 2;
+        changed |= choose_setting(p, "Compositing", &s->splat.compositing, sums, 2, by_splat);
+        if (slide(p, "Kernel radius", &radius, 1.5, 6, "%.2f voxels")) {
+            s->splat.kernel_radius = radius;
+            changed = true;
+        }
     }
-    changed |= slide(p, "Level of detail", &s->lod_px, 0, 8, "%.1f px");
-    changed |= choose(p, "Method", &s->method, methods, 3);
-    if (s->method == TRIPTYCH_MERGE) {
-        const double leftmost = -0.01;
-        double h = s->h >= 0 ? s->h : leftmost;
-        changed |= slide(p, "Blend start (h)", &h, leftmost, 0.99, h < 0 ? "automatic" : "%.2f");
-        s->h = h >= 0 ? h : TRIPTYCH_H_AUTO;
-    }
-    {
-        const double leftmost = -0.001;
-        double early_termination = s->early_termination >= 0 ? s->early_termination : leftmost;
-        changed |= slide(p, "Early termination", &early_termination, leftmost, 0.1,
-                         early_termination < 0 ? "automatic" : "%.3f");
-        s->early_termination =
-            early_termination >= 0 ? early_termination : TRIPTYCH_EARLY_TERMINATION_AUTO;
-    }
-    changed |= mark_beside(p, "Antialiasing", ImGui::SliderInt("Antialiasing", &s->samples, 1, 4));
     return changed;
 }
 
@@ -554,10 +593,11 @@ bool draw_shown(trip_panel *p, trip_document *d)
     static const char *const legends[] = { "", "list: X red, Y green, Z blue",
                                            "weight: X red, Y green, Z blue",
                                            "finest white, then blue, green, yellow, ..." };
-    triptych_settings *s = &d->settings;
-    const bool changed = choose(p, "Debug view", &s->show, shown, 4);
-    if (s->show)
-        ImGui::TextDisabled("%s", legends[s->show]);
+    static const int off = TRIPTYCH_SHOW_PICTURE;
+    draw_settings *s = &d->settings;
+    const bool changed = choose_setting(p, "Debug view", &s->all.show, shown, 4, off);
+    if (s->all.show > TRIPTYCH_SHOW_PICTURE)
+        ImGui::TextDisabled("%s", legends[s->all.show - TRIPTYCH_SHOW_PICTURE]);
     return changed;
 }
 
@@ -881,10 +921,12 @@ void draw_document(trip_panel *p, trip_viewer *v, trip_document *d)
         draw_function(p, v, d);
     if (section(p, "Light"))
         v->changed |= draw_light(p, d);
-    if (section(p, "Effects", d->settings.effects != 0))
+    if (section(p, "Effects", d->settings.effects.which != 0))
         v->changed |= draw_effects(p, d);
     if (section(p, "Quality"))
         v->changed |= draw_quality(p, d);
+    if (section(p, "Variants of the papers", false))
+        v->changed |= draw_papers(p, d);
     if (section(p, "Clipping", false))
         v->changed |= draw_clipping(p, d);
     if (section(p, "Show")) {

@@ -11,7 +11,6 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "clipping.h"
 #include "exact_json.h"
 #include "input_file.h"
 #include "json.h"
@@ -20,10 +19,10 @@
 #include "text.h"
 #include "transfer_function.h"
 
-enum { MAX_BYTES = 16 << 20, VERSION = 1 };
+enum { MAX_BYTES = 16 << 20, VERSION = 2 };
 
 /* The numbers of a state: name, offset, type and range. */
-typedef enum kind { NUMBERS, WHOLE, YES_OR_NO } kind;
+typedef enum kind { NUMBERS, YES_OR_NO } kind;
 
 typedef struct entry {
     const char *key;
@@ -35,7 +34,6 @@ typedef struct entry {
 
 #define FAR 1e300
 #define CAMERA(name) offsetof(trip_view_state, navigation.name)
-#define SETTING(name) offsetof(trip_view_state, settings.name)
 
 static const entry camera_entries[] = {
     { "eye", CAMERA(eye), NUMBERS, 3, -FAR, FAR },
@@ -45,36 +43,6 @@ static const entry camera_entries[] = {
     { "fov_degrees", CAMERA(fov_degrees), NUMBERS, 1, TRIPTYCH_FOV_MIN_DEGREES,
       TRIPTYCH_FOV_MAX_DEGREES },
     { "ortho_height", CAMERA(ortho_height), NUMBERS, 1, 0, 1e100 },
-};
-
-static const entry setting_entries[] = {
-    { "classify", SETTING(classify), WHOLE, 1, TRIPTYCH_PRE, TRIPTYCH_CLASSIFY_AUTO },
-    { "compositing", SETTING(compositing), WHOLE, 1, TRIPTYCH_BY_SPLAT, TRIPTYCH_BY_SHEET },
-    { "samples_per_sheet", SETTING(samples_per_sheet), WHOLE, 1, 0, 16 },
-    { "method", SETTING(method), WHOLE, 1, TRIPTYCH_MERGE, TRIPTYCH_AXIS },
-    { "shading", SETTING(shading), WHOLE, 1, 0, 1 },
-    { "headlight", SETTING(headlight), WHOLE, 1, 0, 1 },
-    { "point_light", SETTING(point_light), WHOLE, 1, 0, 1 },
-    { "light", SETTING(light), NUMBERS, 3, -FAR, FAR },
-    { "effects", SETTING(effects), WHOLE, 1, 0, 31 },
-    { "anisotropy", SETTING(anisotropy), NUMBERS, 1, -0.95, 0.95 },
-    { "cueing", SETTING(cueing), NUMBERS, 1, 1e-6, 1 },
-    { "kelvin", SETTING(kelvin), NUMBERS, 2, 0, 100000 },
-    { "light_cells", SETTING(light_cells), WHOLE, 1, 8, 1024 },
-    { "h", SETTING(h), NUMBERS, 1, TRIPTYCH_H_AUTO, 0.999999 },
-    { "early_termination", SETTING(early_termination), NUMBERS, 1, TRIPTYCH_EARLY_TERMINATION_AUTO,
-      0.1 },
-    { "kernel_radius", SETTING(kernel_radius), NUMBERS, 1, 0.1, 100 },
-    { "background", SETTING(background), NUMBERS, 4, 0, 1 },
-    { "lod_px", SETTING(lod_px), NUMBERS, 1, 0, 1000 },
-    { "samples", SETTING(samples), WHOLE, 1, 1, 64 },
-    { "show", SETTING(show), WHOLE, 1, TRIPTYCH_SHOW_PICTURE, TRIPTYCH_SHOW_LEVELS },
-    { "clip_box", SETTING(clip.box), WHOLE, 1, 0, 1 },
-    { "clip_box_of_voxels", SETTING(clip.box_of_voxels), WHOLE, 1, 0, 1 },
-    { "clip_box_lo", SETTING(clip.box_lo), NUMBERS, 3, -FAR, FAR },
-    { "clip_box_hi", SETTING(clip.box_hi), NUMBERS, 3, -FAR, FAR },
-    { "clip_planes", SETTING(clip.planes), WHOLE, 1, 0, TRIP_CLIPPING_PLANES },
-    { "clip_plane", SETTING(clip.plane), NUMBERS, 4 * TRIP_CLIPPING_PLANES, -FAR, FAR },
 };
 
 static const entry other_entries[] = {
@@ -95,8 +63,6 @@ static cJSON *value_of(const trip_view_state *s, const entry *e)
     const void *at = (const char *)s + e->at;
     if (e->kind == YES_OR_NO)
         return cJSON_CreateBool(*(const bool *)at);
-    if (e->kind == WHOLE)
-        return trip_exact_number(*(const int *)at);
     return e->count > 1 ? trip_exact_numbers(at, e->count) : trip_exact_number(*(const double *)at);
 }
 
@@ -135,7 +101,9 @@ char *trip_view_state_print(const trip_view_state *s, const char *data)
         cJSON_AddStringToObject(root, "function", s->function);
     if (s->heat)
         cJSON_AddStringToObject(root, "heat", s->heat);
-    add_entries(cJSON_AddObjectToObject(root, "settings"), s, ENTRIES(setting_entries));
+    char *settings = draw_settings_text(&s->settings);
+    cJSON_AddStringToObject(root, "settings", settings ? settings : "");
+    free(settings);
     add_entries(root, s, ENTRIES(other_entries));
     char *text = root ? trip_json_print(root, true) : NULL;
     cJSON_Delete(root);
@@ -144,15 +112,6 @@ char *trip_view_state_print(const trip_view_state *s, const char *data)
 
 /* ---- from text ---- */
 
-static bool read_whole(const cJSON *item, const entry *e, int *out)
-{
-    double number;
-    if (!trip_exact_read(item, e->lo, e->hi, &number) || number != floor(number))
-        return false;
-    *out = (int)number;
-    return true;
-}
-
 static bool read_entry(trip_view_state *s, const cJSON *item, const entry *e)
 {
     void *at = (char *)s + e->at;
@@ -160,8 +119,6 @@ static bool read_entry(trip_view_state *s, const cJSON *item, const entry *e)
         return trip_exact_read_numbers(item, e->count, e->lo, e->hi, at);
     if (e->kind == NUMBERS)
         return trip_exact_read(item, e->lo, e->hi, at);
-    if (e->kind == WHOLE)
-        return read_whole(item, e, at);
     *(bool *)at = cJSON_IsTrue(item);
     return cJSON_IsBool(item);
 }
@@ -224,6 +181,20 @@ static int read_function(trip_view_state *s, const cJSON *root, const char *path
     return status;
 }
 
+static int read_settings(trip_view_state *s, const cJSON *root, const char *path)
+{
+    char *text;
+    int status = read_string(root, "settings", &text, path);
+    if (status || !text)
+        return status;
+    s->settings = (draw_settings){ 0 };
+    status = draw_settings_read_text(&s->settings, text);
+    if (!status)
+        status = draw_settings_check_ranges(&s->settings);
+    free(text);
+    return status ? TRIP_ERROR : 0;
+}
+
 static int read_root(trip_view_state *s, const cJSON *root, const char *path)
 {
     int status = read_function(s, root, path);
@@ -232,18 +203,9 @@ static int read_root(trip_view_state *s, const cJSON *root, const char *path)
     if (!status)
         status = read_camera(s, cJSON_GetObjectItemCaseSensitive(root, "camera"), path);
     if (!status)
-        status = read_entries(s, cJSON_GetObjectItemCaseSensitive(root, "settings"),
-                              ENTRIES(setting_entries), false, path);
+        status = read_settings(s, root, path);
     if (!status)
         status = read_entries(s, root, ENTRIES(other_entries), false, path);
-    const triptych_settings *t = &s->settings;
-    if (!status && (t->shading || t->effects) && !t->headlight && !t->point_light &&
-        !(length_of(t->light) > 0))
-        status = trip_fail(TRIP_ERROR, "read", path, "the light has no direction");
-    if (!status && !(t->kelvin[0] < t->kelvin[1]))
-        status = trip_fail(TRIP_ERROR, "read", path, "the temperatures are invalid");
-    if (!status && !trip_clipping_is_sound(&t->clip))
-        status = trip_fail(TRIP_ERROR, "read", path, "the clipping box or planes are invalid");
     return status;
 }
 

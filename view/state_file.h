@@ -4,6 +4,7 @@
 #ifndef TRIP_VIEW_STATE_FILE_H
 #define TRIP_VIEW_STATE_FILE_H
 
+#include "draw_settings.h"
 #include "navigation.h"
 
 #ifdef __cplusplus
@@ -18,7 +19,7 @@ typedef struct trip_view_state {
     char *heat;     /* absolute path of the heat data set; may be NULL */
     double opacity_scale;
     /* Only the settings that the viewer changes are saved. */
-    triptych_settings settings;
+    draw_settings settings;
     bool clips;                       /* settings.clip is active */
     bool panel, box, axes, scale_bar; /* visible */
 } trip_view_state;

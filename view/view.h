@@ -24,7 +24,7 @@ typedef struct trip_view_params {
     const char *function;
     const char *heat; /* heat data set of the inputs; may be NULL */
     double opacity_scale;
-    triptych_settings settings;
+    draw_settings settings;
     bool start_given, settings_given; /* override the saved state of a data set */
     bool no_panel;
     bool fresh;         /* neither restores nor saves states */

@@ -9,7 +9,7 @@
 #include "camera_text.h"
 #include "clipping.h"
 #include "light.h"
-#include "look_text.h"
+#include "text.h"
 #include "state_file.h"
 
 enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
@@ -18,11 +18,12 @@ enum { PANEL_WIDTH = 330, SECONDS_SAID = 6 };
 
 void trip_viewer_init(trip_viewer *v, trip_frames *frames)
 {
-    *v = (trip_viewer){ .frames = frames,
-                        .shown = -1,
-                        .scale = 1,
-                        .panel = true,
-                        .settings = triptych_default_settings() };
+    *v = (trip_viewer){
+        .frames = frames,
+        .shown = -1,
+        .scale = 1,
+        .panel = true,
+    };
 }
 
 static void free_document(trip_document *d)
@@ -52,9 +53,9 @@ static void keep(const trip_viewer *v, const trip_document *d)
         return;
     char *text = d->edited ? trip_tf_editor_text(d->editor) : NULL;
     char *heat = d->heat ? realpath(d->heat, NULL) : NULL; /* the file may be missing for a while */
-    triptych_settings settings = d->settings;
+    draw_settings settings = d->settings;
     if (!d->heat)
-        settings.effects &= ~TRIPTYCH_EMISSION;
+        settings.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;
     trip_state_file_save(&(trip_view_state){ .has_navigation = d->has_navigation,
                                              .navigation = d->navigation,
                                              .function = d->function,
@@ -201,15 +202,16 @@ const char *trip_viewer_heat(const trip_document *d)
     return d->cold ? NULL : d->heat;
 }
 
-triptych_settings trip_viewer_settings(const trip_document *d)
+draw_settings trip_viewer_settings(const trip_document *d)
 {
-    triptych_settings s = d->settings;
+    draw_settings s = d->settings;
     if (!d->clips)
         s.clip = (triptych_clip){ 0 };
-    if (s.headlight) /* its shadows are invisible */
-        s.effects &= ~TRIPTYCH_SHADOWS;
+    if (trip_light_is_head(&s)) /* its shadows are invisible */
+        s.effects.which &= ~TRIPTYCH_EFFECT_SHADOWS;
     if (!trip_viewer_heat(d))
-        s.effects &= ~TRIPTYCH_EMISSION;
+        s.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;
+    draw_settings_drop_excluded(&s, TRIPTYCH_RENDERER_AUTO);
     return s;
 }
 
@@ -543,24 +545,43 @@ static void take_made(trip_viewer *v)
     v->changed |= d == trip_viewer_document(v);
 }
 
+static void put_look(FILE *out, const trip_document *d, const draw_settings *s)
+{
+    char number[32];
+    const bool glows = s->effects.which & (TRIPTYCH_EFFECT_EMISSION | TRIPTYCH_EFFECT_AUTO);
+    if (d->function && !d->edited) {
+        fputs(" --tf ", out);
+        trip_text_write_word(out, d->function);
+    }
+    if (d->opacity_scale != 1)
+        fprintf(out, " --opacity-scale %s", trip_text_from_double(d->opacity_scale, number));
+    if (trip_viewer_heat(d) && glows) {
+        fputs(" --emission ", out);
+        trip_text_write_word(out, trip_viewer_heat(d));
+    }
+}
+
 char *trip_viewer_options(trip_viewer *v)
 {
     const trip_document *d = navigable(v);
+    char *text = NULL;
+    size_t bytes;
     if (!d)
         return NULL;
-    const triptych_settings s = trip_viewer_settings(d);
-    char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
-    char *clip = trip_clipping_text(&s.clip), *light = trip_light_text(&s);
-    char *effects = trip_effects_text(&s, trip_viewer_heat(d));
-    char *look = trip_look_text(&s, d->edited ? NULL : d->function, d->opacity_scale);
-    if (camera && clip && light && effects && look &&
-        asprintf(&text, "%s%s%s%s%s", camera, clip, light, effects, look) < 0)
-        text = NULL;
-    free(look);
-    free(effects);
+    const draw_settings s = trip_viewer_settings(d);
+    char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height);
+    char *settings = draw_settings_text(&s);
+    FILE *out = camera && settings ? open_memstream(&text, &bytes) : NULL;
+    if (out) {
+        fprintf(out, "%s%s", camera, settings);
+        put_look(out, d, &s);
+        if (fclose(out)) {
+            free(text);
+            text = NULL;
+        }
+    }
     free(camera);
-    free(clip);
-    free(light);
+    free(settings);
     return text;
 }
 
@@ -599,7 +620,7 @@ static void show_next(trip_viewer *v)
 static bool press_view(trip_viewer *v, int key)
 {
     if (key >= '1' && key <= '6')
-        trip_viewer_see_side(v, (triptych_side)(TRIPTYCH_FRONT + key - '1'));
+        trip_viewer_see_side(v, (triptych_side)(TRIPTYCH_SIDE_FRONT + key - '1'));
     else if (key == '0' || key == TRIP_KEY_HOME)
         trip_viewer_see_side(v, TRIPTYCH_SIDE_DEFAULT);
     else if (key >= 'x' && key <= 'z')

@@ -33,7 +33,7 @@ typedef struct trip_document {
     trip_tf_editor *editor;
     uint64_t revision; /* of the editor, as last wanted */
     double opacity_scale;
-    triptych_settings settings;
+    draw_settings settings;
     bool clips;            /* settings.clip is active */
     trip_camera_path path; /* of the marked views */
     char *path_file;       /* file of the path; NULL until a view is marked */
@@ -70,7 +70,7 @@ typedef struct trip_viewer {
     /* Initial state of documents; given parts override the saved state. */
     bool start_given, settings_given;
     triptych_view start;
-    triptych_settings settings;
+    draw_settings settings;
     const char *function, *heat;
     double opacity_scale; /* 0 if not given */
 } trip_viewer;
@@ -83,7 +83,7 @@ void trip_viewer_release(trip_viewer *v);
 /* Returns the document in the window, or NULL. */
 trip_document *trip_viewer_document(trip_viewer *v);
 /* Returns the settings for the library, without the parts that the data set cannot draw. */
-triptych_settings trip_viewer_settings(const trip_document *d);
+draw_settings trip_viewer_settings(const trip_document *d);
 /* Returns the heat data set if it can be opened, else NULL. */
 const char *trip_viewer_heat(const trip_document *d);
 /* Opens a data set or volume and shows it. Opens it again if it is open already. */

@@ -365,7 +365,7 @@ static void clear(const window *w)
 {
     const trip_viewer *v = &w->viewer;
     const trip_document *d = v->shown >= 0 ? v->documents[v->shown] : NULL;
-    const double *ground = d ? d->settings.background : (const double[4]){ 0 };
+    const double *ground = d ? draw_settings_background(&d->settings) : (const double[4]){ 0 };
     float colour[3];
     for (int i = 0; i < 3; i++)
         colour[i] = (float)(ground[i] * ground[3]);

@@ -1,12 +1,13 @@
 /* Tests that settings convert to options and back, and which setting of a report is selected. */
 #include "fastest.h"
 #include "test.h"
+#include "draw_settings.h"
 
 static void options_describe_a_setting_completely(void **state)
 {
     (void)state;
     accuracy_setting all[ACCURACY_SETTINGS_MAX];
-    const triptych_settings defaults = triptych_default_settings();
+    const draw_settings defaults = { 0 };
     int count = accuracy_settings(all, &defaults);
     assert_true(count > 40 && count <= ACCURACY_SETTINGS_MAX);
     for (int i = 0; i < count; i++) {
@@ -16,7 +17,7 @@ static void options_describe_a_setting_completely(void **state)
         for (int k = 0; k < n; k++)
             assert_true(accuracy_setting_read_option(&again, options[k].name, options[k].value));
         if (all[i].renderer == TRIPTYCH_RENDERER_INTEGRAL) /* the integral ignores `classify` */
-            again.settings.classify = all[i].settings.classify;
+            again.settings.all.classify = all[i].settings.all.classify;
         assert_int_equal(again.renderer, all[i].renderer);
         assert_memory_equal(&again.settings, &all[i].settings, sizeof defaults);
     }
@@ -35,7 +36,7 @@ static void unknown_options_are_refused(void **state)
                                             { "method", "" },
                                             { "renderer", "cpu " } };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        accuracy_setting s = { .settings = triptych_default_settings() };
+        accuracy_setting s = { .settings = (draw_settings){ .has_background = 0 } };
         assert_false(accuracy_setting_read_option(&s, pairs[i][0], pairs[i][1]));
     }
 }
@@ -111,7 +112,7 @@ static void the_fastest_setting_below_the_error_is_selected(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof choices / sizeof *choices; i++) {
-        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        accuracy_found found = { .setting.settings = (draw_settings){ .has_background = 0 } };
         const accuracy_wanted wanted = { .error = choices[i].error,
                                          .renderers = choices[i].renderers };
         found.setting.settings.background[0] = 0.25;
@@ -138,7 +139,7 @@ static void invalid_reports_are_refused(void **state)
         REPORT(""),  REPORT("{\"name\":\"a\",\"data_set\":\"a.trip\"}")
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
-        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        accuracy_found found = { .setting.settings = (draw_settings){ .has_background = 0 } };
         test_catch_reports();
         assert_int_equal(
             accuracy_fastest_in(texts[i], "a.json", &(accuracy_wanted){ .error = 9 }, &found),
@@ -161,7 +162,7 @@ static void a_report_of_another_data_set_is_refused(void **state)
                   { "", "00000000000000ff", 0, 1 } };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char text[512];
-        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        accuracy_found found = { .setting.settings = (draw_settings){ .has_background = 0 } };
         snprintf(text, sizeof text,
                  "{\"triptych_accuracy\":1,\"data_set\":\"a.trip\",\"shading\":true,%s%s",
                  cases[i].checksum, row);
@@ -190,7 +191,7 @@ static void a_report_names_the_levels_of_its_data_set(void **state)
                   { "", false, TRIPTYCH_LEVELS_FOR_AUTO } };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char text[512];
-        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        accuracy_found found = { .setting.settings = (draw_settings){ .has_background = 0 } };
         snprintf(
             text, sizeof text,
             "{\"triptych_accuracy\":1,\"data_set\":\"a.trip\",\"shading\":true,%s\"rows\":[" ROW(

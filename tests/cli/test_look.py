@@ -164,7 +164,7 @@ class Look(program.ProgramTest):
             self.fails(1, "brick", "ball.nrrd", "-o", "b.trip", "--tf", slip, says=f"{preset}?")
 
     def test_every_preset_in_the_help_draws(self):
-        page = self.works("render", "--help").stdout.decode()
+        page = self.works("render", "--help=all").stdout.decode()
         names = [
             *("auto", "ct", "mr", "fog", "labels", "simulation", "ct-bone", "ct-soft", "ct-lung"),
             *("ct-skin", "grey", "bone", "hot-metal", "viridis", "vessels", "xray"),

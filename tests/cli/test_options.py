@@ -3,6 +3,7 @@ valid value works."""
 import concurrent.futures
 import os
 import re
+import subprocess
 
 import program
 
@@ -135,8 +136,8 @@ INFO = {"--verify": None, "--json": None}
 
 
 def options_of(command):
-    text = program.call(command, "--help").stdout.decode()
-    return set(re.findall(r"--[a-z][a-z-]*", text)) - {"--help"}
+    text = program.call(command, "--help=names").stdout.decode()
+    return set(re.findall(r"^--[a-z][a-z-]*", text, re.M))
 
 
 class Options(program.ProgramTest):
@@ -162,6 +163,38 @@ class Options(program.ProgramTest):
     def test_the_tables_name_every_option(self):
         for command, table in ("brick", BRICK), ("render", RENDER), ("info", INFO):
             self.assertEqual(options_of(command) - set(table), set())
+
+    def test_the_short_help_fits_a_screen(self):
+        text = self.works("render", "--help").stdout.decode()
+        self.assertLessEqual(text.count("\n"), 60)
+        self.assertLessEqual(max(map(len, text.splitlines())), 79)
+        self.assertTrue(set(re.findall(r"--[a-z][a-z-]*", text)) - {"--help"} <= options_of("render"))
+
+    def test_man_pages_have_every_option(self):
+        pages = os.path.join(os.path.dirname(__file__), "..", "..", "cli", "man")
+        made = os.path.join(os.path.dirname(program.PROGRAM), "cli")
+        for command in "accuracy", "bench", "brick", "cache", "info", "render", "serve", "tf", "view":
+            page = f"triptych-{command}.1"
+            folder = made if os.path.exists(os.path.join(made, page)) else pages
+            with open(os.path.join(folder, page), encoding="utf-8") as f:
+                lines = f.read().replace("\\-", "-").splitlines()
+            heads = " ".join(l for before, l in zip(lines, lines[1:]) if before == ".TP")
+            named = set(re.findall(r"--[a-z][a-z-]*", heads)) - {"--help"}
+            self.assertEqual(named, options_of(command) - {"--help"}, command)
+
+    def test_bash_completes_options_and_choices(self):
+        script = os.path.join(os.path.dirname(__file__), "..", "..", "cli", "completion.bash")
+        for words, expected in (
+            (["triptych", "ren"], "render"),
+            (["triptych", "render", "--clas"], "--classify"),
+            (["triptych", "render", "--classify", "p"], "pre post"),
+            (["triptych", "brick", "--lev"], "--level-set --levels --levels-for"),
+        ):
+            run = subprocess.run(
+                ["bash", "-c", f'. "{script}"; COMP_WORDS=("${{@:2}}"); COMP_CWORD=$((${{#@}} - 2)); '
+                 '_triptych "$1"; echo "${COMPREPLY[@]}"', "bash", program.PROGRAM, *words],
+                capture_output=True, check=True, text=True)
+            self.assertEqual(run.stdout.strip(), expected, run.stderr)
 
     def test_wrong_values_are_refused(self):
         wrong = []

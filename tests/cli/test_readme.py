@@ -70,7 +70,7 @@ class Readme(program.ProgramTest):
             name, *arguments = shlex.split(line)
             if name != "triptych":
                 continue
-            text = self.works(arguments[0], "--help").stdout.decode()
+            text = self.works(arguments[0], "--help=all").stdout.decode()
             for option in arguments:
                 if option.startswith("--"):
                     self.assertIn(option.split("=")[0], text, line)

@@ -40,7 +40,7 @@ class Build:
 
     def __init__(self, path):
         self.path = path
-        self.help = {c: run(path, c, "--help") for c in ("brick", "render", "bench")}
+        self.help = {c: run(path, c, "--help=all") for c in ("brick", "render", "bench")}
 
     def given(self, command, *options):
         """Returns the options that the command has in this build."""

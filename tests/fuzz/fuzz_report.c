@@ -12,7 +12,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(text, data, size);
     for (unsigned renderers = 0; renderers < 8; renderers += 4) {
         const accuracy_wanted wanted = { .error = 1, .renderers = renderers };
-        accuracy_found found = { .setting.settings = triptych_default_settings() };
+        accuracy_found found = { .setting.settings = (draw_settings){ 0 } };
         if (accuracy_fastest_in(text, "fuzz", &wanted, &found) == 0)
             FUZZ_PROMISE(found.error >= 0 && found.error < 1 && found.ms >= 0);
     }

@@ -9,7 +9,7 @@
 
 static trip_view_state defaults(void)
 {
-    return (trip_view_state){ .opacity_scale = 1, .settings = triptych_default_settings() };
+    return (trip_view_state){ .opacity_scale = 1, .settings = (draw_settings){ 0 } };
 }
 
 static void check_again(const trip_view_state *s)
@@ -18,7 +18,8 @@ static void check_again(const trip_view_state *s)
     char *text = trip_view_state_print(s, "/d");
     FUZZ_PROMISE(text && trip_view_state_parse(&again, "/d", text, "again") == 1);
     FUZZ_PROMISE(memcmp(&again.navigation, &s->navigation, sizeof s->navigation) == 0);
-    FUZZ_PROMISE(memcmp(again.settings.light, s->settings.light, sizeof s->settings.light) == 0);
+    FUZZ_PROMISE(memcmp(again.settings.light.toward, s->settings.light.toward,
+                        sizeof s->settings.light.toward) == 0);
     FUZZ_PROMISE(again.opacity_scale == s->opacity_scale && again.panel == s->panel);
     trip_view_state_release(&again);
     free(text);
@@ -31,7 +32,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(text, data, size);
     if (trip_view_state_parse(&s, "/d", text, "fuzz") == 1) {
         FUZZ_PROMISE(!s.has_navigation || trip_navigation_distance(&s.navigation) > 0);
-        FUZZ_PROMISE(s.settings.samples >= 1 && s.settings.samples <= 64);
+        FUZZ_PROMISE(s.settings.all.samples >= 1 && s.settings.all.samples <= 64);
         check_again(&s);
     } else {
         FUZZ_PROMISE(s.text == NULL && s.function == NULL);

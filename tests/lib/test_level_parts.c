@@ -1,6 +1,7 @@
 /* Tests pictures of interpolated values that are drawn in parts at several levels of detail. The
  * values of the volume rise linearly, so that interpolated means equal the values, and all levels
  * are alike. The picture must therefore equal the integral through the finest level. */
+#include "draw_settings.h"
 #include <triptych_brick.h>
 
 #include <math.h>
@@ -89,21 +90,21 @@ static triptych *open_at(triptych_renderer renderer, const double eye[3])
     return t;
 }
 
-static triptych_settings plain(double lod_px)
+static draw_settings plain(double lod_px)
 {
-    triptych_settings s = triptych_default_settings();
-    s.shading = 0;
-    s.lod_px = lod_px;
-    s.tolerance = 1e-4;
+    draw_settings s = { 0 };
+    s.light.no_shading = 1;
+    s.lod.voxel_px = lod_px;
+    s.integral.tolerance = 1e-4;
     s.clip = inside;
-    memset(s.background, 0, sizeof s.background);
+    s.has_background = 1;
     return s;
 }
 
-static uint64_t draw(triptych *t, const triptych_settings *s, float *rgba)
+static uint64_t draw(triptych *t, const draw_settings *s, float *rgba)
 {
     triptych_frame_stats stats;
-    assert_int_equal(triptych_set_settings(t, s), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, s), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
     assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_OK);
     return stats.splats;
@@ -150,7 +151,7 @@ static void parts_join_without_a_seam(void **state)
     static float truth[FLOATS], fine[FLOATS], parts[FLOATS];
     for (int e = 0; e < 2; e++) {
         triptych *t = open_at(TRIPTYCH_RENDERER_INTEGRAL, eyes[e]);
-        triptych_settings s = plain(0);
+        draw_settings s = plain(0);
         draw(t, &s, truth);
         triptych_destroy(t);
         assert_true(truth[4 * (SIZE / 2 * SIZE + SIZE / 2) + 3] > 0.7F);
@@ -174,7 +175,7 @@ static void the_background_is_added_after_the_last_part(void **state)
     (void)state;
     static float clear[FLOATS], other[FLOATS];
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
-    triptych_settings s = plain(4);
+    draw_settings s = plain(4);
     draw(t, &s, clear);
     const double background[4] = { 0.9, 0.3, 0.6, 0.75 };
     memcpy(s.background, background, sizeof background);
@@ -184,13 +185,13 @@ static void the_background_is_added_after_the_last_part(void **state)
         const double behind = (i % 4 < 3 ? background[i % 4] : 1) * background[3];
         assert_float_equal(other[i], clear[i] + (1 - alpha) * behind, 1e-6);
     }
-    s.normalise = 1;
+    s.all.normalise = 1;
     draw(t, &s, other);
     for (int i = 0; i < FLOATS; i++)
         if (clear[i / 4 * 4 + 3] > 1e-3F)
             assert_float_equal(other[i], clear[i] / clear[i / 4 * 4 + 3], 1e-5);
     s = plain(8);
-    s.samples = 2;
+    s.all.samples = 2;
     draw(t, &s, other);
     assert_near(other, clear, 0.3, 12); /* the rim of the box is smoother */
     triptych_destroy(t);
@@ -203,13 +204,13 @@ static void drawing_in_steps_gives_the_same_bits(void **state)
     (void)state;
     static float whole[FLOATS], again[FLOATS], on_the_way[FLOATS];
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
-    const triptych_settings s = plain(4);
+    const draw_settings s = plain(4);
     draw(t, &s, whole);
-    int status = TRIPTYCH_MORE;
+    int status = TRIPTYCH_STEP_MORE;
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     while (status > 0) {
         status = triptych_step(t, 0);
-        if (status == TRIPTYCH_WAITS)
+        if (status == TRIPTYCH_STEP_WAITS)
             triptych_await(t, 20000000);
         assert_true(status >= 0);
         assert_int_equal(triptych_picture(t, on_the_way), TRIPTYCH_OK);
@@ -251,9 +252,9 @@ static void the_plan_explains_the_part_being_drawn(void **state)
 {
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
-    const triptych_settings s = plain(4);
-    int status = TRIPTYCH_MORE, number = 0;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    const draw_settings s = plain(4);
+    int status = TRIPTYCH_STEP_MORE, number = 0;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(check_plan(t), 1);
     while (status > 0) {
@@ -262,7 +263,7 @@ static void the_plan_explains_the_part_being_drawn(void **state)
         const int now = check_plan(t);
         assert_in_range(now, number, 3);
         number = now;
-        if (status == TRIPTYCH_WAITS)
+        if (status == TRIPTYCH_STEP_WAITS)
             assert_int_equal(triptych_await(t, UINT64_MAX), TRIPTYCH_OK);
     }
     assert_int_equal(number, 3);
@@ -270,10 +271,10 @@ static void the_plan_explains_the_part_being_drawn(void **state)
     triptych_destroy(t);
 }
 
-static void assert_levels(triptych *t, const triptych_settings *s, const char *words)
+static void assert_levels(triptych *t, const draw_settings *s, const char *words)
 {
     char *text = NULL;
-    assert_int_equal(triptych_set_settings(t, s), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, s), TRIPTYCH_OK);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
     assert_non_null(strstr(text, words));
@@ -285,13 +286,13 @@ static void the_plan_gives_the_reasons_for_the_levels(void **state)
 {
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
-    triptych_settings s = plain(4);
+    draw_settings s = plain(4);
     assert_levels(t, &s, ": the coarsest with voxels at most 4 pixels wide\n");
-    s.lod_px = 0.25;
+    s.lod.voxel_px = 0.25;
     assert_levels(t, &s,
                   "do not run: level 0: coarser levels have voxels more than 0.25 pixels wide\n");
-    s.lod_px = 0;
-    s.max_bytes = 100;
+    s.lod.voxel_px = 0;
+    s.lod.max_bytes = 100;
     assert_levels(t, &s, ": the coarsest level, with more bytes than the bound allows\n");
     triptych_destroy(t);
 }
@@ -301,16 +302,16 @@ static void distances_and_effects_use_one_level(void **state)
 {
     (void)state;
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
-    triptych_settings s = plain(4);
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    draw_settings s = plain(4);
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(count_parts(t), 3);
-    s.depth = 1;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.all.depth = 1;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(count_parts(t), 1);
-    s.depth = 0;
-    s.effects = TRIPTYCH_OCCLUSION;
-    s.shading = 1;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.all.depth = 0;
+    s.effects.which = TRIPTYCH_EFFECT_OCCLUSION;
+    s.light.no_shading = 0;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(count_parts(t), 1);
     triptych_destroy(t);
 }
@@ -321,11 +322,11 @@ static void a_bound_on_bytes_makes_parts_coarser(void **state)
     (void)state;
     static float truth[FLOATS], bounded[FLOATS];
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[0]);
-    triptych_settings s = plain(0);
+    draw_settings s = plain(0);
     const uint64_t of_fine = draw(t, &s, truth);
     uint64_t before = of_fine;
     for (double bytes = 1 << 20; bytes > 1 << 12; bytes /= 4) {
-        s.max_bytes = bytes;
+        s.lod.max_bytes = bytes;
         const uint64_t splats = draw(t, &s, bounded);
         assert_true(splats <= before);
         assert_near(bounded, truth, 0.5, 3);
@@ -342,11 +343,11 @@ static void a_bound_on_bytes_applies_to_a_single_level(void **state)
     (void)state;
     static float picture[FLOATS];
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, eyes[1]);
-    triptych_settings s = plain(0);
-    s.effects = TRIPTYCH_OCCLUSION;
-    s.shading = 1;
+    draw_settings s = plain(0);
+    s.effects.which = TRIPTYCH_EFFECT_OCCLUSION;
+    s.light.no_shading = 0;
     const uint64_t of_fine = draw(t, &s, picture);
-    s.max_bytes = 3.0 * 2 * NX * NY * NZ / 8;        /* level 1 in three lists */
+    s.lod.max_bytes = 3.0 * 2 * NX * NY * NZ / 8;    /* level 1 in three lists */
     assert_true(draw(t, &s, picture) < of_fine / 4); /* wider bricks, more of them visible */
     assert_int_equal(count_parts(t), 1);
     triptych_destroy(t);
@@ -360,7 +361,7 @@ static void a_level_without_cells_is_not_drawn(void **state)
     static float thin[FLOATS];
     assert_int_equal(brick_ramp(3), 0);
     triptych *t = open_at(TRIPTYCH_RENDERER_CPU, (double[]){ 10, 30, -500 });
-    triptych_settings s = plain(100);
+    draw_settings s = plain(100);
     s.clip = (triptych_clip){ 0 };
     draw(t, &s, thin);
     float max = 0;

@@ -1,4 +1,5 @@
 /* Tests the library as other programs use it, with only its headers and its shared object. */
+#include "draw_settings.h"
 #include <triptych_brick.h>
 
 #include <math.h>
@@ -51,8 +52,8 @@ static void open_data(triptych *t, triptych_renderer renderer)
             &(triptych_resources){ .memory_bytes = 64 << 20, .threads = 2, .renderer = renderer }),
         TRIPTYCH_OK);
     assert_int_equal(
-        triptych_set_view(t,
-                          &(triptych_view){ .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO }),
+        triptych_set_view(
+            t, &(triptych_view){ .width = SIZE, .height = SIZE, .side = TRIPTYCH_SIDE_ISO }),
         TRIPTYCH_OK);
 }
 
@@ -128,24 +129,25 @@ static void a_frame_has_statistics_for_each_list(void **state)
     (void)state;
     static float timed[FLOATS], counted[FLOATS];
     triptych *t = new_context();
-    triptych_settings settings = triptych_default_settings();
+    draw_settings settings = { 0 };
     triptych_frame_stats frame;
     triptych_list_stats list;
     triptych_info info;
-    settings.classify = TRIPTYCH_PRE;
-    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    settings.all.classify = TRIPTYCH_CLASSIFY_PRE;
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, timed), TRIPTYCH_OK);
-    for (settings.count = 0; settings.count < 2; settings.count++) {
+    for (settings.all.count_exactly = 0; settings.all.count_exactly < 2;
+         settings.all.count_exactly++) {
         uint64_t splats = 0, bytes = 0, drawn = 0;
-        assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+        assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
         assert_int_equal(triptych_draw(t, counted), TRIPTYCH_OK);
         assert_memory_equal(timed, counted, sizeof timed);
         assert_int_equal(triptych_get_frame_stats(t, &frame), TRIPTYCH_OK);
         for (unsigned i = 0; i < info.lists; i++) {
             assert_int_equal(triptych_get_list_stats(t, i, &list), TRIPTYCH_OK);
-            assert_int_equal(list.counted, settings.count);
+            assert_int_equal(list.counted, settings.all.count_exactly);
             assert_true(list.splats_drawn <= list.splats_projected);
             assert_true(list.splats_projected <= list.splats_read);
             assert_true(list.bricks_selected + list.bricks_transparent + list.bricks_outside +
@@ -157,7 +159,7 @@ static void a_frame_has_statistics_for_each_list(void **state)
         }
         assert_int_equal(splats, frame.splats);
         assert_int_equal(bytes, frame.bytes_read);
-        assert_int_equal(drawn > 0, settings.count);
+        assert_int_equal(drawn > 0, settings.all.count_exactly);
     }
     assert_true(frame.splats > 0 && frame.splats <= 3 * info.kept);
     assert_true(frame.ms > 0 && frame.memory_bytes == 64 << 20);
@@ -173,14 +175,14 @@ static void reads_of_a_frame_do_not_depend_on_earlier_frames(void **state)
 {
     (void)state;
     triptych *t = new_context();
-    triptych_settings s = triptych_default_settings();
+    draw_settings s = { 0 };
     triptych_frame_stats stats;
     uint64_t bytes[3] = { 0 };
     float *rgba = calloc((size_t)SIZE * SIZE * 4, sizeof *rgba);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     for (int i = 0; i < 3; i++) {
-        s.classify = i == 1 ? TRIPTYCH_PRE : TRIPTYCH_POST;
-        assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+        s.all.classify = i == 1 ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
+        assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
         assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
         assert_int_equal(triptych_get_frame_stats(t, &stats), TRIPTYCH_OK);
         bytes[i] = stats.bytes_read;
@@ -262,13 +264,13 @@ static void pictures_are_part_of_the_given_memory(void **state)
 
 /* Checks the classification of a frame with these settings, in its statistics and in the words of
  * its plan. */
-static void check_classified(triptych *t, const triptych_settings *s, triptych_classify expected,
+static void check_classified(triptych *t, const draw_settings *s, triptych_classify expected,
                              const char *words)
 {
     static float rgba[FLOATS];
     triptych_frame_stats frame;
     char *text;
-    assert_int_equal(triptych_set_settings(t, s), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, s), TRIPTYCH_OK);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
     assert_non_null(strstr(text, words));
@@ -277,37 +279,38 @@ static void check_classified(triptych *t, const triptych_settings *s, triptych_c
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
     assert_int_equal(triptych_get_frame_stats(t, &frame), TRIPTYCH_OK);
     assert_int_equal(frame.classify, expected);
-    assert_int_equal(frame.samples_per_sheet > 0, expected == TRIPTYCH_POST);
+    assert_int_equal(frame.samples_per_sheet > 0, expected == TRIPTYCH_CLASSIFY_POST);
 }
 
 static void settings_for_splats_select_pre(void **state)
 {
     (void)state;
     triptych *t = new_context();
-    triptych_settings defaults = triptych_default_settings(), s = defaults;
-    assert_int_equal(defaults.classify, TRIPTYCH_CLASSIFY_AUTO);
+    draw_settings defaults = { 0 }, s = defaults;
+    assert_int_equal(defaults.all.classify, TRIPTYCH_CLASSIFY_AUTO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    check_classified(t, &s, TRIPTYCH_POST, "by the view");
-    s.samples_per_sheet = 4;
-    check_classified(t, &s, TRIPTYCH_POST, "at 4 samples per sheet");
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "by the view");
+    s.sheet.samples = 4;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "at 4 samples per sheet");
     s = defaults;
-    s.kernel_radius = 1.75;
-    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: a kernel radius");
+    s.splat.kernel_radius = 1.75;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_PRE,
+                     "instead of post: --kernel-radius is for splats");
     s = defaults;
-    s.lod_px = 2;
-    check_classified(t, &s, TRIPTYCH_POST, "the data set has none");
+    s.lod.voxel_px = 2;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "the data set has none");
     s = defaults;
-    s.target = TRIPTYCH_RGBA8;
-    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: the target");
+    s.splat.target = TRIPTYCH_TARGET_RGBA8;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_PRE, "instead of post: --target is for splats");
     s = defaults;
-    s.traversal = TRIPTYCH_ASCENDING;
-    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: traversal");
+    s.all.traversal = TRIPTYCH_TRAVERSAL_ASCENDING;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_PRE, "instead of post: --traversal is for splats");
     s = defaults;
-    s.count = 1;
-    check_classified(t, &s, TRIPTYCH_PRE, "instead of post: splats are counted");
-    s.count = 0;
-    s.classify = TRIPTYCH_PRE;
-    check_classified(t, &s, TRIPTYCH_PRE, "classify    pre");
+    s.all.count_exactly = 1;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_PRE, "instead of post: --count is for splats");
+    s.all.count_exactly = 0;
+    s.all.classify = TRIPTYCH_CLASSIFY_PRE;
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_PRE, "classify    pre");
     triptych_destroy(t);
 }
 
@@ -317,10 +320,10 @@ static void depth_is_the_distance_of_the_visible_surface(void **state)
     (void)state;
     static float rgba[FLOATS], plain[FLOATS], depth[SIZE * SIZE];
     triptych *t = new_context();
-    triptych_settings settings = triptych_default_settings();
+    draw_settings settings = { 0 };
     triptych_info info;
     int seen = 0;
-    settings.depth = 1;
+    settings.all.depth = 1;
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
     const double middle = (info.lo[1] + info.hi[1]) / 2, far = 1000;
@@ -334,7 +337,7 @@ static void depth_is_the_distance_of_the_visible_surface(void **state)
     };
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, plain), TRIPTYCH_OK);
-    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
     assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "picture_and_depth");
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     while (triptych_step(t, UINT64_MAX) > 0)
@@ -355,8 +358,9 @@ static void depth_is_the_distance_of_the_visible_surface(void **state)
     assert_fails(t, triptych_write_depth(t, "depth.exr", SIZE, SIZE, depth), TRIPTYCH_ERROR,
                  "(5, 0)");
     assert_int_equal(remove("depth.exr"), 0);
-    settings.target = TRIPTYCH_RGBA8;
-    assert_fails(t, triptych_set_settings(t, &settings), TRIPTYCH_USAGE, "depth");
+    settings.splat.target = TRIPTYCH_TARGET_RGBA8;
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
+    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "--depth: requires --target rgba32f");
     triptych_destroy(t);
 }
 
@@ -379,11 +383,11 @@ static void a_probe_finds_the_visible_surface(void **state)
     (void)state;
     static float rgba[FLOATS], depth[SIZE * SIZE];
     triptych *t = new_context();
-    triptych_settings settings = triptych_default_settings();
+    draw_settings settings = { 0 };
     triptych_info info;
     triptych_hit hit;
     int surface = 0;
-    settings.depth = 1;
+    settings.all.depth = 1;
     settings.background[3] = 0;
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(
@@ -392,14 +396,14 @@ static void a_probe_finds_the_visible_surface(void **state)
         TRIPTYCH_OK);
     for (int parallel = 0; parallel < 2; parallel++) {
         const triptych_view view = {
-            .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO, .ortho_fit = parallel
+            .width = SIZE, .height = SIZE, .side = TRIPTYCH_SIDE_ISO, .ortho_fit = parallel
         };
         assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
         assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
-        assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+        assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
         assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
         assert_fails(t, triptych_probe(t, 1, 1, &hit), TRIPTYCH_USAGE, "end it first");
-        while (triptych_step(t, UINT64_MAX) == TRIPTYCH_WAITS)
+        while (triptych_step(t, UINT64_MAX) == TRIPTYCH_STEP_WAITS)
             triptych_await(t, UINT64_MAX);
         assert_int_equal(triptych_picture_and_depth(t, rgba, depth), TRIPTYCH_OK);
         triptych_end(t);
@@ -534,10 +538,10 @@ static void progress_is_reported_by_stage(void **state)
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
     assert_true(seen.draws > 0 && seen.splats == 0);
-    triptych_settings s = triptych_default_settings();
-    s.classify = TRIPTYCH_PRE;
+    draw_settings s = { 0 };
+    s.all.classify = TRIPTYCH_CLASSIFY_PRE;
     seen = (stages){ 0 };
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
     assert_true(seen.splats > 0 && seen.draws == 0);
     assert_fails(t, triptych_brick(t, VOLUME, "progress.trip", NULL, &summary), TRIPTYCH_ERROR,
@@ -654,8 +658,8 @@ static void a_failure_gives_its_reason_and_the_context_continues(void **state)
     static float rgba[FLOATS];
     triptych *t = new_context();
     triptych_info info;
-    triptych_settings bad = triptych_default_settings();
-    bad.h = 1;
+    draw_settings bad = { 0 };
+    bad.all.h = 1;
     assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "no data set is open");
     assert_fails(t, triptych_get_info(t, &info), TRIPTYCH_USAGE, "no data set is open");
     assert_fails(t, triptych_open(t, "none.trip", NULL), TRIPTYCH_ERROR, "none.trip");
@@ -664,7 +668,7 @@ static void a_failure_gives_its_reason_and_the_context_continues(void **state)
     assert_fails(t, triptych_step(t, 0), TRIPTYCH_USAGE, "no frame is begun");
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_string_equal(triptych_error(t), "");
-    assert_fails(t, triptych_set_settings(t, &bad), TRIPTYCH_USAGE, "h must be");
+    assert_fails(t, draw_settings_use(t, &bad), TRIPTYCH_USAGE, "--h: 1 is not between 0 and 1");
     assert_fails(t, triptych_set_view(t, &(triptych_view){ .zoom = NAN }), TRIPTYCH_USAGE,
                  "finite");
     assert_fails(t, triptych_set_view(t, &(triptych_view){ .width = -1 }), TRIPTYCH_USAGE,
@@ -700,7 +704,7 @@ static void messages_go_to_the_callback_if_there_is_one(void **state)
 {
     (void)state;
     triptych *t = new_context();
-    int messages = 0, left_out = -1, ends[2], keep = dup(STDERR_FILENO);
+    int messages = 0, ends[2], keep = dup(STDERR_FILENO);
     char text[16];
     assert_int_equal(pipe(ends), 0);
     dup2(ends[1], STDERR_FILENO);
@@ -722,9 +726,8 @@ static void messages_go_to_the_callback_if_there_is_one(void **state)
     assert_int_equal(messages, 2);
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_set_transfer_function(
-                         t, &(triptych_transfer_function){ .name = "grey", .left_out = &left_out }),
+                         t, &(triptych_transfer_function){ .name = "grey", .all_values = 1 }),
                      TRIPTYCH_OK);
-    assert_int_equal(left_out, 0);
     triptych_destroy(t);
 }
 
@@ -740,22 +743,22 @@ static void a_too_small_kernel_gives_one_warning(void **state)
     (void)state;
     triptych *t = new_context();
     char line[400] = "";
-    triptych_settings settings = triptych_default_settings();
+    draw_settings settings = { 0 };
     triptych_set_messages(t, keep_message, line);
     for (int i = 0; i < 3; i++) {
         const double radii[3] = { 2, 1.5, 30 };
-        settings.kernel_radius = radii[i];
-        assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+        settings.splat.kernel_radius = radii[i];
+        assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
         assert_string_equal(line, "");
     }
-    settings.kernel_radius = 1;
-    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    settings.splat.kernel_radius = 1;
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
     assert_non_null(strstr(line, "warning"));
     assert_non_null(strstr(line, "+81 %"));
     assert_non_null(strstr(line, "-58 %"));
     line[0] = 0;
-    settings.h = 0.5;
-    assert_int_equal(triptych_set_settings(t, &settings), TRIPTYCH_OK);
+    settings.all.h = 0.5;
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
     assert_string_equal(line, "");
     triptych_destroy(t);
 }
@@ -774,7 +777,7 @@ static void steps_draw_the_same_picture_as_one_call(void **state)
         if (steps++ % 8 == 0)
             assert_int_equal(triptych_picture(t, stepped), TRIPTYCH_OK);
     }
-    assert_int_equal(status, TRIPTYCH_DONE);
+    assert_int_equal(status, TRIPTYCH_STEP_DONE);
     assert_int_equal(triptych_picture(t, stepped), TRIPTYCH_OK);
     triptych_end(t);
     assert_true(steps > 3);
@@ -828,22 +831,22 @@ static void the_integral_of_kept_voxels_equals_the_one_of_the_volume(void **stat
     enum { SMALL = 20, SMALL_FLOATS = 4 * SMALL * SMALL };
     float stored[SMALL_FLOATS], source[SMALL_FLOATS];
     triptych *t = new_context();
-    triptych_settings s = triptych_default_settings();
+    draw_settings s = { 0 };
     const triptych_view view = { .width = SMALL, .height = SMALL };
     const char *other = TRIP_SOURCE_DIR "/datasets/stent.nrrd";
-    s.shading = 0;
+    s.light.no_shading = 1;
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_fails(t, triptych_set_source(t, VOLUME, NULL), TRIPTYCH_USAGE, "only the integral");
     open_data(t, TRIPTYCH_RENDERER_INTEGRAL);
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, stored), TRIPTYCH_OK);
     assert_fails(t, triptych_set_source(t, other, NULL), TRIPTYCH_ERROR, "the grids differ");
     assert_int_equal(triptych_set_source(t, VOLUME, NULL), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, source), TRIPTYCH_OK);
     assert_memory_equal(stored, source, sizeof stored);
-    s.field = TRIPTYCH_SPLATS;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.integral.field = TRIPTYCH_FIELD_SPLATS;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_draw(t, source), TRIPTYCH_USAGE, "the sum of the splats");
     triptych_destroy(t);
 }
@@ -854,14 +857,14 @@ static void samples_are_averaged_as_in_a_larger_picture(void **state)
     enum { SIDE = 3, LARGE = SIDE * SIZE };
     static float rgba[FLOATS], large[SIDE * SIDE * FLOATS];
     triptych *t = new_context();
-    triptych_settings s = triptych_default_settings();
-    const triptych_view view = { .width = LARGE, .height = LARGE, .side = TRIPTYCH_ISO };
+    draw_settings s = { 0 };
+    const triptych_view view = { .width = LARGE, .height = LARGE, .side = TRIPTYCH_SIDE_ISO };
     open_data(t, TRIPTYCH_RENDERER_CPU);
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, large), TRIPTYCH_OK);
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    s.samples = SIDE;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.all.samples = SIDE;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(triptych_draw(t, rgba), TRIPTYCH_OK);
     double max = 0;
     for (int n = 0; n < FLOATS; n++) {
@@ -873,14 +876,14 @@ static void samples_are_averaged_as_in_a_larger_picture(void **state)
         max = fmax(max, fabs((double)large[4 * (y * LARGE + x) + n % 4] - (double)rgba[n]));
     }
     assert_true(max > 0.01);
-    s.depth = 1;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.all.depth = 1;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_draw(t, rgba), TRIPTYCH_USAGE, "requires --samples 1");
-    s.samples = 0;
-    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "samples");
-    s.samples = 1;
-    s.tolerance = 0;
-    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "tolerance");
+    s.all.samples = 65;
+    assert_fails(t, draw_settings_use(t, &s), TRIPTYCH_USAGE, "samples");
+    s.all.samples = 1;
+    s.integral.tolerance = 1;
+    assert_fails(t, draw_settings_use(t, &s), TRIPTYCH_USAGE, "tolerance");
     triptych_destroy(t);
 }
 
@@ -888,11 +891,11 @@ static void samples_are_averaged_as_in_a_larger_picture(void **state)
 static triptych_frame_stats draw_in_steps(triptych *t, float *rgba)
 {
     triptych_frame_stats stats = { 0 };
-    int status = TRIPTYCH_MORE;
+    int status = TRIPTYCH_STEP_MORE;
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     while (status > 0) {
         status = triptych_step(t, 0);
-        if (status == TRIPTYCH_WAITS)
+        if (status == TRIPTYCH_STEP_WAITS)
             triptych_await(t, 20000000);
         if (status >= 0)
             assert_int_equal(triptych_picture(t, rgba), TRIPTYCH_OK);
@@ -906,12 +909,12 @@ static triptych_frame_stats draw_in_steps(triptych *t, float *rgba)
 /* Draws with an `lod_px` that makes voxels of level 1 2^octaves times too wide. */
 static triptych_frame_stats draw_at(triptych *t, double octaves, float *rgba)
 {
-    triptych_settings s = triptych_default_settings();
+    draw_settings s = { 0 };
     triptych_camera camera;
     assert_int_equal(triptych_get_camera(t, &camera), TRIPTYCH_OK);
-    s.classify = TRIPTYCH_POST;
-    s.lod_px = 2 * camera.height / camera.ortho_height * exp2(-octaves);
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.all.classify = TRIPTYCH_CLASSIFY_POST;
+    s.lod.voxel_px = 2 * camera.height / camera.ortho_height * exp2(-octaves);
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     return draw_in_steps(t, rgba);
 }
 
@@ -920,7 +923,7 @@ static void two_levels_are_blended(void **state)
     (void)state;
     static float fine[FLOATS], coarse[FLOATS], mixed[FLOATS], again[FLOATS];
     const triptych_view view = {
-        .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO, .ortho_fit = 1
+        .width = SIZE, .height = SIZE, .side = TRIPTYCH_SIDE_ISO, .ortho_fit = 1
     };
     triptych *t = new_context();
     const triptych_brick_options options = { .levels = 1, .memory_bytes = 64 << 20 };
@@ -929,8 +932,8 @@ static void two_levels_are_blended(void **state)
                                            .renderer = TRIPTYCH_RENDERER_CPU };
     assert_int_equal(triptych_open(t, "levels.trip", &resources), TRIPTYCH_OK);
     unsigned levels[2];
-    assert_int_equal(triptych_count_levels(t, TRIPTYCH_POST, &levels[0]), TRIPTYCH_OK);
-    assert_int_equal(triptych_count_levels(t, TRIPTYCH_PRE, &levels[1]), TRIPTYCH_OK);
+    assert_int_equal(triptych_count_levels(t, TRIPTYCH_CLASSIFY_POST, &levels[0]), TRIPTYCH_OK);
+    assert_int_equal(triptych_count_levels(t, TRIPTYCH_CLASSIFY_PRE, &levels[1]), TRIPTYCH_OK);
     assert_int_equal(levels[0], 1);
     assert_int_equal(levels[1], 0);
     assert_int_equal(triptych_set_view(t, &view), TRIPTYCH_OK);
@@ -1066,14 +1069,14 @@ static bool are_same(const float *a, const float *b)
     return memcmp(a, b, FLOATS * sizeof *a) == 0;
 }
 
-static triptych_settings with_effects(int effects)
+static draw_settings with_effects(int effects)
 {
-    triptych_settings s = triptych_default_settings();
+    draw_settings s = { 0 };
     const double light[3] = { 1, -1, 1 };
-    s.headlight = 0;
-    memcpy(s.light, light, sizeof light);
-    s.effects = effects;
-    s.light_cells = 32;
+    s.light.kind = TRIPTYCH_LIGHT_DIRECTION;
+    memcpy(s.light.toward, light, sizeof light);
+    s.effects.which = effects;
+    s.effects.light_cells = 32;
     return s;
 }
 
@@ -1081,18 +1084,18 @@ static void effects_cost_nothing_when_off_and_are_kept_between_views(void **stat
 {
     (void)state;
     static float plain[FLOATS], lit[FLOATS], turned[FLOATS], again[FLOATS];
-    const triptych_settings none = with_effects(0);
-    const triptych_settings some = with_effects(TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION);
+    const draw_settings none = with_effects(0);
+    const draw_settings some = with_effects(TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION);
     triptych *t = new_context(), *other = new_context();
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    assert_int_equal(triptych_set_settings(t, &none), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, &none), TRIPTYCH_OK);
     const triptych_frame_stats before = draw(t, plain);
     assert_int_equal(before.effects, 0);
     assert_int_equal(before.light_bytes_read + before.light_memory_bytes, 0);
 
-    assert_int_equal(triptych_set_settings(t, &some), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, &some), TRIPTYCH_OK);
     triptych_frame_stats with = draw(t, lit);
-    assert_int_equal(with.effects, TRIPTYCH_SHADOWS | TRIPTYCH_OCCLUSION);
+    assert_int_equal(with.effects, TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION);
     assert_int_equal(with.bytes_read, before.bytes_read);
     assert_true(with.light_bytes_read > 0 && with.light_memory_bytes > 0);
     assert_false(are_same(plain, lit));
@@ -1100,7 +1103,7 @@ static void effects_cost_nothing_when_off_and_are_kept_between_views(void **stat
     assert_int_equal(triptych_turn(t, 40), TRIPTYCH_OK);
     assert_int_equal(draw(t, turned).light_bytes_read, 0);
     open_data(other, TRIPTYCH_RENDERER_CPU);
-    assert_int_equal(triptych_set_settings(other, &some), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(other, &some), TRIPTYCH_OK);
     assert_int_equal(triptych_turn(other, 40), TRIPTYCH_OK);
     assert_true(draw(other, again).light_bytes_read > 0);
     assert_true(are_same(turned, again));
@@ -1111,7 +1114,7 @@ static void effects_cost_nothing_when_off_and_are_kept_between_views(void **stat
     assert_true(draw(t, turned).light_bytes_read > 0);
     assert_int_equal(triptych_set_transfer_function(t, NULL), TRIPTYCH_OK);
     assert_int_equal(triptych_turn(t, 0), TRIPTYCH_OK);
-    assert_int_equal(triptych_set_settings(t, &none), TRIPTYCH_OK);
+    assert_int_equal(draw_settings_use(t, &none), TRIPTYCH_OK);
     with = draw(t, again);
     assert_int_equal(with.light_bytes_read + with.light_memory_bytes, 0);
     assert_int_equal(with.bytes_read, before.bytes_read);
@@ -1125,17 +1128,17 @@ static void heat_is_read_once_if_emission_runs(void **state)
     (void)state;
     static float plain[FLOATS], hot[FLOATS], again[FLOATS];
     triptych *t = new_context();
-    triptych_settings s = triptych_default_settings();
+    draw_settings s = { 0 };
     open_data(t, TRIPTYCH_RENDERER_CPU);
     draw(t, plain);
     assert_int_equal(triptych_set_heat(t, DATA_SET), TRIPTYCH_OK);
     triptych_frame_stats stats = draw(t, again);
     assert_int_equal(stats.heat_bytes_read + stats.heat_memory_bytes, 0);
     assert_true(are_same(plain, again));
-    s.effects = TRIPTYCH_EFFECTS_AUTO;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.effects.which = TRIPTYCH_EFFECT_AUTO;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     stats = draw(t, hot);
-    assert_int_equal(stats.effects, TRIPTYCH_EMISSION);
+    assert_int_equal(stats.effects, TRIPTYCH_EFFECT_EMISSION);
     assert_true(stats.heat_bytes_read > 0 && stats.heat_memory_bytes > 0);
     assert_false(are_same(plain, hot));
     stats = draw(t, again);
@@ -1175,7 +1178,7 @@ static void brick_rising_volume(void)
 }
 
 /* Checks that `t` draws the same picture as a new context, and whether both use the closed form. */
-static void assert_drawn_afresh(triptych *t, const char *function, const triptych_settings *s,
+static void assert_drawn_afresh(triptych *t, const char *function, const draw_settings *s,
                                 bool with_high, bool closed)
 {
     static float rgba[FLOATS], expected[FLOATS];
@@ -1188,11 +1191,11 @@ static void assert_drawn_afresh(triptych *t, const char *function, const triptyc
         assert_int_equal(triptych_set_transfer_function(
                              both[i], &(triptych_transfer_function){ .text = function }),
                          TRIPTYCH_OK);
-        assert_int_equal(triptych_set_settings(both[i], s), TRIPTYCH_OK);
-        assert_int_equal(
-            triptych_set_view(
-                both[i], &(triptych_view){ .width = SIZE, .height = SIZE, .side = TRIPTYCH_ISO }),
-            TRIPTYCH_OK);
+        assert_int_equal(draw_settings_use(both[i], s), TRIPTYCH_OK);
+        assert_int_equal(triptych_set_view(both[i], &(triptych_view){ .width = SIZE,
+                                                                      .height = SIZE,
+                                                                      .side = TRIPTYCH_SIDE_ISO }),
+                         TRIPTYCH_OK);
     }
     for (int i = 0; i < 2; i++) /* the second frame reuses results of the first */
         assert_int_equal(draw(t, rgba).closed_form, closed);
@@ -1209,9 +1212,9 @@ static void the_closed_form_depends_on_the_current_settings(void **state)
     static const char *const line = LOOK "255 .9 .6 .3 .1\n";
     /* Up to 140 this equals `line`. The maximum value in the lower half and its halo is 136. */
     static const char *const bent = LOOK "140 .9 .6 .3 .054902\n255 .1 .6 .9 .9\n";
-    triptych_settings defaults = triptych_default_settings(), cued = defaults, cubic = defaults;
-    cued.effects = TRIPTYCH_CUEING;
-    cubic.kernel = TRIPTYCH_CUBIC; /* overshoots the maximum value */
+    draw_settings defaults = { 0 }, cued = defaults, cubic = defaults;
+    cued.effects.which = TRIPTYCH_EFFECT_CUEING;
+    cubic.all.kernel = TRIPTYCH_KERNEL_CUBIC; /* overshoots the maximum value */
     brick_rising_volume();
     triptych *t = new_context();
     assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
@@ -1238,13 +1241,15 @@ static void the_device_names_the_kernels_in_use(void **state)
     static float rgba[FLOATS];
     char defaults[64];
     triptych *t = new_context();
-    triptych_settings s = triptych_default_settings();
+    draw_settings s = { 0 };
     open_data(t, TRIPTYCH_RENDERER_CPU);
     snprintf(defaults, sizeof defaults, "%s", draw(t, rgba).device);
     for (int i = 0; i < 4; i++) {
-        s.kernel = i == 1 ? TRIPTYCH_CUBIC : i == 2 ? TRIPTYCH_GAUSSIAN : TRIPTYCH_LINEAR;
-        s.classify = i == 3 ? TRIPTYCH_PRE : TRIPTYCH_POST;
-        assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+        s.all.kernel = i == 1   ? TRIPTYCH_KERNEL_CUBIC
+                       : i == 2 ? TRIPTYCH_KERNEL_GAUSSIAN
+                                : TRIPTYCH_KERNEL_LINEAR;
+        s.all.classify = i == 3 ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
+        assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
         assert_string_equal(draw(t, rgba).device,
                             i == 1 || i == 2 ? "CPU, plain, 2 threads" : defaults);
     }
@@ -1258,8 +1263,8 @@ static void measured_volumes_have_effects_only_on_request(void **state)
     triptych *t = new_context();
     char *text;
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    triptych_settings s = with_effects(TRIPTYCH_EFFECTS_AUTO);
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    draw_settings s = with_effects(TRIPTYCH_EFFECT_AUTO);
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_int_equal(draw(t, rgba).effects, 0);
     assert_int_equal(triptych_begin(t), TRIPTYCH_OK);
     assert_int_equal(triptych_explain(t, &text), TRIPTYCH_OK);
@@ -1267,17 +1272,18 @@ static void measured_volumes_have_effects_only_on_request(void **state)
     assert_null(strstr(text, "light  "));
     free(text);
     triptych_end(t);
-    s.effects |= TRIPTYCH_CUEING;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
-    assert_int_equal(draw(t, rgba).effects, TRIPTYCH_CUEING);
-    s.effects = TRIPTYCH_SHADOWS;
-    s.headlight = 1;
-    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "give the light a direction");
-    s.effects = TRIPTYCH_EMISSION;
-    assert_int_equal(triptych_set_settings(t, &s), TRIPTYCH_OK);
+    s.effects.which |= TRIPTYCH_EFFECT_CUEING;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
+    assert_int_equal(draw(t, rgba).effects, TRIPTYCH_EFFECT_CUEING);
+    s.effects.which = TRIPTYCH_EFFECT_SHADOWS;
+    s.light.kind = TRIPTYCH_LIGHT_HEAD;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
+    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "shadows require a light");
+    s.effects.which = TRIPTYCH_EFFECT_EMISSION;
+    assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "needs a data set of heat");
-    s.effects = 32;
-    assert_fails(t, triptych_set_settings(t, &s), TRIPTYCH_USAGE, "unknown effect");
+    s.effects.which = 32;
+    assert_fails(t, draw_settings_use(t, &s), TRIPTYCH_USAGE, "unknown effect");
     triptych_destroy(t);
 }
 

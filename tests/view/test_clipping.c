@@ -74,22 +74,6 @@ static void opposite_planes_are_not_interpolated(void **state)
     assert_true(mix.planes == 1 && mix.plane[0][0] == 1 && trip_clipping_is_sound(&mix));
 }
 
-static void clipping_is_written_as_options_of_render(void **state)
-{
-    (void)state;
-    const triptych_clip c = { .box = 1,
-                              .box_of_voxels = 1,
-                              .box_lo = { 0.5, -1, 2 },
-                              .box_hi = { 3, 4, 5 },
-                              .planes = 1,
-                              .plane = { { 1, 0, 0, -0.25 } } };
-    char *text = trip_clipping_text(&c), *none = trip_clipping_text(&(triptych_clip){ 0 });
-    assert_string_equal(text, " --clip-box voxels:0.5,-1,2,3,4,5 --clip-plane 1,0,0,-0.25");
-    assert_string_equal(none, "");
-    free(text);
-    free(none);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -97,7 +81,6 @@ int main(void)
         cmocka_unit_test(a_new_plane_cuts_in_front_of_the_look_point),
         cmocka_unit_test(a_box_of_voxels_keeps_its_position_in_a_finer_grid),
         cmocka_unit_test(opposite_planes_are_not_interpolated),
-        cmocka_unit_test(clipping_is_written_as_options_of_render),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

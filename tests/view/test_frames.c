@@ -85,12 +85,9 @@ static trip_frames *start(void)
 
 static trip_wanted wanted_of(unsigned document, const char *input)
 {
-    return (trip_wanted){ .document = document,
-                          .input = input,
-                          .width = WIDTH,
-                          .height = HEIGHT,
-                          .opacity_scale = 1,
-                          .settings = triptych_default_settings() };
+    return (trip_wanted){
+        .document = document, .input = input, .width = WIDTH, .height = HEIGHT, .opacity_scale = 1
+    };
 }
 
 /* Waits until the picture is complete or has failed. */
@@ -154,7 +151,7 @@ static void assert_drawn_alike(const copy *c, const char *path, const trip_wante
         triptych_open(t, path, &(triptych_resources){ .renderer = TRIPTYCH_RENDERER_CPU }), 0);
     assert_int_equal(
         triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = w->function }), 0);
-    assert_int_equal(triptych_set_settings(t, &w->settings), 0);
+    assert_int_equal(draw_settings_use(t, &w->settings), 0);
     assert_int_equal(triptych_set_view(t, &view), 0);
     assert_int_equal(triptych_draw(t, rgba), 0);
     triptych_destroy(t);
@@ -173,7 +170,7 @@ static void the_picture_at_rest_equals_the_picture_of_the_library(void **state)
     assert_true(c.picture.whole && c.picture.width == WIDTH);
     assert_drawn_alike(&c, data, &w);
     w.function = "hot-metal";
-    w.settings.classify = TRIPTYCH_POST;
+    w.settings.all.classify = TRIPTYCH_CLASSIFY_POST;
     w.has_navigation = true;
     w.navigation = c.picture.navigation;
     trip_navigation_orbit(&w.navigation, 40, 20);
@@ -192,7 +189,7 @@ static void moving_views_of_splats_use_coarse_levels_of_post(void **state)
     (void)state;
     trip_frames *f = start();
     trip_wanted w = wanted_of(1, with_levels);
-    w.settings.classify = TRIPTYCH_PRE;
+    w.settings.all.classify = TRIPTYCH_CLASSIFY_PRE;
     trip_frames_want(f, &w);
     const trip_frames_status s = await(f, 1);
     assert_true(s.exact && s.moving > 0 && s.lod_px > 0);

@@ -1,4 +1,5 @@
 #include "test.h"
+#include "draw_settings.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -7,7 +8,9 @@
 
 static trip_view_state defaults(void)
 {
-    return (trip_view_state){ .opacity_scale = 1, .settings = triptych_default_settings() };
+    return (trip_view_state){
+        .opacity_scale = 1,
+    };
 }
 
 static trip_view_state unusual(void)
@@ -23,19 +26,19 @@ static trip_view_state unusual(void)
     s.text = strdup("unit voxel\nvalues data\n0 0 0 0 0\n1 1 1 1 0.5\n");
     s.heat = strdup("/data/heat of it.trip");
     s.opacity_scale = 2.5;
-    s.settings.classify = TRIPTYCH_POST;
-    s.settings.samples_per_sheet = 3;
-    s.settings.compositing = TRIPTYCH_BY_SHEET;
-    s.settings.early_termination = 1.0 / 96;
-    s.settings.lod_px = 1.5;
-    s.settings.headlight = 0;
-    s.settings.point_light = 1;
-    s.settings.light[1] = -1.0 / 7;
-    s.settings.effects = TRIPTYCH_EMISSION | TRIPTYCH_CUEING;
-    s.settings.kelvin[0] = 100.0 / 3;
-    s.settings.kelvin[1] = 3000;
+    s.settings.all.classify = TRIPTYCH_CLASSIFY_POST;
+    s.settings.sheet.samples = 3;
+    s.settings.splat.compositing = TRIPTYCH_COMPOSITING_SHEET;
+    s.settings.all.early_termination = 1.0 / 96;
+    s.settings.lod.voxel_px = 1.5;
+    s.settings.light.kind = TRIPTYCH_LIGHT_POINT;
+    s.settings.light.toward[1] = -1.0 / 7;
+    s.settings.effects.which = TRIPTYCH_EFFECT_EMISSION | TRIPTYCH_EFFECT_CUEING;
+    s.settings.effects.kelvin[0] = 100.0 / 3;
+    s.settings.effects.kelvin[1] = 3000;
+    s.settings.has_background = 1;
     s.settings.background[2] = 0.2;
-    s.settings.show = TRIPTYCH_SHOW_LEVELS;
+    s.settings.all.show = TRIPTYCH_SHOW_LEVELS;
     s.settings.clip = (triptych_clip){ .box = 1,
                                        .box_lo = { 0.1, -1.0 / 3, 2 },
                                        .box_hi = { 1, 0, 1e9 },
@@ -64,17 +67,19 @@ static void assert_same(const trip_view_state *a, const trip_view_state *b)
     free(p);
     free(q);
     assert_memory_equal(&a->navigation, &b->navigation, sizeof a->navigation);
-    assert_int_equal(a->settings.point_light, b->settings.point_light);
-    assert_memory_equal(a->settings.light, b->settings.light, sizeof a->settings.light);
+    assert_int_equal(a->settings.light.kind, b->settings.light.kind);
+    assert_memory_equal(a->settings.light.toward, b->settings.light.toward,
+                        sizeof a->settings.light.toward);
     assert_true(a->settings.background[2] == b->settings.background[2]);
-    assert_int_equal(a->settings.classify, b->settings.classify);
-    assert_int_equal(a->settings.samples_per_sheet, b->settings.samples_per_sheet);
-    assert_int_equal(a->settings.compositing, b->settings.compositing);
-    assert_true(a->settings.lod_px == b->settings.lod_px);
+    assert_int_equal(a->settings.all.classify, b->settings.all.classify);
+    assert_int_equal(a->settings.sheet.samples, b->settings.sheet.samples);
+    assert_int_equal(a->settings.splat.compositing, b->settings.splat.compositing);
+    assert_true(a->settings.lod.voxel_px == b->settings.lod.voxel_px);
     assert_same_clip(&a->settings.clip, &b->settings.clip);
-    assert_int_equal(a->settings.show, b->settings.show);
-    assert_int_equal(a->settings.effects, b->settings.effects);
-    assert_memory_equal(a->settings.kelvin, b->settings.kelvin, sizeof a->settings.kelvin);
+    assert_int_equal(a->settings.all.show, b->settings.all.show);
+    assert_int_equal(a->settings.effects.which, b->settings.effects.which);
+    assert_memory_equal(a->settings.effects.kelvin, b->settings.effects.kelvin,
+                        sizeof a->settings.effects.kelvin);
     assert_string_equal(a->heat, b->heat);
     assert_int_equal(a->clips, b->clips);
 }
@@ -108,10 +113,10 @@ static void a_saved_state_is_restored_exactly(void **state)
     assert_same(&found, &kept);
     assert_null(found.function);
     /* A later save replaces the file. */
-    kept.settings.samples = 2;
+    kept.settings.all.samples = 2;
     assert_int_equal(trip_state_file_save(&kept, "/data/head.trip"), 0);
     assert_int_equal(trip_state_file_load(&found, "/data/head.trip"), 1);
-    assert_int_equal(found.settings.samples, 2);
+    assert_int_equal(found.settings.all.samples, 2);
     trip_view_state_release(&found);
     trip_view_state_release(&kept);
 }
@@ -168,10 +173,12 @@ static void an_invalid_state_is_refused_completely(void **state)
     (void)state;
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t1e9", "opacity_scale");
     assert_refused("\"opacity_scale\":\t2.5", "\"opacity_scale\":\t\"2\"", "opacity_scale");
-    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t2.5", "samples_per_sheet");
-    assert_refused("\"samples_per_sheet\":\t3", "\"samples_per_sheet\":\t17", "samples_per_sheet");
-    assert_refused("\"lod_px\":\t1.5", "\"lod_px\":\t-1", "lod_px");
-    assert_refused("\"compositing\":\t1", "\"compositing\":\t2", "compositing");
+    assert_refused("--samples-per-sheet 3", "--samples-per-sheet 2.5", "samples-per-sheet");
+    assert_refused("--samples-per-sheet 3", "--samples-per-sheet 17", "samples-per-sheet");
+    assert_refused("--lod 1.5", "--lod -1", "lod");
+    assert_refused("--compositing sheet", "--compositing sheets", "compositing");
+    assert_refused("--compositing sheet", "--compositing", "compositing");
+    assert_refused("--compositing sheet", "--composting sheet", "composting");
     assert_refused("\"fov_degrees\":\t30", "\"fov_degrees\":\t230", "fov_degrees");
     assert_refused("\"fov_degrees\":\t30", "\"fow\":\t30", "fov_degrees");
     assert_refused("5e+20", "1e999", "eye");
@@ -179,12 +186,12 @@ static void an_invalid_state_is_refused_completely(void **state)
     assert_refused("[0.1, 0.7, 0]", "[0, 0, 0]", "the camera is invalid");
     assert_refused("[0, 1, 0]", "[0, 0.5, 0]", "the camera is invalid");
     assert_refused("\"heat\":\t\"/data/heat of it.trip\"", "\"heat\":\t7", "heat");
-    assert_refused("\"effects\":\t20", "\"effects\":\t32", "effects");
-    assert_refused("33.3", "3333.3", "the temperatures are invalid");
+    assert_refused("--effects cueing", "--effects cuing", "effects");
+    assert_refused("33.3", "3333.3", "temperature");
     assert_refused("\"panel\":\ttrue", "\"panel\":\t1", "panel");
     assert_refused("1 1 1 1 0.5", "1 1 1 1 7.5", "opacity");
-    assert_refused("-0.142", "x", "is not a state file");
-    assert_refused("\"triptych_view\":\t1", "\"triptych_view\":\t\"1\"", "is not a state file");
+    assert_refused("-0.142", "x", "light");
+    assert_refused("\"triptych_view\":\t2", "\"triptych_view\":\t\"2\"", "is not a state file");
     trip_view_state s = defaults();
     test_catch_reports();
     assert_int_equal(trip_view_state_parse(&s, "/d", "[[[", "state.json"), TRIP_ERROR);
@@ -198,10 +205,10 @@ static void states_of_other_versions_and_data_sets_are_ignored(void **state)
     char *text = trip_view_state_print(&s, "/d");
     assert_int_equal(trip_view_state_parse(&s, "/e", text, "f"), 0);
     assert_int_equal(
-        trip_view_state_parse(&s, "/d", "{\"triptych_view\": 2, \"data\": \"/d\"}", "f"), 0);
+        trip_view_state_parse(&s, "/d", "{\"triptych_view\": 3, \"data\": \"/d\"}", "f"), 0);
     assert_memory_equal(&s, &before, sizeof s);
     assert_int_equal(
-        trip_view_state_parse(&s, "/d", "{\"triptych_view\": 1, \"data\": \"/d\"}", "f"), 1);
+        trip_view_state_parse(&s, "/d", "{\"triptych_view\": 2, \"data\": \"/d\"}", "f"), 1);
     assert_memory_equal(&s, &before, sizeof s);
     free(text);
 }

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "options.h"
+#include "option.h"
 #include "report.h"
 
 struct read_file {

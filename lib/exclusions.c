@@ -1,0 +1,310 @@
+/* The rules of which settings exclude one another, with their reasons. */
+#include <math.h>
+#include <stdio.h>
+
+#include "draw_settings.h"
+#include "report.h"
+
+#define ROW(name) (UINT64_C(1) << DRAW_##name)
+#define RENDERER(name) (1u << TRIPTYCH_RENDERER_##name)
+#define ALL 0x1fu
+
+/* Facts about the settings. */
+enum {
+    PRE = 1 << 0, /* asked for */
+    POST = 1 << 1,
+    FOR_SPLATS = 1 << 2, /* a setting that only splats have */
+    MERGE = 1 << 3,
+    IMAGE = 1 << 4,
+    ASCENDING = 1 << 5,
+    BY_SHEET = 1 << 6,
+    VERTEX = 1 << 7,
+    EWA = 1 << 8,
+    FIXED = 1 << 9,
+    UNIFORM = 1 << 10,
+    FLATTENED = 1 << 11,
+    GAUSSIAN = 1 << 12,
+    FIELD_OF_SPLATS = 1 << 13,
+    DEBUG_VIEW = 1 << 14,
+    SHOW_MERGE = 1 << 15,
+    COUNTED = 1 << 16,
+    PLAIN = 1 << 17, /* neither shading nor effects */
+    HEADLIGHT = 1 << 18,
+    SHADOWS = 1 << 19,
+    MAY_SHADOW = 1 << 20, /* shadows or automatic effects */
+    MAY_CUE = 1 << 21,
+    MAY_LATTICE = 1 << 22,
+    NARROW_TARGET = 1 << 23,
+    SEVERAL_SAMPLES = 1 << 24,
+    INDEXED = 1 << 25,
+};
+
+static const uint64_t of_splats = ROW(COMPOSITING) | ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN) |
+                                  ROW(WEIGHTS) | ROW(KERNEL_RADIUS) | ROW(TARGET) | ROW(LISTS) |
+                                  ROW(PRIMITIVES) | ROW(COUNT);
+static const uint64_t of_levels = ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS);
+
+/* A rule refuses the rows `given`, if any is set, for these renderers, if all facts `with` hold and
+ * none of `without`. */
+static const struct rule {
+    uint64_t given;
+    unsigned renderers;
+    int with, without;
+    const char *why;
+    enum verdict {
+        CONFLICT,
+        IDLE
+    } verdict; /* idle settings have no effect; drawing ignores them */
+} rules[] = {
+    { ROW(LIGHT), ALL, PLAIN, 0, "does not apply with --no-shading", IDLE },
+    { ROW(QUALITY), RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral, which is exact", IDLE },
+    { ROW(ANISOTROPY), ALL, 0, MAY_SHADOW, "requires --effects shadows or auto", IDLE },
+    { ROW(CUEING), ALL, 0, MAY_CUE, "requires --effects cueing or auto", IDLE },
+    { ROW(LIGHT_CELLS), ALL, 0, MAY_LATTICE,
+      "requires --effects shadows, occlusion, emission or auto", IDLE },
+    { ROW(EFFECTS), ALL, SHADOWS | HEADLIGHT, 0,
+      "shadows require a light that is not at the eye; give --light X,Y,Z or --light "
+      "point:X,Y,Z",
+      CONFLICT },
+    { ROW(EARLY_TERMINATION), ALL, ASCENDING, 0, "requires --traversal outward", IDLE },
+    { ROW(H), ALL, 0, MERGE, "requires --method merge", IDLE },
+    /* the integral renderer */
+    { ROW(FIELD) | ROW(TOLERANCE), ALL & ~RENDERER(INTEGRAL), 0, 0, "requires --renderer integral",
+      true },
+    { ROW(KERNEL), RENDERER(INTEGRAL), FIELD_OF_SPLATS, 0, "does not apply to --field splats",
+      true },
+    { ROW(KERNEL), RENDERER(INTEGRAL), GAUSSIAN, 0,
+      "must be linear or cubic with --renderer integral", CONFLICT },
+    { ROW(CLASSIFY), RENDERER(INTEGRAL), 0, 0, "does not apply to --renderer integral", IDLE },
+    { ROW(SAMPLES_PER_SHEET), RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral, which has no sheets", IDLE },
+    { ROW(EARLY_TERMINATION), RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral; use --tolerance", IDLE },
+    { ROW(METHOD) | ROW(H) | ROW(WEIGHTS) | ROW(TRAVERSAL) | ROW(COMPOSITING), RENDERER(INTEGRAL),
+      0, 0, "does not apply to --renderer integral, which has no layers", IDLE },
+    { ROW(SHOW), RENDERER(INTEGRAL), DEBUG_VIEW, 0,
+      "does not apply to --renderer integral, which has no lists and no levels", CONFLICT },
+    { of_levels, RENDERER(INTEGRAL), 0, 0,
+      "does not apply to --renderer integral, which draws the finest level", IDLE },
+    { ROW(KERNEL_RADIUS), RENDERER(INTEGRAL), 0, FIELD_OF_SPLATS,
+      "requires --field splats with --renderer integral", IDLE },
+    { ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN), RENDERER(INTEGRAL), 0, 0,
+      "is for footprints, which --renderer integral does not have", CONFLICT },
+    { ROW(COUNT), RENDERER(INTEGRAL), 0, 0, "does not apply to --renderer integral", IDLE },
+    /* footprints and methods */
+    { ROW(LOW_PASS), ALL & ~RENDERER(REFERENCE), UNIFORM, 0,
+      "uniform requires --renderer reference and --kernel ewa", CONFLICT },
+    { ROW(LOW_PASS), ALL, UNIFORM, EWA, "uniform requires --renderer reference and --kernel ewa",
+      CONFLICT },
+    { ROW(FLATTEN), ALL, FLATTENED, EWA, "requires --kernel ewa", CONFLICT },
+    { ROW(FLATTEN), ALL, FLATTENED | COUNTED, 0, "does not apply with --count", CONFLICT },
+    { ROW(WEIGHTS), ALL, VERTEX, MERGE, "vertex requires --method merge", CONFLICT },
+    { ROW(WEIGHTS), ALL, VERTEX | BY_SHEET, 0, "vertex requires --compositing splat", CONFLICT },
+    { ROW(COMPOSITING), ALL, IMAGE, 0, "does not apply to --method image", CONFLICT },
+    { ROW(TRAVERSAL), ALL, IMAGE | ASCENDING, 0, "must be outward with --method image", CONFLICT },
+    { of_levels, ALL, IMAGE, 0, "does not apply to --method image", CONFLICT },
+    { of_levels, ALL, FIXED, 0, "does not apply to --kernel fixed", CONFLICT },
+    { of_levels, ALL, INDEXED, 0, "does not apply to --submit indexed", CONFLICT },
+    { ROW(METHOD), RENDERER(GL) | RENDERER(CPU), IMAGE, 0, "image requires --renderer reference",
+      CONFLICT },
+    { ROW(WEIGHTS), RENDERER(GL) | RENDERER(CPU), VERTEX, 0, "vertex requires --renderer reference",
+      CONFLICT },
+    { ROW(FOOTPRINT), RENDERER(CPU), FIXED, 0, "fixed requires --renderer reference or gl",
+      CONFLICT },
+    /* pre and post */
+    { ROW(SAMPLES_PER_SHEET) | ROW(KERNEL), ALL & ~RENDERER(INTEGRAL), FOR_SPLATS, PRE | POST,
+      "does not apply with options for splats: --kernel exact, ewa or fixed, --low-pass, "
+      "--flatten, --kernel-radius, --method image, --weights, --compositing, --target, --submit, "
+      "--count and --traversal ascending",
+      true },
+    { ROW(KERNEL), ALL & ~RENDERER(INTEGRAL), PRE, 0,
+      "linear, cubic and gaussian require --classify post or --renderer integral", IDLE },
+    { ROW(SAMPLES_PER_SHEET), ALL, PRE, 0, "requires --classify post", IDLE },
+    { ROW(TRAVERSAL), ALL, POST | ASCENDING, 0, "must be outward with --classify post", CONFLICT },
+    { ROW(METHOD), ALL, POST | IMAGE, 0, "image requires --classify pre", CONFLICT },
+    { of_splats, ALL, POST, 0, "requires --classify pre", CONFLICT },
+    { ROW(TARGET), RENDERER(REFERENCE) | RENDERER(INTEGRAL), 0, 0, "requires --renderer gl or cpu",
+      true },
+    { ROW(LISTS) | ROW(PRIMITIVES), ALL & ~(RENDERER(AUTO) | RENDERER(GL)), 0, 0,
+      "requires --renderer gl", IDLE },
+    /* distances */
+    { ROW(DEPTH), RENDERER(INTEGRAL), 0, 0, "does not apply to --renderer integral", CONFLICT },
+    { ROW(DEPTH), ALL, SHOW_MERGE, 0,
+      "does not apply to --show merge, which does not draw the volume", CONFLICT },
+    { ROW(DEPTH), ALL, NARROW_TARGET, 0, "requires --target rgba32f", CONFLICT },
+    { ROW(DEPTH), ALL, SEVERAL_SAMPLES, 0, "requires --samples 1", CONFLICT },
+};
+
+static uint64_t given_rows(const draw_settings *s)
+{
+    uint64_t given = 0;
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        given |= (uint64_t)trip_option_is_set(&draw_settings_table.rows[i], s) << i;
+    return given;
+}
+
+static int facts_of_effects(const draw_settings *s)
+{
+    const int which = s->effects.which, some = which & TRIPTYCH_EFFECT_AUTO ? ~0 : which;
+    const int lattices =
+        TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION | TRIPTYCH_EFFECT_EMISSION;
+    return (s->light.no_shading && !which ? PLAIN : 0) |
+           (s->light.kind < TRIPTYCH_LIGHT_DIRECTION ? HEADLIGHT : 0) |
+           (which & TRIPTYCH_EFFECT_SHADOWS ? SHADOWS : 0) |
+           (some & TRIPTYCH_EFFECT_SHADOWS ? MAY_SHADOW : 0) |
+           (some & TRIPTYCH_EFFECT_CUEING ? MAY_CUE : 0) | (some & lattices ? MAY_LATTICE : 0);
+}
+
+static int facts_of_splats(const draw_settings *s)
+{
+    const triptych_splat_settings *p = &s->splat;
+    return (p->compositing == TRIPTYCH_COMPOSITING_SHEET ? BY_SHEET : 0) |
+           (p->weights == TRIPTYCH_WEIGHTS_VERTEX ? VERTEX : 0) |
+           (p->footprint == TRIPTYCH_FOOTPRINT_EWA ? EWA : 0) |
+           (p->footprint == TRIPTYCH_FOOTPRINT_FIXED ? FIXED : 0) |
+           (p->low_pass == TRIPTYCH_LOW_PASS_UNIFORM ? UNIFORM : 0) |
+           (p->flatten > 1 ? FLATTENED : 0) |
+           (p->target > TRIPTYCH_TARGET_RGBA32F ? NARROW_TARGET : 0) |
+           (p->lists == TRIPTYCH_SUBMIT_INDEXED ? INDEXED : 0);
+}
+
+triptych_classify draw_settings_classify(const draw_settings *s)
+{
+    const bool post =
+        s->all.quality == TRIPTYCH_QUALITY_DRAFT || s->all.quality >= TRIPTYCH_QUALITY_HIGH;
+    return s->all.classify == TRIPTYCH_CLASSIFY_AUTO && post ? TRIPTYCH_CLASSIFY_POST
+                                                             : s->all.classify;
+}
+
+const char *draw_settings_of_splats(const draw_settings *s)
+{
+    const uint64_t given = given_rows(s) & of_splats;
+    for (int i = 0; i < DRAW_OPTIONS; i++)
+        if (given >> i & 1)
+            return draw_settings_table.rows[i].name;
+    return s->all.method == TRIPTYCH_METHOD_IMAGE             ? "method"
+           : s->all.traversal == TRIPTYCH_TRAVERSAL_ASCENDING ? "traversal"
+                                                              : NULL;
+}
+
+static int facts_of(const draw_settings *s)
+{
+    const triptych_classify classify = draw_settings_classify(s);
+    return (classify == TRIPTYCH_CLASSIFY_PRE ? PRE : 0) |
+           (classify == TRIPTYCH_CLASSIFY_POST ? POST : 0) |
+           (draw_settings_of_splats(s) ? FOR_SPLATS : 0) |
+           (s->all.method <= TRIPTYCH_METHOD_MERGE ? MERGE : 0) |
+           (s->all.method == TRIPTYCH_METHOD_IMAGE ? IMAGE : 0) |
+           (s->all.traversal == TRIPTYCH_TRAVERSAL_ASCENDING ? ASCENDING : 0) |
+           (s->all.kernel == TRIPTYCH_KERNEL_GAUSSIAN ? GAUSSIAN : 0) |
+           (s->integral.field == TRIPTYCH_FIELD_SPLATS ? FIELD_OF_SPLATS : 0) |
+           (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
+           (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |
+           (s->all.count_exactly ? COUNTED : 0) | (s->all.samples > 1 ? SEVERAL_SAMPLES : 0) |
+           facts_of_splats(s) | facts_of_effects(s);
+}
+
+/* Returns the first rule that the settings break, or NULL. */
+static const struct rule *find_broken(const draw_settings *s, triptych_renderer renderer,
+                                      bool idle_too)
+{
+    const uint64_t given = given_rows(s);
+    const int facts = facts_of(s);
+    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
+        const struct rule *r = &rules[i];
+        if ((idle_too || r->verdict == CONFLICT) && r->given & given &&
+            r->renderers >> renderer & 1 && !(r->with & ~facts) && !(r->without & facts))
+            return r;
+    }
+    return NULL;
+}
+
+static int fail_rule(const struct rule *r, uint64_t given)
+{
+    char option[64];
+    int i = 0;
+    while (!((r->given & given) >> i & 1))
+        i++;
+    snprintf(option, sizeof option, "--%s", draw_settings_table.rows[i].name);
+    return trip_option_fail(option, r->why);
+}
+
+/* Returns the renderer that the settings require, or auto. */
+static triptych_renderer required_renderer(const draw_settings *s)
+{
+    const bool reference =
+        s->all.method == TRIPTYCH_METHOD_IMAGE || s->splat.weights == TRIPTYCH_WEIGHTS_VERTEX;
+    const bool gl =
+        s->splat.footprint == TRIPTYCH_FOOTPRINT_FIXED || s->splat.lists || s->splat.primitives;
+    return reference ? TRIPTYCH_RENDERER_REFERENCE
+           : gl      ? TRIPTYCH_RENDERER_GL
+                     : TRIPTYCH_RENDERER_AUTO;
+}
+
+static int check_light(const triptych_light *l)
+{
+    const double length = hypot(hypot(l->toward[0], l->toward[1]), l->toward[2]);
+    if (l->kind < TRIPTYCH_LIGHT_DEFAULT || l->kind > TRIPTYCH_LIGHT_POINT)
+        return trip_option_fail("--light", "unknown kind of light");
+    if (l->kind >= TRIPTYCH_LIGHT_DIRECTION && !isfinite(length))
+        return trip_option_fail("--light", "the light is too far away or not finite");
+    if (l->kind == TRIPTYCH_LIGHT_DIRECTION && !(length > 0))
+        return trip_option_fail("--light", "the direction to the light is zero");
+    return 0;
+}
+
+static int check_clip(const triptych_clip *c)
+{
+    for (int a = 0; c->box && a < 3; a++)
+        if (!(c->box_lo[a] < c->box_hi[a]))
+            return trip_option_fail("--clip-box",
+                                    "the clipping box has its minimum not below its maximum");
+    if (!(c->planes >= 0 && c->planes <= 6))
+        return trip_option_fail("--clip-plane", "the number of clipping planes must be 0 to 6");
+    for (int i = 0; i < c->planes; i++) {
+        const double *p = c->plane[i], length = hypot(hypot(p[0], p[1]), p[2]);
+        if (!(length > 0 && isfinite(length) && isfinite(p[3])))
+            return trip_option_fail("--clip-plane",
+                                    "the normal of a clipping plane is zero or not finite");
+    }
+    return 0;
+}
+
+int draw_settings_check_ranges(const draw_settings *s)
+{
+    const int effects = TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION |
+                        TRIPTYCH_EFFECT_CUEING | TRIPTYCH_EFFECT_AUTO | TRIPTYCH_EFFECT_EMISSION;
+    int status = 0;
+    for (int i = 0; i < DRAW_OPTIONS && !status; i++)
+        status = trip_option_check(&draw_settings_table.rows[i], s);
+    for (int i = 0; i < 4 && !status && s->has_background; i++)
+        if (!(s->background[i] >= 0 && s->background[i] <= 1))
+            return trip_option_fail("--background", "components must be between 0 and 1");
+    if (!status && s->effects.which & ~effects)
+        return trip_option_fail("--effects", "unknown effect");
+    if (!status)
+        status = check_light(&s->light);
+    return status ? status : check_clip(&s->clip);
+}
+
+int draw_settings_check(const draw_settings *s, triptych_renderer *renderer, bool idle_too)
+{
+    int status = draw_settings_check_ranges(s);
+    if (status)
+        return status;
+    if (*renderer == TRIPTYCH_RENDERER_AUTO)
+        *renderer = required_renderer(s);
+    const struct rule *broken = find_broken(s, *renderer, idle_too);
+    return broken ? fail_rule(broken, given_rows(s)) : 0;
+}
+
+void draw_settings_drop_excluded(draw_settings *s, triptych_renderer renderer)
+{
+    const draw_settings unset = { 0 };
+    const struct rule *broken;
+    while ((broken = find_broken(s, renderer, true)))
+        for (int i = 0; i < DRAW_OPTIONS; i++)
+            if (broken->given >> i & 1)
+                trip_option_copy(&draw_settings_table.rows[i], s, &unset);
+}

@@ -1,0 +1,45 @@
+/* Command lines from tables of options (common/option.h), by argp. Errors have one line and exit
+ * status 2. --help prints the common options, and --help=all every option. For other programs,
+ * --help=names prints names and arguments (completion.bash), and --help=man a man page's list. Main
+ * thread only. */
+#ifndef TRIP_COMMAND_LINE_H
+#define TRIP_COMMAND_LINE_H
+
+#include <argp.h>
+
+#include "option.h"
+
+/* A table, and the struct that a command line fills. */
+typedef struct option_set {
+    const trip_option_table *table;
+    void *base;
+    uint64_t without; /* bits of rows that the command does not have */
+    uint64_t given;   /* bits of rows that were given */
+} option_set;
+
+enum { OPTION_SETS_MAX = 10 };
+
+typedef struct command_line {
+    const char *args_doc, *doc;
+    option_set *sets;
+    int set_count;
+    int (*argument)(void *user, char *argument); /* NULL if the command takes only options */
+    int (*end)(void *user);                      /* checks combinations; may be NULL */
+    void *user;
+} command_line;
+
+/* Parses argv, which starts with the name of the command. --help prints the help and exits. Returns
+ * 0, or TRIP_USAGE after reporting an error. */
+int command_line_parse(const command_line *c, int argc, char **argv);
+/* The same for a command with an argp parser of its own. */
+int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input);
+
+/* Names of triptych_levels_for, terminated by NULL. */
+extern const char *const trip_levels_for_names[];
+
+/* Message for a second volume, mostly caused by a shell that expanded a pattern of slices. */
+#define TRIP_ONE_VOLUME                                                                            \
+    "only one volume is possible at a time; give slices by their folder, or by a pattern in "      \
+    "quotes, like \"*.tif\""
+
+#endif

@@ -1,0 +1,107 @@
+#include "test.h"
+
+#include <string.h>
+
+#include "draw_settings.h"
+#include "scope.h"
+
+static char line[400];
+
+static void keep(const char *text, void *user)
+{
+    (void)user;
+    snprintf(line, sizeof line, "%s", text);
+}
+
+/* Checks settings given as options; fills `line` with the failure. */
+static int check(const char *options, triptych_renderer *renderer)
+{
+    draw_settings s = { .has_background = 0 };
+    trip_scope scope = { .sink = keep }, *before = trip_scope_enter(&scope);
+    line[0] = 0;
+    int status = draw_settings_read_text(&s, options);
+    if (!status)
+        status = draw_settings_check(&s, renderer, true);
+    trip_scope_enter(before);
+    return status;
+}
+
+static void assert_refused(const char *options, triptych_renderer renderer, const char *reason)
+{
+    assert_int_not_equal(check(options, &renderer), 0);
+    if (!strstr(line, reason))
+        fail_msg("%s: \"%s\" lacks \"%s\"", options, line, reason);
+}
+
+static void the_message_names_the_option_and_the_reason(void **state)
+{
+    (void)state;
+    const triptych_renderer any = TRIPTYCH_RENDERER_AUTO, integral = TRIPTYCH_RENDERER_INTEGRAL;
+    assert_refused("--light 1,0,0 --no-shading", any, "--light: does not apply with --no-shading");
+    assert_refused("--effects shadows", any, "shadows require a light that is not at the eye");
+    assert_refused("--h 0.5 --method clip", any, "--h: requires --method merge");
+    assert_refused("--tolerance 0.01", any, "--tolerance: requires --renderer integral");
+    assert_refused("--lod 2", integral, "--lod: does not apply to --renderer integral");
+    assert_refused("--classify post --kernel-radius 2", any,
+                   "--kernel-radius: requires --classify pre");
+    assert_refused("--quality draft --compositing splat", any,
+                   "--compositing: requires --classify pre");
+    assert_refused("--samples-per-sheet 2 --target rgba8", any, "does not apply with options for");
+    assert_refused("--low-pass uniform --kernel ewa", any, "uniform requires --renderer reference");
+    assert_refused("--kernel gaussian", integral, "must be linear or cubic");
+    assert_refused("--depth --samples 2", any, "--depth: requires --samples 1");
+    assert_refused("--lod 1 --submit indexed", any, "--lod: does not apply to --submit indexed");
+    assert_refused("--method image", TRIPTYCH_RENDERER_CPU, "image requires --renderer reference");
+}
+
+static void settings_select_the_renderer_that_they_require(void **state)
+{
+    (void)state;
+    triptych_renderer renderer = TRIPTYCH_RENDERER_AUTO;
+    assert_int_equal(check("--method image", &renderer), 0);
+    assert_int_equal(renderer, TRIPTYCH_RENDERER_REFERENCE);
+    renderer = TRIPTYCH_RENDERER_AUTO;
+    assert_int_equal(check("--submit triangles", &renderer), 0);
+    assert_int_equal(renderer, TRIPTYCH_RENDERER_GL);
+    renderer = TRIPTYCH_RENDERER_AUTO;
+    assert_int_equal(check("--kernel-radius 3", &renderer), 0);
+    assert_int_equal(renderer, TRIPTYCH_RENDERER_AUTO);
+}
+
+static void excluded_settings_are_dropped_and_others_stay(void **state)
+{
+    (void)state;
+    draw_settings s = { .has_background = 0 };
+    triptych_renderer renderer = TRIPTYCH_RENDERER_CPU;
+    assert_int_equal(draw_settings_read_text(&s, "--classify post --kernel-radius 3 --h 0.5 "
+                                                 "--method axis --samples 2 --submit indexed"),
+                     0);
+    draw_settings_drop_excluded(&s, renderer);
+    assert_int_equal(draw_settings_check(&s, &renderer, true), 0);
+    assert_true(s.splat.kernel_radius == 0 && s.all.h == 0 && s.splat.lists == 0);
+    assert_int_equal(s.all.classify, TRIPTYCH_CLASSIFY_POST);
+    assert_int_equal(s.all.method, TRIPTYCH_METHOD_AXIS);
+    assert_int_equal(s.all.samples, 2);
+}
+
+static void settings_of_splats_are_named(void **state)
+{
+    (void)state;
+    draw_settings s = { .has_background = 0 };
+    assert_null(draw_settings_of_splats(&s));
+    s.splat.footprint = TRIPTYCH_FOOTPRINT_EXACT;
+    assert_string_equal(draw_settings_of_splats(&s), "kernel");
+    s = (draw_settings){ .all = { .traversal = TRIPTYCH_TRAVERSAL_ASCENDING } };
+    assert_string_equal(draw_settings_of_splats(&s), "traversal");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_message_names_the_option_and_the_reason),
+        cmocka_unit_test(settings_select_the_renderer_that_they_require),
+        cmocka_unit_test(excluded_settings_are_dropped_and_others_stay),
+        cmocka_unit_test(settings_of_splats_are_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
