@@ -3,8 +3,8 @@
 #include <string.h>
 
 #include "clock.h"
-#include "frame.h"
 #include "light_shares.h"
+#include "renderer.h"
 #include "report.h"
 
 enum {
