@@ -6,7 +6,6 @@
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
 #include "kernel.h"
-#include "lod_limit.h"
 #include "normalise.h"
 #include "report.h"
 #include "rounding.h"

@@ -142,7 +142,7 @@ typedef struct trip_settings {
      * lod_parts.h). 0 draws the finest level everywhere. */
     double lod_px;
     /* Upper bound of the bytes read. Coarser levels than lod_px asks for are drawn to keep it
-     * (lod_limit.h). 0 sets no bound. */
+     * (lod.h). 0 sets no bound. */
     double max_bytes;
     trip_kernel kernel; /* of values, in post and the integral */
     /* For the integral renderer alone. */
