@@ -4,10 +4,8 @@
 #include <string.h>
 
 #include "cpu/occlusion.h"
-#include "cpu/sheets/open_squares.h"
 #include "cpu/sheets/pass_view.h"
 #include "cpu/sheets/cpu_sheets_state.h"
-#include "cpu/panes.h"
 #include "effects.h"
 #include "report.h"
 #include "sheet.h"
