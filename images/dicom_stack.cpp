@@ -15,7 +15,6 @@
 #include <dcmtk/dcmjpls/djdecode.h>
 
 #include "connection.h"
-#include "slice_gaps.h"
 #include "slice_stack.h"
 #include "volume_reader.h"
 
