@@ -4,7 +4,7 @@
 
 #include "region.h"
 #include "transfer_function.h"
-#include "volume.h"
+#include "volume_info.h"
 
 typedef struct trip_value_range {
     double lo, hi; /* inclusive */

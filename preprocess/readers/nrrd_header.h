@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "byte_stream.h"
-#include "volume.h"
+#include "volume_info.h"
 
 #define TRIP_NRRD_HEADER_BYTES_MAX ((size_t)1 << 20)
 
