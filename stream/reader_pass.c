@@ -3,7 +3,6 @@
 #include "reader.h"
 
 #include "clock.h"
-#include "errno_text.h"
 #include "reader_state.h"
 #include "report.h"
 

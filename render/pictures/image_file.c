@@ -12,7 +12,6 @@
 #include <unistd.h>
 
 #include "budget.h"
-#include "errno_text.h"
 #include "image_helper.h"
 #include "new_file.h"
 #include "report.h"
