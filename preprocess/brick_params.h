@@ -2,7 +2,6 @@
 #ifndef TRIP_BRICK_PARAMS_H
 #define TRIP_BRICK_PARAMS_H
 
-#include "region.h"
 #include "transfer_function.h"
 #include "volume_info.h"
 

@@ -103,6 +103,20 @@ typedef struct trip_volume_params {
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;
 
+/* The voxels from `first` up to, but not including, `past` along i, j, k. past 0 stands for the end
+ * of the grid. */
+typedef struct trip_region {
+    int64_t first[3], past[3];
+} trip_region;
+
+static inline bool trip_region_is_whole(const trip_region *r)
+{
+    bool whole = true;
+    for (int a = 0; a < 3; a++)
+        whole = whole && r->first[a] == 0 && r->past[a] == 0;
+    return whole;
+}
+
 /* A box of voxels ready for decoding: whole slices of a dense volume, or a box around active voxels
  * of a sparse volume. Origin and size are in voxels. Portions do not overlap, and together they
  * hold every existing voxel once. */
