@@ -23,7 +23,7 @@ typedef enum trip_method {
     TRIP_METHOD_CLIP,  /* each pixel from the list its ray is most aligned with (2005, 5.1) */
     TRIP_METHOD_AXIS,  /* one list per frame, by the ray at the image centre (Westover 1989) */
     /* Splats of any one list, cut into sheets parallel to the image plane (Mueller & Crawfis 1998,
-     * image_sheets.h). */
+     * reference_sheets.h). */
     TRIP_METHOD_IMAGE,
 } trip_method;
 

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "emission.h"
-#include "image_sheets.h"
 #include "layer.h"
 #include "light_map.h"
 #include "normal.h"

@@ -3,10 +3,21 @@
 #ifndef TRIP_CPU_SHEETS_STATE_H
 #define TRIP_CPU_SHEETS_STATE_H
 
-#include "cpu/sheets/need.h"
 #include "cpu/sheets/store.h"
 #include "cpu/cpu_state.h"
+#include "cpu/kernels/kernel_sheets.h"
+#include "cpu/sheets/integrals.h"
+#include "plan.h"
 #include "selection.h"
+
+/* The memory that the sheets of a layer need at most. */
+typedef struct trip_cpu_need {
+    uint64_t rasters; /* maximum over consecutive sheets that are in memory together */
+    uint64_t of_sheet, runs, words; /* maximum over single sheets */
+} trip_cpu_need;
+
+/* Maximum of `held_sheets` in trip_cpu_need_find(). */
+enum { TRIP_CPU_AT_HAND_MAX = 6 };
 
 /* Maximum number of runs decoded at a time, and of rasters taken for the runs. */
 enum { TRIP_CPU_SHEETS_RUNS = 256, TRIP_CPU_SHEETS_TAKEN = 1024 };
@@ -133,5 +144,20 @@ bool trip_cpu_open_squares_some_of_run(const trip_cpu_sheets *s, const trip_run 
 /* Forgets the open squares. Call it after pixels were drawn, and before sheets of another row or
  * pass. */
 void trip_cpu_open_squares_forget(trip_cpu_sheets *s);
+
+/* ---- need.c ---- */
+
+/* Finds the need of a layer. A sheet has at most `rasters` rasters, and `held_sheets` sheets are in
+ * memory at a time. Returns TRIP_ERROR if the budget has too little left for the search. */
+int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
+                       int held_sheets, trip_budget *budget);
+
+/* ---- pass_view.c: the constants of a pass over sheets, in the form of kernel_sheets.h ---- */
+
+/* Returns how far drawn rays move at most along u or v between two sheets, in index lengths. */
+double trip_cpu_pass_steepest(const trip_frame *frame);
+
+void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame, int axis,
+                             bool descending, const trip_cpu_tf *function);
 
 #endif
