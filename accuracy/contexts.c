@@ -2,8 +2,8 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
+#include "clock.h"
 #include "report.h"
 #include "triptych_brick.h"
 
@@ -89,13 +89,6 @@ int accuracy_contexts_look(accuracy_contexts *c, const accuracy_view *view)
     return status;
 }
 
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
 int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
                            const draw_settings *settings, float *rgba, double *ms)
 {
@@ -104,9 +97,9 @@ int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
     if (status)
         return status;
     status = draw_settings_use(t, settings);
-    double begin = now_ms();
+    double begin = trip_now_ms();
     if (!status)
         status = triptych_draw(t, rgba);
-    *ms = now_ms() - begin;
+    *ms = trip_now_ms() - begin;
     return status ? keep_why(c, data, renderer, t, status) : 0;
 }

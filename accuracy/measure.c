@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "bench_progress.h"
+#include "clock.h"
 #include "contexts.h"
 #include "flip.h"
 #include "json.h"
@@ -49,13 +49,6 @@ typedef struct sweep {
     accuracy_error view; /* scratch memory */
 } sweep;
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 static int ascending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -70,7 +63,7 @@ double accuracy_median(double *ms, int count)
 
 static bool is_over(const sweep *s)
 {
-    return now_seconds() - s->begin > s->o->budget_seconds;
+    return trip_now_seconds() - s->begin > s->o->budget_seconds;
 }
 
 static size_t pixels_of(const sweep *s)
@@ -552,7 +545,7 @@ static int measure_view(sweep *s, int view)
 /* Starts a view only if the budget allows the mean time of the views before it. */
 static bool has_time_for(const sweep *s, int view)
 {
-    double spent = now_seconds() - s->begin;
+    double spent = trip_now_seconds() - s->begin;
     return view == 0 || spent * (view + 1) / view <= s->o->budget_seconds;
 }
 
@@ -604,7 +597,7 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
     s->m = m;
     s->o = o;
     s->defaults = default_settings(o);
-    s->begin = now_seconds();
+    s->begin = trip_now_seconds();
     int status = add_rows(m, &s->defaults);
     if (!status)
         status = accuracy_contexts_create(&s->contexts, o);
@@ -616,7 +609,7 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
         s->progress = bench_progress_start_lines("accuracy");
     if (!status)
         status = measure_views(s);
-    m->seconds = now_seconds() - s->begin;
+    m->seconds = trip_now_seconds() - s->begin;
     bench_progress_end(s->progress);
     for (int i = 0; i < PICTURES; i++)
         if (s->pictures[i])

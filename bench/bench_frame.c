@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "clock.h"
 #include "cpu/cpu_renderer.h"
 #include "report.h"
 #include "sheet_samples.h"
@@ -12,9 +12,7 @@
 
 double bench_now_ms(void)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+    return trip_now_ms();
 }
 
 uint64_t bench_splats_drawn(const trip_frame_stats *s)

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "budget.h"
+#include "clock.h"
 #include "report.h"
 
 #define INDEX_NAME "index.trip"
@@ -25,13 +26,6 @@ typedef struct search {
     triptych_brick_options options;
     triptych_identity identity; /* of the files when the key was found */
 } search;
-
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 static bool has_index(const char *folder)
 {
@@ -173,13 +167,13 @@ static bool take(search *s)
 static int brick(search *s)
 {
     cached_volume *v = s->v;
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     int status = triptych_brick(s->t, s->volume, v->path, &s->options, NULL);
     if (status == 0 && (status = check_unchanged(s)) < 0)
         cache_folder_remove(&v->folder, &v->key);
     if (status < 0)
         return status;
-    v->seconds = now_seconds() - begin;
+    v->seconds = trip_now_seconds() - begin;
     v->hold = cache_folder_hold(&v->folder, &v->key);
     return cache_folder_shrink(&v->folder, v->folder.limit_bytes);
 }

@@ -5,15 +5,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "clock.h"
+
 static const double interval_seconds = 0.25;
 static const double steady_seconds = 1; /* a rate over a shorter time is too uncertain */
-
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 trip_progress trip_progress_start(bool quiet)
 {
@@ -46,7 +41,7 @@ static void print_line(const trip_progress *p, double share, double rate, double
 void trip_progress_show(trip_progress *p, const char *stage, uint64_t done, uint64_t total,
                         const char *things)
 {
-    double now = now_seconds();
+    double now = trip_now_seconds();
     if (!p->shown)
         return;
     if (strcmp(p->stage, stage) != 0) {

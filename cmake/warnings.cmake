@@ -27,7 +27,7 @@ endfunction()
 # Instruments the parsers of outside bytes, which the fuzzers explore. Instrumenting other code
 # would only slow the tests.
 if(TRIP_FUZZ)
-    set(parsers trip_common trip_images trip_stream trip_preprocess trip_view_model)
+    set(parsers trip_common trip_stream trip_preprocess trip_view_model)
     target_compile_options(trip_flags INTERFACE
         "$<$<IN_LIST:$<TARGET_PROPERTY:NAME>,${parsers}>:-fsanitize=fuzzer-no-link>")
 endif()

@@ -7,7 +7,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "errno_text.h"
 #include "text.h"
 
 enum { LINE_BYTES = 4096, WHERE_BYTES = 2560 };
@@ -214,4 +213,25 @@ void trip_report_print(const trip_held_report *h)
 {
     if (*h->line)
         deliver(h->status, h->line);
+}
+
+int trip_fail_line(const char *stage, const char *name, long number, const char *why, ...)
+{
+    char where[512], text[512];
+    va_list args;
+    va_start(args, why);
+    vsnprintf(text, sizeof text, why, args);
+    va_end(args);
+    snprintf(where, sizeof where, "%.400s: line %ld", name, number);
+    return trip_fail(TRIP_ERROR, stage, where, "%s", text);
+}
+
+const char *trip_errno_text(int error, char *room, size_t bytes)
+{
+    if (error == EFBIG)
+        return "the file would be larger than the limit on file sizes (ulimit -f) or the file "
+               "system allows";
+    if (error == EMFILE)
+        return "too many open files; raise the limit (ulimit -n)";
+    return strerror_r(error, room, bytes);
 }

@@ -5,6 +5,8 @@
 #ifndef TRIP_REPORT_H
 #define TRIP_REPORT_H
 
+#include <stddef.h>
+
 #include "scope.h"
 
 #ifdef __cplusplus
@@ -61,6 +63,13 @@ void trip_report_print(const trip_held_report *h);
 /* Redirects the messages and failures of the calling thread's scope. NULL ends the redirection. No
  * other thread may be in the scope. */
 void trip_report_redirect(void (*sink)(const char *line, void *user), void *user);
+
+/* Calls trip_fail(TRIP_ERROR, stage, "NAME: line N", why, ...). */
+__attribute__((format(printf, 4, 5))) int trip_fail_line(const char *stage, const char *name,
+                                                         long line, const char *why, ...);
+
+/* Returns the text, without a dot or a line feed. It lies in `room` or in static storage. */
+const char *trip_errno_text(int error, char *room, size_t bytes);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,5 @@
 #include "tf_internal.h"
 
-#include "fail_line.h"
 #include "report.h"
 #include "text.h"
 

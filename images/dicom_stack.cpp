@@ -15,9 +15,8 @@
 #include <dcmtk/dcmjpls/djdecode.h>
 
 #include "connection.h"
-#include "slice_gaps.h"
 #include "slice_stack.h"
-#include "volume_reader.h"
+#include "volume_info.h"
 
 namespace
 {

@@ -12,7 +12,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-#include "errno_text.h"
+#include "report.h"
 #include "slice_files.h"
 
 namespace

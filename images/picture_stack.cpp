@@ -5,7 +5,7 @@
 
 #include "connection.h"
 #include "slice_stack.h"
-#include "volume_reader.h"
+#include "volume_info.h"
 
 namespace
 {

@@ -14,8 +14,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "slice_gaps.h"
-
 namespace
 {
 

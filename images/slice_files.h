@@ -31,9 +31,28 @@ struct trip_slice_files {
  * - a glob pattern ("s*.png"): the files that match, in natural order;
  * - a file.
  * All files must be of one kind. If names number the slices, no number may be missing, unless
- * `allow_gaps` is set (trip_check_numbers() of slice_gaps.h). DICOM slices are checked by their
+ * `allow_gaps` is set (trip_check_numbers()). DICOM slices are checked by their
  * positions instead (dicom_stack.cpp). A file with the name of a slice that is not a picture or
  * cannot be read is an error. */
 trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps);
+
+/* ---- slice_gaps.cpp: missing slices ---- */
+
+/* Returns a name with its numbers replaced. Names with one shape differ only in their numbers. */
+std::string trip_name_shape(const std::string &name);
+
+/* Checks names that differ in exactly one number. The steps between the numbers must be equal; with
+ * two names the step must be 1. Names of several shapes are checked shape by shape. Names that
+ * differ in several numbers, such as dates and times, are not checked. Throws trip_slice_error for
+ * `path` with the number and name of a missing slice, or warns if `allow_gaps` is set. */
+void trip_check_numbers(const std::string &path, const std::vector<std::string> &names,
+                        bool allow_gaps);
+
+/* Checks `positions`, in ascending order, with one entry of `names` each. The median step is the
+ * normal one, and a step of about two or more times its length has slices missing. Throws or warns
+ * as trip_check_numbers() does. Returns the normal step divided by the mean step if gaps were found
+ * and allowed, else 1. */
+double trip_check_positions(const std::vector<double> &positions,
+                            const std::vector<std::string> &names, bool allow_gaps);
 
 #endif

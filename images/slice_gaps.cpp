@@ -1,12 +1,10 @@
-#include "slice_gaps.h"
+#include "slice_files.h"
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <map>
-
-#include "slice_files.h"
 
 namespace
 {

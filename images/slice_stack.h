@@ -6,8 +6,9 @@
 #include <cstdint>
 #include <memory>
 
+#include "budget.h"
 #include "slice_files.h"
-#include "volume.h"
+#include "volume_info.h"
 
 /* Memory from the budget. take() throws an error with the size if the budget refuses. */
 class trip_slice_buffer

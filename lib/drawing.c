@@ -1,12 +1,11 @@
 /* The frames of triptych.h: begin, steps, picture, end. */
 #include <string.h>
-#include <time.h>
 
+#include "clock.h"
 #include "library_context.h"
 #include "cpu/cpu_renderer.h"
 #include "dataset_level.h"
 #include "kernel.h"
-#include "lod_limit.h"
 #include "normalise.h"
 #include "report.h"
 #include "rounding.h"
@@ -354,24 +353,24 @@ static void check_bound(const triptych *t)
 /* Plans the next part. */
 static int plan(triptych *t)
 {
-    uint64_t start = trip_frame_now_ns();
+    uint64_t start = trip_now_ns();
     int status = enter_part(t);
     if (!status)
         status = plan_frame(t);
-    t->plan_ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    t->plan_ms = (double)(trip_now_ns() - start) * 1e-6;
     t->begun = status == 0;
     return status;
 }
 
 static int plan_first(triptych *t)
 {
-    uint64_t start = trip_frame_now_ns();
+    uint64_t start = trip_now_ns();
     choose_settings(t);
     check_rounding(t);
     int status = trip_context_choose_effects(t);
     if (!status)
         status = choose_parts(t);
-    const double ms = (double)(trip_frame_now_ns() - start) * 1e-6;
+    const double ms = (double)(trip_now_ns() - start) * 1e-6;
     if (!status)
         status = plan(t);
     t->plan_ms += ms;

@@ -7,6 +7,7 @@
 
 #include "anatomy.h"
 #include "brick.h"
+#include "estimate.h"
 #include "library_context.h"
 #include "identity.h"
 #include "report.h"

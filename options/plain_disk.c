@@ -5,9 +5,9 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "clock.h"
 #include "report.h"
 
 /* The transfers of one file, shared by the threads. */
@@ -23,13 +23,6 @@ typedef struct job {
     atomic_uint taken; /* number of memory parts in use, one for each thread */
     atomic_uint seen;  /* sum of the bytes looked at, so that the compiler keeps the loads */
 } job;
-
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 static ssize_t move_transfer(const job *j, unsigned char *transfer, uint64_t i)
 {
@@ -94,11 +87,11 @@ static int move_file(plain_disk *d, int fd, bool write, uint64_t bytes, const ch
               .transfers = (bytes + PLAIN_DISK_TRANSFER_BYTES - 1) / PLAIN_DISK_TRANSFER_BYTES,
               .scope = trip_scope_current(),
               .memory = memory };
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     int error = share_out(&j);
     if (!error && write && !trip_interrupted() && fsync(fd) < 0)
         error = errno;
-    d->seconds += now_seconds() - begin;
+    d->seconds += trip_now_seconds() - begin;
     d->bytes += atomic_load(&j.bytes);
     close(fd);
     if (trip_interrupted())

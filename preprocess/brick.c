@@ -4,13 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "brick_codes.h"
 #include "brick_input.h"
 #include "brick_memory.h"
 #include "brick_temporary.h"
 #include "brick_metadata.h"
+#include "clock.h"
 #include "dataset.h"
 #include "estimate.h"
 #include "folder.h"
@@ -39,13 +39,6 @@ typedef struct brick {
     uint64_t written_before; /* bytes written until the end of the last stage */
 } brick;
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 static uint64_t input_bytes(const brick *b)
 {
     return b->in.tally->voxels * trip_scalar_bytes(b->in.info->type);
@@ -60,7 +53,7 @@ static uint64_t bytes_written(const brick *b)
 static void end_stage(brick *b, trip_brick_stage stage, double begin)
 {
     trip_brick_cost *c = &b->summary->stages[stage];
-    c->seconds = now_seconds() - begin;
+    c->seconds = trip_now_seconds() - begin;
     c->bytes_written = bytes_written(b) - b->written_before;
     b->written_before += c->bytes_written;
 }
@@ -69,7 +62,7 @@ static void end_stage(brick *b, trip_brick_stage stage, double begin)
 static int scan(brick *b)
 {
     const trip_journal_start *start = trip_journal_get_start(b->temporary.journal);
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     int status = 0;
     if (start)
         status = trip_brick_input_set_tally(&b->in, &start->tally);
@@ -283,7 +276,7 @@ static int read_volume(brick *b)
                               .box = on_box,
                               .batch = on_batch,
                               .user = b };
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     int status = trip_walk(b->in.volume, b->in.workers, &walk);
     end_stage(b, TRIP_BRICK_READ, begin);
     if (status < 0)
@@ -301,7 +294,7 @@ static void on_merge_progress(void *user, uint64_t splats)
 
 static int merge_lists(brick *b)
 {
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     int status = 0;
     if (!b->format.quantised) {
         trip_brick_codes_set_range(&b->codes, &b->in, b->in.tally->value_min,
@@ -334,7 +327,7 @@ static bool is_hidden_above(const brick *b)
 /* Makes the coarse levels. First releases the memory of level 0, which is no longer needed. */
 static int make_levels(brick *b)
 {
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     trip_list_builder_destroy(b->builder);
     trip_splatter_destroy(b->splatter);
     b->builder = NULL;
@@ -426,7 +419,7 @@ static int find_orientation(brick *b)
 
 static int finish_output(brick *b)
 {
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     char *text = trip_brick_metadata_make(&(trip_brick_metadata){ .params = b->params,
                                                                   .info = b->in.info,
                                                                   .envelope = &b->in.envelope,
@@ -446,7 +439,7 @@ static int finish_output(brick *b)
     if (status == 0)
         b->writer = NULL;
     free(text);
-    b->summary->stages[TRIP_BRICK_FINISH].seconds = now_seconds() - begin;
+    b->summary->stages[TRIP_BRICK_FINISH].seconds = trip_now_seconds() - begin;
     return status;
 }
 

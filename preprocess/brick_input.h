@@ -4,7 +4,7 @@
 #define TRIP_BRICK_INPUT_H
 
 #include "coordinates.h"
-#include "brick.h"
+#include "brick_params.h"
 #include "envelope.h"
 #include "piece.h"
 #include "scan.h"

@@ -4,7 +4,7 @@
 #define TRIP_BRICK_MEMORY_H
 
 #include "piece.h"
-#include "volume.h"
+#include "volume_info.h"
 
 typedef struct trip_memory_plan {
     int64_t slices;      /* slices read at once, for dense volumes */

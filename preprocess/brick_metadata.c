@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "anatomy.h"
-#include "orientation_base.h"
+#include "orientation.h"
 #include "json.h"
 #include "report.h"
 #include "text.h"

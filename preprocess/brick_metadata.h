@@ -4,7 +4,7 @@
 #ifndef TRIP_BRICK_METADATA_H
 #define TRIP_BRICK_METADATA_H
 
-#include "brick.h"
+#include "brick_params.h"
 #include "envelope.h"
 #include "orientation.h"
 

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/statvfs.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "clock.h"
 #include "levels.h"
 #include "report.h"
 
@@ -30,13 +30,6 @@ static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
 static const double means_part = 0.19, values_part = 0.06;
 /* Estimates are uncertain: a run is refused only if this share of the estimate does not fit. */
 static const double surely = 0.7;
-
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 static int64_t slices_of(const trip_memory_plan *plan)
 {
@@ -60,7 +53,7 @@ static int on_progress(void *user, uint64_t voxels)
 {
     const sampling *s = user;
     trip_brick_input_progress(s->in, "sample", voxels, s->in->grid_voxels);
-    return now_seconds() > s->until ? STOPPED : 0;
+    return trip_now_seconds() > s->until ? STOPPED : 0;
 }
 
 /* Returns the share of the grid inside the region. */
@@ -91,7 +84,7 @@ static double seconds_for_all(const trip_brick_input *in, const trip_tally *t, d
                               double skipping)
 {
     double part = in->info->sparse ? 1 : (double)t->voxels / (double)in->grid_voxels;
-    return (now_seconds() - begin - skipping) / part + skipping;
+    return (trip_now_seconds() - begin - skipping) / part + skipping;
 }
 
 /* Estimates the numbers of voxels from portions at regular distances, and the seconds for the whole
@@ -100,7 +93,7 @@ static double seconds_for_all(const trip_brick_input *in, const trip_tally *t, d
 static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, double limit_seconds,
                          trip_brick_estimate *e)
 {
-    double begin = now_seconds(), skipping = 0;
+    double begin = trip_now_seconds(), skipping = 0;
     sampling s = { in, limit_seconds > 0 ? begin + limit_seconds : INFINITY };
     const trip_scan_params scan = { .slices = slices_of(plan),
                                     .read_ahead = plan->read_ahead,
@@ -183,9 +176,9 @@ static double seconds_per_byte(const char *output)
     int fd = folder ? open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC | O_DIRECT, 0600) : -1;
     if (fd >= 0 && data) {
         memset(data, 1, TRIAL_BYTES);
-        double begin = now_seconds();
+        double begin = trip_now_seconds();
         if (write(fd, data, TRIAL_BYTES) == (ssize_t)TRIAL_BYTES)
-            seconds = (now_seconds() - begin) / (double)TRIAL_BYTES;
+            seconds = (trip_now_seconds() - begin) / (double)TRIAL_BYTES;
     }
     if (fd >= 0)
         close(fd);
@@ -197,7 +190,7 @@ static double seconds_per_byte(const char *output)
 /* Estimates from a sample. Replaces the scan that a run makes first. */
 static int scan_sample(trip_brick_input *in, const trip_memory_plan *plan, trip_brick_estimate *e)
 {
-    double begin = now_seconds(), skipping = 0;
+    double begin = trip_now_seconds(), skipping = 0;
     int status = trip_brick_input_scan(in, (trip_scan_params){ .slices = slices_of(plan),
                                                                .read_ahead = plan->read_ahead,
                                                                .stride = stride_of(in, plan),

@@ -2,8 +2,8 @@
 
 #include <assert.h>
 #include <math.h>
-#include <time.h>
 
+#include "clock.h"
 #include "emission.h"
 #include "light_map.h"
 #include "report.h"
@@ -13,18 +13,6 @@ enum { HELD_MAX = TRIP_FRAME_HELD_MAX };
 
 /* Interval at which a waiting frame checks for cancellation. */
 enum { POLL_NS = 20000000 };
-
-uint64_t trip_frame_now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
-
-static double now_ms(void)
-{
-    return (double)trip_frame_now_ns() * 1e-6;
-}
 
 static void report_progress(trip_drawing *d, const trip_batch *batch)
 {
@@ -105,7 +93,7 @@ static int draw_piece(trip_drawing *d, bool whole)
 {
     const trip_renderer_ops *ops = d->renderer->ops;
     const trip_batch *batch = newest_held(d);
-    double start = now_ms();
+    double start = trip_now_ms();
     int begun = begin_layers(d, batch->pass->selections->list->axis);
     if (begun)
         return begun;
@@ -117,7 +105,7 @@ static int draw_piece(trip_drawing *d, bool whole)
     else
         report_progress(d, &piece);
     d->in_batch = d->next_run < batch->run_count;
-    d->stats.draw_ms += now_ms() - start;
+    d->stats.draw_ms += trip_now_ms() - start;
     return status;
 }
 
@@ -300,7 +288,7 @@ int trip_frame_begin(trip_drawing *d, trip_renderer *renderer, trip_reader *read
                          .stats = { .counted = frame->count },
                          .scope = { .around = trip_scope_current() },
                          .loaded = !renderer->ops->load,
-                         .begun_ms = now_ms() };
+                         .begun_ms = trip_now_ms() };
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = check_camera(frame->camera);
     if (!status)
@@ -325,7 +313,7 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
             status = d->done ? TRIP_FRAME_DONE : draw_next(d, whole);
             if (status == TRIP_FRAME_MORE && trip_frame_poll())
                 status = TRIP_INTERRUPTED;
-        } while (status == TRIP_FRAME_MORE && (whole || trip_frame_now_ns() < deadline_ns));
+        } while (status == TRIP_FRAME_MORE && (whole || trip_now_ns() < deadline_ns));
     d->done = status == TRIP_FRAME_DONE;
     trip_scope_enter(before);
     return status;
@@ -335,10 +323,10 @@ int trip_frame_step(trip_drawing *d, uint64_t deadline_ns)
 static void await_renderer(trip_drawing *d, uint64_t timeout_ns)
 {
     const trip_renderer_ops *ops = d->renderer->ops;
-    const double start = now_ms();
+    const double start = trip_now_ms();
     if (ops->await && !d->done)
         ops->await(d->renderer, timeout_ns);
-    d->stats.draw_ms += now_ms() - start;
+    d->stats.draw_ms += trip_now_ms() - start;
 }
 
 void trip_frame_await(trip_drawing *d, uint64_t timeout_ns)
@@ -370,7 +358,7 @@ static bool is_of_numbers(const trip_camera *camera, const float *rgba, const fl
 
 int trip_frame_picture(trip_drawing *d, float *rgba, float *depth)
 {
-    double start = now_ms();
+    double start = trip_now_ms();
     trip_scope *before = trip_scope_enter(&d->scope);
     int status = trip_frame_poll();
     if (!status)
@@ -379,8 +367,8 @@ int trip_frame_picture(trip_drawing *d, float *rgba, float *depth)
     trip_scope_enter(before);
     if (status || !d->done)
         return status;
-    d->stats.merge_ms = now_ms() - start;
-    d->stats.ms = now_ms() - d->begun_ms;
+    d->stats.merge_ms = trip_now_ms() - start;
+    d->stats.ms = trip_now_ms() - d->begun_ms;
     d->stats.reader = trip_reader_get_stats(d->reader);
     d->stats.read_ms = (double)d->stats.reader.wait_ns * 1e-6;
     take_counts(d);

@@ -83,7 +83,4 @@ int trip_frame_draw(trip_renderer *renderer, trip_reader *reader, const trip_fra
 trip_list_stats trip_frame_list_stats(const trip_renderer *renderer, const trip_reader *reader,
                                       unsigned list);
 
-/* CLOCK_MONOTONIC. */
-uint64_t trip_frame_now_ns(void);
-
 #endif

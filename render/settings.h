@@ -23,7 +23,7 @@ typedef enum trip_method {
     TRIP_METHOD_CLIP,  /* each pixel from the list its ray is most aligned with (2005, 5.1) */
     TRIP_METHOD_AXIS,  /* one list per frame, by the ray at the image centre (Westover 1989) */
     /* Splats of any one list, cut into sheets parallel to the image plane (Mueller & Crawfis 1998,
-     * image_sheets.h). */
+     * reference_sheets.h). */
     TRIP_METHOD_IMAGE,
 } trip_method;
 
@@ -142,7 +142,7 @@ typedef struct trip_settings {
      * lod_parts.h). 0 draws the finest level everywhere. */
     double lod_px;
     /* Upper bound of the bytes read. Coarser levels than lod_px asks for are drawn to keep it
-     * (lod_limit.h). 0 sets no bound. */
+     * (lod.h). 0 sets no bound. */
     double max_bytes;
     trip_kernel kernel; /* of values, in post and the integral */
     /* For the integral renderer alone. */

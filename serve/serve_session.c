@@ -8,6 +8,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "clock.h"
 #include "encode.h"
 #include "json.h"
 #include "light.h"
@@ -141,22 +142,15 @@ static struct timespec in_seconds(double seconds)
     return t;
 }
 
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 void trip_session_tick(trip_session *s, double seconds)
 {
     const struct timespec end = in_seconds(seconds);
     bool ended;
-    double start = now();
+    double start = trip_now_seconds();
     wait_for_news(s, s->seen, &end);
     s->seen = news_so_far(s, &ended);
     pthread_mutex_lock(&s->lock);
-    trip_viewer_tick(&s->viewer, now() - start);
+    trip_viewer_tick(&s->viewer, trip_now_seconds() - start);
     pthread_mutex_unlock(&s->lock);
 }
 

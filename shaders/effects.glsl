@@ -2,7 +2,7 @@
 // textures. Positions are in the index space of level 0, directions in world space. SHADOWS,
 // OCCLUSION, EMISSION and CUED select the effects; LIT is set if SHADOWS or OCCLUSION is.
 // In: lattices and constants. Out: colours.
-// Mirrors trip_effects_colour() in render/light/effects.c and trip_emission_at() in render/light/emission.c.
+// Mirrors trip_effects_colour() in render/light/effects.c.
 #include "shared.h"
 
 #if defined(SHADOWS) || defined(OCCLUSION)

@@ -1,7 +1,6 @@
 #include "folder.h"
 
 #include "dataset.h"
-#include "errno_text.h"
 #include "remove_files.h"
 #include "report.h"
 

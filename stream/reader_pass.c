@@ -2,7 +2,7 @@
  */
 #include "reader.h"
 
-#include "errno_text.h"
+#include "clock.h"
 #include "reader_state.h"
 #include "report.h"
 
@@ -177,13 +177,6 @@ static void fill_slots(trip_reader *r)
     }
 }
 
-static uint64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
-
 static void count_requests(trip_reader *r, const trip_slot *s)
 {
     for (unsigned i = 0; i < s->request_count; i++) {
@@ -223,13 +216,13 @@ static bool slot_is_ready(const trip_reader *r)
 static bool wait_for_slot(trip_reader *r, const struct timespec *until)
 {
     int late = 0;
-    uint64_t start = now_ns();
+    uint64_t start = trip_now_ns();
     pthread_mutex_lock(&r->lock);
     while (!slot_is_ready(r) && !late)
         late = pthread_cond_timedwait(&r->ready, &r->lock, until);
     bool ready = slot_is_ready(r);
     pthread_mutex_unlock(&r->lock);
-    r->stats.wait_ns += now_ns() - start;
+    r->stats.wait_ns += trip_now_ns() - start;
     return ready;
 }
 
@@ -247,7 +240,7 @@ static bool has_answer(trip_reader *r)
 static struct timespec time_after(uint64_t timeout_ns)
 {
     uint64_t end;
-    if (__builtin_add_overflow(now_ns(), timeout_ns, &end) || end > INT64_MAX)
+    if (__builtin_add_overflow(trip_now_ns(), timeout_ns, &end) || end > INT64_MAX)
         end = INT64_MAX;
     return (struct timespec){ .tv_sec = (time_t)(end / 1000000000u),
                               .tv_nsec = (long)(end % 1000000000u) };
@@ -255,12 +248,12 @@ static struct timespec time_after(uint64_t timeout_ns)
 
 bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
 {
-    const uint64_t begin = now_ns();
+    const uint64_t begin = trip_now_ns();
     while (!r->failed) {
         fill_slots(r);
         if (has_answer(r))
             return true;
-        const uint64_t passed = now_ns() - begin;
+        const uint64_t passed = trip_now_ns() - begin;
         if (passed >= timeout_ns || trip_interrupted())
             return false;
         const uint64_t left = timeout_ns - passed;

@@ -9,7 +9,6 @@
 #include "camera_path.h"
 #include "clipping.h"
 #include "exact_json.h"
-#include "fail_line.h"
 #include "input_file.h"
 #include "json.h"
 #include "new_file.h"

@@ -3,17 +3,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "clock.h"
 #include "frames_state.h"
 #include "report.h"
-
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 static void wake(trip_frames *f)
 {
@@ -74,7 +67,7 @@ static void show_stage(trip_frames *f, const char *stage, double done)
     snprintf(f->status.stage, sizeof f->status.stage, "%s", stage);
     f->status.done = done;
     pthread_mutex_unlock(&f->lock);
-    const double ms = now_ms();
+    const double ms = trip_now_ms();
     if (ms - f->shown_ms > 50) {
         f->shown_ms = ms;
         wake(f);
@@ -405,7 +398,7 @@ static void show(trip_frames *f, int width, int height, bool whole)
                                  .whole = whole,
                                  .number = f->picture.number + 1 };
     pthread_mutex_unlock(&f->picture_lock);
-    f->shown_ms = now_ms();
+    f->shown_ms = trip_now_ms();
     wake(f);
 }
 
@@ -425,18 +418,15 @@ enum { STEP_NS = 10000000, PART_MS = 150, MAX_MS = 1000 };
 /* Moving frames are abandoned only if they take long. */
 static bool gives_up(trip_frames *f, const frame *d)
 {
-    return has_newer(f) && (!d->first || now_ms() - d->begun_ms > MAX_MS || has_other(f));
+    return has_newer(f) && (!d->first || trip_now_ms() - d->begun_ms > MAX_MS || has_other(f));
 }
 
 static int step(trip_frames *f, const frame *d)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    const uint64_t ns = (uint64_t)t.tv_sec * 1000000000 + (uint64_t)t.tv_nsec;
-    int status = triptych_step(f->t, ns + STEP_NS);
+    int status = triptych_step(f->t, trip_now_ns() + STEP_NS);
     if (status == TRIPTYCH_STEP_WAITS)
         triptych_await(f->t, STEP_NS);
-    if (status > 0 && d->first && now_ms() - f->shown_ms > PART_MS) {
+    if (status > 0 && d->first && trip_now_ms() - f->shown_ms > PART_MS) {
         int taken = triptych_picture(f->t, f->rgba);
         if (taken)
             return taken;
@@ -522,7 +512,7 @@ static int draw(trip_frames *f, double scale, double detail, const draw_settings
                 .settings = *settings,
                 .detail = detail,
                 .first = first,
-                .begun_ms = now_ms() };
+                .begun_ms = trip_now_ms() };
     const triptych_view view = trip_navigation_view(&w->navigation, d.width, d.height);
     f->shown_ms = first ? d.begun_ms : f->shown_ms;
     set_ends_early(f, !first);
@@ -541,7 +531,7 @@ static int draw(trip_frames *f, double scale, double detail, const draw_settings
         return status;
     show(f, d.width, d.height, d.whole);
     f->whole = d.whole;
-    note_frame(f, &d, now_ms() - d.begun_ms);
+    note_frame(f, &d, trip_now_ms() - d.begun_ms);
     wake(f);
     return 0;
 }

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include "input_file.h"
-#include "fail_line.h"
 #include "report.h"
 #include "text.h"
 

@@ -8,7 +8,7 @@
 #include <netcdf.h>
 #include <strings.h>
 
-#include "volume_reader.h"
+#include "volume_info.h"
 
 namespace
 {

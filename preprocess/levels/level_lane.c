@@ -17,12 +17,12 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     l->value_sums = trip_level_carve(memory, &used, plane * sizeof *l->value_sums);
     l->values = trip_level_carve(memory, &used, plane * sizeof *l->values);
     l->touched = trip_level_carve(memory, &used, plane / 8);
-    if (w->params->kinds.means) {
+    if (w->means) {
         l->mean_sums = trip_level_carve(memory, &used, plane * sizeof *l->mean_sums);
         l->means = trip_level_carve(memory, &used, plane * sizeof *l->means);
         l->box.normals = trip_level_carve(memory, &used, plane * sizeof(uint32_t));
     }
-    const size_t sheets = w->params->kinds.values ? TRIP_SHARPEN_SHEETS : 1;
+    const size_t sheets = w->values ? TRIP_SHARPEN_SHEETS : 1;
     l->box.values = trip_level_carve(memory, &used, sheets * plane * sizeof(uint32_t));
     for (int axis = 0; axis < 3; axis++)
         l->box.bits[axis] =
@@ -31,7 +31,7 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
         l->run = trip_level_carve(memory, &used, trip_list_buffer_bytes());
     else
         l->values_below = trip_level_carve(memory, &used, plane * sizeof *l->values_below);
-    if (!w->lists && w->params->kinds.means)
+    if (!w->lists && w->means)
         l->means_below = trip_level_carve(memory, &used, plane * sizeof *l->means_below);
     if (w->format.halo)
         used += trip_sharpen_lane_make(&l->sharpen, w->edge_log2, memory ? memory + used : NULL);
@@ -42,22 +42,22 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
 
 static void gradient_of(const trip_level_work *w, uint32_t normal, double gradient[3])
 {
-    if (w->params->compact)
-        trip_compact_normal_unpack(w->params->compact, normal, gradient);
+    if (w->compact)
+        trip_compact_normal_unpack(w->compact, normal, gradient);
     else
-        trip_normal_unpack(normal, w->params->quantiser.gradient_full, gradient);
+        trip_normal_unpack(normal, w->quantiser.gradient_full, gradient);
 }
 
 /* Packs the normal of a gradient in world space. */
 static uint32_t normal_of(const trip_level_work *w, const double gradient[3])
 {
-    const double(*j)[4] = w->params->index_to_world.m;
+    const double(*j)[4] = w->index_to_world.m;
     double index[3];
-    if (!w->params->compact)
-        return trip_normal_pack(gradient, w->params->quantiser.gradient_full);
+    if (!w->compact)
+        return trip_normal_pack(gradient, w->quantiser.gradient_full);
     for (int a = 0; a < 3; a++)
         index[a] = j[0][a] * gradient[0] + j[1][a] * gradient[1] + j[2][a] * gradient[2];
-    return trip_compact_normal_pack(w->params->compact, index);
+    return trip_compact_normal_pack(w->compact, index);
 }
 
 /* Clears the sums of a voxel before its first contribution. */
@@ -127,7 +127,7 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
     for (uint32_t i = 0; i < of->count; i++)
         sums[i + 1] = sums[i] + codes[i];
     if (!square->kept)
-        find_around(of, codes, w->params->hidden_above, around);
+        find_around(of, codes, w->hidden_above, around);
     const uint64_t counts = counts_of(of->mask);
     uint64_t some = (counts | counts >> 1 | counts >> 2) & UINT64_C(0x1111111111111111);
     for (uint32_t before = 0; some; some &= some - 1) {
@@ -207,7 +207,7 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         const trip_coarse_value *value = &l->values_below[i];
         const position p = position_of(w, square, value->u, value->v);
         touch(l, p.at);
-        trip_coarse_value_add(&l->value_sums[p.at], value, w->params->hidden_above);
+        trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
         if (!l->means_below || !l->means_below[i].kept)
             continue;
         if (w->format.normals)
@@ -330,7 +330,7 @@ int trip_level_lane_emit_means(trip_level_lane *l, const trip_level_work *w, uin
 
 static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *voxel)
 {
-    const unsigned step = w->params->quantiser.bytes ? TRIP_CODE_STEP : 1;
+    const unsigned step = w->quantiser.bytes ? TRIP_CODE_STEP : 1;
     return (voxel->value + step / 2) / step * step;
 }
 

@@ -4,15 +4,20 @@
 #define TRIP_LEVEL_LANE_H
 
 #include "level_source.h"
-#include "levels.h"
+#include "list_builder.h"
 #include "mean.h"
+#include "normal.h"
 #include "sharpen.h"
 #include "splat_box.h"
 
 /* The part of a level that its lanes share. It is read-only while they work. */
 typedef struct trip_level_work {
-    const trip_levels_params *params;
     trip_piece_format format; /* format of the level's pieces */
+    bool means, values;       /* the kinds of lists */
+    bool hidden_above;        /* as in trip_levels_params */
+    trip_quantiser quantiser;
+    const trip_compact_normals *compact; /* NULL means 4 bytes */
+    trip_affine index_to_world;
     trip_mean_scale scale;
     unsigned edge_log2; /* log2 of the edge of the level's squares, in voxels */
     bool lists;         /* the level is made from lists, not from a file */

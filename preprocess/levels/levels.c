@@ -35,6 +35,7 @@ typedef struct made_square {
  * appended to the file in the order of squares. The thread that made the next square appends it and
  * all consecutive waiting squares. */
 typedef struct making {
+    const trip_levels_params *params;
     trip_level_work work; /* lanes only read it */
     trip_budget *budget;
     unsigned level, first_list;
@@ -139,7 +140,7 @@ static uint64_t records_below(const making *m)
 {
     uint64_t records = 0;
     for (unsigned list = 0; list < m->first_list; list++)
-        records += trip_writer_records(m->work.params->writer, list);
+        records += trip_writer_records(m->params->writer, list);
     return records;
 }
 
@@ -167,7 +168,7 @@ static size_t lay_out_made(const making *m, made_square *made, unsigned char *me
     const size_t plane = (size_t)1 << 2 * m->work.edge_log2;
     size_t used = 0;
     made->values = trip_level_carve(memory, &used, plane * sizeof *made->values);
-    if (m->work.params->kinds.means)
+    if (m->params->kinds.means)
         made->means = trip_level_carve(memory, &used, plane * sizeof *made->means);
     return used;
 }
@@ -175,7 +176,7 @@ static size_t lay_out_made(const making *m, made_square *made, unsigned char *me
 /* One lane per worker, or as many as memory allows. */
 static int open_lanes(making *m)
 {
-    const trip_levels_params *p = m->work.params;
+    const trip_levels_params *p = m->params;
     const uint64_t left = trip_budget_left_bytes(m->budget), late = late_bytes(m);
     unsigned count = trip_workers_count(p->workers);
     trip_level_lane lane;
@@ -205,7 +206,7 @@ static int open_lanes(making *m)
 
 static int open_builder(making *m)
 {
-    const trip_levels_params *p = m->work.params;
+    const trip_levels_params *p = m->params;
     const uint64_t min = trip_list_builder_min_bytes(&m->work.format, m->lane_count);
     const uint64_t wanted = min + records_below(m) * PIECE_BYTES, late = late_bytes(m);
     uint64_t left = trip_budget_left_bytes(m->budget);
@@ -365,7 +366,7 @@ static int make_values(void *user, unsigned thread, uint64_t item)
 
 static void show(making *m)
 {
-    const trip_levels_params *p = m->work.params;
+    const trip_levels_params *p = m->params;
     pthread_mutex_lock(&m->lock);
     const uint64_t sheet = m->sheet;
     pthread_mutex_unlock(&m->lock);
@@ -375,7 +376,7 @@ static void show(making *m)
 
 static int run_lanes(making *m, trip_work work)
 {
-    trip_workers *workers = m->work.params->workers;
+    trip_workers *workers = m->params->workers;
     int status;
     show(m);
     trip_workers_start(workers, work, m, m->lane_count);
@@ -386,7 +387,7 @@ static int run_lanes(making *m, trip_work work)
 
 static int add_halo(making *m)
 {
-    const trip_levels_params *p = m->work.params;
+    const trip_levels_params *p = m->params;
     int status = trip_level_halo_add(m->file, p->kinds.means, p->hidden_above, &m->with_halo,
                                      m->dims, m->work.edge_log2, m->budget);
     return status == 0 ? trip_output_flush(&m->with_halo) : status;
@@ -402,14 +403,14 @@ static int make_level(making *m)
     if (status == 0 && m->work.format.halo)
         status = run_lanes(m, make_values);
     if (status == 0)
-        status = trip_list_builder_finish(m->work.builder, &m->work.params->quantiser,
-                                          m->work.params->workers, NULL, NULL);
+        status = trip_list_builder_finish(m->work.builder, &m->params->quantiser,
+                                          m->params->workers, NULL, NULL);
     return status;
 }
 
 static int open_lists(making *m)
 {
-    const trip_levels_params *p = m->work.params;
+    const trip_levels_params *p = m->params;
     int status = 0;
     for (unsigned i = 0; i < 4 && status == 0; i++) {
         bool halo = i / 2;
@@ -427,7 +428,7 @@ static int open_file(making *m, const trip_output *below)
     int status = 0;
     for (unsigned odd = 0; odd < 2 && status == 0; odd++)
         status = trip_level_source_file(&m->sources[m->source_count++], below,
-                                        m->work.params->kinds.means, odd, m->work.edge_log2);
+                                        m->params->kinds.means, odd, m->work.edge_log2);
     return status;
 }
 
@@ -449,7 +450,7 @@ static int create_file(const making *m, trip_output *file, uint64_t voxels, bool
 {
     return trip_output_create(
         file,
-        &(trip_output_params){ .folder = m->work.params->folder,
+        &(trip_output_params){ .folder = m->params->folder,
                                .name = TRIP_SPOOL_NAME,
                                .buffer_bytes = file_buffer_bytes(m, voxels, means),
                                .unnamed = true },
@@ -461,9 +462,8 @@ static int open_sharpen(making *m)
     const bool own = has_halo_of_its_own(m);
     /* A kept voxel has 26 neighbours, hence 27. */
     int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
-    trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file,
-                      m->work.params->kinds.means && !own, m->work.params->hidden_above,
-                      m->work.edge_log2, m->budget);
+    trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file, m->params->kinds.means && !own,
+                      m->params->hidden_above, m->work.edge_log2, m->budget);
     return status;
 }
 
@@ -488,8 +488,8 @@ static int make(making *m, const trip_output *below, trip_output *file)
 {
     const bool halo = m->work.format.halo;
     int status = m->work.lists ? open_lists(m) : open_file(m, below);
-    if (status == 0 && (m->level < m->work.params->levels || halo))
-        status = create_file(m, m->file = file, records_below(m), m->work.params->kinds.means);
+    if (status == 0 && (m->level < m->params->levels || halo))
+        status = create_file(m, m->file = file, records_below(m), m->params->kinds.means);
     if (status == 0 && halo)
         status = open_sharpen(m);
     if (status == 0)
@@ -502,16 +502,22 @@ static int make(making *m, const trip_output *below, trip_output *file)
 static void begin(making *m, const trip_levels_params *params, unsigned level, trip_budget *budget)
 {
     *m =
-        (making){ .budget = budget,
+        (making){ .params = params,
+                  .budget = budget,
                   .level = level,
                   .with_halo = { .fd = -1 },
                   .first_list = trip_levels_first_list(params->format.halo, params->kinds, level) };
     trip_level_work *w = &m->work;
-    w->params = params;
     w->format = params->format;
     w->format.quantised = true; /* pieces of coarse levels always hold codes */
     w->format.halo = params->kinds.values;
     w->format.normals = params->format.normals && params->kinds.means;
+    w->means = params->kinds.means;
+    w->values = params->kinds.values;
+    w->hidden_above = params->hidden_above;
+    w->quantiser = params->quantiser;
+    w->compact = params->compact;
+    w->index_to_world = params->index_to_world;
     w->scale = trip_mean_scale_make(params->value_min, params->value_max, params->quantiser.lo,
                                     params->quantiser.hi);
     w->edge_log2 = (unsigned)__builtin_ctzll((unsigned long long)trip_splat_box_edge(&w->format));

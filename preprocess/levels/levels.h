@@ -6,7 +6,7 @@
 #ifndef TRIP_LEVELS_H
 #define TRIP_LEVELS_H
 
-#include "brick.h"
+#include "brick_params.h"
 #include "list_builder.h"
 #include "normal.h"
 

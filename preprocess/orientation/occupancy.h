@@ -1,5 +1,5 @@
-/* A coarse map of the kept part of a volume. orientation_symmetry.h and orientation_base.h use it
- * to guess the orientation of a volume if its file gives none. One thread. */
+/* A coarse map of the kept part of a volume. orientation.h uses it to guess the orientation of a
+ * volume if its file gives none. One thread. */
 #ifndef TRIP_OCCUPANCY_H
 #define TRIP_OCCUPANCY_H
 

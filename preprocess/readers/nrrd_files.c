@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "nrrd_parser.h"
+#include "nrrd_header.h"
 #include "report.h"
 
 #define FILES_MAX 65536

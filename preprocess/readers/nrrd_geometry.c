@@ -4,7 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "nrrd_parser.h"
+#include "nrrd_header.h"
 #include "text.h"
 
 /* A named space: the directions of the axes of world space. */

@@ -1,6 +1,6 @@
 /* The project has its own parser because teem leaks on malformed headers and keeps its errors in
  * one global buffer. */
-#include "nrrd_parser.h"
+#include "nrrd_header.h"
 
 #include <ctype.h>
 #include <stdarg.h>

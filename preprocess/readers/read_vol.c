@@ -12,7 +12,6 @@
 
 #include "byte_stream.h"
 #include "dense_file.h"
-#include "fail_line.h"
 #include "report.h"
 #include "volume_reader.h"
 

@@ -6,7 +6,8 @@
 
 #include <stddef.h>
 
-#include "volume.h"
+#include "budget.h"
+#include "volume_info.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -48,16 +49,6 @@ typedef struct trip_volume_reader {
 /* Chooses a reader by content, then by name. Refuses options that do not apply to the format. */
 int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
                               const trip_volume_params *params);
-
-/* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
- * fits in an int64_t. Readers that compute sizes call it first. In any case volume.c calls it for
- * every volume. */
-int trip_volume_check_dims(const char *path, const trip_volume_info *info);
-
-/* Converts `count` stored values to slope * stored + inter, computed in double precision and
- * rounded once. `swap` reverses their byte order. */
-void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
-                        size_t count, float *values);
 
 extern const trip_volume_reader trip_read_vdb; /* loads vdb/ */
 extern const trip_volume_reader trip_read_nrrd;

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "volume.h"
+#include "volume_info.h"
 
 /* Returns the factor of the difference of both neighbours along an axis: 1/2, or 1 at a border.
  * Beyond a border the voxel itself is repeated, which makes the difference one-sided. */

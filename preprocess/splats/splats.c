@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "dilate.h"
 #include "gradient.h"
 #include "normal.h"
 #include "report.h"
@@ -17,7 +16,7 @@ typedef struct workspace {
     uint8_t *active;  /* which voxels exist, in sparse volumes */
     uint8_t *kept;    /* flags */
     uint8_t *halo;    /* flags */
-    uint8_t *scratch; /* for trip_dilate() */
+    uint8_t *scratch; /* for dilate() */
     trip_splat_box box;
     uint64_t kept_count, halo_count; /* sums over all boxes so far; see trip_splatter_halo() */
     trip_tally tally;
@@ -338,6 +337,46 @@ static void drop_not_finite(const float *values, uint8_t *flags, size_t count)
     }
 }
 
+/* Dilates a row along x. */
+static void dilate_row(const uint8_t *restrict from, uint8_t *restrict to, int64_t count)
+{
+    if (count == 1) {
+        to[0] = from[0];
+        return;
+    }
+    to[0] = from[0] | from[1];
+    for (int64_t i = 1; i < count - 1; i++)
+        to[i] = from[i - 1] | from[i] | from[i + 1];
+    to[count - 1] = from[count - 2] | from[count - 1];
+}
+
+/* Dilates `count` consecutive groups of `length` flags by the groups before and after each: rows in
+ * a slice, or slices in a box. */
+static void dilate_groups(const uint8_t *restrict from, uint8_t *restrict to, int64_t length,
+                          int64_t count)
+{
+    for (int64_t r = 0; r < count; r++) {
+        const uint8_t *at = from + r * length;
+        const uint8_t *before = r > 0 ? at - length : at;
+        const uint8_t *after = r < count - 1 ? at + length : at;
+        for (int64_t i = 0; i < length; i++)
+            to[r * length + i] = before[i] | at[i] | after[i];
+    }
+}
+
+/* Dilates the flags (0 or 1) of a dense box, x fastest, by the 26 neighbours. It finds the halo,
+ * which interpolation needs at the border of the kept voxels. `out` is 1 if the voxel or a
+ * neighbour inside the box is set, else 0. `scratch` has the same size. */
+static void dilate(const uint8_t *flags, uint8_t *out, uint8_t *scratch, const int64_t size[3])
+{
+    const int64_t slice = size[0] * size[1];
+    for (int64_t row = 0; row < size[1] * size[2]; row++)
+        dilate_row(flags + row * size[0], out + row * size[0], size[0]);
+    for (int64_t z = 0; z < size[2]; z++)
+        dilate_groups(out + z * slice, scratch + z * slice, size[0], size[1]);
+    dilate_groups(scratch, out, slice, size[2]);
+}
+
 /* Flags the halo: voxels of the window that are not kept, have a finite value, and have a kept
  * neighbour. Returns false if there are none. */
 static bool find_halo(const work *k)
@@ -348,7 +387,7 @@ static bool find_halo(const work *k)
     size_t count = (size_t)(k->step[2] * k->size[2]);
     if (!memchr(kept, 1, count) || !memchr(kept, 0, count))
         return false;
-    trip_dilate(kept, halo, w->scratch, k->size);
+    dilate(kept, halo, w->scratch, k->size);
     for (size_t i = 0; i < count; i++)
         halo[i] &= kept[i] ^ 1;
     drop_not_finite(w->decoded, halo, count);

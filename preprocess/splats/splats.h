@@ -7,7 +7,7 @@
 #include "envelope.h"
 #include "normal.h"
 #include "piece.h"
-#include "region.h"
+#include "volume_info.h"
 #include "scan.h"
 #include "walk.h"
 

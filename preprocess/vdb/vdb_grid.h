@@ -7,8 +7,9 @@
 #include <memory>
 #include <vector>
 
+#include "budget.h"
 #include "vdb_file.h"
-#include "volume.h"
+#include "volume_info.h"
 
 /* A box around existing voxels with at most 64 voxels on each side, in the grid's own coordinates.
  * It crosses no multiple of 64, so boxes do not overlap. */

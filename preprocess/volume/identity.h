@@ -4,7 +4,7 @@
 #ifndef TRIP_IDENTITY_H
 #define TRIP_IDENTITY_H
 
-#include "brick.h"
+#include "brick_params.h"
 #include "transfer_function.h"
 
 /* Computes the identity. `functions` are the loaded transfer functions of the parameters. Reports

@@ -3,7 +3,7 @@
 #ifndef TRIP_SOURCE_H
 #define TRIP_SOURCE_H
 
-#include "volume.h"
+#include "volume_info.h"
 
 #ifdef __cplusplus
 extern "C" {

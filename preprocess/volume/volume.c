@@ -208,30 +208,6 @@ static int set_axes(trip_volume *v, const char *axes)
     return 0;
 }
 
-int trip_volume_check_dims(const char *path, const trip_volume_info *info)
-{
-    int64_t bytes = trip_scalar_bytes(info->type);
-    bool possible = true;
-    for (int a = 0; a < 3; a++)
-        possible =
-            possible && info->dims[a] >= 1 && !__builtin_mul_overflow(bytes, info->dims[a], &bytes);
-    if (possible)
-        return 0;
-    return trip_fail(TRIP_ERROR, "read", path,
-                     "has an impossible size, %" PRId64 " x %" PRId64 " x %" PRId64, info->dims[0],
-                     info->dims[1], info->dims[2]);
-}
-
-int trip_volume_check_axes(const char *path, const trip_volume_info *info)
-{
-    for (int a = 0; a < 3; a++)
-        if (info->dims[a] > TRIP_VOLUME_AXIS_MAX)
-            return trip_fail(TRIP_ERROR, "read", path,
-                             "has more than %" PRId64 " voxels along an axis",
-                             TRIP_VOLUME_AXIS_MAX);
-    return 0;
-}
-
 static int check_lengths(const trip_volume *v)
 {
     const double(*m)[4] = v->info.index_to_world.m;

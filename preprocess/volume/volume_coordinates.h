@@ -3,7 +3,7 @@
 #ifndef TRIP_VOLUME_COORDINATES_H
 #define TRIP_VOLUME_COORDINATES_H
 
-#include "volume.h"
+#include "volume_info.h"
 
 #ifdef __cplusplus
 extern "C" {

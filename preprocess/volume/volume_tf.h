@@ -3,7 +3,7 @@
 #ifndef TRIP_VOLUME_TF_H
 #define TRIP_VOLUME_TF_H
 
-#include "brick.h"
+#include "brick_params.h"
 
 /* Sets *out to the first transfer function in the parameters, or to an automatic one if there is
  * none. It is in data units; free it with trip_tf_destroy(). Reads the whole volume if the transfer

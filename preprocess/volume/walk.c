@@ -2,8 +2,8 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "clock.h"
 #include "report.h"
 
 /* Portions of sparse formats are small; a batch has work for all threads. */
@@ -168,19 +168,12 @@ static int skip_stride(walk *w, batch *b)
     return skip_batches(w, b, count);
 }
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 static int read_next(walk *w, batch *b)
 {
-    double begin = now_seconds();
+    double begin = trip_now_seconds();
     int status = skip_stride(w, b);
     if (w->params->skip_seconds)
-        *w->params->skip_seconds += now_seconds() - begin;
+        *w->params->skip_seconds += trip_now_seconds() - begin;
     return status == 0 ? read_batch(w, b, w->params->slices) : status;
 }
 

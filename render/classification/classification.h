@@ -5,10 +5,12 @@
 #ifndef TRIP_CLASSIFICATION_H
 #define TRIP_CLASSIFICATION_H
 
+#include "budget.h"
 #include "closed_form.h"
 #include "code_set.h"
 #include "dataset.h"
 #include "settings.h"
+#include "transfer_function.h"
 
 /* Zero-initialised, it knows nothing yet. */
 typedef struct trip_classification {
@@ -34,5 +36,30 @@ void trip_classification_form(trip_classification *c, const trip_dataset *data, 
 const trip_code_set *trip_classification_shown(trip_classification *c, const trip_tf_entry *table);
 /* Forgets the transfer function. Call it after the table has changed. */
 void trip_classification_forget_table(trip_classification *c);
+
+/* ---- tables of coarse levels ----
+ *
+ * A table has 65536 entries that map a code of means to colour and extinction. The colour is the
+ * transfer function's at the mean. The extinction makes a splat as opaque as the kept part of its
+ * cube. Lists with equally long cubes along their axes share a table. The caller may keep the
+ * tables from frame to frame, and releases them when the transfer function or the data set changes.
+ */
+
+enum { TRIP_MEAN_TABLES_MAX = 3 * 32 }; /* one per axis and level */
+
+/* Zero-initialise it. */
+typedef struct trip_mean_tables {
+    unsigned count;
+    double lengths[TRIP_MEAN_TABLES_MAX]; /* length of cubes along the axis, world units */
+    trip_tf_entry *tables[TRIP_MEAN_TABLES_MAX];
+} trip_mean_tables;
+
+/* Returns the table of a list of means, and makes it if it is missing. `function` is the table of
+ * level 0. Fails, reported, if memory is exhausted. */
+int trip_mean_tables_get(trip_mean_tables *t, const trip_dataset *data, const trip_list *list,
+                         const trip_tf_entry *function, trip_budget *budget,
+                         const trip_tf_entry **table);
+uint64_t trip_mean_tables_bytes(const trip_mean_tables *t);
+void trip_mean_tables_release(trip_mean_tables *t, trip_budget *budget);
 
 #endif

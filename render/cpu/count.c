@@ -1,6 +1,5 @@
-#include "cpu/count.h"
-
 #include "cpu/cpu_batch.h"
+
 #include "report.h"
 #include "weight.h"
 

@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "cpu/count.h"
 #include "cpu/cull.h"
 #include "cpu/panes.h"
 

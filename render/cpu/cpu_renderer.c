@@ -13,7 +13,6 @@
 #include <string.h>
 
 #include "cpu/cpu_batch.h"
-#include "cpu/count.h"
 #include "cpu/occlusion.h"
 #include "cpu/sheets/cpu_sheets.h"
 #include "cpu/panes.h"

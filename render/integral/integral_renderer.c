@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cpu/pool.h"
+#include "emission.h"
 #include "field_fill.h"
 #include "integrand.h"
 #include "report.h"
@@ -128,7 +129,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
         .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };
-    r->in.effects.emission = frame->emission;
+    if (frame->settings->effects.emission)
+        r->in.effects.emission = trip_emission_view_of(frame->emission);
     return status;
 }
 

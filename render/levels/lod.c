@@ -1,7 +1,6 @@
 #include "lod.h"
 
 #include "dataset_level.h"
-#include "lod_limit.h"
 #include "report.h"
 
 /* log2 of the cube size in voxels: about a level 0 brick, and larger if there would be too many

@@ -4,9 +4,9 @@
  * lies in one cube, and is drawn if the cube has that level. So each position is drawn at exactly
  * one level.
  *
- * Without a bound on bytes (lod_limit.h), a cube has the coarsest level with voxels at most lod_px
- * pixels wide. The width is measured at the cube's nearest point to the eye, along the grid's
- * longest step. Cubes around the eye have level 0. Read-only once made. */
+ * Without a bound on bytes (trip_lod_bound()), a cube has the coarsest level with voxels at most
+ * lod_px pixels wide. The width is measured at the cube's nearest point to the eye, along the
+ * grid's longest step. Cubes around the eye have level 0. Read-only once made. */
 #ifndef TRIP_LOD_H
 #define TRIP_LOD_H
 
@@ -82,5 +82,24 @@ uint64_t trip_lod_square(const trip_lod *lod, const trip_list *list, int64_t she
 /* Returns whether any voxel of a brick can be drawn. */
 bool trip_lod_brick(const trip_lod *lod, const trip_list *list, const trip_file_header *header,
                     const trip_file_brick *brick, int64_t slab);
+
+/* Minimum distance from the eye. Nearer cubes count as this far, so that they too can be coarser.
+ */
+#define TRIP_LOD_NEAREST_VOXELS 32.0
+
+/* Chooses levels under a bound on bytes. The result is the same as with the smallest
+ * settings.lod_px that keeps the bound. So the cubes that appear widest are drawn finest. Bytes are
+ * the codes and normals of the cubes in view, in all lists with weight in the view. They are
+ * computed from the number of level 0 voxels in each cube and the relative size of each level's
+ * lists. The bytes, and so the picture, do not depend on tiles, slabs or earlier reads.
+ *
+ * Raises levels until settings->max_bytes suffice or all are the coarsest, and fills lod->limit.
+ * Cubes must be at least as large as tiles. Returns TRIP_ERROR if memory is exhausted. */
+int trip_lod_bound(trip_lod *lod, const trip_dataset *data, const trip_camera *camera,
+                   const trip_settings *settings, trip_budget *budget);
+
+/* Returns the bytes of a level's values in all lists read, independent of the view. */
+double trip_lod_values_bytes(const trip_dataset *data, const trip_camera *camera,
+                             const trip_settings *settings, unsigned level);
 
 #endif

@@ -1,4 +1,4 @@
-#include "lod_limit.h"
+#include "lod.h"
 
 #include "brick_box.h"
 #include "dataset_level.h"

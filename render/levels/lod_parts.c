@@ -3,7 +3,6 @@
 #include <math.h>
 
 #include "dataset_level.h"
-#include "lod_limit.h"
 
 /* Octaves of distance over which one level for the whole volume blends into the next. */
 #define MIXED_OCTAVES 0.25

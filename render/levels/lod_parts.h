@@ -13,7 +13,7 @@
  *   takes over.
  *
  * A bound on bytes acts like a larger lod_px. It applies to the visible part of each part
- * (lod_limit.h), and to the whole grid if it has one level. Plain values. */
+ * (trip_lod_bound()), and to the whole grid if it has one level. Plain values. */
 #ifndef TRIP_LOD_PARTS_H
 #define TRIP_LOD_PARTS_H
 

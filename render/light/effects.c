@@ -1,7 +1,5 @@
 #include "effects.h"
 
-#include "emission.h"
-
 /* The directions lie on a spiral from pole to pole with equal areas (Fibonacci lattice). */
 trip_vec3 trip_effects_direction(int number)
 {
@@ -104,12 +102,30 @@ static void light_colour(const trip_effects_view *e, const trip_light *light, tr
         rgb[i] = clamp(rgb[i] * matt + lit.strength * reached * TRIP_SPECULAR * lit.specular);
 }
 
-static void add_emission(const trip_emission *emission, trip_vec3 voxel, double rgb[3])
+/* Returns 1 inside the data set, falling to 0 at one voxel outside. */
+static double inside(const trip_emission_view *v, trip_vec3 at)
 {
-    double own[3];
-    trip_emission_at(emission, voxel, own);
-    for (int i = 0; i < 3; i++)
-        rgb[i] += own[i];
+    double share = 1;
+    for (int a = 0; a < 3; a++) {
+        const double x = trip_component(at, a);
+        share *= fmax(0, 1 - fmax(0, fmax(-x, x - v->last[a])));
+    }
+    return share;
+}
+
+/* Adds E at a point in the drawn data set's index space. */
+static void add_emission(const trip_emission_view *v, trip_vec3 voxel, double rgb[3])
+{
+    const trip_vec3 at = trip_affine_point(&v->to_heat, voxel);
+    const double share = inside(v, at);
+    const double heat = share > 0 ? share * trip_light_grid_at(v->heat, at) : 0;
+    const double x = heat * TRIP_EMISSION_STEPS;
+    const int step = x < TRIP_EMISSION_STEPS ? (int)x : TRIP_EMISSION_STEPS - 1;
+    const float *entry = v->rgb + 4 * step;
+    for (int k = 0; k < 3; k++) {
+        const double below = (double)entry[k], above = (double)entry[k + 4];
+        rgb[k] += below + (x - step) * (above - below);
+    }
 }
 
 void trip_effects_colour(const trip_effects_view *e, const trip_light *light, trip_vec3 voxel,
@@ -120,7 +136,7 @@ void trip_effects_colour(const trip_effects_view *e, const trip_light *light, tr
     else if (gradient)
         trip_light_colour(light, gradient, rgb);
     if (e->effects.emission)
-        add_emission(e->emission, voxel, rgb);
+        add_emission(&e->emission, voxel, rgb);
     if (!(e->effects.cueing > 0))
         return;
     double f = e->effects.cueing *

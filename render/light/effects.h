@@ -62,6 +62,16 @@ trip_vec3 trip_effects_direction(int number);
 /* T and m at a point in index space. */
 typedef double (*trip_light_reached)(const void *user, trip_vec3 voxel);
 
+enum { TRIP_EMISSION_STEPS = 256 };
+
+/* The light of hot matter (emission.h). */
+typedef struct trip_emission_view {
+    const trip_light_grid *heat; /* v / V */
+    trip_affine to_heat;         /* maps the drawn data set's index space to the heat data set's */
+    double last[3];              /* index of the heat data set's last voxel */
+    const float *rgb; /* E for v / V from 0 to 1: TRIP_EMISSION_STEPS + 1 entries of 4 floats */
+} trip_emission_view;
+
 /* Constants of a frame. */
 typedef struct trip_effects_view {
     trip_effects effects;
@@ -74,7 +84,7 @@ typedef struct trip_effects_view {
     double cue_rgb[3];
     const void *user; /* set by the caller: */
     trip_light_reached reached, open;
-    const struct trip_emission *emission; /* set by the caller if emission runs */
+    trip_emission_view emission; /* set by the caller if emission runs */
 } trip_effects_view;
 
 /* Computes the constants of a frame. `camera` belongs to the grid of `dims` voxels. */

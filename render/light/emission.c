@@ -148,28 +148,3 @@ trip_emission_view trip_emission_view_of(const trip_emission *e)
         .rgb = e->rgb[0],
     };
 }
-
-/* Returns 1 inside the data set, falling to 0 at one voxel outside. */
-static double inside(const trip_emission_view *v, trip_vec3 at)
-{
-    double share = 1;
-    for (int a = 0; a < 3; a++) {
-        const double x = trip_component(at, a);
-        share *= fmax(0, 1 - fmax(0, fmax(-x, x - v->last[a])));
-    }
-    return share;
-}
-
-void trip_emission_at(const trip_emission *e, trip_vec3 voxel, double rgb[3])
-{
-    const trip_emission_view v = trip_emission_view_of(e);
-    const trip_vec3 at = trip_affine_point(&v.to_heat, voxel);
-    const double share = inside(&v, at);
-    const double heat = share > 0 ? share * trip_light_grid_at(v.heat, at) : 0;
-    const double x = heat * TRIP_EMISSION_STEPS;
-    const int step = x < TRIP_EMISSION_STEPS ? (int)x : TRIP_EMISSION_STEPS - 1;
-    for (int k = 0; k < 3; k++) {
-        const double below = (double)e->rgb[step][k], above = (double)e->rgb[step + 1][k];
-        rgb[k] = below + (x - step) * (above - below);
-    }
-}

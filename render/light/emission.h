@@ -13,8 +13,6 @@
 
 #include "light_map.h"
 
-enum { TRIP_EMISSION_STEPS = 256 };
-
 typedef struct trip_emission trip_emission;
 
 /* Parameters of a frame. */
@@ -25,14 +23,6 @@ typedef struct trip_emission_params {
     trip_engine engine;
     unsigned threads;
 } trip_emission_params;
-
-/* The data that renderers need. */
-typedef struct trip_emission_view {
-    const trip_light_grid *heat; /* v / V */
-    trip_affine to_heat;         /* maps the drawn data set's index space to the heat data set's */
-    double last[3];              /* index of the heat data set's last voxel */
-    const float *rgb; /* E for v / V from 0 to 1: TRIP_EMISSION_STEPS + 1 entries of 4 floats */
-} trip_emission_view;
 
 /* Opens the heat data set. Fails, reported, if it holds no values above 0. */
 int trip_emission_create(trip_emission **out, const char *path, trip_budget *budget);
@@ -46,7 +36,5 @@ void trip_emission_drop(trip_emission *e);
 trip_light_map *trip_emission_map(const trip_emission *e);
 
 trip_emission_view trip_emission_view_of(const trip_emission *e);
-/* Returns E at a point in the drawn data set's index space. */
-void trip_emission_at(const trip_emission *e, trip_vec3 voxel, double rgb[3]);
 
 #endif

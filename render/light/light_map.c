@@ -2,8 +2,9 @@
 
 #include <string.h>
 
-#include "frame.h"
+#include "clock.h"
 #include "light_shares.h"
+#include "renderer.h"
 #include "report.h"
 
 enum {
@@ -561,14 +562,14 @@ static int sweep(trip_light_map *m, const trip_task_runner *runner)
 
 int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner)
 {
-    const uint64_t start = trip_frame_now_ns();
+    const uint64_t start = trip_now_ns();
     if (m->stage == COMPLETE)
         return TRIP_FRAME_DONE;
     const bool gathers = m->stage <= AVERAGE;
     int status = m->stage == GATHER    ? gather(m)
                  : m->stage == AVERAGE ? average(m)
                                        : sweep(m, runner);
-    m->made_ns = trip_frame_now_ns();
+    m->made_ns = trip_now_ns();
     double ms = (double)(m->made_ns - start) * 1e-6;
     m->stats.gather_ms += gathers ? ms : 0;
     m->stats.sweep_ms += gathers ? 0 : ms;

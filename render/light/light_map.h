@@ -39,7 +39,7 @@ void trip_light_map_destroy(trip_light_map *m);
  * reported, if the lattices exceed the budget. */
 int trip_light_map_begin(trip_light_map *m, const trip_light_source *source);
 /* Does one piece of ready work: a batch, or some rows of nodes or columns. `runner` may do it with
- * several threads; NULL uses the caller's. Returns a TRIP_FRAME_* of frame.h. */
+ * several threads; NULL uses the caller's. Returns a TRIP_FRAME_* of renderer.h. */
 int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
 /* Waits for ready work, at most for the timeout. */
 void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns);

@@ -1,5 +1,5 @@
-/* Picture files. png_file.h writes PNG in this process. The helper program of image_helper.h writes
- * JPEG, TIFF and OpenEXR. One thread at a time uses a helper; several threads have one each.
+/* Picture files. This process writes PNG; the helper program of image_helper.h writes JPEG, TIFF
+ * and OpenEXR. One thread at a time uses a helper; several threads have one each.
  *
  * In memory a picture is float RGBA with premultiplied (associated) alpha: `height` rows of `width`
  * pixels, row 0 at the top. Colours are display values (sRGB). PNG, JPEG and TIFF store them

@@ -9,7 +9,6 @@
 #include "classification.h"
 #include "list_grid.h"
 #include "lod.h"
-#include "mean_tables.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"

@@ -1,4 +1,4 @@
-#include "image_sheets.h"
+#include "reference_sheets.h"
 
 #include <math.h>
 #include <string.h>

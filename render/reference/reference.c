@@ -6,7 +6,7 @@
 #include <limits.h>
 #include <string.h>
 
-#include "image_sheets.h"
+#include "emission.h"
 #include "layer.h"
 #include "light_map.h"
 #include "normal.h"
@@ -146,7 +146,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
                                            header->gradient_step);
     r->effects = trip_effects_view_make(frame->settings, frame->camera, header->dims);
     trip_light_map_view(frame->light, &r->effects);
-    r->effects.emission = frame->emission;
+    if (frame->settings->effects.emission)
+        r->effects.emission = trip_emission_view_of(frame->emission);
     r->axis = -1;
     r->broken = false;
     r->sums = trip_settings_sum_sheets(frame->settings);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "emission.h"
 #include "field_fill.h"
 #include "light_map.h"
 #include "segments.h"
@@ -50,7 +51,8 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     trip_segments_make(&s->segments, frame->table);
     s->effects = trip_effects_view_make(frame->settings, frame->camera, h->dims);
     trip_light_map_view(frame->light, &s->effects);
-    s->effects.emission = frame->emission;
+    if (frame->settings->effects.emission)
+        s->effects.emission = trip_emission_view_of(frame->emission);
     return 0;
 }
 

@@ -15,7 +15,6 @@ extern "C" {
 }
 
 #include "report.h"
-#include "slice_gaps.h"
 
 namespace
 {

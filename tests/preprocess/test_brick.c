@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 
 #include "comma_locale.h"
+#include "estimate.h"
 #include "identity.h"
 #include "normal.h"
 

@@ -1,4 +1,5 @@
 #include "brick_files.h"
+#include "estimate.h"
 
 #include <math.h>
 

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "orientation_base.h"
+#include "orientation.h"
 
 enum { EDGE = TRIP_OCCUPANCY_EDGE };
 

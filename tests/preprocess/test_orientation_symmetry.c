@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "orientation_symmetry.h"
+#include "orientation.h"
 
 static double score(int i, int j, int k, const uint16_t *weights, int axis)
 {

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "sampled.h"
+#include "volume.h"
 
 /* Returns the value of voxel (i, j, k). */
 static unsigned value_at(int64_t i, int64_t j, int64_t k)

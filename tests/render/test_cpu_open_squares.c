@@ -1,7 +1,6 @@
 /* Occlusion culling of squares in sheets. A square must stay if a ray through an open pixel centre
  * samples one of its voxels. The test follows each ray in double precision. */
-#include "cpu/sheets/open_squares.h"
-#include "cpu/sheets/pass_view.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 #include "scenes.h"
 #include "sheet.h"
 #include "test.h"

@@ -1,4 +1,5 @@
 /* Tests of frames drawn in steps, which are inspected, cancelled, and drawn side by side. */
+#include "clock.h"
 #include "desk.h"
 
 #include <pthread.h>
@@ -231,7 +232,7 @@ static void a_frame_cancelled_during_reads_leaves_the_next_one_unchanged(void **
         for (int round = 0; round < 3; round++) {
             trip_drawing drawing;
             assert_int_equal(trip_frame_begin(&drawing, d.renderer, d.reader, &d.frame), 0);
-            for (uint64_t end = trip_frame_now_ns() + 10000000; trip_frame_now_ns() < end;)
+            for (uint64_t end = trip_now_ns() + 10000000; trip_now_ns() < end;)
                 if (trip_frame_step(&drawing, end) == TRIP_FRAME_WAITS)
                     trip_frame_await(&drawing, 1000000);
             assert_false(drawing.done);
@@ -287,7 +288,7 @@ static double stop_at_gate(desk *d, gate *g, unsigned reads)
     g->waiting = 0;
     pthread_mutex_unlock(&g->lock);
     assert_int_equal(trip_frame_begin(&drawing, d->renderer, d->reader, &d->frame), 0);
-    for (uint64_t end = trip_frame_now_ns() + 10000000; trip_frame_now_ns() < end || !has_come(g);)
+    for (uint64_t end = trip_now_ns() + 10000000; trip_now_ns() < end || !has_come(g);)
         if (trip_frame_step(&drawing, end) == TRIP_FRAME_WAITS)
             trip_frame_await(&drawing, 1000000);
     assert_false(drawing.done);

@@ -102,7 +102,7 @@ INLINE void light_positions(const trip_cpu_effects *e, const vf position[3], con
         rgb[k] = within_01(v_fma(rgb[k], matt, s->gloss * reached));
 }
 
-/* Adds trip_emission_at() for V positions. */
+/* Adds the emission of effects.c for V positions. */
 INLINE void add_emission(const trip_cpu_emission *e, const vf position[3], vf rgb[3])
 {
     vf at[3], share = v_set(1);

@@ -4,10 +4,7 @@
 #include <string.h>
 
 #include "cpu/occlusion.h"
-#include "cpu/sheets/open_squares.h"
-#include "cpu/sheets/pass_view.h"
 #include "cpu/sheets/cpu_sheets_state.h"
-#include "cpu/panes.h"
 #include "effects.h"
 #include "report.h"
 #include "sheet.h"
@@ -127,7 +124,7 @@ static uint64_t rasters_in(const trip_cpu_rasters *all)
  */
 static int in_a_row(const trip_frame *frame)
 {
-    static_assert(4 + TRIP_SHEET_REACH_MAX - 1 == (int)TRIP_CPU_AT_HAND_MAX, "need.h");
+    static_assert(4 + TRIP_SHEET_REACH_MAX - 1 == (int)TRIP_CPU_AT_HAND_MAX, "the need");
     return 4 + trip_cpu_sheets_about(frame);
 }
 
@@ -154,7 +151,7 @@ int trip_cpu_sheets_about(const trip_frame *frame)
 
 int trip_cpu_sheets_held(const trip_frame *frame)
 {
-    static_assert(2 + 2 * (TRIP_SHEET_REACH_MAX - 1) == (int)TRIP_CPU_AT_HAND_MAX, "need.h");
+    static_assert(2 + 2 * (TRIP_SHEET_REACH_MAX - 1) == (int)TRIP_CPU_AT_HAND_MAX, "the need");
     return 2 + 2 * trip_cpu_sheets_about(frame);
 }
 

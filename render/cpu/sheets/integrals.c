@@ -312,3 +312,16 @@ const trip_cpu_tf *trip_cpu_tfs_take(trip_cpu_tfs *f, trip_budget *budget,
     set(&f->kept[at], table, hash, closed, codes, voxel_world);
     return &f->kept[at];
 }
+
+trip_cpu_codes trip_cpu_codes_of(unsigned min, unsigned max)
+{
+    trip_cpu_codes c = { .first = 0 };
+    if (min > max)
+        return c;
+    c.first = (uint16_t)min;
+    while ((max - min) << (c.shift + 1) <= UINT16_MAX && c.shift < 15)
+        c.shift++;
+    if (c.shift == 0)
+        c.first = 0;
+    return c;
+}

@@ -1,4 +1,4 @@
-#include "cpu/sheets/need.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 
 #include "cpu/kernels/kernel_sheets.h"
 #include "report.h"

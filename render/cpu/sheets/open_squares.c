@@ -1,4 +1,4 @@
-#include "cpu/sheets/open_squares.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 
 #include <math.h>
 #include <string.h>

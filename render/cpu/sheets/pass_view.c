@@ -1,4 +1,4 @@
-#include "cpu/sheets/pass_view.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 
 #include <math.h>
 

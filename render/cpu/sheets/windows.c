@@ -1,8 +1,7 @@
-#include "cpu/sheets/windows.h"
+#include "cpu/sheets/cpu_sheets_state.h"
 
 #include <string.h>
 
-#include "cpu/sheets/cpu_sheets_state.h"
 #include "report.h"
 
 /* ---- memory ---- */

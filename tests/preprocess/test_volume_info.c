@@ -1,6 +1,6 @@
 #include "volume_files.h"
 
-#include "volume_reader.h"
+#include "volume_info.h"
 
 static void every_type_has_a_name(void **state)
 {

@@ -1,7 +1,10 @@
-#include "volume_reader.h"
+#include "volume_info.h"
 
+#include <inttypes.h>
 #include <string.h>
 #include <strings.h>
+
+#include "report.h"
 
 static const struct {
     unsigned bytes;
@@ -204,4 +207,28 @@ void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter,
         [TRIP_F32] = decode_f32, [TRIP_F64] = decode_f64,
     };
     decoders[type](stored, count, swap, slope, inter, values);
+}
+
+int trip_volume_check_dims(const char *path, const trip_volume_info *info)
+{
+    int64_t bytes = trip_scalar_bytes(info->type);
+    bool possible = true;
+    for (int a = 0; a < 3; a++)
+        possible =
+            possible && info->dims[a] >= 1 && !__builtin_mul_overflow(bytes, info->dims[a], &bytes);
+    if (possible)
+        return 0;
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "has an impossible size, %" PRId64 " x %" PRId64 " x %" PRId64, info->dims[0],
+                     info->dims[1], info->dims[2]);
+}
+
+int trip_volume_check_axes(const char *path, const trip_volume_info *info)
+{
+    for (int a = 0; a < 3; a++)
+        if (info->dims[a] > TRIP_VOLUME_AXIS_MAX)
+            return trip_fail(TRIP_ERROR, "read", path,
+                             "has more than %" PRId64 " voxels along an axis",
+                             TRIP_VOLUME_AXIS_MAX);
+    return 0;
 }
