@@ -66,6 +66,8 @@ static int measure(const accuracy_options *o, accuracy_folder *folder, const cha
         accuracy_report_print(stdout, &r);
     }
     accuracy_report_free(&r);
+    for (int i = 0; i < m.popping_count; i++)
+        cJSON_Delete(m.popping[i].rows);
     accuracy_measured_free(&m);
     return status;
 }

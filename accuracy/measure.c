@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "bench_progress.h"
+#include "progress_line.h"
 #include "contexts.h"
 #include "flip.h"
 #include "json.h"

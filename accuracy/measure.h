@@ -6,9 +6,9 @@
 #define TRIP_ACCURACY_MEASURE_H
 
 #include "accuracy_options.h"
+#include "accuracy_popping.h"
 #include "compared_programs.h"
 #include "error.h"
-#include "popping.h"
 #include "setting.h"
 #include "views.h"
 

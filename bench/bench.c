@@ -13,14 +13,20 @@
 static const struct {
     const char *name;
     int (*run)(const session *s, const bench_options *o, bench_report *r);
+    /* Runs instead with an open scene. */
+    int (*run_scene)(bench_scene *scene, const bench_options *o, bench_report *r);
     bool makes_volumes; /* makes its own volumes if no data set is named */
     bool opens;         /* opens the data set itself */
 } tables[] = {
-    { "orders", bench_orders, false, false },     { "submit", bench_submit, false, false },
-    { "stream", bench_stream, false, false },     { "renderers", bench_renderers, false, false },
-    { "popping", bench_popping, false, false },   { "levels", bench_levels, true, false },
-    { "flight", bench_flight, false, true },      { "ewa", bench_ewa, false, false },
-    { "variants", bench_variants, false, false },
+    { .name = "orders", .run_scene = bench_orders },
+    { .name = "submit", .run_scene = bench_submit },
+    { .name = "stream", .run = bench_stream },
+    { .name = "renderers", .run = bench_renderers },
+    { .name = "popping", .run_scene = bench_popping },
+    { .name = "levels", .run = bench_levels, .makes_volumes = true },
+    { .name = "flight", .run = bench_flight, .opens = true },
+    { .name = "ewa", .run = bench_ewa },
+    { .name = "variants", .run_scene = bench_variants },
 };
 
 /* Returns whether the frames are shaded: pre by the stored normals, post by differences of
@@ -33,7 +39,7 @@ static bool is_lit(const session *s, const trip_settings *settings)
 
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)
 {
-    cJSON *settings = bench_report_settings(r);
+    cJSON *settings = r->settings;
     const trip_file_header *h = &s->data->header;
     char text[64];
     snprintf(text, sizeof text, "%llu x %llu x %llu", (unsigned long long)h->dims[0],
@@ -43,9 +49,8 @@ static void describe(const session *s, const bench_options *o, bool included, be
     cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
     cJSON_AddStringToObject(settings, "transfer_function",
                             o->tf ? o->tf : "stored in the data set");
-    snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
     if (o->size_count == 1)
-        cJSON_AddStringToObject(settings, "size", text);
+        bench_report_add_size(settings, o->sizes[0]);
     if (o->settings.classify == TRIP_CLASSIFY_PRE)
         cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
     cJSON_AddBoolToObject(settings, "shading", is_lit(s, &o->settings));
@@ -69,6 +74,16 @@ static size_t table_of(const bench_options *o)
     return i;
 }
 
+static int run_scene(size_t table, const session *s, const bench_options *o, bench_report *r)
+{
+    bench_scene scene;
+    int status = bench_scene_open(&scene, s, o, r);
+    if (!status)
+        status = tables[table].run_scene(&scene, o, r);
+    bench_scene_close(&scene);
+    return status;
+}
+
 /* Measures the named data set, or makes a data set of the included volume. */
 static int measure_data(bench_options *o, size_t table, bench_report *r)
 {
@@ -85,7 +100,8 @@ static int measure_data(bench_options *o, size_t table, bench_report *r)
     if (!status && !tables[table].opens)
         describe(&s, o, included, r);
     if (!status)
-        status = tables[table].run(tables[table].opens ? NULL : &s, o, r);
+        status = tables[table].run_scene ? run_scene(table, &s, o, r)
+                                         : tables[table].run(tables[table].opens ? NULL : &s, o, r);
     session_close(&s);
     bench_sample_remove(&sample);
     return status;

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "bench_frame.h"
 #include "report.h"
+#include "times.h"
 
 /* Reports the error of the context if a call failed. */
 static int check(const bench_context *c, int status)
@@ -64,6 +64,14 @@ void bench_context_close(bench_context *c)
     c->t = NULL;
 }
 
+int bench_context_find(bench_context *c, const triptych_view *view, triptych_camera *camera)
+{
+    int status = triptych_set_view(c->t, view);
+    if (!status)
+        status = triptych_get_camera(c->t, camera);
+    return check(c, status);
+}
+
 int bench_context_look(bench_context *c, const triptych_camera *camera)
 {
     const triptych_view view = { .width = camera->width,
@@ -82,11 +90,11 @@ int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba
     c->settings.lod_px = lod_px;
     c->settings.samples = samples;
     int status = triptych_set_settings(c->t, &c->settings);
-    const double start = bench_now_ms();
+    const double start = measure_now_ms();
     if (!status)
         status = triptych_draw(c->t, rgba);
     if (ms)
-        *ms = bench_now_ms() - start;
+        *ms = measure_now_ms() - start;
     return check(c, status);
 }
 

@@ -20,6 +20,8 @@ triptych_renderer bench_context_renderer(const bench_options *o);
 int bench_context_open(bench_context *c, const char *path, const bench_options *o);
 void bench_context_close(bench_context *c);
 
+/* Sets a view and computes its camera. */
+int bench_context_find(bench_context *c, const triptych_view *view, triptych_camera *camera);
 /* Sets the view of *camera. */
 int bench_context_look(bench_context *c, const triptych_camera *camera);
 

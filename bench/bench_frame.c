@@ -3,19 +3,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "cpu/cpu_renderer.h"
+#include "machine.h"
 #include "report.h"
 #include "sheet_samples.h"
 #include "splat.h"
-
-double bench_now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
+#include "times.h"
 
 uint64_t bench_splats_drawn(const trip_frame_stats *s)
 {
@@ -25,6 +19,13 @@ uint64_t bench_splats_drawn(const trip_frame_stats *s)
 uint64_t bench_splats_read(const trip_frame_stats *s)
 {
     return s->all.splats_read;
+}
+
+const char *bench_classified(const trip_settings *settings)
+{
+    return settings->classify == TRIP_CLASSIFY_POST          ? "post"
+           : settings->compositing == TRIP_COMPOSITING_SHEET ? "pre, by sheets"
+                                                             : "pre, by splats";
 }
 
 unsigned bench_planes(const session *s, const trip_settings *settings)
@@ -77,12 +78,12 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         settings.sprite_px = sprite_px(f->session->data, camera, &settings);
     if (f->occluder)
         *f->occluder = count ? NULL : f->renderer;
-    double start = bench_now_ms();
+    double start = measure_now_ms();
     int status = trip_plan_make_next(&plan, f->session->data, camera, &settings, f->session->table,
                                      session_classified(f->session, 0), NULL, f->session->budget);
     if (status)
         return status;
-    double planned = bench_now_ms();
+    double planned = measure_now_ms();
     trip_frame frame = {
         .data = f->session->data,
         .camera = camera,
@@ -92,7 +93,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         .count = count,
     };
     status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, NULL, &cost->stats);
-    cost->ms = bench_now_ms() - start;
+    cost->ms = measure_now_ms() - start;
     cost->plan_ms = planned - start;
     cost->wait_ms = cost->stats.read_ms;
     cost->draw_ms = cost->stats.draw_ms;
@@ -169,14 +170,10 @@ void bench_runs_describe(bench_runs *r, int frame, cJSON *row)
     char text[48];
     const bench_cost *runs = bench_runs_sorted(r, frame), *middle = &runs[(r->repeat - 1) / 2];
     bound(middle, text);
-    cJSON_AddNumberToObject(row, "ms", middle->ms);
-    cJSON_AddNumberToObject(row, "ms_min", runs[0].ms);
-    cJSON_AddNumberToObject(row, "ms_max", runs[r->repeat - 1].ms);
-    cJSON_AddNumberToObject(row, "fps", 1e3 / middle->ms);
-    cJSON_AddNumberToObject(row, "plan_ms", middle->plan_ms);
-    cJSON_AddNumberToObject(row, "wait_ms", middle->wait_ms);
-    cJSON_AddNumberToObject(row, "draw_ms", middle->draw_ms);
-    cJSON_AddNumberToObject(row, "merge_ms", middle->merge_ms);
+    measure_add(row, { "ms", middle->ms }, { "ms_min", runs[0].ms },
+                { "ms_max", runs[r->repeat - 1].ms }, { "fps", 1e3 / middle->ms },
+                { "plan_ms", middle->plan_ms }, { "wait_ms", middle->wait_ms },
+                { "draw_ms", middle->draw_ms }, { "merge_ms", middle->merge_ms });
     cJSON_AddStringToObject(row, "bound_by", text);
 }
 
@@ -220,6 +217,13 @@ void bench_renderer_destroy(trip_renderer *r)
         r->ops->destroy(r);
 }
 
+void bench_describe_frame(const bench_frame *f, bench_report *r)
+{
+    measure_describe_renderer(r->machine, f->renderer->ops->name,
+                              f->renderer->ops->device(f->renderer),
+                              trip_reader_engine_name(f->reader));
+}
+
 int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bench_report *r)
 {
     char why[256];
@@ -229,17 +233,15 @@ int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, b
     int status = session_take_image(s, b->size[0], b->size[1], &f->rgba);
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
+    bench_progress_expect(o->progress, 1);
     bench_progress_step(o->progress, "data set to memory");
     if (!status)
         status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, f->renderer, NULL);
     if (status)
         return status;
-    cJSON *machine = bench_report_machine(r);
-    cJSON_AddStringToObject(machine, "renderer", f->renderer->ops->name);
-    cJSON_AddStringToObject(machine, "device", f->renderer->ops->device(f->renderer));
-    cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(f->reader));
+    bench_describe_frame(f, r);
     if (o->threads[0])
-        cJSON_AddNumberToObject(machine, "threads", o->threads[0]);
+        cJSON_AddNumberToObject(r->machine, "threads", o->threads[0]);
     return 0;
 }
 

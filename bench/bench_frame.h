@@ -56,7 +56,6 @@ const bench_cost *bench_runs_sorted(bench_runs *r, int frame);
 /* Adds ms, ms_min, ms_max, fps, the parts of the median run and the largest part. */
 void bench_runs_describe(bench_runs *r, int frame, cJSON *row);
 
-double bench_now_ms(void);
 /* Sums over the lists. */
 uint64_t bench_splats_drawn(const trip_frame_stats *s);
 uint64_t bench_splats_read(const trip_frame_stats *s);
@@ -64,6 +63,10 @@ uint64_t bench_splats_read(const trip_frame_stats *s);
  * as in bench_frame; both may be NULL. */
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
                         trip_engine engine, trip_renderer *renderer, trip_renderer **occluder);
+/* Names the classification and the unit of compositing. */
+const char *bench_classified(const trip_settings *settings);
+/* Adds the renderer and the engine of the reader to the machine of the report. */
+void bench_describe_frame(const bench_frame *f, bench_report *r);
 /* Returns the planes that the settings read, a bit per trip_plane. */
 unsigned bench_planes(const session *s, const trip_settings *settings);
 

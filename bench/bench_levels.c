@@ -56,13 +56,9 @@ static int look_at(measuring *m, int view, unsigned level, triptych_camera *came
                                   .azimuth_degrees = 360.0 * view / m->options->views,
                                   .ortho_fit = 1,
                                   .turntable = 1 };
-    int status = triptych_set_view(m->context.t, &whole);
-    if (!status)
-        status = triptych_get_camera(m->context.t, camera);
-    if (status) {
-        trip_report_line(triptych_error(m->context.t));
+    int status = bench_context_find(&m->context, &whole, camera);
+    if (status)
         return status;
-    }
     camera->width = camera->height = (int)ceil(camera->ortho_height / pixel);
     camera->ortho_height = camera->height * pixel;
     return bench_context_look(&m->context, camera);
@@ -123,7 +119,7 @@ static int measure_view(measuring *m, int view, unsigned level, entry *e)
     return status;
 }
 
-static const bench_column level_columns[] = {
+static const measure_column level_columns[] = {
     { "level", "level", 0, 0 },
     { "width", "pixels", 0, 0 },
     { "colour_mean", "colour: mean", 2, 0 },
@@ -142,27 +138,21 @@ static void add_level(const measuring *m, cJSON *table, unsigned level, const en
 {
     const accuracy_error_figures colour = accuracy_error_measure(&e->colour);
     const accuracy_error_figures alpha = accuracy_error_measure(&e->alpha);
-    cJSON *row = cJSON_CreateObject();
-    cJSON_AddNumberToObject(row, "level", level);
-    cJSON_AddNumberToObject(row, "width", e->width);
-    cJSON_AddNumberToObject(row, "colour_mean", colour.mean);
-    cJSON_AddNumberToObject(row, "colour_99", colour.percentile_99);
-    cJSON_AddNumberToObject(row, "alpha_mean", alpha.mean);
-    cJSON_AddNumberToObject(row, "alpha_99", alpha.percentile_99);
-    cJSON_AddNumberToObject(row, "ms", e->ms / m->options->views);
-    cJSON_AddNumberToObject(row, "own_colour_mean", accuracy_error_measure(&e->own_colour).mean);
-    cJSON_AddNumberToObject(row, "own_alpha_mean", accuracy_error_measure(&e->own_alpha).mean);
-    cJSON_AddNumberToObject(row, "fine_colour_mean", accuracy_error_measure(&e->fine_colour).mean);
-    cJSON_AddNumberToObject(row, "fine_alpha_mean", accuracy_error_measure(&e->fine_alpha).mean);
-    cJSON_AddNumberToObject(row, "fine_ms", e->fine_ms / m->options->views);
-    cJSON_AddItemToArray(table, row);
+    cJSON *row = measure_new_row(table);
+    measure_add(row, { "level", level }, { "width", e->width }, { "colour_mean", colour.mean },
+                { "colour_99", colour.percentile_99 }, { "alpha_mean", alpha.mean },
+                { "alpha_99", alpha.percentile_99 }, { "ms", e->ms / m->options->views },
+                { "own_colour_mean", accuracy_error_measure(&e->own_colour).mean },
+                { "own_alpha_mean", accuracy_error_measure(&e->own_alpha).mean },
+                { "fine_colour_mean", accuracy_error_measure(&e->fine_colour).mean },
+                { "fine_alpha_mean", accuracy_error_measure(&e->fine_alpha).mean },
+                { "fine_ms", e->fine_ms / m->options->views });
 }
 
 static int measure_levels(measuring *m)
 {
     cJSON *table = bench_report_table(
-        m->report, "levels", "Each level with voxels one pixel wide: error of 255", level_columns,
-        sizeof level_columns / sizeof level_columns[0]);
+        m->report, "levels", "Each level with voxels one pixel wide: error of 255", level_columns);
     int status = 0;
     entry *e = malloc(sizeof *e);
     if (!e)
@@ -207,13 +197,9 @@ static int look_from(measuring *m, const triptych_camera *from, int step)
 static int find_start(measuring *m, triptych_camera *from)
 {
     const triptych_view whole = { .width = DOLLY_PX, .height = DOLLY_PX, .fov_degrees = 30 };
-    int status = triptych_set_view(m->context.t, &whole);
-    if (!status)
-        status = triptych_get_camera(m->context.t, from);
-    if (status) {
-        trip_report_line(triptych_error(m->context.t));
+    int status = bench_context_find(&m->context, &whole, from);
+    if (status)
         return status;
-    }
     const double wanted =
         m->voxel * DOLLY_PX / dolly_px / 2 / tan(30 * 3.14159265358979323846 / 360);
     double distance = 0;
@@ -239,7 +225,7 @@ static int dolly(measuring *m, const triptych_camera *from, double lod_px, float
     return status;
 }
 
-static const bench_column dolly_columns[] = {
+static const measure_column dolly_columns[] = {
     { "drawn", "drawn", 0, 0 },
     { "mean", "mean", 3, 0 },
     { "max", "max", 3, 0 },
@@ -250,7 +236,7 @@ static const bench_column dolly_columns[] = {
 static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const flicker *finest)
 {
     double sum = 0, max = 0, sum_of_finest = 0, max_of_finest = 0;
-    cJSON *row = cJSON_CreateObject();
+    cJSON *row = measure_new_row(table);
     for (int i = 0; i < DOLLY_STEPS; i++) {
         sum += f->changes[i];
         max = fmax(max, f->changes[i]);
@@ -258,18 +244,14 @@ static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const f
         max_of_finest = fmax(max_of_finest, f->changes[i] / finest->changes[i]);
     }
     cJSON_AddStringToObject(row, "drawn", drawn);
-    cJSON_AddNumberToObject(row, "mean", sum / DOLLY_STEPS);
-    cJSON_AddNumberToObject(row, "max", max);
-    cJSON_AddNumberToObject(row, "mean_of_finest", sum / sum_of_finest);
-    cJSON_AddNumberToObject(row, "most_of_finest", max_of_finest);
-    cJSON_AddItemToArray(table, row);
+    measure_add(row, { "mean", sum / DOLLY_STEPS }, { "max", max },
+                { "mean_of_finest", sum / sum_of_finest }, { "most_of_finest", max_of_finest });
 }
 
 static int measure_dolly(measuring *m)
 {
-    cJSON *table =
-        bench_report_table(m->report, "dolly", "Change between consecutive pictures, of 255",
-                           dolly_columns, sizeof dolly_columns / sizeof dolly_columns[0]);
+    cJSON *table = bench_report_table(m->report, "dolly",
+                                      "Change between consecutive pictures, of 255", dolly_columns);
     triptych_camera from;
     flicker finest, coarse;
     float *pictures[2] = { NULL, NULL };

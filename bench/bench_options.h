@@ -3,7 +3,7 @@
 #ifndef TRIP_BENCH_OPTIONS_H
 #define TRIP_BENCH_OPTIONS_H
 
-#include "bench_progress.h"
+#include "progress_line.h"
 #include "reader.h"
 #include "renderer_choice.h"
 #include "settings.h"

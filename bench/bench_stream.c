@@ -22,7 +22,7 @@ static const char *const keys[STAGES] = { "plain", "plain_blind", "plain_small",
 
 static const double gigabyte = 1e9, second_ms = 1e3;
 
-static const bench_column stage_columns[] = {
+static const measure_column stage_columns[] = {
     { "stage", "stage", 0, 0 },
     { "ms", "median s", 3, second_ms },
     { "ms_min", "fastest", 3, second_ms },
@@ -33,7 +33,7 @@ static const bench_column stage_columns[] = {
     { "of_blind", "x blind", 3, 0 },
 };
 
-static const bench_column summary_columns[] = {
+static const measure_column summary_columns[] = {
     { "dataset_bytes", "data set GB", 3, gigabyte },
     { "memory_limit_bytes", "memory limit MB", 1, 1e6 },
     { "memory_peak_bytes", "peak MB", 1, 1e6 },
@@ -200,62 +200,51 @@ static double gb_per_s(sample s)
 
 static void add_stages(const stream *t, bench_report *r)
 {
-    cJSON *rows = bench_report_table(r, "stages", "The parts of a frame, alone and together",
-                                     stage_columns, sizeof stage_columns / sizeof stage_columns[0]);
+    cJSON *rows =
+        bench_report_table(r, "stages", "The parts of a frame, alone and together", stage_columns);
     for (int stage = 0; stage < STAGES; stage++) {
         sample own = middle(t, stage), plain = middle(t, PLAIN), blind = middle(t, BLIND);
         const sample *runs = &t->samples[stage * t->options->repeat];
-        cJSON *row = cJSON_CreateObject();
+        cJSON *row = measure_new_row(rows);
         cJSON_AddStringToObject(row, "key", keys[stage]);
         cJSON_AddStringToObject(row, "stage", names[stage]);
         if (stage != DRAW || t->in_memory.renderer) {
-            cJSON_AddNumberToObject(row, "ms", own.ms);
-            cJSON_AddNumberToObject(row, "ms_min", runs[0].ms);
-            cJSON_AddNumberToObject(row, "ms_max", runs[t->options->repeat - 1].ms);
+            measure_add(row, { "ms", own.ms }, { "ms_min", runs[0].ms },
+                        { "ms_max", runs[t->options->repeat - 1].ms });
         }
         if (stage != DRAW) {
-            cJSON_AddNumberToObject(row, "bytes_read", own.bytes);
-            cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(own));
-            cJSON_AddNumberToObject(row, "of_plain", gb_per_s(own) / gb_per_s(plain));
-            cJSON_AddNumberToObject(row, "of_blind", gb_per_s(own) / gb_per_s(blind));
+            measure_add(row, { "bytes_read", own.bytes }, { "gb_per_s", gb_per_s(own) },
+                        { "of_plain", gb_per_s(own) / gb_per_s(plain) },
+                        { "of_blind", gb_per_s(own) / gb_per_s(blind) });
         }
-        cJSON_AddItemToArray(rows, row);
     }
 }
 
 static void add_summary(const stream *t, bench_report *r)
 {
     cJSON *rows =
-        bench_report_table(r, "summary", "The frame, compared with its limits", summary_columns,
-                           sizeof summary_columns / sizeof summary_columns[0]);
-    cJSON *row = cJSON_CreateObject();
+        bench_report_table(r, "summary", "The frame, compared with its limits", summary_columns);
+    cJSON *row = measure_new_row(rows);
     sample plain = middle(t, PLAIN), read = middle(t, READ), draw = middle(t, DRAW);
     sample streamed = middle(t, STREAMED), frame = middle(t, FRAME);
-    cJSON_AddNumberToObject(row, "dataset_bytes", (double)t->session->data->bytes);
-    cJSON_AddNumberToObject(row, "memory_limit_bytes",
-                            (double)trip_budget_limit_bytes(t->session->budget));
-    cJSON_AddNumberToObject(row, "memory_peak_bytes", (double)t->peak_bytes);
-    cJSON_AddNumberToObject(row, "peak_rss_bytes", (double)t->peak_rss_bytes);
-    cJSON_AddNumberToObject(row, "seconds_per_frame", frame.ms / second_ms);
-    cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(frame));
-    cJSON_AddNumberToObject(row, "disk_gb_per_s", gb_per_s(plain));
-    cJSON_AddNumberToObject(row, "frame_of_disk", gb_per_s(frame) / gb_per_s(plain));
-    cJSON_AddNumberToObject(row, "streamed_of_disk", gb_per_s(streamed) / gb_per_s(plain));
+    measure_add(row, { "dataset_bytes", (double)t->session->data->bytes },
+                { "memory_limit_bytes", (double)trip_budget_limit_bytes(t->session->budget) },
+                { "memory_peak_bytes", (double)t->peak_bytes },
+                { "peak_rss_bytes", (double)t->peak_rss_bytes },
+                { "seconds_per_frame", frame.ms / second_ms }, { "gb_per_s", gb_per_s(frame) },
+                { "disk_gb_per_s", gb_per_s(plain) },
+                { "frame_of_disk", gb_per_s(frame) / gb_per_s(plain) },
+                { "streamed_of_disk", gb_per_s(streamed) / gb_per_s(plain) });
     if (t->in_memory.renderer) {
         cJSON_AddStringToObject(row, "bound", read.ms > draw.ms ? "read" : "draw");
         cJSON_AddNumberToObject(row, "frame_of_bound", frame.ms / fmax(read.ms, draw.ms));
     }
-    cJSON_AddItemToArray(rows, row);
 }
 
 static void describe(const stream *t, bench_report *r)
 {
-    cJSON *machine = bench_report_machine(r);
-    trip_renderer *renderer = t->frame.renderer;
-    cJSON_AddStringToObject(machine, "renderer", renderer->ops->name);
-    cJSON_AddStringToObject(machine, "device", renderer->ops->device(renderer));
-    cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(t->frame.reader));
-    cJSON_AddStringToObject(machine, "plain_read",
+    bench_describe_frame(&t->frame, r);
+    cJSON_AddStringToObject(r->machine, "plain_read",
                             t->direct ? "8 threads, transfers of 1 MiB, O_DIRECT"
                                       : "8 threads, transfers of 1 MiB, through the page cache "
                                         "(O_DIRECT refused), dropped before each run");

@@ -60,7 +60,7 @@ static const struct {
 static const char *const paper_keys[PAPER_SETS] = { "paper_engine", "paper_foot", "paper_head",
                                                     "paper_mri" };
 
-static const bench_column columns[] = {
+static const measure_column columns[] = {
     { "lists", "lists", 0, 0 },
     { "primitives", "primitives", 0, 0 },
     { "orders", "orders", 0, 0 },
@@ -77,7 +77,7 @@ static void add_row(cJSON *rows, bench_runs *runs, const bench_frame *frame,
                     const bench_cost *counted, int form)
 {
     double kept = (double)frame->session->data->header.kept;
-    cJSON *row = cJSON_CreateObject();
+    cJSON *row = measure_new_row(rows);
     cJSON_AddStringToObject(row, "lists", forms[form].lists);
     cJSON_AddStringToObject(row, "primitives", forms[form].primitives);
     cJSON_AddStringToObject(row, "orders", forms[form].orders);
@@ -95,7 +95,6 @@ static void add_row(cJSON *rows, bench_runs *runs, const bench_frame *frame,
         if (forms[form].paper_fps[i] > 0)
             cJSON_AddNumberToObject(row, paper_keys[i],
                                     forms[form].paper_fps[i] / forms[0].paper_fps[i]);
-    cJSON_AddItemToArray(rows, row);
 }
 
 /* Draws one counted frame, which also loads data and compiles shaders. Leaves out a form that does
@@ -136,7 +135,7 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
         cJSON *rows = bench_report_table(
             r, "submit",
             "Oblique view, all three lists (2008, Table 3); speed is relative to the first row",
-            columns, sizeof columns / sizeof columns[0]);
+            columns);
         for (int i = 0; i < FORMS; i++)
             add_row(rows, &runs, &frames[i], &counted[i], i);
     }
@@ -160,15 +159,9 @@ static void add_limits(bench_report *r)
                           "not fit. Objects, views and kernels differ.");
 }
 
-int bench_submit(const session *s, const bench_options *o, bench_report *r)
+int bench_submit(bench_scene *scene, const bench_options *o, bench_report *r)
 {
-    bench_scene scene;
-    bench_progress_expect(o->progress, 1 + FORMS * (1 + o->repeat));
-    int status = bench_scene_open(&scene, s, o, r);
-    if (!status) {
-        add_limits(r);
-        status = measure(&scene.frame, o, r);
-    }
-    bench_scene_close(&scene);
-    return status;
+    bench_progress_expect(o->progress, FORMS * (1 + o->repeat));
+    add_limits(r);
+    return measure(&scene->frame, o, r);
 }

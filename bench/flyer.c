@@ -3,16 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "report.h"
-
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
+#include "times.h"
 
 /* Called by the drawing thread. */
 static void wake(void *user)
@@ -131,7 +124,7 @@ static void look(void *user, const trip_picture *p)
 static void note_picture(void *user, const trip_picture *p)
 {
     flyer *f = user;
-    const double ms = now_ms();
+    const double ms = measure_now_ms();
     const int step = step_of(f, &p->navigation);
     look(f, p); /* also keeps the picture of the last step */
     if (step < 0 || !has_room(f))
@@ -152,24 +145,24 @@ static void note_picture(void *user, const trip_picture *p)
  * complete one. */
 static int await_rest(flyer *f, double *first_ms, double *whole_ms)
 {
-    const double begun = now_ms();
+    const double begun = measure_now_ms();
     const uint64_t number = f->number;
     *first_ms = 0;
     for (;;) {
         const trip_frames_status s = trip_frames_get_status(f->frames);
         trip_frames_use_picture(f->frames, f->number, look, f);
         if (*first_ms == 0 && f->number != number)
-            *first_ms = now_ms() - begun;
+            *first_ms = measure_now_ms() - begun;
         if (s.failed)
             return trip_fail(TRIP_ERROR, "bench", f->wanted.input, "%s", s.message);
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "bench", "flight", "interrupted");
         if (s.rests && s.exact)
             break;
-        sleep_until(f, now_ms() + 50);
+        sleep_until(f, measure_now_ms() + 50);
     }
     trip_frames_use_picture(f->frames, f->number, look, f);
-    *whole_ms = now_ms() - begun;
+    *whole_ms = measure_now_ms() - begun;
     return f->last ? 0 : trip_fail(TRIP_ERROR, "bench", "flight", "out of memory for a picture");
 }
 
@@ -177,19 +170,19 @@ static void want_step(flyer *f)
 {
     f->wanted.navigation = f->navigation[f->step_count];
     f->wanted.has_navigation = true;
-    f->wanted_ms[f->step_count++] = now_ms();
+    f->wanted_ms[f->step_count++] = measure_now_ms();
     trip_frames_want(f->frames, &f->wanted);
 }
 
 /* Steps come at fixed times, independent of the drawing thread. */
 static int move_all(flyer *f)
 {
-    f->begun_ms = now_ms();
+    f->begun_ms = measure_now_ms();
     while (f->step_count < f->steps) {
         const double next = f->begun_ms + f->step_count * 1e3 / FLYER_STEPS_PER_SECOND;
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "bench", "flight", "interrupted");
-        if (now_ms() >= next)
+        if (measure_now_ms() >= next)
             want_step(f);
         else
             sleep_until(f, next);

@@ -1,8 +1,8 @@
 /* Shows the progress of a table on one line of a terminal. A thread redraws the line four times a
  * second, so that the time advances also in long steps and timed code does no output. If stderr is
  * not a terminal, there is neither line nor thread, unless lines are requested. */
-#ifndef TRIP_BENCH_PROGRESS_H
-#define TRIP_BENCH_PROGRESS_H
+#ifndef TRIP_MEASURE_PROGRESS_LINE_H
+#define TRIP_MEASURE_PROGRESS_LINE_H
 
 typedef struct bench_progress bench_progress;
 

@@ -1,4 +1,4 @@
-#include "bench_progress.h"
+#include "progress_line.h"
 
 #include <pthread.h>
 #include <signal.h>

@@ -1,7 +1,7 @@
 /* Errors of pictures against reference pictures of the same views. A pixel counts if the object
  * covers it: alpha is above 1/255 in either picture. One thread. */
-#ifndef TRIP_ACCURACY_ERROR_H
-#define TRIP_ACCURACY_ERROR_H
+#ifndef TRIP_MEASURE_ERROR_H
+#define TRIP_MEASURE_ERROR_H
 
 #include <stddef.h>
 #include <stdint.h>
