@@ -2,9 +2,9 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #include "report.h"
+#include "times.h"
 #include "triptych_brick.h"
 
 int accuracy_contexts_create(accuracy_contexts *c, const accuracy_options *o)
@@ -89,13 +89,6 @@ int accuracy_contexts_look(accuracy_contexts *c, const accuracy_view *view)
     return status;
 }
 
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
 int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
                            const triptych_settings *settings, float *rgba, double *ms)
 {
@@ -104,9 +97,9 @@ int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
     if (status)
         return status;
     status = triptych_set_settings(t, settings);
-    double begin = now_ms();
+    double begin = measure_now_ms();
     if (!status)
         status = triptych_draw(t, rgba);
-    *ms = now_ms() - begin;
+    *ms = measure_now_ms() - begin;
     return status ? keep_why(c, data, renderer, t, status) : 0;
 }

@@ -3,10 +3,12 @@
 #include "bench.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "bench_sample.h"
 #include "bench_tables.h"
+#include "machine.h"
 #include "new_file.h"
 #include "read_files.h"
 
@@ -15,12 +17,13 @@ static const struct {
     int (*run)(const session *s, const bench_options *o, bench_report *r);
     /* Runs instead with an open scene. */
     int (*run_scene)(bench_scene *scene, const bench_options *o, bench_report *r);
+    bool from_disk;     /* the frames of the scene read from disk, not from memory */
     bool makes_volumes; /* makes its own volumes if no data set is named */
     bool opens;         /* opens the data set itself */
 } tables[] = {
     { .name = "orders", .run_scene = bench_orders },
     { .name = "submit", .run_scene = bench_submit },
-    { .name = "stream", .run = bench_stream },
+    { .name = "stream", .run_scene = bench_stream, .from_disk = true },
     { .name = "renderers", .run = bench_renderers },
     { .name = "popping", .run_scene = bench_popping },
     { .name = "levels", .run = bench_levels, .makes_volumes = true },
@@ -57,14 +60,6 @@ static void describe(const session *s, const bench_options *o, bool included, be
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }
 
-/* Joins the command line, cut if it is too long. */
-static void join(int argc, char **argv, char *text, size_t bytes)
-{
-    size_t used = (size_t)snprintf(text, bytes, "triptych");
-    for (int i = 0; i < argc && used < bytes; i++)
-        used += (size_t)snprintf(text + used, bytes - used, " %s", argv[i]);
-}
-
 /* Returns the index of the table, a valid name after parsing. */
 static size_t table_of(const bench_options *o)
 {
@@ -77,7 +72,7 @@ static size_t table_of(const bench_options *o)
 static int run_scene(size_t table, const session *s, const bench_options *o, bench_report *r)
 {
     bench_scene scene;
-    int status = bench_scene_open(&scene, s, o, r);
+    int status = bench_scene_open(&scene, s, o, tables[table].from_disk, r);
     if (!status)
         status = tables[table].run_scene(&scene, o, r);
     bench_scene_close(&scene);
@@ -144,21 +139,21 @@ static void print_tables(void)
 
 int trip_bench(int argc, char **argv)
 {
-    char command[4096];
+    char *command = measure_command_line(argc, argv);
     bench_options o;
     bench_report *report = NULL;
-    join(argc, argv, command, sizeof command);
     int status = bench_options_parse(&o, argc, argv);
     if (!status)
         status = check_plot(&o);
     if (!status && o.in_short && !o.json)
         print_tables();
     if (!status)
-        status = bench_report_create(&report, o.table, command);
+        status = bench_report_create(&report, o.table, command ? command : "");
     if (!status)
         status = measure(&o, report);
     if (!status)
         status = bench_report_print(report, o.json);
     bench_report_destroy(report);
+    free(command);
     return status;
 }

@@ -84,6 +84,11 @@ int bench_context_look(bench_context *c, const triptych_camera *camera)
     return check(c, triptych_set_view(c->t, &view));
 }
 
+int bench_context_picture(bench_context *c, int width, int height, float **rgba)
+{
+    return check(c, triptych_new_picture(c->t, width, height, 4, rgba));
+}
+
 int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba, double *ms)
 {
     bench_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");

@@ -25,6 +25,9 @@ int bench_context_find(bench_context *c, const triptych_view *view, triptych_cam
 /* Sets the view of *camera. */
 int bench_context_look(bench_context *c, const triptych_camera *camera);
 
+/* Creates a picture of 4 floats per pixel. It ends with the context, or earlier by
+ * triptych_release_picture(). */
+int bench_context_picture(bench_context *c, int width, int height, float **rgba);
 /* Draws the view into `rgba` (width * height * 4 floats). `lod_px` selects the levels, and each
  * pixel has samples * samples rays. The time of planning, drawing and merging is stored in *ms,
  * which may be NULL. */

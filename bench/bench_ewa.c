@@ -153,9 +153,9 @@ static int measure_view(pair *p, double fov, cJSON *rows)
     const int *size = p->options->sizes[0];
     const triptych_view view = { .width = size[0], .height = size[1], .fov_degrees = fov };
     accuracy_error *error = calloc(1, sizeof *error);
-    int status = error ? triptych_set_view(p->context.t, &view) : TRIP_ERROR;
-    if (status)
-        trip_report_line(error ? triptych_error(p->context.t) : "out of memory");
+    triptych_camera camera;
+    int status = error ? bench_context_find(&p->context, &view, &camera)
+                       : trip_fail(TRIP_ERROR, "bench", "ewa", "out of memory");
     if (!status)
         status = take_turns(p);
     if (!status) {
@@ -179,13 +179,11 @@ static int measure_pictures(pair *p, bench_report *r)
     int status = 0;
     for (int i = 0; i < 2 && !status; i++) {
         p->ms[i] = calloc((size_t)p->options->repeat, sizeof *p->ms[i]);
-        status = p->ms[i] ? triptych_new_picture(p->context.t, size[0], size[1], 4, &p->pictures[i])
-                          : TRIP_ERROR;
+        status = p->ms[i] ? bench_context_picture(&p->context, size[0], size[1], &p->pictures[i])
+                          : trip_fail(TRIP_ERROR, "bench", "ewa", "out of memory");
     }
-    if (status) {
-        trip_report_line(triptych_error(p->context.t));
+    if (status)
         return status;
-    }
     cJSON *rows = bench_report_table(
         r, "pictures",
         "Whole pictures by EWA, compared with the exact form; the object has the same size in each",
@@ -220,11 +218,8 @@ int bench_ewa(const session *s, const bench_options *o, bench_report *r)
         status = measure_pictures(&p, r);
     if (!status)
         add_limits(r);
-    for (int i = 0; i < 2; i++) {
-        if (p.context.t)
-            triptych_release_picture(p.context.t, p.pictures[i]);
+    for (int i = 0; i < 2; i++)
         free(p.ms[i]);
-    }
     bench_context_close(&p.context);
     return status;
 }

@@ -1,11 +1,11 @@
-#include "bench_finer.h"
+/* Times and errors of one object that is sampled more and more finely. Part of bench levels. */
+#include "bench_tables.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "bench_context.h"
-#include "bench_frame.h"
 #include "bench_sample.h"
 #include "error.h"
 #include "plot.h"
@@ -160,38 +160,19 @@ static void add_rows(const measuring *m, cJSON *rows)
 }
 
 /* Plots the times over the resolution. */
-static int plot(const cJSON *rows, const char *path)
+static int save_plot(const cJSON *rows, const char *path)
 {
     static const char *const names[MAX] = { "128\302\263", "256\302\263", "512\302\263",
                                             "1024\302\263" };
-    measure_point points[ENTRIES][MAX];
-    const int count = cJSON_GetArraySize(rows);
-    for (int i = 0; i < count; i++) {
-        const cJSON *row = cJSON_GetArrayItem(rows, i);
-        points[0][i] = (measure_point){ .x = i, .y = measure_number(row, "fine_ms") };
-        points[1][i] = (measure_point){ .x = i, .y = measure_number(row, "ms") };
-    }
-    const measure_series series[ENTRIES] = {
-        { .name = "finest level",
-          .colour = "#b03020",
-          .points = points[0],
-          .count = count,
-          .joined = count },
-        { .name = "coarse levels",
-          .colour = "#2050b0",
-          .points = points[1],
-          .count = count,
-          .joined = count },
-    };
-    return measure_plot_save(measure_plot_svg(&(measure_plot){ .width = 560,
-                                                               .height = 360,
-                                                               .x_title = "voxels",
-                                                               .y_title = "ms per frame",
-                                                               .names = names,
-                                                               .name_count = count,
-                                                               .series = series,
-                                                               .count = ENTRIES }),
-                             path);
+    static const measure_curve curves[] = { { "fine_ms", "finest level", "#b03020" },
+                                            { "ms", "coarse levels", "#2050b0" } };
+    const measure_plot plot = { .width = 560,
+                                .height = 360,
+                                .x_title = "voxels",
+                                .y_title = "ms per frame",
+                                .names = names,
+                                .name_count = cJSON_GetArraySize(rows) };
+    return measure_plot_save(measure_plot_rows(&plot, rows, curves, ENTRIES, MAX), path);
 }
 
 static void describe(const bench_options *o, bench_report *r)
@@ -224,7 +205,7 @@ static int report(const measuring *m, bench_report *r)
         bench_report_limit(
             r, "The gradient for full shading depends on the voxel size, so that finer volumes are "
                "shaded differently. --no-shading removes this part of the errors of colour.");
-    return m->options->plot ? plot(rows, m->options->plot) : 0;
+    return m->options->plot ? save_plot(rows, m->options->plot) : 0;
 }
 
 static int begin(measuring *m)

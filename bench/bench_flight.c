@@ -111,45 +111,27 @@ static int byte_of(float x)
     return x > 0 ? (x < 1 ? (int)(x * 255 + 0.5f) : 255) : 0;
 }
 
-static int draw_alone(const flying *m, triptych *t, int *differ)
-{
-    const bench_options *o = m->options;
-    const triptych_settings settings = triptych_default_settings();
-    const int width = o->sizes[0][0], height = o->sizes[0][1];
-    const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
-    float *rgba = NULL;
-    int status = triptych_open(t, o->input,
-                               &(triptych_resources){ .memory_bytes = o->memory_bytes,
-                                                      .threads = (unsigned)o->threads[0],
-                                                      .renderer = bench_context_renderer(o),
-                                                      .engine = (triptych_engine)o->engine });
-    if (!status)
-        status = triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = o->tf });
-    if (!status)
-        status = triptych_set_settings(t, &settings);
-    if (!status)
-        status = triptych_set_view(t, &view);
-    if (!status)
-        status = triptych_new_picture(t, width, height, 4, &rgba);
-    if (!status)
-        status = triptych_draw(t, rgba);
-    for (size_t i = 0; !status && i < (size_t)width * (size_t)height; i++)
-        for (size_t c = 0; c < 3; c++)
-            *differ += byte_of(rgba[4 * i + c]) != m->flyer.last[4 * i + c];
-    return status;
-}
-
 /* Counts the channels that differ between the picture at rest and the library's picture. */
 static int compare_rest(const flying *m, int *differ)
 {
-    triptych *t = NULL;
+    const int width = m->options->sizes[0][0], height = m->options->sizes[0][1];
+    const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
+    triptych_camera camera;
+    bench_context c;
+    float *rgba = NULL;
     *differ = 0;
-    if (triptych_create(&t))
-        return trip_fail(TRIP_ERROR, "bench", "flight", "out of memory");
-    int status = draw_alone(m, t, differ);
-    if (status)
-        trip_report_line(triptych_error(t));
-    triptych_destroy(t);
+    int status = bench_context_open(&c, m->options->input, m->options);
+    c.settings = triptych_default_settings();
+    if (!status)
+        status = bench_context_find(&c, &view, &camera);
+    if (!status)
+        status = bench_context_picture(&c, width, height, &rgba);
+    if (!status)
+        status = bench_context_draw(&c, c.settings.lod_px, c.settings.samples, rgba, NULL);
+    for (size_t i = 0; !status && i < (size_t)width * (size_t)height; i++)
+        for (size_t k = 0; k < 3; k++)
+            *differ += byte_of(rgba[4 * i + k]) != m->flyer.last[4 * i + k];
+    bench_context_close(&c);
     return status;
 }
 

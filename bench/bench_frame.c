@@ -11,16 +11,6 @@
 #include "splat.h"
 #include "times.h"
 
-uint64_t bench_splats_drawn(const trip_frame_stats *s)
-{
-    return s->all.splats_drawn;
-}
-
-uint64_t bench_splats_read(const trip_frame_stats *s)
-{
-    return s->all.splats_read;
-}
-
 const char *bench_classified(const trip_settings *settings)
 {
     return settings->classify == TRIP_CLASSIFY_POST          ? "post"
@@ -141,11 +131,12 @@ static int by_time(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-const bench_cost *bench_runs_sorted(bench_runs *r, int frame)
+/* Sorts the runs of a frame by time and returns the median, or the faster of two middle runs. */
+static const bench_cost *median(bench_runs *r, int frame)
 {
     bench_cost *costs = &r->costs[frame * r->repeat];
     qsort(costs, (size_t)r->repeat, sizeof *costs, by_time);
-    return costs;
+    return &costs[(r->repeat - 1) / 2];
 }
 
 /* Names the largest part of a frame and its share, for example "drawing 93 %". */
@@ -165,16 +156,23 @@ static void bound(const bench_cost *c, char text[48])
     snprintf(text, 48, "%s %.0f %%", parts[max].name, 100 * parts[max].ms / c->ms);
 }
 
-void bench_runs_describe(bench_runs *r, int frame, cJSON *row)
+void bench_runs_describe(bench_runs *r, int frame, int base, const bench_cost *counted, double kept,
+                         cJSON *row)
 {
     char text[48];
-    const bench_cost *runs = bench_runs_sorted(r, frame), *middle = &runs[(r->repeat - 1) / 2];
+    const bench_cost *middle = median(r, frame), *runs = &r->costs[frame * r->repeat];
+    const trip_list_stats *all = &counted->stats.all;
+    measure_add(row, { "splats_read", (double)all->splats_read },
+                { "splats_drawn", (double)all->splats_drawn });
+    if (kept > 0)
+        cJSON_AddNumberToObject(row, "multiple", (double)all->splats_drawn / kept);
     bound(middle, text);
     measure_add(row, { "ms", middle->ms }, { "ms_min", runs[0].ms },
                 { "ms_max", runs[r->repeat - 1].ms }, { "fps", 1e3 / middle->ms },
                 { "plan_ms", middle->plan_ms }, { "wait_ms", middle->wait_ms },
                 { "draw_ms", middle->draw_ms }, { "merge_ms", middle->merge_ms });
     cJSON_AddStringToObject(row, "bound_by", text);
+    cJSON_AddNumberToObject(row, "speed", median(r, base)->ms / middle->ms);
 }
 
 /* Keeps the last reported line instead of printing it. An interruption is printed, because it ends
@@ -217,29 +215,27 @@ void bench_renderer_destroy(trip_renderer *r)
         r->ops->destroy(r);
 }
 
-void bench_describe_frame(const bench_frame *f, bench_report *r)
-{
-    measure_describe_renderer(r->machine, f->renderer->ops->name,
-                              f->renderer->ops->device(f->renderer),
-                              trip_reader_engine_name(f->reader));
-}
-
-int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bench_report *r)
+int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bool from_disk,
+                     bench_report *r)
 {
     char why[256];
     *b = (bench_scene){ .frame = { .session = s, .settings = o->settings, .progress = o->progress },
                         .size = { o->sizes[0][0], o->sizes[0][1] } };
     bench_frame *f = &b->frame;
+    f->occluder = from_disk && !o->draw_occluded ? &b->occluder : NULL;
     int status = session_take_image(s, b->size[0], b->size[1], &f->rgba);
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
     bench_progress_expect(o->progress, 1);
-    bench_progress_step(o->progress, "data set to memory");
+    bench_progress_step(o->progress, from_disk ? "data set" : "data set to memory");
     if (!status)
-        status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, f->renderer, NULL);
+        status = bench_reader_create(s, &f->reader, o, from_disk ? o->engine : TRIP_ENGINE_NULL,
+                                     f->renderer, f->occluder);
     if (status)
         return status;
-    bench_describe_frame(f, r);
+    measure_describe_renderer(r->machine, f->renderer->ops->name,
+                              f->renderer->ops->device(f->renderer),
+                              trip_reader_engine_name(f->reader));
     if (o->threads[0])
         cJSON_AddNumberToObject(r->machine, "threads", o->threads[0]);
     return 0;

@@ -7,7 +7,6 @@
 #include <stdlib.h>
 
 #include "bench_context.h"
-#include "bench_finer.h"
 #include "error.h"
 #include "report.h"
 
@@ -107,12 +106,10 @@ static int measure_view(measuring *m, int view, unsigned level, entry *e)
     e->width = camera.width;
     if (camera.width > MAX_TRUTH_PX / samples_of(level))
         return TOO_LARGE;
-    status = triptych_new_picture(m->context.t, e->width, e->width, 4, &truth);
+    status = bench_context_picture(&m->context, e->width, e->width, &truth);
     if (!status)
-        status = triptych_new_picture(m->context.t, e->width, e->width, 4, &rgba);
-    if (status)
-        trip_report_line(triptych_error(m->context.t));
-    else
+        status = bench_context_picture(&m->context, e->width, e->width, &rgba);
+    if (!status)
         status = draw_and_compare(m, level, e, truth, rgba);
     triptych_release_picture(m->context.t, truth);
     triptych_release_picture(m->context.t, rgba);
@@ -257,13 +254,11 @@ static int measure_dolly(measuring *m)
     float *pictures[2] = { NULL, NULL };
     int status = find_start(m, &from);
     for (int i = 0; i < 2 && !status; i++)
-        status = triptych_new_picture(m->context.t, DOLLY_PX, DOLLY_PX, 4, &pictures[i]);
+        status = bench_context_picture(&m->context, DOLLY_PX, DOLLY_PX, &pictures[i]);
     if (!status)
         status = dolly(m, &from, 0, pictures, &finest);
     if (!status)
         status = dolly(m, &from, 1, pictures, &coarse);
-    for (int i = 0; i < 2; i++)
-        triptych_release_picture(m->context.t, pictures[i]);
     if (status)
         return status;
     add_dolly(table, "finest", &finest, &finest);

@@ -64,19 +64,11 @@ static const measure_column columns[] = {
 static void add_row(cJSON *rows, bench_runs *runs, const bench_cost counted[METHODS], int view,
                     int method, double kept)
 {
-    const bench_cost *axis = &bench_runs_sorted(runs, AXIS)[(runs->repeat - 1) / 2];
-    const bench_cost *own = &bench_runs_sorted(runs, method)[(runs->repeat - 1) / 2];
-    double drawn = (double)bench_splats_drawn(&counted[method].stats);
     cJSON *row = measure_new_row(rows);
     cJSON_AddStringToObject(row, "method", methods[method].name);
     if (methods[method].method == TRIP_METHOD_MERGE)
         cJSON_AddNumberToObject(row, "h", methods[method].h);
-    measure_add(row, { "splats_read", (double)bench_splats_read(&counted[method].stats) },
-                { "splats_drawn", drawn });
-    if (kept > 0)
-        cJSON_AddNumberToObject(row, "multiple", drawn / kept);
-    bench_runs_describe(runs, method, row);
-    cJSON_AddNumberToObject(row, "speed", axis->ms / own->ms);
+    bench_runs_describe(runs, method, AXIS, &counted[method], kept, row);
     if (method >= IN_PAPER)
         return;
     measure_add(row, { "paper_splats", paper[view][method].splats },

@@ -103,7 +103,7 @@ static int measure_load(bench_frame frame, load *out)
     bench_cost cost;
     bench_probe probe = bench_probe_make(SAMPLE_EVERY);
     int status = bench_frame_draw(&frame, true, &cost);
-    out->splats = (double)bench_splats_drawn(&cost.stats);
+    out->splats = (double)cost.stats.all.splats_drawn;
     frame.renderer = &probe.base;
     if (!status)
         status = bench_frame_draw(&frame, false, &cost);

@@ -76,21 +76,12 @@ static const measure_column columns[] = {
 static void add_row(cJSON *rows, bench_runs *runs, const bench_frame *frame,
                     const bench_cost *counted, int form)
 {
-    double kept = (double)frame->session->data->header.kept;
     cJSON *row = measure_new_row(rows);
     cJSON_AddStringToObject(row, "lists", forms[form].lists);
     cJSON_AddStringToObject(row, "primitives", forms[form].primitives);
     cJSON_AddStringToObject(row, "orders", forms[form].orders);
-    if (frame->renderer) {
-        const bench_cost *first = &bench_runs_sorted(runs, 0)[(runs->repeat - 1) / 2];
-        const bench_cost *own = &bench_runs_sorted(runs, form)[(runs->repeat - 1) / 2];
-        double drawn = (double)bench_splats_drawn(&counted->stats);
-        cJSON_AddNumberToObject(row, "splats_drawn", drawn);
-        if (kept > 0)
-            cJSON_AddNumberToObject(row, "multiple", drawn / kept);
-        bench_runs_describe(runs, form, row);
-        cJSON_AddNumberToObject(row, "speed", first->ms / own->ms);
-    }
+    if (frame->renderer)
+        bench_runs_describe(runs, form, 0, counted, (double)frame->session->data->header.kept, row);
     for (int i = 0; i < PAPER_SETS; i++)
         if (forms[form].paper_fps[i] > 0)
             cJSON_AddNumberToObject(row, paper_keys[i],

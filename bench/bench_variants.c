@@ -2,11 +2,11 @@
  * image-aligned sheets, with the reference renderer. */
 #include "bench_tables.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bench_view.h"
+#include "error.h"
 #include "normalise.h"
 #include "report.h"
 
@@ -33,31 +33,9 @@ static const measure_column columns[] = {
     { "max", "max", 1, 0 },   { "ms", "ms", 0, 0 },
 };
 
-static int ascending(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-/* Compares the components of the pixels that either picture covers. `apart` is scratch memory for a
- * picture. */
-static void compare(const float *a, const float *b, size_t pixels, float *apart, cJSON *row)
-{
-    size_t count = 0;
-    double sum = 0;
-    for (size_t i = 0; i < 4 * pixels; i++)
-        if (a[i | 3] > 1.0F / 255 || b[i | 3] > 1.0F / 255)
-            sum += (double)(apart[count++] = fabsf(a[i] - b[i]));
-    qsort(apart, count, sizeof *apart, ascending);
-    const bool some = count > 0;
-    measure_add(row, { "mean", some ? 255 * sum / (double)count : 0 },
-                { "percentile_99", some ? 255 * (double)apart[(count - 1) * 99 / 100] : 0 },
-                { "max", some ? 255 * (double)apart[count - 1] : 0 });
-}
-
 /* `defaults` keeps the picture of the first form. */
-static int measure(bench_frame *frame, const bench_options *o, float *defaults, float *apart,
-                   bench_report *r)
+static int measure(bench_frame *frame, const bench_options *o, float *defaults,
+                   accuracy_error *error, bench_report *r)
 {
     static const double none[4] = { 0 };
     const size_t pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1];
@@ -82,8 +60,11 @@ static int measure(bench_frame *frame, const bench_options *o, float *defaults, 
             memcpy(defaults, frame->rgba, 4 * pixels * sizeof *defaults);
         cJSON *row = measure_new_row(rows);
         cJSON_AddStringToObject(row, "form", variants[i].name);
-        compare(defaults, frame->rgba, pixels, apart, row);
-        cJSON_AddNumberToObject(row, "ms", cost.ms);
+        *error = (accuracy_error){ 0 };
+        accuracy_error_add(error, frame->rgba, defaults, pixels);
+        const accuracy_error_figures figures = accuracy_error_measure(error);
+        measure_add(row, { "mean", figures.mean }, { "percentile_99", figures.percentile_99 },
+                    { "max", figures.max }, { "ms", cost.ms });
     }
     return status;
 }
@@ -103,15 +84,16 @@ int bench_variants(bench_scene *scene, const bench_options *o, bench_report *r)
 {
     trip_budget *budget = scene->frame.session->budget;
     const size_t bytes = 4 * (size_t)scene->size[0] * (size_t)scene->size[1] * sizeof(float);
-    float *defaults = trip_budget_take(budget, bytes), *apart = trip_budget_take(budget, bytes);
+    float *defaults = trip_budget_take(budget, bytes);
+    accuracy_error *error = malloc(sizeof *error);
     bench_progress_expect(o->progress, VARIANTS);
     add_limits(r);
-    int status = defaults && apart
-                     ? measure(&scene->frame, o, defaults, apart, r)
+    int status = defaults && error
+                     ? measure(&scene->frame, o, defaults, error, r)
                      : trip_fail(TRIP_ERROR, "bench", "variants",
-                                 "two more pictures do not fit the memory; raise --memory or "
+                                 "another picture does not fit the memory; raise --memory or "
                                  "reduce --size");
     trip_budget_release(budget, defaults, bytes);
-    trip_budget_release(budget, apart, bytes);
+    free(error);
     return status;
 }

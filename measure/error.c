@@ -34,7 +34,7 @@ static double percentile(const accuracy_error *e, double share)
     for (size_t i = 0; i < ACCURACY_ERROR_BINS; i++) {
         below += e->bins[i];
         if ((double)below >= share * (double)e->count)
-            return (double)i / ACCURACY_ERROR_BINS_PER_LEVEL;
+            return fmin((double)i / ACCURACY_ERROR_BINS_PER_LEVEL, e->max);
     }
     return e->max;
 }

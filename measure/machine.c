@@ -6,6 +6,7 @@
 #include <sys/utsname.h>
 
 #include "budget.h"
+#include "text.h"
 
 static void cpu_model(char *text, size_t bytes, const struct utsname *system)
 {
@@ -22,6 +23,22 @@ static void cpu_model(char *text, size_t bytes, const struct utsname *system)
     }
     if (f)
         fclose(f);
+}
+
+char *measure_command_line(int argc, char **argv)
+{
+    char *text = NULL;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    if (!f)
+        return NULL;
+    fputs("triptych", f);
+    for (int i = 0; i < argc; i++) {
+        fputc(' ', f);
+        trip_text_write_word(f, argv[i]);
+    }
+    fclose(f);
+    return text;
 }
 
 void measure_describe_machine(cJSON *machine)

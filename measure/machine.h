@@ -1,8 +1,12 @@
-/* The machine on which figures were measured, as JSON. Any thread. */
+/* The command and the machine by which figures were measured. Any thread. */
 #ifndef TRIP_MEASURE_MACHINE_H
 #define TRIP_MEASURE_MACHINE_H
 
 #include <cjson/cJSON.h>
+
+/* Joins "triptych" and the arguments as shell words, for free(). Returns NULL if memory is
+ * exhausted. */
+char *measure_command_line(int argc, char **argv);
 
 /* Adds the processor, the number of cores that this process may use, free memory and kernel. */
 void measure_describe_machine(cJSON *machine);

@@ -147,7 +147,7 @@ static void draw_line(drawing *d, const measure_series *s)
     double last_x = 0, last_y = 0;
     fprintf(d->f, "<path fill='none' stroke='%s' stroke-width='%g' d='", s->colour,
             s->steps ? 1.2 : 2);
-    for (int i = 0; i < s->joined; i++) {
+    for (int i = 0; i < s->joined && i < s->count; i++) {
         const double x = x_of(d, s->points[i].x), y = y_of(d, s->points[i].y);
         fprintf(d->f, i == 0 ? "M%.1f %.1f" : s->steps ? " H%.1f V%.1f" : " L%.1f %.1f", x, y);
         if (i > 0 && s->steps) {
@@ -295,6 +295,31 @@ char *measure_plot_svg(const measure_plot *p)
         return svg;
     free(svg);
     return NULL;
+}
+
+char *measure_plot_rows(const measure_plot *p, const cJSON *rows, const measure_curve *curves,
+                        int count, int joined)
+{
+    measure_plot plot = *p;
+    measure_series *series = calloc((size_t)count, sizeof *series);
+    measure_point *points = calloc((size_t)count * (size_t)p->name_count, sizeof *points);
+    for (int c = 0; series && points && c < count; c++) {
+        measure_point *own = &points[c * p->name_count];
+        const cJSON *row = rows->child;
+        for (int i = 0; i < p->name_count; i++, row = row->next)
+            own[i] = (measure_point){ .x = i, .y = measure_number(row, curves[c].key) };
+        series[c] = (measure_series){ .name = curves[c].name,
+                                      .colour = curves[c].colour,
+                                      .points = own,
+                                      .count = p->name_count,
+                                      .joined = joined };
+    }
+    plot.series = series;
+    plot.count = count;
+    char *svg = series && points ? measure_plot_svg(&plot) : NULL;
+    free(series);
+    free(points);
+    return svg;
 }
 
 int measure_plot_save(char *svg, const char *path)

@@ -2,6 +2,7 @@
 #ifndef TRIP_MEASURE_PLOT_H
 #define TRIP_MEASURE_PLOT_H
 
+#include <cjson/cJSON.h>
 #include <stdbool.h>
 
 typedef struct measure_point {
@@ -33,6 +34,15 @@ typedef struct measure_plot {
 
 /* Returns the plot as SVG, for free(). Returns NULL if memory is exhausted. */
 char *measure_plot_svg(const measure_plot *p);
+/* A series of the numbers of a key, one for each row of a table. */
+typedef struct measure_curve {
+    const char *key, *name, *colour;
+} measure_curve;
+
+/* Plots curves over the names of *p, one name for each row. Lines join the first `joined` points.
+ * Takes everything but the series from *p. Returns SVG as measure_plot_svg() does. */
+char *measure_plot_rows(const measure_plot *p, const cJSON *rows, const measure_curve *curves,
+                        int count, int joined);
 /* Writes SVG from measure_plot_svg() into a new file, and frees it. */
 int measure_plot_save(char *svg, const char *path);
 

@@ -122,36 +122,19 @@ int measure_popping_all(measure_popping_draw *draw, void *user, const float *rgb
 
 char *measure_popping_svg(const cJSON *rows)
 {
-    static const struct {
-        const char *key, *name, *colour;
-    } curves[] = { { "max", "max", "#b03020" },
-                   { "percentile_99", "99 %", "#c08010" },
-                   { "mean", "mean", "#2050b0" },
-                   { "motion", "motion", "#777" } };
-    enum { CURVES = sizeof curves / sizeof *curves, SETTINGS = MEASURE_POPPING_SETTINGS };
-    measure_point points[CURVES][SETTINGS];
-    measure_series series[CURVES];
-    const char *names[SETTINGS];
-    const int count = cJSON_GetArraySize(rows);
-    for (int c = 0; c < CURVES; c++) {
-        const cJSON *row = rows->child;
-        for (int i = 0; i < count; i++, row = row->next) {
-            points[c][i] = (measure_point){ .x = i, .y = measure_number(row, curves[c].key) };
-            names[i] = measure_popping_settings[i].label;
-        }
-        series[c] = (measure_series){ .name = curves[c].name,
-                                      .colour = curves[c].colour,
-                                      .points = points[c],
-                                      .count = count,
-                                      .joined = MERGES };
-    }
-    return measure_plot_svg(&(measure_plot){ .width = 620,
-                                             .height = 380,
-                                             .x_title = "merge by h, then the other methods",
-                                             .y_title = "change beyond the motion, of 255",
-                                             .names = names,
-                                             .name_count = count,
-                                             .y_min = 0.01,
-                                             .series = series,
-                                             .count = CURVES });
+    static const measure_curve curves[] = { { "max", "max", "#b03020" },
+                                            { "percentile_99", "99 %", "#c08010" },
+                                            { "mean", "mean", "#2050b0" },
+                                            { "motion", "motion", "#777" } };
+    const char *names[MEASURE_POPPING_SETTINGS];
+    for (int i = 0; i < MEASURE_POPPING_SETTINGS; i++)
+        names[i] = measure_popping_settings[i].label;
+    const measure_plot plot = { .width = 620,
+                                .height = 380,
+                                .x_title = "merge by h, then the other methods",
+                                .y_title = "change beyond the motion, of 255",
+                                .names = names,
+                                .name_count = cJSON_GetArraySize(rows),
+                                .y_min = 0.01 };
+    return measure_plot_rows(&plot, rows, curves, sizeof curves / sizeof *curves, MERGES);
 }
