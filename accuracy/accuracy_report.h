@@ -35,9 +35,8 @@ int accuracy_report_make(accuracy_report *r, const accuracy_measured *m, const c
 void accuracy_report_free(accuracy_report *r);
 int accuracy_report_write(const accuracy_report *r, const char *folder);
 
-/* Returns whether a row of `rows` has settings and is on the Pareto front of time and error: no
- * other settings beat it in one without being worse in the other. `error` is the key of the error.
- */
+/* Returns whether a row of `rows` has settings on the Pareto front of time and error. No other
+ * settings are better in one without being worse in the other. `error` is the key of the error. */
 bool accuracy_is_on_front(const cJSON *rows, const cJSON *row, const char *error);
 
 /* Makes accuracy.json without "front". */

@@ -52,8 +52,9 @@ typedef struct bench_runs {
 /* Draws all frames once, then again, `repeat` times in total. */
 int bench_runs_take(bench_runs *r, const bench_frame *frames, int count, int repeat);
 void bench_runs_free(bench_runs *r);
-/* Adds the counts of an untimed frame; ms, ms_min, ms_max, fps and the parts of the median run; the
- * largest part; and the speed relative to the frame `base`. `kept` is the number of kept voxels. */
+/* Adds the counts of an untimed frame, then ms, ms_min, ms_max, fps and the parts of the median
+ * run. Adds its largest part, and its speed relative to the frame `base`. `kept` is the number of
+ * kept voxels. */
 void bench_runs_describe(bench_runs *r, int frame, int base, const bench_cost *counted, double kept,
                          cJSON *row);
 

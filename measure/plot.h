@@ -24,7 +24,7 @@ typedef struct measure_series {
 typedef struct measure_plot {
     int width, height; /* in pixels */
     const char *x_title, *y_title;
-    /* x is an index of these names. NULL makes x logarithmic. */
+    /* These names are along x, which counts them. NULL makes x logarithmic. */
     const char *const *names;
     int name_count;
     double y_min; /* smaller y are drawn here; 0 for none */
