@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "clock.h"
 #include "report.h"
-#include "times.h"
 #include "triptych_brick.h"
 
 int accuracy_contexts_create(accuracy_contexts *c, const accuracy_options *o)
@@ -97,9 +97,9 @@ int accuracy_contexts_draw(accuracy_contexts *c, int data, int renderer,
     if (status)
         return status;
     status = triptych_set_settings(t, settings);
-    double begin = measure_now_ms();
+    double begin = trip_now_ms();
     if (!status)
         status = triptych_draw(t, rgba);
-    *ms = measure_now_ms() - begin;
+    *ms = trip_now_ms() - begin;
     return status ? keep_why(c, data, renderer, t, status) : 0;
 }

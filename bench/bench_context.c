@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "clock.h"
 #include "report.h"
-#include "times.h"
 
 /* Reports the error of the context if a call failed. */
 static int check(const bench_context *c, int status)
@@ -95,11 +95,11 @@ int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba
     c->settings.lod_px = lod_px;
     c->settings.samples = samples;
     int status = triptych_set_settings(c->t, &c->settings);
-    const double start = measure_now_ms();
+    const double start = trip_now_ms();
     if (!status)
         status = triptych_draw(c->t, rgba);
     if (ms)
-        *ms = measure_now_ms() - start;
+        *ms = trip_now_ms() - start;
     return check(c, status);
 }
 

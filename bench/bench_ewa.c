@@ -10,7 +10,7 @@
 #include "error.h"
 #include "report.h"
 #include "splat.h"
-#include "times.h"
+#include "median.h"
 
 #define PI 3.14159265358979323846
 

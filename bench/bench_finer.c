@@ -10,7 +10,7 @@
 #include "error.h"
 #include "plot.h"
 #include "report.h"
-#include "times.h"
+#include "median.h"
 
 /* Voxels along each axis of the first volume; maximum number of volumes. */
 enum { COARSEST = 128, MAX = 4, TRUTH_SAMPLES = 4, ENTRIES = 2 };

@@ -10,7 +10,7 @@
 #include "budget.h"
 #include "flyer.h"
 #include "report.h"
-#include "times.h"
+#include "median.h"
 
 typedef struct flying {
     const bench_options *options;

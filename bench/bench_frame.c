@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clock.h"
 #include "cpu/cpu_renderer.h"
 #include "machine.h"
 #include "report.h"
 #include "sheet_samples.h"
 #include "splat.h"
-#include "times.h"
 
 const char *bench_classified(const trip_settings *settings)
 {
@@ -68,12 +68,12 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         settings.sprite_px = sprite_px(f->session->data, camera, &settings);
     if (f->occluder)
         *f->occluder = count ? NULL : f->renderer;
-    double start = measure_now_ms();
+    double start = trip_now_ms();
     int status = trip_plan_make_next(&plan, f->session->data, camera, &settings, f->session->table,
                                      session_classified(f->session, 0), NULL, f->session->budget);
     if (status)
         return status;
-    double planned = measure_now_ms();
+    double planned = trip_now_ms();
     trip_frame frame = {
         .data = f->session->data,
         .camera = camera,
@@ -83,7 +83,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         .count = count,
     };
     status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, NULL, &cost->stats);
-    cost->ms = measure_now_ms() - start;
+    cost->ms = trip_now_ms() - start;
     cost->plan_ms = planned - start;
     cost->wait_ms = cost->stats.read_ms;
     cost->draw_ms = cost->stats.draw_ms;

@@ -9,7 +9,7 @@
 #include "bench_probe.h"
 #include "bench_view.h"
 #include "report.h"
-#include "times.h"
+#include "median.h"
 
 enum { MAX_CONTENDERS = BENCH_LIST_MAX * BENCH_LIST_MAX, SAMPLE_EVERY = 16 };
 

@@ -3,9 +3,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
+#include "clock.h"
 #include "report.h"
-#include "times.h"
 
 /* Called by the drawing thread. */
 static void wake(void *user)
@@ -124,7 +125,7 @@ static void look(void *user, const trip_picture *p)
 static void note_picture(void *user, const trip_picture *p)
 {
     flyer *f = user;
-    const double ms = measure_now_ms();
+    const double ms = trip_now_ms();
     const int step = step_of(f, &p->navigation);
     look(f, p); /* also keeps the picture of the last step */
     if (step < 0 || !has_room(f))
@@ -145,24 +146,24 @@ static void note_picture(void *user, const trip_picture *p)
  * complete one. */
 static int await_rest(flyer *f, double *first_ms, double *whole_ms)
 {
-    const double begun = measure_now_ms();
+    const double begun = trip_now_ms();
     const uint64_t number = f->number;
     *first_ms = 0;
     for (;;) {
         const trip_frames_status s = trip_frames_get_status(f->frames);
         trip_frames_use_picture(f->frames, f->number, look, f);
         if (*first_ms == 0 && f->number != number)
-            *first_ms = measure_now_ms() - begun;
+            *first_ms = trip_now_ms() - begun;
         if (s.failed)
             return trip_fail(TRIP_ERROR, "bench", f->wanted.input, "%s", s.message);
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "bench", "flight", "interrupted");
         if (s.rests && s.exact)
             break;
-        sleep_until(f, measure_now_ms() + 50);
+        sleep_until(f, trip_now_ms() + 50);
     }
     trip_frames_use_picture(f->frames, f->number, look, f);
-    *whole_ms = measure_now_ms() - begun;
+    *whole_ms = trip_now_ms() - begun;
     return f->last ? 0 : trip_fail(TRIP_ERROR, "bench", "flight", "out of memory for a picture");
 }
 
@@ -170,19 +171,19 @@ static void want_step(flyer *f)
 {
     f->wanted.navigation = f->navigation[f->step_count];
     f->wanted.has_navigation = true;
-    f->wanted_ms[f->step_count++] = measure_now_ms();
+    f->wanted_ms[f->step_count++] = trip_now_ms();
     trip_frames_want(f->frames, &f->wanted);
 }
 
 /* Steps come at fixed times, independent of the drawing thread. */
 static int move_all(flyer *f)
 {
-    f->begun_ms = measure_now_ms();
+    f->begun_ms = trip_now_ms();
     while (f->step_count < f->steps) {
         const double next = f->begun_ms + f->step_count * 1e3 / FLYER_STEPS_PER_SECOND;
         if (trip_interrupted())
             return trip_fail(TRIP_INTERRUPTED, "bench", "flight", "interrupted");
-        if (measure_now_ms() >= next)
+        if (trip_now_ms() >= next)
             want_step(f);
         else
             sleep_until(f, next);

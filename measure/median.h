@@ -1,9 +1,7 @@
-/* Times in milliseconds and their medians. Any thread. */
-#ifndef TRIP_MEASURE_TIMES_H
-#define TRIP_MEASURE_TIMES_H
+/* Medians of times and other figures. Any thread. */
+#ifndef TRIP_MEASURE_MEDIAN_H
+#define TRIP_MEASURE_MEDIAN_H
 
-/* Returns the time of the monotonic clock. */
-double measure_now_ms(void);
 /* Sorts values in ascending order. */
 void measure_sort(double *values, int count);
 /* Sorts the values and returns the median, or the lower of two middle values. */

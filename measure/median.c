@@ -1,15 +1,7 @@
-#include "times.h"
+#include "median.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <time.h>
-
-double measure_now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 static int ascending(const void *a, const void *b)
 {
