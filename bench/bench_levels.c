@@ -29,6 +29,7 @@ typedef struct measuring {
     bench_context context;
     double voxel; /* width in world units */
     unsigned levels;
+    int width; /* of the picture of a level */
     bench_report *report;
 } measuring;
 
@@ -37,13 +38,12 @@ typedef struct measuring {
 /* settings.lod_px that selects the level with voxels one pixel wide. */
 static const double level_px = 1.0001;
 
-/* The errors of a level, summed over views. */
+/* The errors of colour and alpha of a level, summed over views. */
 typedef struct entry {
-    accuracy_error colour, alpha;           /* with one ray per pixel */
-    accuracy_error own_colour, own_alpha;   /* with as many rays as the reference */
-    accuracy_error fine_colour, fine_alpha; /* finest level at this size, with one ray per pixel */
-    double ms, fine_ms;                     /* sums over the views */
-    int width;
+    accuracy_error drawn[2]; /* with one ray per pixel */
+    accuracy_error own[2];   /* with as many rays as the reference */
+    accuracy_error fine[2];  /* finest level at this size, with one ray per pixel */
+    double ms, fine_ms;      /* sums over the views */
 } entry;
 
 /* Sets a parallel view of the whole object, with voxels of a level one pixel wide. */
@@ -68,31 +68,20 @@ static int samples_of(unsigned level)
     return (1 << level) > MIN_SAMPLES ? 1 << level : MIN_SAMPLES;
 }
 
-static int draw_and_compare(measuring *m, unsigned level, entry *e, float *truth, float *rgba)
+/* Draws the view and adds its errors. With `ms`, adds the time of a second frame. */
+static int draw_and_compare(measuring *m, double lod_px, int samples, const float *truth,
+                            float *rgba, double *ms, accuracy_error errors[2])
 {
-    const size_t pixels = (size_t)e->width * (size_t)e->width;
-    double ms = 0, fine_ms = 0;
-    int status = bench_context_draw(&m->context, 0, samples_of(level), truth, NULL);
+    const size_t pixels = (size_t)m->width * (size_t)m->width;
+    double own_ms;
+    int status = bench_context_draw(&m->context, lod_px, samples, rgba, NULL);
+    if (!status && ms)
+        status = bench_context_draw(&m->context, lod_px, samples, rgba, &own_ms);
     if (!status)
-        status = bench_context_draw(&m->context, 0, 1, rgba, NULL);
-    if (!status)
-        status = bench_context_draw(&m->context, 0, 1, rgba, &fine_ms);
-    if (status)
-        return status;
-    accuracy_error_add_apart(&e->fine_colour, &e->fine_alpha, rgba, truth, pixels);
-    status = bench_context_draw(&m->context, level_px, samples_of(level), rgba, NULL);
-    if (status)
-        return status;
-    accuracy_error_add_apart(&e->own_colour, &e->own_alpha, rgba, truth, pixels);
-    status = bench_context_draw(&m->context, level_px, 1, rgba, NULL);
-    if (!status)
-        status = bench_context_draw(&m->context, level_px, 1, rgba, &ms);
-    if (status)
-        return status;
-    accuracy_error_add_apart(&e->colour, &e->alpha, rgba, truth, pixels);
-    e->ms += ms;
-    e->fine_ms += fine_ms;
-    return 0;
+        accuracy_error_add_apart(&errors[0], &errors[1], rgba, truth, pixels);
+    if (!status && ms)
+        *ms += own_ms;
+    return status;
 }
 
 /* Returns TOO_LARGE if the reference would be too large. */
@@ -103,14 +92,20 @@ static int measure_view(measuring *m, int view, unsigned level, entry *e)
     int status = look_at(m, view, level, &camera);
     if (status)
         return status;
-    e->width = camera.width;
+    m->width = camera.width;
     if (camera.width > MAX_TRUTH_PX / samples_of(level))
         return TOO_LARGE;
-    status = bench_context_picture(&m->context, e->width, e->width, &truth);
+    status = bench_context_picture(&m->context, m->width, m->width, &truth);
     if (!status)
-        status = bench_context_picture(&m->context, e->width, e->width, &rgba);
+        status = bench_context_picture(&m->context, m->width, m->width, &rgba);
     if (!status)
-        status = draw_and_compare(m, level, e, truth, rgba);
+        status = bench_context_draw(&m->context, 0, samples_of(level), truth, NULL);
+    if (!status)
+        status = draw_and_compare(m, 0, 1, truth, rgba, &e->fine_ms, e->fine);
+    if (!status)
+        status = draw_and_compare(m, level_px, samples_of(level), truth, rgba, NULL, e->own);
+    if (!status)
+        status = draw_and_compare(m, level_px, 1, truth, rgba, &e->ms, e->drawn);
     triptych_release_picture(m->context.t, truth);
     triptych_release_picture(m->context.t, rgba);
     return status;
@@ -133,16 +128,16 @@ static const measure_column level_columns[] = {
 
 static void add_level(const measuring *m, cJSON *table, unsigned level, const entry *e)
 {
-    const accuracy_error_figures colour = accuracy_error_measure(&e->colour);
-    const accuracy_error_figures alpha = accuracy_error_measure(&e->alpha);
+    const accuracy_error_figures colour = accuracy_error_measure(&e->drawn[0]);
+    const accuracy_error_figures alpha = accuracy_error_measure(&e->drawn[1]);
     cJSON *row = measure_new_row(table);
-    measure_add(row, { "level", level }, { "width", e->width }, { "colour_mean", colour.mean },
+    measure_add(row, { "level", level }, { "width", m->width }, { "colour_mean", colour.mean },
                 { "colour_99", colour.percentile_99 }, { "alpha_mean", alpha.mean },
                 { "alpha_99", alpha.percentile_99 }, { "ms", e->ms / m->options->views },
-                { "own_colour_mean", accuracy_error_measure(&e->own_colour).mean },
-                { "own_alpha_mean", accuracy_error_measure(&e->own_alpha).mean },
-                { "fine_colour_mean", accuracy_error_measure(&e->fine_colour).mean },
-                { "fine_alpha_mean", accuracy_error_measure(&e->fine_alpha).mean },
+                { "own_colour_mean", accuracy_error_measure(&e->own[0]).mean },
+                { "own_alpha_mean", accuracy_error_measure(&e->own[1]).mean },
+                { "fine_colour_mean", accuracy_error_measure(&e->fine[0]).mean },
+                { "fine_alpha_mean", accuracy_error_measure(&e->fine[1]).mean },
                 { "fine_ms", e->fine_ms / m->options->views });
 }
 
