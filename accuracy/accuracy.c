@@ -10,7 +10,7 @@
 #include "measure.h"
 #include "report.h"
 #include "accuracy_report.h"
-#include "text.h"
+#include "machine.h"
 
 static int print_settings(void)
 {
@@ -28,23 +28,6 @@ static int print_settings(void)
                accuracy_poppings[i].name,
                accuracy_poppings[i].classify == TRIPTYCH_CLASSIFY_POST ? "post" : "pre");
     return 0;
-}
-
-/* Joins the command line; the caller frees it. */
-static char *join(int argc, char **argv)
-{
-    char *text = NULL;
-    size_t bytes;
-    FILE *f = open_memstream(&text, &bytes);
-    if (!f)
-        return NULL;
-    fputs("triptych", f);
-    for (int i = 0; i < argc; i++) {
-        fputc(' ', f);
-        trip_text_write_word(f, argv[i]);
-    }
-    fclose(f);
-    return text;
 }
 
 static int measure(const accuracy_options *o, accuracy_folder *folder, const char *command)
@@ -66,6 +49,8 @@ static int measure(const accuracy_options *o, accuracy_folder *folder, const cha
         accuracy_report_print(stdout, &r);
     }
     accuracy_report_free(&r);
+    for (int i = 0; i < m.popping_count; i++)
+        cJSON_Delete(m.popping[i].rows);
     accuracy_measured_free(&m);
     return status;
 }
@@ -74,7 +59,7 @@ int trip_accuracy(int argc, char **argv)
 {
     accuracy_options o;
     accuracy_folder folder = { 0 };
-    char *command = join(argc, argv), *output = NULL;
+    char *command = measure_command_line(argc, argv), *output = NULL;
     int status = accuracy_options_parse(&o, argc, argv);
     if (!status && o.list) {
         free(command);

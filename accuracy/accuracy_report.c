@@ -2,44 +2,25 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
+#include "json.h"
 #include "new_file.h"
 #include "report.h"
+#include "text.h"
 
-const char *const accuracy_step_names[ACCURACY_STEPS] = { "total",  "storage", "model",
-                                                          "method", "level",   "precision" };
-
-static bool is_measured(const accuracy_report *r, int i)
+bool accuracy_is_on_front(const cJSON *rows, const cJSON *row, const char *error)
 {
-    return r->m->rows[i].state == ACCURACY_MEASURED;
-}
-
-/* Excludes rows of other programs. */
-static bool is_setting(const accuracy_report *r, int i)
-{
-    return is_measured(r, i) && !r->m->rows[i].program;
-}
-
-static double error_of(const accuracy_report *r, int i, bool mean)
-{
-    const accuracy_error_figures *f = &r->figures[i][ACCURACY_TOTAL];
-    return mean ? f->mean : f->percentile_99;
-}
-
-/* Finds the Pareto front: the settings that no other setting beats in time or error without being
- * worse in the other. */
-static void find_front(const accuracy_report *r, bool mean, bool *front)
-{
-    for (int i = 0; i < r->m->row_count; i++) {
-        front[i] = is_setting(r, i);
-        for (int j = 0; j < r->m->row_count && front[i]; j++) {
-            double e = error_of(r, i, mean), other = error_of(r, j, mean);
-            if (is_setting(r, j) && r->ms[j] <= r->ms[i] && other <= e &&
-                (r->ms[j] < r->ms[i] || other < e))
-                front[i] = false;
-        }
+    const double ms = measure_number(row, "ms"), e = measure_number(row, error);
+    const cJSON *other;
+    bool front = cJSON_HasObjectItem(row, "options");
+    cJSON_ArrayForEach(other, rows)
+    {
+        const double other_ms = measure_number(other, "ms"), other_e = measure_number(other, error);
+        if (cJSON_HasObjectItem(other, "options") && other_ms <= ms && other_e <= e &&
+            (other_ms < ms || other_e < e))
+            front = false;
     }
+    return front;
 }
 
 static int out_of_memory(void)
@@ -49,56 +30,88 @@ static int out_of_memory(void)
 
 int accuracy_report_make(accuracy_report *r, const accuracy_measured *m, const char *command)
 {
-    size_t rows = (size_t)m->row_count;
-    double load_before = r->load_before;
-    *r = (accuracy_report){ .m = m, .command = command, .load_before = load_before };
-    r->figures = calloc(rows, sizeof *r->figures);
-    r->ms = calloc(rows, sizeof *r->ms);
-    r->front = calloc(rows, sizeof *r->front);
-    r->front_of_mean = calloc(rows, sizeof *r->front_of_mean);
+    *r = (accuracy_report){ .m = m,
+                            .command = command,
+                            .load_before = r->load_before,
+                            .json = cJSON_CreateObject(),
+                            .shown = cJSON_CreateArray() };
     if (getloadavg(&r->load_after, 1) != 1)
         r->load_after = NAN;
-    if (!r->figures || !r->ms || !r->front || !r->front_of_mean)
+    if (!r->json || !r->shown)
         return out_of_memory();
-    for (int i = 0; i < m->row_count; i++) {
-        for (int s = 0; s < ACCURACY_STEPS; s++)
-            r->figures[i][s] = accuracy_error_measure(&m->rows[i].error[s]);
-        r->ms[i] = accuracy_median(m->rows[i].ms, m->rows[i].frames);
-    }
-    find_front(r, false, r->front);
-    find_front(r, true, r->front_of_mean);
+    accuracy_report_json(r);
+    cJSON *row;
+    cJSON_ArrayForEach(row, cJSON_GetObjectItem(r->json, "rows")) cJSON_AddBoolToObject(
+        row, "front", accuracy_is_on_front(r->shown, row, "total.percentile_99"));
     return 0;
 }
 
 void accuracy_report_free(accuracy_report *r)
 {
-    free(r->figures);
-    free(r->ms);
-    free(r->front);
-    free(r->front_of_mean);
+    cJSON_Delete(r->shown);
+    cJSON_Delete(r->json);
     *r = (accuracy_report){ 0 };
+}
+
+static void write_json(FILE *f, const accuracy_report *r)
+{
+    char *text = trip_json_print(r->json, true);
+    fputs(text ? text : "", f);
+    free(text);
+}
+
+/* Writes a line for each measured setting. */
+static void write_csv(FILE *f, const accuracy_report *r)
+{
+#define FIGURES(step) step ".max", step ".mean", step ".median", step ".percentile_99", step ".psnr"
+    static const char *const keys[] = { "name",
+                                        "data_set",
+                                        "options",
+                                        "views",
+                                        "frames",
+                                        "ms",
+                                        "ms_min",
+                                        "ms_max",
+                                        "splats",
+                                        "splats_drawn",
+                                        "bytes_read",
+                                        FIGURES("total"),
+                                        FIGURES("storage"),
+                                        FIGURES("model"),
+                                        FIGURES("method"),
+                                        FIGURES("level"),
+                                        FIGURES("precision"),
+                                        "total.worst_percentile_99",
+                                        "total.ssim",
+                                        "total.flip",
+                                        "front" };
+    measure_table_csv(f, cJSON_GetObjectItem(r->json, "rows"), keys, sizeof keys / sizeof *keys);
+}
+
+/* Writes a part of the report into a file. */
+static int write_part(const accuracy_report *r, const char *folder, const char *name,
+                      void (*write)(FILE *f, const accuracy_report *r))
+{
+    char path[PATH_MAX + 32], *text = NULL;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    if (f)
+        write(f, r);
+    int status = !f || fclose(f) || !bytes ? out_of_memory()
+                 : trip_interrupted()
+                     ? trip_fail(TRIP_INTERRUPTED, "accuracy", folder, "interrupted")
+                     : trip_new_file_of_text("write", path, text);
+    free(text);
+    return status;
 }
 
 int accuracy_report_write(const accuracy_report *r, const char *folder)
 {
-    static const struct {
-        const char *name;
-        char *(*text)(const accuracy_report *r);
-    } parts[] = { { "accuracy.json", accuracy_report_json },
-                  { "accuracy.csv", accuracy_report_csv },
-                  { "index.html", accuracy_report_html } };
-    int status = 0;
-    for (size_t i = 0; i < sizeof parts / sizeof *parts && !status; i++) {
-        char path[PATH_MAX + 32];
-        char *text = parts[i].text(r);
-        snprintf(path, sizeof path, "%s/%s", folder, parts[i].name);
-        status = !text ? out_of_memory()
-                 : trip_interrupted()
-                     ? trip_fail(TRIP_INTERRUPTED, "accuracy", folder, "interrupted")
-                     : trip_new_file_of_text("write", path, text);
-        free(text);
-    }
-    return status;
+    int status = write_part(r, folder, "accuracy.json", write_json);
+    if (!status)
+        status = write_part(r, folder, "accuracy.csv", write_csv);
+    return status ? status : write_part(r, folder, "index.html", accuracy_report_html);
 }
 
 static void write_point(FILE *f, const char *name, const double p[3])
@@ -127,32 +140,41 @@ void accuracy_write_options(FILE *f, const accuracy_setting *s)
         fprintf(f, "%s--%s %s", i ? " " : "", options[i].name, options[i].value);
 }
 
-static void print_why(FILE *f, const char *name, accuracy_state state, const char *why)
+void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *before,
+                             void (*write)(FILE *f, const char *text))
 {
-    if (state != ACCURACY_MEASURED)
-        fprintf(f, "left out: %s: %s\n", name,
-                state == ACCURACY_LEFT_OUT ? why : "--budget was used up");
+    const cJSON *one;
+    cJSON_ArrayForEach(one, cJSON_GetObjectItem(r->json, "left_out"))
+    {
+        fputs(before, f);
+        write(f, cJSON_GetObjectItem(one, "name")->valuestring);
+        fputs(": ", f);
+        write(f, cJSON_GetObjectItem(one, "why")->valuestring);
+        fputc('\n', f);
+    }
+    if (r->m->view_count < r->m->options->views)
+        fprintf(f, "%sviews %d to %d: --budget was used up\n", before, r->m->view_count + 1,
+                r->m->options->views);
 }
 
 void accuracy_report_print(FILE *f, const accuracy_report *r)
 {
-    fprintf(f, "\n| settings | median ms | error of 255: mean | 99 %% | max | PSNR, dB | SSIM | "
-               "FLIP |\n|---|--:|--:|--:|--:|--:|--:|--:|\n");
-    for (int i = 0; i < r->m->row_count; i++) {
-        const accuracy_error_figures *e = &r->figures[i][ACCURACY_TOTAL];
-        const accuracy_row *row = &r->m->rows[i];
-        if (is_measured(r, i))
-            fprintf(f, "| %s%s | %.1f | %.2f | %.2f | %.2f | %.1f | %.4f | %.4f |\n",
-                    row->setting.name, r->front[i] ? " *" : "", r->ms[i], e->mean, e->percentile_99,
-                    e->max, e->psnr, row->ssim / row->views, row->flip / row->views);
-    }
+    static const measure_column columns[] = {
+        { "name", "settings", 0, 0 },
+        { "ms", "median ms", 1, 0 },
+        { "total.mean", "error of 255: mean", 2, 0 },
+        { "total.percentile_99", "99 %", 2, 0 },
+        { "total.max", "max", 2, 0 },
+        { "total.psnr", "PSNR, dB", 1, 0 },
+        { "total.ssim", "SSIM", 4, 0 },
+        { "total.flip", "FLIP", 4, 0 },
+    };
+    fputc('\n', f);
+    measure_table_print(f, &(measure_table){ .rows = r->shown,
+                                             .columns = columns,
+                                             .count = sizeof columns / sizeof *columns,
+                                             .mark = "front" });
     fprintf(f,
             "\n* on the front: no other setting is as fast and as close at the 99th percentile.\n");
-    for (int i = 0; i < r->m->row_count; i++)
-        print_why(f, r->m->rows[i].setting.name, r->m->rows[i].state, r->m->rows[i].why);
-    for (int i = 0; i < r->m->popping_count; i++)
-        print_why(f, r->m->popping[i].name, r->m->popping[i].state, r->m->popping[i].why);
-    if (r->m->view_count < r->m->options->views)
-        fprintf(f, "left out: views %d to %d: --budget was used up\n", r->m->view_count + 1,
-                r->m->options->views);
+    accuracy_print_left_out(f, r, "left out: ", trip_text_write);
 }

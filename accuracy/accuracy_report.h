@@ -7,6 +7,7 @@
 #include <stdio.h>
 
 #include "measure.h"
+#include "table.h"
 
 typedef struct accuracy_folder {
     const char *path; /* owned by the caller */
@@ -26,27 +27,29 @@ typedef struct accuracy_report {
     const accuracy_measured *m;
     const char *command; /* command line of the measurement */
     double load_before, load_after;
-    accuracy_error_figures (*figures)[ACCURACY_STEPS]; /* of each row and step */
-    double *ms;                                        /* median time of each row */
-    bool *front, *front_of_mean; /* whether a row is on the Pareto front by the 99th percentile, and
-                                    by the mean */
+    cJSON *json;  /* accuracy.json */
+    cJSON *shown; /* references to all measured rows: settings, then other programs */
 } accuracy_report;
 
 int accuracy_report_make(accuracy_report *r, const accuracy_measured *m, const char *command);
 void accuracy_report_free(accuracy_report *r);
 int accuracy_report_write(const accuracy_report *r, const char *folder);
 
-/* Names of the steps: "total", "storage", ... */
-extern const char *const accuracy_step_names[ACCURACY_STEPS];
+/* Returns whether a row of `rows` has settings on the Pareto front of time and error. No other
+ * settings are better in one without being worse in the other. `error` is the key of the error. */
+bool accuracy_is_on_front(const cJSON *rows, const cJSON *row, const char *error);
 
-/* Return the parts as text; the caller frees it. NULL if memory is exhausted. */
-char *accuracy_report_json(const accuracy_report *r);
-char *accuracy_report_csv(const accuracy_report *r);
-char *accuracy_report_html(const accuracy_report *r);
-/* Writes a plot of time and error as SVG, by the mean error or by the 99th percentile. */
-void accuracy_report_plot(FILE *f, const accuracy_report *r, bool mean);
+/* Makes accuracy.json without "front". */
+void accuracy_report_json(accuracy_report *r);
+void accuracy_report_html(FILE *f, const accuracy_report *r);
+/* Returns a plot of time and error as SVG, as measure_plot_svg() does. */
+char *accuracy_report_plot(const cJSON *rows, const char *error, const char *title);
 /* Prints a short table for people. */
 void accuracy_report_print(FILE *f, const accuracy_report *r);
+/* Prints the settings and views that were not measured, each on a line after `before`. `write`
+ * prints a text. */
+void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *before,
+                             void (*write)(FILE *f, const char *text));
 
 /* Write the options of `triptych render` for a view and for a setting, as shell words. */
 void accuracy_write_view(FILE *f, const accuracy_view *view);

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bench_progress.h"
 #include "clock.h"
+#include "progress_line.h"
 #include "contexts.h"
 #include "flip.h"
 #include "json.h"
@@ -37,7 +37,7 @@ typedef struct sweep {
     const accuracy_options *o;
     accuracy_contexts contexts;
     draw_settings defaults;
-    bench_progress *progress;
+    measure_progress *progress;
     float *pictures[PICTURES];
     size_t picture_bytes;
     double begin;
@@ -46,20 +46,8 @@ typedef struct sweep {
     int stored_data, field_data, reference_data;
     draw_settings field; /* only the settings that change the integral */
     draw_settings reference;
-    accuracy_error view; /* scratch memory */
+    measure_error view; /* scratch memory */
 } sweep;
-
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-double accuracy_median(double *ms, int count)
-{
-    qsort(ms, (size_t)count, sizeof *ms, ascending);
-    return count ? ms[(count - 1) / 2] : NAN;
-}
 
 static bool is_over(const sweep *s)
 {
@@ -243,7 +231,7 @@ static int draw_integral(sweep *s, int data, int renderer, draw_settings setting
     double ms;
     settings.integral.tolerance = s->o->tolerance;
     settings.all.samples = s->o->samples;
-    bench_progress_step(s->progress, "integral");
+    measure_progress_step(s->progress, "integral");
     int status = accuracy_contexts_draw(&s->contexts, data, renderer, &settings, rgba, &ms);
     return status == TRIP_ERROR
                ? trip_fail(TRIP_ERROR, "accuracy",
@@ -299,7 +287,7 @@ static int need_reference(sweep *s, const accuracy_row *row)
     s->reference_data = -1;
     s->reference = settings;
     draw_settings_drop_excluded(&settings, TRIPTYCH_RENDERER_REFERENCE);
-    bench_progress_step(s->progress, "reference");
+    measure_progress_step(s->progress, "reference");
     int status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
                                         &settings, s->pictures[REFERENCE], &ms);
     memcpy(s->pictures[FINE], s->pictures[REFERENCE], s->picture_bytes);
@@ -314,7 +302,7 @@ static int need_reference(sweep *s, const accuracy_row *row)
 static void compare(sweep *s, accuracy_row *row, accuracy_step step, which a, which b)
 {
     row->has[step] = true;
-    accuracy_error_add(&row->error[step], s->pictures[a], s->pictures[b], pixels_of(s));
+    measure_error_add(&row->error[step], s->pictures[a], s->pictures[b], pixels_of(s));
 }
 
 /* Returns whether the frame was drawn by pre-classification. */
@@ -374,10 +362,10 @@ static int compare_with_truth(sweep *s, accuracy_row *row)
     double ssim, flip;
     const float *ran = s->pictures[RAN], *truth = s->pictures[TRUTH];
     compare(s, row, ACCURACY_TOTAL, RAN, TRUTH);
-    s->view = (accuracy_error){ 0 };
-    accuracy_error_add(&s->view, ran, truth, pixels_of(s));
+    s->view = (measure_error){ 0 };
+    measure_error_add(&s->view, ran, truth, pixels_of(s));
     row->worst_percentile_99 =
-        fmax(row->worst_percentile_99, accuracy_error_measure(&s->view).percentile_99);
+        fmax(row->worst_percentile_99, measure_error_measure(&s->view).percentile_99);
     int status = accuracy_ssim(ran, truth, s->o->width, s->o->height, s->contexts.budget, &ssim);
     if (!status)
         status = accuracy_flip(ran, truth, s->o->width, s->o->height, s->contexts.budget, &flip);
@@ -441,7 +429,7 @@ static int measure_program(sweep *s, accuracy_row *row, int view)
 {
     triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
     int status = 0;
-    bench_progress_step(s->progress, row->setting.name);
+    measure_progress_step(s->progress, row->setting.name);
     if (view == 0) {
         status = accuracy_program_start(row->program, s->o, t, row->why);
         if (!status)
@@ -469,7 +457,7 @@ static int measure_row(sweep *s, accuracy_row *row, int view)
     int renderer = (int)row->setting.renderer;
     triptych_frame_stats stats;
     double ms;
-    bench_progress_step(s->progress, row->setting.name);
+    measure_progress_step(s->progress, row->setting.name);
     int status = accuracy_contexts_draw(&s->contexts, row->data, renderer, &row->setting.settings,
                                         s->pictures[RAN], &ms);
     if (status == TRIP_ERROR) {
@@ -581,8 +569,8 @@ static int measure_views(sweep *s)
     int status = 0, steps = 0;
     for (int i = 0; i < s->m->row_count; i++)
         steps += s->m->rows[i].state == ACCURACY_NOT_REACHED;
-    bench_progress_expect(s->progress, s->o->views * (s->o->ladder ? 3 + 2 * steps : 1 + steps));
-    bench_progress_expect(s->progress, ACCURACY_POPPING_ROWS * s->m->popping_count);
+    measure_progress_expect(s->progress, s->o->views * (s->o->ladder ? 3 + 2 * steps : 1 + steps));
+    measure_progress_expect(s->progress, ACCURACY_POPPING_ROWS * s->m->popping_count);
     for (int view = 0; view < s->o->views && !status && has_time_for(s, view); view++)
         status = measure_view(s, view);
     return status ? status : measure_popping(s);
@@ -606,11 +594,11 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
     if (!status)
         status = leave_out_idle(s);
     if (!status && !o->quiet)
-        s->progress = bench_progress_start_lines("accuracy");
+        s->progress = measure_progress_start_lines("accuracy");
     if (!status)
         status = measure_views(s);
     m->seconds = trip_now_seconds() - s->begin;
-    bench_progress_end(s->progress);
+    measure_progress_end(s->progress);
     for (int i = 0; i < PICTURES; i++)
         if (s->pictures[i])
             trip_budget_release(s->contexts.budget, s->pictures[i], s->picture_bytes);

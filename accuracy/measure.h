@@ -6,9 +6,9 @@
 #define TRIP_ACCURACY_MEASURE_H
 
 #include "accuracy_options.h"
+#include "accuracy_popping.h"
 #include "compared_programs.h"
 #include "error.h"
-#include "popping.h"
 #include "setting.h"
 #include "views.h"
 
@@ -37,7 +37,7 @@ typedef struct accuracy_row {
     bool is_vtk;               /* VTK was added without --compare */
     accuracy_state state;
     char why[256]; /* reason if the row was left out */
-    accuracy_error error[ACCURACY_STEPS];
+    measure_error error[ACCURACY_STEPS];
     bool has[ACCURACY_STEPS];
     double worst_percentile_99; /* total error in the worst view */
     double ssim, flip;          /* sums over the views */
@@ -67,7 +67,5 @@ typedef struct accuracy_measured {
 int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder);
 void accuracy_measured_free(accuracy_measured *m);
 
-/* Sorts `count` times and returns the median, or the lower of two middle times. */
-double accuracy_median(double *ms, int count);
 
 #endif

@@ -1,7 +1,5 @@
 /* index.html: a self-contained page with all tables, plots and pictures. */
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "picture_data.h"
 #include "accuracy_report.h"
@@ -18,58 +16,22 @@ static const char style[] =
     "pre{background:#f4f4f4;padding:8px;overflow-x:auto;font-size:12px}\n"
     "figure{display:inline-block;margin:0 12px 14px 0;font-size:12px;vertical-align:top}"
     "figcaption{max-width:262px}img{background:#000;image-rendering:pixelated;margin-right:4px}\n"
-    "svg{max-width:100%;height:auto;font:11px system-ui,sans-serif;background:#fff}"
-    ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#222;fill:none}.leader{stroke:#bbb;fill:none}"
-    "circle,rect{stroke:#fff}"
-    ".program{fill:#7b3fa0}.post{fill:#1f6fc4}.pre{fill:#e07b1a}.gl{fill:#2a9d4e}.slow{fill:#888}."
-    "quality{fill:#c21f3a}"
-    ".key{display:inline-block;width:11px;height:11px;border-radius:6px;"
-    "margin:0 4px 0 14px}\n";
-
-static void write_escaped(FILE *f, const char *text)
-{
-    for (; *text; text++)
-        switch (*text) {
-        case '<':
-            fputs("&lt;", f);
-            break;
-        case '>':
-            fputs("&gt;", f);
-            break;
-        case '&':
-            fputs("&amp;", f);
-            break;
-        case '"':
-            fputs("&quot;", f);
-            break;
-        default:
-            if ((unsigned char)*text >= ' ')
-                fputc(*text, f);
-        }
-}
-
-static void write_number(FILE *f, double value, int decimals)
-{
-    if (isfinite(value))
-        fprintf(f, "<td>%.*f", decimals, value);
-    else
-        fputs("<td>-", f);
-}
+    "svg{max-width:100%;height:auto;display:block}\n";
 
 static void write_head(FILE *f, const accuracy_report *r)
 {
     const accuracy_options *o = r->m->options;
     fputs("<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8>\n<title>Accuracy: ", f);
-    write_escaped(f, o->data[0]);
+    measure_write_escaped(f, o->data[0]);
     fprintf(f, "</title>\n<style>\n%s</style></head><body>\n<h1>Accuracy and time: ", style);
-    write_escaped(f, o->data[0]);
+    measure_write_escaped(f, o->data[0]);
     fprintf(f,
             "</h1>\n<p>Pictures of %d x %d pixels from %d view%s, compared with the "
             "emission&ndash;absorption integral ",
             o->width, o->height, r->m->view_count, r->m->view_count == 1 ? "" : "s");
     if (o->source) {
         fputs("through the source volume ", f);
-        write_escaped(f, o->source);
+        measure_write_escaped(f, o->source);
     } else
         fputs("through the values in the data set (no figure includes the error of storing)", f);
     fprintf(f,
@@ -79,65 +41,49 @@ static void write_head(FILE *f, const accuracy_report *r)
             o->samples, o->samples, o->tolerance, r->load_before, r->load_after);
 }
 
-static void write_plots(FILE *f, const accuracy_report *r)
+static void write_svg(FILE *f, char *svg)
 {
-    fprintf(f,
-            "<h2>Time and error</h2>\n<p><span class='key post' "
-            "style='background:#1f6fc4'></span>post<span class=key "
-            "style='background:#e07b1a'></span>pre<span class=key "
-            "style='background:#2a9d4e'></span>gl<span class=key "
-            "style='background:#888'></span>reference, integral<span class=key "
-            "style='background:#c21f3a'></span>quality%s. The line is the front: no other setting "
-            "is both faster and closer to the integral.</p>\n",
-            r->m->options->program_count || r->m->vtk[0]
-                ? "<span class=key style='background:#7b3fa0;border-radius:0'></span>"
-                  "another program, with its own light"
-                : "");
-    accuracy_report_plot(f, r, false);
-    accuracy_report_plot(f, r, true);
+    fputs(svg ? svg : "", f);
+    free(svg);
 }
 
-static void write_row(FILE *f, const accuracy_report *r, int i)
+static void write_plots(FILE *f, const accuracy_report *r)
 {
-    const accuracy_row *row = &r->m->rows[i];
-    const accuracy_error_figures *e = &r->figures[i][ACCURACY_TOTAL];
-    fprintf(f, "<tr%s><td title=\"", r->front[i] ? " class=front" : "");
-    if (row->program)
-        write_escaped(f, row->program->about);
-    else
-        accuracy_write_options(f, &row->setting);
-    fputs("\">", f);
-    write_escaped(f, row->setting.name);
-    write_number(f, r->ms[i], 1);
-    write_number(f, row->splats / row->views / 1e6, 3);
-    write_number(f, row->bytes_read / row->views / 1e6, 2);
-    write_number(f, e->max, 1);
-    write_number(f, e->mean, 2);
-    write_number(f, e->median, 2);
-    write_number(f, e->percentile_99, 2);
-    write_number(f, e->psnr, 1);
-    write_number(f, row->ssim / row->views, 4);
-    write_number(f, row->flip / row->views, 4);
-    for (int s = ACCURACY_STORAGE; s < ACCURACY_STEPS; s++) {
-        const accuracy_error_figures *step = &r->figures[i][s];
-        if (row->has[s])
-            fprintf(f, "<td>%.2f / %.2f", step->mean, step->percentile_99);
-        else
-            fputs("<td>-", f);
-    }
-    fputs("\n", f);
+    fputs("<h2>Time and error</h2>\n<p>The line is the front: no other setting is both faster and "
+          "closer to the integral.</p>\n",
+          f);
+    write_svg(
+        f, accuracy_report_plot(r->shown, "total.percentile_99", "error of 255, 99th percentile"));
+    write_svg(f, accuracy_report_plot(r->shown, "total.mean", "mean error of 255"));
 }
 
 static void write_table(FILE *f, const accuracy_report *r)
 {
-    fputs("<h2>Settings</h2>\n<div class=wide><table><tr><th>settings<th>ms<th>million "
-          "splats<th>MB read<th>max<th>mean<th>median<th>99 "
-          "%<th>PSNR<th>SSIM<th>FLIP<th>storage<th>model<th>method<th>level<th>precision\n",
-          f);
-    for (int i = 0; i < r->m->row_count; i++)
-        if (r->m->rows[i].state == ACCURACY_MEASURED)
-            write_row(f, r, i);
-    fputs("</table></div>\n<p>Bold settings are on the front of the 99th percentile. The last "
+    static const measure_column columns[] = {
+        { "name", "settings", 0, 0 },
+        { "ms", "ms", 1, 0 },
+        { "splats", "million splats", 3, 1e6 },
+        { "bytes_read", "MB read", 2, 1e6 },
+        { "total.max", "max", 1, 0 },
+        { "total.mean", "mean", 2, 0 },
+        { "total.median", "median", 2, 0 },
+        { "total.percentile_99", "99 %", 2, 0 },
+        { "total.psnr", "PSNR", 1, 0 },
+        { "total.ssim", "SSIM", 4, 0 },
+        { "total.flip", "FLIP", 4, 0 },
+        { "storage", "storage", 2, 0 },
+        { "model", "model", 2, 0 },
+        { "method", "method", 2, 0 },
+        { "level", "level", 2, 0 },
+        { "precision", "precision", 2, 0 },
+    };
+    fputs("<h2>Settings</h2>\n", f);
+    measure_table_html(f, &(measure_table){ .rows = r->shown,
+                                            .columns = columns,
+                                            .count = sizeof columns / sizeof *columns,
+                                            .mark = "front",
+                                            .tips = { "options", "version" } });
+    fputs("<p>Bold settings are on the front of the 99th percentile. The last "
           "columns split the error into steps, as mean / 99th percentile. <b>storage</b> compares "
           "the integral of the stored values with the integral of the source. <b>model</b> "
           "compares the integral of the drawn field (the sum of splats with pre, values with post) "
@@ -154,37 +100,33 @@ static void write_table(FILE *f, const accuracy_report *r)
 
 static void write_popping(FILE *f, const accuracy_report *r)
 {
-    bool any = false;
-    for (int i = 0; i < r->m->popping_count; i++) {
-        const accuracy_popping *p = &r->m->popping[i];
-        if (p->state != ACCURACY_MEASURED)
-            continue;
-        if (!any)
-            fprintf(
-                f,
+    const cJSON *popping = cJSON_GetObjectItem(r->json, "popping"), *one;
+    if (popping->child)
+        fprintf(f,
                 "<h2>Popping</h2>\n<p>The eye turns around the object in %d steps of %g degrees, "
                 "through the direction with X and Y equally close to the central ray. The median "
                 "change of a pixel over all steps is its <b>motion</b>. A jump is the change of a "
                 "pixel in one step minus its motion. The figures are of 255, over the pixels that "
                 "change, in the step with the largest jumps. A single list per frame (axis) jumps "
                 "at the change of the axis; merged lists should not.</p>\n",
-                BENCH_POPPING_STEPS, bench_popping_degrees(1) - bench_popping_degrees(0));
-        any = true;
+                MEASURE_POPPING_STEPS, MEASURE_POPPING_DEGREES);
+    cJSON_ArrayForEach(one, popping)
+    {
         fputs("<figure>\n", f);
-        bench_popping_draw(f, p->rows, ACCURACY_POPPING_ROWS);
-        fprintf(f, "<figcaption>%s</figcaption></figure>\n", p->name);
+        write_svg(f, measure_popping_svg(one));
+        fprintf(f, "<figcaption>%s</figcaption></figure>\n", one->string);
     }
 }
 
 static void write_figure(FILE *f, const char *name, const char *picture, const char *difference,
-                         const accuracy_error_figures *e)
+                         measure_error_figures e)
 {
     if (!picture || !difference)
         return;
     fprintf(f, "<figure><img alt='' src=\"%s\"><img alt='' src=\"%s\"><figcaption>", picture,
             difference);
-    write_escaped(f, name);
-    fprintf(f, ": mean %.2f, 99 %% %.2f</figcaption></figure>\n", e->mean, e->percentile_99);
+    measure_write_escaped(f, name);
+    fprintf(f, ": mean %.2f, 99 %% %.2f</figcaption></figure>\n", e.mean, e.percentile_99);
 }
 
 static void write_pictures(FILE *f, const accuracy_report *r)
@@ -200,36 +142,17 @@ static void write_pictures(FILE *f, const accuracy_report *r)
     for (int i = 0; i < r->m->row_count; i++) {
         const accuracy_row *row = &r->m->rows[i];
         write_figure(f, row->setting.name, row->picture, row->difference,
-                     &r->figures[i][ACCURACY_TOTAL]);
+                     measure_error_measure(&row->error[ACCURACY_TOTAL]));
     }
-}
-
-static void write_why(FILE *f, const char *name, accuracy_state state, const char *why)
-{
-    if (state == ACCURACY_MEASURED)
-        return;
-    fprintf(f, "<li>%s: ", name);
-    write_escaped(f, state == ACCURACY_LEFT_OUT ? why : "--budget was used up");
-    fputs("\n", f);
 }
 
 static void write_left_out(FILE *f, const accuracy_report *r)
 {
-    bool any = r->m->view_count < r->m->options->views;
-    for (int i = 0; i < r->m->row_count; i++)
-        any |= r->m->rows[i].state != ACCURACY_MEASURED;
-    for (int i = 0; i < r->m->popping_count; i++)
-        any |= r->m->popping[i].state != ACCURACY_MEASURED;
-    if (!any)
+    if (r->m->view_count == r->m->options->views &&
+        !cJSON_GetObjectItem(r->json, "left_out")->child)
         return;
     fputs("<h2>Left out</h2>\n<ul>\n", f);
-    if (r->m->view_count < r->m->options->views)
-        fprintf(f, "<li>views %d to %d: --budget was used up\n", r->m->view_count + 1,
-                r->m->options->views);
-    for (int i = 0; i < r->m->row_count; i++)
-        write_why(f, r->m->rows[i].setting.name, r->m->rows[i].state, r->m->rows[i].why);
-    for (int i = 0; i < r->m->popping_count; i++)
-        write_why(f, r->m->popping[i].name, r->m->popping[i].state, r->m->popping[i].why);
+    accuracy_print_left_out(f, r, "<li>", measure_write_escaped);
     fputs("</ul>\n", f);
 }
 
@@ -266,22 +189,13 @@ static void write_commands(FILE *f, const accuracy_report *r)
     }
     fclose(memory);
     fputs("<h2>Commands</h2>\n<pre>", f);
-    for (const char *line = text; line && *line; line++)
-        if (*line == '\n')
-            fputc('\n', f);
-        else
-            write_escaped(f, (const char[2]){ *line, 0 });
+    measure_write_escaped(f, text ? text : "");
     fputs("</pre>\n", f);
     free(text);
 }
 
-char *accuracy_report_html(const accuracy_report *r)
+void accuracy_report_html(FILE *f, const accuracy_report *r)
 {
-    char *text = NULL;
-    size_t bytes;
-    FILE *f = open_memstream(&text, &bytes);
-    if (!f)
-        return NULL;
     write_head(f, r);
     write_plots(f, r);
     write_table(f, r);
@@ -290,8 +204,4 @@ char *accuracy_report_html(const accuracy_report *r)
     write_left_out(f, r);
     write_commands(f, r);
     fputs("</body></html>\n", f);
-    if (fclose(f) == 0)
-        return text;
-    free(text);
-    return NULL;
 }

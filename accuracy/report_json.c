@@ -1,28 +1,22 @@
 /* accuracy.json: all figures. */
-#include <cjson/cJSON.h>
+#include "accuracy_report.h"
+
 #include <math.h>
 
-#include "bench_report.h"
-#include "json.h"
-#include "accuracy_report.h"
 #include "fastest.h"
+#include "machine.h"
+#include "median.h"
 
-static void add_number(cJSON *to, const char *name, double value)
-{
-    if (isfinite(value))
-        cJSON_AddNumberToObject(to, name, value);
-    else
-        cJSON_AddNullToObject(to, name); /* the PSNR of equal pictures is infinite */
-}
+static const char *const step_names[ACCURACY_STEPS] = { "total",  "storage", "model",
+                                                        "method", "level",   "precision" };
 
-static cJSON *add_figures(cJSON *to, const char *name, const accuracy_error_figures *f)
+/* The PSNR of equal pictures is infinite, which becomes null. */
+static cJSON *add_step(cJSON *to, const accuracy_row *row, accuracy_step step)
 {
-    cJSON *o = cJSON_AddObjectToObject(to, name);
-    add_number(o, "max", f->max);
-    add_number(o, "mean", f->mean);
-    add_number(o, "median", f->median);
-    add_number(o, "percentile_99", f->percentile_99);
-    add_number(o, "psnr", f->psnr);
+    const measure_error_figures f = measure_error_measure(&row->error[step]);
+    cJSON *o = cJSON_AddObjectToObject(to, step_names[step]);
+    measure_add(o, { "max", f.max }, { "mean", f.mean }, { "median", f.median },
+                { "percentile_99", f.percentile_99 }, { "psnr", f.psnr });
     return o;
 }
 
@@ -35,48 +29,35 @@ static void add_options(cJSON *to, const accuracy_setting *s)
         cJSON_AddStringToObject(o, options[i].name, options[i].value);
 }
 
-static void add_times(cJSON *to, double median, const double *sorted, int frames)
+static cJSON *add_row(cJSON *rows, const accuracy_report *r, const accuracy_row *row)
 {
-    add_number(to, "ms", median);
-    add_number(to, "ms_min", sorted[0]);
-    add_number(to, "ms_max", sorted[frames - 1]);
-    add_number(to, "frames", frames);
-}
-
-static void add_row(cJSON *rows, const accuracy_report *r, int i)
-{
-    const accuracy_row *row = &r->m->rows[i];
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddItemToArray(rows, o);
+    cJSON *o = measure_new_row(rows);
+    const double views = row->views, median = measure_median(row->ms, row->frames);
     cJSON_AddStringToObject(o, "name", row->setting.name);
     cJSON_AddStringToObject(o, "data_set", r->m->options->data[row->data]);
     if (row->program)
         cJSON_AddStringToObject(o, "version", row->program->about);
     else
         add_options(o, &row->setting);
-    add_number(o, "views", row->views);
-    add_times(o, r->ms[i], row->ms, row->frames);
-    if (!row->program) {
-        add_number(o, "splats", row->splats / row->views);
-        add_number(o, "splats_drawn", row->splats_drawn >= 0 ? row->splats_drawn : NAN);
-        add_number(o, "bytes_read", row->bytes_read / row->views);
-    }
-    cJSON *total = add_figures(o, "total", &r->figures[i][ACCURACY_TOTAL]);
-    add_number(total, "worst_percentile_99", row->worst_percentile_99);
-    add_number(total, "ssim", row->ssim / row->views);
-    add_number(total, "flip", row->flip / row->views);
+    measure_add(o, { "views", views }, { "ms", median }, { "ms_min", row->ms[0] },
+                { "ms_max", row->ms[row->frames - 1] }, { "frames", row->frames });
+    if (!row->program)
+        measure_add(o, { "splats", row->splats / views },
+                    { "splats_drawn", row->splats_drawn >= 0 ? row->splats_drawn : NAN },
+                    { "bytes_read", row->bytes_read / views });
+    measure_add(add_step(o, row, ACCURACY_TOTAL),
+                { "worst_percentile_99", row->worst_percentile_99 }, { "ssim", row->ssim / views },
+                { "flip", row->flip / views });
     for (int s = ACCURACY_TOTAL + 1; s < ACCURACY_STEPS; s++)
         if (row->has[s])
-            add_figures(o, accuracy_step_names[s], &r->figures[i][s]);
-    if (!row->program)
-        cJSON_AddBoolToObject(o, "front", r->front[i]);
+            add_step(o, row, (accuracy_step)s);
+    return o;
 }
 
 static void add_view(cJSON *views, const accuracy_view *view)
 {
     const triptych_camera *c = &view->camera;
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddItemToArray(views, o);
+    cJSON *o = measure_new_row(views);
     cJSON_AddStringToObject(o, "name", view->name);
     cJSON_AddItemToObject(o, "eye", cJSON_CreateDoubleArray(c->eye, 3));
     cJSON_AddItemToObject(o, "look", cJSON_CreateDoubleArray(c->look, 3));
@@ -89,25 +70,9 @@ static void add_view(cJSON *views, const accuracy_view *view)
 
 static void add_left_out(cJSON *list, const char *name, accuracy_state state, const char *why)
 {
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddItemToArray(list, o);
+    cJSON *o = measure_new_row(list);
     cJSON_AddStringToObject(o, "name", name);
     cJSON_AddStringToObject(o, "why", state == ACCURACY_LEFT_OUT ? why : "--budget was used up");
-}
-
-static void add_popping(cJSON *to, const accuracy_popping *p)
-{
-    cJSON *rows = cJSON_AddArrayToObject(to, p->name);
-    for (int i = 0; i < ACCURACY_POPPING_ROWS; i++) {
-        const bench_popping_row *row = &p->rows[i];
-        cJSON *o = cJSON_CreateObject();
-        cJSON_AddItemToArray(rows, o);
-        cJSON_AddStringToObject(o, "settings", bench_popping_settings[i].name);
-        add_number(o, "mean", row->mean);
-        add_number(o, "percentile_99", row->percentile_99);
-        add_number(o, "max", row->max);
-        add_number(o, "motion", row->motion);
-    }
 }
 
 static void add_facts(cJSON *root, const accuracy_report *r)
@@ -126,43 +91,39 @@ static void add_facts(cJSON *root, const accuracy_report *r)
     cJSON_AddItemToObject(root, "transfer_function",
                           o->tf ? cJSON_CreateString(o->tf) : cJSON_CreateNull());
     cJSON_AddBoolToObject(root, "shading", o->shading);
-    cJSON_AddNumberToObject(root, "width", o->width);
-    cJSON_AddNumberToObject(root, "height", o->height);
-    cJSON_AddNumberToObject(root, "samples", o->samples);
-    cJSON_AddNumberToObject(root, "tolerance", o->tolerance);
-    cJSON_AddNumberToObject(root, "repeat", o->repeat);
-    add_number(root, "load_before", r->load_before);
-    add_number(root, "load_after", r->load_after);
-    add_number(root, "seconds", r->m->seconds);
-    bench_describe_machine(cJSON_AddObjectToObject(root, "machine"));
+    measure_add(root, { "width", o->width }, { "height", o->height }, { "samples", o->samples },
+                { "tolerance", o->tolerance }, { "repeat", o->repeat },
+                { "load_before", r->load_before }, { "load_after", r->load_after },
+                { "seconds", r->m->seconds });
+    measure_describe_machine(cJSON_AddObjectToObject(root, "machine"));
 }
 
-char *accuracy_report_json(const accuracy_report *r)
+void accuracy_report_json(accuracy_report *r)
 {
-    cJSON *root = cJSON_CreateObject();
+    const accuracy_measured *m = r->m;
+    cJSON *root = r->json;
     add_facts(root, r);
     cJSON *views = cJSON_AddArrayToObject(root, "views");
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     cJSON *programs = cJSON_AddArrayToObject(root, "compared");
     cJSON *popping = cJSON_AddObjectToObject(root, "popping");
     cJSON *left_out = cJSON_AddArrayToObject(root, "left_out");
-    for (int i = 0; i < r->m->view_count; i++)
-        add_view(views, &r->m->views[i]);
-    for (int i = 0; i < r->m->row_count; i++)
-        if (r->m->rows[i].state == ACCURACY_MEASURED)
-            add_row(r->m->rows[i].program ? programs : rows, r, i);
+    for (int i = 0; i < m->view_count; i++)
+        add_view(views, &m->views[i]);
+    for (int i = 0; i < m->row_count; i++) {
+        const accuracy_row *row = &m->rows[i];
+        if (row->state == ACCURACY_MEASURED)
+            cJSON_AddItemReferenceToArray(r->shown,
+                                          add_row(row->program ? programs : rows, r, row));
         else
-            add_left_out(left_out, r->m->rows[i].setting.name, r->m->rows[i].state,
-                         r->m->rows[i].why);
-    for (int i = 0; i < r->m->popping_count; i++) {
-        const accuracy_popping *p = &r->m->popping[i];
+            add_left_out(left_out, row->setting.name, row->state, row->why);
+    }
+    for (int i = 0; i < m->popping_count; i++) {
+        const accuracy_popping *p = &m->popping[i];
         if (p->state == ACCURACY_MEASURED)
-            add_popping(popping, p);
+            cJSON_AddItemReferenceToObject(popping, p->name, p->rows);
         else
             add_left_out(left_out, p->name, p->state, p->why);
     }
-    cJSON_AddNumberToObject(root, "views_left_out", r->m->options->views - r->m->view_count);
-    char *text = trip_json_print(root, true);
-    cJSON_Delete(root);
-    return text;
+    cJSON_AddNumberToObject(root, "views_left_out", m->options->views - m->view_count);
 }

@@ -3,24 +3,33 @@
 #include "bench.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "bench_sample.h"
 #include "bench_tables.h"
+#include "machine.h"
 #include "new_file.h"
 #include "read_files.h"
 
 static const struct {
     const char *name;
     int (*run)(const session *s, const bench_options *o, bench_report *r);
+    /* Runs instead with an open scene. */
+    int (*run_scene)(bench_scene *scene, const bench_options *o, bench_report *r);
+    bool from_disk;     /* the frames of the scene read from disk, not from memory */
     bool makes_volumes; /* makes its own volumes if no data set is named */
     bool opens;         /* opens the data set itself */
 } tables[] = {
-    { "orders", bench_orders, false, false },     { "submit", bench_submit, false, false },
-    { "stream", bench_stream, false, false },     { "renderers", bench_renderers, false, false },
-    { "popping", bench_popping, false, false },   { "levels", bench_levels, true, false },
-    { "flight", bench_flight, false, true },      { "ewa", bench_ewa, false, false },
-    { "variants", bench_variants, false, false },
+    { .name = "orders", .run_scene = bench_orders },
+    { .name = "submit", .run_scene = bench_submit },
+    { .name = "stream", .run_scene = bench_stream, .from_disk = true },
+    { .name = "renderers", .run = bench_renderers },
+    { .name = "popping", .run_scene = bench_popping },
+    { .name = "levels", .run = bench_levels, .makes_volumes = true },
+    { .name = "flight", .run = bench_flight, .opens = true },
+    { .name = "ewa", .run = bench_ewa },
+    { .name = "variants", .run_scene = bench_variants },
 };
 
 /* Returns whether the frames are shaded: pre by the stored normals, post by differences of
@@ -33,7 +42,7 @@ static bool is_lit(const session *s, const trip_settings *settings)
 
 static void describe(const session *s, const bench_options *o, bool included, bench_report *r)
 {
-    cJSON *settings = bench_report_settings(r);
+    cJSON *settings = r->settings;
     const trip_file_header *h = &s->data->header;
     char text[64];
     snprintf(text, sizeof text, "%llu x %llu x %llu", (unsigned long long)h->dims[0],
@@ -43,21 +52,12 @@ static void describe(const session *s, const bench_options *o, bool included, be
     cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
     cJSON_AddStringToObject(settings, "transfer_function",
                             o->tf ? o->tf : "stored in the data set");
-    snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
     if (o->size_count == 1)
-        cJSON_AddStringToObject(settings, "size", text);
+        bench_report_add_size(settings, o->sizes[0]);
     if (o->settings.classify == TRIP_CLASSIFY_PRE)
         cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
     cJSON_AddBoolToObject(settings, "shading", is_lit(s, &o->settings));
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
-}
-
-/* Joins the command line, cut if it is too long. */
-static void join(int argc, char **argv, char *text, size_t bytes)
-{
-    size_t used = (size_t)snprintf(text, bytes, "triptych");
-    for (int i = 0; i < argc && used < bytes; i++)
-        used += (size_t)snprintf(text + used, bytes - used, " %s", argv[i]);
 }
 
 /* Returns the index of the table, a valid name after parsing. */
@@ -67,6 +67,16 @@ static size_t table_of(const bench_options *o)
     while (i + 1 < sizeof tables / sizeof tables[0] && strcmp(tables[i].name, o->table) != 0)
         i++;
     return i;
+}
+
+static int run_scene(size_t table, const session *s, const bench_options *o, bench_report *r)
+{
+    bench_scene scene;
+    int status = bench_scene_open(&scene, s, o, tables[table].from_disk, r);
+    if (!status)
+        status = tables[table].run_scene(&scene, o, r);
+    bench_scene_close(&scene);
+    return status;
 }
 
 /* Measures the named data set, or makes a data set of the included volume. */
@@ -85,7 +95,8 @@ static int measure_data(bench_options *o, size_t table, bench_report *r)
     if (!status && !tables[table].opens)
         describe(&s, o, included, r);
     if (!status)
-        status = tables[table].run(tables[table].opens ? NULL : &s, o, r);
+        status = tables[table].run_scene ? run_scene(table, &s, o, r)
+                                         : tables[table].run(tables[table].opens ? NULL : &s, o, r);
     session_close(&s);
     bench_sample_remove(&sample);
     return status;
@@ -111,10 +122,10 @@ static int check_plot(const bench_options *o)
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
-    o->progress = bench_progress_start(o->table);
+    o->progress = measure_progress_start(o->table);
     int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
                                                           : measure_data(o, table, r);
-    bench_progress_end(o->progress);
+    measure_progress_end(o->progress);
     return status;
 }
 
@@ -128,21 +139,21 @@ static void print_tables(void)
 
 int trip_bench(int argc, char **argv)
 {
-    char command[4096];
+    char *command = measure_command_line(argc, argv);
     bench_options o;
     bench_report *report = NULL;
-    join(argc, argv, command, sizeof command);
     int status = bench_options_parse(&o, argc, argv);
     if (!status)
         status = check_plot(&o);
     if (!status && o.in_short && !o.json)
         print_tables();
     if (!status)
-        status = bench_report_create(&report, o.table, command);
+        status = bench_report_create(&report, o.table, command ? command : "");
     if (!status)
         status = measure(&o, report);
     if (!status)
         status = bench_report_print(report, o.json);
     bench_report_destroy(report);
+    free(command);
     return status;
 }

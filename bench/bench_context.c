@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "bench_frame.h"
+#include "clock.h"
 #include "report.h"
 
 /* Reports the error of the context if a call failed. */
@@ -71,6 +71,14 @@ void bench_context_close(bench_context *c)
     c->t = NULL;
 }
 
+int bench_context_find(bench_context *c, const triptych_view *view, triptych_camera *camera)
+{
+    int status = triptych_set_view(c->t, view);
+    if (!status)
+        status = triptych_get_camera(c->t, camera);
+    return check(c, status);
+}
+
 int bench_context_look(bench_context *c, const triptych_camera *camera)
 {
     const triptych_view view = { .width = camera->width,
@@ -83,17 +91,22 @@ int bench_context_look(bench_context *c, const triptych_camera *camera)
     return check(c, triptych_set_view(c->t, &view));
 }
 
+int bench_context_picture(bench_context *c, int width, int height, float **rgba)
+{
+    return check(c, triptych_new_picture(c->t, width, height, 4, rgba));
+}
+
 int bench_context_draw(bench_context *c, double lod_px, int samples, float *rgba, double *ms)
 {
-    bench_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");
+    measure_progress_step(c->progress, lod_px > 0 ? "coarse levels" : "finest level");
     c->settings.lod.voxel_px = lod_px;
     c->settings.all.samples = samples;
     int status = draw_settings_use(c->t, &c->settings);
-    const double start = bench_now_ms();
+    const double start = trip_now_ms();
     if (!status)
         status = triptych_draw(c->t, rgba);
     if (ms)
-        *ms = bench_now_ms() - start;
+        *ms = trip_now_ms() - start;
     return check(c, status);
 }
 

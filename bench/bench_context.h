@@ -11,7 +11,7 @@
 typedef struct bench_context {
     triptych *t;
     draw_settings settings;   /* from the options, without background */
-    bench_progress *progress; /* each picture is a step */
+    measure_progress *progress; /* each picture is a step */
 } bench_context;
 
 /* Returns the first renderer of the options. */
@@ -21,9 +21,14 @@ triptych_renderer bench_context_renderer(const bench_options *o);
 int bench_context_open(bench_context *c, const char *path, const bench_options *o);
 void bench_context_close(bench_context *c);
 
+/* Sets a view and computes its camera. */
+int bench_context_find(bench_context *c, const triptych_view *view, triptych_camera *camera);
 /* Sets the view of *camera. */
 int bench_context_look(bench_context *c, const triptych_camera *camera);
 
+/* Creates a picture of 4 floats per pixel. It ends with the context, or earlier by
+ * triptych_release_picture(). */
+int bench_context_picture(bench_context *c, int width, int height, float **rgba);
 /* Draws the view into `rgba` (width * height * 4 floats). `lod_px` selects the levels, and each
  * pixel has samples * samples rays. The time of planning, drawing and merging is stored in *ms,
  * which may be NULL. */

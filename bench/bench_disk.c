@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bench_frame.h"
+#include "clock.h"
 #include "plain_disk.h"
 #include "report.h"
 
@@ -137,10 +137,10 @@ int bench_files_stream(const session *s, const bench_files *files, trip_reader *
         status = select_axis(s, files, axis, selections + count, &passes[axis]);
         count += passes[axis].selection_count;
     }
-    double start = bench_now_ms();
+    double start = trip_now_ms();
     if (!status)
         status = stream_passes(reader, passes);
-    out->ms = bench_now_ms() - start;
+    out->ms = trip_now_ms() - start;
     out->bytes = trip_reader_get_stats(reader).bytes_read;
     out->direct = strstr(trip_reader_engine_name(reader), "O_DIRECT");
     for (unsigned i = 0; i < lists; i++)

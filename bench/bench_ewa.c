@@ -10,6 +10,7 @@
 #include "error.h"
 #include "report.h"
 #include "splat.h"
+#include "median.h"
 
 #define PI 3.14159265358979323846
 
@@ -84,7 +85,7 @@ static int measure_splat(double angle_degrees, double distance, deviation *out)
     return 0;
 }
 
-static const bench_column splat_columns[] = {
+static const measure_column splat_columns[] = {
     { "angle", "degrees", 0, 0 },
     { "distance", "kernel radii", 0, 0 },
     { "max", "maximum, % of peak", 2, 0 },
@@ -96,22 +97,19 @@ static int measure_splats(bench_report *r)
 {
     cJSON *rows = bench_report_table(
         r, "splats", "Optical depth of an affine splat, compared with the exact form",
-        splat_columns, sizeof splat_columns / sizeof *splat_columns);
+        splat_columns);
     for (int i = 0; i < ANGLES; i++)
         for (int k = 0; k < DISTANCES; k++) {
             deviation d;
             int status = measure_splat(angles[i], distances[k], &d);
             if (status)
                 return status;
-            cJSON *row = cJSON_CreateObject();
-            cJSON_AddNumberToObject(row, "angle", angles[i]);
-            cJSON_AddNumberToObject(row, "distance", distances[k]);
+            cJSON *row = measure_new_row(rows);
+            measure_add(row, { "angle", angles[i] }, { "distance", distances[k] });
             if (d.affine) {
-                cJSON_AddNumberToObject(row, "max", 100 * d.max);
-                cJSON_AddNumberToObject(row, "mean", 100 * d.mean);
-                cJSON_AddNumberToObject(row, "sum", 100 * d.sum);
+                measure_add(row, { "max", 100 * d.max }, { "mean", 100 * d.mean },
+                            { "sum", 100 * d.sum });
             }
-            cJSON_AddItemToArray(rows, row);
         }
     return 0;
 }
@@ -121,7 +119,7 @@ static int measure_splats(bench_report *r)
 static const double fields_of_view[] = { 10, 30, 60, 90, 120 };
 enum { FIELDS = sizeof fields_of_view / sizeof *fields_of_view };
 
-static const bench_column picture_columns[] = {
+static const measure_column picture_columns[] = {
     { "fov", "field of view, degrees", 0, 0 }, { "mean", "mean of 255", 3, 0 },
     { "percentile_99", "99 %", 3, 0 },         { "max", "max", 2, 0 },
     { "exact_ms", "exact: median ms", 1, 0 },  { "ewa_ms", "ewa", 1, 0 },
@@ -151,43 +149,26 @@ static int take_turns(pair *p)
     return status;
 }
 
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median_of(double *values, int count)
-{
-    qsort(values, (size_t)count, sizeof *values, by_size);
-    return values[(count - 1) / 2];
-}
-
 static int measure_view(pair *p, double fov, cJSON *rows)
 {
     const int *size = p->options->sizes[0];
     const triptych_view view = { .width = size[0], .height = size[1], .fov_degrees = fov };
-    accuracy_error *error = calloc(1, sizeof *error);
-    int status = error ? triptych_set_view(p->context.t, &view) : TRIP_ERROR;
-    if (status)
-        trip_report_line(error ? triptych_error(p->context.t) : "out of memory");
+    measure_error *error = calloc(1, sizeof *error);
+    triptych_camera camera;
+    int status = error ? bench_context_find(&p->context, &view, &camera)
+                       : trip_fail(TRIP_ERROR, "bench", "ewa", "out of memory");
     if (!status)
         status = take_turns(p);
     if (!status) {
-        accuracy_error_add(error, p->pictures[1], p->pictures[0],
+        measure_error_add(error, p->pictures[1], p->pictures[0],
                            (size_t)size[0] * (size_t)size[1]);
-        const accuracy_error_figures figures = accuracy_error_measure(error);
-        double exact = median_of(p->ms[0], p->options->repeat);
-        double ewa = median_of(p->ms[1], p->options->repeat);
-        cJSON *row = cJSON_CreateObject();
-        cJSON_AddNumberToObject(row, "fov", fov);
-        cJSON_AddNumberToObject(row, "mean", figures.mean);
-        cJSON_AddNumberToObject(row, "percentile_99", figures.percentile_99);
-        cJSON_AddNumberToObject(row, "max", figures.max);
-        cJSON_AddNumberToObject(row, "exact_ms", exact);
-        cJSON_AddNumberToObject(row, "ewa_ms", ewa);
-        cJSON_AddNumberToObject(row, "ratio", ewa / exact);
-        cJSON_AddItemToArray(rows, row);
+        const measure_error_figures figures = measure_error_measure(error);
+        double exact = measure_median(p->ms[0], p->options->repeat);
+        double ewa = measure_median(p->ms[1], p->options->repeat);
+        cJSON *row = measure_new_row(rows);
+        measure_add(row, { "fov", fov }, { "mean", figures.mean },
+                    { "percentile_99", figures.percentile_99 }, { "max", figures.max },
+                    { "exact_ms", exact }, { "ewa_ms", ewa }, { "ratio", ewa / exact });
     }
     free(error);
     return status;
@@ -199,17 +180,15 @@ static int measure_pictures(pair *p, bench_report *r)
     int status = 0;
     for (int i = 0; i < 2 && !status; i++) {
         p->ms[i] = calloc((size_t)p->options->repeat, sizeof *p->ms[i]);
-        status = p->ms[i] ? triptych_new_picture(p->context.t, size[0], size[1], 4, &p->pictures[i])
-                          : TRIP_ERROR;
+        status = p->ms[i] ? bench_context_picture(&p->context, size[0], size[1], &p->pictures[i])
+                          : trip_fail(TRIP_ERROR, "bench", "ewa", "out of memory");
     }
-    if (status) {
-        trip_report_line(triptych_error(p->context.t));
+    if (status)
         return status;
-    }
     cJSON *rows = bench_report_table(
         r, "pictures",
         "Whole pictures by EWA, compared with the exact form; the object has the same size in each",
-        picture_columns, sizeof picture_columns / sizeof *picture_columns);
+        picture_columns);
     for (int i = 0; i < FIELDS && !status; i++)
         status = measure_view(p, fields_of_view[i], rows);
     return status;
@@ -232,7 +211,7 @@ int bench_ewa(const session *s, const bench_options *o, bench_report *r)
 {
     pair p = { .options = o };
     (void)s;
-    bench_progress_expect(o->progress, FIELDS * 2 * (1 + o->repeat));
+    measure_progress_expect(o->progress, FIELDS * 2 * (1 + o->repeat));
     int status = measure_splats(r);
     if (!status)
         status = bench_context_open(&p.context, o->input, o);
@@ -240,11 +219,8 @@ int bench_ewa(const session *s, const bench_options *o, bench_report *r)
         status = measure_pictures(&p, r);
     if (!status)
         add_limits(r);
-    for (int i = 0; i < 2; i++) {
-        if (p.context.t)
-            triptych_release_picture(p.context.t, p.pictures[i]);
+    for (int i = 0; i < 2; i++)
         free(p.ms[i]);
-    }
     bench_context_close(&p.context);
     return status;
 }

@@ -1,4 +1,5 @@
-#include "bench_finer.h"
+/* Times and errors of one object that is sampled more and more finely. Part of bench levels. */
+#include "bench_tables.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -7,16 +8,19 @@
 #include "bench_context.h"
 #include "bench_sample.h"
 #include "error.h"
+#include "plot.h"
 #include "report.h"
+#include "median.h"
 
-enum { MAX = BENCH_FINER_MAX, TRUTH_SAMPLES = 4, ENTRIES = 2 };
+/* Voxels along each axis of the first volume; maximum number of volumes. */
+enum { COARSEST = 128, MAX = 4, TRUTH_SAMPLES = 4, ENTRIES = 2 };
 
 /* One volume, drawn by two contexts, so that each keeps the data that it reads. */
 typedef struct volume {
     bench_sample sample;
     bench_context contexts[ENTRIES]; /* [0] for the finest level, [1] for coarse levels */
     double *ms[ENTRIES];             /* sums of each run over all views */
-    accuracy_error colour[ENTRIES], alpha[ENTRIES];
+    measure_error colour[ENTRIES], alpha[ENTRIES];
 } volume;
 
 typedef struct measuring {
@@ -32,8 +36,8 @@ static int open_volume(measuring *m, int i)
 {
     const bench_options *o = m->options;
     volume *v = &m->volumes[i];
-    bench_progress_step(o->progress, "volume");
-    int status = bench_sample_make_field(&v->sample, o->field, BENCH_FINER_COARSEST << i, o->tf);
+    measure_progress_step(o->progress, "volume");
+    int status = bench_sample_make_field(&v->sample, o->field, COARSEST << i, o->tf);
     for (int e = 0; e < ENTRIES && !status; e++) {
         v->ms[e] = calloc((size_t)o->repeat, sizeof *v->ms[e]);
         if (!v->ms[e])
@@ -51,13 +55,7 @@ static int find_view(measuring *m, int view, triptych_camera *camera)
                                    .height = o->sizes[0][1],
                                    .azimuth_degrees = 360.0 * view / o->views,
                                    .turntable = 1 };
-    triptych *t = m->volumes[0].contexts[0].t;
-    int status = triptych_set_view(t, &wanted);
-    if (!status)
-        status = triptych_get_camera(t, camera);
-    if (status)
-        trip_report_line(triptych_error(t));
-    return status;
+    return bench_context_find(&m->volumes[0].contexts[0], &wanted, camera);
 }
 
 /* Computes the maximum width in pixels of the first volume's voxels. With this --lod all volumes
@@ -73,7 +71,7 @@ static int find_lod(measuring *m)
         return status;
     for (int a = 0; a < 3; a++)
         distance = hypot(distance, camera.eye[a] - camera.look[a]);
-    const double near = distance - 0.5 * sqrt(3) * voxel * BENCH_FINER_COARSEST;
+    const double near = distance - 0.5 * sqrt(3) * voxel * COARSEST;
     const double slope = 2 * tan(camera.fov_degrees * 3.14159265358979323846 / 360);
     m->lod_px = voxel / (near * slope / camera.height);
     return 0;
@@ -96,7 +94,7 @@ static int measure_errors(measuring *m, const triptych_camera *camera)
             volume *v = &m->volumes[i];
             status = draw(m, v, e, camera, 1, m->rgba, NULL);
             if (!status)
-                accuracy_error_add_apart(&v->colour[e], &v->alpha[e], m->rgba, m->truth, m->pixels);
+                measure_error_add_apart(&v->colour[e], &v->alpha[e], m->rgba, m->truth, m->pixels);
         }
     return status;
 }
@@ -129,32 +127,7 @@ static int measure(measuring *m)
     return status;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double middle(double *ms, int count)
-{
-    qsort(ms, (size_t)count, sizeof *ms, ascending);
-    return ms[(count - 1) / 2];
-}
-
-static bench_finer_row row_of(const measuring *m, int i)
-{
-    volume *v = &m->volumes[i];
-    const int repeat = m->options->repeat;
-    return (bench_finer_row){ .voxels = BENCH_FINER_COARSEST << i,
-                              .fine_ms = middle(v->ms[0], repeat),
-                              .fine_colour = accuracy_error_measure(&v->colour[0]).mean,
-                              .fine_alpha = accuracy_error_measure(&v->alpha[0]).mean,
-                              .ms = middle(v->ms[1], repeat),
-                              .colour = accuracy_error_measure(&v->colour[1]).mean,
-                              .alpha = accuracy_error_measure(&v->alpha[1]).mean };
-}
-
-static const bench_column columns[] = {
+static const measure_column columns[] = {
     { "voxels", "voxels per side", 0, 0 },
     { "fine_ms", "finest: ms", 1, 0 },
     { "fine_growth", "x previous", 2, 0 },
@@ -166,48 +139,56 @@ static const bench_column columns[] = {
     { "alpha", "alpha", 2, 0 },
 };
 
-static void add_rows(bench_report *r, const bench_finer_row *rows, int count)
+/* Adds a row for each volume: milliseconds per frame, and mean errors of 255. */
+static void add_rows(const measuring *m, cJSON *rows)
 {
-    cJSON *table =
-        bench_report_table(r, "finer", "Frames of one object, sampled more and more finely",
-                           columns, sizeof columns / sizeof columns[0]);
-    for (int i = 0; i < count; i++) {
-        cJSON *row = cJSON_CreateObject();
-        cJSON_AddNumberToObject(row, "voxels", rows[i].voxels);
-        cJSON_AddNumberToObject(row, "fine_ms", rows[i].fine_ms);
-        cJSON_AddNumberToObject(row, "ms", rows[i].ms);
-        if (i > 0) {
-            cJSON_AddNumberToObject(row, "fine_growth", rows[i].fine_ms / rows[i - 1].fine_ms);
-            cJSON_AddNumberToObject(row, "growth", rows[i].ms / rows[i - 1].ms);
-        }
-        cJSON_AddNumberToObject(row, "fine_colour", rows[i].fine_colour);
-        cJSON_AddNumberToObject(row, "fine_alpha", rows[i].fine_alpha);
-        cJSON_AddNumberToObject(row, "colour", rows[i].colour);
-        cJSON_AddNumberToObject(row, "alpha", rows[i].alpha);
-        cJSON_AddItemToArray(table, row);
+    for (int i = 0; i < m->count; i++) {
+        volume *v = &m->volumes[i];
+        const double fine_ms = measure_median(v->ms[0], m->options->repeat);
+        const double ms = measure_median(v->ms[1], m->options->repeat);
+        const cJSON *last = i > 0 ? cJSON_GetArrayItem(rows, i - 1) : NULL;
+        cJSON *row = measure_new_row(rows);
+        measure_add(row, { "voxels", COARSEST << i }, { "fine_ms", fine_ms }, { "ms", ms },
+                    { "fine_colour", measure_error_measure(&v->colour[0]).mean },
+                    { "fine_alpha", measure_error_measure(&v->alpha[0]).mean },
+                    { "colour", measure_error_measure(&v->colour[1]).mean },
+                    { "alpha", measure_error_measure(&v->alpha[1]).mean });
+        if (last)
+            measure_add(row, { "fine_growth", fine_ms / measure_number(last, "fine_ms") },
+                        { "growth", ms / measure_number(last, "ms") });
     }
+}
+
+/* Plots the times over the resolution. */
+static int save_plot(const cJSON *rows, const char *path)
+{
+    static const char *const names[MAX] = { "128\302\263", "256\302\263", "512\302\263",
+                                            "1024\302\263" };
+    static const measure_curve curves[] = { { "fine_ms", "finest level", "#b03020" },
+                                            { "ms", "coarse levels", "#2050b0" } };
+    const measure_plot plot = { .width = 560,
+                                .height = 360,
+                                .x_title = "voxels",
+                                .y_title = "ms per frame",
+                                .names = names,
+                                .name_count = cJSON_GetArraySize(rows) };
+    return measure_plot_save(measure_plot_rows(&plot, rows, curves, ENTRIES, MAX), path);
 }
 
 static void describe(const bench_options *o, bench_report *r)
 {
-    cJSON *settings = bench_report_settings(r);
-    char size[32];
-    snprintf(size, sizeof size, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
-    cJSON_AddStringToObject(settings, "size", size);
+    cJSON *settings = r->settings;
+    bench_report_add_size(settings, o->sizes[0]);
     cJSON_AddStringToObject(settings, "field", o->field);
-    cJSON_AddStringToObject(settings, "classified",
-                            o->settings.classify == TRIP_CLASSIFY_POST          ? "post"
-                            : o->settings.compositing == TRIP_COMPOSITING_SHEET ? "pre, by sheets"
-                                                                                : "pre, by splats");
+    cJSON_AddStringToObject(settings, "classified", bench_classified(&o->settings));
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }
 
 static int report(const measuring *m, bench_report *r)
 {
-    bench_finer_row rows[MAX];
-    for (int i = 0; i < m->count; i++)
-        rows[i] = row_of(m, i);
-    add_rows(r, rows, m->count);
+    cJSON *rows = bench_report_table(r, "finer",
+                                     "Frames of one object, sampled more and more finely", columns);
+    add_rows(m, rows);
     describe(m->options, r);
     bench_report_limit(
         r,
@@ -224,7 +205,7 @@ static int report(const measuring *m, bench_report *r)
         bench_report_limit(
             r, "The gradient for full shading depends on the voxel size, so that finer volumes are "
                "shaded differently. --no-shading removes this part of the errors of colour.");
-    return m->options->plot ? bench_finer_plot(m->options->plot, rows, m->count) : 0;
+    return m->options->plot ? save_plot(rows, m->options->plot) : 0;
 }
 
 static int begin(measuring *m)
@@ -236,7 +217,7 @@ static int begin(measuring *m)
     m->truth = malloc(bytes);
     if (!m->volumes || !m->rgba || !m->truth)
         return trip_fail(TRIP_ERROR, "bench", "levels", "out of memory");
-    bench_progress_expect(o->progress,
+    measure_progress_expect(o->progress,
                           m->count + o->views * (1 + m->count * ENTRIES * (1 + o->repeat)));
     int status = 0;
     for (int i = 0; i < m->count && !status; i++)
@@ -264,7 +245,7 @@ int bench_finer(const bench_options *o, bench_report *r)
     measuring m = { .options = o,
                     .count = 1,
                     .pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1] };
-    while (m.count < MAX && BENCH_FINER_COARSEST << m.count <= o->finest)
+    while (m.count < MAX && COARSEST << m.count <= o->finest)
         m.count++;
     int status = begin(&m);
     if (!status)

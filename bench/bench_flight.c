@@ -10,6 +10,7 @@
 #include "budget.h"
 #include "flyer.h"
 #include "report.h"
+#include "median.h"
 
 typedef struct flying {
     const bench_options *options;
@@ -19,12 +20,6 @@ typedef struct flying {
 } flying;
 
 /* ---- frame times ---- */
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* Returns the smallest of the sorted numbers that is not less than a given part of them. */
 static double quantile(const double *sorted, int count, double part)
@@ -52,31 +47,28 @@ static void gather(const flyer *f, int first, int past, part *p)
         p->stale += at->step < at->latest - 1;
         p->count++;
     }
-    qsort(p->between, (size_t)p->count, sizeof *p->between, ascending);
-    qsort(p->age, (size_t)p->count, sizeof *p->age, ascending);
-    qsort(p->scale, (size_t)p->count, sizeof *p->scale, ascending);
+    measure_sort(p->between, p->count);
+    measure_sort(p->age, p->count);
+    measure_sort(p->scale, p->count);
 }
 
 static void add_part(cJSON *table, const char *name, const part *p)
 {
     double sum = 0;
-    cJSON *row = cJSON_CreateObject();
+    cJSON *row = measure_new_row(table);
     for (int i = 0; i < p->count; i++)
         sum += p->between[i];
     cJSON_AddStringToObject(row, "part", name);
-    cJSON_AddNumberToObject(row, "pictures", p->count);
-    cJSON_AddNumberToObject(row, "fps", sum > 0 ? 1e3 * p->count / sum : 0);
-    cJSON_AddNumberToObject(row, "ms", quantile(p->between, p->count, 0.5));
-    cJSON_AddNumberToObject(row, "ms_99", quantile(p->between, p->count, 0.99));
-    cJSON_AddNumberToObject(row, "ms_max", quantile(p->between, p->count, 1));
-    cJSON_AddNumberToObject(row, "age_ms", quantile(p->age, p->count, 0.5));
-    cJSON_AddNumberToObject(row, "age_ms_99", quantile(p->age, p->count, 0.99));
-    cJSON_AddNumberToObject(row, "stale", p->stale);
-    cJSON_AddNumberToObject(row, "scale", quantile(p->scale, p->count, 0.5));
-    cJSON_AddItemToArray(table, row);
+    measure_add(row, { "pictures", p->count }, { "fps", sum > 0 ? 1e3 * p->count / sum : 0 },
+                { "ms", quantile(p->between, p->count, 0.5) },
+                { "ms_99", quantile(p->between, p->count, 0.99) },
+                { "ms_max", quantile(p->between, p->count, 1) },
+                { "age_ms", quantile(p->age, p->count, 0.5) },
+                { "age_ms_99", quantile(p->age, p->count, 0.99) }, { "stale", p->stale },
+                { "scale", quantile(p->scale, p->count, 0.5) });
 }
 
-static const bench_column part_columns[] = {
+static const measure_column part_columns[] = {
     { "part", "part", 0, 0 },
     { "pictures", "pictures", 0, 0 },
     { "fps", "pictures/s", 1, 0 },
@@ -93,8 +85,8 @@ static int add_parts(const flying *m)
 {
     static const char *const names[FLYER_PARTS] = { "round", "nearer", "through", "back" };
     const flyer *f = &m->flyer;
-    cJSON *table = bench_report_table(m->report, "parts", "Pictures while the eye moves",
-                                      part_columns, sizeof part_columns / sizeof part_columns[0]);
+    cJSON *table =
+        bench_report_table(m->report, "parts", "Pictures while the eye moves", part_columns);
     const size_t room = (size_t)f->picture_count + 1;
     double *memory = calloc(3 * room, sizeof *memory);
     if (!memory)
@@ -119,48 +111,31 @@ static int byte_of(float x)
     return x > 0 ? (x < 1 ? (int)(x * 255 + 0.5f) : 255) : 0;
 }
 
-static int draw_alone(const flying *m, triptych *t, int *differ)
-{
-    const bench_options *o = m->options;
-    const int width = o->sizes[0][0], height = o->sizes[0][1];
-    const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
-    float *rgba = NULL;
-    int status = triptych_open(t, o->input,
-                               &(triptych_resources){ .memory_bytes = o->memory_bytes,
-                                                      .threads = (unsigned)o->threads[0],
-                                                      .renderer = bench_context_renderer(o),
-                                                      .engine = (triptych_engine)o->engine });
-    if (!status)
-        status = triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = o->tf });
-    if (!status)
-        status = triptych_set_settings(t, NULL);
-    if (!status)
-        status = triptych_set_view(t, &view);
-    if (!status)
-        status = triptych_new_picture(t, width, height, 4, &rgba);
-    if (!status)
-        status = triptych_draw(t, rgba);
-    for (size_t i = 0; !status && i < (size_t)width * (size_t)height; i++)
-        for (size_t c = 0; c < 3; c++)
-            *differ += byte_of(rgba[4 * i + c]) != m->flyer.last[4 * i + c];
-    return status;
-}
-
 /* Counts the channels that differ between the picture at rest and the library's picture. */
 static int compare_rest(const flying *m, int *differ)
 {
-    triptych *t = NULL;
+    const int width = m->options->sizes[0][0], height = m->options->sizes[0][1];
+    const triptych_view view = trip_navigation_view(&m->flyer.wanted.navigation, width, height);
+    triptych_camera camera;
+    bench_context c;
+    float *rgba = NULL;
     *differ = 0;
-    if (triptych_create(&t))
-        return trip_fail(TRIP_ERROR, "bench", "flight", "out of memory");
-    int status = draw_alone(m, t, differ);
-    if (status)
-        trip_report_line(triptych_error(t));
-    triptych_destroy(t);
+    int status = bench_context_open(&c, m->options->input, m->options);
+    c.settings = (draw_settings){ .has_background = 0 };
+    if (!status)
+        status = bench_context_find(&c, &view, &camera);
+    if (!status)
+        status = bench_context_picture(&c, width, height, &rgba);
+    if (!status)
+        status = bench_context_draw(&c, c.settings.lod.voxel_px, c.settings.all.samples, rgba, NULL);
+    for (size_t i = 0; !status && i < (size_t)width * (size_t)height; i++)
+        for (size_t k = 0; k < 3; k++)
+            *differ += byte_of(rgba[4 * i + k]) != m->flyer.last[4 * i + k];
+    bench_context_close(&c);
     return status;
 }
 
-static const bench_column rest_columns[] = {
+static const measure_column rest_columns[] = {
     { "first_ms", "ms to first picture", 0, 0 }, { "first_whole_ms", "to complete picture", 0, 0 },
     { "rest_ms", "after flight", 0, 0 },         { "differ", "differing channels", 0, 0 },
     { "peak_bytes", "peak memory MB", 1, 1e6 },  { "limit_bytes", "limit MB", 1, 1e6 },
@@ -169,18 +144,16 @@ static const bench_column rest_columns[] = {
 
 static int add_rest(const flying *m)
 {
-    cJSON *table = bench_report_table(m->report, "rest", "Before and after the flight",
-                                      rest_columns, sizeof rest_columns / sizeof rest_columns[0]);
-    cJSON *row = cJSON_CreateObject();
+    cJSON *table =
+        bench_report_table(m->report, "rest", "Before and after the flight", rest_columns);
+    cJSON *row = measure_new_row(table);
     const double resident = (double)trip_memory_peak_rss_bytes();
     int differ;
-    cJSON_AddItemToArray(table, row);
-    cJSON_AddNumberToObject(row, "first_ms", m->flyer.first_ms);
-    cJSON_AddNumberToObject(row, "first_whole_ms", m->flyer.first_whole_ms);
-    cJSON_AddNumberToObject(row, "rest_ms", m->flyer.rest_ms);
-    cJSON_AddNumberToObject(row, "peak_bytes", (double)m->status.stats.peak_memory_bytes);
-    cJSON_AddNumberToObject(row, "limit_bytes", (double)m->status.stats.memory_bytes);
-    cJSON_AddNumberToObject(row, "resident_bytes", resident);
+    measure_add(row, { "first_ms", m->flyer.first_ms },
+                { "first_whole_ms", m->flyer.first_whole_ms }, { "rest_ms", m->flyer.rest_ms },
+                { "peak_bytes", (double)m->status.stats.peak_memory_bytes },
+                { "limit_bytes", (double)m->status.stats.memory_bytes },
+                { "resident_bytes", resident });
     int status = compare_rest(m, &differ);
     cJSON_AddNumberToObject(row, "differ", differ);
     return status;
@@ -190,7 +163,7 @@ static void describe(const flying *m)
 {
     const bench_options *o = m->options;
     const triptych_info *info = &m->flyer.opened.info;
-    cJSON *settings = bench_report_settings(m->report);
+    cJSON *settings = m->report->settings;
     char text[64];
     cJSON_AddStringToObject(settings, "data_set", o->input);
     snprintf(text, sizeof text, "%lld x %lld x %lld", (long long)info->dims[0],
@@ -199,8 +172,7 @@ static void describe(const flying *m)
     cJSON_AddNumberToObject(settings, "stored_bytes", (double)info->bytes);
     cJSON_AddStringToObject(settings, "transfer_function",
                             o->tf ? o->tf : "stored in the data set");
-    snprintf(text, sizeof text, "%d x %d", o->sizes[0][0], o->sizes[0][1]);
-    cJSON_AddStringToObject(settings, "size", text);
+    bench_report_add_size(settings, o->sizes[0]);
     cJSON_AddStringToObject(settings, "renderer", m->status.renderer);
     cJSON_AddStringToObject(settings, "device", m->status.device);
     cJSON_AddNumberToObject(settings, "wanted_fps", o->frames_per_second);

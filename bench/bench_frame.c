@@ -6,23 +6,16 @@
 
 #include "clock.h"
 #include "cpu/cpu_renderer.h"
+#include "machine.h"
 #include "report.h"
 #include "sheet_samples.h"
 #include "splat.h"
 
-double bench_now_ms(void)
+const char *bench_classified(const trip_settings *settings)
 {
-    return trip_now_ms();
-}
-
-uint64_t bench_splats_drawn(const trip_frame_stats *s)
-{
-    return s->all.splats_drawn;
-}
-
-uint64_t bench_splats_read(const trip_frame_stats *s)
-{
-    return s->all.splats_read;
+    return settings->classify == TRIP_CLASSIFY_POST          ? "post"
+           : settings->compositing == TRIP_COMPOSITING_SHEET ? "pre, by sheets"
+                                                             : "pre, by splats";
 }
 
 unsigned bench_planes(const session *s, const trip_settings *settings)
@@ -75,12 +68,12 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         settings.sprite_px = sprite_px(f->session->data, camera, &settings);
     if (f->occluder)
         *f->occluder = count ? NULL : f->renderer;
-    double start = bench_now_ms();
+    double start = trip_now_ms();
     int status = trip_plan_make_next(&plan, f->session->data, camera, &settings, f->session->table,
                                      session_classified(f->session, 0), NULL, f->session->budget);
     if (status)
         return status;
-    double planned = bench_now_ms();
+    double planned = trip_now_ms();
     trip_frame frame = {
         .data = f->session->data,
         .camera = camera,
@@ -90,7 +83,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         .count = count,
     };
     status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, NULL, &cost->stats);
-    cost->ms = bench_now_ms() - start;
+    cost->ms = trip_now_ms() - start;
     cost->plan_ms = planned - start;
     cost->wait_ms = cost->stats.read_ms;
     cost->draw_ms = cost->stats.draw_ms;
@@ -103,7 +96,7 @@ static void show_step(const bench_frame *f, bool count)
 {
     char text[48];
     snprintf(text, sizeof text, "frame of %s%s", f->renderer->ops->name, count ? ", counted" : "");
-    bench_progress_step(f->progress, text);
+    measure_progress_step(f->progress, text);
 }
 
 int bench_frame_draw(const bench_frame *f, bool count, bench_cost *cost)
@@ -138,11 +131,12 @@ static int by_time(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-const bench_cost *bench_runs_sorted(bench_runs *r, int frame)
+/* Sorts the runs of a frame by time and returns the median, or the faster of two middle runs. */
+static const bench_cost *median(bench_runs *r, int frame)
 {
     bench_cost *costs = &r->costs[frame * r->repeat];
     qsort(costs, (size_t)r->repeat, sizeof *costs, by_time);
-    return costs;
+    return &costs[(r->repeat - 1) / 2];
 }
 
 /* Names the largest part of a frame and its share, for example "drawing 93 %". */
@@ -162,20 +156,23 @@ static void bound(const bench_cost *c, char text[48])
     snprintf(text, 48, "%s %.0f %%", parts[max].name, 100 * parts[max].ms / c->ms);
 }
 
-void bench_runs_describe(bench_runs *r, int frame, cJSON *row)
+void bench_runs_describe(bench_runs *r, int frame, int base, const bench_cost *counted, double kept,
+                         cJSON *row)
 {
     char text[48];
-    const bench_cost *runs = bench_runs_sorted(r, frame), *middle = &runs[(r->repeat - 1) / 2];
+    const bench_cost *middle = median(r, frame), *runs = &r->costs[frame * r->repeat];
+    const trip_list_stats *all = &counted->stats.all;
+    measure_add(row, { "splats_read", (double)all->splats_read },
+                { "splats_drawn", (double)all->splats_drawn });
+    if (kept > 0)
+        cJSON_AddNumberToObject(row, "multiple", (double)all->splats_drawn / kept);
     bound(middle, text);
-    cJSON_AddNumberToObject(row, "ms", middle->ms);
-    cJSON_AddNumberToObject(row, "ms_min", runs[0].ms);
-    cJSON_AddNumberToObject(row, "ms_max", runs[r->repeat - 1].ms);
-    cJSON_AddNumberToObject(row, "fps", 1e3 / middle->ms);
-    cJSON_AddNumberToObject(row, "plan_ms", middle->plan_ms);
-    cJSON_AddNumberToObject(row, "wait_ms", middle->wait_ms);
-    cJSON_AddNumberToObject(row, "draw_ms", middle->draw_ms);
-    cJSON_AddNumberToObject(row, "merge_ms", middle->merge_ms);
+    measure_add(row, { "ms", middle->ms }, { "ms_min", runs[0].ms },
+                { "ms_max", runs[r->repeat - 1].ms }, { "fps", 1e3 / middle->ms },
+                { "plan_ms", middle->plan_ms }, { "wait_ms", middle->wait_ms },
+                { "draw_ms", middle->draw_ms }, { "merge_ms", middle->merge_ms });
     cJSON_AddStringToObject(row, "bound_by", text);
+    cJSON_AddNumberToObject(row, "speed", median(r, base)->ms / middle->ms);
 }
 
 /* Keeps the last reported line instead of printing it. An interruption is printed, because it ends
@@ -218,26 +215,29 @@ void bench_renderer_destroy(trip_renderer *r)
         r->ops->destroy(r);
 }
 
-int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bench_report *r)
+int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bool from_disk,
+                     bench_report *r)
 {
     char why[256];
     *b = (bench_scene){ .frame = { .session = s, .settings = o->settings, .progress = o->progress },
                         .size = { o->sizes[0][0], o->sizes[0][1] } };
     bench_frame *f = &b->frame;
+    f->occluder = from_disk && !o->draw_occluded ? &b->occluder : NULL;
     int status = session_take_image(s, b->size[0], b->size[1], &f->rgba);
     if (!status)
         status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
-    bench_progress_step(o->progress, "data set to memory");
+    measure_progress_expect(o->progress, 1);
+    measure_progress_step(o->progress, from_disk ? "data set" : "data set to memory");
     if (!status)
-        status = bench_reader_create(s, &f->reader, o, TRIP_ENGINE_NULL, f->renderer, NULL);
+        status = bench_reader_create(s, &f->reader, o, from_disk ? o->engine : TRIP_ENGINE_NULL,
+                                     f->renderer, f->occluder);
     if (status)
         return status;
-    cJSON *machine = bench_report_machine(r);
-    cJSON_AddStringToObject(machine, "renderer", f->renderer->ops->name);
-    cJSON_AddStringToObject(machine, "device", f->renderer->ops->device(f->renderer));
-    cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(f->reader));
+    measure_describe_renderer(r->machine, f->renderer->ops->name,
+                              f->renderer->ops->device(f->renderer),
+                              trip_reader_engine_name(f->reader));
     if (o->threads[0])
-        cJSON_AddNumberToObject(machine, "threads", o->threads[0]);
+        cJSON_AddNumberToObject(r->machine, "threads", o->threads[0]);
     return 0;
 }
 

@@ -17,18 +17,21 @@ typedef struct bench_frame {
     float *rgba;
     /* The reader skips runs that *occluder has already covered. NULL reads everything. */
     trip_renderer **occluder;
-    bench_progress *progress; /* each frame is a step; may be NULL */
+    measure_progress *progress; /* each frame is a step; may be NULL */
 } bench_frame;
 
 /* A renderer and a reader for most tables: the first renderer, size and number of threads of the
- * options, and the data set in memory. Adds the renderer to the report. The caller closes it even
- * after a failure. */
+ * options, and the data set in memory or on disk. Adds the renderer to the report. The caller
+ * closes it even after a failure. */
 typedef struct bench_scene {
     bench_frame frame; /* without a view */
     int size[2];
+    trip_renderer *occluder; /* from disk: renderer of the current frame, unless occluded bricks are
+                                drawn */
 } bench_scene;
 
-int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bench_report *r);
+int bench_scene_open(bench_scene *b, const session *s, const bench_options *o, bool from_disk,
+                     bench_report *r);
 void bench_scene_close(bench_scene *b);
 
 /* Cost of one frame. ms is the whole time, with planning. */
@@ -49,21 +52,18 @@ typedef struct bench_runs {
 /* Draws all frames once, then again, `repeat` times in total. */
 int bench_runs_take(bench_runs *r, const bench_frame *frames, int count, int repeat);
 void bench_runs_free(bench_runs *r);
-/* Sorts the runs of a frame by time and returns them. The median, or the faster of two middle runs,
- * is at (repeat - 1) / 2. */
-const bench_cost *bench_runs_sorted(bench_runs *r, int frame);
+/* Adds the counts of an untimed frame, then ms, ms_min, ms_max, fps and the parts of the median
+ * run. Adds its largest part, and its speed relative to the frame `base`. `kept` is the number of
+ * kept voxels. */
+void bench_runs_describe(bench_runs *r, int frame, int base, const bench_cost *counted, double kept,
+                         cJSON *row);
 
-/* Adds ms, ms_min, ms_max, fps, the parts of the median run and the largest part. */
-void bench_runs_describe(bench_runs *r, int frame, cJSON *row);
-
-double bench_now_ms(void);
-/* Sums over the lists. */
-uint64_t bench_splats_drawn(const trip_frame_stats *s);
-uint64_t bench_splats_read(const trip_frame_stats *s);
 /* Creates a reader for the frames of the options. `renderer` is as in session_reader and `occluder`
  * as in bench_frame; both may be NULL. */
 int bench_reader_create(const session *s, trip_reader **out, const bench_options *o,
                         trip_engine engine, trip_renderer *renderer, trip_renderer **occluder);
+/* Names the classification and the unit of compositing. */
+const char *bench_classified(const trip_settings *settings);
 /* Returns the planes that the settings read, a bit per trip_plane. */
 unsigned bench_planes(const session *s, const trip_settings *settings);
 

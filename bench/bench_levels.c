@@ -7,7 +7,6 @@
 #include <stdlib.h>
 
 #include "bench_context.h"
-#include "bench_finer.h"
 #include "error.h"
 #include "report.h"
 
@@ -30,6 +29,7 @@ typedef struct measuring {
     bench_context context;
     double voxel; /* width in world units */
     unsigned levels;
+    int width; /* of the picture of a level */
     bench_report *report;
 } measuring;
 
@@ -38,13 +38,12 @@ typedef struct measuring {
 /* settings.lod_px that selects the level with voxels one pixel wide. */
 static const double level_px = 1.0001;
 
-/* The errors of a level, summed over views. */
+/* The errors of colour and alpha of a level, summed over views. */
 typedef struct entry {
-    accuracy_error colour, alpha;           /* with one ray per pixel */
-    accuracy_error own_colour, own_alpha;   /* with as many rays as the reference */
-    accuracy_error fine_colour, fine_alpha; /* finest level at this size, with one ray per pixel */
-    double ms, fine_ms;                     /* sums over the views */
-    int width;
+    measure_error drawn[2]; /* with one ray per pixel */
+    measure_error own[2];   /* with as many rays as the reference */
+    measure_error fine[2];  /* finest level at this size, with one ray per pixel */
+    double ms, fine_ms;      /* sums over the views */
 } entry;
 
 /* Sets a parallel view of the whole object, with voxels of a level one pixel wide. */
@@ -56,13 +55,9 @@ static int look_at(measuring *m, int view, unsigned level, triptych_camera *came
                                   .azimuth_degrees = 360.0 * view / m->options->views,
                                   .ortho_fit = 1,
                                   .turntable = 1 };
-    int status = triptych_set_view(m->context.t, &whole);
-    if (!status)
-        status = triptych_get_camera(m->context.t, camera);
-    if (status) {
-        trip_report_line(triptych_error(m->context.t));
+    int status = bench_context_find(&m->context, &whole, camera);
+    if (status)
         return status;
-    }
     camera->width = camera->height = (int)ceil(camera->ortho_height / pixel);
     camera->ortho_height = camera->height * pixel;
     return bench_context_look(&m->context, camera);
@@ -73,31 +68,20 @@ static int samples_of(unsigned level)
     return (1 << level) > MIN_SAMPLES ? 1 << level : MIN_SAMPLES;
 }
 
-static int draw_and_compare(measuring *m, unsigned level, entry *e, float *truth, float *rgba)
+/* Draws the view and adds its errors. With `ms`, adds the time of a second frame. */
+static int draw_and_compare(measuring *m, double lod_px, int samples, const float *truth,
+                            float *rgba, double *ms, measure_error errors[2])
 {
-    const size_t pixels = (size_t)e->width * (size_t)e->width;
-    double ms = 0, fine_ms = 0;
-    int status = bench_context_draw(&m->context, 0, samples_of(level), truth, NULL);
+    const size_t pixels = (size_t)m->width * (size_t)m->width;
+    double own_ms;
+    int status = bench_context_draw(&m->context, lod_px, samples, rgba, NULL);
+    if (!status && ms)
+        status = bench_context_draw(&m->context, lod_px, samples, rgba, &own_ms);
     if (!status)
-        status = bench_context_draw(&m->context, 0, 1, rgba, NULL);
-    if (!status)
-        status = bench_context_draw(&m->context, 0, 1, rgba, &fine_ms);
-    if (status)
-        return status;
-    accuracy_error_add_apart(&e->fine_colour, &e->fine_alpha, rgba, truth, pixels);
-    status = bench_context_draw(&m->context, level_px, samples_of(level), rgba, NULL);
-    if (status)
-        return status;
-    accuracy_error_add_apart(&e->own_colour, &e->own_alpha, rgba, truth, pixels);
-    status = bench_context_draw(&m->context, level_px, 1, rgba, NULL);
-    if (!status)
-        status = bench_context_draw(&m->context, level_px, 1, rgba, &ms);
-    if (status)
-        return status;
-    accuracy_error_add_apart(&e->colour, &e->alpha, rgba, truth, pixels);
-    e->ms += ms;
-    e->fine_ms += fine_ms;
-    return 0;
+        measure_error_add_apart(&errors[0], &errors[1], rgba, truth, pixels);
+    if (!status && ms)
+        *ms += own_ms;
+    return status;
 }
 
 /* Returns TOO_LARGE if the reference would be too large. */
@@ -108,22 +92,26 @@ static int measure_view(measuring *m, int view, unsigned level, entry *e)
     int status = look_at(m, view, level, &camera);
     if (status)
         return status;
-    e->width = camera.width;
+    m->width = camera.width;
     if (camera.width > MAX_TRUTH_PX / samples_of(level))
         return TOO_LARGE;
-    status = triptych_new_picture(m->context.t, e->width, e->width, 4, &truth);
+    status = bench_context_picture(&m->context, m->width, m->width, &truth);
     if (!status)
-        status = triptych_new_picture(m->context.t, e->width, e->width, 4, &rgba);
-    if (status)
-        trip_report_line(triptych_error(m->context.t));
-    else
-        status = draw_and_compare(m, level, e, truth, rgba);
+        status = bench_context_picture(&m->context, m->width, m->width, &rgba);
+    if (!status)
+        status = bench_context_draw(&m->context, 0, samples_of(level), truth, NULL);
+    if (!status)
+        status = draw_and_compare(m, 0, 1, truth, rgba, &e->fine_ms, e->fine);
+    if (!status)
+        status = draw_and_compare(m, level_px, samples_of(level), truth, rgba, NULL, e->own);
+    if (!status)
+        status = draw_and_compare(m, level_px, 1, truth, rgba, &e->ms, e->drawn);
     triptych_release_picture(m->context.t, truth);
     triptych_release_picture(m->context.t, rgba);
     return status;
 }
 
-static const bench_column level_columns[] = {
+static const measure_column level_columns[] = {
     { "level", "level", 0, 0 },
     { "width", "pixels", 0, 0 },
     { "colour_mean", "colour: mean", 2, 0 },
@@ -140,29 +128,23 @@ static const bench_column level_columns[] = {
 
 static void add_level(const measuring *m, cJSON *table, unsigned level, const entry *e)
 {
-    const accuracy_error_figures colour = accuracy_error_measure(&e->colour);
-    const accuracy_error_figures alpha = accuracy_error_measure(&e->alpha);
-    cJSON *row = cJSON_CreateObject();
-    cJSON_AddNumberToObject(row, "level", level);
-    cJSON_AddNumberToObject(row, "width", e->width);
-    cJSON_AddNumberToObject(row, "colour_mean", colour.mean);
-    cJSON_AddNumberToObject(row, "colour_99", colour.percentile_99);
-    cJSON_AddNumberToObject(row, "alpha_mean", alpha.mean);
-    cJSON_AddNumberToObject(row, "alpha_99", alpha.percentile_99);
-    cJSON_AddNumberToObject(row, "ms", e->ms / m->options->views);
-    cJSON_AddNumberToObject(row, "own_colour_mean", accuracy_error_measure(&e->own_colour).mean);
-    cJSON_AddNumberToObject(row, "own_alpha_mean", accuracy_error_measure(&e->own_alpha).mean);
-    cJSON_AddNumberToObject(row, "fine_colour_mean", accuracy_error_measure(&e->fine_colour).mean);
-    cJSON_AddNumberToObject(row, "fine_alpha_mean", accuracy_error_measure(&e->fine_alpha).mean);
-    cJSON_AddNumberToObject(row, "fine_ms", e->fine_ms / m->options->views);
-    cJSON_AddItemToArray(table, row);
+    const measure_error_figures colour = measure_error_measure(&e->drawn[0]);
+    const measure_error_figures alpha = measure_error_measure(&e->drawn[1]);
+    cJSON *row = measure_new_row(table);
+    measure_add(row, { "level", level }, { "width", m->width }, { "colour_mean", colour.mean },
+                { "colour_99", colour.percentile_99 }, { "alpha_mean", alpha.mean },
+                { "alpha_99", alpha.percentile_99 }, { "ms", e->ms / m->options->views },
+                { "own_colour_mean", measure_error_measure(&e->own[0]).mean },
+                { "own_alpha_mean", measure_error_measure(&e->own[1]).mean },
+                { "fine_colour_mean", measure_error_measure(&e->fine[0]).mean },
+                { "fine_alpha_mean", measure_error_measure(&e->fine[1]).mean },
+                { "fine_ms", e->fine_ms / m->options->views });
 }
 
 static int measure_levels(measuring *m)
 {
     cJSON *table = bench_report_table(
-        m->report, "levels", "Each level with voxels one pixel wide: error of 255", level_columns,
-        sizeof level_columns / sizeof level_columns[0]);
+        m->report, "levels", "Each level with voxels one pixel wide: error of 255", level_columns);
     int status = 0;
     entry *e = malloc(sizeof *e);
     if (!e)
@@ -207,13 +189,9 @@ static int look_from(measuring *m, const triptych_camera *from, int step)
 static int find_start(measuring *m, triptych_camera *from)
 {
     const triptych_view whole = { .width = DOLLY_PX, .height = DOLLY_PX, .fov_degrees = 30 };
-    int status = triptych_set_view(m->context.t, &whole);
-    if (!status)
-        status = triptych_get_camera(m->context.t, from);
-    if (status) {
-        trip_report_line(triptych_error(m->context.t));
+    int status = bench_context_find(&m->context, &whole, from);
+    if (status)
         return status;
-    }
     const double wanted =
         m->voxel * DOLLY_PX / dolly_px / 2 / tan(30 * 3.14159265358979323846 / 360);
     double distance = 0;
@@ -239,7 +217,7 @@ static int dolly(measuring *m, const triptych_camera *from, double lod_px, float
     return status;
 }
 
-static const bench_column dolly_columns[] = {
+static const measure_column dolly_columns[] = {
     { "drawn", "drawn", 0, 0 },
     { "mean", "mean", 3, 0 },
     { "max", "max", 3, 0 },
@@ -250,7 +228,7 @@ static const bench_column dolly_columns[] = {
 static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const flicker *finest)
 {
     double sum = 0, max = 0, sum_of_finest = 0, max_of_finest = 0;
-    cJSON *row = cJSON_CreateObject();
+    cJSON *row = measure_new_row(table);
     for (int i = 0; i < DOLLY_STEPS; i++) {
         sum += f->changes[i];
         max = fmax(max, f->changes[i]);
@@ -258,30 +236,24 @@ static void add_dolly(cJSON *table, const char *drawn, const flicker *f, const f
         max_of_finest = fmax(max_of_finest, f->changes[i] / finest->changes[i]);
     }
     cJSON_AddStringToObject(row, "drawn", drawn);
-    cJSON_AddNumberToObject(row, "mean", sum / DOLLY_STEPS);
-    cJSON_AddNumberToObject(row, "max", max);
-    cJSON_AddNumberToObject(row, "mean_of_finest", sum / sum_of_finest);
-    cJSON_AddNumberToObject(row, "most_of_finest", max_of_finest);
-    cJSON_AddItemToArray(table, row);
+    measure_add(row, { "mean", sum / DOLLY_STEPS }, { "max", max },
+                { "mean_of_finest", sum / sum_of_finest }, { "most_of_finest", max_of_finest });
 }
 
 static int measure_dolly(measuring *m)
 {
-    cJSON *table =
-        bench_report_table(m->report, "dolly", "Change between consecutive pictures, of 255",
-                           dolly_columns, sizeof dolly_columns / sizeof dolly_columns[0]);
+    cJSON *table = bench_report_table(m->report, "dolly",
+                                      "Change between consecutive pictures, of 255", dolly_columns);
     triptych_camera from;
     flicker finest, coarse;
     float *pictures[2] = { NULL, NULL };
     int status = find_start(m, &from);
     for (int i = 0; i < 2 && !status; i++)
-        status = triptych_new_picture(m->context.t, DOLLY_PX, DOLLY_PX, 4, &pictures[i]);
+        status = bench_context_picture(&m->context, DOLLY_PX, DOLLY_PX, &pictures[i]);
     if (!status)
         status = dolly(m, &from, 0, pictures, &finest);
     if (!status)
         status = dolly(m, &from, 1, pictures, &coarse);
-    for (int i = 0; i < 2; i++)
-        triptych_release_picture(m->context.t, pictures[i]);
     if (status)
         return status;
     add_dolly(table, "finest", &finest, &finest);
@@ -321,7 +293,7 @@ int bench_levels(const session *s, const bench_options *o, bench_report *r)
             trip_fail(TRIP_ERROR, "bench", o->input,
                       "has no coarse levels for %s; `triptych brick --levels-for both` makes them",
                       o->settings.classify == TRIP_CLASSIFY_POST ? "post" : "pre");
-    bench_progress_expect(o->progress, (int)m.levels * o->views * 6 + 2 * (DOLLY_STEPS + 1));
+    measure_progress_expect(o->progress, (int)m.levels * o->views * 6 + 2 * (DOLLY_STEPS + 1));
     if (!status)
         status = measure_levels(&m);
     if (!status)

@@ -3,7 +3,7 @@
 #ifndef TRIP_BENCH_OPTIONS_H
 #define TRIP_BENCH_OPTIONS_H
 
-#include "bench_progress.h"
+#include "progress_line.h"
 #include "reader.h"
 #include "renderer_choice.h"
 #include "settings.h"
@@ -31,7 +31,7 @@ typedef struct bench_options {
     int draw_occluded;     /* whether bricks behind opaque ones are drawn */
     int no_counts;         /* measures only times */
     int json;
-    bench_progress *progress; /* shows the progress of the table; not an option; may be NULL */
+    measure_progress *progress; /* shows the progress of the table; not an option; may be NULL */
 } bench_options;
 
 /* One line for each table. */

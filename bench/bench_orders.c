@@ -50,7 +50,7 @@ static const struct {
       bench_view_lateral },
 };
 
-static const bench_column columns[] = {
+static const measure_column columns[] = {
     { "method", "method", 0, 0 },
     { "splats_drawn", "splats drawn", 0, 0 },
     { "multiple", "x kept", 3, 0 },
@@ -64,26 +64,17 @@ static const bench_column columns[] = {
 static void add_row(cJSON *rows, bench_runs *runs, const bench_cost counted[METHODS], int view,
                     int method, double kept)
 {
-    const bench_cost *axis = &bench_runs_sorted(runs, AXIS)[(runs->repeat - 1) / 2];
-    const bench_cost *own = &bench_runs_sorted(runs, method)[(runs->repeat - 1) / 2];
-    double drawn = (double)bench_splats_drawn(&counted[method].stats);
-    cJSON *row = cJSON_CreateObject();
+    cJSON *row = measure_new_row(rows);
     cJSON_AddStringToObject(row, "method", methods[method].name);
     if (methods[method].method == TRIP_METHOD_MERGE)
         cJSON_AddNumberToObject(row, "h", methods[method].h);
-    cJSON_AddNumberToObject(row, "splats_read", (double)bench_splats_read(&counted[method].stats));
-    cJSON_AddNumberToObject(row, "splats_drawn", drawn);
-    if (kept > 0)
-        cJSON_AddNumberToObject(row, "multiple", drawn / kept);
-    bench_runs_describe(runs, method, row);
-    cJSON_AddNumberToObject(row, "speed", axis->ms / own->ms);
-    cJSON_AddItemToArray(rows, row);
+    bench_runs_describe(runs, method, AXIS, &counted[method], kept, row);
     if (method >= IN_PAPER)
         return;
-    cJSON_AddNumberToObject(row, "paper_splats", paper[view][method].splats);
-    cJSON_AddNumberToObject(row, "paper_multiple", paper[view][method].splats / PAPER_VALID_VOXELS);
-    cJSON_AddNumberToObject(row, "paper_fps", paper[view][method].fps);
-    cJSON_AddNumberToObject(row, "paper_speed", paper[view][method].fps / paper[view][AXIS].fps);
+    measure_add(row, { "paper_splats", paper[view][method].splats },
+                { "paper_multiple", paper[view][method].splats / PAPER_VALID_VOXELS },
+                { "paper_fps", paper[view][method].fps },
+                { "paper_speed", paper[view][method].fps / paper[view][AXIS].fps });
 }
 
 /* The method image is the last one. Only some renderers implement it. */
@@ -110,8 +101,7 @@ static int measure_view(const bench_frame *base, const bench_options *o, bench_r
     if (!status)
         status = bench_runs_take(&runs, frames, count, o->repeat);
     if (!status) {
-        cJSON *rows = bench_report_table(r, views[view].key, views[view].title, columns,
-                                         sizeof columns / sizeof columns[0]);
+        cJSON *rows = bench_report_table(r, views[view].key, views[view].title, columns);
         for (int i = 0; i < count; i++)
             add_row(rows, &runs, counted, view, i, (double)base->session->data->header.kept);
     }
@@ -145,15 +135,12 @@ static void add_limits(bench_report *r)
                        PAPER_VALID_VOXELS);
 }
 
-int bench_orders(const session *s, const bench_options *o, bench_report *r)
+int bench_orders(bench_scene *scene, const bench_options *o, bench_report *r)
 {
-    bench_scene scene;
-    bench_progress_expect(o->progress, 1 + VIEWS * METHODS * (1 + o->repeat));
-    int status = bench_scene_open(&scene, s, o, r);
-    if (!status)
-        add_limits(r);
+    int status = 0;
+    measure_progress_expect(o->progress, VIEWS * METHODS * (1 + o->repeat));
+    add_limits(r);
     for (int view = 0; view < VIEWS && !status; view++)
-        status = measure_view(&scene.frame, o, r, view);
-    bench_scene_close(&scene);
+        status = measure_view(&scene->frame, o, r, view);
     return status;
 }

@@ -9,10 +9,11 @@
 #include "bench_probe.h"
 #include "bench_view.h"
 #include "report.h"
+#include "median.h"
 
 enum { MAX_CONTENDERS = BENCH_LIST_MAX * BENCH_LIST_MAX, SAMPLE_EVERY = 16 };
 
-static const bench_column columns[] = {
+static const measure_column columns[] = {
     { "renderer", "renderer", 0, 0 },
     { "threads", "threads", 0, 0 },
     { "size", "size", 0, 0 },
@@ -64,7 +65,7 @@ static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_re
         bench_report_limit(r, "left out: %s: %s", names[kind], why);
         return status;
     }
-    cJSON *machine = bench_report_machine(r);
+    cJSON *machine = r->machine;
     snprintf(key, sizeof key, "renderer_%s", own->renderer->ops->name);
     if (!cJSON_HasObjectItem(machine, key))
         cJSON_AddStringToObject(machine, key, own->renderer->ops->device(own->renderer));
@@ -102,7 +103,7 @@ static int measure_load(bench_frame frame, load *out)
     bench_cost cost;
     bench_probe probe = bench_probe_make(SAMPLE_EVERY);
     int status = bench_frame_draw(&frame, true, &cost);
-    out->splats = (double)bench_splats_drawn(&cost.stats);
+    out->splats = (double)cost.stats.all.splats_drawn;
     frame.renderer = &probe.base;
     if (!status)
         status = bench_frame_draw(&frame, false, &cost);
@@ -169,12 +170,6 @@ static void add_views(const race *c, const contender *own, cJSON *row)
     }
 }
 
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void add_row(const race *c, const contender *own, const int size[2], double *values,
                     cJSON *rows)
 {
@@ -186,37 +181,30 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
         splats += c->loads[i / repeat].splats;
         pixels += c->loads[i / repeat].pixels;
     }
-    qsort(values, (size_t)frames, sizeof *values, ascending);
-    double median = values[(frames - 1) / 2];
-    char text[32];
-    snprintf(text, sizeof text, "%d x %d", size[0], size[1]);
-    cJSON *row = cJSON_CreateObject();
+    const double median = measure_median(values, frames);
+    cJSON *row = measure_new_row(rows);
     cJSON_AddStringToObject(row, "renderer", own->renderer->ops->name);
     cJSON_AddStringToObject(row, "device", own->renderer->ops->device(own->renderer));
     if (own->threads)
         cJSON_AddNumberToObject(row, "threads", own->threads);
-    cJSON_AddStringToObject(row, "size", text);
-    cJSON_AddNumberToObject(row, "views", c->options->views);
-    cJSON_AddNumberToObject(row, "ms", median);
-    cJSON_AddNumberToObject(row, "ms_min", values[0]);
-    cJSON_AddNumberToObject(row, "ms_max", values[frames - 1]);
-    cJSON_AddNumberToObject(row, "fps", 1e3 / median);
+    bench_report_add_size(row, size);
+    measure_add(row, { "views", c->options->views }, { "ms", median }, { "ms_min", values[0] },
+                { "ms_max", values[frames - 1] }, { "fps", 1e3 / median });
     if (counts(c)) {
-        cJSON_AddNumberToObject(row, "splats_drawn", splats / frames);
-        cJSON_AddNumberToObject(row, "msplats_per_s", splats / ms * 1e-3);
-        cJSON_AddNumberToObject(row, "mpixels_per_s", pixels / ms * 1e-3);
+        measure_add(row, { "splats_drawn", splats / frames },
+                    { "msplats_per_s", splats / ms * 1e-3 },
+                    { "mpixels_per_s", pixels / ms * 1e-3 });
     }
     if (splats > 0)
         cJSON_AddNumberToObject(row, "pixels_per_splat", pixels / splats);
     add_views(c, own, row);
-    cJSON_AddItemToArray(rows, row);
 }
 
 static int run(race *c, bench_report *r)
 {
     const bench_options *o = c->options;
-    cJSON *rows = bench_report_table(r, "renderers", "Renderers, in views around the object",
-                                     columns, sizeof columns / sizeof columns[0]);
+    cJSON *rows =
+        bench_report_table(r, "renderers", "Renderers, in views around the object", columns);
     double *values = calloc((size_t)(o->views * o->repeat), sizeof *values);
     c->loads = calloc((size_t)o->views, sizeof *c->loads);
     c->views = calloc((size_t)o->views, sizeof *c->views);
@@ -267,12 +255,12 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
         return trip_fail(TRIP_ERROR, "bench", "renderers", "out of memory");
     c->session = s;
     c->options = o;
-    cJSON_AddNumberToObject(bench_report_settings(r), "views", o->views);
+    cJSON_AddNumberToObject(r->settings, "views", o->views);
     int status = add_contenders(c, r);
     add_limits(c, r);
     int frames = c->count * (1 + o->repeat) + (o->no_counts ? 0 : 2); /* per view */
-    bench_progress_expect(o->progress, 1 + frames * o->views * o->size_count);
-    bench_progress_step(o->progress, "loading the data set");
+    measure_progress_expect(o->progress, 1 + frames * o->views * o->size_count);
+    measure_progress_step(o->progress, "loading the data set");
     if (!status)
         status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, occluder_of(c));
     if (!status)

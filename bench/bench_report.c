@@ -1,72 +1,19 @@
 #include "bench_report.h"
 
-#include <math.h>
-#include <sched.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/utsname.h>
 
 #include "budget.h"
 #include "json.h"
+#include "machine.h"
 #include "report.h"
 #include "text.h"
-
-enum { MAX_TABLES = 8, CELL_BYTES = 96 };
-
-typedef struct table {
-    cJSON *object; /* the table in the root */
-    const bench_column *columns;
-    int column_count;
-} table;
-
-struct bench_report {
-    cJSON *root, *settings, *machine, *tables, *limits;
-    table shown[MAX_TABLES];
-    int table_count;
-};
 
 static int out_of_memory(void)
 {
     return trip_fail(TRIP_ERROR, "bench", "report", "out of memory");
-}
-
-static void cpu_model(char *text, size_t bytes, const struct utsname *system)
-{
-    char line[512];
-    FILE *f = fopen("/proc/cpuinfo", "r");
-    snprintf(text, bytes, "%s", system->machine);
-    while (f && fgets(line, sizeof line, f)) {
-        char *colon = strchr(line, ':');
-        if (strncmp(line, "model name", 10) || !colon || strlen(colon) < 3)
-            continue;
-        line[strcspn(line, "\n")] = 0;
-        snprintf(text, bytes, "%s", colon + 2);
-        break;
-    }
-    if (f)
-        fclose(f);
-}
-
-/* Returns the number of processors that this process may use. */
-static int cores(void)
-{
-    cpu_set_t set;
-    return sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
-}
-
-void bench_describe_machine(cJSON *machine)
-{
-    struct utsname system = { 0 };
-    char model[256], kernel[256];
-    uname(&system);
-    cpu_model(model, sizeof model, &system);
-    snprintf(kernel, sizeof kernel, "%.64s %.128s", system.sysname, system.release);
-    cJSON_AddStringToObject(machine, "cpu", model);
-    cJSON_AddNumberToObject(machine, "cores", cores());
-    cJSON_AddNumberToObject(machine, "memory_bytes", (double)trip_memory_available_bytes());
-    cJSON_AddStringToObject(machine, "system", kernel);
 }
 
 int bench_report_create(bench_report **out, const char *name, const char *command)
@@ -83,7 +30,7 @@ int bench_report_create(bench_report **out, const char *name, const char *comman
     r->limits = cJSON_AddArrayToObject(r->root, "limits");
     if (!r->settings || !r->machine || !r->tables || !r->limits)
         return out_of_memory();
-    bench_describe_machine(r->machine);
+    measure_describe_machine(r->machine);
     return 0;
 }
 
@@ -95,24 +42,23 @@ void bench_report_destroy(bench_report *r)
     free(r);
 }
 
-cJSON *bench_report_settings(bench_report *r)
-{
-    return r->settings;
-}
-
-cJSON *bench_report_machine(bench_report *r)
-{
-    return r->machine;
-}
-
-cJSON *bench_report_table(bench_report *r, const char *key, const char *title,
-                          const bench_column *columns, int column_count)
+cJSON *bench_report_add_table(bench_report *r, const char *key, const char *title,
+                              const measure_column *columns, int count)
 {
     cJSON *object = cJSON_AddObjectToObject(r->tables, key);
     cJSON_AddStringToObject(object, "title", title);
-    if (r->table_count < MAX_TABLES)
-        r->shown[r->table_count++] = (table){ object, columns, column_count };
-    return cJSON_AddArrayToObject(object, "rows");
+    cJSON *rows = cJSON_AddArrayToObject(object, "rows");
+    if (r->table_count < BENCH_REPORT_TABLES)
+        r->shown[r->table_count++] =
+            (measure_table){ .title = title, .rows = rows, .columns = columns, .count = count };
+    return rows;
+}
+
+void bench_report_add_size(cJSON *to, const int size[2])
+{
+    char text[32];
+    snprintf(text, sizeof text, "%d x %d", size[0], size[1]);
+    cJSON_AddStringToObject(to, "size", text);
 }
 
 void bench_report_limit(bench_report *r, const char *sentence, ...)
@@ -123,73 +69,6 @@ void bench_report_limit(bench_report *r, const char *sentence, ...)
     vsnprintf(text, sizeof text, sentence, arguments);
     va_end(arguments);
     cJSON_AddItemToArray(r->limits, cJSON_CreateString(text));
-}
-
-static void cell(const cJSON *row, const bench_column *c, char text[CELL_BYTES])
-{
-    const cJSON *value = cJSON_GetObjectItemCaseSensitive(row, c->key);
-    if (cJSON_IsNumber(value) && isfinite(value->valuedouble))
-        snprintf(text, CELL_BYTES, "%.*f", c->decimals,
-                 value->valuedouble / (c->unit ? c->unit : 1));
-    else
-        snprintf(text, CELL_BYTES, "%s", cJSON_IsString(value) ? value->valuestring : "-");
-}
-
-static int column_width(const cJSON *rows, const bench_column *c)
-{
-    int width = (int)strlen(c->heading);
-    const cJSON *row;
-    cJSON_ArrayForEach(row, rows)
-    {
-        char text[CELL_BYTES];
-        cell(row, c, text);
-        width = (int)strlen(text) > width ? (int)strlen(text) : width;
-    }
-    return width;
-}
-
-/* Columns of numbers are aligned to the right, words to the left. */
-static int is_number(const cJSON *rows, const bench_column *c)
-{
-    const cJSON *row;
-    cJSON_ArrayForEach(row, rows)
-    {
-        if (cJSON_IsNumber(cJSON_GetObjectItemCaseSensitive(row, c->key)))
-            return 1;
-    }
-    return 0;
-}
-
-static void print_rule(int width, int number)
-{
-    for (int i = 0; i < width + 2 - number; i++)
-        putchar('-');
-    printf(number ? ":|" : "|");
-}
-
-static void print_table(const table *t)
-{
-    const cJSON *rows = cJSON_GetObjectItemCaseSensitive(t->object, "rows"), *row;
-    printf("\n%s\n\n|", cJSON_GetObjectItemCaseSensitive(t->object, "title")->valuestring);
-    for (int i = 0; i < t->column_count; i++) {
-        int width = column_width(rows, &t->columns[i]);
-        printf(" %*s |", is_number(rows, &t->columns[i]) ? width : -width, t->columns[i].heading);
-    }
-    printf("\n|");
-    for (int i = 0; i < t->column_count; i++)
-        print_rule(column_width(rows, &t->columns[i]), is_number(rows, &t->columns[i]));
-    printf("\n");
-    cJSON_ArrayForEach(row, rows)
-    {
-        printf("|");
-        for (int i = 0; i < t->column_count; i++) {
-            char text[CELL_BYTES];
-            int width = column_width(rows, &t->columns[i]);
-            cell(row, &t->columns[i], text);
-            printf(" %*s |", is_number(rows, &t->columns[i]) ? width : -width, text);
-        }
-        printf("\n");
-    }
 }
 
 static void print_fact(const char *key, const char *text)
@@ -236,7 +115,7 @@ int bench_report_print(bench_report *r, int json)
     trip_text_write(stdout, cJSON_GetObjectItemCaseSensitive(r->root, "command")->valuestring);
     putchar('\n');
     for (int i = 0; i < r->table_count; i++)
-        print_table(&r->shown[i]);
+        measure_table_print(stdout, &r->shown[i]);
     printf("\nLimits of these figures\n\n");
     cJSON_ArrayForEach(limit, r->limits) printf("- %s\n", limit->valuestring);
     print_facts("Settings", r->settings);

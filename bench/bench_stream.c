@@ -22,7 +22,7 @@ static const char *const keys[STAGES] = { "plain", "plain_blind", "plain_small",
 
 static const double gigabyte = 1e9, second_ms = 1e3;
 
-static const bench_column stage_columns[] = {
+static const measure_column stage_columns[] = {
     { "stage", "stage", 0, 0 },
     { "ms", "median s", 3, second_ms },
     { "ms_min", "fastest", 3, second_ms },
@@ -33,7 +33,7 @@ static const bench_column stage_columns[] = {
     { "of_blind", "x blind", 3, 0 },
 };
 
-static const bench_column summary_columns[] = {
+static const measure_column summary_columns[] = {
     { "dataset_bytes", "data set GB", 3, gigabyte },
     { "memory_limit_bytes", "memory limit MB", 1, 1e6 },
     { "memory_peak_bytes", "peak MB", 1, 1e6 },
@@ -46,69 +46,43 @@ static const bench_column summary_columns[] = {
     { "frame_of_bound", "frame / max(read, draw)", 3, 0 },
 };
 
-typedef struct sample {
-    double ms, bytes;
-} sample;
-
 /* State of the measurement. */
 typedef struct stream {
     const session *session;
     const bench_options *options;
     trip_budget
         *whole; /* holds the data set for drawing without the disk, outside the memory limit */
-    bench_frame frame;     /* from disk */
+    bench_scene *scene;
+    bench_frame *frame;    /* of the scene, from disk */
     bench_frame in_memory; /* renderer is NULL if the data set does not fit */
     bench_frame unread;    /* reads, and does not draw */
     bench_probe probe;
-    trip_renderer *occluder; /* renderer of the current frame */
     bench_files files;
-    bool direct;
     uint64_t peak_rss_bytes, peak_bytes;
-    sample *samples; /* [stage * repeat + run] */
+    bench_disk_read *samples; /* [stage * repeat + run] */
 } stream;
 
-static sample of_cost(const bench_cost *c)
-{
-    return (sample){ c->ms, (double)c->stats.reader.bytes_read };
-}
-
-static int take_plain(stream *t, bench_plain how, sample *out)
-{
-    bench_disk_read read;
-    int status = bench_files_read(t->session, &t->files, how, &read);
-    *out = (sample){ read.ms, (double)read.bytes };
-    t->direct = read.direct;
-    return status;
-}
-
-static int take_streamed(stream *t, sample *out)
-{
-    bench_disk_read read;
-    t->occluder = NULL;
-    int status = bench_files_stream(t->session, &t->files, t->frame.reader, &read);
-    *out = (sample){ read.ms, (double)read.bytes };
-    return status;
-}
-
-static int take(stream *t, int stage, sample *out)
+static int take(stream *t, int stage, bench_disk_read *out)
 {
     const bench_frame *frames[STAGES] = {
-        [READ] = &t->unread, [DRAW] = &t->in_memory, [FRAME] = &t->frame
+        [READ] = &t->unread, [DRAW] = &t->in_memory, [FRAME] = t->frame
     };
     static const bench_plain plain[] = {
         [PLAIN] = BENCH_PLAIN, [BLIND] = BENCH_PLAIN_BLIND, [SMALL] = BENCH_PLAIN_SMALL
     };
     bench_cost cost;
-    bench_progress_step(t->options->progress, names[stage]);
+    measure_progress_step(t->options->progress, names[stage]);
     if (stage == DRAW && !t->in_memory.renderer)
         return 0;
     bench_files_forget(t->session, &t->files);
     if (stage <= SMALL)
-        return take_plain(t, plain[stage], out);
-    if (stage == STREAMED)
-        return take_streamed(t, out);
+        return bench_files_read(t->session, &t->files, plain[stage], out);
+    if (stage == STREAMED) {
+        t->scene->occluder = NULL;
+        return bench_files_stream(t->session, &t->files, t->frame->reader, out);
+    }
     int status = bench_frame_draw(frames[stage], false, &cost);
-    *out = of_cost(&cost);
+    *out = (bench_disk_read){ .ms = cost.ms, .bytes = cost.stats.reader.bytes_read };
     return status;
 }
 
@@ -116,9 +90,9 @@ static int find_files(stream *t)
 {
     trip_camera camera;
     trip_plan plan;
-    int status = trip_camera_make(&camera, &t->frame.view, &t->session->data->index_to_world);
+    int status = trip_camera_make(&camera, &t->frame->view, &t->session->data->index_to_world);
     if (!status)
-        status = trip_plan_make(&plan, t->session->data, &camera, &t->frame.settings,
+        status = trip_plan_make(&plan, t->session->data, &camera, &t->frame->settings,
                                 t->session->table, t->session->budget);
     if (status)
         return status;
@@ -127,32 +101,18 @@ static int find_files(stream *t)
     return 0;
 }
 
-/* Creates the renderer and the reader within the memory limit, and draws one frame. Notes the peaks
- * before anything else takes memory. */
-static int open_frame(stream *t)
+/* Draws a frame within the memory limit. Notes the peaks before anything else takes memory. */
+static int draw_first(stream *t)
 {
-    const session *s = t->session;
-    const bench_options *o = t->options;
-    const int *size = o->sizes[0];
-    char why[256];
     bench_cost cost;
-    bench_frame *f = &t->frame;
-    *f = (bench_frame){ .session = s, .settings = o->settings };
-    f->occluder = o->draw_occluded ? NULL : &t->occluder;
-    f->view = bench_view_oblique(s, size);
-    int status = session_take_image(s, size[0], size[1], &f->rgba);
+    t->frame->view = bench_view_oblique(t->session, t->scene->size);
+    int status = find_files(t);
     if (!status)
-        status = bench_renderer_create(s, &f->renderer, o->renderers[0], o->threads[0], true, why);
-    if (!status)
-        status = bench_reader_create(s, &f->reader, o, o->engine, f->renderer, f->occluder);
-    if (!status)
-        status = find_files(t);
-    if (!status)
-        status = bench_frame_draw(f, false, &cost);
+        status = bench_frame_draw(t->frame, false, &cost);
     t->peak_rss_bytes = trip_memory_peak_rss_bytes();
-    t->peak_bytes = trip_budget_peak_bytes(s->budget);
+    t->peak_bytes = trip_budget_peak_bytes(t->session->budget);
     t->probe = bench_probe_make(0);
-    t->unread = *f;
+    t->unread = *t->frame;
     t->unread.renderer = &t->probe.base;
     return status;
 }
@@ -162,7 +122,7 @@ static int open_in_memory(stream *t, bench_report *r)
 {
     char why[256] = "";
     session other = *t->session;
-    t->in_memory = t->frame;
+    t->in_memory = *t->frame;
     t->in_memory.reader = NULL;
     int status = trip_budget_create(&t->whole, trip_memory_available_bytes() / 4 * 3);
     if (status)
@@ -170,7 +130,7 @@ static int open_in_memory(stream *t, bench_report *r)
     other.budget = t->whole;
     bench_keep_report(why);
     status = bench_reader_create(&other, &t->in_memory.reader, t->options, TRIP_ENGINE_NULL, NULL,
-                                 t->frame.occluder);
+                                 t->frame->occluder);
     bench_keep_report(NULL);
     if (!status || trip_interrupted())
         return status;
@@ -181,84 +141,71 @@ static int open_in_memory(stream *t, bench_report *r)
 
 static int by_time(const void *a, const void *b)
 {
-    double x = ((const sample *)a)->ms, y = ((const sample *)b)->ms;
+    double x = ((const bench_disk_read *)a)->ms, y = ((const bench_disk_read *)b)->ms;
     return (x > y) - (x < y);
 }
 
 /* Returns the median run. */
-static sample middle(const stream *t, int stage)
+static bench_disk_read middle(const stream *t, int stage)
 {
-    sample *runs = &t->samples[stage * t->options->repeat];
+    bench_disk_read *runs = &t->samples[stage * t->options->repeat];
     qsort(runs, (size_t)t->options->repeat, sizeof *runs, by_time);
     return runs[(t->options->repeat - 1) / 2];
 }
 
-static double gb_per_s(sample s)
+static double gb_per_s(bench_disk_read s)
 {
-    return s.ms > 0 ? s.bytes / gigabyte / (s.ms / second_ms) : 0;
+    return s.ms > 0 ? (double)s.bytes / gigabyte / (s.ms / second_ms) : 0;
 }
 
 static void add_stages(const stream *t, bench_report *r)
 {
-    cJSON *rows = bench_report_table(r, "stages", "The parts of a frame, alone and together",
-                                     stage_columns, sizeof stage_columns / sizeof stage_columns[0]);
+    cJSON *rows =
+        bench_report_table(r, "stages", "The parts of a frame, alone and together", stage_columns);
     for (int stage = 0; stage < STAGES; stage++) {
-        sample own = middle(t, stage), plain = middle(t, PLAIN), blind = middle(t, BLIND);
-        const sample *runs = &t->samples[stage * t->options->repeat];
-        cJSON *row = cJSON_CreateObject();
+        const bench_disk_read own = middle(t, stage);
+        const double plain = gb_per_s(middle(t, PLAIN)), blind = gb_per_s(middle(t, BLIND));
+        const bench_disk_read *runs = &t->samples[stage * t->options->repeat];
+        cJSON *row = measure_new_row(rows);
         cJSON_AddStringToObject(row, "key", keys[stage]);
         cJSON_AddStringToObject(row, "stage", names[stage]);
-        if (stage != DRAW || t->in_memory.renderer) {
-            cJSON_AddNumberToObject(row, "ms", own.ms);
-            cJSON_AddNumberToObject(row, "ms_min", runs[0].ms);
-            cJSON_AddNumberToObject(row, "ms_max", runs[t->options->repeat - 1].ms);
-        }
-        if (stage != DRAW) {
-            cJSON_AddNumberToObject(row, "bytes_read", own.bytes);
-            cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(own));
-            cJSON_AddNumberToObject(row, "of_plain", gb_per_s(own) / gb_per_s(plain));
-            cJSON_AddNumberToObject(row, "of_blind", gb_per_s(own) / gb_per_s(blind));
-        }
-        cJSON_AddItemToArray(rows, row);
+        if (stage != DRAW || t->in_memory.renderer)
+            measure_add(row, { "ms", own.ms }, { "ms_min", runs[0].ms },
+                        { "ms_max", runs[t->options->repeat - 1].ms });
+        if (stage != DRAW)
+            measure_add(row, { "bytes_read", (double)own.bytes }, { "gb_per_s", gb_per_s(own) },
+                        { "of_plain", gb_per_s(own) / plain },
+                        { "of_blind", gb_per_s(own) / blind });
     }
 }
 
 static void add_summary(const stream *t, bench_report *r)
 {
     cJSON *rows =
-        bench_report_table(r, "summary", "The frame, compared with its limits", summary_columns,
-                           sizeof summary_columns / sizeof summary_columns[0]);
-    cJSON *row = cJSON_CreateObject();
-    sample plain = middle(t, PLAIN), read = middle(t, READ), draw = middle(t, DRAW);
-    sample streamed = middle(t, STREAMED), frame = middle(t, FRAME);
-    cJSON_AddNumberToObject(row, "dataset_bytes", (double)t->session->data->bytes);
-    cJSON_AddNumberToObject(row, "memory_limit_bytes",
-                            (double)trip_budget_limit_bytes(t->session->budget));
-    cJSON_AddNumberToObject(row, "memory_peak_bytes", (double)t->peak_bytes);
-    cJSON_AddNumberToObject(row, "peak_rss_bytes", (double)t->peak_rss_bytes);
-    cJSON_AddNumberToObject(row, "seconds_per_frame", frame.ms / second_ms);
-    cJSON_AddNumberToObject(row, "gb_per_s", gb_per_s(frame));
-    cJSON_AddNumberToObject(row, "disk_gb_per_s", gb_per_s(plain));
-    cJSON_AddNumberToObject(row, "frame_of_disk", gb_per_s(frame) / gb_per_s(plain));
-    cJSON_AddNumberToObject(row, "streamed_of_disk", gb_per_s(streamed) / gb_per_s(plain));
+        bench_report_table(r, "summary", "The frame, compared with its limits", summary_columns);
+    cJSON *row = measure_new_row(rows);
+    const bench_disk_read read = middle(t, READ), draw = middle(t, DRAW), frame = middle(t, FRAME);
+    const double disk = gb_per_s(middle(t, PLAIN)), streamed = gb_per_s(middle(t, STREAMED));
+    measure_add(row, { "dataset_bytes", (double)t->session->data->bytes },
+                { "memory_limit_bytes", (double)trip_budget_limit_bytes(t->session->budget) },
+                { "memory_peak_bytes", (double)t->peak_bytes },
+                { "peak_rss_bytes", (double)t->peak_rss_bytes },
+                { "seconds_per_frame", frame.ms / second_ms }, { "gb_per_s", gb_per_s(frame) },
+                { "disk_gb_per_s", disk }, { "frame_of_disk", gb_per_s(frame) / disk },
+                { "streamed_of_disk", streamed / disk });
     if (t->in_memory.renderer) {
         cJSON_AddStringToObject(row, "bound", read.ms > draw.ms ? "read" : "draw");
         cJSON_AddNumberToObject(row, "frame_of_bound", frame.ms / fmax(read.ms, draw.ms));
     }
-    cJSON_AddItemToArray(rows, row);
 }
 
 static void describe(const stream *t, bench_report *r)
 {
-    cJSON *machine = bench_report_machine(r);
-    trip_renderer *renderer = t->frame.renderer;
-    cJSON_AddStringToObject(machine, "renderer", renderer->ops->name);
-    cJSON_AddStringToObject(machine, "device", renderer->ops->device(renderer));
-    cJSON_AddStringToObject(machine, "engine", trip_reader_engine_name(t->frame.reader));
-    cJSON_AddStringToObject(machine, "plain_read",
-                            t->direct ? "8 threads, transfers of 1 MiB, O_DIRECT"
-                                      : "8 threads, transfers of 1 MiB, through the page cache "
-                                        "(O_DIRECT refused), dropped before each run");
+    cJSON_AddStringToObject(r->machine, "plain_read",
+                            t->samples[0].direct
+                                ? "8 threads, transfers of 1 MiB, O_DIRECT"
+                                : "8 threads, transfers of 1 MiB, through the page cache "
+                                  "(O_DIRECT refused), dropped before each run");
     bench_report_limit(
         r, "plain read: the plane files of the lists that the view needs, each as a whole, into "
            "pages like the ring's (2 MiB if the system has them). A byte of every cache line is "
@@ -274,7 +221,7 @@ static void describe(const stream *t, bench_report *r)
     bench_report_limit(
         r, "draw alone: the same frame with the data set in memory (null engine), outside the "
            "memory limit. gl copies the data to its own memory; cpu and reference do not.");
-    if (t->frame.occluder)
+    if (t->frame->occluder)
         bench_report_limit(
             r, "The frame skips bricks behind opaque ones; read alone cannot skip them.");
     bench_report_limit(r, "memory: the limit, the peak use, and the resident memory after one "
@@ -295,27 +242,15 @@ static int measure(stream *t)
     return status;
 }
 
-static void close_stream(stream *t)
+int bench_stream(bench_scene *scene, const bench_options *o, bench_report *r)
 {
-    const int *size = t->options->sizes[0];
-    free(t->samples);
-    if (t->in_memory.reader)
-        trip_reader_destroy(t->in_memory.reader);
-    if (t->whole)
-        trip_budget_destroy(t->whole);
-    if (t->frame.reader)
-        trip_reader_destroy(t->frame.reader);
-    bench_renderer_destroy(t->frame.renderer);
-    session_release_image(t->session, size[0], size[1], t->frame.rgba);
-}
-
-int bench_stream(const session *s, const bench_options *o, bench_report *r)
-{
-    stream t = { .session = s, .options = o };
-    bench_progress_expect(o->progress, 2 + STAGES * o->repeat);
-    bench_progress_step(o->progress, "first frame");
-    int status = open_frame(&t);
-    bench_progress_step(o->progress, "loading the data set");
+    stream t = {
+        .session = scene->frame.session, .options = o, .scene = scene, .frame = &scene->frame
+    };
+    measure_progress_expect(o->progress, 1 + STAGES * o->repeat);
+    scene->frame.progress = NULL; /* each stage is a step */
+    int status = draw_first(&t);
+    measure_progress_step(o->progress, "loading the data set");
     if (!status)
         status = open_in_memory(&t, r);
     if (!status)
@@ -325,6 +260,10 @@ int bench_stream(const session *s, const bench_options *o, bench_report *r)
         add_summary(&t, r);
         add_stages(&t, r);
     }
-    close_stream(&t);
+    free(t.samples);
+    if (t.in_memory.reader)
+        trip_reader_destroy(t.in_memory.reader);
+    if (t.whole)
+        trip_budget_destroy(t.whole);
     return status;
 }

@@ -11,56 +11,39 @@ enum { FORMS = 10, PAPER_SETS = 4 };
 
 /* Frames per second in Hofsetz, Max & Bastos 2008, Table 3; 0 means that the form did not fit.
  * "align" in the paper is one list, and "pbuff" is three merged lists. */
-static const struct {
-    bool indexed, triangles, fixed;
-    trip_method method;
-    const char *lists, *primitives, *orders;
+static const struct form {
+    bool indexed, merged;
+    enum { FIXED, SPRITES, TRIANGLES } primitives;
     double paper_fps[PAPER_SETS];
 } forms[FORMS] = {
-    { 0,
-      0,
-      1,
-      TRIP_METHOD_AXIS,
-      "replicated",
-      "fixed sprites",
-      "axis",
-      { 61.16, 32.79, 22.45, 6.07 } },
-    { 0,
-      0,
-      1,
-      TRIP_METHOD_MERGE,
-      "replicated",
-      "fixed sprites",
-      "merge",
-      { 61.16, 23.27, 18.02, 3.03 } },
-    { 0, 0, 0, TRIP_METHOD_AXIS, "replicated", "sprites", "axis", { 0 } },
-    { 0, 0, 0, TRIP_METHOD_MERGE, "replicated", "sprites", "merge", { 0 } },
-    { 0, 1, 0, TRIP_METHOD_AXIS, "replicated", "triangles", "axis", { 58.31, 29.81, 20.00, 0 } },
-    { 0, 1, 0, TRIP_METHOD_MERGE, "replicated", "triangles", "merge", { 31.25, 14.40, 5.40, 0 } },
-    { 1,
-      0,
-      1,
-      TRIP_METHOD_AXIS,
-      "indexed",
-      "fixed sprites",
-      "axis",
-      { 58.48, 30.53, 20.39, 2.94 } },
-    { 1,
-      0,
-      1,
-      TRIP_METHOD_MERGE,
-      "indexed",
-      "fixed sprites",
-      "merge",
-      { 47.51, 15.29, 15.09, 1.53 } },
-    { 1, 1, 0, TRIP_METHOD_AXIS, "indexed", "triangles", "axis", { 61.16, 5.49, 4.32, 0 } },
-    { 1, 1, 0, TRIP_METHOD_MERGE, "indexed", "triangles", "merge", { 29.85, 2.49, 2.00, 0 } },
+    { false, false, FIXED, { 61.16, 32.79, 22.45, 6.07 } },
+    { false, true, FIXED, { 61.16, 23.27, 18.02, 3.03 } },
+    { false, false, SPRITES, { 0 } },
+    { false, true, SPRITES, { 0 } },
+    { false, false, TRIANGLES, { 58.31, 29.81, 20.00, 0 } },
+    { false, true, TRIANGLES, { 31.25, 14.40, 5.40, 0 } },
+    { true, false, FIXED, { 58.48, 30.53, 20.39, 2.94 } },
+    { true, true, FIXED, { 47.51, 15.29, 15.09, 1.53 } },
+    { true, false, TRIANGLES, { 61.16, 5.49, 4.32, 0 } },
+    { true, true, TRIANGLES, { 29.85, 2.49, 2.00, 0 } },
 };
+
+static const char *const primitives[] = { "fixed sprites", "sprites", "triangles" };
+
+static const char *lists_of(const struct form *f)
+{
+    return f->indexed ? "indexed" : "replicated";
+}
+
+static const char *orders_of(const struct form *f)
+{
+    return f->merged ? "merge" : "axis";
+}
 
 static const char *const paper_keys[PAPER_SETS] = { "paper_engine", "paper_foot", "paper_head",
                                                     "paper_mri" };
 
-static const bench_column columns[] = {
+static const measure_column columns[] = {
     { "lists", "lists", 0, 0 },
     { "primitives", "primitives", 0, 0 },
     { "orders", "orders", 0, 0 },
@@ -76,26 +59,16 @@ static const bench_column columns[] = {
 static void add_row(cJSON *rows, bench_runs *runs, const bench_frame *frame,
                     const bench_cost *counted, int form)
 {
-    double kept = (double)frame->session->data->header.kept;
-    cJSON *row = cJSON_CreateObject();
-    cJSON_AddStringToObject(row, "lists", forms[form].lists);
-    cJSON_AddStringToObject(row, "primitives", forms[form].primitives);
-    cJSON_AddStringToObject(row, "orders", forms[form].orders);
-    if (frame->renderer) {
-        const bench_cost *first = &bench_runs_sorted(runs, 0)[(runs->repeat - 1) / 2];
-        const bench_cost *own = &bench_runs_sorted(runs, form)[(runs->repeat - 1) / 2];
-        double drawn = (double)bench_splats_drawn(&counted->stats);
-        cJSON_AddNumberToObject(row, "splats_drawn", drawn);
-        if (kept > 0)
-            cJSON_AddNumberToObject(row, "multiple", drawn / kept);
-        bench_runs_describe(runs, form, row);
-        cJSON_AddNumberToObject(row, "speed", first->ms / own->ms);
-    }
+    cJSON *row = measure_new_row(rows);
+    cJSON_AddStringToObject(row, "lists", lists_of(&forms[form]));
+    cJSON_AddStringToObject(row, "primitives", primitives[forms[form].primitives]);
+    cJSON_AddStringToObject(row, "orders", orders_of(&forms[form]));
+    if (frame->renderer)
+        bench_runs_describe(runs, form, 0, counted, (double)frame->session->data->header.kept, row);
     for (int i = 0; i < PAPER_SETS; i++)
         if (forms[form].paper_fps[i] > 0)
             cJSON_AddNumberToObject(row, paper_keys[i],
                                     forms[form].paper_fps[i] / forms[0].paper_fps[i]);
-    cJSON_AddItemToArray(rows, row);
 }
 
 /* Draws one counted frame, which also loads data and compiles shaders. Leaves out a form that does
@@ -108,8 +81,8 @@ static int warm_up(bench_frame *f, bench_cost *counted, bench_report *r, int for
     bench_keep_report(NULL);
     if (!status || form == 0 || trip_interrupted())
         return status;
-    bench_report_limit(r, "left out: %s %s, %s: %s", forms[form].lists, forms[form].primitives,
-                       forms[form].orders, why);
+    bench_report_limit(r, "left out: %s %s, %s: %s", lists_of(&forms[form]),
+                       primitives[forms[form].primitives], orders_of(&forms[form]), why);
     f->renderer = NULL;
     return 0;
 }
@@ -123,10 +96,10 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
     for (int i = 0; i < FORMS && !status; i++) {
         frames[i] = *base;
         frames[i].view = bench_view_oblique(base->session, o->sizes[0]);
-        frames[i].settings.method = forms[i].method;
+        frames[i].settings.method = forms[i].merged ? TRIP_METHOD_MERGE : TRIP_METHOD_AXIS;
         frames[i].settings.indexed = forms[i].indexed;
-        frames[i].settings.triangles = forms[i].triangles;
-        if (forms[i].fixed)
+        frames[i].settings.triangles = forms[i].primitives == TRIANGLES;
+        if (forms[i].primitives == FIXED)
             frames[i].settings.footprint = TRIP_FOOTPRINT_FIXED;
         status = warm_up(&frames[i], &counted[i], r, i);
     }
@@ -136,7 +109,7 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
         cJSON *rows = bench_report_table(
             r, "submit",
             "Oblique view, all three lists (2008, Table 3); speed is relative to the first row",
-            columns, sizeof columns / sizeof columns[0]);
+            columns);
         for (int i = 0; i < FORMS; i++)
             add_row(rows, &runs, &frames[i], &counted[i], i);
     }
@@ -160,15 +133,9 @@ static void add_limits(bench_report *r)
                           "not fit. Objects, views and kernels differ.");
 }
 
-int bench_submit(const session *s, const bench_options *o, bench_report *r)
+int bench_submit(bench_scene *scene, const bench_options *o, bench_report *r)
 {
-    bench_scene scene;
-    bench_progress_expect(o->progress, 1 + FORMS * (1 + o->repeat));
-    int status = bench_scene_open(&scene, s, o, r);
-    if (!status) {
-        add_limits(r);
-        status = measure(&scene.frame, o, r);
-    }
-    bench_scene_close(&scene);
-    return status;
+    measure_progress_expect(o->progress, FORMS * (1 + o->repeat));
+    add_limits(r);
+    return measure(&scene->frame, o, r);
 }

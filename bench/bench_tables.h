@@ -5,16 +5,17 @@
 
 #include "bench_frame.h"
 
-int bench_orders(const session *s, const bench_options *o, bench_report *r);
-int bench_submit(const session *s, const bench_options *o, bench_report *r);
-int bench_stream(const session *s, const bench_options *o, bench_report *r);
-int bench_popping(const session *s, const bench_options *o, bench_report *r);
+int bench_orders(bench_scene *scene, const bench_options *o, bench_report *r);
+int bench_submit(bench_scene *scene, const bench_options *o, bench_report *r);
+int bench_stream(bench_scene *scene, const bench_options *o, bench_report *r);
+int bench_popping(bench_scene *scene, const bench_options *o, bench_report *r);
 /* With s NULL, measures volumes that it makes. */
 int bench_levels(const session *s, const bench_options *o, bench_report *r);
+int bench_finer(const bench_options *o, bench_report *r);
 /* Ignores s, and opens the data set as the viewer does. */
 int bench_flight(const session *s, const bench_options *o, bench_report *r);
 int bench_ewa(const session *s, const bench_options *o, bench_report *r);
-int bench_variants(const session *s, const bench_options *o, bench_report *r);
+int bench_variants(bench_scene *scene, const bench_options *o, bench_report *r);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 
 #endif

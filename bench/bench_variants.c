@@ -2,11 +2,11 @@
  * image-aligned sheets, with the reference renderer. */
 #include "bench_tables.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bench_view.h"
+#include "error.h"
 #include "normalise.h"
 #include "report.h"
 
@@ -28,43 +28,20 @@ static const struct form {
 
 enum { VARIANTS = sizeof variants / sizeof variants[0] };
 
-static const bench_column columns[] = {
+static const measure_column columns[] = {
     { "form", "form", 0, 0 }, { "mean", "mean", 3, 0 }, { "percentile_99", "99 %", 2, 0 },
     { "max", "max", 1, 0 },   { "ms", "ms", 0, 0 },
 };
 
-static int ascending(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-/* Compares the components of the pixels that either picture covers. `apart` is scratch memory for a
- * picture. */
-static void compare(const float *a, const float *b, size_t pixels, float *apart, cJSON *row)
-{
-    size_t count = 0;
-    double sum = 0;
-    for (size_t i = 0; i < 4 * pixels; i++)
-        if (a[i | 3] > 1.0F / 255 || b[i | 3] > 1.0F / 255)
-            sum += (double)(apart[count++] = fabsf(a[i] - b[i]));
-    qsort(apart, count, sizeof *apart, ascending);
-    const bool some = count > 0;
-    cJSON_AddNumberToObject(row, "mean", some ? 255 * sum / (double)count : 0);
-    cJSON_AddNumberToObject(row, "percentile_99",
-                            some ? 255 * (double)apart[(count - 1) * 99 / 100] : 0);
-    cJSON_AddNumberToObject(row, "max", some ? 255 * (double)apart[count - 1] : 0);
-}
-
 /* `defaults` keeps the picture of the first form. */
-static int measure(bench_frame *frame, const bench_options *o, float *defaults, float *apart,
-                   bench_report *r)
+static int measure(bench_frame *frame, const bench_options *o, float *defaults,
+                   measure_error *error, bench_report *r)
 {
     static const double none[4] = { 0 };
     const size_t pixels = (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1];
     cJSON *rows = bench_report_table(
-        r, "variants", "Oblique view: change of the picture against the first row, of 255", columns,
-        sizeof columns / sizeof columns[0]);
+        r, "variants", "Oblique view: change of the picture against the first row, of 255",
+        columns);
     int status = 0;
     frame->view = bench_view_oblique(frame->session, o->sizes[0]);
     memset(frame->settings.background, 0, sizeof frame->settings.background);
@@ -81,11 +58,13 @@ static int measure(bench_frame *frame, const bench_options *o, float *defaults, 
             trip_normalise(frame->rgba, pixels, none);
         if (i == 0)
             memcpy(defaults, frame->rgba, 4 * pixels * sizeof *defaults);
-        cJSON *row = cJSON_CreateObject();
+        cJSON *row = measure_new_row(rows);
         cJSON_AddStringToObject(row, "form", variants[i].name);
-        compare(defaults, frame->rgba, pixels, apart, row);
-        cJSON_AddNumberToObject(row, "ms", cost.ms);
-        cJSON_AddItemToArray(rows, row);
+        *error = (measure_error){ 0 };
+        measure_error_add(error, frame->rgba, defaults, pixels);
+        const measure_error_figures figures = measure_error_measure(error);
+        measure_add(row, { "mean", figures.mean }, { "percentile_99", figures.percentile_99 },
+                    { "max", figures.max }, { "ms", cost.ms });
     }
     return status;
 }
@@ -101,28 +80,20 @@ static void add_limits(bench_report *r)
            "section 5, step 3. image-aligned sheets: Mueller & Crawfis 1998.");
 }
 
-int bench_variants(const session *s, const bench_options *o, bench_report *r)
+int bench_variants(bench_scene *scene, const bench_options *o, bench_report *r)
 {
-    bench_scene scene;
-    const size_t bytes =
-        4 * (size_t)o->sizes[0][0] * (size_t)o->sizes[0][1] * sizeof *scene.frame.rgba;
-    float *defaults = NULL, *apart = NULL;
-    bench_progress_expect(o->progress, 1 + VARIANTS);
-    int status = bench_scene_open(&scene, s, o, r);
-    if (!status) {
-        defaults = trip_budget_take(s->budget, bytes);
-        apart = trip_budget_take(s->budget, bytes);
-        if (!defaults || !apart)
-            status = trip_fail(
-                TRIP_ERROR, "bench", "variants",
-                "two more pictures do not fit the memory; raise --memory or reduce --size");
-    }
-    if (!status) {
-        add_limits(r);
-        status = measure(&scene.frame, o, defaults, apart, r);
-    }
-    trip_budget_release(s->budget, defaults, bytes);
-    trip_budget_release(s->budget, apart, bytes);
-    bench_scene_close(&scene);
+    trip_budget *budget = scene->frame.session->budget;
+    const size_t bytes = 4 * (size_t)scene->size[0] * (size_t)scene->size[1] * sizeof(float);
+    float *defaults = trip_budget_take(budget, bytes);
+    measure_error *error = malloc(sizeof *error);
+    measure_progress_expect(o->progress, VARIANTS);
+    add_limits(r);
+    int status = defaults && error
+                     ? measure(&scene->frame, o, defaults, error, r)
+                     : trip_fail(TRIP_ERROR, "bench", "variants",
+                                 "another picture does not fit the memory; raise --memory or "
+                                 "reduce --size");
+    trip_budget_release(budget, defaults, bytes);
+    free(error);
     return status;
 }

@@ -451,7 +451,7 @@ for line in sys.stdin:
         self.assertIn("the program has ended", left_out["why"])
         with open("others/index.html", encoding="utf-8") as f:
             page = f.read()
-        self.assertEqual(page.count("<rect class=program"), 2)
+        self.assertEqual(page.count("<title>nothing: 12.5, "), 2)
         self.assertFalse(os.path.exists("others/program.raw"))
 
     def test_vtk_is_compared_if_installed(self):

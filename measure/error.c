@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-static void add_channel(accuracy_error *e, double error)
+static void add_channel(measure_error *e, double error)
 {
-    double position = fmin(ACCURACY_ERROR_BINS - 1, round(error * ACCURACY_ERROR_BINS_PER_LEVEL));
+    double position = fmin(MEASURE_ERROR_BINS - 1, round(error * MEASURE_ERROR_BINS_PER_LEVEL));
     e->bins[(size_t)position]++;
     e->count++;
     e->sum += error;
@@ -12,7 +12,7 @@ static void add_channel(accuracy_error *e, double error)
     e->max = fmax(e->max, error);
 }
 
-void accuracy_error_add_apart(accuracy_error *colour, accuracy_error *alpha, const float *picture,
+void measure_error_add_apart(measure_error *colour, measure_error *alpha, const float *picture,
                               const float *truth, size_t pixels)
 {
     for (size_t i = 0; i < 4 * pixels; i += 4)
@@ -22,29 +22,29 @@ void accuracy_error_add_apart(accuracy_error *colour, accuracy_error *alpha, con
                             255 * fabs((double)picture[i + c] - (double)truth[i + c]));
 }
 
-void accuracy_error_add(accuracy_error *e, const float *picture, const float *truth, size_t pixels)
+void measure_error_add(measure_error *e, const float *picture, const float *truth, size_t pixels)
 {
-    accuracy_error_add_apart(e, e, picture, truth, pixels);
+    measure_error_add_apart(e, e, picture, truth, pixels);
 }
 
 /* Returns the smallest error that a share of the channels does not exceed. */
-static double percentile(const accuracy_error *e, double share)
+static double percentile(const measure_error *e, double share)
 {
     uint64_t below = 0;
-    for (size_t i = 0; i < ACCURACY_ERROR_BINS; i++) {
+    for (size_t i = 0; i < MEASURE_ERROR_BINS; i++) {
         below += e->bins[i];
         if ((double)below >= share * (double)e->count)
-            return (double)i / ACCURACY_ERROR_BINS_PER_LEVEL;
+            return fmin((double)i / MEASURE_ERROR_BINS_PER_LEVEL, e->max);
     }
     return e->max;
 }
 
-accuracy_error_figures accuracy_error_measure(const accuracy_error *e)
+measure_error_figures measure_error_measure(const measure_error *e)
 {
     if (!e->count)
-        return (accuracy_error_figures){ .psnr = INFINITY };
+        return (measure_error_figures){ .psnr = INFINITY };
     double count = (double)e->count;
-    return (accuracy_error_figures){
+    return (measure_error_figures){
         .median = percentile(e, 0.5),
         .mean = e->sum / count,
         .percentile_99 = percentile(e, 0.99),

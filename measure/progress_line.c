@@ -1,4 +1,4 @@
-#include "bench_progress.h"
+#include "progress_line.h"
 
 #include <pthread.h>
 #include <signal.h>
@@ -10,7 +10,7 @@
 
 enum { INTERVAL_MS = 250, LINES_INTERVAL_MS = 2000 };
 
-struct bench_progress {
+struct measure_progress {
     const char *name;
     bool lines; /* prints line below line, because stderr is not a terminal */
     struct timespec begin;
@@ -31,7 +31,7 @@ static unsigned seconds_since(const struct timespec *begin)
 }
 
 /* Prints the line. The next output overwrites it. */
-static void print_line(const bench_progress *p)
+static void print_line(const measure_progress *p)
 {
     unsigned s = seconds_since(&p->begin);
     fprintf(stderr, "%s%s  %u:%02u", p->lines ? "" : "\r\033[K", p->name, s / 60, s % 60);
@@ -53,7 +53,7 @@ static struct timespec time_of_next_line(int interval_ms)
 
 static void *show(void *argument)
 {
-    bench_progress *p = argument;
+    measure_progress *p = argument;
     pthread_mutex_lock(&p->lock);
     do {
         struct timespec next = time_of_next_line(p->lines ? LINES_INTERVAL_MS : INTERVAL_MS);
@@ -66,7 +66,7 @@ static void *show(void *argument)
 }
 
 /* Starts the thread with all signals blocked, so that the main thread gets them. */
-static bool start_thread(bench_progress *p)
+static bool start_thread(measure_progress *p)
 {
     sigset_t all, before;
     sigfillset(&all);
@@ -76,16 +76,16 @@ static bool start_thread(bench_progress *p)
     return started;
 }
 
-static void release(bench_progress *p)
+static void release(measure_progress *p)
 {
     pthread_cond_destroy(&p->stop);
     pthread_mutex_destroy(&p->lock);
     free(p);
 }
 
-static bench_progress *start(const char *name, bool lines)
+static measure_progress *start(const char *name, bool lines)
 {
-    bench_progress *p = calloc(1, sizeof *p);
+    measure_progress *p = calloc(1, sizeof *p);
     if (!p)
         return NULL;
     p->lines = lines;
@@ -103,17 +103,17 @@ static bench_progress *start(const char *name, bool lines)
     return NULL;
 }
 
-bench_progress *bench_progress_start(const char *name)
+measure_progress *measure_progress_start(const char *name)
 {
     return isatty(STDERR_FILENO) == 1 ? start(name, false) : NULL;
 }
 
-bench_progress *bench_progress_start_lines(const char *name)
+measure_progress *measure_progress_start_lines(const char *name)
 {
     return start(name, isatty(STDERR_FILENO) != 1);
 }
 
-void bench_progress_expect(bench_progress *p, int steps)
+void measure_progress_expect(measure_progress *p, int steps)
 {
     if (!p)
         return;
@@ -122,7 +122,7 @@ void bench_progress_expect(bench_progress *p, int steps)
     pthread_mutex_unlock(&p->lock);
 }
 
-void bench_progress_step(bench_progress *p, const char *stage)
+void measure_progress_step(measure_progress *p, const char *stage)
 {
     if (!p)
         return;
@@ -132,7 +132,7 @@ void bench_progress_step(bench_progress *p, const char *stage)
     pthread_mutex_unlock(&p->lock);
 }
 
-void bench_progress_end(bench_progress *p)
+void measure_progress_end(measure_progress *p)
 {
     if (!p)
         return;

@@ -1,4 +1,4 @@
-#include "popping.h"
+#include "accuracy_popping.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -10,18 +10,23 @@ const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS] = {
     { .name = "popping-pre", .classify = TRIPTYCH_CLASSIFY_PRE },
 };
 
-/* ---- the turn ---- */
-
 /* A camera that turns around the object, at a distance where the whole object is visible from every
- * side. */
+ * side, and the settings that all pictures share. */
 typedef struct orbit {
     accuracy_view view;
     triptych_info info;
     double distance;
+    accuracy_contexts *contexts;
+    draw_settings settings;
+    float *rgba;
+    measure_progress *progress; /* each setting is a step */
+    const char *name;
+    const measure_popping_setting *last;
 } orbit;
 
-static int find_turn(triptych *t, const accuracy_options *o, orbit *out)
+static int find_turn(triptych *t, orbit *out)
 {
+    const accuracy_options *o = out->contexts->options;
     triptych_camera *c = &out->view.camera;
     out->view.name = "turned";
     int status = triptych_set_view(
@@ -59,70 +64,61 @@ static void turn_to(orbit *turn, double degrees)
         c->eye[i] = c->look[i] + way[i] * turn->distance / length;
 }
 
-/* ---- pictures of the turn ---- */
-
-static int draw_steps(accuracy_contexts *contexts, triptych *t, const draw_settings *settings,
-                      orbit *turn, float *rgba, bench_popping_changes *changes)
+static int draw_step(void *user, const measure_popping_setting *of, double degrees)
 {
-    int status = 0;
+    orbit *turn = user;
     double ms;
-    for (int i = 0; i <= BENCH_POPPING_STEPS && !status; i++) {
-        turn_to(turn, bench_popping_degrees(i));
-        status = accuracy_view_use(t, &turn->view);
-        if (!status)
-            status =
-                accuracy_contexts_draw(contexts, 0, TRIPTYCH_RENDERER_CPU, settings, rgba, &ms);
-        if (!status)
-            bench_popping_add(changes, i, rgba);
-    }
-    return status;
+    if (of != turn->last)
+        measure_progress_step(turn->progress, turn->name);
+    turn->last = of;
+    turn->settings.all.method = of->method;
+    turn->settings.all.h = of->method != TRIPTYCH_METHOD_MERGE ? 0
+                           : of->h > 0                         ? of->h
+                                                               : TRIPTYCH_ZERO;
+    turn_to(turn, degrees);
+    int status = accuracy_view_use(turn->contexts->contexts[0][TRIPTYCH_RENDERER_CPU], &turn->view);
+    return status ? status
+                  : accuracy_contexts_draw(turn->contexts, 0, TRIPTYCH_RENDERER_CPU,
+                                           &turn->settings, turn->rgba, &ms);
 }
 
 /* Measures all settings. If a frame fails, its message becomes the reason for leaving out the
  * table. */
-static int measure_settings(accuracy_popping *p, accuracy_contexts *contexts, triptych *t,
-                            const draw_settings *defaults, bench_progress *progress, orbit *turn,
-                            float *rgba, bench_popping_changes *changes)
+static int measure_rows(accuracy_popping *p, orbit *turn, size_t pixels)
 {
-    int status = 0;
-    for (int i = 0; i < ACCURACY_POPPING_ROWS && !status; i++) {
-        const bench_popping_setting *one = &bench_popping_settings[i];
-        draw_settings settings = *defaults;
-        settings.all.classify = p->classify;
-        settings.all.method = one->method;
-        settings.all.h = one->method != TRIPTYCH_METHOD_MERGE ? 0
-                         : one->h > 0                         ? one->h
-                                                              : TRIPTYCH_ZERO;
-        bench_progress_step(progress, p->name);
-        status = draw_steps(contexts, t, &settings, turn, rgba, changes);
-        if (!status)
-            bench_popping_find(changes, one, &p->rows[i]);
+    accuracy_contexts *contexts = turn->contexts;
+    const size_t bytes = measure_popping_bytes(pixels);
+    void *memory = trip_budget_take(contexts->budget, bytes);
+    p->state = ACCURACY_LEFT_OUT;
+    if (!memory) {
+        snprintf(p->why, sizeof p->why,
+                 "the changes need %zu bytes, which do not fit the memory; raise --memory", bytes);
+        return 0;
     }
-    p->state = status ? ACCURACY_LEFT_OUT : ACCURACY_MEASURED;
-    if (status == TRIP_ERROR)
+    int status = measure_popping_all(draw_step, turn, turn->rgba, pixels, memory,
+                                     ACCURACY_POPPING_ROWS, p->rows);
+    trip_budget_release(contexts->budget, memory, bytes);
+    if (!status)
+        p->state = ACCURACY_MEASURED;
+    else if (status == TRIP_ERROR)
         snprintf(p->why, sizeof p->why, "%s", contexts->why[0][TRIPTYCH_RENDERER_CPU]);
     return status == TRIP_ERROR ? 0 : status;
 }
 
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const draw_settings *defaults, bench_progress *progress, float *rgba)
+                             const draw_settings *defaults, measure_progress *progress, float *rgba)
 {
     const accuracy_options *o = contexts->options;
     triptych *t = contexts->contexts[0][TRIPTYCH_RENDERER_CPU];
-    bench_popping_changes changes;
-    orbit turn;
-    if (find_turn(t, o, &turn))
+    orbit turn = { .contexts = contexts,
+                   .settings = *defaults,
+                   .rgba = rgba,
+                   .progress = progress,
+                   .name = p->name };
+    turn.settings.all.classify = p->classify;
+    if (find_turn(t, &turn))
         return trip_fail(TRIP_ERROR, "accuracy", o->data[0], "cannot set a view: %s",
                          triptych_error(t));
-    const size_t pixels = (size_t)o->width * (size_t)o->height;
-    if (!bench_popping_begin(&changes, contexts->budget, pixels)) {
-        snprintf(p->why, sizeof p->why,
-                 "the changes need %zu bytes, which do not fit the memory; raise --memory",
-                 bench_popping_bytes(pixels));
-        p->state = ACCURACY_LEFT_OUT;
-        return 0;
-    }
-    int status = measure_settings(p, contexts, t, defaults, progress, &turn, rgba, &changes);
-    bench_popping_end(&changes);
-    return status;
+    p->rows = cJSON_CreateArray();
+    return measure_rows(p, &turn, (size_t)o->width * (size_t)o->height);
 }

@@ -14,11 +14,11 @@ static void make_picture(float rgba[PIXELS * 4])
 static void a_picture_has_no_error_against_itself(void **state)
 {
     (void)state;
-    static accuracy_error e;
+    static measure_error e;
     float picture[PIXELS * 4];
     make_picture(picture);
-    accuracy_error_add(&e, picture, picture, PIXELS);
-    const accuracy_error_figures f = accuracy_error_measure(&e);
+    measure_error_add(&e, picture, picture, PIXELS);
+    const measure_error_figures f = measure_error_measure(&e);
     assert_int_equal(e.count, PIXELS * 2);
     assert_true(f.median == 0 && f.mean == 0 && f.percentile_99 == 0 && f.max == 0);
     assert_true(isinf(f.psnr) && f.psnr > 0);
@@ -28,15 +28,15 @@ static void a_picture_has_no_error_against_itself(void **state)
 static void errors_made_by_hand_have_the_expected_figures(void **state)
 {
     (void)state;
-    static accuracy_error e;
+    static measure_error e;
     float picture[PIXELS * 4], truth[PIXELS * 4];
     make_picture(picture);
     make_picture(truth);
     for (int i = 0; i < 240; i++)
         picture[i] += (i % 2 ? 3.0F : -3.0F) / 255;
     picture[0] = picture[101] = 0.5F + 51.0F / 255;
-    accuracy_error_add(&e, picture, truth, PIXELS);
-    const accuracy_error_figures f = accuracy_error_measure(&e);
+    measure_error_add(&e, picture, truth, PIXELS);
+    const measure_error_figures f = measure_error_measure(&e);
     assert_close(f.median, 3, 1e-6);
     assert_close(f.mean, (238 * 3 + 2 * 51) / 400.0, 1e-5);
     assert_close(f.percentile_99, 3, 1e-6);
@@ -49,15 +49,15 @@ static void the_percentile_is_an_error_that_99_percent_do_not_exceed(void **stat
 {
     (void)state;
     for (int off = 2; off <= 3; off++) {
-        accuracy_error *e = calloc(1, sizeof *e);
+        measure_error *e = calloc(1, sizeof *e);
         float picture[200], truth[200];
         assert_non_null(e);
         for (int i = 0; i < 200; i++)
             truth[i] = picture[i] = 0.5F;
         for (int i = 0; i < off; i++)
             picture[70 * i] += 51.0F / 255;
-        accuracy_error_add(e, picture, truth, 50);
-        assert_close(accuracy_error_measure(e).percentile_99, off == 2 ? 0 : 51, 1e-6);
+        measure_error_add(e, picture, truth, 50);
+        assert_close(measure_error_measure(e).percentile_99, off == 2 ? 0 : 51, 1e-6);
         free(e);
     }
 }
@@ -65,27 +65,27 @@ static void the_percentile_is_an_error_that_99_percent_do_not_exceed(void **stat
 static void colour_and_alpha_are_counted_separately(void **state)
 {
     (void)state;
-    static accuracy_error colour, alpha;
+    static measure_error colour, alpha;
     const float truth[8] = { 0.2F, 0.2F, 0.2F, 1, 0, 0, 0, 0 };
     const float picture[8] = { 0.2F + 6.0F / 255, 0.2F, 0.2F, 1 - 5.0F / 255, 1, 1, 1, 0 };
-    accuracy_error_add_apart(&colour, &alpha, picture, truth, 2);
+    measure_error_add_apart(&colour, &alpha, picture, truth, 2);
     assert_int_equal(colour.count, 3);
     assert_int_equal(alpha.count, 1);
-    assert_close(accuracy_error_measure(&colour).mean, 2, 1e-5);
-    assert_close(accuracy_error_measure(&alpha).mean, 5, 1e-5);
+    assert_close(measure_error_measure(&colour).mean, 2, 1e-5);
+    assert_close(measure_error_measure(&alpha).mean, 5, 1e-5);
 }
 
 static void pixels_count_if_either_picture_covers_them(void **state)
 {
     (void)state;
-    static accuracy_error e;
+    static measure_error e;
     float covered[4] = { 0.2F, 0, 0, 1 }, empty[4] = { 0 }, faint[4] = { 0, 0, 0, 0.9F / 255 };
-    accuracy_error_add(&e, covered, empty, 1);
-    accuracy_error_add(&e, empty, covered, 1);
+    measure_error_add(&e, covered, empty, 1);
+    measure_error_add(&e, empty, covered, 1);
     assert_int_equal(e.count, 8);
-    accuracy_error_add(&e, faint, empty, 1);
+    measure_error_add(&e, faint, empty, 1);
     assert_int_equal(e.count, 8);
-    const accuracy_error_figures f = accuracy_error_measure(&e);
+    const measure_error_figures f = measure_error_measure(&e);
     assert_close(f.mean, (51 + 255) / 4.0, 1e-5);
     assert_close(f.max, 255, 1e-6);
 }
