@@ -96,8 +96,7 @@ static void order_axes(const int64_t stride[3], int axes[3])
     }
 }
 
-/* Copies slices, along the axis of the shortest stride first, so that the caches hold what is read
- * next. */
+/* Copies slices along the axis of the shortest stride first, so that caches are hit most often. */
 static void copy_slices(const memory *m, int64_t count, unsigned char *values)
 {
     const int64_t *dims = m->from.dims, *from = m->from.stride_bytes;

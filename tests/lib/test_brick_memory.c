@@ -182,7 +182,7 @@ static void strides_can_have_any_order_sign_and_padding(void **state)
     free(values);
 }
 
-/* What a function of slices knows: the values of a file, and what it was asked for. */
+/* State of the function that reads slices. */
 typedef struct reading {
     const unsigned char *values;
     int64_t next, fails_at;
