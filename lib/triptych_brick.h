@@ -58,20 +58,20 @@ typedef struct triptych_range {
 /* A volume in memory, dense, with values in the machine's byte order. Zero it first, then set
  * `size`, `type`, `dims`, and either `data` or `read_slices`. */
 typedef struct triptych_volume {
-    size_t size;      /* sizeof(triptych_volume): tells the library which fields exist */
+    size_t size;      /* sizeof(triptych_volume); another size is refused */
     const char *type; /* as triptych_brick_options.raw_type */
     int64_t dims[3];  /* voxels along x, y and z */
     /* Voxel (0, 0, 0). The values must not change during the call. The library reads them in place
      * and copies only the slices that it works on. */
     const void *data;
-    /* From one voxel to the next along x, y and z. May be negative. All 0 means that all values are
-     * contiguous, x fastest and z slowest. */
+    /* Distance from one voxel to the next along x, y and z. May be negative. All 0 means that all
+     * values are contiguous, x fastest and z slowest. */
     int64_t stride_bytes[3];
     /* Only if `data` is NULL: a function that fills `values` with slices `first` to
      * first + count - 1 along z. The values are contiguous, x fastest. Returns 0; any other result
      * ends the call with TRIPTYCH_ERROR.
      * - The library calls it on the calling thread, while other threads work on earlier slices.
-     * - Bricking makes up to three passes from the first slice to the last. A pass may skip slices.
+     * - Bricking makes several passes from the first slice to the last, and a pass may skip slices.
      *   All passes must get the same values.
      * - The function may call triptych_cancel(), but nothing else with the same context. */
     int (*read_slices)(void *user, int64_t first, int64_t count, void *values);

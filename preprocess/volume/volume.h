@@ -86,8 +86,8 @@ typedef struct trip_volume_memory {
     trip_affine index_to_world; /* all zeros: identity, without orientation */
     const void *data;           /* voxel (0, 0, 0) */
     int64_t stride_bytes[3];    /* from a voxel to the next along i, j, k; none is 0 */
-    /* Used if `data` is NULL: fills `values` with slices [first, first + count), i fastest. A result
-     * other than 0 is a failure. The thread that reads the volume calls it. */
+    /* Used if `data` is NULL: fills `values` with slices [first, first + count), i fastest. A
+     * result other than 0 is a failure. The thread that reads the volume calls it. */
     int (*read_slices)(void *user, int64_t first, int64_t count, void *values);
     void *user;
 } trip_volume_memory;
