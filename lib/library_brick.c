@@ -14,9 +14,26 @@
 #include "source.h"
 #include "source_field.h"
 
+/* The volume must be free of faults. */
+static trip_volume_memory memory_of(const triptych_volume *v)
+{
+    trip_volume_memory m = { .type = (trip_scalar)trip_scalar_from_name(v->type),
+                             .data = v->data,
+                             .read_slices = v->data ? NULL : v->read_slices,
+                             .user = v->user };
+    int64_t dense = trip_scalar_bytes(m.type);
+    for (int a = 0; a < 3; a++) {
+        m.dims[a] = v->dims[a];
+        m.stride_bytes[a] = v->stride_bytes[a] ? v->stride_bytes[a] : dense;
+        dense *= v->dims[a];
+    }
+    memcpy(m.index_to_world.m, v->index_to_world, sizeof m.index_to_world.m);
+    return m;
+}
+
 static trip_volume_params volume_params(const triptych_brick_options *o)
 {
-    return (trip_volume_params){
+    trip_volume_params p = {
         .grid = o->grid,
         .level_set = (trip_level_set_mode)o->level_set,
         .raw_dims = { o->raw_dims[0], o->raw_dims[1], o->raw_dims[2] },
@@ -29,6 +46,9 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .allow_gaps = o->allow_gaps,
         .max_voxels = o->max_voxels,
     };
+    if (o->in_memory)
+        p.memory = memory_of(o->in_memory);
+    return p;
 }
 
 static trip_region region_of(const triptych_brick_options *o)
@@ -71,8 +91,42 @@ static trip_brick_params brick_params(triptych *t, const char *volume,
     };
 }
 
+/* Returns whether all values and their strides span less than 2^63 bytes. */
+static bool is_addressable(const triptych_volume *v)
+{
+    int64_t size = trip_scalar_bytes((trip_scalar)trip_scalar_from_name(v->type)), span = size;
+    bool possible = true;
+    for (int a = 0; a < 3 && possible; a++) {
+        int64_t stride = v->stride_bytes[a], extent;
+        possible = !__builtin_mul_overflow(size, v->dims[a], &size) && stride > INT64_MIN &&
+                   !__builtin_mul_overflow(llabs(stride), v->dims[a] - 1, &extent) &&
+                   !__builtin_add_overflow(span, extent, &span);
+    }
+    return possible;
+}
+
+static const char *fault_of_memory(const triptych_volume *v)
+{
+    if (!v->type || !triptych_is_raw_type(v->type))
+        return "unknown type of a volume in memory; use uint8, int16, float, ...";
+    if (v->dims[0] < 1 || v->dims[1] < 1 || v->dims[2] < 1)
+        return "a volume in memory must have at least one voxel along each axis";
+    if (!v->data && !v->read_slices)
+        return "a volume in memory needs data or read_slices()";
+    if (!is_addressable(v))
+        return "a volume in memory must span less than 2^63 bytes";
+    const int64_t *s = v->stride_bytes;
+    if ((s[0] || s[1] || s[2]) && (!s[0] || !s[1] || !s[2]))
+        return "the strides of a volume in memory must be all 0 or none";
+    return NULL;
+}
+
+/* Must return NULL before volume_params() may be called. */
 static const char *fault_of_volume(const triptych_brick_options *o)
 {
+    const char *fault = o->in_memory ? fault_of_memory(o->in_memory) : NULL;
+    if (fault)
+        return fault;
     for (int a = 0; a < 3; a++) {
         if (!(o->spacing[a] >= 0 && isfinite(o->spacing[a])))
             return "the spacing of voxels must be finite and at least 0";
@@ -107,6 +161,8 @@ static const char *fault_of_options(const triptych_brick_options *o)
     if (o->no_halo &&
         (o->levels_for == TRIPTYCH_LEVELS_FOR_POST || o->levels_for == TRIPTYCH_LEVELS_FOR_BOTH))
         return "coarse levels for post require the halo";
+    if (o->in_memory && o->resume)
+        return "a volume in memory cannot be resumed, since nothing tells whether it changed";
     for (size_t i = 0; i < o->range_count; i++)
         if (!(o->ranges[i].lo <= o->ranges[i].hi))
             return "a range has its minimum above its maximum";
@@ -121,13 +177,15 @@ static int make_params(triptych *t, const char *volume, const triptych_brick_opt
     const char *fault = fault_of_options(&o);
     int status = trip_context_check_idle(t, false);
     *ranges = NULL;
+    *out = (trip_brick_params){ .input = volume };
     if (!status && fault)
         status = trip_fail(TRIP_USAGE, "brick", volume, "%s", fault);
     if (!status && !(*ranges = calloc(o.range_count + 1, sizeof **ranges)))
         status = trip_fail(TRIP_ERROR, "brick", volume, "out of memory");
     for (size_t i = 0; i < o.range_count && !status; i++)
         (*ranges)[i] = (trip_value_range){ o.ranges[i].lo, o.ranges[i].hi };
-    *out = brick_params(t, volume, &o, *ranges);
+    if (!status)
+        *out = brick_params(t, volume, &o, *ranges);
     return status;
 }
 
@@ -253,6 +311,8 @@ int triptych_identify(triptych *t, const char *volume, const triptych_brick_opti
     trip_brick_params params;
     *out = (triptych_identity){ 0 };
     int status = make_params(t, volume, options, &ranges, &params);
+    if (!status && options && options->in_memory)
+        status = trip_fail(TRIP_USAGE, "brick", volume, "a volume in memory has no identity");
     if (!status)
         status = identify(t, &params, max_content_bytes, out);
     free(ranges);
@@ -262,11 +322,11 @@ int triptych_identify(triptych *t, const char *volume, const triptych_brick_opti
 static int list_files(const char *volume, const triptych_brick_options *o,
                       int (*found)(void *user, const char *path), void *user)
 {
-    const trip_volume_params params = volume_params(o);
     const char *fault = fault_of_volume(o);
     trip_source source = { 0 };
     if (fault)
         return trip_fail(TRIP_USAGE, "read", volume, "%s", fault);
+    const trip_volume_params params = volume_params(o);
     int status = trip_source_find(&source, volume, &params);
     for (size_t i = 0; i < source.count && status >= 0; i++)
         status = found(user, source.files[i].path);
@@ -285,7 +345,6 @@ int triptych_list_files(triptych *t, const char *volume, const triptych_brick_op
 
 static int use_source(triptych *t, const char *path, const triptych_brick_options *o)
 {
-    const trip_volume_params params = volume_params(o);
     const char *fault = fault_of_volume(o);
     int status = trip_context_check_idle(t, true);
     if (!status && fault)
@@ -296,6 +355,7 @@ static int use_source(triptych *t, const char *path, const triptych_brick_option
                            "--renderer integral");
     if (status)
         return status;
+    const trip_volume_params params = volume_params(o);
     trip_context_drop_renderer(t); /* since its field would take as much memory again */
     trip_field_destroy(t->source);
     return trip_source_field_read(&t->source, t->session.data, path, &params, t->session.budget);

@@ -55,9 +55,42 @@ typedef struct triptych_range {
     double lo, hi; /* both inclusive */
 } triptych_range;
 
+/* Fills `values` with slices `first` to first + count - 1. */
+typedef int (*triptych_read_slices_callback)(void *user, int64_t first, int64_t count,
+                                             void *values);
+
+/* A volume in memory, dense, with values in the machine's byte order. `type`, `dims`, and either
+ * `data` or `read_slices` are required. */
+typedef struct triptych_volume {
+    const char *type; /* as triptych_brick_options.raw_type */
+    int64_t dims[3];  /* voxels along x, y and z */
+    /* Voxel (0, 0, 0). The values must not change during the call. The library reads them in place
+     * and copies only the slices that it works on. */
+    const void *data;
+    /* Distance from one voxel to the next along x, y and z. May be negative. All 0 means that all
+     * values are contiguous, x fastest and z slowest. */
+    int64_t stride_bytes[3];
+    /* Only if `data` is NULL: a function that fills `values` with slices `first` to
+     * first + count - 1 along z. The values are contiguous, x fastest. Returns 0; any other result
+     * ends the call with TRIPTYCH_ERROR.
+     * - The library calls it on the calling thread, while other threads work on earlier slices.
+     * - Bricking makes several passes from the first slice to the last, and a pass may skip slices.
+     *   All passes must get the same values.
+     * - The function may call triptych_cancel(), but nothing else with the same context. */
+    triptych_read_slices_callback read_slices;
+    void *user;
+    /* Takes index space to world space, as in triptych_info. All 0: the options give the spacing,
+     * and voxel (0, 0, 0) lies at the origin. If not all 0, z is up unless `axes` says otherwise.
+     * `spacing` replaces the lengths of its columns. */
+    double index_to_world[3][4];
+} triptych_volume;
+
 typedef struct triptych_brick_options {
     /* ---- reading the volume ---- */
 
+    /* If not NULL, the volume is read from memory. The argument `volume` is then only its name, for
+     * messages and for triptych_info.notes. Options for files and `resume` are refused. */
+    const triptych_volume *in_memory;
     /* OpenVDB grid. The default is "density", then the first fog volume, then the first scalar
      * grid. */
     const char *grid;
@@ -153,6 +186,7 @@ typedef struct triptych_brick_summary {
  * - a file: .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img, .nc, .vdb, .vol, or raw data
  * - DICOM files
  * - slices: their folder, or a pattern of their names
+ * - memory: triptych_brick_options.in_memory
  * The data set appears under its name only when it is complete. */
 TRIPTYCH_API int triptych_brick(triptych *t, const char *volume, const char *data_set,
                                 const triptych_brick_options *options,
@@ -188,19 +222,22 @@ typedef struct triptych_identity {
     int stable;
 } triptych_identity;
 
-/* Computes the keys. Reads the files for `content` if they have at most `max_content_bytes` in
- * total; 0 never reads them. Options that do not change the data set, such as memory and threads,
- * do not count. */
+/* Computes the keys. Refuses volumes in memory. Reads the files for `content` if they have at most
+ * `max_content_bytes` in total; 0 never reads them. Options that do not change the data set, such
+ * as memory and threads, do not count. */
 TRIPTYCH_API int triptych_identify(triptych *t, const char *volume,
                                    const triptych_brick_options *options,
                                    uint64_t max_content_bytes, triptych_identity *out);
 
+/* Receives the path of a file of a volume. A negative result ends triptych_list_files(). */
+typedef int (*triptych_file_callback)(void *user, const char *path);
+
 /* Calls `found` with the path of every file of the volume. For a folder or a pattern there may be
- * further files. Only the options for reading count; NULL is allowed. If `found` returns a negative
- * number, the function stops and returns that number. */
+ * further files. A volume in memory has none. Only the options for reading count; NULL is allowed.
+ * If `found` returns a negative number, the function stops and returns that number. */
 TRIPTYCH_API int triptych_list_files(triptych *t, const char *volume,
                                      const triptych_brick_options *options,
-                                     int (*found)(void *user, const char *path), void *user);
+                                     triptych_file_callback found, void *user);
 
 /* Returns 1 if `name` is a valid triptych_brick_options.raw_type, otherwise 0. */
 TRIPTYCH_API int triptych_is_raw_type(const char *name);

@@ -239,7 +239,8 @@ char *trip_brick_metadata_make(const trip_brick_metadata *t)
     char note[TRIP_BRICK_NOTE_BYTES];
     trip_brick_metadata_note(t->info, t->upright, note);
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "source", base_name(t->params->input));
+    if (strcmp(t->info->format, "memory") != 0)
+        cJSON_AddStringToObject(root, "source", base_name(t->params->input));
     add_source_options(root, t->params);
     cJSON_AddStringToObject(root, "format", t->info->format);
     if (t->info->name[0])

@@ -9,7 +9,7 @@
  *                        are mirror-symmetric; for volumes without orientation
  *   "footing"            "-x" ... "+z": the only side of the grid at which the kept voxels are
  *                        level; for volumes without orientation
- *   "source"             the volume's file
+ *   "source"             the volume's file; absent for a volume from memory
  *   "source_options"     the options of `brick` that make the data set again, without the options
  *                        for kept values
  *   "note"               a choice that the file left open, for people

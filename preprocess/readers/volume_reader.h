@@ -58,6 +58,7 @@ extern const trip_volume_reader trip_read_netcdf4;
 extern const trip_volume_reader trip_read_vol;
 extern const trip_volume_reader trip_read_images;
 extern const trip_volume_reader trip_read_raw;
+extern const trip_volume_reader trip_read_memory; /* of trip_volume_params.memory; has no probe() */
 
 #ifdef __cplusplus
 }

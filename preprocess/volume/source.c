@@ -96,7 +96,7 @@ static int begin(XXH3_state_t **hash, const trip_source *s, const char *text)
 {
     *hash = XXH3_createState();
     if (!*hash || XXH3_128bits_reset(*hash) != XXH_OK)
-        return fail_memory(s->files[0].path);
+        return fail_memory(s->count ? s->files[0].path : s->format);
     XXH3_128bits_update(*hash, s->format, strlen(s->format) + 1);
     XXH3_128bits_update(*hash, text, strlen(text) + 1);
     XXH3_128bits_update(*hash, &s->count, sizeof s->count);

@@ -118,6 +118,10 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
 {
     unsigned char head[HEAD_BYTES];
     size_t bytes;
+    if (params->memory.data || params->memory.read_slices) {
+        *out = &trip_read_memory;
+        return check_options(path, trip_read_memory.format, params);
+    }
     int status = read_head(path, head, &bytes);
     if (status < 0)
         return status;

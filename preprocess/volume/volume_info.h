@@ -84,8 +84,24 @@ typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_BAND, /* density max(0, 1 - |distance| / half band width) */
 } trip_level_set_mode;
 
+/* A dense volume in memory, with values in the machine's byte order. The values must stay valid and
+ * unchanged until the volume is closed. */
+typedef struct trip_volume_memory {
+    int64_t dims[3];
+    trip_scalar type;
+    trip_affine index_to_world; /* all zeros: identity, without orientation */
+    const void *data;           /* voxel (0, 0, 0) */
+    int64_t stride_bytes[3];    /* from a voxel to the next along i, j, k; none is 0 */
+    /* Used if `data` is NULL: fills `values` with slices [first, first + count), i fastest. A
+     * result other than 0 is a failure. The thread that reads the volume calls it. */
+    int (*read_slices)(void *user, int64_t first, int64_t count, void *values);
+    void *user;
+} trip_volume_memory;
+
 /* Zero selects the default of every field. */
 typedef struct trip_volume_params {
+    /* If it has data or a function, the volume is read from there, and its path is only a name. */
+    trip_volume_memory memory;
     const char *grid; /* OpenVDB grid or netCDF variable; the OpenVDB default is "density", else the
                          first fog volume, else the first scalar grid */
     trip_level_set_mode level_set;

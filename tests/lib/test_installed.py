@@ -1,5 +1,7 @@
-"""Tests the installed library, which programs find by pkg-config. As a shared and as a static
-library it draws the same picture as the program. Only the functions of its headers are visible."""
+"""Tests the installed library, which programs find by pkg-config or by CMake. As a shared and as a
+static library it draws the same picture as the program. Only the functions of its headers are
+visible."""
+import array
 import os
 import re
 import shutil
@@ -10,6 +12,9 @@ import unittest
 
 CMAKE, BUILD, SOURCE, CC, CXX = sys.argv[1:]
 DATA = os.path.join(SOURCE, "datasets", "tooth.nhdr")
+EXAMPLES = {name: os.path.join(SOURCE, "lib", f"{name}.c")
+            for name in ("example", "example_memory")}
+STRICT = ["-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 VIEW = ["--size", "320x240", "--view", "iso", "--azimuth", "30", "--background", "0,0,0.25"]
 
 
@@ -18,6 +23,17 @@ def run(*command, **options):
     if result.returncode:
         raise AssertionError(f"{command}: {result.returncode}\n{result.stdout}{result.stderr}")
     return result.stdout
+
+
+def write_tanglecube(path):
+    """Writes the volume of example_memory.c, computed independently."""
+    size = 96
+    x = [(i - (size - 1) / 2) / 16 for i in range(size)]
+    part = [v * v * (v * v - 5) for v in x]
+    with open(path, "wb") as f:
+        for k in part:
+            for j in part:
+                array.array("f", (-11.8 - i - j - k for i in part)).tofile(f)
 
 
 @unittest.skipUnless(shutil.which("pkg-config"), "pkg-config is missing")
@@ -35,6 +51,14 @@ class Installed(unittest.TestCase):
         run(cls.program, "brick", DATA, "-o", cls.data)
         cls.expected = os.path.join(cls.folder.name, "expected.exr")
         run(cls.program, "render", cls.data, "-o", cls.expected, "--tf", "grey", *VIEW)
+        volume = os.path.join(cls.folder.name, "tanglecube.raw")
+        data = os.path.join(cls.folder.name, "tanglecube.trip")
+        write_tanglecube(volume)
+        run(cls.program, "brick", volume, "--size", "96,96,96", "--type", "float", "--range",
+            "0:100", "-o", data)
+        cls.expected_memory = os.path.join(cls.folder.name, "expected_memory.exr")
+        run(cls.program, "render", data, "-o", cls.expected_memory, "--size", "320x240",
+            "--background", "0,0,0")
 
     @classmethod
     def tearDownClass(cls):
@@ -50,22 +74,48 @@ class Installed(unittest.TestCase):
         """Runs the example. Its picture must equal the picture of the program, bit for bit."""
         picture = self.path("picture.exr")
         run(program, self.data, "grey", picture, env=self.environment, cwd=self.folder.name)
-        with open(picture, "rb") as one, open(self.expected, "rb") as other:
-            self.assertEqual(one.read(), other.read())
+        self.assert_same(picture, self.expected)
 
-    def test_the_example_draws_the_same_picture_as_the_program(self):
-        run(CC, "-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Werror", "-o",
-            self.path("example"), os.path.join(SOURCE, "lib", "example.c"),
-            *self.pkg_config("--cflags", "--libs"))
+    def draw_memory(self, program, *slices):
+        """Runs the example of a volume in memory. The program bricks the same values from a file."""
+        picture = self.path("memory.exr")
+        run(program, self.path("memory.trip"), picture, *slices, env=self.environment)
+        self.assert_same(picture, self.expected_memory)
+
+    def assert_same(self, picture, expected):
+        with open(picture, "rb") as one, open(expected, "rb") as other:
+            self.assertTrue(one.read() == other.read(), f"{picture} differs from {expected}")
+
+    def test_the_examples_draw_the_same_pictures_as_the_program(self):
+        for name, source in EXAMPLES.items():
+            run(CC, *STRICT, "-o", self.path(name), source,
+                *self.pkg_config("--cflags", "--libs"))
         self.draw(self.path("example"))
+        self.draw_memory(self.path("example_memory"))
+        self.draw_memory(self.path("example_memory"), "slices")
+
+    def test_cmake_finds_the_library(self):
+        folder = self.path("project")
+        os.mkdir(folder)
+        version = self.pkg_config("--modversion")[0]
+        with open(os.path.join(folder, "CMakeLists.txt"), "w") as f:
+            f.write("cmake_minimum_required(VERSION 3.22)\nproject(examples C)\n"
+                    f"find_package(Triptych {version} REQUIRED)\n")
+            for name, source in EXAMPLES.items():
+                f.write(f"add_executable({name} {source})\n"
+                        f"target_link_libraries({name} Triptych::triptych)\n")
+        run(CMAKE, "-S", folder, "-B", folder, "-G", "Ninja", f"-DCMAKE_C_COMPILER={CC}",
+            f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run(CMAKE, "--build", folder)
+        self.draw(os.path.join(folder, "example"))
+        self.draw_memory(os.path.join(folder, "example_memory"))
 
     def test_the_static_library_draws_the_same_picture(self):
         flags = self.pkg_config("--static", "--cflags", "--libs")
         static = [os.path.join(self.libraries, "libtriptych.a") if flag == "-ltriptych" else flag
                   for flag in flags]
         self.assertNotEqual(flags, static)
-        run(CC, "-std=c11", "-D_POSIX_C_SOURCE=200809L", "-o", self.path("static"),
-            os.path.join(SOURCE, "lib", "example.c"), *static)
+        run(CC, *STRICT, "-o", self.path("static"), EXAMPLES["example"], *static)
         needed = run("readelf", "-d", self.path("static"))
         self.assertNotIn("libtriptych", needed)
         self.draw(self.path("static"))
@@ -73,6 +123,7 @@ class Installed(unittest.TestCase):
     def test_the_headers_compile_as_c_plus_plus(self):
         with open(self.path("a.cpp"), "w") as f:
             f.write("#include <triptych_brick.h>\n#include <cstdio>\nint main() { triptych *t;"
+                    " triptych_volume volume{};"
                     " if (triptych_create(&t)) return 1; triptych_view view{}; view.width = 8;"
                     " int status = triptych_set_view(t, &view); std::puts(triptych_error(t));"
                     " triptych_destroy(t); return status == TRIPTYCH_USAGE ? 0 : 1; }\n")
