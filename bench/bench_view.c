@@ -1,5 +1,7 @@
 #include "bench_view.h"
 
+#include "framing.h"
+
 static const double fov_degrees = 30, fill = 0.95, degree = 3.14159265358979323846 / 180;
 
 /* The bounding box of all splats with their kernels in world space, and the axes of a view. */
@@ -10,8 +12,7 @@ typedef struct framing {
 
 static void frame_box(framing *f, const session *s)
 {
-    trip_camera_framing box = { 0 };
-    trip_dataset_metadata_frame(s->text, s->data, &box);
+    const trip_view_object box = trip_view_object_of(s->data, s->text);
     const double *lo = box.lo, *hi = box.hi;
     for (int i = 0; i < 8; i++)
         f->corners[i] = trip_affine_point(
@@ -99,13 +100,14 @@ trip_camera_params bench_view_lateral(const session *s, const int size[2])
 static framing make_turned(const session *s, double azimuth_degrees)
 {
     framing f;
-    trip_camera_params view;
-    trip_camera_framing box = { .width = 1, .height = 1, .azimuth_degrees = azimuth_degrees };
-    trip_dataset_metadata_frame(s->text, s->data, &box);
-    trip_camera_frame(&box, &s->data->index_to_world, &view);
+    trip_found_view view;
+    const trip_view_object box = trip_view_object_of(s->data, s->text);
+    trip_view_find(
+        &view, &(trip_view_settings){ .width = 1, .height = 1, .azimuth_degrees = azimuth_degrees },
+        &box);
     frame_box(&f, s);
-    f.view_direction = trip_normalize(trip_sub(view.look, view.eye));
-    f.right = trip_normalize(trip_cross(f.view_direction, view.up));
+    f.view_direction = trip_normalize(trip_sub(view.params.look, view.params.eye));
+    f.right = trip_normalize(trip_cross(f.view_direction, view.params.up));
     f.up = trip_cross(f.right, f.view_direction);
     return f;
 }

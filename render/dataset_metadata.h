@@ -24,7 +24,6 @@
 #define TRIP_DATASET_METADATA_H
 
 #include "dataset.h"
-#include "framing.h"
 #include "transfer_function.h"
 
 typedef struct trip_dataset_metadata trip_dataset_metadata;
@@ -60,9 +59,10 @@ bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histog
 double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_tf *tf,
                                     double range[2]);
 
-/* Sets the framing of the default view from the data set: bounds of the splats, up, and front. The
- * bounds do not depend on the size of tiles. */
-void trip_dataset_metadata_frame(const trip_dataset_metadata *t, const trip_dataset *d,
-                                 trip_camera_framing *framing);
+/* Sets the world directions that are up and front: from the text, else from the patient's position,
+ * else by the format's custom, else by a guess, which preprocess/brick_metadata.c notes. Zero means
+ * the default of a view. */
+void trip_dataset_metadata_orient(const trip_dataset_metadata *t, const trip_dataset *d,
+                                  trip_vec3 *up, trip_vec3 *front);
 
 #endif
