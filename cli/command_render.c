@@ -13,7 +13,6 @@
 #include "render_files.h"
 #include "render_options.h"
 #include "render_stats.h"
-#include "render_view.h"
 #include "report.h"
 #include "sequence.h"
 #include "video.h"
@@ -167,14 +166,13 @@ static int take_pictures(drawing *d)
 
 static int open_drawing(drawing *d)
 {
-    const triptych_view view = render_view(&d->o);
     int status = sequence_find_shown(&d->sequence);
     if (!status)
         status = open_input(d);
     if (!status)
         status = take_pictures(d);
-    if (!status && !d->o.path)
-        status = triptych_set_view(d->t, &view);
+    if (!status)
+        status = sequence_set_view(&d->sequence, d->t);
     if (!status && d->o.stats)
         status = render_stats_create(&d->stats);
     return status;

@@ -1,8 +1,10 @@
 #include "navigation.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "geometry.h"
+#include "text.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 
@@ -90,6 +92,26 @@ triptych_view trip_navigation_view(const trip_navigation *n, int width, int heig
                             .up = n->up,
                             .fov_degrees = n->fov_degrees,
                             .ortho_height = n->ortho_height };
+}
+
+static const char *triple(const double p[3], char text[128])
+{
+    char x[32], y[32], z[32];
+    snprintf(text, 128, "%s,%s,%s", trip_text_from_double(p[0], x), trip_text_from_double(p[1], y),
+             trip_text_from_double(p[2], z));
+    return text;
+}
+
+char *trip_navigation_options(const trip_navigation *n, int width, int height)
+{
+    char *options, eye[128], look[128], up[128], number[32];
+    bool ortho = n->ortho_height > 0;
+    trip_text_from_double(ortho ? n->ortho_height : n->fov_degrees, number);
+    if (asprintf(&options, "--eye %s --look %s --up %s --%s %s --size %dx%d", triple(n->eye, eye),
+                 triple(n->look, look), triple(n->up, up), ortho ? "ortho" : "fov", number, width,
+                 height) < 0)
+        return NULL;
+    return options;
 }
 
 trip_navigation_axes trip_navigation_get_axes(const trip_navigation *n)

@@ -24,6 +24,11 @@ trip_navigation trip_navigation_from_camera(const triptych_camera *camera, const
 /* Returns the view for triptych_set_view(). It points into *n. */
 triptych_view trip_navigation_view(const trip_navigation *n, int width, int height);
 
+/* Returns the view as options of `triptych render` that reproduce it bit for bit:
+ * "--eye X,Y,Z --look ... --up ... --fov DEGREES --size WxH", with --ortho HEIGHT in place of --fov
+ * for a parallel view. The text is for free(); NULL if memory is exhausted. */
+char *trip_navigation_options(const trip_navigation *n, int width, int height);
+
 /* The camera's axes, unit length. */
 typedef struct trip_navigation_axes {
     double right[3], up[3], forward[3];

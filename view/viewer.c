@@ -6,7 +6,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "camera_text.h"
 #include "clipping.h"
 #include "light.h"
 #include "look_text.h"
@@ -549,7 +548,8 @@ char *trip_viewer_options(trip_viewer *v)
     if (!d)
         return NULL;
     const triptych_settings s = trip_viewer_settings(d);
-    char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height), *text = NULL;
+    char *camera = trip_navigation_options(&d->navigation, v->picture_width, v->height),
+         *text = NULL;
     char *clip = trip_clipping_text(&s.clip), *light = trip_light_text(&s);
     char *effects = trip_effects_text(&s, trip_viewer_heat(d));
     char *look = trip_look_text(&s, d->edited ? NULL : d->function, d->opacity_scale);
