@@ -156,11 +156,6 @@ const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, 
     return cJSON_GetStringValue(cJSON_GetArrayItem(options, i));
 }
 
-const char *trip_dataset_metadata_note(const trip_dataset_metadata *t)
-{
-    return string_at(t, "note");
-}
-
 int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf **out)
 {
     const char *text = string_at(t, "transfer_function");

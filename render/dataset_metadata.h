@@ -38,9 +38,6 @@ void trip_dataset_metadata_destroy(trip_dataset_metadata *t);
 const char *trip_dataset_metadata_source(const trip_dataset_metadata *t);
 const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, int i);
 
-/* Returns the note about choices that the file left open, or NULL. */
-const char *trip_dataset_metadata_note(const trip_dataset_metadata *t);
-
 /* Returns the kind of the volume, or TRIP_TF_SIMULATION if the text has none. */
 trip_tf_kind trip_dataset_metadata_kind(const trip_dataset_metadata *t);
 

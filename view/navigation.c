@@ -65,9 +65,7 @@ static double tangent(const trip_navigation *n)
 /* Rotates about an axis of unit length. */
 static trip_vec3 turned(trip_vec3 v, trip_vec3 axis, double degrees)
 {
-    trip_vec3 along = trip_scale(axis, trip_dot(axis, v)), across = trip_sub(v, along);
-    return trip_add(along, trip_add(trip_scale(across, cos(degrees * DEGREE)),
-                                    trip_scale(trip_cross(axis, across), sin(degrees * DEGREE))));
+    return trip_turned(v, axis, degrees * DEGREE);
 }
 
 trip_navigation trip_navigation_from_camera(const triptych_camera *camera, const double *upright)
@@ -153,21 +151,6 @@ void trip_navigation_point(const trip_navigation *n, int width, int height, cons
     double x = (pixel[0] - 0.5 * width) * size, y = (0.5 * height - pixel[1]) * size;
     put(point, trip_add(trip_add(p.eye, trip_scale(p.forward, depth)),
                         trip_add(trip_scale(p.right, x), trip_scale(p.up, y))));
-}
-
-void trip_navigation_ray(const trip_navigation *n, int width, int height, const double pixel[2],
-                         double origin[3], double direction[3])
-{
-    pose p = pose_of(n);
-    double ahead[3];
-    put(origin, p.eye);
-    put(direction, p.forward);
-    if (n->ortho_height > 0) {
-        trip_navigation_point(n, width, height, pixel, 0, origin);
-    } else {
-        trip_navigation_point(n, width, height, pixel, p.distance, ahead);
-        put(direction, trip_normalize(trip_sub(vector(ahead), p.eye)));
-    }
 }
 
 void trip_navigation_orbit(trip_navigation *n, double azimuth_degrees, double elevation_degrees)

@@ -44,10 +44,6 @@ double trip_navigation_pixel(const trip_navigation *n, int height, double depth)
  * direction. In perspective the pixel is valid only if that distance is above 0. */
 double trip_navigation_project(const trip_navigation *n, int width, int height,
                                const double point[3], double pixel[2]);
-/* Computes the ray of a pixel position: its origin, in the plane of the eye for parallel views, and
- * its direction of unit length. */
-void trip_navigation_ray(const trip_navigation *n, int width, int height, const double pixel[2],
-                         double origin[3], double direction[3]);
 /* Computes the point on a pixel's ray at distance `depth` along the view direction. */
 void trip_navigation_point(const trip_navigation *n, int width, int height, const double pixel[2],
                            double depth, double point[3]);

@@ -1,5 +1,7 @@
 #include "framing.h"
 
+#include <string.h>
+
 #include "report.h"
 #include "settings.h"
 
@@ -163,17 +165,6 @@ static void set_directions(finding *f)
 
 /* ---- extent ---- */
 
-static void set_box(finding *f, const double lo[3], const double hi[3])
-{
-    for (int a = 0; a < 3; a++) {
-        f->lo[a] = lo[a];
-        f->hi[a] = hi[a];
-    }
-    f->origin = (trip_reach_origin){ trip_v3(0.5 * lo[0] + 0.5 * hi[0], 0.5 * lo[1] + 0.5 * hi[1],
-                                             0.5 * lo[2] + 0.5 * hi[2]),
-                                     trip_normalize(f->axis) };
-}
-
 /* Returns the radius of a splat that must be inside the picture. It is half of the kernel radius,
  * since the splat is faint beyond, and the margin holds the rest. For small objects the margin is
  * too narrow, so the radius is larger. */
@@ -189,16 +180,18 @@ static double kernel_that_counts(const finding *f, double radius)
 /* Sets the box around the part to fit. */
 static int find_box(finding *f, const trip_view_object *o)
 {
-    double lo[3], hi[3];
-    set_box(f, o->lo, o->hi);
-    if (!o->visible)
-        return 0;
-    int status = trip_visible_bounds(o->visible, lo, hi);
-    if (status)
-        return status;
-    set_box(f, lo, hi);
-    o->visible->kernel_radius = kernel_that_counts(f, o->kernel_radius);
-    return 0;
+    int status = 0;
+    memcpy(f->lo, o->lo, sizeof f->lo);
+    memcpy(f->hi, o->hi, sizeof f->hi);
+    if (o->visible) {
+        status = trip_visible_bounds(o->visible, f->lo, f->hi);
+        o->visible->kernel_radius = kernel_that_counts(f, o->kernel_radius);
+    }
+    const double *lo = f->lo, *hi = f->hi;
+    f->origin = (trip_reach_origin){ trip_v3(0.5 * lo[0] + 0.5 * hi[0], 0.5 * lo[1] + 0.5 * hi[1],
+                                             0.5 * lo[2] + 0.5 * hi[2]),
+                                     trip_normalize(f->axis) };
+    return status;
 }
 
 /* Computes the maximum values over the corners of the box. */
