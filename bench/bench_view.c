@@ -13,11 +13,13 @@ typedef struct framing {
 static void frame_box(framing *f, const session *s)
 {
     const trip_view_object box = trip_view_object_of(s->data, s->text);
-    const double *lo = box.lo, *hi = box.hi;
-    for (int i = 0; i < 8; i++)
-        f->corners[i] = trip_affine_point(
-            &s->data->index_to_world,
-            trip_v3(i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2]));
+    for (int i = 0; i < 8; i++) {
+        double corner[3];
+        for (int a = 0; a < 3; a++)
+            corner[a] = i >> a & 1 ? box.hi[a] + box.kernel_radius : box.lo[a] - box.kernel_radius;
+        f->corners[i] =
+            trip_affine_point(&s->data->index_to_world, trip_v3(corner[0], corner[1], corner[2]));
+    }
     f->middle = trip_scale(trip_add(f->corners[0], f->corners[7]), 0.5);
 }
 

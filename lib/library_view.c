@@ -55,9 +55,8 @@ static trip_view_settings settings_of(const triptych_view *o)
     };
 }
 
-/* Starts to look for the visible voxels with a reader of its own, which ends before the reader of
- * the frames is made. */
-static int start_visible(const triptych *t, trip_visible *v)
+/* Makes a reader for the visible voxels, which ends before the reader of the frames is made. */
+static int make_reader(const triptych *t, trip_visible *v)
 {
     const triptych_resources *r = &t->resources;
     const trip_engine engine = (trip_engine)r->engine;
@@ -67,10 +66,7 @@ static int start_visible(const triptych *t, trip_visible *v)
         .skip = trip_visible_skip,
         .skip_user = v,
     };
-    int status = session_make_reader(&t->session, &v->reader, &wanted);
-    if (!status)
-        trip_visible_start(v);
-    return status;
+    return session_make_reader(&t->session, &v->reader, &wanted);
 }
 
 int trip_context_find_view(triptych *t, const triptych_view *given)
@@ -88,13 +84,12 @@ int trip_context_find_view(triptych *t, const triptych_view *given)
     trip_view_object object = trip_view_object_of(s->data, s->text);
     trip_visible visible = { .data = s->data, .budget = s->budget, .table = s->table };
     if (!(settings.eye && settings.look) && !trip_coordinates_uneven(&s->data->coordinates)) {
-        status = start_visible(t, &visible);
+        status = make_reader(t, &visible);
         object.visible = &visible;
         object.kernel_radius = t->settings.kernel_radius;
     }
     if (!status)
         status = trip_view_find(&found, &settings, &object);
-    trip_visible_end(&visible);
     trip_reader_destroy(visible.reader);
     if (status)
         return status;

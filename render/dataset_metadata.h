@@ -56,8 +56,8 @@ bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histog
 double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_tf *tf,
                                     double range[2]);
 
-/* Sets the world directions that are up and front: from the text, else from the patient's position,
- * else by the format's custom, else by a guess, which preprocess/brick_metadata.c notes. Zero means
+/* Sets the world directions that are up and front. The sources in order are the text, the patient's
+ * position, the format's custom, and a guess, which preprocess/brick_metadata.c notes. Zero means
  * the default of a view. */
 void trip_dataset_metadata_orient(const trip_dataset_metadata *t, const trip_dataset *d,
                                   trip_vec3 *up, trip_vec3 *front);

@@ -1,7 +1,5 @@
 #include "framing.h"
 
-#include <string.h>
-
 #include "report.h"
 #include "settings.h"
 
@@ -25,18 +23,17 @@ typedef struct finding {
     const trip_view_settings *s;
     const trip_affine *map; /* from index space to world space */
 
-    trip_vec3 axis, front; /* of the object, unit length */
+    trip_vec3 axis, front; /* up and front of the object; a zero front selects the default */
     trip_side side;
 
     trip_vec3 right, up, forward; /* of the picture, orthonormal: right x up = -forward */
     double sin_elevation, cos_elevation, sin_roll, cos_roll;
 
     double lo[3], hi[3];      /* index-space box around the part to fit */
-    trip_reach_origin origin; /* the centre of the box */
+    trip_reach_origin origin; /* the centre of the box, and up of the object */
     trip_visible *visible;    /* NULL: the box is the part to fit */
 
     bool parallel;
-    double fov;
     double half[2]; /* half size of the area to fill, along right and up: tangents, or lengths in
                        parallel views */
 } finding;
@@ -67,13 +64,12 @@ static void set_slice(trip_view_object *o, const trip_dataset *d)
 
 trip_view_object trip_view_object_of(const trip_dataset *d, const trip_dataset_metadata *text)
 {
-    trip_view_object o = { .index_to_world = d->index_to_world };
+    trip_view_object o = { .index_to_world = d->index_to_world,
+                           .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS };
     trip_dataset_kept_bounds(d, o.lo, o.hi);
     for (int a = 0; a < 3; a++) {
         o.lo[a] = trip_coordinates_position(&d->coordinates, a, o.lo[a]);
         o.hi[a] = trip_coordinates_position(&d->coordinates, a, o.hi[a]);
-        o.lo[a] -= TRIP_KERNEL_RADIUS_VOXELS;
-        o.hi[a] += TRIP_KERNEL_RADIUS_VOXELS;
     }
     trip_dataset_metadata_orient(text, d, &o.up, &o.front);
     set_slice(&o, d);
@@ -126,6 +122,7 @@ static void orient(finding *f, const trip_view_object *o)
         tip(f, vector(f->s->up));
     else if (trip_length(o->row) > 0 && f->side == TRIP_SIDE_DEFAULT)
         face_slice(f, o);
+    f->origin.axis = trip_normalize(f->axis);
 }
 
 /* ---- directions ---- */
@@ -177,20 +174,23 @@ static double kernel_that_counts(const finding *f, double radius)
     return fmax(radius / 2, radius - margin * voxels);
 }
 
-/* Sets the box around the part to fit. */
+/* Sets the box around the part to fit: of the visible voxels, or of all splats. */
 static int find_box(finding *f, const trip_view_object *o)
 {
     int status = 0;
-    memcpy(f->lo, o->lo, sizeof f->lo);
-    memcpy(f->hi, o->hi, sizeof f->hi);
+    const double kernel = o->visible ? 0 : o->kernel_radius;
+    for (int a = 0; a < 3; a++) {
+        f->lo[a] = o->lo[a] - kernel;
+        f->hi[a] = o->hi[a] + kernel;
+    }
     if (o->visible) {
+        trip_visible_start(o->visible, o->lo, o->hi);
         status = trip_visible_bounds(o->visible, f->lo, f->hi);
         o->visible->kernel_radius = kernel_that_counts(f, o->kernel_radius);
     }
     const double *lo = f->lo, *hi = f->hi;
-    f->origin = (trip_reach_origin){ trip_v3(0.5 * lo[0] + 0.5 * hi[0], 0.5 * lo[1] + 0.5 * hi[1],
-                                             0.5 * lo[2] + 0.5 * hi[2]),
-                                     trip_normalize(f->axis) };
+    f->origin.index =
+        trip_v3(0.5 * lo[0] + 0.5 * hi[0], 0.5 * lo[1] + 0.5 * hi[1], 0.5 * lo[2] + 0.5 * hi[2]);
     return status;
 }
 
@@ -385,7 +385,6 @@ static int frame_visible(finding *f, trip_visible *visible, trip_camera_params *
 static int find_framed(finding *f, trip_visible *visible, trip_camera_params *out)
 {
     const trip_view_settings *s = f->s;
-    set_directions(f);
     f->half[1] = TRIP_FRAMING_FILL * (f->parallel ? 1 : tan(out->fov_degrees / 2 * DEGREE));
     f->half[0] = f->half[1] * s->width / s->height;
     int status = frame_visible(f, visible, out);
@@ -441,6 +440,7 @@ int trip_view_find(trip_found_view *out, const trip_view_settings *s, const trip
                                 .width = s->width,
                                 .height = s->height };
     orient(&f, o);
+    set_directions(&f);
     int status = find_box(&f, o);
     if (!status && s->eye)
         look_from_eye(&f, &view);
@@ -448,6 +448,8 @@ int trip_view_find(trip_found_view *out, const trip_view_settings *s, const trip
         status = find_framed(&f, o->visible, &view);
     if (!status)
         status = zoom(&view, s->zoom);
+    if (o->visible)
+        trip_visible_end(o->visible);
     *out = (trip_found_view){ view, f.axis };
     return status;
 }

@@ -1,14 +1,13 @@
 /* Finds the view of a picture. The steps go one way, from the settings to the kernels:
  *
- *   settings      trip_view_settings: the options of a view, as given
- *   object        trip_view_object: the box of the data set, and which directions are up and front
- *   orientation   the settings may set another up; a single slice faces the viewer
- *   directions    right, up and forward of the picture, by side, azimuth, elevation and roll
- *   extent        visible.h: how far the visible voxels reach in given directions
- *   framing       the point looked at, and the eye's distance or the height of a parallel view
- *   lens          the zoom; the result is a trip_camera_params
- *   camera        trip_camera_make() (camera.h) converts it to the data's index space, for the plan
- *                 and the kernels
+ *   settings      Takes the options of a view as given: trip_view_settings.
+ *   object        Reads the box of the data set, and its directions up and front: trip_view_object.
+ *   orientation   Sets another up if one is given. Lets a single slice face the viewer.
+ *   directions    Turns right, up and forward of the picture by side, azimuth, elevation and roll.
+ *   extent        Finds how far the visible voxels reach in given directions: visible.h.
+ *   framing       Finds the point looked at, and the eye's distance or a parallel view's height.
+ *   lens          Zooms. The result is a trip_camera_params.
+ *   camera        Converts it to the data's index space: trip_camera_make() of camera.h.
  *
  * trip_view_find() takes the steps from orientation to lens. One thread at a time. */
 #ifndef TRIP_FRAMING_H
@@ -52,14 +51,13 @@ typedef struct trip_view_settings {
 
 typedef struct trip_view_object {
     trip_affine index_to_world;
-    double lo[3], hi[3];   /* index-space box around the object */
+    double lo[3], hi[3];   /* index-space box of the voxels */
+    double kernel_radius;  /* voxels: how far splats reach beyond their voxel */
     trip_vec3 up, front;   /* world directions: up (default +z), and the object's front (default -y,
                               or +z if +y is up) */
     trip_vec3 row, column; /* world directions of a single slice's axes; zero for other grids */
-    /* Finds the visible part of the object, which the view then fits. NULL: the view fits the box.
-     * The caller starts and ends the search, one for each view. */
+    /* Finds the visible part, which the view then fits. NULL: the view fits the box. */
     trip_visible *visible;
-    double kernel_radius; /* voxels: of the splats that the view fits */
 } trip_view_object;
 
 typedef struct trip_found_view {
@@ -67,8 +65,8 @@ typedef struct trip_found_view {
     trip_vec3 axis; /* unit length: up of the object, the axis of an orbit */
 } trip_found_view;
 
-/* Describes a data set: the bounds of its splats, which do not depend on the size of tiles, and the
- * orientation by its metadata. */
+/* Describes a data set: the bounds of its kept voxels, which do not depend on the size of tiles,
+ * and the orientation by its metadata. */
 trip_view_object trip_view_object_of(const trip_dataset *d, const trip_dataset_metadata *text);
 
 /* Finds the view. Without an eye, the tighter direction has margins of 5 % of the picture on both

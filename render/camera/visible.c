@@ -1,5 +1,7 @@
 #include "visible.h"
 
+#include <string.h>
+
 #include "brick_box.h"
 #include "report.h"
 
@@ -47,9 +49,10 @@ static double min_extinction(const trip_visible *v, bool alone)
     return -log1p(-MIN_OPACITY) / (SHARE_OF_DEPTH * trip_length(trip_affine_vector(m, diagonal)));
 }
 
-void trip_visible_start(trip_visible *v)
+void trip_visible_start(trip_visible *v, const double lo[3], const double hi[3])
 {
-    trip_dataset_kept_bounds(v->data, v->lo, v->hi);
+    memcpy(v->lo, lo, sizeof v->lo);
+    memcpy(v->hi, hi, sizeof v->hi);
     trip_code_set_make(&v->codes, v->table, min_extinction(v, false));
 }
 

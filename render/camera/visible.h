@@ -30,10 +30,10 @@ typedef struct trip_visible {
     trip_reader *reader; /* reads voxels, no pass running; may skip by trip_visible_skip() */
     trip_budget *budget;
     const trip_tf_entry *table; /* filled for the data set */
-    double kernel_radius;       /* voxels: how far splats reach beyond their voxel */
 
+    double lo[3], hi[3];  /* bounds of all voxels in index space */
+    double kernel_radius; /* voxels: how far splats reach beyond their voxel; may be set any time */
     trip_outline *outline; /* NULL: voxels visible together with others count */
-    double lo[3], hi[3];   /* bounds of all splats in index space */
     uint64_t splats;       /* examined so far */
     trip_code_set codes;   /* codes of the visible voxels */
     /* Results of the last searches. Later searches start from them. */
@@ -42,8 +42,9 @@ typedef struct trip_visible {
     const struct trip_visible_search *search; /* current search, or NULL */
 } trip_visible;
 
-/* Starts, after the caller's fields are set; the others must be zero. */
-void trip_visible_start(trip_visible *v);
+/* Starts, after the caller's fields are set; the others must be zero. [lo, hi] are the bounds of
+ * all voxels. */
+void trip_visible_start(trip_visible *v, const double lo[3], const double hi[3]);
 void trip_visible_end(trip_visible *v);
 
 /* Implements trip_reader_params.skip; `user` is the trip_visible. Skips runs that reach no farther
@@ -60,7 +61,7 @@ int trip_visible_outline(trip_visible *v, const double lo[3], const double hi[3]
 
 /* Sets values[i] to the maximum of wanted[i] over the visible part with its kernels, for i < count
  * <= TRIP_REACHES_MAX. If no voxel is visible together with others, it uses the bounds of all
- * splats. */
+ * voxels. */
 int trip_visible_reach(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 

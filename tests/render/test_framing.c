@@ -120,7 +120,6 @@ static void a_sphere_has_the_distance_of_its_tangent_cone(void **state)
     trip_view_settings settings = { .width = 200, .height = 100, .fov_degrees = 50 };
     assert_int_equal(trip_reader_create(&v.reader, s.data, &(trip_reader_params){ 0 }, s.budget),
                      0);
-    trip_visible_start(&v);
     trip_camera_params p = frame(&settings, o);
     trip_vec3 to = trip_sub(trip_v3(1, 2, 3), p.eye), view_direction = trip_sub(p.look, p.eye);
     assert_close(trip_length(to), 4 / sin(atan(0.9 * tan(25 * DEGREE))), 1e-9);
@@ -132,7 +131,6 @@ static void a_sphere_has_the_distance_of_its_tangent_cone(void **state)
     view_direction = trip_normalize(trip_sub(p.look, p.eye));
     assert_close(trip_length(trip_cross(to, view_direction)), 0, 1e-9);
     assert_true(trip_dot(to, view_direction) > 4); /* the eye is in front of the sphere */
-    trip_visible_end(&v);
     trip_reader_destroy(v.reader);
     scene_destroy(&s);
 }
@@ -148,7 +146,6 @@ static void without_memory_to_search_there_is_no_view(void **state)
     trip_visible v = { .data = s.data, .budget = none, .table = s.table };
     const trip_view_object o = { .index_to_world = trip_affine_identity(), .visible = &v };
     trip_found_view found;
-    trip_visible_start(&v);
     test_catch_reports();
     assert_int_equal(trip_view_find(&found, &(trip_view_settings){ .width = 9, .height = 9 }, &o),
                      TRIP_ERROR);

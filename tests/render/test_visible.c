@@ -5,6 +5,8 @@
 
 enum { NX = 70, NY = 45, NZ = 37 };
 
+static const double grid_lo[3], grid_hi[3] = { NX - 1, NY - 1, NZ - 1 };
+
 /* An oblique cigar of random codes among scattered faint voxels. */
 static bool cigar(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -57,7 +59,7 @@ static void find(const scene *s, const trip_reader_params *params, double kernel
         .data = s->data, .budget = s->budget, .table = s->table, .kernel_radius = kernel_radius
     };
     assert_int_equal(trip_reader_create(&v.reader, s->data, params, s->budget), 0);
-    trip_visible_start(&v);
+    trip_visible_start(&v, grid_lo, grid_hi);
     assert_int_equal(trip_visible_reach(&v, origin, wanted, count, values), 0);
     *splats = v.splats;
     trip_reader_destroy(v.reader);
@@ -108,11 +110,10 @@ static void voxels_visible_alone_reach_beyond_the_outline(void **state)
     scene s;
     make(&s, 16, 4);
     trip_visible v = { .data = s.data, .budget = s.budget, .table = s.table };
-    const double lo[3] = { 0 }, hi[3] = { NX - 1, NY - 1, NZ - 1 };
     trip_outline_params params = { .data = s.data, .budget = s.budget, .table = s.table };
     trip_outline *outline;
     const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.3), 300, 40, 64);
-    memcpy(params.hi, hi, sizeof hi);
+    memcpy(params.hi, grid_hi, sizeof params.hi);
     params.view = &view;
     assert_int_equal(
         trip_reader_create(&v.reader, s.data,
@@ -121,8 +122,8 @@ static void voxels_visible_alone_reach_beyond_the_outline(void **state)
         0);
     params.reader = v.reader;
     assert_int_equal(trip_outline_make(&outline, &params), 0);
-    trip_visible_start(&v);
-    assert_int_equal(trip_visible_outline(&v, lo, hi, &view), 0);
+    trip_visible_start(&v, grid_lo, grid_hi);
+    assert_int_equal(trip_visible_outline(&v, grid_lo, grid_hi, &view), 0);
     assert_true(outline && v.outline && v.splats == trip_outline_splats(outline));
     int farther = 0, nearer = 0;
     for (int t = 0; t < 12; t++) {
@@ -171,7 +172,7 @@ static void bounds_are_those_of_the_visible_voxels(void **state)
     }
     assert_int_equal(trip_reader_create(&v.reader, s.data, &(trip_reader_params){ 0 }, s.budget),
                      0);
-    trip_visible_start(&v);
+    trip_visible_start(&v, grid_lo, grid_hi);
     assert_int_equal(trip_visible_bounds(&v, lo, hi), 0);
     assert_memory_equal(lo, min, sizeof lo);
     assert_memory_equal(hi, max, sizeof hi);
