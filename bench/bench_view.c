@@ -1,5 +1,7 @@
 #include "bench_view.h"
 
+#include "framing.h"
+
 static const double fov_degrees = 30, fill = 0.95, degree = 3.14159265358979323846 / 180;
 
 /* The bounding box of all splats with their kernels in world space, and the axes of a view. */
@@ -10,13 +12,14 @@ typedef struct framing {
 
 static void frame_box(framing *f, const session *s)
 {
-    trip_camera_framing box = { 0 };
-    trip_dataset_metadata_frame(s->text, s->data, &box);
-    const double *lo = box.lo, *hi = box.hi;
-    for (int i = 0; i < 8; i++)
-        f->corners[i] = trip_affine_point(
-            &s->data->index_to_world,
-            trip_v3(i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2]));
+    const trip_view_object box = trip_view_object_of(s->data, s->text);
+    for (int i = 0; i < 8; i++) {
+        double corner[3];
+        for (int a = 0; a < 3; a++)
+            corner[a] = i >> a & 1 ? box.hi[a] + box.kernel_radius : box.lo[a] - box.kernel_radius;
+        f->corners[i] =
+            trip_affine_point(&s->data->index_to_world, trip_v3(corner[0], corner[1], corner[2]));
+    }
     f->middle = trip_scale(trip_add(f->corners[0], f->corners[7]), 0.5);
 }
 
@@ -99,13 +102,14 @@ trip_camera_params bench_view_lateral(const session *s, const int size[2])
 static framing make_turned(const session *s, double azimuth_degrees)
 {
     framing f;
-    trip_camera_params view;
-    trip_camera_framing box = { .width = 1, .height = 1, .azimuth_degrees = azimuth_degrees };
-    trip_dataset_metadata_frame(s->text, s->data, &box);
-    trip_camera_frame(&box, &s->data->index_to_world, &view);
+    trip_found_view view;
+    const trip_view_object box = trip_view_object_of(s->data, s->text);
+    trip_view_find(
+        &view, &(trip_view_settings){ .width = 1, .height = 1, .azimuth_degrees = azimuth_degrees },
+        &box);
     frame_box(&f, s);
-    f.view_direction = trip_normalize(trip_sub(view.look, view.eye));
-    f.right = trip_normalize(trip_cross(f.view_direction, view.up));
+    f.view_direction = trip_normalize(trip_sub(view.params.look, view.params.eye));
+    f.right = trip_normalize(trip_cross(f.view_direction, view.params.up));
     f.up = trip_cross(f.right, f.view_direction);
     return f;
 }

@@ -160,14 +160,13 @@ static int take_pictures(drawing *d)
 
 static int open_drawing(drawing *d)
 {
-    const triptych_view view = render_options_view(&d->o);
     int status = sequence_find_shown(&d->sequence);
     if (!status)
         status = open_input(d);
     if (!status)
         status = take_pictures(d);
-    if (!status && !d->o.path)
-        status = triptych_set_view(d->t, &view);
+    if (!status)
+        status = sequence_set_view(&d->sequence, d->t);
     if (!status && d->o.stats)
         status = render_stats_create(&d->stats);
     return status;

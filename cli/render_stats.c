@@ -11,8 +11,8 @@
 
 #include "budget.h"
 #include "json.h"
+#include "navigation.h"
 #include "new_file.h"
-#include "camera_text.h"
 #include "report.h"
 #include "text.h"
 
@@ -154,11 +154,18 @@ static void add_counted(void *user, const char *name, const triptych_list_stats 
     put_list(user, name, list);
 }
 
+/* Returns the options of a view, for free(). */
+static char *options_of(const triptych_camera *camera)
+{
+    const trip_navigation n = trip_navigation_from_camera(camera, NULL);
+    return trip_navigation_options(&n, camera->width, camera->height);
+}
+
 static int add_camera(cJSON *frame, triptych *t)
 {
     triptych_camera view;
     int status = triptych_get_camera(t, &view);
-    char *options = status ? NULL : trip_camera_text_of(&view);
+    char *options = status ? NULL : options_of(&view);
     bool added = options && cJSON_AddStringToObject(frame, "camera", options);
     free(options);
     return status || added ? status : out_of_memory();
@@ -310,7 +317,7 @@ int render_stats_explain_plan(triptych *t, FILE *out)
     int status = triptych_get_camera(t, &view);
     if (!status)
         status = triptych_explain(t, &plan);
-    if (!status && !(options = trip_camera_text_of(&view)))
+    if (!status && !(options = options_of(&view)))
         status = out_of_memory();
     if (!status) {
         fprintf(out, "camera      %s\n", options);

@@ -105,34 +105,29 @@ double sequence_frames_per_second(const sequence *s)
 
 /* ---- views ---- */
 
-static triptych_camera camera_of(const sequence *s, int frame)
+int sequence_set_view(const sequence *s, triptych *t)
 {
-    double seconds = trip_camera_path_seconds(&s->path, frame);
-    trip_navigation n = trip_camera_path_view(&s->path, seconds);
-    triptych_camera camera = { .fov_degrees = n.fov_degrees,
-                               .ortho_height = n.ortho_height,
-                               .width = s->o->view.view.width,
-                               .height = s->o->view.view.height };
-    memcpy(camera.eye, n.eye, sizeof camera.eye);
-    memcpy(camera.look, n.look, sizeof camera.look);
-    memcpy(camera.up, n.up, sizeof camera.up);
-    return camera;
+    const triptych_view view = render_options_view(s->o);
+    return s->o->path ? 0 : triptych_set_view(t, &view);
 }
 
 static int find_cameras(sequence *s, triptych *t)
 {
     int status = 0;
+    triptych_camera camera;
     s->cameras = calloc((size_t)s->frames, sizeof *s->cameras);
     if (!s->cameras)
         return trip_fail(TRIP_ERROR, "render", "frames", "out of memory");
     for (int i = 0; i < s->frames && !status; i++) {
         if (s->path.count) {
-            s->cameras[i] = camera_of(s, i);
+            s->cameras[i] = trip_camera_path_view(&s->path, trip_camera_path_seconds(&s->path, i));
             continue;
         }
         status = triptych_turn(t, s->o->orbit ? 360.0 * i / s->o->orbit : 0);
         if (!status)
-            status = triptych_get_camera(t, &s->cameras[i]);
+            status = triptych_get_camera(t, &camera);
+        if (!status)
+            s->cameras[i] = trip_navigation_from_camera(&camera, NULL);
     }
     return status;
 }
@@ -246,14 +241,8 @@ void sequence_release(sequence *s)
 
 int sequence_set_frame(const sequence *s, triptych *t, int frame, bool quiet)
 {
-    const triptych_camera *c = &s->cameras[frame];
-    const triptych_view view = { .width = c->width,
-                                 .height = c->height,
-                                 .eye = c->eye,
-                                 .look = c->look,
-                                 .up = c->up,
-                                 .fov_degrees = c->fov_degrees,
-                                 .ortho_height = c->ortho_height };
+    const triptych_view view =
+        trip_navigation_view(&s->cameras[frame], s->o->view.view.width, s->o->view.view.height);
     int status = s->functions ? set_function(s, t, frame, quiet) : 0;
     if (!status && s->path.count)
         status = set_clip(s, t, frame);

@@ -12,7 +12,7 @@ typedef struct sequence {
     const render_options *o;
     int frames;
     trip_camera_path path;    /* without keys if no path is given */
-    triptych_camera *cameras; /* of each frame, after sequence_prepare() */
+    trip_navigation *cameras; /* of each frame, after sequence_prepare() */
     trip_tf **functions;      /* default first, then of each key; NULL if the key has none */
     /* Transfer functions that bricking takes into account: the names of presets and files, and the
      * visible value ranges of transfer functions given as text. */
@@ -27,6 +27,8 @@ int sequence_load(sequence *s, const render_options *o);
 int sequence_find_shown(sequence *s);
 /* Returns whether a key of the path has a transfer function. */
 bool sequence_has_functions(const sequence *s);
+/* Sets the view of the options, unless there is a path. */
+int sequence_set_view(const sequence *s, triptych *t);
 /* Computes all cameras and transfer functions, and prints the warnings for transfer functions. The
  * context must have its data set, transfer function and view. */
 int sequence_prepare(sequence *s, triptych *t);

@@ -83,6 +83,14 @@ static inline double trip_component(trip_vec3 a, int axis)
     return axis == 0 ? a.x : axis == 1 ? a.y : a.z;
 }
 
+/* Rotates about an axis of unit length, counterclockwise seen against the axis. */
+static inline trip_vec3 trip_turned(trip_vec3 v, trip_vec3 axis, double radians)
+{
+    const trip_vec3 along = trip_scale(axis, trip_dot(axis, v)), across = trip_sub(v, along);
+    return trip_add(along, trip_add(trip_scale(across, cos(radians)),
+                                    trip_scale(trip_cross(axis, across), sin(radians))));
+}
+
 trip_affine trip_affine_identity(void);
 trip_vec3 trip_affine_point(const trip_affine *a, trip_vec3 p);
 trip_vec3 trip_affine_vector(const trip_affine *a, trip_vec3 v);

@@ -92,12 +92,12 @@ static int pixels_a_side(const triptych *t)
     return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->settings.samples;
 }
 
-static int make_camera(triptych *t)
+static int make_camera(triptych *t, const trip_dataset *data)
 {
     trip_camera_params view = t->turned;
     view.width *= pixels_a_side(t);
     view.height *= pixels_a_side(t);
-    return trip_camera_make(&t->camera, &view, &drawn_session(t).data->index_to_world);
+    return trip_camera_make(&t->camera, &view, &data->index_to_world);
 }
 
 /* Bytes that a processor draws per millisecond, until frames have been measured. */
@@ -170,10 +170,7 @@ static int choose_parts(triptych *t)
     const trip_settings *s = &t->drawn_settings;
     const bool one = t->given.all.count_exactly || s->depth || s->effects.emission ||
                      trip_effects_light(&s->effects);
-    trip_dataset *before = t->at_level;
-    t->at_level = NULL;
-    int status = make_camera(t);
-    t->at_level = before;
+    int status = make_camera(t, t->session.data);
     t->parts = (trip_lod_parts){ .count = 1 };
     t->part = 0;
     if (status || s->classify != TRIP_CLASSIFY_POST ||
@@ -185,12 +182,13 @@ static int choose_parts(triptych *t)
     return status;
 }
 
-/* Selects the level of the next part and makes its camera. */
+/* Selects the level of the next part and makes its camera. A first part at level 0 has the camera
+ * of choose_parts(). */
 static int enter_part(triptych *t)
 {
     int status = use_level(t, t->parts.level[t->part]);
-    if (!status)
-        status = make_camera(t);
+    if (!status && (t->part > 0 || t->level > 0))
+        status = make_camera(t, drawn_session(t).data);
     if (status)
         return status;
     t->samples_per_sheet =

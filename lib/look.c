@@ -1,10 +1,7 @@
-/* The appearance of a picture: transfer function, settings and view (triptych.h). */
+/* The appearance of a picture: transfer function and settings (triptych.h). */
 #include "library_context.h"
 #include "report.h"
 #include "splat.h"
-#include "library_view.h"
-
-enum { DEFAULT_SIZE = 1024 };
 
 #define DEFAULT_CUEING 0.6
 
@@ -252,78 +249,4 @@ trip_clip trip_context_clip(const triptych *t)
         trip_clip_add(&clip, trip_v3(c->plane[i][0], c->plane[i][1], c->plane[i][2]),
                       c->plane[i][3]);
     return clip;
-}
-
-int trip_context_find_view(triptych *t, const triptych_view *given)
-{
-    const triptych_resources *r = &t->resources;
-    trip_engine engine = (trip_engine)r->engine;
-    const session_reader wanted = {
-        .engine = engine == TRIP_ENGINE_NULL ? TRIP_ENGINE_AUTO : engine,
-        .threads = (int)trip_context_threads(r->threads),
-    };
-    triptych_view view = *given;
-    trip_found_view found;
-    view.width = view.width ? view.width : DEFAULT_SIZE;
-    view.height = view.height ? view.height : DEFAULT_SIZE;
-    int status = t->has_function
-                     ? 0
-                     : trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
-    if (!status)
-        status = trip_view_find(&found, &view, &t->session, t->settings.kernel_radius, &wanted);
-    if (status)
-        return status;
-    t->view = t->turned = found.params;
-    t->axis = found.axis;
-    t->fit_splats = found.splats;
-    t->has_view = true;
-    return 0;
-}
-
-int triptych_set_view(triptych *t, const triptych_view *view)
-{
-    trip_scope *before = trip_context_enter_anew(t);
-    int status = trip_context_check_idle(t, true);
-    return trip_context_leave(before, status ? status : trip_context_find_view(t, view));
-}
-
-int triptych_turn(triptych *t, double degrees)
-{
-    trip_scope *before = trip_context_enter_anew(t);
-    int status = trip_context_check_idle(t, true);
-    if (!status && !isfinite(degrees))
-        status = trip_fail(TRIP_USAGE, "render", "view", "the angle is not finite");
-    if (!status && !t->has_view)
-        status = trip_context_find_view(t, &(triptych_view){ 0 });
-    if (!status)
-        t->turned = degrees != 0 ? trip_camera_turn(&t->view, t->axis, degrees) : t->view;
-    return trip_context_leave(before, status);
-}
-
-static void put(double out[3], trip_vec3 v)
-{
-    out[0] = v.x;
-    out[1] = v.y;
-    out[2] = v.z;
-}
-
-int triptych_get_camera(triptych *t, triptych_camera *out)
-{
-    trip_scope *before = trip_context_enter(t);
-    int status = trip_context_check_open(t);
-    if (!status && !t->has_view)
-        status = trip_context_check_idle(t, true);
-    if (!status && !t->has_view)
-        status = trip_context_find_view(t, &(triptych_view){ 0 });
-    if (status)
-        return trip_context_leave(before, status);
-    *out = (triptych_camera){ .fov_degrees = t->turned.fov_degrees,
-                              .ortho_height = t->turned.ortho_height,
-                              .width = t->turned.width,
-                              .height = t->turned.height,
-                              .splats = t->fit_splats };
-    put(out->eye, t->turned.eye);
-    put(out->look, t->turned.look);
-    put(out->up, t->turned.up);
-    return trip_context_leave(before, 0);
 }

@@ -8,7 +8,6 @@
 #include "anatomy.h"
 #include "json.h"
 #include "report.h"
-#include "settings.h"
 
 enum { MAX_BINS = 65536 };
 
@@ -157,11 +156,6 @@ const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, 
     return cJSON_GetStringValue(cJSON_GetArrayItem(options, i));
 }
 
-const char *trip_dataset_metadata_note(const trip_dataset_metadata *t)
-{
-    return string_at(t, "note");
-}
-
 int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf **out)
 {
     const char *text = string_at(t, "transfer_function");
@@ -250,10 +244,8 @@ static bool is_mirrored_across_z(const trip_dataset_metadata *t)
     return mirror && !strcmp(mirror, "z");
 }
 
-/* Sets up and front: from the text, else from the patient's position, else by the format's custom,
- * else by a guess, which preprocess/brick_metadata.c notes. */
-static void orient(const trip_dataset_metadata *t, const trip_dataset *d, trip_vec3 *up,
-                   trip_vec3 *front)
+void trip_dataset_metadata_orient(const trip_dataset_metadata *t, const trip_dataset *d,
+                                  trip_vec3 *up, trip_vec3 *front)
 {
     const char *format = string_at(t, "format");
     const char *space = string_at(t, "space");
@@ -282,17 +274,4 @@ static void orient(const trip_dataset_metadata *t, const trip_dataset *d, trip_v
         *up = trip_scale(footing, -1);
     if (!(trip_length(*front) > 0) && (patient || scan))
         *front = trip_v3(0, patient ? 1 : -1, 0);
-}
-
-void trip_dataset_metadata_frame(const trip_dataset_metadata *t, const trip_dataset *d,
-                                 trip_camera_framing *framing)
-{
-    trip_dataset_kept_bounds(d, framing->lo, framing->hi);
-    for (int a = 0; a < 3; a++) {
-        framing->lo[a] = trip_coordinates_position(&d->coordinates, a, framing->lo[a]);
-        framing->hi[a] = trip_coordinates_position(&d->coordinates, a, framing->hi[a]);
-        framing->lo[a] -= TRIP_KERNEL_RADIUS_VOXELS;
-        framing->hi[a] += TRIP_KERNEL_RADIUS_VOXELS;
-    }
-    orient(t, d, &framing->up, &framing->front);
 }

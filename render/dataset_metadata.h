@@ -24,7 +24,6 @@
 #define TRIP_DATASET_METADATA_H
 
 #include "dataset.h"
-#include "framing.h"
 #include "transfer_function.h"
 
 typedef struct trip_dataset_metadata trip_dataset_metadata;
@@ -38,9 +37,6 @@ void trip_dataset_metadata_destroy(trip_dataset_metadata *t);
  * data set again. They return NULL if the text has none, or beyond the last option. */
 const char *trip_dataset_metadata_source(const trip_dataset_metadata *t);
 const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, int i);
-
-/* Returns the note about choices that the file left open, or NULL. */
-const char *trip_dataset_metadata_note(const trip_dataset_metadata *t);
 
 /* Returns the kind of the volume, or TRIP_TF_SIMULATION if the text has none. */
 trip_tf_kind trip_dataset_metadata_kind(const trip_dataset_metadata *t);
@@ -60,9 +56,10 @@ bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histog
 double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_tf *tf,
                                     double range[2]);
 
-/* Sets the framing of the default view from the data set: bounds of the splats, up, and front. The
- * bounds do not depend on the size of tiles. */
-void trip_dataset_metadata_frame(const trip_dataset_metadata *t, const trip_dataset *d,
-                                 trip_camera_framing *framing);
+/* Sets the world directions that are up and front. The sources in order are the text, the patient's
+ * position, the format's custom, and a guess, which preprocess/brick_metadata.c notes. Zero means
+ * the default of a view. */
+void trip_dataset_metadata_orient(const trip_dataset_metadata *t, const trip_dataset *d,
+                                  trip_vec3 *up, trip_vec3 *front);
 
 #endif

@@ -173,11 +173,7 @@ static trip_vec3 turn_between(const rotation *a, const rotation *b)
 
 static trip_vec3 turned(trip_vec3 v, trip_vec3 turn)
 {
-    double angle = trip_length(turn);
-    trip_vec3 axis = trip_normalize(turn), along = trip_scale(axis, trip_dot(axis, v));
-    trip_vec3 across = trip_sub(v, along);
-    return trip_add(along, trip_add(trip_scale(across, cos(angle)),
-                                    trip_scale(trip_cross(axis, across), sin(angle))));
+    return trip_turned(v, trip_normalize(turn), trip_length(turn));
 }
 
 /* ---- the view ---- */

@@ -1,8 +1,10 @@
 #include "navigation.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "geometry.h"
+#include "text.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 
@@ -63,9 +65,7 @@ static double tangent(const trip_navigation *n)
 /* Rotates about an axis of unit length. */
 static trip_vec3 turned(trip_vec3 v, trip_vec3 axis, double degrees)
 {
-    trip_vec3 along = trip_scale(axis, trip_dot(axis, v)), across = trip_sub(v, along);
-    return trip_add(along, trip_add(trip_scale(across, cos(degrees * DEGREE)),
-                                    trip_scale(trip_cross(axis, across), sin(degrees * DEGREE))));
+    return trip_turned(v, axis, degrees * DEGREE);
 }
 
 trip_navigation trip_navigation_from_camera(const triptych_camera *camera, const double *upright)
@@ -90,6 +90,26 @@ triptych_view trip_navigation_view(const trip_navigation *n, int width, int heig
                             .up = n->up,
                             .fov_degrees = n->fov_degrees,
                             .ortho_height = n->ortho_height };
+}
+
+static const char *triple(const double p[3], char text[128])
+{
+    char x[32], y[32], z[32];
+    snprintf(text, 128, "%s,%s,%s", trip_text_from_double(p[0], x), trip_text_from_double(p[1], y),
+             trip_text_from_double(p[2], z));
+    return text;
+}
+
+char *trip_navigation_options(const trip_navigation *n, int width, int height)
+{
+    char *options, eye[128], look[128], up[128], number[32];
+    bool ortho = n->ortho_height > 0;
+    trip_text_from_double(ortho ? n->ortho_height : n->fov_degrees, number);
+    if (asprintf(&options, "--eye %s --look %s --up %s --%s %s --size %dx%d", triple(n->eye, eye),
+                 triple(n->look, look), triple(n->up, up), ortho ? "ortho" : "fov", number, width,
+                 height) < 0)
+        return NULL;
+    return options;
 }
 
 trip_navigation_axes trip_navigation_get_axes(const trip_navigation *n)
@@ -131,21 +151,6 @@ void trip_navigation_point(const trip_navigation *n, int width, int height, cons
     double x = (pixel[0] - 0.5 * width) * size, y = (0.5 * height - pixel[1]) * size;
     put(point, trip_add(trip_add(p.eye, trip_scale(p.forward, depth)),
                         trip_add(trip_scale(p.right, x), trip_scale(p.up, y))));
-}
-
-void trip_navigation_ray(const trip_navigation *n, int width, int height, const double pixel[2],
-                         double origin[3], double direction[3])
-{
-    pose p = pose_of(n);
-    double ahead[3];
-    put(origin, p.eye);
-    put(direction, p.forward);
-    if (n->ortho_height > 0) {
-        trip_navigation_point(n, width, height, pixel, 0, origin);
-    } else {
-        trip_navigation_point(n, width, height, pixel, p.distance, ahead);
-        put(direction, trip_normalize(trip_sub(vector(ahead), p.eye)));
-    }
 }
 
 void trip_navigation_orbit(trip_navigation *n, double azimuth_degrees, double elevation_degrees)

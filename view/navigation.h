@@ -24,6 +24,11 @@ trip_navigation trip_navigation_from_camera(const triptych_camera *camera, const
 /* Returns the view for triptych_set_view(). It points into *n. */
 triptych_view trip_navigation_view(const trip_navigation *n, int width, int height);
 
+/* Returns the view as options of `triptych render` that reproduce it bit for bit:
+ * "--eye X,Y,Z --look ... --up ... --fov DEGREES --size WxH", with --ortho HEIGHT in place of --fov
+ * for a parallel view. The text is for free(); NULL if memory is exhausted. */
+char *trip_navigation_options(const trip_navigation *n, int width, int height);
+
 /* The camera's axes, unit length. */
 typedef struct trip_navigation_axes {
     double right[3], up[3], forward[3];
@@ -39,10 +44,6 @@ double trip_navigation_pixel(const trip_navigation *n, int height, double depth)
  * direction. In perspective the pixel is valid only if that distance is above 0. */
 double trip_navigation_project(const trip_navigation *n, int width, int height,
                                const double point[3], double pixel[2]);
-/* Computes the ray of a pixel position: its origin, in the plane of the eye for parallel views, and
- * its direction of unit length. */
-void trip_navigation_ray(const trip_navigation *n, int width, int height, const double pixel[2],
-                         double origin[3], double direction[3]);
 /* Computes the point on a pixel's ray at distance `depth` along the view direction. */
 void trip_navigation_point(const trip_navigation *n, int width, int height, const double pixel[2],
                            double depth, double point[3]);

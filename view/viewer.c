@@ -6,7 +6,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "camera_text.h"
 #include "clipping.h"
 #include "light.h"
 #include "text.h"
@@ -569,7 +568,7 @@ char *trip_viewer_options(trip_viewer *v)
     if (!d)
         return NULL;
     const draw_settings s = trip_viewer_settings(d);
-    char *camera = trip_camera_text(&d->navigation, v->picture_width, v->height);
+    char *camera = trip_navigation_options(&d->navigation, v->picture_width, v->height);
     char *settings = draw_settings_text(&s);
     FILE *out = camera && settings ? open_memstream(&text, &bytes) : NULL;
     if (out) {

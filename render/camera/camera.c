@@ -175,19 +175,12 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
     return check_range(c);
 }
 
-static trip_vec3 turned(trip_vec3 v, trip_vec3 axis, double angle)
-{
-    trip_vec3 along = trip_scale(axis, trip_dot(axis, v)), across = trip_sub(v, along);
-    return trip_add(along, trip_add(trip_scale(across, cos(angle)),
-                                    trip_scale(trip_cross(axis, across), sin(angle))));
-}
-
 trip_camera_params trip_camera_turn(const trip_camera_params *view, trip_vec3 axis, double degrees)
 {
     trip_camera_params p = *view;
     double angle = degrees * (PI / 180);
     axis = trip_normalize(axis);
-    p.eye = trip_add(view->look, turned(trip_sub(view->eye, view->look), axis, angle));
-    p.up = turned(view->up, axis, angle);
+    p.eye = trip_add(view->look, trip_turned(trip_sub(view->eye, view->look), axis, angle));
+    p.up = trip_turned(view->up, axis, angle);
     return p;
 }

@@ -1,72 +1,78 @@
-/* Finds the default view of an object: from a named side, with the whole object in the picture,
- * centred, with a margin. The caller describes the object by its maximum reach in given directions,
- * so that the fit is exact for any shape. One thread at a time. */
+/* Finds the view of a picture. The steps go one way, from the settings to the kernels:
+ *
+ *   settings      Takes the options of a view as given: trip_view_settings.
+ *   object        Reads the box of the data set, and its directions up and front: trip_view_object.
+ *   orientation   Sets another up if one is given. Lets a single slice face the viewer.
+ *   directions    Turns right, up and forward of the picture by side, azimuth, elevation and roll.
+ *   extent        Finds how far the visible voxels reach in given directions: visible.h.
+ *   framing       Finds the point looked at, and the eye's distance or a parallel view's height.
+ *   lens          Zooms. The result is a trip_camera_params.
+ *   camera        Converts it to the data's index space: trip_camera_make() of camera.h.
+ *
+ * trip_view_find() takes the steps from orientation to lens. One thread at a time. */
 #ifndef TRIP_FRAMING_H
 #define TRIP_FRAMING_H
 
 #include "camera.h"
+#include "dataset_metadata.h"
+#include "visible.h"
 
 #define TRIP_FRAMING_FILL 0.9 /* share of the picture's width or height that the object fills */
-
-/* A convex function of a position p: along . (p - o) + around * (distance of p from the axis
- * through o). o is the origin. World space and units; around >= 0. */
-typedef struct trip_reach {
-    trip_vec3 along;
-    double around;
-} trip_reach;
-
-enum { TRIP_REACHES_MAX = 8 };
-
-/* The origin and axis of reaches. */
-typedef struct trip_reach_origin {
-    trip_vec3 index; /* o, in index space */
-    trip_vec3 axis;  /* world direction, unit length; required if any `around` is not zero */
-} trip_reach_origin;
+#define TRIP_VIEW_FOV_MIN_DEGREES 1e-6
+#define TRIP_VIEW_FOV_MAX_DEGREES 179.999
 
 /* The sides of an object. Left and right are the object's own, like a person's who faces the
  * viewer: its left side is on the viewer's right. */
-typedef enum trip_view {
-    TRIP_VIEW_DEFAULT, /* the front, a little from its left and from above */
-    TRIP_VIEW_FRONT,
-    TRIP_VIEW_BACK,
-    TRIP_VIEW_LEFT,
-    TRIP_VIEW_RIGHT,
-    TRIP_VIEW_TOP,
-    TRIP_VIEW_BOTTOM,
-    TRIP_VIEW_ISO, /* equally from the front, its left and above */
-} trip_view;
+typedef enum trip_side {
+    TRIP_SIDE_DEFAULT, /* the front, a little from its left and from above */
+    TRIP_SIDE_FRONT,
+    TRIP_SIDE_BACK,
+    TRIP_SIDE_LEFT,
+    TRIP_SIDE_RIGHT,
+    TRIP_SIDE_TOP,
+    TRIP_SIDE_BOTTOM,
+    TRIP_SIDE_ISO, /* equally from the front, its left and above */
+} trip_side;
 
-/* Parameters of the default view. Zero means the default. */
-typedef struct trip_camera_framing {
-    double lo[3], hi[3]; /* index-space box around the object */
-    /* Sets values[i] to the maximum of wanted[i] over the object, for i < count <=
-     * TRIP_REACHES_MAX. Returns 0, or a reported failure. NULL means that the object is the box. */
-    int (*reach)(void *user, const trip_reach_origin *origin, const trip_reach *wanted, int count,
-                 double *values);
-    void *reach_user;
-    int width, height;   /* pixels */
-    trip_vec3 up, front; /* world directions: up (default +z), and the object's front (default -y,
-                            or +z if +y is up) */
-    trip_view view;
+/* Zero means the default. */
+typedef struct trip_view_settings {
+    int width, height;             /* pixels; required */
+    const double *eye, *look, *up; /* world space; NULL: found */
+    trip_side side;                /* unused if an eye is given */
     /* Relative to the side: azimuth to the viewer's right, elevation upward, roll of the picture
      * clockwise. Degrees. */
     double azimuth_degrees, elevation_degrees, roll_degrees;
-    double fov_degrees; /* default 30 */
-    bool parallel;
-    double ortho_height; /* height of a parallel view; default: fits the whole object */
+    double zoom;         /* factor on the picture size, by another lens */
+    double fov_degrees;  /* default 30 */
+    double ortho_height; /* > 0: parallel view of this height in world units */
+    bool ortho_fit;      /* parallel view that fits the whole object */
     bool turntable;      /* fit the object at all angles about up through the centre of the box */
-} trip_camera_framing;
+} trip_view_settings;
 
-/* Tips the object so that another of its directions is up, while its front keeps facing the viewer.
- * If the front becomes parallel to up, the object's former bottom or top faces the viewer. */
-void trip_framing_set_up(trip_camera_framing *f, trip_vec3 up);
+typedef struct trip_view_object {
+    trip_affine index_to_world;
+    double lo[3], hi[3];   /* index-space box of the voxels */
+    double kernel_radius;  /* voxels: how far splats reach beyond their voxel */
+    trip_vec3 up, front;   /* world directions: up (default +z), and the object's front (default -y,
+                              or +z if +y is up) */
+    trip_vec3 row, column; /* world directions of a single slice's axes; zero for other grids */
+    /* Finds the visible part, which the view then fits. NULL: the view fits the box. */
+    trip_visible *visible;
+} trip_view_object;
 
-/* Returns the centre of the box in world space. */
-trip_vec3 trip_framing_middle(const trip_camera_framing *f, const trip_affine *index_to_world);
+typedef struct trip_found_view {
+    trip_camera_params params;
+    trip_vec3 axis; /* unit length: up of the object, the axis of an orbit */
+} trip_found_view;
 
-/* Finds the view. The tighter direction has margins of 5 % of the picture on both sides; the other
- * direction is centred. Fails if `reach` fails. */
-int trip_camera_frame(const trip_camera_framing *f, const trip_affine *index_to_world,
-                      trip_camera_params *out);
+/* Describes a data set: the bounds of its kept voxels, which do not depend on the size of tiles,
+ * and the orientation by its metadata. */
+trip_view_object trip_view_object_of(const trip_dataset *d, const trip_dataset_metadata *text);
+
+/* Finds the view. Without an eye, the tighter direction has margins of 5 % of the picture on both
+ * sides, and the other direction is centred. Returns 0, or a reported failure: of reading, or
+ * TRIP_USAGE for a zoom beyond the limits of the angle of view. */
+int trip_view_find(trip_found_view *out, const trip_view_settings *settings,
+                   const trip_view_object *object);
 
 #endif

@@ -7,9 +7,24 @@
 #ifndef TRIP_OUTLINE_H
 #define TRIP_OUTLINE_H
 
-#include "framing.h"
+#include "camera.h"
 #include "reader.h"
 #include "transfer_function.h"
+
+/* A convex function of a position p: along . (p - o) + around * (distance of p from the axis
+ * through o). o is the origin. World space and units; around >= 0. */
+typedef struct trip_reach {
+    trip_vec3 along;
+    double around;
+} trip_reach;
+
+enum { TRIP_REACHES_MAX = 8 };
+
+/* The origin and axis of reaches. */
+typedef struct trip_reach_origin {
+    trip_vec3 index; /* o, in index space */
+    trip_vec3 axis;  /* world direction, unit length; required if any `around` is not zero */
+} trip_reach_origin;
 
 #define TRIP_OUTLINE_OPACITY (8.0 / 255)
 
@@ -28,8 +43,8 @@ typedef struct trip_outline_params {
 int trip_outline_make(trip_outline **out, const trip_outline_params *params);
 void trip_outline_destroy(trip_outline *o);
 
-/* Computes reaches over the visible pixels, like trip_camera_framing.reach, from the nearest to the
- * farthest visible depth of each pixel. */
+/* Sets values[i] to the maximum of wanted[i], for i < count <= TRIP_REACHES_MAX: over the visible
+ * pixels, from the nearest to the farthest visible depth of each pixel. */
 void trip_outline_reach(const trip_outline *o, const trip_reach_origin *origin,
                         const trip_reach *wanted, int count, double *values);
 

@@ -1,5 +1,7 @@
 #include "visible.h"
 
+#include <string.h>
+
 #include "brick_box.h"
 #include "report.h"
 
@@ -37,21 +39,26 @@ typedef struct trip_visible_search {
 } search;
 
 /* Returns the minimum extinction of a visible voxel, per world unit. */
-static double min_extinction(const trip_visible *v)
+static double min_extinction(const trip_visible *v, bool alone)
 {
     const trip_affine *m = &v->data->index_to_world;
-    if (v->alone)
+    if (alone)
         return -log1p(-MIN_ALONE) / cbrt(fabs(trip_affine_determinant(m)));
     trip_vec3 diagonal =
         trip_v3(v->hi[0] - v->lo[0] + 1, v->hi[1] - v->lo[1] + 1, v->hi[2] - v->lo[2] + 1);
     return -log1p(-MIN_OPACITY) / (SHARE_OF_DEPTH * trip_length(trip_affine_vector(m, diagonal)));
 }
 
-void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone)
+void trip_visible_start(trip_visible *v, const double lo[3], const double hi[3])
 {
-    v->alone = alone;
-    v->splats = 0;
-    trip_code_set_make(&v->codes, table, min_extinction(v));
+    memcpy(v->lo, lo, sizeof v->lo);
+    memcpy(v->hi, hi, sizeof v->hi);
+    trip_code_set_make(&v->codes, v->table, min_extinction(v, false));
+}
+
+void trip_visible_end(trip_visible *v)
+{
+    trip_outline_destroy(v->outline);
 }
 
 /* Computes a linear form. Every operation rounds monotonically in x, y and z alone, so the corners
@@ -351,7 +358,7 @@ static double result(const search *s, const form *f)
     const trip_visible *v = s->visible;
     const trip_brick_box all = { { v->lo[0], v->lo[1], v->lo[2] },
                                  { v->hi[0], v->hi[1], v->hi[2] } };
-    return f->best > -INFINITY || v->alone ? f->best : bound(s, f, &all);
+    return f->best > -INFINITY ? f->best : bound(s, f, &all);
 }
 
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3])
@@ -389,30 +396,52 @@ static double with_kernel(const trip_visible *v, const form *f, double value)
     return value + v->kernel_radius * f->per_voxel;
 }
 
-int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
-                       int count, double *values)
+int trip_visible_outline(trip_visible *v, const double lo[3], const double hi[3],
+                         const trip_camera_params *view)
 {
-    trip_visible *v = user;
-    search s = make_search(v, origin, wanted, count);
-    int status = find(&s);
-    for (int i = 0; i < count; i++)
-        values[i] = with_kernel(v, &s.forms[i], result(&s, &s.forms[i]));
-    return status;
+    int status = trip_outline_make(&v->outline, &(trip_outline_params){
+                                                    .data = v->data,
+                                                    .reader = v->reader,
+                                                    .budget = v->budget,
+                                                    .table = v->table,
+                                                    .lo = { lo[0], lo[1], lo[2] },
+                                                    .hi = { hi[0], hi[1], hi[2] },
+                                                    .view = view,
+                                                });
+    if (!v->outline)
+        return status;
+    v->splats += trip_outline_splats(v->outline);
+    trip_code_set_make(&v->codes, v->table, min_extinction(v, true));
+    return 0;
 }
 
-int trip_visible_raise(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
-                       int count, double *values)
+/* Starts from the values of the outline: voxels that reach no farther are not searched. */
+static void begin_with_outline(search *s, const trip_reach_origin *origin, const trip_reach *wanted,
+                               double *values)
 {
-    search s = make_search(v, origin, wanted, count);
-    for (int i = 0; i < count; i++) {
-        form *f = &s.forms[i];
+    const trip_visible *v = s->visible;
+    trip_outline_reach(v->outline, origin, wanted, s->count, values);
+    for (int i = 0; i < s->count; i++) {
+        form *f = &s->forms[i];
         f->best = values[i] - v->kernel_radius * f->per_voxel;
         while (with_kernel(v, f, f->best) > values[i]) /* rounding */
             f->best = nextafter(f->best, -INFINITY);
     }
+}
+
+int trip_visible_reach(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
+                       int count, double *values)
+{
+    search s = make_search(v, origin, wanted, count);
+    if (v->outline)
+        begin_with_outline(&s, origin, wanted, values);
     int status = find(&s);
-    for (int i = 0; i < count; i++)
-        if (s.forms[i].found)
-            values[i] = fmax(values[i], with_kernel(v, &s.forms[i], s.forms[i].best));
+    for (int i = 0; i < count; i++) {
+        const form *f = &s.forms[i];
+        if (!v->outline)
+            values[i] = with_kernel(v, f, result(&s, f));
+        else if (f->found)
+            values[i] = fmax(values[i], with_kernel(v, f, f->best));
+    }
     return status;
 }

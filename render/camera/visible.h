@@ -6,14 +6,15 @@
  * - Visible together with others: a ray through equal voxels along a sixteenth of the data set's
  *   diagonal loses at least 1/255 of its light. Fainter voxels are visible only where many lie
  *   behind one another, and they do not at the rim.
- * - Visible alone: a ray through the voxel loses a tenth of its light. */
+ * - Visible alone: a ray through the voxel loses a tenth of its light.
+ *
+ * With an outline, the visible part is the outline and the voxels that are visible alone. Otherwise
+ * it is the voxels that are visible together with others. */
 #ifndef TRIP_VISIBLE_H
 #define TRIP_VISIBLE_H
 
 #include "code_set.h"
-#include "framing.h"
-#include "reader.h"
-#include "transfer_function.h"
+#include "outline.h"
 
 enum { TRIP_VISIBLE_POSITIONS = 32 };
 
@@ -28,22 +29,23 @@ typedef struct trip_visible {
     const trip_dataset *data;
     trip_reader *reader; /* reads voxels, no pass running; may skip by trip_visible_skip() */
     trip_budget *budget;
-    double kernel_radius; /* voxels: how far splats reach beyond their voxel */
-    double lo[3], hi[3];  /* bounds of all splats in index space */
+    const trip_tf_entry *table; /* filled for the data set */
 
-    bool alone;          /* count only voxels visible alone, see trip_visible_start() */
-    uint64_t splats;     /* examined so far */
-    trip_code_set codes; /* codes of the visible voxels */
+    double lo[3], hi[3];  /* bounds of all voxels in index space */
+    double kernel_radius; /* voxels: how far splats reach beyond their voxel; may be set any time */
+    trip_outline *outline; /* NULL: voxels visible together with others count */
+    uint64_t splats;       /* examined so far */
+    trip_code_set codes;   /* codes of the visible voxels */
     /* Results of the last searches. Later searches start from them. */
     trip_visible_position positions[TRIP_VISIBLE_POSITIONS];
     unsigned position_count;                  /* all results so far */
     const struct trip_visible_search *search; /* current search, or NULL */
 } trip_visible;
 
-/* Starts with a transfer function, after the caller's fields are set. `table` must be filled for
- * the data set. `alone` counts voxels that are visible alone; otherwise all voxels count that are
- * visible together with others. */
-void trip_visible_start(trip_visible *v, const trip_tf_entry *table, bool alone);
+/* Starts, after the caller's fields are set; the others must be zero. [lo, hi] are the bounds of
+ * all voxels. */
+void trip_visible_start(trip_visible *v, const double lo[3], const double hi[3]);
+void trip_visible_end(trip_visible *v);
 
 /* Implements trip_reader_params.skip; `user` is the trip_visible. Skips runs that reach no farther
  * than the result so far. */
@@ -52,15 +54,15 @@ bool trip_visible_skip(void *user, const trip_selection *selection, const trip_r
 /* Computes the bounds of the visible voxels in index space, without kernels. */
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);
 
-/* Implements trip_camera_framing; `user` is the trip_visible. If no voxel is visible, it uses the
- * bounds of all splats. If `alone` is set and no voxel is visible alone, the values are -INFINITY.
- */
-int trip_visible_reach(void *user, const trip_reach_origin *origin, const trip_reach *wanted,
-                       int count, double *values);
+/* Makes the outline of the box [lo, hi] in a view from outside. There is no outline if nothing is
+ * visible in it, or if no level is small enough. */
+int trip_visible_outline(trip_visible *v, const double lo[3], const double hi[3],
+                         const trip_camera_params *view);
 
-/* Raises `values` to the values of trip_visible_reach() for voxels that are visible alone. It does
- * not search below the given values. */
-int trip_visible_raise(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
+/* Sets values[i] to the maximum of wanted[i] over the visible part with its kernels, for i < count
+ * <= TRIP_REACHES_MAX. If no voxel is visible together with others, it uses the bounds of all
+ * voxels. */
+int trip_visible_reach(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 
 #endif

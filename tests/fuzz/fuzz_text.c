@@ -2,7 +2,7 @@
  * for drawing. */
 #include "fuzz.h"
 
-#include "dataset_metadata.h"
+#include "framing.h"
 
 #include <math.h>
 #include <string.h>
@@ -17,11 +17,10 @@ static void use(const trip_dataset_metadata *text, const trip_dataset *d)
 {
     double range[2];
     trip_tf *tf = NULL;
-    trip_camera_framing framing = { .width = 8, .height = 8 };
-    trip_dataset_metadata_frame(text, d, &framing);
-    FUZZ_PROMISE(is_axis(framing.up) && is_axis(framing.front));
+    const trip_view_object object = trip_view_object_of(d, text);
+    FUZZ_PROMISE(is_axis(object.up) && is_axis(object.front));
     for (int a = 0; a < 3; a++)
-        FUZZ_PROMISE(isfinite(framing.lo[a]) && framing.lo[a] <= framing.hi[a]);
+        FUZZ_PROMISE(isfinite(object.lo[a]) && object.lo[a] <= object.hi[a]);
     if (trip_dataset_metadata_tf(text, d, &tf) != 0)
         return;
     trip_tf_denormalise(tf, d->header.value_min, d->header.value_max);

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "dataset_metadata.h"
+#include "framing.h"
 
 /* Returns a data set of 10 x 20 x 40 voxels without splats and with the given metadata text. */
 static trip_dataset with_text(char *text)
@@ -29,13 +29,13 @@ static trip_vec3 view_from(char *text, trip_vec3 *up)
 {
     trip_dataset d = with_text(text);
     trip_dataset_metadata *t = parse(&d);
-    trip_camera_framing f = { .width = 100, .height = 100 };
-    trip_dataset_metadata_frame(t, &d, &f);
+    const trip_view_object o = trip_view_object_of(&d, t);
     trip_dataset_metadata_destroy(t);
-    trip_camera_params p;
-    assert_int_equal(trip_camera_frame(&f, &d.index_to_world, &p), 0);
-    *up = p.up;
-    return trip_normalize(trip_sub(p.eye, p.look));
+    trip_found_view v;
+    assert_int_equal(trip_view_find(&v, &(trip_view_settings){ .width = 100, .height = 100 }, &o),
+                     0);
+    *up = v.params.up;
+    return trip_normalize(trip_sub(v.params.eye, v.params.look));
 }
 
 static void text_without_an_object_is_refused(void **state)
@@ -63,9 +63,9 @@ static void keys_of_another_kind_are_taken_as_missing(void **state)
     assert_int_equal(trip_dataset_metadata_tf(t, &d, &tf), 0);
     assert_true(trip_tf_evaluate(tf, 100).opacity > 0);
     assert_close(trip_dataset_metadata_culled(t, tf, range), 0, 0);
-    trip_camera_framing f = { 0 };
-    trip_dataset_metadata_frame(t, &d, &f);
-    assert_close(f.up.z, 1, 0);
+    trip_vec3 up, front;
+    trip_dataset_metadata_orient(t, &d, &up, &front);
+    assert_close(up.z, 1, 0);
     trip_tf_destroy(tf);
     trip_dataset_metadata_destroy(t);
 }
@@ -135,10 +135,10 @@ static void thick_slices_of_a_known_orientation_are_not_turned_over(void **state
     for (int i = 0; i < 3; i++) {
         trip_dataset d = with_text(texts[i]);
         trip_dataset_metadata *t = parse(&d);
-        trip_camera_framing f = { 0 };
+        trip_vec3 up, front;
         d.index_to_world.m[2][2] = 5;
-        trip_dataset_metadata_frame(t, &d, &f);
-        assert_close(f.up.z, 1, 0);
+        trip_dataset_metadata_orient(t, &d, &up, &front);
+        assert_close(up.z, 1, 0);
         trip_dataset_metadata_destroy(t);
     }
 }
@@ -148,13 +148,13 @@ static void thick_slices_without_an_orientation_are_a_scan_from_above(void **sta
     (void)state;
     trip_dataset d = with_text("{\"format\": \"nrrd\"}");
     trip_dataset_metadata *t = parse(&d);
-    trip_camera_framing f = { 0 };
+    trip_vec3 up, front;
     d.index_to_world.m[2][2] = 2;
-    trip_dataset_metadata_frame(t, &d, &f);
-    assert_close(f.up.z, -1, 0);
+    trip_dataset_metadata_orient(t, &d, &up, &front);
+    assert_close(up.z, -1, 0);
     d.index_to_world.m[2][3] = -300; /* an origin: the file gives the position */
-    trip_dataset_metadata_frame(t, &d, &f);
-    assert_close(f.up.z, 1, 0);
+    trip_dataset_metadata_orient(t, &d, &up, &front);
+    assert_close(up.z, 1, 0);
     trip_dataset_metadata_destroy(t);
 }
 

@@ -5,6 +5,8 @@
 
 enum { NX = 70, NY = 45, NZ = 37 };
 
+static const double grid_lo[3], grid_hi[3] = { NX - 1, NY - 1, NZ - 1 };
+
 /* An oblique cigar of random codes among scattered faint voxels. */
 static bool cigar(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -53,12 +55,11 @@ static void find(const scene *s, const trip_reader_params *params, double kernel
                  const trip_reach_origin *origin, const trip_reach *wanted, int count,
                  double *values, uint64_t *splats)
 {
-    trip_visible v = { .data = s->data,
-                       .budget = s->budget,
-                       .kernel_radius = kernel_radius,
-                       .hi = { NX - 1, NY - 1, NZ - 1 } };
+    trip_visible v = {
+        .data = s->data, .budget = s->budget, .table = s->table, .kernel_radius = kernel_radius
+    };
     assert_int_equal(trip_reader_create(&v.reader, s->data, params, s->budget), 0);
-    trip_visible_start(&v, s->table, false);
+    trip_visible_start(&v, grid_lo, grid_hi);
     assert_int_equal(trip_visible_reach(&v, origin, wanted, count, values), 0);
     *splats = v.splats;
     trip_reader_destroy(v.reader);
@@ -101,33 +102,54 @@ static void reaches_of_visible_voxels_do_not_depend_on_tiles_and_slots(void **st
     }
 }
 
-/* The result does not depend on values known before or on the end of earlier searches. */
-static void values_are_raised_where_visible_voxels_reach_farther(void **state)
+/* The outline is made here a second time, and the voxels are examined one by one. The result does
+ * not depend on the end of earlier searches. */
+static void voxels_visible_alone_reach_beyond_the_outline(void **state)
 {
     (void)state;
     scene s;
     make(&s, 16, 4);
-    trip_visible v = {
-        .data = s.data, .budget = s.budget, .kernel_radius = 2, .hi = { NX - 1, NY - 1, NZ - 1 }
-    };
-    const trip_reader_params params = { .skip = trip_visible_skip, .skip_user = &v };
-    assert_int_equal(trip_reader_create(&v.reader, s.data, &params, s.budget), 0);
-    trip_visible_start(&v, s.table, true);
-    for (int t = 0; t < 6; t++) {
+    trip_visible v = { .data = s.data, .budget = s.budget, .table = s.table };
+    trip_outline_params params = { .data = s.data, .budget = s.budget, .table = s.table };
+    trip_outline *outline;
+    const trip_camera_params view = scene_view(&s, trip_v3(0.4, -1, 0.3), 300, 40, 64);
+    memcpy(params.hi, grid_hi, sizeof params.hi);
+    params.view = &view;
+    assert_int_equal(
+        trip_reader_create(&v.reader, s.data,
+                           &(trip_reader_params){ .skip = trip_visible_skip, .skip_user = &v },
+                           s.budget),
+        0);
+    params.reader = v.reader;
+    assert_int_equal(trip_outline_make(&outline, &params), 0);
+    trip_visible_start(&v, grid_lo, grid_hi);
+    assert_int_equal(trip_visible_outline(&v, grid_lo, grid_hi, &view), 0);
+    assert_true(outline && v.outline && v.splats == trip_outline_splats(outline));
+    int farther = 0, nearer = 0;
+    for (int t = 0; t < 12; t++) {
         trip_reach_origin origin;
         trip_reach wanted[TRIP_REACHES_MAX];
-        double reach[TRIP_REACHES_MAX], raised[TRIP_REACHES_MAX], known[TRIP_REACHES_MAX];
+        double got[TRIP_REACHES_MAX], drawn[TRIP_REACHES_MAX], alone[TRIP_REACHES_MAX];
         any_reaches(&origin, wanted);
-        assert_int_equal(trip_visible_reach(&v, &origin, wanted, TRIP_REACHES_MAX, reach), 0);
-        v.position_count = t % 2 ? v.position_count : 0;
-        for (int n = 0; n < TRIP_REACHES_MAX; n++)
-            raised[n] = known[n] = n % 4 == 0   ? -INFINITY
-                                   : n % 4 == 1 ? reach[n]
-                                                : reach[n] + 20 * (test_random() - 0.5);
-        assert_int_equal(trip_visible_raise(&v, &origin, wanted, TRIP_REACHES_MAX, raised), 0);
-        for (int n = 0; n < TRIP_REACHES_MAX; n++)
-            assert_true(raised[n] == fmax(known[n], reach[n]));
+        for (int n = 0; n < TRIP_REACHES_MAX && t % 2; n++)
+            wanted[n].around = 0;
+        v.kernel_radius = t % 2 ? 0.5 : 0;
+        v.position_count = t % 3 ? v.position_count : 0;
+        assert_int_equal(trip_visible_reach(&v, &origin, wanted, TRIP_REACHES_MAX, got), 0);
+        trip_outline_reach(outline, &origin, wanted, TRIP_REACHES_MAX, drawn);
+        expect(&s, 41000, 65535, &origin, wanted, TRIP_REACHES_MAX, alone);
+        for (int n = 0; n < TRIP_REACHES_MAX; n++) {
+            alone[n] +=
+                v.kernel_radius *
+                trip_length(trip_affine_transpose_vector(&s.data->index_to_world, wanted[n].along));
+            farther += alone[n] > drawn[n];
+            nearer += alone[n] < drawn[n];
+            assert_close(got[n], fmax(drawn[n], alone[n]), 1e-12);
+        }
     }
+    assert_true(farther > 0 && nearer > 0);
+    trip_outline_destroy(outline);
+    trip_visible_end(&v);
     trip_reader_destroy(v.reader);
     scene_destroy(&s);
 }
@@ -137,7 +159,7 @@ static void bounds_are_those_of_the_visible_voxels(void **state)
     (void)state;
     scene s;
     make(&s, 32, 8);
-    trip_visible v = { .data = s.data, .budget = s.budget, .kernel_radius = 2 };
+    trip_visible v = { .data = s.data, .budget = s.budget, .table = s.table, .kernel_radius = 2 };
     double lo[3], hi[3], min[3] = { NX, NY, NZ }, max[3] = { 0 };
     for (int i = 0; i < NX * NY * NZ; i++) {
         const int at[3] = { i % NX, i / NX % NY, i / NX / NY };
@@ -150,7 +172,7 @@ static void bounds_are_those_of_the_visible_voxels(void **state)
     }
     assert_int_equal(trip_reader_create(&v.reader, s.data, &(trip_reader_params){ 0 }, s.budget),
                      0);
-    trip_visible_start(&v, s.table, false);
+    trip_visible_start(&v, grid_lo, grid_hi);
     assert_int_equal(trip_visible_bounds(&v, lo, hi), 0);
     assert_memory_equal(lo, min, sizeof lo);
     assert_memory_equal(hi, max, sizeof hi);
@@ -231,7 +253,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(reaches_of_visible_voxels_do_not_depend_on_tiles_and_slots),
-        cmocka_unit_test(values_are_raised_where_visible_voxels_reach_farther),
+        cmocka_unit_test(voxels_visible_alone_reach_beyond_the_outline),
         cmocka_unit_test(bounds_are_those_of_the_visible_voxels),
         cmocka_unit_test(most_of_a_list_is_not_visited),
         cmocka_unit_test(kernels_reach_beyond_their_voxels),

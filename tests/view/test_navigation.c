@@ -67,23 +67,17 @@ static void points_are_projected_in_perspective_and_in_parallel(void **state)
     assert_pixel(&n, (const double[3]){ 1, -5, 0 }, WIDTH / 2 + k / 10, HEIGHT / 2);
 }
 
-/* Points on the ray of a pixel project onto this pixel. */
-static void points_on_the_ray_of_a_pixel_project_onto_it(void **state)
+static void points_of_a_pixel_project_onto_it(void **state)
 {
     (void)state;
     for (int parallel = 0; parallel < 2; parallel++) {
         trip_navigation n = oblique(parallel);
         const double pixel[2] = { 17.5, 400.25 };
-        double origin[3], direction[3], p[3], q[2];
-        trip_navigation_ray(&n, WIDTH, HEIGHT, pixel, origin, direction);
-        for (int i = 0; i < 3; i++)
-            p[i] = origin[i] + 6 * direction[i];
-        double depth = trip_navigation_project(&n, WIDTH, HEIGHT, p, q);
+        double p[3], q[2];
+        trip_navigation_point(&n, WIDTH, HEIGHT, pixel, 6, p);
+        assert_close(trip_navigation_project(&n, WIDTH, HEIGHT, p, q), 6, 1e-12);
         assert_close(q[0], pixel[0], 1e-10);
         assert_close(q[1], pixel[1], 1e-10);
-        trip_navigation_point(&n, WIDTH, HEIGHT, pixel, depth, origin);
-        assert_point(origin, p[0], p[1], p[2]);
-        assert_close(hypot(hypot(direction[0], direction[1]), direction[2]), 1, 1e-12);
     }
 }
 
@@ -318,12 +312,53 @@ static void a_dolly_can_always_leave_the_look_point_again(void **state)
     assert_close(n.look[0], 1, 1e-12);
 }
 
+static void assert_options(char *text, const char *expected)
+{
+    assert_string_equal(text, expected);
+    free(text);
+}
+
+static void a_view_is_written_as_options(void **state)
+{
+    (void)state;
+    trip_navigation n = {
+        .eye = { 1, -2.5, 0 }, .look = { 0, 0, 1e-20 }, .up = { 0, 0, 1 }, .fov_degrees = 30
+    };
+    assert_options(trip_navigation_options(&n, 640, 480),
+                   "--eye 1,-2.5,0 --look 0,0,1e-20 --up 0,0,1 --fov 30 --size 640x480");
+    n.ortho_height = 12.25;
+    assert_options(trip_navigation_options(&n, 1, 2),
+                   "--eye 1,-2.5,0 --look 0,0,1e-20 --up 0,0,1 --ortho 12.25 --size 1x2");
+}
+
+/* Numbers that are read back have the same bits. */
+static void numbers_are_written_without_loss(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 1000; i++) {
+        trip_navigation n = { .fov_degrees = 180 * test_random(), .ortho_height = 0 };
+        double got[10], *numbers[] = { n.eye, n.look, n.up };
+        for (int v = 0; v < 9; v++)
+            numbers[v / 3][v % 3] = ldexp(test_random() - 0.5, (int)(80 * test_random()) - 40);
+        char *text = trip_navigation_options(&n, 9, 9);
+        assert_int_equal(
+            sscanf(text, "--eye %lf,%lf,%lf --look %lf,%lf,%lf --up %lf,%lf,%lf --fov %lf", &got[0],
+                   &got[1], &got[2], &got[3], &got[4], &got[5], &got[6], &got[7], &got[8], &got[9]),
+            10);
+        assert_memory_equal(got, n.eye, sizeof n.eye);
+        assert_memory_equal(got + 3, n.look, sizeof n.look);
+        assert_memory_equal(got + 6, n.up, sizeof n.up);
+        assert_true(got[9] == n.fov_degrees);
+        free(text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_view_points_to_the_members_of_the_state),
         cmocka_unit_test(points_are_projected_in_perspective_and_in_parallel),
-        cmocka_unit_test(points_on_the_ray_of_a_pixel_project_onto_it),
+        cmocka_unit_test(points_of_a_pixel_project_onto_it),
         cmocka_unit_test(an_orbit_moves_the_eye_around_the_look_point),
         cmocka_unit_test(an_orbit_passes_over_the_top),
         cmocka_unit_test(a_grabbed_point_stays_under_the_cursor),
@@ -339,6 +374,8 @@ int main(void)
         cmocka_unit_test(heights_of_parallel_views_stay_within_bounds),
         cmocka_unit_test(the_height_of_a_parallel_view_follows_the_distance),
         cmocka_unit_test(a_dolly_can_always_leave_the_look_point_again),
+        cmocka_unit_test(a_view_is_written_as_options),
+        cmocka_unit_test(numbers_are_written_without_loss),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
