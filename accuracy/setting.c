@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "scope.h"
+#include "report.h"
 
 typedef struct sweep {
     accuracy_setting *out;
@@ -207,11 +207,6 @@ int accuracy_setting_options(const accuracy_setting *one, accuracy_option out[AC
     return count;
 }
 
-static void drop_line(const char *line, void *user)
-{
-    (void)line, (void)user;
-}
-
 bool accuracy_setting_read_option(accuracy_setting *one, const char *name, const char *value)
 {
     static const char *const renderers[] = { "auto", "gl", "cpu", "reference", "integral" };
@@ -219,7 +214,7 @@ bool accuracy_setting_read_option(accuracy_setting *one, const char *name, const
     for (int i = 0; i < 5 && !strcmp(name, "renderer"); i++)
         if (!strcmp(value, renderers[i]))
             return one->renderer = (triptych_renderer)i, true;
-    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    trip_scope quiet = { .sink = trip_report_discard }, *before = trip_scope_enter(&quiet);
     const int status = trip_option_read(&draw_settings_table, name, value, &one->settings, &given);
     trip_scope_enter(before);
     return status == 0;

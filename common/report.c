@@ -111,6 +111,11 @@ static void emit(int status, const char *text)
     trip_scope_enter(here);
 }
 
+void trip_report_discard(const char *text, void *user)
+{
+    (void)text, (void)user;
+}
+
 void trip_report_line(const char *text)
 {
     emit(TRIP_OK, text);

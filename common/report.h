@@ -43,6 +43,9 @@ __attribute__((format(printf, 2, 3))) void trip_warn(const char *where, const ch
 /* Prints "triptych: note: WHERE: ...", for a choice made for the user, and how to change it. */
 __attribute__((format(printf, 2, 3))) void trip_note(const char *where, const char *stage, ...);
 
+/* A sink that discards lines; see trip_scope.sink. */
+void trip_report_discard(const char *line, void *user);
+
 /* Reports a line that another scope received. */
 void trip_report_line(const char *line);
 

@@ -37,6 +37,7 @@ enum {
     NARROW_TARGET = 1 << 23,
     SEVERAL_SAMPLES = 1 << 24,
     INDEXED = 1 << 25,
+    MAY_EMIT = 1 << 26,
 };
 
 static const uint64_t of_splats = ROW(COMPOSITING) | ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN) |
@@ -61,6 +62,7 @@ static const struct rule {
       "does not apply to --renderer integral, which is exact", IDLE },
     { ROW(ANISOTROPY), ALL, 0, MAY_SHADOW, "requires --effects shadows or auto", IDLE },
     { ROW(CUEING), ALL, 0, MAY_CUE, "requires --effects cueing or auto", IDLE },
+    { ROW(TEMPERATURE), ALL, 0, MAY_EMIT, "requires --effects emission or auto", IDLE },
     { ROW(LIGHT_CELLS), ALL, 0, MAY_LATTICE,
       "requires --effects shadows, occlusion, emission or auto", IDLE },
     { ROW(EFFECTS), ALL, SHADOWS | HEADLIGHT, 0,
@@ -153,7 +155,8 @@ static int facts_of_effects(const draw_settings *s)
            (s->light.kind < TRIPTYCH_LIGHT_DIRECTION ? HEADLIGHT : 0) |
            (which & TRIPTYCH_EFFECT_SHADOWS ? SHADOWS : 0) |
            (some & TRIPTYCH_EFFECT_SHADOWS ? MAY_SHADOW : 0) |
-           (some & TRIPTYCH_EFFECT_CUEING ? MAY_CUE : 0) | (some & lattices ? MAY_LATTICE : 0);
+           (some & TRIPTYCH_EFFECT_CUEING ? MAY_CUE : 0) |
+           (some & TRIPTYCH_EFFECT_EMISSION ? MAY_EMIT : 0) | (some & lattices ? MAY_LATTICE : 0);
 }
 
 static int facts_of_splats(const draw_settings *s)

@@ -179,15 +179,10 @@ static void act(trip_session *s, const trip_script *script)
     pthread_mutex_unlock(&s->lock);
 }
 
-static void drop_line(const char *line, void *user)
-{
-    (void)line, (void)user;
-}
-
 bool trip_session_do(trip_session *s, const char *text, size_t bytes)
 {
     trip_script script;
-    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    trip_scope quiet = { .sink = trip_report_discard }, *before = trip_scope_enter(&quiet);
     bool good = trip_script_parse(&script, "events", text, bytes) == 0;
     trip_scope_enter(before);
     good = good && script.count <= MAX_EVENTS;
@@ -267,7 +262,7 @@ static bool set_number(double *out, const char *value, double lo, double hi)
 /* Sets a setting by its option. An empty value selects the default. */
 static bool set_setting(draw_settings *s, const char *name, const char *value)
 {
-    trip_scope quiet = { .sink = drop_line }, *before = trip_scope_enter(&quiet);
+    trip_scope quiet = { .sink = trip_report_discard }, *before = trip_scope_enter(&quiet);
     uint64_t given = 0;
     bool known = false;
     int status = 0;

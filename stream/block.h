@@ -26,7 +26,6 @@
 #include <stddef.h>
 
 #include "format.h"
-#include "kind.h"
 
 enum {
     TRIP_BLOCK_PRESENT_MAX = 4, /* words */
@@ -74,13 +73,6 @@ static inline uint32_t trip_bits_set(uint64_t x)
 #else
     return (uint32_t)__builtin_popcountll(x);
 #endif
-}
-
-static inline trip_block_form trip_block_form_of(const trip_file_header *h, trip_kind kind)
-{
-    const trip_kind_info *of = trip_kind_of(kind);
-    return (trip_block_form){ h->tile_log2, of->code_bytes ? of->code_bytes : h->code_bytes,
-                              h->normal_bytes, of->steps && h->code_bytes == 1 };
 }
 
 static inline unsigned trip_block_step(const trip_block_form *f)

@@ -324,6 +324,7 @@ typedef struct list_check {
     const char *where;
     const trip_file_header *h;
     const trip_file_list *f;
+    const trip_kind_info *kind;
     trip_block_form form;
     const trip_file_slab *slabs;
     const trip_file_brick *bricks;
@@ -351,7 +352,7 @@ static bool runs_fit(const list_check *c, uint64_t i, uint64_t *bytes)
         const trip_file_run *r = &runs[s];
         if (r->records > (s < b->sheet_min || s > b->sheet_max ? 0 : room))
             return false;
-        if (r->records ? !trip_block_words_fit(&c->form, r->records, r->words) : r->words != 0)
+        if (r->records ? !c->kind->words_fit(&c->form, r->records, r->words) : r->words != 0)
             return false;
         sum += r->records;
         *bytes += 8 * (uint64_t)r->words;
@@ -480,6 +481,7 @@ int trip_dataset_check_tables(const unsigned char *index, const trip_file_header
             .where = where,
             .h = h,
             .f = &lists[i],
+            .kind = trip_kind_of((trip_kind)lists[i].kind),
             .form = trip_block_form_of(h, (trip_kind)lists[i].kind),
             .slabs = (const void *)(index + lists[i].slabs_offset),
             .bricks = (const void *)(index + lists[i].bricks_offset),

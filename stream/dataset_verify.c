@@ -113,10 +113,11 @@ static int check_run(list_verifier *v, const run_stream *s)
     uint64_t p[3] = { 0 };
     int axis = v->list->axis;
     const trip_run *run = &s->run;
-    const unsigned own = trip_kind_of(v->list->kind)->axis_bits;
-    if (!trip_block_is_padded(&s->block))
+    const trip_kind_info *kind = trip_kind_of(v->list->kind);
+    const unsigned own = kind->axis_bits;
+    if (!kind->is_padded(&s->block))
         return fail_run(v->data, v->list, run, "the padding is not zero");
-    trip_block_voxels(&s->block, 0, run->count, v->voxels);
+    kind->unpack(&s->block, 0, run->count, v->voxels);
     if (s->block.normals)
         trip_block_normals(&s->block, 0, run->count, v->normals);
     p[axis] = (uint64_t)run->sheet;

@@ -15,14 +15,15 @@ static size_t paged_bytes(const trip_planner *p, uint64_t low, uint64_t high)
 
 size_t trip_planner_min_slot(const trip_dataset *d, unsigned planes)
 {
-    trip_block_form form = trip_block_form_of(&d->header, TRIP_KIND_VOXELS);
-    size_t page = (size_t)1 << d->header.page_log2, bytes = 0;
+    const size_t page = (size_t)1 << d->header.page_log2;
+    size_t bytes = 0, words = 0, normals = 0;
     for (unsigned i = 0; i < d->list_count; i++) {
-        unsigned own = trip_kind_of(d->lists[i].kind)->code_bytes;
-        form.code_bytes = own > form.code_bytes ? own : form.code_bytes;
+        const trip_block_form form = trip_block_form_of(&d->header, d->lists[i].kind);
+        const size_t own = trip_kind_of(d->lists[i].kind)->max_words(&form);
+        words = own > words ? own : words;
+        normals = ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes;
     }
-    size_t max[TRIP_PLANES] = { 8 * (size_t)trip_block_max_words(&form),
-                                ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes };
+    const size_t max[TRIP_PLANES] = { 8 * words, normals };
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (planes >> plane & 1) /* a run may start anywhere in a page */
             bytes += (max[plane] + page - 1) / page * page + page;

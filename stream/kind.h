@@ -1,9 +1,12 @@
-/* The kinds of records in a list. A kind is a row of a constant table with the properties that
- * decoding, culling and drawing use. */
+/* The kinds of records in a list. A kind is a row of a constant table: the properties that culling
+ * and drawing use, and the functions that writing, reading and checking call for the bytes of its
+ * runs. */
 #ifndef TRIP_KIND_H
 #define TRIP_KIND_H
 
 #include <stdbool.h>
+
+#include "block.h"
 
 typedef enum trip_kind {
     TRIP_KIND_VOXELS, /* voxels that are visible under some transfer function */
@@ -28,9 +31,29 @@ typedef struct trip_kind_info {
     bool steps;   /* codes are multiples of TRIP_CODE_STEP if the header's codes have 8 bits */
     bool coarse;  /* only at levels above 0 */
     double reach; /* radius of a splat, as a multiple of the kernel radius */
+    /* Returns the words of the largest block of a run. */
+    uint32_t (*max_words)(const trip_block_form *f);
+    /* Whether a run of `records` records, at least 1, can have a block of `words` words. */
+    bool (*words_fit)(const trip_block_form *f, uint32_t records, uint32_t words);
+    /* Packs the records of a run; see trip_block_pack(). */
+    uint32_t (*pack)(const trip_block_form *f, const uint32_t *records, uint32_t count,
+                     uint64_t *block);
+    /* Checks a block from a file against its brick. Returns the fault, or NULL. */
+    const char *(*check)(const trip_block *b, const trip_file_brick *brick);
+    /* Whether the unused bytes of a checked block are zero. */
+    bool (*is_padded)(const trip_block *b);
+    /* Unpacks records [first, first + count) of a checked block; see trip_block_voxels(). */
+    void (*unpack)(const trip_block *b, uint32_t first, uint32_t count, uint32_t *records);
 } trip_kind_info;
 
 /* Returns NULL for an invalid number. */
 const trip_kind_info *trip_kind_of(trip_kind kind);
+
+static inline trip_block_form trip_block_form_of(const trip_file_header *h, trip_kind kind)
+{
+    const trip_kind_info *of = trip_kind_of(kind);
+    return (trip_block_form){ h->tile_log2, of->code_bytes ? of->code_bytes : h->code_bytes,
+                              h->normal_bytes, of->steps && h->code_bytes == 1 };
+}
 
 #endif

@@ -154,10 +154,11 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *p
 {
     const trip_list_writer *l = c->list;
     const trip_file_run *r = &position->run;
+    const trip_kind_info *kind = trip_kind_of(l->is.kind);
     const bool normals = c->normals;
     const uint64_t *block;
-    if (!trip_block_words_fit(&l->form, r->records,
-                              r->words)) /* it would not fit into the buffer either */
+    if (!kind->words_fit(&l->form, r->records,
+                         r->words)) /* it would not fit into the buffer either */
         return fail_changed(l);
     int status = fetch_block(l, position, words, to, &block);
     if (status == TRIP_OK && normals)
@@ -166,7 +167,7 @@ int trip_list_cursor_read(const trip_list_cursor *c, const trip_list_position *p
     if (status < 0)
         return status;
     *out = trip_block_make(&l->form, r->records, r->words, block, normals ? to->packed : NULL);
-    return trip_block_check(out, &position->brick) ? fail_changed(l) : TRIP_OK;
+    return kind->check(out, &position->brick) ? fail_changed(l) : TRIP_OK;
 }
 
 /* Advances to the next run of the slab. Returns true if *position is a wanted run. */

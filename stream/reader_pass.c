@@ -392,7 +392,8 @@ static int report_block(const trip_batch *b, const trip_run *run, const char *wh
 static const char *fault_of(const trip_batch *b, const trip_run *run)
 {
     const trip_block block = trip_block_of(b, run);
-    return trip_block_check(&block, &trip_batch_list(b, run)->bricks[run->brick]);
+    const trip_list *list = trip_batch_list(b, run);
+    return trip_kind_of(list->kind)->check(&block, &list->bricks[run->brick]);
 }
 
 /* Number of runs that one task checks. */

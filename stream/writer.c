@@ -385,7 +385,7 @@ static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint3
                       uint32_t tile_v, const uint32_t *voxels, uint32_t count)
 {
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
-    uint32_t words = trip_block_pack(&l->form, voxels, count, block);
+    uint32_t words = trip_kind_of(l->is.kind)->pack(&l->form, voxels, count, block);
     if (words == 0)
         return trip_fail(TRIP_ERROR, "write", w->folder.path,
                          "list %c: records of tile (%u, %u) of sheet %u are out of order, outside "

@@ -52,6 +52,7 @@ typedef enum trip_event_kind {
                          */
     TRIP_EVENT_RANDOM,  /* `count` random events of the kinds that people make, from `seed` */
     TRIP_EVENT_STATUS,  /* text is the file for the statistics, as JSON */
+    TRIP_EVENT_SET,     /* text has options of settings (draw_settings_read_text()) */
     TRIP_EVENT_CLICK,   /* clicks a control of the panel with the left button: text is its label, x
                            the position along it, 0 to 1 */
 } trip_event_kind;

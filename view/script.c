@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "draw_settings.h"
 #include "input_file.h"
 #include "report.h"
 #include "text.h"
@@ -226,6 +227,19 @@ static int parse_file(parser *p)
     return add(p, (trip_event){ .kind = kinds[find(p->words[0], names)], .text = text });
 }
 
+static int parse_set(parser *p)
+{
+    draw_settings scratch = { .has_background = 0 };
+    trip_scope quiet = { .sink = trip_report_discard }, *before = trip_scope_enter(&quiet);
+    const int status = draw_settings_read_text(&scratch, p->words[1]);
+    trip_scope_enter(before);
+    char *text = status ? NULL : strdup(p->words[1]);
+    if (!text)
+        return status ? fail_at(p, "`%.40s` does not set settings", p->words[1])
+                      : fail_at(p, "out of memory");
+    return add(p, (trip_event){ .kind = TRIP_EVENT_SET, .text = text });
+}
+
 static int parse_click(parser *p)
 {
     char *label = NULL;
@@ -268,6 +282,7 @@ static const struct command {
     { "picture", REST, false, parse_file },
     { "random", 2, false, parse_random },
     { "status", REST, false, parse_file },
+    { "set", REST, false, parse_set },
     { "click", REST, false, parse_click },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };

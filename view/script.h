@@ -19,6 +19,7 @@
  *   picture FILE                 the full picture, as `triptych render` writes it
  *   random COUNT SEED            COUNT random events, equal for equal seeds
  *   status FILE                  the statistics, as JSON
+ *   set --OPTION VALUE...        settings, as options of `triptych render`
  *   click PART LABEL             a control of the panel, at PART of its width, 0 to 1
  *
  * TEXT and FILE are the rest of the line. `#` at the beginning of a line makes it a comment. */

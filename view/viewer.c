@@ -208,8 +208,10 @@ draw_settings trip_viewer_settings(const trip_document *d)
         s.clip = (triptych_clip){ 0 };
     if (trip_light_is_head(&s)) /* its shadows are invisible */
         s.effects.which &= ~TRIPTYCH_EFFECT_SHADOWS;
-    if (!trip_viewer_heat(d))
+    if (!trip_viewer_heat(d)) {
         s.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;
+        draw_settings_unset(&s, DRAW_TEMPERATURE);
+    }
     draw_settings_drop_excluded(&s, TRIPTYCH_RENDERER_AUTO);
     return s;
 }
@@ -706,6 +708,16 @@ static void drop(trip_viewer *v, const char *path)
         trip_viewer_open(v, path);
 }
 
+/* Clipping that is set becomes active. */
+static void set(trip_viewer *v, const char *options)
+{
+    trip_document *d = trip_viewer_document(v);
+    if (!d || draw_settings_read_text(&d->settings, options))
+        return;
+    d->clips |= strstr(options, "--clip-") != NULL;
+    v->changed = true;
+}
+
 void trip_viewer_event(trip_viewer *v, const trip_event *e)
 {
     switch (e->kind) {
@@ -728,6 +740,9 @@ void trip_viewer_event(trip_viewer *v, const trip_event *e)
         break;
     case TRIP_EVENT_DROP:
         drop(v, e->text);
+        break;
+    case TRIP_EVENT_SET:
+        set(v, e->text);
         break;
     case TRIP_EVENT_CLOSE:
         v->quits = true;

@@ -97,7 +97,6 @@ static void wrong_usage_is_one_line_and_exit_status_2(void **state)
         "fog.trip -o a.png --target rgba64f",
         "fog.trip -o a.png --submit sprites --renderer cpu",
         "fog.trip -o a.png --submit sprites,triangles",
-        "fog.trip -o a.png --submit replicated --submit indexed",
         "fog.trip -o a.png --submit quads",
         "fog.trip -o a.png --occluded skip --renderer reference",
         "fog.trip -o a.png --memory 0",
@@ -332,34 +331,6 @@ static void a_failed_write_leaves_no_file(void **state)
     assert_int_equal(WEXITSTATUS(system("ls *.partial* 2>/dev/null")), 2);
 }
 
-/* Every --option of --help must be in the man page. */
-static void man_pages_name_every_option(void **state)
-{
-    (void)state;
-    const char *const commands[] = { "brick", "info", "render", "bench", "serve" };
-    for (int i = 0; i < 5; i++) {
-        static char page[65536];
-        char path[512], plain[sizeof page];
-        snprintf(path, sizeof path, "%s/cli/man/triptych-%s.1", TRIP_SOURCE_DIR, commands[i]);
-        program_read(path, page, sizeof page);
-        size_t n = 0;
-        for (const char *c = page; *c; c++)
-            if (*c != '\\')
-                plain[n++] = *c;
-        plain[n] = 0;
-        program_call(&run, "%s --help", commands[i]);
-        assert_works(&run);
-        for (char *o = strstr(run.out, "--"); o; o = strstr(o + 2, "--")) {
-            char option[64];
-            int length = (int)strspn(o, "abcdefghijklmnopqrstuvwxyz-");
-            snprintf(option, sizeof option, "%.*s", length, o);
-            if (!strstr(plain, option))
-                print_error("triptych-%s.1 does not name %s\n", commands[i], option);
-            assert_non_null(strstr(plain, option));
-        }
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -374,7 +345,6 @@ int main(void)
         cmocka_unit_test(explain_prints_the_plan_and_its_cost),
         cmocka_unit_test(a_warning_counts_the_voxels_that_bricking_dropped),
         cmocka_unit_test(a_failed_write_leaves_no_file),
-        cmocka_unit_test(man_pages_name_every_option),
     };
     return cmocka_run_group_tests(tests, enter_with_data, program_leave_folder);
 }

@@ -122,13 +122,13 @@ class InBrowser(program.ProgramTest):
         before = self.exact()
         self.browser.value("document.getElementById('panel').open = true")
         for query, value in (
-            ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=shading]", "checked = false"),
-            ("[data-set=shading]", "checked = true"), ("#head", "checked = false"),
+            ("[data-set=opacity]", "value = '-0.5'"), ("[data-set=no-shading]", "checked = false"),
+            ("[data-set=no-shading]", "checked = true"), ("#head", "checked = false"),
             ("#round", "value = '90'"), ("#up", "value = '-40'"), ("#head", "checked = true"),
             ("[data-set=classify]", "value = 'post'"), ("[data-set=classify]", "value = 'pre'"),
             ("[data-set=h]", "value = '0.1'"), ("[data-set=method]", "value = 'axis'"),
             ("[data-set=show]", "value = 'lists'"), ("[data-set=show]", "value = 'merge'"),
-            ("[data-set=show]", "value = 'picture'"), ("#occlusion", "checked = true"),
+            ("[data-set=show]", "value = ''"), ("#occlusion", "checked = true"),
             ("#cueing", "checked = true"), ("#fading", "value = '0.2'"), ("#head", "checked = false"),
             ("#shadows", "checked = true"), ("#anisotropy", "value = '0.5'"),
             ("#cueing", "checked = false"), ("#occlusion", "checked = false"),

@@ -152,14 +152,14 @@ class Serve(program.ProgramTest):
             ("classify", "pre", pre),
             ("classify", "post", ["--classify=post"]),
             ("classify", "pre", pre),
-            ("shading", "0", flat),
+            ("no-shading", "1", flat),
             ("show", "lists", [*flat, "--show=lists"]),
             ("show", "picture", flat),
             ("method", "axis", [*flat, "--method=axis"]),
             ("method", "merge", flat),
             ("h", "0.2", [*flat, "--h=0.2"]),
-            ("early_termination", "0.05", [*flat, "--h=0.2", "--early-termination=0.05"]),
-            ("early_termination", "-1", [*flat, "--h=0.2"]),
+            ("early-termination", "0.05", [*flat, "--h=0.2", "--early-termination=0.05"]),
+            ("early-termination", "", [*flat, "--h=0.2"]),
             ("opacity", "0.1", [*flat, "--h=0.2", "--opacity-scale=0.1"]),
         ):
             status, _, data = self.ask("/set", "POST", name=name, value=value)
@@ -170,19 +170,21 @@ class Serve(program.ProgramTest):
             self.assert_rendered(picture, shown)
             self.assertTrue((picture != before).any(), (name, value))
         for name, value in (
-            ("classify", "x"), ("classify", ""), ("shading", "2"), ("h", "1"), ("h", "nan"),
-            ("early_termination", "0.11"), ("early_termination", "-2"), ("early_termination", "x"),
+            ("classify", "x"), ("shading", "2"), ("h", "1"), ("h", "nan"),
+            ("early-termination", "0.11"), ("early-termination", "-2"), ("early-termination", "x"),
             ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2"),
             ("light", "nan,0,9"), ("light", "0,91,9"), ("light", "0,0,0"), ("light", "1,2,3,4"),
-            ("light", "," * 500), ("samples", "64"), ("", ""), ("shadows", "1"), ("emission", "1"),
+            ("light", "," * 500), ("samples", "65"), ("depth", "1"), ("count", "1"), ("", ""), ("shadows", "1"), ("emission", "1"),
             ("cueing", "2"), ("occlusion", ""), ("auto", "yes"), ("fading", "0"), ("fading", "1.1"),
             ("anisotropy", "nan"), ("anisotropy", "-1"), ("coldest", "-1"), ("hottest", "1e9"),
             ("light-cells", "7"), ("light-cells", "1025"), ("light-cells", "8.5"),
         ):
             self.assertEqual(self.ask("/set", "POST", name=name, value=value)[0], 400, (name, value))
         self.assertEqual(self.ask("/set", "POST", name="light", value="30,45,1.5")[0], 204)
-        self.assertEqual(self.status()["settings"], {
-            "classify": "pre", "method": "merge", "show": "picture", "shading": 0, "h": 0.2, "early_termination": -1})
+        settings = self.status()["settings"]
+        self.assertTrue(settings.pop("light").startswith("point:"))
+        self.assertEqual(settings, {
+            "classify": "pre", "method": "merge", "show": "picture", "no-shading": "1", "h": "0.2"})
         self.assertIn("bone", json.loads(self.ask("/presets")[2]))
 
     def test_a_point_light_equals_render(self):
@@ -283,7 +285,7 @@ class Serve(program.ProgramTest):
 
     def test_the_automatic_choice_has_the_name_of_the_option(self):
         _, _, page = self.ask("/")
-        self.assertIn(b'<option value="auto">Automatic</option>', page)
+        self.assertIn(b'<option value="">Automatic</option>', page)
 
     def test_only_local_requests_with_the_token_are_answered(self):
         for path in ("/", "/picture", "/status", "/presets", "/nothing"):

@@ -125,6 +125,8 @@ static void a_click_has_a_position_and_a_label(void **state)
     assert_string_equal(s.events[0].text, "Level of detail");
     assert_string_equal(s.events[1].text, "h");
     trip_script_free(&s);
+    assert_refused("set --kernel-radius wide", "does not set settings");
+    assert_refused("set --no-such 3", "does not set settings");
     assert_refused("click half Slices", "`half` is not how far along a control");
     assert_refused("click 1.5 Slices", "`1.5` is not how far along a control");
     assert_refused("click 0.5", "label is missing");

@@ -112,8 +112,8 @@ class View(program.ProgramTest):
                       f"--renderer={renderer}")
             camera = shlex.split(self.status()["camera"])
             self.assertEqual(camera[camera.index("--effects") :],
-                             ["--effects", "cueing,emission", "--emission", "heat.trip",
-                              "--temperature", "500:3000"])
+                             ["--effects", "cueing,emission", "--temperature", "500:3000",
+                              "--emission", "heat.trip"])
             self.works("render", "noise.trip", *camera, "--background=0,0,0", "-o", "drawn.exr",
                        f"--renderer={renderer}")
             with open("seen.exr", "rb") as seen, open("drawn.exr", "rb") as drawn:
@@ -227,7 +227,7 @@ class View(program.ProgramTest):
                     "click 0.5 Light from the eye\nclick 0.2 Light azimuth", "click 0.9 Light elevation",
                     "click 0.4 Light distance",
                     "click 0.5 Classification\nclick 0.5 Pre (splats)",
-                    "click 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Per sheet",
+                    "click 0.5 Variants of the papers\nclick 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Per sheet",
                     "click 0.2 Blend start (h)",
                     "click 0.5 Method\nclick 0.5 Clip", "click 0.5 Method\nclick 0.5 Axis",
                     "click 0.4 Antialiasing", "click 0.5 Classification\nclick 0.5 Post (interpolation)",
@@ -274,6 +274,16 @@ class View(program.ProgramTest):
         for before, after, name in zip(pictures, pictures[1:], names):
             changes = before.shape != after.shape or (before != after).any()
             self.assertEqual(changes, name not in unchanged, name)
+
+    def test_a_script_sets_settings_by_their_options(self):
+        chosen = ["--classify", "pre", "--compositing", "sheet", "--background", "0.1,0.2,0.3,1"]
+        seen, = self.pictures(f"wait\nset {' '.join(chosen)}\nwait\npicture seen.exr\nstatus status.json\n",
+                              ["seen"], "noise.trip")
+        camera = self.status()["camera"]
+        for option in "--classify pre", "--compositing sheet":
+            self.assertIn(option, camera)
+        self.works("render", "noise.trip", *shlex.split(camera), "-o", "drawn.exr")
+        self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
     def test_clipping_options_apply(self):
         cut = ["--clip-box=voxels:4,4,4,20,15,20", "--clip-plane=1,0.5,0,-6"]
