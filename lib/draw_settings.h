@@ -129,7 +129,9 @@ triptych_classify draw_settings_classify(const draw_settings *s);
 /* Returns whether the settings allow post. */
 static inline bool draw_settings_may_use_sheets(const draw_settings *s)
 {
-    return draw_settings_classify(s) != TRIPTYCH_CLASSIFY_PRE && !draw_settings_of_splats(s);
+    const triptych_classify classify = draw_settings_classify(s);
+    return classify == TRIPTYCH_CLASSIFY_POST ||
+           (classify == TRIPTYCH_CLASSIFY_AUTO && !draw_settings_of_splats(s));
 }
 /* Returns whether coarse levels may be drawn. */
 static inline bool draw_settings_has_levels(const draw_settings *s)
