@@ -42,7 +42,7 @@ struct trip_option {
     const char *arg;      /* name of the argument in the help, or NULL */
     const char *help;     /* a sentence without its full stop */
     const char *standard; /* the default, in words, or NULL */
-    const char *limits;   /* what else the help says after the default, or NULL */
+    const char *limits;   /* the end of the help, such as "requires --level", or NULL */
     const char *alias;    /* an older name, which the help does not show, or NULL */
     const char *brief;    /* for the short help of a command with many options, or NULL */
     char short_name;      /* a letter, or 0 */
@@ -67,8 +67,8 @@ typedef struct trip_option_table {
 enum { TRIP_OPTION_TEXT_BYTES = 512 };
 
 /* Reads a value into the struct at `base`. Sets *row to the row that took it, if `row` is not NULL.
- * Several rows may have the same name: the one whose choices contain the value takes it, and the
- * parts of a value joined by commas may go to different rows. Returns 1 if no row has the name. */
+ * Several rows may have the same name. Then the row with this choice takes the value. Values
+ * joined by commas may belong to different rows. Returns 1 if no row has the name. */
 int trip_option_read(const trip_option_table *table, const char *name, const char *text, void *base,
                      uint64_t *given);
 bool trip_option_is_set(const trip_option *row, const void *base);

@@ -1,5 +1,5 @@
-/* The settings of a picture by value, their table of options, and the rules of which settings
- * exclude one another. triptych_settings points to the groups that this struct holds. All zero
+/* The settings of a picture by value, their table of options, and the rules between settings.
+ * triptych_settings points to the groups; this struct holds the groups. All zero
  * bytes are the defaults. Any thread. */
 #ifndef TRIP_DRAW_SETTINGS_H
 #define TRIP_DRAW_SETTINGS_H

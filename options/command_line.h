@@ -31,7 +31,7 @@ typedef struct command_line {
 /* Parses argv, which starts with the name of the command. --help prints the help and exits. Returns
  * 0, or TRIP_USAGE after reporting an error. */
 int command_line_parse(const command_line *c, int argc, char **argv);
-/* The same for a command with an argp parser of its own. */
+/* Does the same for a command with an argp parser of its own. */
 int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input);
 
 /* Names of triptych_levels_for, terminated by NULL. */

@@ -1,6 +1,6 @@
-/* The kinds of records in a list. A kind is a row of a constant table: the properties that culling
- * and drawing use, and the functions that writing, reading and checking call for the bytes of its
- * runs. */
+/* The kinds of records in a list. A kind is a row of a constant table. It has the properties that
+ * culling and drawing use. It also has functions for the bytes of its runs, which writing, reading
+ * and checking call. */
 #ifndef TRIP_KIND_H
 #define TRIP_KIND_H
 

@@ -552,7 +552,7 @@ bool draw_quality(trip_panel *p, trip_document *d)
     return changed;
 }
 
-// A number whose leftmost position selects the default.
+// Draws a slider with the default at its leftmost position.
 bool slide_or_default(trip_panel *p, const char *label, double *value, double step, double hi,
                       const char *format)
 {
