@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cstdlib>
+#include <string>
 #include <vector>
 
 #include <OpenImageIO/imageio.h>
@@ -41,6 +43,28 @@ std::string message(std::string text)
     return text.empty() ? "cannot be read" : text;
 }
 
+/* Returns the faults among the library's messages. It remarks on tags that it does not know, such
+ * as the private tags of microscopes and of GeoTIFF, and such a file is sound. */
+std::string faults(const std::string &messages)
+{
+    std::string left;
+    for (size_t at = 0; at < messages.size();) {
+        const size_t end = std::min(messages.find('\n', at), messages.size());
+        const std::string line = messages.substr(at, end - at);
+        if (line.find("Unknown field with tag") == std::string::npos && !line.empty())
+            left += line + "\n";
+        at = end + 1;
+    }
+    return left;
+}
+
+/* Whether a page of a TIFF is a smaller copy of another page: a thumbnail, or a level of a pyramid.
+ * Bit 0 of the tag NewSubfileType says so. */
+bool is_reduced(const OIIO::ImageSpec &spec)
+{
+    return (spec.get_int_attribute("tiff:subfiletype") & 1) != 0;
+}
+
 trip_scalar scalar_of(const std::string &file, OIIO::TypeDesc type)
 {
     static const struct {
@@ -77,6 +101,7 @@ class PictureStack : public trip_slice_stack
     trip_scalar stored_ = TRIP_U8;
     Input current_;
     int64_t current_file_ = -1;
+    std::vector<int> pages_;   /* of a single file: the page of each slice */
     trip_slice_buffer colour_; /* a slice with all channels; only for colour */
 };
 
@@ -119,22 +144,25 @@ void PictureStack::count_pages(OIIO::ImageInput &in)
 {
     const std::string &file = files_.names[0];
     const OIIO::ImageSpec first = in.spec();
-    int pages = 1;
-    while (in.seek_subimage(pages, 0)) {
+    int pages = 0;
+    pages_.assign(1, 0);
+    while (in.seek_subimage(++pages, 0)) {
         if (files_.kind != TRIP_IMAGE_TIFF) {
             trip_warn(file.c_str(), "has several parts; the first one is read");
             break;
         }
-        check_same(file + ": page " + std::to_string(pages + 1), in.spec());
-        pages++;
         trip_connection_working();
+        if (is_reduced(in.spec()))
+            continue;
+        check_same(file + ": page " + std::to_string(pages + 1), in.spec());
+        pages_.push_back(pages);
     }
     /* After the last page the library reports only the file's name, which is no error. */
-    std::string why = in.geterror();
+    const std::string why = faults(in.geterror());
     if (files_.kind == TRIP_IMAGE_TIFF && !why.empty() && message(why) != file)
         throw trip_slice_error(file, "after page " + std::to_string(pages) + ": " + message(why));
     check_imagej(file, first, pages);
-    dims[2] = pages;
+    dims[2] = (int64_t)pages_.size();
 }
 
 void PictureStack::choose_channels(trip_budget *budget)
@@ -200,7 +228,7 @@ void PictureStack::read(int64_t k, void *values)
 {
     bool single = files_.names.size() == 1;
     int64_t index = single ? 0 : k;
-    int page = single ? (int)k : 0;
+    int page = single ? pages_[(size_t)k] : 0;
     const std::string &file = files_.names[(size_t)index];
     if (index != current_file_) {
         current_file_ = -1;

@@ -42,14 +42,39 @@ struct trip_byte_stream {
     } codec;
 };
 
+/* Returns the number of bytes read, at most `bytes`. */
+static size_t read_head(const char *path, unsigned char *head, size_t bytes)
+{
+    FILE *file = fopen(path, "rbe");
+    const size_t got = file ? fread(head, 1, bytes, file) : 0;
+    if (file)
+        fclose(file);
+    return got;
+}
+
+/* Some programs name a NIfTI file .nii.gz and do not compress it. Its header starts with its own
+ * length, in either byte order. */
+static bool is_plain_nifti(const unsigned char *head, size_t bytes)
+{
+    static const unsigned char lengths[4][4] = {
+        { 0x5c, 1, 0, 0 }, { 0, 0, 1, 0x5c }, { 0x1c, 2, 0, 0 }, { 0, 0, 2, 0x1c }
+    };
+    for (int i = 0; i < 4 && bytes >= 348; i++)
+        if (!memcmp(head, lengths[i], 4))
+            return true;
+    return false;
+}
+
 trip_byte_encoding trip_byte_encoding_of(const char *path)
 {
     const char *dot = strrchr(path, '.');
-    if (dot && strcasecmp(dot, ".gz") == 0)
-        return TRIP_BYTES_ZLIB;
-    if (dot && strcasecmp(dot, ".bz2") == 0)
-        return TRIP_BYTES_BZIP2;
-    return TRIP_BYTES_PLAIN;
+    const bool gz = dot && strcasecmp(dot, ".gz") == 0, bz2 = dot && strcasecmp(dot, ".bz2") == 0;
+    unsigned char head[348];
+    if (!gz && !bz2)
+        return TRIP_BYTES_PLAIN;
+    if (is_plain_nifti(head, read_head(path, head, sizeof head)))
+        return TRIP_BYTES_PLAIN;
+    return gz ? TRIP_BYTES_ZLIB : TRIP_BYTES_BZIP2;
 }
 
 static int open_regular(const char *path, int *fd_out, uint64_t *bytes_out)

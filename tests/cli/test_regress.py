@@ -2,8 +2,10 @@
 import bz2
 import os
 import signal
+import struct
 import time
 
+import PIL.Image
 import numpy
 import program
 
@@ -38,6 +40,36 @@ class Regress(program.ProgramTest):
             drawn = self.picture("scaled.trip", "--renderer=cpu", *VIEW, *view)
             self.assertGreater(expected[..., 3].max(), 0.5, (spacing, view))
             self.assertLessEqual(numpy.abs(drawn - expected).max(), 2 / 255, (spacing, view))
+
+    def test_pages_of_a_tiff_are_its_slices_in_spite_of_tags_and_thumbnails(self):
+        """Files with private tags were refused, and so were files with a reduced page."""
+        for name, kind in ("unknown-tags", "<i2"), ("thumbnail-page", "<u2"):
+            pages = PIL.Image.open(os.path.join(REGRESS, f"{name}.tif"))
+            values = []
+            for page in range(24):
+                pages.seek(page)
+                values.append(numpy.array(pages).astype(kind))
+            program.write("pages.raw", numpy.stack(values).tobytes())
+            self.brick("pages.raw", "raw.trip", "--size=40,32,24", "--keep-all",
+                       f"--type={'int16' if kind == '<i2' else 'uint16'}")
+            self.brick(os.path.join(REGRESS, f"{name}.tif"), "tiff.trip", "--keep-all")
+            drawn, expected = (self.picture(f"{d}.trip", *VIEW, "--tf=grey", "--up=0,0,1", "--view=left")
+                               for d in ("tiff", "raw"))
+            self.assertGreater(expected.std(), 0.01)
+            self.assertTrue((drawn == expected).all(), name)
+
+    def test_a_nifti_file_named_gz_need_not_be_compressed(self):
+        header = bytearray(352)
+        struct.pack_into("<i", header, 0, 348)
+        struct.pack_into("<8h", header, 40, 3, 6, 5, 4, 1, 1, 1, 1)
+        struct.pack_into("<2h", header, 70, 2, 8)
+        struct.pack_into("<8f", header, 76, 1, 1, 1, 1, 1, 1, 1, 1)
+        struct.pack_into("<3f", header, 108, 352, 1, 0)
+        header[344:348] = b"n+1\0"
+        program.write("plain.nii.gz", bytes(header) + bytes(range(120)))
+        self.brick("plain.nii.gz", "plain.trip", "--keep-all")
+        info = self.info("plain.trip")
+        self.assertEqual((info["dims"], info["value_max"]), ([6, 5, 4], 119))
 
     def test_a_temporary_of_a_killed_process_does_no_harm(self):
         """The killed process had the same process number."""
