@@ -340,6 +340,9 @@ void trip_option_print(const trip_option *row, const void *base, char text[TRIP_
     case TRIP_OPTION_BYTES_64:
         snprintf(text, bytes, "%llu", (unsigned long long)*(const uint64_t *)at);
         return;
+    case TRIP_OPTION_BYTES:
+        snprintf(text, bytes, "%.0f", numbers[0]);
+        return;
     case TRIP_OPTION_CHOICE:
         snprintf(text, bytes, "%s", row->choices[*(const int *)at - row->first]);
         return;

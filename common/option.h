@@ -64,7 +64,7 @@ typedef struct trip_option_table {
     size_t count; /* at most 64 */
 } trip_option_table;
 
-enum { TRIP_OPTION_TEXT_BYTES = 512 };
+enum { TRIP_OPTION_TEXT_BYTES = 1024 };
 
 /* Reads a value into the struct at `base`. Sets *row to the row that took it, if `row` is not NULL.
  * Several rows may have the same name. Then the row with this choice takes the value. Values

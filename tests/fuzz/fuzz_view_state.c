@@ -18,8 +18,7 @@ static void check_again(const trip_view_state *s)
     char *text = trip_view_state_print(s, "/d");
     FUZZ_PROMISE(text && trip_view_state_parse(&again, "/d", text, "again") == 1);
     FUZZ_PROMISE(memcmp(&again.navigation, &s->navigation, sizeof s->navigation) == 0);
-    FUZZ_PROMISE(memcmp(again.settings.light.toward, s->settings.light.toward,
-                        sizeof s->settings.light.toward) == 0);
+    FUZZ_PROMISE(draw_settings_same(&again.settings, &s->settings));
     FUZZ_PROMISE(again.opacity_scale == s->opacity_scale && again.panel == s->panel);
     trip_view_state_release(&again);
     free(text);
@@ -32,7 +31,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(text, data, size);
     if (trip_view_state_parse(&s, "/d", text, "fuzz") == 1) {
         FUZZ_PROMISE(!s.has_navigation || trip_navigation_distance(&s.navigation) > 0);
-        FUZZ_PROMISE(s.settings.all.samples >= 1 && s.settings.all.samples <= 64);
+        FUZZ_PROMISE(draw_settings_check_ranges(&s.settings) == 0);
         check_again(&s);
     } else {
         FUZZ_PROMISE(s.text == NULL && s.function == NULL);

@@ -56,6 +56,19 @@ static void options_set_the_members_of_their_names(void **state)
     assert_int_equal(s.all.traversal, TRIPTYCH_TRAVERSAL_ASCENDING);
 }
 
+static void the_longest_values_are_printed_completely(void **state)
+{
+    (void)state;
+    draw_settings s = { .clip = { .planes = 6 }, .lod = { .max_bytes = 1e18 } },
+                  again = { .has_background = 0 };
+    for (int i = 0; i < 24; i++)
+        s.clip.plane[i / 4][i % 4] = -1.2345678901234567e-300 / (i + 3);
+    char *text = draw_settings_text(&s);
+    assert_int_equal(draw_settings_read_text(&again, text), 0);
+    assert_true(draw_settings_same(&s, &again));
+    free(text);
+}
+
 static void a_difference_in_any_row_is_seen(void **state)
 {
     (void)state;
@@ -128,6 +141,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_row_reads_and_prints_the_same_option),
         cmocka_unit_test(options_set_the_members_of_their_names),
+        cmocka_unit_test(the_longest_values_are_printed_completely),
         cmocka_unit_test(a_difference_in_any_row_is_seen),
         cmocka_unit_test(public_settings_point_to_every_group),
         cmocka_unit_test(bad_values_are_refused),
