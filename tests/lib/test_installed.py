@@ -123,7 +123,7 @@ class Installed(unittest.TestCase):
     def test_the_headers_compile_as_c_plus_plus(self):
         with open(self.path("a.cpp"), "w") as f:
             f.write("#include <triptych_brick.h>\n#include <cstdio>\nint main() { triptych *t;"
-                    " triptych_volume volume{}; volume.type = "uint8";"
+                    " triptych_volume volume{}; (void)volume;"
                     " if (triptych_create(&t)) return 1; triptych_view view{}; view.width = 8;"
                     " int status = triptych_set_view(t, &view); std::puts(triptych_error(t));"
                     " triptych_destroy(t); return status == TRIPTYCH_USAGE ? 0 : 1; }\n")
