@@ -26,6 +26,7 @@ extern const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS];
 /* Measures popping on the first data set by the cpu renderer. Its context is open, and its view
  * changes. `defaults` has the settings that all share. `rgba` has room for one picture. */
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const draw_settings *defaults, measure_progress *progress, float *rgba);
+                             const draw_settings *defaults, measure_progress *progress,
+                             float *rgba);
 
 #endif

@@ -67,5 +67,4 @@ typedef struct accuracy_measured {
 int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char *folder);
 void accuracy_measured_free(accuracy_measured *m);
 
-
 #endif

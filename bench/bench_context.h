@@ -10,7 +10,7 @@
 
 typedef struct bench_context {
     triptych *t;
-    draw_settings settings;   /* from the options, without background */
+    draw_settings settings;     /* from the options, without background */
     measure_progress *progress; /* each picture is a step */
 } bench_context;
 

@@ -160,8 +160,7 @@ static int measure_view(pair *p, double fov, cJSON *rows)
     if (!status)
         status = take_turns(p);
     if (!status) {
-        measure_error_add(error, p->pictures[1], p->pictures[0],
-                           (size_t)size[0] * (size_t)size[1]);
+        measure_error_add(error, p->pictures[1], p->pictures[0], (size_t)size[0] * (size_t)size[1]);
         const measure_error_figures figures = measure_error_measure(error);
         double exact = measure_median(p->ms[0], p->options->repeat);
         double ewa = measure_median(p->ms[1], p->options->repeat);

@@ -218,7 +218,7 @@ static int begin(measuring *m)
     if (!m->volumes || !m->rgba || !m->truth)
         return trip_fail(TRIP_ERROR, "bench", "levels", "out of memory");
     measure_progress_expect(o->progress,
-                          m->count + o->views * (1 + m->count * ENTRIES * (1 + o->repeat)));
+                            m->count + o->views * (1 + m->count * ENTRIES * (1 + o->repeat)));
     int status = 0;
     for (int i = 0; i < m->count && !status; i++)
         status = open_volume(m, i);

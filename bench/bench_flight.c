@@ -127,7 +127,8 @@ static int compare_rest(const flying *m, int *differ)
     if (!status)
         status = bench_context_picture(&c, width, height, &rgba);
     if (!status)
-        status = bench_context_draw(&c, c.settings.lod.voxel_px, c.settings.all.samples, rgba, NULL);
+        status =
+            bench_context_draw(&c, c.settings.lod.voxel_px, c.settings.all.samples, rgba, NULL);
     for (size_t i = 0; !status && i < (size_t)width * (size_t)height; i++)
         for (size_t k = 0; k < 3; k++)
             *differ += byte_of(rgba[4 * i + k]) != m->flyer.last[4 * i + k];

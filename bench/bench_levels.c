@@ -43,7 +43,7 @@ typedef struct entry {
     measure_error drawn[2]; /* with one ray per pixel */
     measure_error own[2];   /* with as many rays as the reference */
     measure_error fine[2];  /* finest level at this size, with one ray per pixel */
-    double ms, fine_ms;      /* sums over the views */
+    double ms, fine_ms;     /* sums over the views */
 } entry;
 
 /* Sets a parallel view of the whole object, with voxels of a level one pixel wide. */

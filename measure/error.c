@@ -13,7 +13,7 @@ static void add_channel(measure_error *e, double error)
 }
 
 void measure_error_add_apart(measure_error *colour, measure_error *alpha, const float *picture,
-                              const float *truth, size_t pixels)
+                             const float *truth, size_t pixels)
 {
     for (size_t i = 0; i < 4 * pixels; i += 4)
         if (picture[i + 3] > 1.0F / 255 || truth[i + 3] > 1.0F / 255)

@@ -28,7 +28,7 @@ typedef struct measure_error_figures {
 void measure_error_add(measure_error *e, const float *picture, const float *truth, size_t pixels);
 /* Adds red, green and blue to `colour`, and alpha to `alpha`. */
 void measure_error_add_apart(measure_error *colour, measure_error *alpha, const float *picture,
-                              const float *truth, size_t pixels);
+                             const float *truth, size_t pixels);
 /* Returns zeros and an infinite psnr if no pixel is covered. */
 measure_error_figures measure_error_measure(const measure_error *e);
 

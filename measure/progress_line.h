@@ -8,7 +8,8 @@ typedef struct measure_progress measure_progress;
 
 /* `name` starts the line. Returns NULL if nothing is shown; all functions accept NULL. */
 measure_progress *measure_progress_start(const char *name);
-/* Like measure_progress_start(), but prints a line every two seconds if stderr is not a terminal. */
+/* Like measure_progress_start(), but prints a line every two seconds if stderr is not a terminal.
+ */
 measure_progress *measure_progress_start_lines(const char *name);
 /* Adds to the number of expected steps. */
 void measure_progress_expect(measure_progress *p, int steps);

@@ -44,8 +44,8 @@ int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes);
 /* Returns the length of a regular file. Any other file is a reported failure. */
 int trip_file_size(const char *path, uint64_t *bytes_out);
 
-/* Returns the encoding from the name's extension: ".gz", ".bz2", else plain. A file that starts like
- * an uncompressed NIfTI file is plain. */
+/* Returns the encoding from the name's extension: ".gz", ".bz2", else plain. A file that starts
+ * like an uncompressed NIfTI file is plain. */
 trip_byte_encoding trip_byte_encoding_of(const char *path);
 
 #endif

@@ -1,5 +1,6 @@
-/* Early termination (trip_settings.early_termination). Checks at which transmittance a pixel stops, how
- * far the picture is from one without termination, and that renderers and instruction sets agree.
+/* Early termination (trip_settings.early_termination). Checks at which transmittance a pixel stops,
+ * how far the picture is from one without termination, and that renderers and instruction sets
+ * agree.
  */
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
