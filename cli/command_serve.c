@@ -63,20 +63,6 @@ static int check(void *user)
     return status ? status : draw_settings_check(&s->settings, &o->resources.renderer, true);
 }
 
-static int choose_settings(serve_options *o)
-{
-    trip_serve_params *p = &o->params;
-    const quality_drawn drawn = { p->input, p->function };
-    int status =
-        quality_options_use(&o->quality, &drawn, &p->settings, &o->resources.renderer, false);
-    /* A moving view is drawn from coarse levels by this classification. */
-    const bool coarse_splats = draw_settings_classify(&p->settings) == TRIPTYCH_CLASSIFY_PRE;
-    o->volume.options.levels_for = quality_options_levels(&o->quality, coarse_splats);
-    o->volume.measured_volume = drawn.input;
-    o->volume.measured = o->quality.error > 0 ? o->quality.measured : NULL;
-    return status;
-}
-
 static int parse_options(serve_options *o, int argc, char **argv)
 {
     const uint64_t only_tf = ~(UINT64_C(1) << LOOK_TF);
@@ -114,7 +100,9 @@ static int parse_options(serve_options *o, int argc, char **argv)
     };
     int status = command_line_parse(&c, argc, argv);
     o->params.function = o->volume.function = o->look.name;
-    return status ? status : choose_settings(o);
+    return status ? status
+                  : viewed_volume_choose(&o->volume, &o->quality, o->params.input,
+                                         &o->params.settings, &o->resources.renderer);
 }
 
 /* Reports an unusable input or transfer function before the server starts. */

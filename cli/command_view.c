@@ -101,28 +101,13 @@ static int check(void *user)
     return status ? status : draw_settings_check(&o->params.settings, &o->resources.renderer, true);
 }
 
-static int choose_settings(view_command *o)
-{
-    trip_view_params *p = &o->params;
-    const quality_drawn drawn = { o->inputs[0], o->look.name };
-    int status =
-        quality_options_use(&o->quality, &drawn, &p->settings, &o->resources.renderer, false);
-    /* A moving view is drawn from coarse levels by this classification. */
-    const bool coarse_splats = draw_settings_classify(&p->settings) == TRIPTYCH_CLASSIFY_PRE;
-    o->volume.options.levels_for = quality_options_levels(&o->quality, coarse_splats);
-    p->settings_given |= o->quality.error > 0;
-    o->volume.measured_volume = drawn.input;
-    o->volume.measured = o->quality.error > 0 ? o->quality.measured : NULL;
-    return status;
-}
-
 static void take_options(view_command *o, const option_set sets[SETS])
 {
     trip_view_params *p = &o->params;
     p->start = view_options_view(&o->view);
     p->start_given = sets[VIEW].given != 0;
-    p->settings_given = (sets[SETTINGS].given | sets[HEAT].given) != 0;
-    p->function = o->look.name;
+    p->settings_given = (sets[SETTINGS].given | sets[HEAT].given) != 0 || o->quality.error > 0;
+    p->function = o->volume.function = o->look.name;
     p->opacity_scale = o->look.opacity_scale;
     p->no_panel = o->no_panel;
     p->fresh = o->fresh;
@@ -168,7 +153,9 @@ static int parse_options(view_command *o, int argc, char **argv)
     int status = command_line_parse(&c, argc, argv);
     if (!status)
         take_options(o, p.sets);
-    return status ? status : choose_settings(o);
+    return status ? status
+                  : viewed_volume_choose(&o->volume, &o->quality, o->inputs[0], &o->params.settings,
+                                         &o->resources.renderer);
 }
 
 static int note_read(view_command *o, triptych *t)
@@ -211,7 +198,6 @@ int trip_command_view(int argc, char **argv)
         return trip_exit_status(trip_fail(TRIP_ERROR, "usage", "view", "out of memory"));
     int status = parse_options(&o, argc, argv);
     o.params.inputs = o.inputs;
-    o.volume.function = o.params.function;
     o.volume.samples = true;
     o.params.memory_bytes = o.volume.options.memory_bytes = o.resources.memory_bytes;
     o.params.threads = o.volume.options.threads = o.resources.threads;

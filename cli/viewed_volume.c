@@ -5,7 +5,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "quality_options.h"
 #include "report.h"
 #include "transfer_function.h"
 
@@ -28,6 +27,19 @@ static int pass_file(void *user, const char *path)
 {
     (void)user, (void)path;
     return 0;
+}
+
+int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input,
+                         draw_settings *settings, triptych_renderer *renderer)
+{
+    int status =
+        quality_options_use(q, &(quality_drawn){ input, s->function }, settings, renderer, false);
+    /* A moving view is drawn from coarse levels by this classification. */
+    const bool coarse_splats = draw_settings_classify(settings) == TRIPTYCH_CLASSIFY_PRE;
+    s->options.levels_for = quality_options_levels(q, coarse_splats);
+    s->measured_volume = input;
+    s->measured = q->error > 0 ? q->measured : NULL;
+    return status;
 }
 
 static int check_volume(const viewed_volume *s, triptych *t, const char *volume)

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "cached_volume.h"
+#include "quality_options.h"
 
 typedef struct viewed_volume {
     triptych_brick_options
@@ -18,6 +19,11 @@ typedef struct viewed_volume {
                      from samples */
     cached_volume cached; /* zeroed before its first use */
 } viewed_volume;
+
+/* Takes the settings of --error, and selects the coarse levels for bricking. `q` must outlive *s.
+ */
+int viewed_volume_choose(viewed_volume *s, quality_options *q, const char *input,
+                         draw_settings *settings, triptych_renderer *renderer);
 
 /* Checks the inputs before anything is shown. A data set must open and accept the transfer
  * function. A volume must exist in a known format, and its transfer function must load. The context

@@ -1,5 +1,5 @@
-/* Asserts that the values of the public headers equal those of the parts below, where code casts
- * one to the other. */
+/* Asserts that enums of the public headers have the values of the enums below the library. Code
+ * casts one to the other. */
 #include "brick_params.h"
 #include "framing.h"
 #include "reader.h"

@@ -1,13 +1,13 @@
 /* Finds the view of a picture. The steps go one way, from the settings to the kernels:
  *
- *   settings      Takes the options of a view as given: trip_view_settings.
- *   object        Reads the box of the data set, and its directions up and front: trip_view_object.
- *   orientation   Sets another up if one is given. Lets a single slice face the viewer.
- *   directions    Turns right, up and forward of the picture by side, azimuth, elevation and roll.
- *   extent        Finds how far the visible voxels reach in given directions: visible.h.
- *   framing       Finds the point looked at, and the eye's distance or a parallel view's height.
- *   lens          Zooms. The result is a trip_camera_params.
- *   camera        Converts it to the data's index space: trip_camera_make() of camera.h.
+ * - settings: takes the options of a view as given: trip_view_settings.
+ * - object: reads the box of the data set, and its directions up and front: trip_view_object.
+ * - orientation: sets another up if one is given. Lets a single slice face the viewer.
+ * - directions: turns right, up and forward of the picture by side, azimuth, elevation and roll.
+ * - extent: finds how far the visible voxels reach in given directions: visible.h.
+ * - framing: finds the point looked at, and the eye's distance or a parallel view's height.
+ * - lens: zooms. The result is a trip_camera_params.
+ * - camera: converts it to the data's index space: trip_camera_make() of camera.h.
  *
  * trip_view_find() takes the steps from orientation to lens. One thread at a time. */
 #ifndef TRIP_FRAMING_H
