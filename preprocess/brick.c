@@ -408,7 +408,8 @@ static int find_orientation(brick *b)
                                 .kinds = b->kinds,
                                 .tile_log2 = b->format.tile_log2,
                                 .scale = trip_mean_scale_make(
-                                    b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };
+                                    b->in.tally->value_min, b->in.tally->value_max,
+                                    &(trip_codes){ .lo = q->lo, .hi = q->hi }) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     /* A region may look unlike the whole object. */
     const bool whole = trip_region_is_whole(&b->params->region);
@@ -428,8 +429,10 @@ static int finish_output(brick *b)
                                                                   .upright = b->upright });
     if (!text)
         return TRIP_ERROR;
-    trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
-                              text };
+    trip_writer_summary s = { .value_min = b->in.tally->value_min,
+                              .value_max = b->in.tally->value_max,
+                              .voxels = b->in.tally->voxels,
+                              .text = text };
     int status = check_records(b);
     if (status == 0)
         status =

@@ -23,7 +23,7 @@ static const char *find_difference(const trip_dataset *first, const trip_dataset
         memcmp(a->index_to_world, b->index_to_world, sizeof a->index_to_world) != 0 ||
         !has_same_coordinates(first, d))
         return "has a different grid";
-    if (a->code_lo != b->code_lo || a->code_hi != b->code_hi || a->code_bytes != b->code_bytes)
+    if (!trip_codes_equal(&first->codes, &d->codes) || a->code_bytes != b->code_bytes)
         return "has a different scale of values";
     if (a->normal_bytes != b->normal_bytes || a->gradient_full != b->gradient_full ||
         memcmp(a->gradient_step, b->gradient_step, sizeof a->gradient_step) != 0)
