@@ -1,5 +1,5 @@
 /* Tests the values of codes. */
-#include "test.h"
+#include "fixture.h"
 
 #include <math.h>
 #include <stdlib.h>
