@@ -66,6 +66,7 @@ struct triptych {
     double bytes_per_ms;               /* measured in bounded frames; 0 if none was drawn */
     bool kernel_warned;                /* warned about the halo for the kernel */
     bool levels_warned;                /* warned about missing levels for the classification */
+    bool light_noted;                  /* noted the light that was chosen for shadows */
     double kelvin[2];                  /* of emission */
     /* Reason for the choice of TRIPTYCH_EFFECT_AUTO; NULL without it. */
     const char *why_effects;
