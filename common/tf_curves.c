@@ -122,6 +122,14 @@ void trip_tf_curves_stretch(trip_tf_curves *c)
     normalise(&c->colours);
 }
 
+void trip_tf_curves_drop_opaque(trip_tf_curves *c)
+{
+    for (size_t i = 0; i < c->opacities.count; i++)
+        if (c->opacities.data[i].part[0] < 1)
+            return;
+    c->opacities.count = 0;
+}
+
 /* A growing list of points. */
 typedef struct samples {
     trip_tf curve;
@@ -277,6 +285,9 @@ int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *whe
     *out = NULL;
     if (c->colours.count == 0)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "the function has no colours");
+    if (c->opacities.count == 0)
+        trip_note(where, "has colours without opacities, so its opacity rises from 0 to 1 over the "
+                         "values; `triptych tf convert` writes it as text to edit");
     sample_colours(c, &colour);
     sample_opacities(c, &opacity);
     if (!colour.failed && !opacity.failed)
