@@ -285,9 +285,6 @@ int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *whe
     *out = NULL;
     if (c->colours.count == 0)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, where, "the function has no colours");
-    if (c->opacities.count == 0)
-        trip_note(where, "has colours without opacities, so its opacity rises from 0 to 1 over the "
-                         "values; `triptych tf convert` writes it as text to edit");
     sample_colours(c, &colour);
     sample_opacities(c, &opacity);
     if (!colour.failed && !opacity.failed)
@@ -300,6 +297,8 @@ int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *whe
     else
         status = trip_tf_from_points(out, merged.curve.points, merged.curve.count, c->normalised,
                                      c->unit_world);
+    if (!status)
+        (*out)->ramp = c->opacities.count == 0;
     free(colour.curve.points);
     free(opacity.curve.points);
     free(merged.curve.points);

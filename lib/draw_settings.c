@@ -241,7 +241,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                      "Sets the direction to the light as seen in the picture (1,1,1 is the upper "
                      "left front), or in the world; the position of the light; or a light at the "
                      "eye",
-                     "head; with shadows 1,1,1", .brief = "Sets the light (default: head, at the eye)",
+                     "head; with shadows 1,1,1",
+                     .brief = "Sets the light (default: head, at the eye)",
                      .group = DRAW_GROUP_LIGHT, .type = TRIP_OPTION_CUSTOM, AT(light.kind),
                      .read = read_light, .print = print_light, .same = same_light },
     [DRAW_EFFECTS] = { "effects", "auto|none|LIST",

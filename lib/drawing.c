@@ -173,8 +173,7 @@ static int choose_parts(triptych *t)
     int status = 0;
     t->parts = (trip_lod_parts){ .count = 1 };
     t->part = 0;
-    if (s->classify != TRIP_CLASSIFY_POST ||
-        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
+    if (s->classify != TRIP_CLASSIFY_POST || t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return status;
     status = trip_lod_parts_make(&t->parts, t->session.data, &t->camera, s, one, t->session.budget);
     if (t->parts.count > 1) /* the background is added after the last part */

@@ -28,7 +28,7 @@ enum {
     DEBUG_VIEW = 1 << 14,
     SHOW_MERGE = 1 << 15,
     COUNTED = 1 << 16,
-    PLAIN = 1 << 17, /* neither shading nor effects */
+    PLAIN = 1 << 17,     /* neither shading nor effects */
     HEADLIGHT = 1 << 18, /* asked for */
     SHADOWS = 1 << 19,
     MAY_SHADOW = 1 << 20, /* shadows or automatic effects */

@@ -78,8 +78,8 @@ static int load_function(const session *s, const session_look *look, trip_tf **t
                  : look->tf    ? trip_tf_load(tf, look->tf)
                                : trip_dataset_metadata_tf(s->text, s->data, tf);
     bool window = look->window > 0;
-    if (!status && !(window && trip_tf_is_normalised(*tf))) /* a window replaces the range */
-        status = trip_dataset_metadata_adapt(s->text, s->data, *tf);
+    if (!status && !(window && trip_tf_spans_window(*tf))) /* a window replaces the range */
+        status = trip_dataset_metadata_adapt(s->text, s->data, *tf, s->input);
     return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 

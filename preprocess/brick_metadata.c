@@ -288,9 +288,8 @@ void trip_brick_metadata_note(const trip_brick_metadata *t, char note[TRIP_BRICK
 {
     const trip_volume_info *info = t->info;
     const orientation o = orientation_of(t);
-    const size_t length =
-        (size_t)snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s", info->note,
-                         o.why && info->note[0] ? "; " : "");
+    const size_t length = (size_t)snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s", info->note,
+                                           o.why && info->note[0] ? "; " : "");
     if (o.why)
         snprintf(note + length, TRIP_BRICK_NOTE_BYTES - length,
                  "its file does not say what is up: %s, with up at %s%s%s; --up, --view and --axes "

@@ -41,8 +41,10 @@ const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, 
 /* Returns the kind of the volume, or TRIP_TF_SIMULATION if the text has none. */
 trip_tf_kind trip_dataset_metadata_kind(const trip_dataset_metadata *t);
 
-/* Converts a transfer function that is relative to the data or its histogram to data units. */
-int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf);
+/* Converts a transfer function that is relative to the data or its histogram to data units. `where`
+ * names the data in messages. */
+int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf,
+                                const char *where);
 
 /* Loads the stored transfer function, or else a faint grey ramp over the values. */
 int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf **out);

@@ -249,7 +249,8 @@ static bool set_light(trip_document *d, const char *value)
         if (!trip_text_to_double(strsep(&rest, ","), &numbers[count]))
             return false;
     const trip_light_control c = { count == 2, numbers[0], numbers[1], numbers[2] };
-    if (count < 2 || rest || !(fabs(c.round) <= 360 && fabs(c.up) <= 90 && c.distance >= TRIP_LIGHT_NEAREST))
+    if (count < 2 || rest ||
+        !(fabs(c.round) <= 360 && fabs(c.up) <= 90 && c.distance >= TRIP_LIGHT_NEAREST))
         return false;
     trip_light_control_set(&d->settings, &d->info, &c);
     return true;

@@ -61,8 +61,8 @@ typedef struct trip_volume_info {
     bool sparse;         /* only active voxels exist; all others hold `background` */
     double background;
     const char *format; /* "nrrd", "openvdb", ... */
-    char space[8]; /* orientation of world space in the patient: "RAS", or "" if unknown. Readers may
-                      set "LPS"; opening a volume turns it into "RAS". */
+    char space[8]; /* orientation of world space in the patient: "RAS", or "" if unknown. Readers
+                      may set "LPS"; opening a volume turns it into "RAS". */
     bool oriented; /* the file gives the directions of its axes in world space */
     char up[3];    /* "+y" or "+z", which is up in the program that wrote the file; "" if unknown */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
