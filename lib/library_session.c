@@ -168,15 +168,42 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
     return status;
 }
 
+/* Fails if the last part is made of another volume than the first one. Such a volume may have the
+ * same grid, but one transfer function cannot show both. */
+static int check_source(session *s)
+{
+    const unsigned last = s->part_count - 1;
+    int status = session_read_text(s);
+    if (status)
+        return status;
+    const char *first = trip_dataset_metadata_source(s->texts[0]);
+    const char *other = trip_dataset_metadata_source(s->texts[last]);
+    if (!first || !other || !strcmp(first, other))
+        return 0;
+    return trip_fail(TRIP_ERROR, "open", s->parts[last]->path,
+                     "is made of another volume (%s) than %s (%s); " TRIP_JOIN_ADVICE, other,
+                     s->parts[0]->path, first);
+}
+
+static void drop_last_part(session *s)
+{
+    s->part_count--;
+    trip_dataset_metadata_destroy(s->texts[s->part_count]);
+    trip_dataset_close(s->parts[s->part_count]);
+}
+
 int session_add_data(session *s, const char *input)
 {
-    trip_dataset *joined;
+    trip_dataset *joined = NULL;
     int status = open_part(s, input);
     if (status)
         return status;
     status = trip_dataset_join(&joined, s->parts, s->part_count, s->budget);
+    if (!status)
+        status = check_source(s);
     if (status) {
-        trip_dataset_close(s->parts[--s->part_count]);
+        trip_dataset_join_close(joined);
+        drop_last_part(s);
         return status;
     }
     trip_dataset_join_close(s->joined);

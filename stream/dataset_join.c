@@ -111,9 +111,7 @@ static int check(trip_dataset *const *parts, unsigned count)
     for (unsigned p = 1; p < count; p++) {
         const char *why = find_difference(parts[0], parts[p]);
         if (why)
-            return trip_fail(TRIP_ERROR, "open", parts[p]->path,
-                             "%s than %s; data sets drawn together must be regions of one volume, "
-                             "bricked alike (triptych brick --region)",
+            return trip_fail(TRIP_ERROR, "open", parts[p]->path, "%s than %s; " TRIP_JOIN_ADVICE,
                              why, parts[0]->path);
     }
     if (count_lists(parts, count) > TRIP_LISTS_MAX)
