@@ -191,7 +191,9 @@ static void explain_lattice(const triptych *t, FILE *out)
     fprintf(out, "light       %d x %d x %d nodes, one in %g voxels: %s\n", grid->nodes[0],
             grid->nodes[1], grid->nodes[2], grid->spacing,
             trip_light_map_is_complete(t->light) ? "kept from the frame before, so nothing is read"
-                                                 : "one more list is read");
+            : trip_light_map_is_gathered(t->light)
+                ? "kept from the frame before, but swept for another light"
+                : "one more list is read");
 }
 
 static void explain_heat(const triptych *t, FILE *out)

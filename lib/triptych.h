@@ -24,6 +24,7 @@
  * --kernel-radius.
  *
  * Coordinates: world space has the length units of the volume's file (millimetres, metres, ...).
+ * For a patient, x points to the right, y to anterior and z to superior (RAS), in every format.
  * Index space has voxel (i, j, k) at (i, j, k).
  *
  * Pictures: `height` rows of `width` pixels, the top row first. A pixel is four floats: red, green,
