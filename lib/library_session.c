@@ -168,8 +168,8 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
     return status;
 }
 
-/* Fails if the last part is made of another volume than the first one. Such a volume may have the
- * same grid, but one transfer function cannot show both. */
+/* Fails if the last part is made of another volume than the first one. One
+ * transfer function cannot show both, even if the grids are equal. */
 static int check_source(session *s)
 {
     const unsigned last = s->part_count - 1;

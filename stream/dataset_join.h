@@ -7,7 +7,7 @@
 
 #include "dataset.h"
 
-/* What to do with data sets that cannot be joined, for messages. */
+/* The advice of messages about data sets that cannot be joined. */
 #define TRIP_JOIN_ADVICE                                                                           \
     "only regions of one volume, bricked alike, are drawn together (triptych brick --region); "    \
     "draw "                                                                                        \

@@ -80,6 +80,15 @@ class ViewLight(program.ProgramTest):
         self.assertNotIn(note, run.stderr)
         self.fails(2, *draw, "--effects", "shadows", "--light", "head", says="--light head")
 
+    def test_labels_get_the_same_effects_in_the_first_picture_as_later(self):
+        values = numpy.zeros((24, 24, 24), "u1")
+        values[4:10, 4:10, 4:10], values[14:20, 12:20, 12:20] = 1, 2
+        program.write_nrrd("labels.nrrd", values)
+        program.write("solid.tf", b"values data\n0.4 0 0 0 0\n0.5 1 0 0 1\n1.5 1 0 0 1\n1.5 0 1 0 1\n")
+        text = self.works("render", "labels.nrrd", "-o", "l.exr", "--tf", "solid.tf", "--size=32x32",
+                          "--effects=auto", "--orbit", 2, "--in-flight", 1, "--explain").stdout.decode()
+        self.assertEqual(text.count("occlusion   runs: labels are drawn as surfaces"), 2)
+
 
 if __name__ == "__main__":
     program.main()

@@ -111,7 +111,7 @@ static void colour_maps_of_older_paraview_versions_are_normalised(void **state)
     trip_tf_destroy(tf);
 }
 
-/* Such maps have o="1" throughout. */
+/* All their points have o="1". */
 static void colour_maps_for_surfaces_get_a_ramp(void **state)
 {
     (void)state;

@@ -1362,7 +1362,7 @@ static void measured_volumes_have_effects_only_on_request(void **state)
     s.effects.which = TRIPTYCH_EFFECT_SHADOWS;
     s.light.kind = TRIPTYCH_LIGHT_HEAD;
     assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
-    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "shadows require a light");
+    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "shadows cannot be seen with --light head");
     s.effects.which = TRIPTYCH_EFFECT_EMISSION;
     assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "needs a data set of heat");

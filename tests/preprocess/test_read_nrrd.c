@@ -308,8 +308,10 @@ static void spacings_and_directions_become_the_map(void **state)
                                 "space: left-posterior-superior\n"
                                 "space directions: (1,0.25,0) ( 0 , 2 , 0.5 )  (-0.5,0,3)\n"
                                 "space origin: (-10, 20, 1e1)\n"));
-    assert_map(&a,
-               (const double[3][4]){ { 1, 0, -0.5, -10 }, { 0.25, 2, 0, 20 }, { 0, 0.5, 3, 10 } });
+    assert_map(&a, (const double[3][4]){ /* in RAS, x and y are negated */
+                                         { -1, 0, 0.5, 10 },
+                                         { -0.25, -2, 0, -20 },
+                                         { 0, 0.5, 3, 10 } });
     a = map_of(write_with_lines("extent.nrrd", "axis mins: 1 -3 nan\naxis maxs: 11 3 nan\n"
                                                "centers: cell node cell\n"));
     assert_map(&a, (const double[3][4]){ { 2, 0, 0, 2 }, { 0, 2, 0, -3 }, { 0, 0, 1, 0 } });
