@@ -43,6 +43,8 @@ typedef struct trip_dataset {
     /* For level 0. With uneven spacing it maps positions to world space. */
     trip_affine index_to_world;
     trip_coordinates coordinates;
+    /* The normals of the header and the lists are on no disk (dataset_normals.h). */
+    bool computes_normals;
     trip_list *lists; /* from the budget */
     unsigned list_count;
     char *text;     /* JSON, null-terminated */

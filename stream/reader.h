@@ -23,8 +23,10 @@ typedef enum trip_engine {
 /* Zero selects the default. */
 typedef struct trip_reader_params {
     trip_engine engine;
-    unsigned planes; /* one bit per trip_plane; voxels always */
-    unsigned slots;  /* length of the ring, at least 2; default 8 */
+    /* One bit per trip_plane; voxels always. Normals that the data set does not store are computed,
+     * in passes with trip_pass.around. */
+    unsigned planes;
+    unsigned slots; /* length of the ring, at least 2; default 8 */
     /* Size of a slot for all planes, from trip_reader_slot_bytes(). Slots hold whole runs. */
     size_t slot_bytes;
     /* Gaps up to this size are read through. At least a page; default 32 KiB. */
@@ -87,8 +89,9 @@ typedef struct trip_reader_stats {
     uint64_t bytes_cached;      /* from the cache instead */
     uint64_t splats;            /* handed out */
     uint64_t runs_skipped,
-        bytes_skipped; /* by the skip callback; includes gaps that are read through */
-    uint64_t wait_ns;  /* time spent waiting for the disk */
+        bytes_skipped;   /* by the skip callback; includes gaps that are read through */
+    uint64_t wait_ns;    /* time spent waiting for the disk */
+    uint64_t normals_ns; /* time spent computing normals */
 } trip_reader_stats;
 
 /* Whether the engine can read into memory that does not belong to the process, such as a driver's
@@ -125,7 +128,8 @@ int trip_reader_next(trip_reader *r, trip_batch *batch);
  * the timeout; UINT64_MAX sets none. Returns false after the timeout or an interruption. */
 bool trip_reader_await(trip_reader *r, uint64_t timeout_ns);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
-/* Returns the length of the ring. */
+/* Returns the length of the ring, or 1 if normals are computed: then one batch is handed out at a
+ * time. */
 unsigned trip_reader_slots(const trip_reader *r);
 /* Whether the slots are the caller's memory. */
 bool trip_reader_in_place(const trip_reader *r);

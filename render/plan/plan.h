@@ -37,6 +37,7 @@ typedef struct trip_plan_list {
  * `ascending` traversal one pass covers all sheets. */
 typedef struct trip_plan_pass {
     trip_pass pass;
+    trip_pass around;   /* pass.around, if normals are computed */
     bool front_to_back; /* false only in `ascending` traversal, if the view looks down the axis */
 } trip_plan_pass;
 
@@ -69,6 +70,10 @@ typedef struct trip_plan {
     trip_mean_tables own_tables; /* of coarse levels, if the caller keeps none */
     trip_selection *selections;  /* of all passes; room for two per list */
     unsigned selection_count;
+    /* If normals are computed: the selections of all passes around, with room for two per list. */
+    trip_selection *around;
+    unsigned around_count;
+    uint64_t bytes_around; /* bytes of the bricks that only these selections read */
 } trip_plan;
 
 /* Makes the plan of a frame. `camera` must be made with the index_to_world map of level 0.
