@@ -177,7 +177,7 @@ typedef struct triptych_info {
     /* Checksum of the index, which contains the checksums of all other bytes. Equal data sets have
      * equal checksums. */
     uint64_t checksum;
-    /* normal_bytes is 0 if the data set has no normals; its splats are then not shaded. */
+    /* normal_bytes is 0 if the data set stores no normals; drawing then computes them. */
     unsigned format_version, lists, code_bytes, normal_bytes;
     /* gradient_step is the unit of 3-byte normals. Shading is full from gradients of gradient_full
      * on. */
