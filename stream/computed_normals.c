@@ -625,7 +625,7 @@ typedef struct run_work {
     const trip_list *list;
     const trip_run *run;
     const sheet *sheets[3]; /* below, here, above */
-    double u[3], v[3], sheet[3];
+    float u[3], v[3], sheet[3];
     distances along[3];
 } run_work;
 
@@ -633,33 +633,39 @@ static run_work work_on(const trip_computed_normals *n, const level *l, const tr
                         const trip_run *run)
 {
     run_work w = { .n = n, .l = l, .list = list, .run = run };
+    const double full = n->data->header.gradient_full;
+    const double scale = full > 0 ? n->value_per_code / full : 0;
     for (int i = 0; i < 3; i++) {
         const double(*m)[3] = n->to_world[list->level];
         w.sheets[i] = find_sheet(l, run->sheet - 1 + i);
-        w.sheet[i] = n->value_per_code * m[i][list->axis];
-        w.u[i] = n->value_per_code * m[i][(list->axis + 1) % 3];
-        w.v[i] = n->value_per_code * m[i][(list->axis + 2) % 3];
+        w.sheet[i] = (float)(scale * m[i][list->axis]);
+        w.u[i] = (float)(scale * m[i][(list->axis + 1) % 3]);
+        w.v[i] = (float)(scale * m[i][(list->axis + 2) % 3]);
     }
     find_distances(n, list->level, list->axis, list->dims[list->axis], run->sheet, 1, &w.along[2]);
     return w;
+}
+
+/* Maps the gradients of a square to world space, in units of the gradient of full shading. */
+TRIP_ALSO_V3
+static void map_gradients(const run_work *w, const gradients *g, float to[3][64])
+{
+    for (int i = 0; i < 3; i++)
+        for (int n = 0; n < 64; n++)
+            to[i][n] = w->u[i] * g->u[n] + w->v[i] * g->v[n] + w->sheet[i] * g->sheet[n];
 }
 
 /* Packs the normals of the records of a square to `to`. */
 static void put_normals(const run_work *w, const gradients *g, const square *here, uint64_t mask,
                         unsigned char *to)
 {
-    const double full = w->n->data->header.gradient_full;
-    for (; mask; mask &= mask - 1, to += sizeof(uint32_t)) {
+    float world[3][64];
+    uint32_t normals[64];
+    map_gradients(w, g, world);
+    trip_normals_pack_64(world[0], world[1], world[2], normals);
+    for (; mask; mask &= mask - 1, to += sizeof *normals) {
         const unsigned entry = entry_of((unsigned)__builtin_ctzll(mask));
-        uint32_t normal = 0;
-        if (here->present >> entry & 1) {
-            const double u = (double)g->u[entry], v = (double)g->v[entry],
-                         s = (double)g->sheet[entry];
-            const double gradient[3] = { w->u[0] * u + w->v[0] * v + w->sheet[0] * s,
-                                         w->u[1] * u + w->v[1] * v + w->sheet[1] * s,
-                                         w->u[2] * u + w->v[2] * v + w->sheet[2] * s };
-            normal = trip_normal_pack(gradient, full);
-        }
+        const uint32_t normal = here->present >> entry & 1 ? normals[entry] : 0;
         memcpy(to, &normal, sizeof normal);
     }
 }
