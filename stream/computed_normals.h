@@ -1,17 +1,13 @@
 /* Computes normals from values, for data sets that store none. It stands between the slots of a
  * reader and the caller: it takes the runs of trip_pass.around, and hands out the runs of the pass
- * with a plane of normals, in the same order. A normal is the gradient of the field of sheet.h:
- *
- * - the central difference along each axis if both neighbours are in the lists
- * - the difference to one neighbour if the lists hold only that one
- * - 0 without neighbours
- *
- * The sheets before, at and behind a run are in memory, so memory does not depend on the number of
- * sheets. The reader owns it; one thread. */
+ * with a plane of normals, in the same order. normal_sheets.h defines the
+ * normals. The sheets before, at and behind a run are in memory, so memory does not depend on the
+ * number of sheets. The reader owns it; one thread. */
 #ifndef TRIP_COMPUTED_NORMALS_H
 #define TRIP_COMPUTED_NORMALS_H
 
-#include "reader.h"
+#include "batch.h"
+#include "task_runner.h"
 
 typedef struct trip_computed_normals trip_computed_normals;
 
@@ -23,9 +19,15 @@ typedef enum trip_normals_state {
 
 /* Returns the bytes that the computation takes for a data set. */
 uint64_t trip_computed_normals_bytes(const trip_dataset *d);
-/* Uses `runner`, `skip` and `skip_user` of the parameters. */
+/* As in trip_reader_params. */
+typedef struct trip_computed_normals_params {
+    trip_task_runner runner;
+    bool (*skip)(void *user, const trip_selection *s, const trip_run *run);
+    void *skip_user;
+} trip_computed_normals_params;
+
 int trip_computed_normals_create(trip_computed_normals **out, const trip_dataset *d,
-                                 const trip_reader_params *params, trip_budget *budget);
+                                 const trip_computed_normals_params *params, trip_budget *budget);
 void trip_computed_normals_destroy(trip_computed_normals *n);
 
 /* Forgets all runs. */

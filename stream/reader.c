@@ -255,7 +255,10 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
     if (status == TRIP_OK && r->params.engine == TRIP_ENGINE_NULL)
         status = load_lists(r);
     if (status == TRIP_OK && d->computes_normals && params->planes >> TRIP_PLANE_NORMALS & 1)
-        status = trip_computed_normals_create(&r->normals, d, params, budget);
+        status = trip_computed_normals_create(
+            &r->normals, d,
+            &(trip_computed_normals_params){ params->runner, params->skip, params->skip_user },
+            budget);
     if (status < 0) {
         trip_reader_destroy(r);
         return status;

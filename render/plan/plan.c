@@ -6,7 +6,6 @@
 
 #include "effects.h"
 #include "field.h"
-#include "plan_around.h"
 #include "plan_cull.h"
 #include "report.h"
 #include "shade.h"
@@ -436,6 +435,21 @@ static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const tr
     trip_clip_simplify(&plan->clip, data->header.dims);
 }
 
+/* Adds the passes to read around the passes, if normals are computed. */
+static int add_around(trip_plan *plan, const trip_dataset *data, trip_budget *budget)
+{
+    if (!data->computes_normals || !(plan->planes >> TRIP_PLANE_NORMALS & 1))
+        return 0;
+    int status = trip_plan_around_create(&plan->around, plan->list_count, budget);
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 0; i < plan->layers[axis].pass_count && !status; i++) {
+            trip_plan_pass *pass = &plan->layers[axis].passes[i];
+            status = trip_plan_around_add(&plan->around, &pass->pass, &pass->around, budget);
+            pass->pass.around = &pass->around;
+        }
+    return status;
+}
+
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
@@ -483,7 +497,7 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         plan_classification(&p);
     if (!status)
-        status = trip_plan_around_make(plan, data, budget);
+        status = add_around(plan, data, budget);
     if (status)
         trip_plan_release(plan, budget);
     return status;
@@ -555,7 +569,7 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
     if (!status)
         status = gather_lists(&p, kinds);
     if (!status)
-        status = trip_plan_around_make(plan, data, budget);
+        status = add_around(plan, data, budget);
     if (status)
         trip_plan_release(plan, budget);
     return status;
@@ -566,7 +580,7 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
     size_t count = plan->list_count;
     for (unsigned i = 0; i < plan->selection_count; i++)
         trip_selection_destroy(&plan->selections[i], budget);
-    trip_plan_around_release(plan, budget);
+    trip_plan_around_release(&plan->around, budget);
     trip_mean_tables_release(&plan->own_tables, budget);
     trip_lod_release(&plan->lod, budget);
     trip_budget_release(budget, plan->selections, 2 * count * sizeof *plan->selections);
@@ -916,7 +930,7 @@ static void explain_normals(const trip_plan *plan, const trip_dataset *data, FIL
         fprintf(out,
                 "gradients   are differences of the values, computed while reading: %s more are "
                 "read for them\n",
-                trip_format_bytes(plan->bytes_around, bytes));
+                trip_format_bytes(plan->around.bytes, bytes));
     else
         fprintf(out, "gradients   are the stored normals: normal planes are read, %s\n",
                 trip_format_bytes(sum, bytes));

@@ -9,6 +9,7 @@
 #include "classification.h"
 #include "list_grid.h"
 #include "lod.h"
+#include "plan_around.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
@@ -70,10 +71,7 @@ typedef struct trip_plan {
     trip_mean_tables own_tables; /* of coarse levels, if the caller keeps none */
     trip_selection *selections;  /* of all passes; room for two per list */
     unsigned selection_count;
-    /* If normals are computed: the selections of all passes around, with room for two per list. */
-    trip_selection *around;
-    unsigned around_count;
-    uint64_t bytes_around; /* bytes of the bricks that only these selections read */
+    trip_plan_around around; /* of passes with computed normals */
 } trip_plan;
 
 /* Makes the plan of a frame. `camera` must be made with the index_to_world map of level 0.

@@ -73,7 +73,8 @@ static void add_selection(trip_selection *to, const trip_selection *drawn)
 }
 
 /* Counts the blocks of the selected bricks that the pass does not draw. */
-static void count_bytes(trip_plan *plan, const trip_selection *around, const trip_selection *drawn)
+static void count_bytes(trip_plan_around *a, const trip_selection *around,
+                        const trip_selection *drawn)
 {
     const uint32_t sheets = around->data->header.slab_sheets;
     const trip_list *list = around->list;
@@ -81,17 +82,16 @@ static void count_bytes(trip_plan *plan, const trip_selection *around, const tri
         if (!trip_selection_has(around, b) || (drawn && trip_selection_has(drawn, b)))
             continue;
         for (uint32_t s = 0; s < sheets; s++)
-            plan->bytes_around += 8 * (uint64_t)list->runs[b * sheets + s].words;
+            a->bytes += 8 * (uint64_t)list->runs[b * sheets + s].words;
     }
 }
 
-/* Makes the selection of a list for a pass. Drops it if it has no bricks. */
-static int add_list(trip_plan *plan, trip_plan_pass *pass, const trip_list *list,
-                    trip_budget *budget)
+/* Makes the selection of a list, if the pass draws its level. */
+static int add_list(trip_plan_around *a, const trip_pass *drawn, trip_pass *around,
+                    const trip_list *list, trip_budget *budget)
 {
-    const trip_pass *drawn = &pass->pass;
     const trip_selection *own = NULL;
-    trip_selection *to = &plan->around[plan->around_count];
+    trip_selection *to = &a->selections[a->count];
     int64_t first = INT64_MAX, last = -1;
     for (unsigned i = 0; i < drawn->selection_count; i++) {
         const trip_selection *s = &drawn->selections[i];
@@ -112,9 +112,9 @@ static int add_list(trip_plan *plan, trip_plan_pass *pass, const trip_list *list
     for (unsigned i = 0; i < drawn->selection_count; i++)
         if (drawn->selections[i].list->level == list->level)
             add_selection(to, &drawn->selections[i]);
-    count_bytes(plan, to, own);
-    plan->around_count++;
-    pass->around.selection_count++;
+    count_bytes(a, to, own);
+    a->count++;
+    around->selection_count++;
     return 0;
 }
 
@@ -125,38 +125,34 @@ static bool is_read(const trip_dataset *data, const trip_list *list, int axis)
            (trip_kind_of(list->kind)->splatted || trip_dataset_has_gradients_of(data, list));
 }
 
-static int add_pass(trip_plan *plan, trip_plan_pass *pass, int axis, const trip_dataset *data,
-                    trip_budget *budget)
+int trip_plan_around_create(trip_plan_around *a, unsigned lists, trip_budget *budget)
 {
+    a->room = 2 * lists;
+    a->selections = trip_budget_take(budget, a->room * sizeof *a->selections);
+    if (a->selections)
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", "plan",
+                     "%u lists do not fit the memory given; raise --memory", lists);
+}
+
+int trip_plan_around_add(trip_plan_around *a, const trip_pass *drawn, trip_pass *around,
+                         trip_budget *budget)
+{
+    const trip_dataset *data = drawn->selections->data;
+    const int axis = drawn->selections->list->axis;
     int status = 0;
-    pass->around = (trip_pass){ .selections = &plan->around[plan->around_count],
-                                .descending = pass->pass.descending };
-    pass->pass.around = &pass->around;
+    *around =
+        (trip_pass){ .selections = &a->selections[a->count], .descending = drawn->descending };
     for (unsigned i = 0; i < data->list_count && !status; i++)
         if (is_read(data, &data->lists[i], axis))
-            status = add_list(plan, pass, &data->lists[i], budget);
+            status = add_list(a, drawn, around, &data->lists[i], budget);
     return status;
 }
 
-int trip_plan_around_make(trip_plan *plan, const trip_dataset *data, trip_budget *budget)
+void trip_plan_around_release(trip_plan_around *a, trip_budget *budget)
 {
-    int status = 0;
-    if (!data->computes_normals || !(plan->planes >> TRIP_PLANE_NORMALS & 1))
-        return 0;
-    plan->around = trip_budget_take(budget, 2 * (size_t)plan->list_count * sizeof *plan->around);
-    if (!plan->around)
-        return trip_fail(TRIP_ERROR, "render", "plan",
-                         "%u lists do not fit the memory given; raise --memory", plan->list_count);
-    for (int axis = 0; axis < 3; axis++)
-        for (int i = 0; i < plan->layers[axis].pass_count && !status; i++)
-            status = add_pass(plan, &plan->layers[axis].passes[i], axis, data, budget);
-    return status;
-}
-
-void trip_plan_around_release(trip_plan *plan, trip_budget *budget)
-{
-    for (unsigned i = 0; i < plan->around_count; i++)
-        trip_selection_destroy(&plan->around[i], budget);
-    trip_budget_release(budget, plan->around,
-                        plan->around ? 2 * (size_t)plan->list_count * sizeof *plan->around : 0);
+    for (unsigned i = 0; i < a->count; i++)
+        trip_selection_destroy(&a->selections[i], budget);
+    trip_budget_release(budget, a->selections, a->selections ? a->room * sizeof *a->selections : 0);
+    *a = (trip_plan_around){ 0 };
 }
