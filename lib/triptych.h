@@ -672,6 +672,7 @@ typedef struct triptych_frame_stats {
     /* Parts of `ms`: waiting for the disk, drawing, merging the layers. Merging includes the rays
      * of the integral. */
     double wait_ms, draw_ms, merge_ms;
+    double normals_ms; /* computing normals that the data set does not store (pre) */
     uint64_t splats, bytes_read, reads;     /* over all lists; read from disk */
     uint64_t bytes_cached;                  /* taken from the cache instead of the disk */
     uint64_t runs_occluded, bytes_occluded; /* not read, because they lie behind opaque matter */

@@ -287,7 +287,7 @@ trip_reader_stats trip_reader_get_stats(const trip_reader *r)
     trip_reader_stats stats = r->stats;
     stats.runs_skipped = r->planner.runs_skipped;
     if (r->computing) {
-        stats.runs_skipped = trip_computed_normals_skipped(r->normals);
+        stats.runs_skipped += trip_computed_normals_skipped(r->normals);
         stats.normals_ns = trip_computed_normals_ns(r->normals);
     }
     stats.bytes_skipped = r->planner.bytes_skipped;

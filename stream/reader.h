@@ -40,7 +40,7 @@ typedef struct trip_reader_params {
     void *const *slot_memory;
     /* Called right before the bytes of a run are requested, on the thread that calls begin and
      * next. Returning true leaves the run out, since it has no effect, such as when opaque pixels
-     * occlude it. */
+     * occlude it. Runs of selections with `ahead` also have an effect on the runs beside them. */
     bool (*skip)(void *user, const trip_selection *s, const trip_run *run);
     void *skip_user;
     /* Runs the checks of blocks. The thread that calls next calls the runner. */

@@ -342,7 +342,6 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass)
                          pass->selection_count);
     r->computing = r->normals && pass->around && !r->runs_only;
     if (r->computing) {
-        r->planner.skip = NULL; /* runs beside a skipped run need its values */
         r->drawn_passes[r->pass_count] = pass;
         pass = pass->around;
     }

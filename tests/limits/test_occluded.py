@@ -99,7 +99,7 @@ class Hidden(limits.Test):
 
     def test_normals_are_read_only_for_shading(self):
         volume = self.generate("lobes.nrrd", "marschner-lobb", 64)
-        data = self.brick(volume, "lobes.trip", "--keep-all")
+        data = self.brick(volume, "lobes.trip", "--keep-all", "--normals", "stored")
         pre = "--classify", "pre"
         shaded = self.stats(data, "--occluded", "draw", *pre)[0]
         plain = self.stats(data, "--no-shading", "--occluded", "draw", *pre)[0]
@@ -124,7 +124,7 @@ class Hidden(limits.Test):
 
     def test_cached_bricks_are_not_read_again_in_a_sequence(self):
         data = self.brick(self.generate("turned.nrrd", "marschner-lobb", 144), "turned.trip",
-                          "--keep-all")
+                          "--keep-all", "--normals", "stored")
         for classify in "pre", "post":
             frames = {}
             for memory in "24M", "1G":

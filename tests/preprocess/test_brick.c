@@ -831,6 +831,7 @@ static void the_summary_tells_the_requested_levels(void **state)
     trip_brick_summary s;
     make_bytes();
     p.replace = true;
+    p.normals = TRIP_NORMALS_AUTO;
     for (size_t i = 0; i < sizeof asked / sizeof *asked; i++) {
         test_lists l;
         p.levels = asked[i].levels;

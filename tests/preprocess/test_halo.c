@@ -131,6 +131,7 @@ static void splats_have_the_same_bytes_with_and_without_a_halo(void **state)
     test_lists l;
     trip_brick_params p = params_for_bytes();
     make_bytes(6, 50);
+    p.normals = TRIP_NORMALS_STORED;
     brick_to(p, "a.trip");
     p.no_halo = true;
     trip_brick_summary s = brick_to(p, "b.trip");
