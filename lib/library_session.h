@@ -18,7 +18,7 @@ typedef struct session {
     unsigned part_count;
     trip_dataset *joined;            /* all parts as one data set; NULL if there is one part */
     trip_dataset *with_normals;      /* the same with computed normals; NULL if they are stored */
-    trip_dataset *data;              /* the data set that is drawn: one of these, or parts[0] */
+    trip_dataset *data;              /* the data set that is drawn */
     trip_dataset_metadata **texts;   /* one per part; NULL until read */
     trip_dataset_metadata *text;     /* texts[0] */
     trip_tf_entry *table;            /* 65536 entries; NULL until a transfer function is used */

@@ -11,7 +11,7 @@
 
 /* Limits of a batch that is handed out. */
 enum { OUT_RECORDS = 1 << 16, OUT_BYTES = 1 << 19, OUT_RUNS = 1 << 12, OUT_ROOM = 64 };
-/* Number of sheets of a level whose runs wait for the sheet after them. */
+/* Number of sheets of a level with runs that wait for the next sheet. */
 enum { DRAWN = 2 };
 /* Number of records that one task computes, at least a run. */
 enum { TASK_RECORDS = 4096, TASKS_MAX = OUT_RECORDS / TASK_RECORDS * 2 + 2 };

@@ -1,8 +1,7 @@
-/* Computes normals from values, for data sets that store none. It stands between the slots of a
- * reader and the caller: it takes the runs of trip_pass.around, and hands out the runs of the pass
- * with a plane of normals, in the same order. normal_sheets.h defines the
- * normals. The sheets before, at and behind a run are in memory, so memory does not depend on the
- * number of sheets. The reader owns it; one thread. */
+/* Computes normals from values, for data sets that store none. A reader passes it the runs of
+ * trip_pass.around. It hands out the runs of the pass with a plane of normals, in the same order.
+ * normal_sheets.h defines the normals. The sheets before, at and behind a run are in memory, so
+ * memory does not depend on the number of sheets. The reader owns it; one thread. */
 #ifndef TRIP_COMPUTED_NORMALS_H
 #define TRIP_COMPUTED_NORMALS_H
 

@@ -156,11 +156,10 @@ void trip_normals_pack_64(const float x[64], const float y[64], const float z[64
     for (int i = 0; i < 64; i++)
         scale[i] = length[i] < 1 ? PART_MAX : 0; /* parts of other gradients might overflow */
     for (int i = 0; i < 64; i++)
-        normals[i] =
-            pack_weak(scale[i] * x[i], scale[i] * y[i], scale[i] * z[i], 0, &corner[i]);
+        normals[i] = pack_weak(scale[i] * x[i], scale[i] * y[i], scale[i] * z[i], 0, &corner[i]);
     for (int i = 0; i < 64; i++)
-        at_centre[i] = CENTRE | pack_weak(scale[i] * x[i], scale[i] * y[i], scale[i] * z[i], 0.5f,
-                                          &centre[i]);
+        at_centre[i] =
+            CENTRE | pack_weak(scale[i] * x[i], scale[i] * y[i], scale[i] * z[i], 0.5f, &centre[i]);
     for (int i = 0; i < 64; i++) {
         const uint32_t weak = selected(corner[i] <= centre[i], normals[i], at_centre[i]);
         normals[i] = selected(length[i] < 1, weak, strong[i]);

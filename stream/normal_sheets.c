@@ -9,7 +9,7 @@
 #include "report.h"
 #include "sheet_room.h"
 
-/* Number of sheets whose values are in memory. */
+/* Number of sheets with values in memory. */
 enum { SHEETS = 3 };
 /* Maximum number of tiles of a sheet. */
 #define TILES_MAX (INT64_C(1) << 26)
@@ -425,8 +425,7 @@ static const square *find_square(const trip_normal_sheets *n, const level *l, co
     return at ? &s->values[at - 1] : &no_values;
 }
 
-/* The sheets around the run whose normals are computed, and the columns of its map to world space.
- */
+/* The sheets around a run, and the columns of the map of gradients to world space. */
 typedef struct run_work {
     const trip_normal_sheets *n;
     const level *l;

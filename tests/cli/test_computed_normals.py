@@ -73,6 +73,8 @@ class ComputedNormals(program.ProgramTest):
         for renderer in "cpu", "reference", "gl":
             if renderer == "gl" and "GL" in program.SWITCHED_OFF:
                 continue
+            if renderer == "gl":
+                self.assert_alike("v", "--renderer", "gl", "--submit", "indexed")
             for view in (), ("--azimuth", 130, "--elevation", 50), INSIDE, ("--ortho", "fit"):
                 self.assert_alike("v", "--renderer", renderer, *view)
 
