@@ -269,16 +269,6 @@ static int plan_field(triptych *t)
                                 s->budget);
 }
 
-/* Fails for settings of splats that the data set does not support. */
-static int check_splats(const triptych *t)
-{
-    const trip_settings *s = &t->settings;
-    if (s->flatten > 1 && !(t->session.data->header.planes >> TRIP_PLANE_NORMALS & 1))
-        return trip_fail(TRIP_USAGE, "render", t->name,
-                         "has no normals, which flattened kernels need; brick it with normals");
-    return 0;
-}
-
 /* Computes the common size of fixed footprints. */
 static int choose_sprites(triptych *t)
 {
@@ -299,9 +289,7 @@ static int choose_sprites(triptych *t)
 static int plan_frame(triptych *t)
 {
     session *s = &t->session;
-    int status = check_splats(t);
-    if (!status)
-        status = choose_sprites(t);
+    int status = choose_sprites(t);
     if (status)
         return status;
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)

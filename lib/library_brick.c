@@ -154,7 +154,7 @@ static const char *fault_of_options(const triptych_brick_options *o)
         return "a brick must have 1 to 64 sheets";
     if (o->code_bits < TRIPTYCH_CODE_BITS_AUTO || o->code_bits > TRIPTYCH_CODE_BITS_16)
         return "codes must have 8 or 16 bits";
-    if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_NONE)
+    if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_STORED)
         return "unknown kind of normals";
     if (o->levels_for < TRIPTYCH_LEVELS_FOR_AUTO || o->levels_for > TRIPTYCH_LEVELS_FOR_BOTH)
         return "coarse levels must be for post, pre or both";

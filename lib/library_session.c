@@ -5,7 +5,9 @@
 #include <string.h>
 
 #include "brick_command.h"
+#include "computed_normals.h"
 #include "dataset_join.h"
+#include "dataset_normals.h"
 #include "report.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
@@ -154,6 +156,21 @@ static int open_part(session *s, const char *input)
     return status;
 }
 
+/* Sets the data set that is drawn. It has normals, stored or computed. */
+static int use_data(session *s, trip_dataset *data)
+{
+    trip_dataset *with = NULL;
+    int status = 0;
+    if (!(data->header.planes >> TRIP_PLANE_NORMALS & 1))
+        status = trip_dataset_normals_open(&with, data, s->budget);
+    if (status)
+        return status;
+    trip_dataset_normals_close(s->with_normals);
+    s->with_normals = with;
+    s->data = with ? with : data;
+    return 0;
+}
+
 int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 {
     *s = (session){ .input = input };
@@ -163,9 +180,7 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
         status = trip_fail(TRIP_ERROR, "open", input, "out of memory");
     if (!status)
         status = open_part(s, input);
-    if (!status)
-        s->data = s->parts[0];
-    return status;
+    return status ? status : use_data(s, s->parts[0]);
 }
 
 /* Fails if the last part is made of another volume than the first one. One
@@ -201,13 +216,15 @@ int session_add_data(session *s, const char *input)
     status = trip_dataset_join(&joined, s->parts, s->part_count, s->budget);
     if (!status)
         status = check_source(s);
+    if (!status)
+        status = use_data(s, joined);
     if (status) {
         trip_dataset_join_close(joined);
         drop_last_part(s);
         return status;
     }
     trip_dataset_join_close(s->joined);
-    s->data = s->joined = joined;
+    s->joined = joined;
     memset(s->classified, 0, LEVELS * sizeof *s->classified);
     trip_mean_tables_release(&s->mean_tables, s->budget);
     return 0;
@@ -225,6 +242,7 @@ void session_close(session *s)
         trip_budget_release(s->budget, s->table, table_bytes);
     if (s->budget)
         trip_mean_tables_release(&s->mean_tables, s->budget);
+    trip_dataset_normals_close(s->with_normals);
     trip_dataset_join_close(s->joined);
     for (unsigned i = 0; i < s->part_count; i++) {
         trip_dataset_metadata_destroy(s->texts[i]);
@@ -262,11 +280,19 @@ static unsigned choose_slots(const session_reader *wanted, uint64_t ring_bytes, 
     return fit && !wanted->skip ? MAX_SLOTS : SLOTS;
 }
 
+static bool computes_normals(const session *s, const session_reader *wanted)
+{
+    return s->data->computes_normals && wanted->planes >> TRIP_PLANE_NORMALS & 1;
+}
+
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
 {
     uint64_t left = trip_budget_left_bytes(s->budget);
+    const bool computes = computes_normals(s, wanted);
+    const uint64_t own = computes ? trip_computed_normals_bytes(s->data) : 0;
+    left -= own < left ? own : left;
     size_t page = (size_t)1 << s->data->header.page_log2;
-    size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
+    size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS && !computes ? 2 : 1;
     unsigned slots = choose_slots(wanted, left / 4, plane_count);
     size_t slot = (size_t)(left / 4) / slots / page * page, max = MAX_SLOT_BYTES * plane_count;
     slot = slot < page ? page : slot;
@@ -283,7 +309,8 @@ int session_make_reader(const session *s, trip_reader **out, const session_reade
     };
     if (wanted->renderer)
         params.runner = trip_renderer_runner(wanted->renderer);
-    params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
+    if (!computes) /* runs with computed normals lie in memory of the reader */
+        params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
     return trip_reader_create(out, s->data, &params, s->budget);
 }
 

@@ -17,7 +17,8 @@ typedef struct session {
     trip_dataset **parts; /* opened data sets, in the order of opening */
     unsigned part_count;
     trip_dataset *joined;            /* all parts as one data set; NULL if there is one part */
-    trip_dataset *data;              /* the data set that is drawn: joined, or parts[0] */
+    trip_dataset *with_normals;      /* the same with computed normals; NULL if they are stored */
+    trip_dataset *data;              /* the data set that is drawn */
     trip_dataset_metadata **texts;   /* one per part; NULL until read */
     trip_dataset_metadata *text;     /* texts[0] */
     trip_tf_entry *table;            /* 65536 entries; NULL until a transfer function is used */

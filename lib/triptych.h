@@ -178,7 +178,7 @@ typedef struct triptych_info {
     /* Checksum of the index, which contains the checksums of all other bytes. Equal data sets have
      * equal checksums. */
     uint64_t checksum;
-    /* normal_bytes is 0 if the data set has no normals; its splats are then not shaded. */
+    /* normal_bytes is 0 if the data set stores no normals; drawing then computes them. */
     unsigned format_version, lists, code_bytes, normal_bytes;
     /* gradient_step is the unit of 3-byte normals. Shading is full from gradients of gradient_full
      * on. */
@@ -680,6 +680,7 @@ typedef struct triptych_frame_stats {
     /* Parts of `ms`: waiting for the disk, drawing, merging the layers. Merging includes the rays
      * of the integral. */
     double wait_ms, draw_ms, merge_ms;
+    double normals_ms; /* computing normals that the data set does not store (pre) */
     uint64_t splats, bytes_read, reads;     /* over all lists; read from disk */
     uint64_t bytes_cached;                  /* taken from the cache instead of the disk */
     uint64_t runs_occluded, bytes_occluded; /* not read, because they lie behind opaque matter */

@@ -36,11 +36,14 @@ typedef enum triptych_code_bits {
 } triptych_code_bits;
 
 typedef enum triptych_normals {
-    /* Compact if no colour changes by half of 1/255 or more, otherwise full. */
+    /* None, since drawing computes normals from the values. Stored in two cases: the data set lacks
+     * voxels and has no halo, or its coarse levels are for pre alone. */
     TRIPTYCH_NORMALS_AUTO,
     TRIPTYCH_NORMALS_COMPACT, /* 3 bytes */
     TRIPTYCH_NORMALS_FULL,    /* 4 bytes */
     TRIPTYCH_NORMALS_NONE,
+    /* Compact if no colour changes by half of 1/255 or more, otherwise full. */
+    TRIPTYCH_NORMALS_STORED,
 } triptych_normals;
 
 /* The classification for which coarse levels are made. */

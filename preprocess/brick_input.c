@@ -57,11 +57,19 @@ static int check_levels(const trip_brick_input *in)
                      "leave out --levels");
 }
 
+bool trip_brick_stores_normals(const trip_brick_params *p)
+{
+    const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
+    if (p->normals != TRIP_NORMALS_AUTO)
+        return p->normals != TRIP_NORMALS_NONE;
+    return (p->no_halo && !p->keep_all) || (p->levels >= 0 && kinds.means && !kinds.values);
+}
+
 trip_piece_format trip_brick_format(const trip_brick_params *p)
 {
     return (trip_piece_format){ .tile_log2 =
                                     p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6,
-                                .normals = p->normals != TRIP_NORMALS_NONE,
+                                .normals = trip_brick_stores_normals(p),
                                 .halo = !p->no_halo };
 }
 
@@ -243,9 +251,10 @@ unsigned trip_brick_normal_bytes(const trip_brick_input *in)
     case TRIP_NORMALS_COMPACT:
         return 3;
     case TRIP_NORMALS_AUTO:
+    case TRIP_NORMALS_STORED:
         break;
     }
-    return are_compact_exact(in) ? 3 : 4;
+    return !trip_brick_stores_normals(in->params) ? 0 : are_compact_exact(in) ? 3 : 4;
 }
 
 /* Normals of 8- and 16-bit types are made before all values are known, others after that. */

@@ -46,6 +46,8 @@ unsigned trip_brick_code_bytes(const trip_brick_input *in);
 bool trip_brick_rounds_codes(const trip_brick_input *in);
 /* Returns the bytes of a normal, or 0 without normals. Call it after the scan, if there is one. */
 unsigned trip_brick_normal_bytes(const trip_brick_input *in);
+/* Whether the data set stores normals. */
+bool trip_brick_stores_normals(const trip_brick_params *p);
 /* Returns the gradient magnitude of full shading, for the range [lo, hi] of the values or, if
  * unknown, of the codes. */
 double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi);

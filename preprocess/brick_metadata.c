@@ -183,7 +183,7 @@ static void add_source_options(cJSON *root, const trip_brick_params *p)
     static const char *const code_bits[] = { NULL, "8", "16" };
     if (p->code_bits)
         add_option(options, "--code-bits=%s", code_bits[p->code_bits]);
-    static const char *const normals[] = { NULL, "compact", "full", "none" };
+    static const char *const normals[] = { NULL, "compact", "full", "none", "stored" };
     if (p->normals)
         add_option(options, "--normals=%s", normals[p->normals]);
     if (p->no_halo)

@@ -45,6 +45,8 @@ typedef struct trip_dataset {
     trip_affine index_to_world;
     trip_coordinates coordinates;
     trip_codes codes; /* of voxels, halo and values */
+    /* The normals of the header and the lists are on no disk (dataset_normals.h). */
+    bool computes_normals;
     trip_list *lists; /* from the budget */
     unsigned list_count;
     char *text;     /* JSON, null-terminated */

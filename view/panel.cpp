@@ -511,10 +511,7 @@ bool draw_light(trip_panel *p, trip_document *d)
 {
     draw_settings *s = &d->settings;
     bool changed = false, shading = !s->light.no_shading, head = trip_light_is_head(s);
-    if (d->info.normal_bytes || s->all.classify != TRIPTYCH_CLASSIFY_PRE)
-        changed |= check(p, "Shading", &shading);
-    else
-        ImGui::TextDisabled("The data set has no normals: splats cannot be shaded.");
+    changed |= check(p, "Shading", &shading);
     s->light.no_shading = !shading;
     if (check(p, "Light from the eye", &head)) { // also lights effects
         trip_light_set_head(s, head);

@@ -9,6 +9,7 @@
 #include "classification.h"
 #include "list_grid.h"
 #include "lod.h"
+#include "plan_around.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
@@ -37,6 +38,7 @@ typedef struct trip_plan_list {
  * `ascending` traversal one pass covers all sheets. */
 typedef struct trip_plan_pass {
     trip_pass pass;
+    trip_pass around;   /* pass.around, if normals are computed */
     bool front_to_back; /* false only in `ascending` traversal, if the view looks down the axis */
 } trip_plan_pass;
 
@@ -69,6 +71,7 @@ typedef struct trip_plan {
     trip_mean_tables own_tables; /* of coarse levels, if the caller keeps none */
     trip_selection *selections;  /* of all passes; room for two per list */
     unsigned selection_count;
+    trip_plan_around around; /* of passes with computed normals */
 } trip_plan;
 
 /* Makes the plan of a frame. `camera` must be made with the index_to_world map of level 0.

@@ -132,17 +132,21 @@ class Parts(program.ProgramTest):
         program.write_nrrd("float.nrrd", self.volume.astype("f4") * 2)
         self.make("moved.trip", volume="moved.nrrd")
         self.make("float.trip", volume="float.nrrd")
-        self.make("flat.trip", "--normals", "none")
+        self.make("lit.trip", "--normals", "full", "--region", "21:,:,:")
+        self.make("compact.trip", "--normals", "compact", "--region", ":21,:,:")
         self.make("tiles.trip", "--tile", 32)
         for other, why in (
             ("moved.trip", "a different grid"),
             ("float.trip", "a different scale of values"),
-            ("flat.trip", "different normals"),
             ("tiles.trip", "different tiles"),
         ):
             says = f"open: {other}: "
             run = self.leaves_nothing(1, "render", self.halves[0], other, "-o", "x.png", says=says)
             self.assertIn(why, run.stderr)
+        run = self.leaves_nothing(1, "render", "compact.trip", "lit.trip", "-o", "x.png",
+                                  says="open: lit.trip: ")
+        self.assertIn("different normals", run.stderr)
+        self.works("render", self.halves[0], "lit.trip", "-o", "x.png", *SIZE)
         self.leaves_nothing(2, "render", self.halves[0], "v.nrrd", "-o", "x.png", says="v.nrrd: ")
         self.leaves_nothing(2, "render", *self.halves, "--error", 1, "-o", "x.png", says="--error")
 

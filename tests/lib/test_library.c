@@ -31,6 +31,7 @@ static int brick(void **state)
     const triptych_brick_options options = { .functions = &grey,
                                              .function_count = 1,
                                              .automatic = 1,
+                                             .normals = TRIPTYCH_NORMALS_STORED,
                                              .levels = -1,
                                              .replace = 1,
                                              .memory_bytes = 64 << 20,

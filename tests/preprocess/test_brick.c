@@ -42,6 +42,7 @@ static trip_brick_params params_for(const char *type, const char *output)
     return (trip_brick_params){ .input = input_path,
                                 .output = output_path,
                                 .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = type },
+                                .normals = TRIP_NORMALS_STORED,
                                 .memory_bytes = (uint64_t)1 << 28,
                                 .threads = 2 };
 }
@@ -497,7 +498,7 @@ static void normals_have_the_chosen_number_of_bytes(void **state)
         bool ranges;
         unsigned bytes;
     } ways[] = {
-        { TRIP_NORMALS_AUTO, false, 4 },    { TRIP_NORMALS_AUTO, true, 4 },
+        { TRIP_NORMALS_STORED, false, 4 },  { TRIP_NORMALS_STORED, true, 4 },
         { TRIP_NORMALS_COMPACT, true, 3 },  { TRIP_NORMALS_FULL, false, 4 },
         { TRIP_NORMALS_COMPACT, false, 3 }, { TRIP_NORMALS_NONE, true, 0 },
     };
@@ -830,6 +831,7 @@ static void the_summary_tells_the_requested_levels(void **state)
     trip_brick_summary s;
     make_bytes();
     p.replace = true;
+    p.normals = TRIP_NORMALS_AUTO;
     for (size_t i = 0; i < sizeof asked / sizeof *asked; i++) {
         test_lists l;
         p.levels = asked[i].levels;

@@ -58,6 +58,8 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
     strcpy(path, test_path(output));
     p.input = input;
     p.output = path;
+    if (!p.normals)
+        p.normals = TRIP_NORMALS_STORED;
     if (!p.levels_for && !p.no_halo)
         p.levels_for = TRIP_LEVELS_FOR_BOTH;
     if (p.range_count == 0) {

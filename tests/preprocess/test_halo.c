@@ -112,7 +112,7 @@ static void memory_threads_and_slabs_do_not_change_the_result(void **state)
     make_bytes(5, 100);
     for (int normals = 0; normals < 2; normals++) {
         trip_brick_params p = params_for_bytes();
-        p.normals = normals ? TRIP_NORMALS_AUTO : TRIP_NORMALS_NONE;
+        p.normals = normals ? TRIP_NORMALS_STORED : TRIP_NORMALS_NONE;
         brick_to(p, "a.trip");
         for (int way = 0; way < 5; way++) {
             p.threads = (unsigned[]){ 1, 1, 4, 3, 2 }[way];
@@ -131,6 +131,7 @@ static void splats_have_the_same_bytes_with_and_without_a_halo(void **state)
     test_lists l;
     trip_brick_params p = params_for_bytes();
     make_bytes(6, 50);
+    p.normals = TRIP_NORMALS_STORED;
     brick_to(p, "a.trip");
     p.no_halo = true;
     trip_brick_summary s = brick_to(p, "b.trip");

@@ -51,7 +51,7 @@ static int sum_list(const trip_dataset *d, trip_reader *r, int axis, uint64_t *s
         trip_selection_create(&s, d, &d->lists[axis], false, 0, INT32_MAX, shared.budget), 0);
     for (uint64_t i = 0; i < d->lists[axis].brick_count; i++)
         trip_selection_add(&s, i);
-    int status = trip_reader_begin(r, &(trip_pass){ &s, 1, false });
+    int status = trip_reader_begin(r, &(trip_pass){ &s, 1, false, NULL });
     while (status == 0 && (status = trip_reader_next(r, &b)) == 1) {
         for (size_t i = 0; i < b.run_count; i++) {
             fixture_decode_run(&b, &b.runs[i], voxels, normals);

@@ -658,7 +658,8 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
     const trip_cpu_view *view = &r->views[trip_batch_list(s->batch, run)->index];
     if (view->coordinates)
         return false;
-    trip_cpu_box box = trip_cpu_brick_box(view, run->brick, run->sheet, run->sheet);
+    trip_cpu_box box =
+        trip_cpu_brick_box(view->of->data, view->list, run->brick, run->sheet, run->sheet);
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
 
