@@ -91,9 +91,9 @@ struct trip_dicom_file {
 
 /* Reads everything but the pixels. */
 trip_dicom_file trip_dicom_read(const std::string &path);
-/* Returns the UID of the file's series. Returns "" if there is none, or if the file has several
- * frames or no pixels. */
-std::string trip_dicom_series_of(const std::string &path);
+/* Returns whether a file belongs to the series with this UID. Looks for the UID in the first bytes,
+ * since GDCM aborts the process at some damaged files. */
+bool trip_dicom_is_of_series(const std::string &path, const std::string &series);
 
 /* ---- dicom_pixels.cpp ---- */
 
