@@ -52,7 +52,7 @@ struct trip_dicom_palette {
 
 /* How the pixels are stored. */
 struct trip_dicom_pixels {
-    int64_t columns = 0, rows = 0, frames = 1;    /* of a frame as it is stored */
+    int64_t columns = 0, rows = 0, frames = 1;    /* of a stored frame */
     unsigned allocated = 0, stored = 0, high = 0; /* bits of a sample */
     unsigned samples = 1;                         /* of a pixel */
     bool is_signed = false, floating = false;
