@@ -4,12 +4,14 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 
 #include <gdcmCSAElement.h>
 #include <gdcmCSAHeader.h>
 #include <gdcmReader.h>
 #include <gdcmSequenceOfItems.h>
 #include <gdcmSplitMosaicFilter.h>
+#include <zlib.h>
 
 #include "connection.h"
 
@@ -383,16 +385,12 @@ void read_pixel_format(const std::string &path, const Set &set, trip_dicom_pixel
 class Source
 {
   public:
-    Source(const std::string &path, bool whole) : path_(path)
+    explicit Source(const std::string &path) : path_(path), stream_(trip_dicom_open(path))
     {
-        stream_.open(path, std::ios::binary);
-        if (!stream_)
-            throw trip_slice_error(path, std::string("cannot open: ") + std::strerror(errno));
-        reader_.SetStream(stream_);
-        const std::set<Tag> skipped = { pixel_tag };
+        reader_.SetStream(*stream_);
         bool good = false;
         try {
-            good = reader_.ReadUpToTag(pixel_tag, whole ? std::set<Tag>() : skipped);
+            good = reader_.ReadUpToTag(pixel_tag, { pixel_tag });
         } catch (const std::bad_alloc &) {
             throw;
         } catch (const std::exception &) {
@@ -401,7 +399,7 @@ class Source
         if (!good)
             throw trip_slice_error(
                 path, "cannot be read as DICOM: it is damaged, cut off or of an unknown syntax");
-        stream_.clear();
+        stream_->clear();
     }
     const Set &set() const
     {
@@ -411,6 +409,11 @@ class Source
     {
         return reader_.GetFile();
     }
+    uint64_t bytes()
+    {
+        stream_->seekg(0, std::ios::end);
+        return (uint64_t)std::max<std::streamoff>(stream_->tellg(), 0);
+    }
     gdcm::TransferSyntax syntax() const
     {
         return reader_.GetFile().GetHeader().GetDataSetTransferSyntax();
@@ -419,14 +422,14 @@ class Source
      */
     bool find_pixels(trip_dicom_pixels &p)
     {
-        const std::streamoff end = stream_.tellg();
+        const std::streamoff end = stream_->tellg();
         unsigned char head[12] = { 0 };
         const bool big = syntax().GetSwapCode() == gdcm::SwapCode::BigEndian &&
                          syntax() != gdcm::TransferSyntax::ImplicitVRBigEndianPrivateGE;
         if (end < (std::streamoff)sizeof head)
             return false;
-        stream_.seekg(end - (std::streamoff)sizeof head);
-        stream_.read((char *)head, sizeof head);
+        stream_->seekg(end - (std::streamoff)sizeof head);
+        stream_->read((char *)head, sizeof head);
         const unsigned char tags[2][4] = { { 0xe0, 0x7f, 0x10, 0 }, { 0x7f, 0xe0, 0, 0x10 } };
         const bool is_long = std::memcmp(head, tags[big], 4) == 0 && head[4] == 'O';
         if (!is_long && std::memcmp(head, tags[big], 4) == 0 && head[4] != 'U')
@@ -443,7 +446,7 @@ class Source
 
   private:
     std::string path_;
-    std::ifstream stream_;
+    std::unique_ptr<std::istream> stream_;
     gdcm::Reader reader_;
 };
 
@@ -454,7 +457,6 @@ bool find_pixels(Source &source, const std::string &path, trip_dicom_pixels &p)
     const Set &set = source.set();
     p.syntax = syntax;
     p.compressed = syntax.IsEncapsulated();
-    p.in_memory = syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian;
     p.swap = syntax.GetSwapCode() == gdcm::SwapCode::BigEndian ||
              syntax == gdcm::TransferSyntax::ImplicitVRBigEndianPrivateGE;
     for (const Tag &tag : { float_tag, double_tag })
@@ -463,8 +465,6 @@ bool find_pixels(Source &source, const std::string &path, trip_dicom_pixels &p)
             p.swap = false; /* GDCM has swapped them as numbers */
             return true;
         }
-    if (p.in_memory)
-        return set.FindDataElement(pixel_tag);
     if (!source.find_pixels(p))
         return false;
     if (p.bytes == UINT32_MAX && !p.compressed)
@@ -512,6 +512,7 @@ void read_names(const Set &set, trip_dicom_file &f)
     f.biped = body.empty() || body == "BIPED";
     f.location = number_of(set, Tag(0x20, 0x1041));
     f.number = number_of(set, Tag(0x20, 0x13));
+    f.has_table = Items(set, Tag(0x28, 0x3000)).count() > 0;
     for (size_t i = 0; i < segments.count() && i < 65536; i++) {
         const Set &item = *segments.item(i);
         const size_t number = count_of(item, Tag(0x62, 0x04), 0);
@@ -522,11 +523,9 @@ void read_names(const Set &set, trip_dicom_file &f)
 }
 
 /* Checks that an uncompressed file holds all its frames. */
-void check_length(const trip_dicom_file &f)
+void check_length(const trip_dicom_file &f, uint64_t file_bytes)
 {
     const trip_dicom_pixels &p = f.pixels;
-    std::ifstream stream(f.path, std::ios::binary | std::ios::ate);
-    const uint64_t file_bytes = (uint64_t)std::max<std::streamoff>(stream.tellg(), 0);
     uint64_t needed;
     const bool possible = !__builtin_mul_overflow(p.frame_bytes(), (uint64_t)p.frames, &needed);
     if (p.allocated == 1)
@@ -583,24 +582,81 @@ std::string trip_dicom_file::size_text() const
 trip_dicom_file trip_dicom_read(const std::string &path)
 {
     trip_connection_decode(path);
-    auto source = std::make_unique<Source>(path, false);
+    Source source(path);
     trip_dicom_file f;
     f.path = path;
-    if (source->syntax() == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian)
-        source = std::make_unique<Source>(path, true);
-    const Set &set = source->set();
+    const Set &set = source.set();
     read_names(set, f);
-    f.has_pixels = find_pixels(*source, path, f.pixels);
+    f.has_pixels = find_pixels(source, path, f.pixels);
     if (!f.has_pixels)
         return f;
     read_pixel_format(path, set, f.pixels);
     f.width = f.pixels.columns;
     f.height = f.pixels.rows;
     if (!f.pixels.in_memory)
-        check_length(f);
+        check_length(f, source.bytes());
     read_slices(set, f);
-    unfold_mosaic(source->file(), f);
+    unfold_mosaic(source.file(), f);
     return f;
+}
+
+namespace
+{
+
+/* Returns the part after the head of a deflated file, inflated. */
+std::string inflate_rest(std::istream &file, const std::string &path)
+{
+    std::vector<char> in(65536), out(262144);
+    std::string whole;
+    z_stream z = {};
+    if (inflateInit2(&z, -MAX_WBITS) != Z_OK)
+        throw std::bad_alloc();
+    int status = Z_OK;
+    while (status == Z_OK) {
+        if (z.avail_in == 0) {
+            file.read(in.data(), (std::streamsize)in.size());
+            z.next_in = (Bytef *)in.data();
+            z.avail_in = (uInt)file.gcount();
+        }
+        z.next_out = (Bytef *)out.data();
+        z.avail_out = (uInt)out.size();
+        status = inflate(&z, Z_NO_FLUSH);
+        whole.append(out.data(), out.size() - z.avail_out);
+        trip_connection_working();
+    }
+    inflateEnd(&z);
+    if (status != Z_STREAM_END)
+        throw trip_slice_error(path, "is cut off or damaged: its deflated data end early");
+    return whole;
+}
+
+} // namespace
+
+std::unique_ptr<std::istream> trip_dicom_open(const std::string &path)
+{
+    /* the mark, and the element with the length of the head that follows it */
+    const std::string mark("DICM\2\0\0\0UL\4\0", 12);
+    const std::string deflated = "1.2.840.10008.1.2.1.99", plain("1.2.840.10008.1.2.1\0", 20);
+    auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
+    if (!*file)
+        throw trip_slice_error(path, std::string("cannot open: ") + std::strerror(errno));
+    std::string head(144, 0);
+    file->read(&head[0], (std::streamsize)head.size());
+    uint32_t bytes = 0;
+    std::memcpy(&bytes, &head[140], sizeof bytes);
+    if (file->good() && head.compare(128, mark.size(), mark) == 0 && bytes <= 65536) {
+        std::string rest(bytes, 0);
+        file->read(&rest[0], (std::streamsize)bytes);
+        if (rest.find(deflated) != std::string::npos) {
+            const std::string length("\x1c\0\0\0", 4), syntax("\2\0\x10\0UI\x14\0", 8);
+            return std::make_unique<std::istringstream>(head.substr(0, 140) + length + syntax +
+                                                            plain + inflate_rest(*file, path),
+                                                        std::ios::binary);
+        }
+    }
+    file->clear();
+    file->seekg(0);
+    return file;
 }
 
 bool trip_dicom_is_of_series(const std::string &path, const std::string &series)

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <istream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -61,7 +62,7 @@ struct trip_dicom_pixels {
     std::shared_ptr<trip_dicom_palette> palette;
     int syntax = 0;                 /* gdcm::TransferSyntax::TSType */
     bool compressed = false;        /* in fragments */
-    bool in_memory = false;         /* the whole file is deflated */
+    bool in_memory = false;         /* GDCM returns them all at once */
     bool swap = false;              /* the byte order is not the machine's */
     bool words = false;             /* bytes are stored in words of 16 bits */
     uint64_t offset = 0, bytes = 0; /* of the values in the file */
@@ -79,8 +80,8 @@ struct trip_dicom_file {
     int64_t width = 0, height = 0;     /* of a slice */
     int tiles = 1;                     /* along each side of a mosaic */
     bool biped = true;                 /* x, y and z point left, back and head, as in humans */
-    bool located = false;              /* `location` is known for all slices */
     double location = NAN, number = NAN;
+    bool has_table = false; /* of values in place of slope and intercept */
     trip_dicom_pixels pixels;
     std::vector<trip_dicom_slice> slices;
 
@@ -94,6 +95,10 @@ trip_dicom_file trip_dicom_read(const std::string &path);
 /* Returns whether a file belongs to the series with this UID. Looks for the UID in the first bytes,
  * since GDCM aborts the process at some damaged files. */
 bool trip_dicom_is_of_series(const std::string &path, const std::string &series);
+
+/* Opens a file. Inflates a deflated one into memory, as explicit VR little endian: GDCM fails to
+ * read sequences in deflated files. */
+std::unique_ptr<std::istream> trip_dicom_open(const std::string &path);
 
 /* ---- dicom_pixels.cpp ---- */
 

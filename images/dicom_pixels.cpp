@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstring>
-#include <fstream>
 #include <type_traits>
 
 #include <gdcmFragment.h>
@@ -196,8 +195,8 @@ struct trip_dicom_reader::state {
     void decompress(const trip_dicom_file &f, int64_t frame);
 
     std::string path; /* of the open file */
-    std::ifstream stream;
-    std::string whole;               /* the pixels of a deflated file */
+    std::unique_ptr<std::istream> stream;
+    std::string whole;               /* the pixels that GDCM returned at once */
     std::vector<Fragment> fragments; /* of a compressed file, and the first one of each frame */
     std::vector<size_t> first_of;
     uint64_t first_offset = 0; /* of the first fragment's item */
@@ -233,19 +232,19 @@ void trip_dicom_reader::state::read_bytes(const trip_dicom_file &f, uint64_t off
         std::memcpy(to, whole.data() + offset, bytes);
         return;
     }
-    stream.clear();
-    stream.seekg((std::streamoff)(f.pixels.offset + offset));
-    stream.read(to, (std::streamsize)bytes);
-    if ((uint64_t)stream.gcount() != bytes)
+    stream->clear();
+    stream->seekg((std::streamoff)(f.pixels.offset + offset));
+    stream->read(to, (std::streamsize)bytes);
+    if ((uint64_t)stream->gcount() != bytes)
         throw trip_slice_error(f.path, "is cut off: its pixels end early");
 }
 
 void trip_dicom_reader::state::load_whole(const trip_dicom_file &f)
 {
     gdcm::Reader reader;
-    reader.SetStream(stream);
+    reader.SetStream(*stream);
     reader.ReadUpToTag(pixel_tag);
-    for (uint16_t element : { 0x0010, 0x0008, 0x0009 }) {
+    for (uint16_t element : { 0x0008, 0x0009 }) {
         const gdcm::Tag tag(0x7fe0, element);
         const gdcm::DataSet &set = reader.GetFile().GetDataSet();
         const gdcm::ByteValue *bytes =
@@ -290,8 +289,8 @@ void trip_dicom_reader::state::index_fragments(const trip_dicom_file &f)
 {
     std::vector<uint32_t> table;
     fragments.clear();
-    stream.seekg(0, std::ios::end);
-    const uint64_t file_bytes = (uint64_t)stream.tellg();
+    stream->seekg(0, std::ios::end);
+    const uint64_t file_bytes = (uint64_t)stream->tellg();
     bool first = true;
     for (uint64_t at = 0;;) {
         unsigned char head[8];
@@ -328,9 +327,7 @@ void trip_dicom_reader::state::open(const trip_dicom_file &f)
     path.clear();
     frame = -1;
     whole = std::string();
-    stream = std::ifstream(f.path, std::ios::binary);
-    if (!stream)
-        throw trip_slice_error(f.path, "cannot open");
+    stream = trip_dicom_open(f.path);
     if (f.pixels.in_memory)
         load_whole(f);
     else if (f.pixels.compressed)

@@ -272,6 +272,8 @@ void DicomStack::set_values()
     const bool colour = file.pixels.colour != trip_dicom_colour::GREY;
     if (colour)
         trip_warn(file.path.c_str(), "is in colour; its Rec. 709 luma is read");
+    if (file.has_table)
+        trip_warn(file.path.c_str(), "has a table of values (Modality LUT), which is not applied");
     stored_ = file.type();
     type = alike || colour ? stored_ : TRIP_F32;
     slope = alike && !colour ? first.slope : 1;

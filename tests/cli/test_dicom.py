@@ -10,6 +10,8 @@ import program
 FILES = os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "regress", "dicom")
 VIEW = ("--size=48x40", "--tf=grey", "--up=0,0,1", "--view=left", "--renderer=reference")
 AXIAL = (1, 0, 0, 0, 1, 0)
+FLAT = ("--size=48x40", "--tf=grey", "--view=top", "--renderer=reference",
+        "--classify=pre")
 LUMA = numpy.array([0.2126, 0.7152, 0.0722])
 ROWS, COLUMNS = 12, 16
 
@@ -268,6 +270,36 @@ class Dicom(program.ProgramTest):
         for time in 0, 1:
             own = self.raw(self.values[4 * time:4 * time + 4], z)
             self.same(self.drawn("frames.dcm", "--time", time), own)
+
+    def test_each_segment_of_a_segmentation_is_a_series(self):
+        """Bits of segment 1 follow bits of segment 2 at one position, in the middle of a byte."""
+        bits = numpy.random.default_rng(3).integers(0, 2, (2, 7, 9), "u1")
+        sequence, numbers_at = program.dicom_sequence, program.dicom_numbers
+        us = lambda group, element, value: program.dicom_element(group, element, b"US", number(value))
+        frames = [sequence(0x20, 0x9113, [numbers_at(0x20, 0x32, (0, 0, 0))])
+                  + sequence(0x62, 0x0A, [us(0x62, 0x0B, segment)]) for segment in (2, 1)]
+        names = [us(0x62, 4, segment) + program.dicom_element(0x62, 5, b"LO", name)
+                 for segment, name in ((1, b"liver"), (2, b"spleen"))]
+        elements = slice_of(bits, elements={
+            (0x28, 0x08): (b"IS", b"2"),
+            (0x28, 0x100): (b"US", number(1)),
+            (0x28, 0x101): (b"US", number(1)),
+            (0x28, 0x102): (b"US", number(0)),
+            (0x62, 0x02): (b"SQ", sequence(0, 0, names)[12:]),
+            (0x5200, 0x9229): (b"SQ", sequence(0, 0, [sequence(
+                0x20, 0x9116, [numbers_at(0x20, 0x37, AXIAL)])])[12:]),
+            (0x5200, 0x9230): (b"SQ", sequence(0, 0, frames)[12:]),
+            (0x7FE0, 0x10): (b"OB", numpy.packbits(bits, bitorder="little").tobytes()),
+        })
+        write("seg.dcm", elements)
+        self.assertEqual(self.described("seg.dcm")["series"], [
+            '1 "segment spleen" (CT, 9 x 7 x 1)', '2 "segment liver" (CT, 9 x 7 x 1)'])
+        for series in 1, 2:
+            program.write_nrrd("own.nrrd", bits[series - 1:series])
+            self.brick("own.nrrd", "own.trip", "--keep-all", "--axes=LPS")
+            own = self.picture("own.trip", *FLAT)
+            self.brick("seg.dcm", "seg.trip", "--keep-all", "--series", series)
+            self.same(own, self.picture("seg.trip", *FLAT))
 
     def test_a_damaged_file_is_named(self):
         write_series("bad", self.values, range(9))
