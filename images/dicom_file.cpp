@@ -593,6 +593,9 @@ trip_dicom_file trip_dicom_read(const std::string &path)
     read_pixel_format(path, set, f.pixels);
     f.width = f.pixels.columns;
     f.height = f.pixels.rows;
+    /* A frame has at least one bit. */
+    if ((uint64_t)f.pixels.frames / 8 > source.bytes())
+        throw trip_slice_error(path, "states more frames than it can hold");
     if (!f.pixels.in_memory)
         check_length(f, source.bytes());
     read_slices(set, f);

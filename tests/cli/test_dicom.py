@@ -317,6 +317,10 @@ class Dicom(program.ProgramTest):
             self.fails(1, "brick", "bad", "-o", "b.trip", "-q", says="bad/i004: ")
             if says != "is cut off" or at == len(sound) - 7:
                 self.fails(1, "info", "bad", says=says)
+        with open(os.path.join(FILES, "rtdose_expb.dcm"), "rb") as file:
+            sound = file.read()
+        program.write("many.dcm", sound.replace(b"IS\0\x0215", b"IS\0\x0299", 1))
+        self.fails(1, "info", "many.dcm", says="wrong size")
         name = "JPEG2000.dcm"
         with open(os.path.join(FILES, name), "rb") as file:
             sound = file.read()
