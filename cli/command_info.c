@@ -86,6 +86,12 @@ static const char *space_of(const cJSON *text)
     return trip_anatomy_known(space) ? space : NULL;
 }
 
+/* Returns the source of the orientation, a key of FORMAT.md, or NULL. */
+static const char *orientation_of(const cJSON *text)
+{
+    return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "orientation"));
+}
+
 /* Computes the axis-aligned box in world space that contains the whole grid, including the outer
  * halves of its border voxels. */
 static void grid_bounds(const triptych_info *info, double bounds[2][3])
@@ -186,6 +192,8 @@ static void add_world(cJSON *root, const triptych_info *info, const cJSON *text)
     add_bounds(root, "bounds", bounds);
     kept_bounds(info, bounds);
     add_bounds(root, "kept_bounds", bounds);
+    if (orientation_of(text))
+        cJSON_AddStringToObject(root, "orientation", orientation_of(text));
     if (!space)
         return;
     cJSON_AddStringToObject(root, "space", space);
@@ -325,13 +333,34 @@ static void print_anatomy(const triptych_info *info, const char *space)
                trip_anatomy_words(space, direction(info->index_to_world, a), words));
 }
 
+static void print_orientation(const char *orientation)
+{
+    static const struct {
+        const char *name, *words;
+    } sources[] = {
+        { "space", "from the space of the patient in the file" },
+        { "file", "from the directions in the file" },
+        { "axes", "from --axes" },
+        { "program", "from the program that wrote the file" },
+        { "symmetry", "guessed from the mirror symmetry" },
+        { "voxels", "guessed from the long voxels" },
+        { "base", "guessed from the level base" },
+        { "length", "guessed from the longest side" },
+        { "format", "guessed from the format" },
+        { "none", "not in the file; z is up by default" },
+    };
+    for (size_t i = 0; orientation && i < sizeof sources / sizeof *sources; i++)
+        if (!strcmp(orientation, sources[i].name))
+            printf("%-12s %s\n", "orientation", sources[i].words);
+}
+
 /* Prints the top-level strings of the notes that `triptych brick` stored. */
 static void print_notes(const cJSON *root)
 {
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
         if (cJSON_IsString(item) && strlen(item->valuestring) < 1024 &&
             strlen(item->string) < 200 && !strchr(item->valuestring, '\n') &&
-            strcmp(item->string, "space") != 0) {
+            strcmp(item->string, "space") != 0 && strcmp(item->string, "orientation") != 0) {
             trip_text_write(stdout, item->string);
             for (size_t i = strlen(item->string); i < 12; i++)
                 putchar(' ');
@@ -393,6 +422,7 @@ static void print_text(const data_set *d)
     print_world(info);
     if (space_of(d->source.root))
         print_anatomy(info, space_of(d->source.root));
+    print_orientation(orientation_of(d->source.root));
     print_range("values", info->value_min, info->value_max);
     print_range("codes for", info->code_lo, info->code_hi);
     printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);

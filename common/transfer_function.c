@@ -221,6 +221,8 @@ char *trip_tf_to_text(const trip_tf *tf)
         return NULL;
     if (tf->made)
         fprintf(f, "# made from the histogram: %s\n", trip_tf_kind_name(tf->as));
+    if (tf->ramp)
+        fputs("# opacity: a ramp that starts above the background\n", f);
     fputs("unit ", f);
     if (tf->unit_world > 0)
         write_number(f, tf->unit_world, '\n');

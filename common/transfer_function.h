@@ -98,6 +98,10 @@ const char *trip_tf_preset_name(size_t i);
 const char *trip_tf_preset_summary(size_t i);
 const char *trip_tf_preset_basis(size_t i);
 
+/* Whether trip_tf_adapt() fails without a histogram. */
+bool trip_tf_needs_histogram(const trip_tf *tf);
+/* Whether a window replaces the range of trip_tf_adapt(). */
+bool trip_tf_spans_window(const trip_tf *tf);
 /* Whether values are fractions of the data's range. Otherwise they are in data units. */
 bool trip_tf_is_normalised(const trip_tf *tf);
 /* Converts a normalised function to data units in place. Leaves other functions unchanged. */

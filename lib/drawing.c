@@ -163,18 +163,17 @@ static void choose_settings(triptych *t)
         t->drawn_settings.background[3] = 0;
 }
 
-/* Chooses the levels of the frame by the view of level 0. A frame with distances or with a light
+/* Chooses the levels of the frame by the camera of level 0. A frame with distances or with a light
  * map needs one level: distances belong to one surface, and a light map to one level. */
 static int choose_parts(triptych *t)
 {
     const trip_settings *s = &t->drawn_settings;
     const bool one = t->given.all.count_exactly || s->depth || s->effects.emission ||
                      trip_effects_light(&s->effects);
-    int status = make_camera(t, t->session.data);
+    int status = 0;
     t->parts = (trip_lod_parts){ .count = 1 };
     t->part = 0;
-    if (status || s->classify != TRIP_CLASSIFY_POST ||
-        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
+    if (s->classify != TRIP_CLASSIFY_POST || t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return status;
     status = trip_lod_parts_make(&t->parts, t->session.data, &t->camera, s, one, t->session.budget);
     if (t->parts.count > 1) /* the background is added after the last part */
@@ -183,7 +182,7 @@ static int choose_parts(triptych *t)
 }
 
 /* Selects the level of the next part and makes its camera. A first part at level 0 has the camera
- * of choose_parts(). */
+ * of plan_first(). */
 static int enter_part(triptych *t)
 {
     int status = use_level(t, t->parts.level[t->part]);
@@ -365,7 +364,9 @@ static int plan_first(triptych *t)
     uint64_t start = trip_now_ns();
     choose_settings(t);
     check_rounding(t);
-    int status = trip_context_choose_effects(t);
+    int status = make_camera(t, t->session.data);
+    if (!status)
+        status = trip_context_choose_effects(t);
     if (!status)
         status = choose_parts(t);
     const double ms = (double)(trip_now_ns() - start) * 1e-6;

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #include "camera.h"
 #include "library_context.h"
@@ -25,10 +26,30 @@ static void keep_failure(void *user, int status, const char *line)
         t->take(t->take_user, line);
 }
 
+/* Returns whether the line is a note that was passed on before. */
+static bool is_noted(triptych *t, const char *line)
+{
+    static const char prefix[] = "triptych: note: ";
+    bool found = false;
+    if (strncmp(line, prefix, strlen(prefix)) != 0)
+        return false;
+    const uint64_t hash = XXH64(line, strlen(line), 0);
+    pthread_mutex_lock(&t->lock);
+    for (int i = 0; i < TRIP_CONTEXT_NOTES; i++)
+        found = found || t->noted[i] == hash;
+    if (!found) {
+        memmove(t->noted, t->noted + 1, sizeof t->noted - sizeof *t->noted);
+        t->noted[TRIP_CONTEXT_NOTES - 1] = hash;
+    }
+    pthread_mutex_unlock(&t->lock);
+    return found;
+}
+
+/* Passes on each note once. */
 static void pass_line(const char *line, void *user)
 {
     triptych *t = user;
-    if (t->take)
+    if (t->take && !is_noted(t, line))
         t->take(t->take_user, line);
 }
 

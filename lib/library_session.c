@@ -78,8 +78,8 @@ static int load_function(const session *s, const session_look *look, trip_tf **t
                  : look->tf    ? trip_tf_load(tf, look->tf)
                                : trip_dataset_metadata_tf(s->text, s->data, tf);
     bool window = look->window > 0;
-    if (!status && !(window && trip_tf_is_normalised(*tf))) /* a window replaces the range */
-        status = trip_dataset_metadata_adapt(s->text, s->data, *tf);
+    if (!status && !(window && trip_tf_spans_window(*tf))) /* a window replaces the range */
+        status = trip_dataset_metadata_adapt(s->text, s->data, *tf, s->input);
     return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 
@@ -168,15 +168,42 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
     return status;
 }
 
+/* Fails if the last part is made of another volume than the first one. One
+ * transfer function cannot show both, even if the grids are equal. */
+static int check_source(session *s)
+{
+    const unsigned last = s->part_count - 1;
+    int status = session_read_text(s);
+    if (status)
+        return status;
+    const char *first = trip_dataset_metadata_source(s->texts[0]);
+    const char *other = trip_dataset_metadata_source(s->texts[last]);
+    if (!first || !other || !strcmp(first, other))
+        return 0;
+    return trip_fail(TRIP_ERROR, "open", s->parts[last]->path,
+                     "is made of another volume (%s) than %s (%s); " TRIP_JOIN_ADVICE, other,
+                     s->parts[0]->path, first);
+}
+
+static void drop_last_part(session *s)
+{
+    s->part_count--;
+    trip_dataset_metadata_destroy(s->texts[s->part_count]);
+    trip_dataset_close(s->parts[s->part_count]);
+}
+
 int session_add_data(session *s, const char *input)
 {
-    trip_dataset *joined;
+    trip_dataset *joined = NULL;
     int status = open_part(s, input);
     if (status)
         return status;
     status = trip_dataset_join(&joined, s->parts, s->part_count, s->budget);
+    if (!status)
+        status = check_source(s);
     if (status) {
-        trip_dataset_close(s->parts[--s->part_count]);
+        trip_dataset_join_close(joined);
+        drop_last_part(s);
         return status;
     }
     trip_dataset_join_close(s->joined);

@@ -24,6 +24,7 @@
  * --kernel-radius.
  *
  * Coordinates: world space has the length units of the volume's file (millimetres, metres, ...).
+ * For a patient, x points to the right, y to anterior and z to superior (RAS), in every format.
  * Index space has voxel (i, j, k) at (i, j, k).
  *
  * Pictures: `height` rows of `width` pixels, the top row first. A pixel is four floats: red, green,
@@ -457,22 +458,29 @@ typedef struct triptych_lod_settings {
 } triptych_lod_settings;
 
 typedef enum triptych_light_kind {
-    TRIPTYCH_LIGHT_DEFAULT,   /* head */
+    /* Head. With shadows the light comes from the upper left front of the view instead, and a note
+     * says so. */
+    TRIPTYCH_LIGHT_DEFAULT,
     TRIPTYCH_LIGHT_HEAD,      /* at the eye */
-    TRIPTYCH_LIGHT_DIRECTION, /* from the direction `toward` */
+    TRIPTYCH_LIGHT_DIRECTION, /* from the direction `toward` of world space */
     TRIPTYCH_LIGHT_POINT,     /* at the position `toward`; equally bright at any distance */
+    /* From the direction `toward` of the view: left, up, front. { 1, 1, 1 } shines from the upper
+     * left front. The light turns with the camera, so shadows are swept anew in each new view. */
+    TRIPTYCH_LIGHT_VIEW,
 } triptych_light_kind;
 
 typedef struct triptych_light {
     int no_shading; /* if not 0, gradients do not shade the colours; effects still use the light */
     triptych_light_kind kind;
-    double toward[3]; /* world space: direction to the light, not zero, or its position */
+    /* Direction to the light, not zero, or its position. In world space, except for
+     * TRIPTYCH_LIGHT_VIEW. */
+    double toward[3];
 } triptych_light;
 
 /* Effects beyond shading. An effect that is off costs nothing. */
 enum {
-    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with a
-     * light at the eye. */
+    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with
+     * TRIPTYCH_LIGHT_HEAD. */
     TRIPTYCH_EFFECT_SHADOWS = 1,
     TRIPTYCH_EFFECT_OCCLUSION = 2, /* matter around a point attenuates the light from everywhere */
     TRIPTYCH_EFFECT_CUEING = 4,    /* distant matter fades into the background */

@@ -388,7 +388,7 @@ static int check_records(brick *b)
     return 0;
 }
 
-/* Returns whether the orientation must be guessed: neither the file nor its format gives it. With
+/* Returns whether the orientation must be guessed: neither the file nor its program gives it. With
  * uneven spacing, a mirror image of the voxels is not a mirror image of the object, so nothing is
  * guessed. */
 static bool is_up_unknown(const trip_volume_info *info)
@@ -396,8 +396,7 @@ static bool is_up_unknown(const trip_volume_info *info)
     for (int a = 0; a < 3; a++)
         if (info->coordinates[a])
             return false;
-    return !info->oriented && !info->space[0] && strcmp(info->format, "openvdb") &&
-           strcmp(info->format, "nifti");
+    return !info->oriented && !info->space[0] && !info->up[0] && strcmp(info->format, "nifti");
 }
 
 static int find_orientation(brick *b)
@@ -408,7 +407,8 @@ static int find_orientation(brick *b)
                                 .kinds = b->kinds,
                                 .tile_log2 = b->format.tile_log2,
                                 .scale = trip_mean_scale_make(
-                                    b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };
+                                    b->in.tally->value_min, b->in.tally->value_max,
+                                    &(trip_codes){ .lo = q->lo, .hi = q->hi }) };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     /* A region may look unlike the whole object. */
     const bool whole = trip_region_is_whole(&b->params->region);
@@ -417,19 +417,27 @@ static int find_orientation(brick *b)
                : 0;
 }
 
+static trip_brick_metadata metadata_of(const brick *b)
+{
+    return (trip_brick_metadata){ .params = b->params,
+                                  .info = b->in.info,
+                                  .envelope = &b->in.envelope,
+                                  .functions = b->in.functions,
+                                  .histogram = &b->in.histogram,
+                                  .upright = b->upright };
+}
+
 static int finish_output(brick *b)
 {
     double begin = trip_now_seconds();
-    char *text = trip_brick_metadata_make(&(trip_brick_metadata){ .params = b->params,
-                                                                  .info = b->in.info,
-                                                                  .envelope = &b->in.envelope,
-                                                                  .functions = b->in.functions,
-                                                                  .histogram = &b->in.histogram,
-                                                                  .upright = b->upright });
+    const trip_brick_metadata metadata = metadata_of(b);
+    char *text = trip_brick_metadata_make(&metadata);
     if (!text)
         return TRIP_ERROR;
-    trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
-                              text };
+    trip_writer_summary s = { .value_min = b->in.tally->value_min,
+                              .value_max = b->in.tally->value_max,
+                              .voxels = b->in.tally->voxels,
+                              .text = text };
     int status = check_records(b);
     if (status == 0)
         status =
@@ -448,7 +456,8 @@ static void fill_summary(brick *b)
     trip_brick_summary *s = b->summary;
     const double(*m)[4] = b->in.info->index_to_world.m;
     memcpy(s->dims, b->in.info->dims, sizeof s->dims);
-    trip_brick_metadata_note(b->in.info, b->upright, s->note);
+    const trip_brick_metadata metadata = metadata_of(b);
+    trip_brick_metadata_note(&metadata, s->note);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
     s->voxels = b->in.tally->voxels;

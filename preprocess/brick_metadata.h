@@ -24,8 +24,7 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
 /* Writes the note for the user: the reader's choices, and the orientation guessed from the shape.
  * "" if there is none. */
 enum { TRIP_BRICK_NOTE_BYTES = 1024 };
-void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
-                              char note[TRIP_BRICK_NOTE_BYTES]);
+void trip_brick_metadata_note(const trip_brick_metadata *t, char note[TRIP_BRICK_NOTE_BYTES]);
 
 /* Returns the metadata, for free(), or NULL after a reported failure. */
 char *trip_brick_metadata_make(const trip_brick_metadata *t);

@@ -133,13 +133,14 @@ bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histog
     return out->total > 0;
 }
 
-int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf)
+int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf,
+                                const char *where)
 {
     trip_histogram histogram;
     bool given = trip_tf_needs_data(tf) && trip_dataset_metadata_histogram(t, &histogram);
     const trip_tf_data data = { d->header.value_min, d->header.value_max, given ? &histogram : NULL,
                                 trip_dataset_metadata_kind(t) };
-    return trip_tf_adapt(tf, &data, t->path);
+    return trip_tf_adapt(tf, &data, where);
 }
 
 const char *trip_dataset_metadata_source(const trip_dataset_metadata *t)

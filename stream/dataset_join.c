@@ -23,7 +23,7 @@ static const char *find_difference(const trip_dataset *first, const trip_dataset
         memcmp(a->index_to_world, b->index_to_world, sizeof a->index_to_world) != 0 ||
         !has_same_coordinates(first, d))
         return "has a different grid";
-    if (a->code_lo != b->code_lo || a->code_hi != b->code_hi || a->code_bytes != b->code_bytes)
+    if (!trip_codes_equal(&first->codes, &d->codes) || a->code_bytes != b->code_bytes)
         return "has a different scale of values";
     if (a->normal_bytes != b->normal_bytes || a->gradient_full != b->gradient_full ||
         memcmp(a->gradient_step, b->gradient_step, sizeof a->gradient_step) != 0)
@@ -111,9 +111,7 @@ static int check(trip_dataset *const *parts, unsigned count)
     for (unsigned p = 1; p < count; p++) {
         const char *why = find_difference(parts[0], parts[p]);
         if (why)
-            return trip_fail(TRIP_ERROR, "open", parts[p]->path,
-                             "%s than %s; data sets drawn together must be regions of one volume, "
-                             "bricked alike (triptych brick --region)",
+            return trip_fail(TRIP_ERROR, "open", parts[p]->path, "%s than %s; " TRIP_JOIN_ADVICE,
                              why, parts[0]->path);
     }
     if (count_lists(parts, count) > TRIP_LISTS_MAX)

@@ -453,15 +453,20 @@ void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
 
 bool draw_light_position(trip_panel *p, trip_document *d)
 {
+    bool turns = trip_light_control_of(&d->settings, &d->info).turns;
+    const bool switched = check(p, "Light turns with the view", &turns);
+    if (switched)
+        trip_light_set_turns(&d->settings, &d->info, &d->navigation, turns);
     trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     const bool far = c.distance >= TRIP_LIGHT_FARTHEST;
     bool changed = slide(p, "Light azimuth", &c.round, -180, 180, "%.0f°");
     changed |= slide(p, "Light elevation", &c.up, -89, 89, "%.0f°");
-    changed |= slide(p, "Light distance", &c.distance, TRIP_LIGHT_NEAREST, TRIP_LIGHT_FARTHEST,
-                     far ? "far away" : "%.2f", ImGuiSliderFlags_Logarithmic);
+    if (!turns)
+        changed |= slide(p, "Light distance", &c.distance, TRIP_LIGHT_NEAREST, TRIP_LIGHT_FARTHEST,
+                         far ? "far away" : "%.2f", ImGuiSliderFlags_Logarithmic);
     if (changed)
         trip_light_control_set(&d->settings, &d->info, &c);
-    return changed;
+    return changed || switched;
 }
 
 bool draw_effect_numbers(trip_panel *p, draw_settings *s, const trip_effect_switch &below)

@@ -518,8 +518,9 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     w->quantiser = params->quantiser;
     w->compact = params->compact;
     w->index_to_world = params->index_to_world;
-    w->scale = trip_mean_scale_make(params->value_min, params->value_max, params->quantiser.lo,
-                                    params->quantiser.hi);
+    w->scale = trip_mean_scale_make(
+        params->value_min, params->value_max,
+        &(trip_codes){ .lo = params->quantiser.lo, .hi = params->quantiser.hi });
     w->edge_log2 = (unsigned)__builtin_ctzll((unsigned long long)trip_splat_box_edge(&w->format));
     w->lists = level == 1;
     trip_splat_box_tables_fill(&w->tables, &w->format);

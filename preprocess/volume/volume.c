@@ -189,6 +189,17 @@ static bool is_upright(const trip_affine *m)
     return true;
 }
 
+/* Turns a patient's world space into the one of all data sets, RAS: half a turn about z. */
+static void turn_to_ras(trip_volume_info *info)
+{
+    if (strcmp(info->space, "LPS") != 0)
+        return;
+    for (int row = 0; row < 2; row++)
+        for (int column = 0; column < 4; column++) /* without a negative zero */
+            info->index_to_world.m[row][column] = 0 - info->index_to_world.m[row][column];
+    snprintf(info->space, sizeof info->space, "RAS");
+}
+
 /* Turns world space into the patient's, as if the file gave the orientation. */
 static int set_axes(trip_volume *v, const char *axes)
 {
@@ -203,8 +214,7 @@ static int set_axes(trip_volume *v, const char *axes)
     if (!is_upright(&info->index_to_world))
         return trip_fail(TRIP_USAGE, "read", v->path,
                          "gives the directions of its axes; --axes requires a file without them");
-    snprintf(info->space, sizeof info->space, "%s",
-             strcmp(info->format, "nifti") == 0 ? "RAS" : "LPS");
+    snprintf(info->space, sizeof info->space, "RAS");
     info->oriented = true;
     for (int a = 0; a < 3; a++) {
         trip_vec3 to = trip_anatomy_direction(info->space, axes[a]);
@@ -264,6 +274,7 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
         override_spacing(&v->info.index_to_world, params->spacing);
     if (params->coordinates && !(status = trip_volume_check_dims(v->path, &v->info)))
         status = trip_volume_read_coordinates(&v->info, params->coordinates, v->path);
+    turn_to_ras(&v->info);
     if (!status && params->axes)
         status = set_axes(v, params->axes);
     if (!status)

@@ -61,8 +61,10 @@ typedef struct trip_volume_info {
     bool sparse;         /* only active voxels exist; all others hold `background` */
     double background;
     const char *format; /* "nrrd", "openvdb", ... */
-    char space[8]; /* orientation of world space in the patient, as in anatomy.h; "" if unknown */
+    char space[8]; /* orientation of world space in the patient: "RAS", or "" if unknown. Readers
+                      may set "LPS"; opening a volume turns it into "RAS". */
     bool oriented; /* the file gives the directions of its axes in world space */
+    char up[3];    /* "+y" or "+z", which is up in the program that wrote the file; "" if unknown */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
     char note[512];    /* tells the user which grid or variable was chosen by default, or "" */

@@ -880,7 +880,7 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
 {
     const char *light = s->headlight     ? "from the eye"
                         : s->point_light ? "from the given position"
-                                         : "from the given direction";
+                                         : "from a direction";
     char bytes[32];
     const bool of_values = trip_plan_is_of_values(plan, s);
     if (s->show == TRIP_SHOW_MERGE)

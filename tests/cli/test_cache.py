@@ -554,7 +554,8 @@ class Cache(program.ProgramTest):
             run = self.works("render", vdb, "-o", "one.png", *SIZE)
             self.assertEqual(b"bricked" in run.stdout, bricked)
             self.assertRegex(run.stderr, r'\Atriptych: note: [^\n]*"density" is used[^\n]*\n\Z')
-        self.assertEqual(self.works("render", vdb, "-o", "a.png", *SIZE, "--grid=heat").stderr, "")
+        run = self.works("render", vdb, "-o", "a.png", *SIZE, "--grid=heat")
+        self.assertNotIn("is used", run.stderr)
 
     def test_an_impossible_output_is_reported_before_reading(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))

@@ -146,6 +146,22 @@ class Parts(program.ProgramTest):
         self.leaves_nothing(2, "render", self.halves[0], "v.nrrd", "-o", "x.png", says="v.nrrd: ")
         self.leaves_nothing(2, "render", *self.halves, "--error", 1, "-o", "x.png", says="--error")
 
+    def test_two_volumes_on_one_grid_are_refused_with_a_way_out(self):
+        """A scan and its segmentation. The values of both have the same codes, and no voxel is kept
+        in both, so only their sources tell them apart."""
+        for name, at, value in ("scan", 2, 200), ("labels", 40, 2):
+            values = numpy.zeros((64, 64, 64), "u1")
+            values[at : at + 9, at : at + 9, at : at + 9] = value
+            values[-1, -1, -1] = 255
+            program.write_nrrd(f"{name}.nrrd", values)
+            self.works("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=1:254")
+        run = self.leaves_nothing(1, "render", "scan.trip", "labels.trip", "-o", "x.png",
+                                  says="labels.trip: is made of another volume (labels.nrrd)")
+        self.assertIn("the same --eye, --look and --up", run.stderr)
+        run = self.leaves_nothing(2, "render", "scan.nrrd", "labels.nrrd", "-o", "x.png",
+                                  says="only one volume")
+        self.assertIn("the same --eye, --look and --up", run.stderr)
+
     def test_regions_that_overlap_are_refused_for_every_classification(self):
         self.make("low.trip", "--region", ":22,:,:")
         self.make("corner.trip", "--region", "20:21,:,:")

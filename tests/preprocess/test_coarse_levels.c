@@ -248,8 +248,8 @@ static uint64_t visit(const trip_dataset *d, const trip_list *list,
 static void check_record(const trip_dataset *d, const trip_list *list, const int64_t at[3],
                          unsigned code, void *user)
 {
-    const trip_mean_scale scale = trip_mean_scale_make(d->header.value_min, d->header.value_max,
-                                                       d->header.code_lo, d->header.code_hi);
+    const trip_mean_scale scale =
+        trip_mean_scale_make(d->header.value_min, d->header.value_max, &d->codes);
     const cube c = sum_cube(at, list->level, list->axis);
     const base *b = base_at(at[0], at[1], at[2], list->level);
     (void)user;

@@ -145,13 +145,13 @@ static void dicom_slices_are_ordered_and_placed_in_space(void **state)
     }
     trip_volume_info info = assert_sample(path_of("d%d.dcm"), TRIP_I16, TRIP_I16, 2.5, -1000, 0);
     const double expected[3][4] = {
-        { 0.75, 0, 0, -10 },
-        { 0, 0, -1.5, 20 },
+        { -0.75, 0, 0, 10 },
+        { 0, 0, 1.5, -20 },
         { 0, 0.5, 0.25, 5 },
     };
     assert_map(&info.index_to_world, expected);
     assert_true(info.slope == 2.5 && info.inter == -1000);
-    assert_string_equal(info.space, "LPS");
+    assert_string_equal(info.space, "RAS"); /* DICOM's x and y, negated */
     assert_true(info.oriented);
 }
 

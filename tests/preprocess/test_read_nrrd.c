@@ -308,8 +308,10 @@ static void spacings_and_directions_become_the_map(void **state)
                                 "space: left-posterior-superior\n"
                                 "space directions: (1,0.25,0) ( 0 , 2 , 0.5 )  (-0.5,0,3)\n"
                                 "space origin: (-10, 20, 1e1)\n"));
-    assert_map(&a,
-               (const double[3][4]){ { 1, 0, -0.5, -10 }, { 0.25, 2, 0, 20 }, { 0, 0.5, 3, 10 } });
+    assert_map(&a, (const double[3][4]){ /* in RAS, x and y are negated */
+                                         { -1, 0, 0.5, 10 },
+                                         { -0.25, -2, 0, -20 },
+                                         { 0, 0.5, 3, 10 } });
     a = map_of(write_with_lines("extent.nrrd", "axis mins: 1 -3 nan\naxis maxs: 11 3 nan\n"
                                                "centers: cell node cell\n"));
     assert_map(&a, (const double[3][4]){ { 2, 0, 0, 2 }, { 0, 2, 0, -3 }, { 0, 0, 1, 0 } });
@@ -548,7 +550,7 @@ static void the_space_gives_the_orientation(void **state)
     static const char *const lines[][5] = {
         { "RAS", "space: right-anterior-superior\n", "space: RAS\n",
           "space: rightanteriorsuperior\n", "space: Right Anterior Superior\n" },
-        { "LPS", "space: left-posterior-superior\n", "space: lps\n",
+        { "RAS", "space: left-posterior-superior\n", "space: lps\n",
           "space: left posterior superior\n", "space: LEFTPOSTERIORSUPERIOR\n" },
         { "", "space: scanner-xyz\n", "space: 3D-right-handed\n", "space: 3d right handed\n",
           "space: 3Drighthanded\n" },
@@ -627,9 +629,11 @@ static void vectors_with_time_give_their_spatial_part(void **state)
                  "space origin: (10,20,30,40)\n\n",
                  names[i]);
         trip_volume_info info = info_of(write_with_header("time.nrrd", text));
-        assert_string_equal(info.space, i < 2 ? "RAS" : "LPS");
-        assert_map(&info.index_to_world,
-                   (const double[3][4]){ { 1, 0, 0, 10 }, { 0, 2, 0, 20 }, { 0, 0, 3, 30 } });
+        const double sign = i < 2 ? 1 : -1; /* LPS has x and y negated */
+        assert_string_equal(info.space, "RAS");
+        assert_map(&info.index_to_world, (const double[3][4]){ { sign * 1, 0, 0, sign * 10 },
+                                                               { 0, sign * 2, 0, sign * 20 },
+                                                               { 0, 0, 3, 30 } });
     }
     assert_refused(write_with_lines("time.nrrd",
                                     "space: RAST\n"

@@ -287,8 +287,8 @@ static void axes_orient_files_without_orientation(void **state)
     const trip_volume_params p = { .axes = "SLP" };
     assert_int_equal(read_volume(write_file("up.nrrd", &up), &p, 2, values, VOXELS, &info), 0);
     assert_map(&info.index_to_world,
-               (const double[3][4]){ { 0, 2, 0, 20 }, { 0, 0, 3, 30 }, { 1, 0, 0, 10 } });
-    assert_string_equal(info.space, "LPS");
+               (const double[3][4]){ { 0, -2, 0, -20 }, { 0, 0, -3, -30 }, { 1, 0, 0, 10 } });
+    assert_string_equal(info.space, "RAS");
     append_text(&down, head);
     append_text(&down, "spacings: 1 -2 3\n\n");
     append_volume(&down, TRIP_U8, false);
