@@ -250,7 +250,7 @@ typedef struct triptych_description {
     int64_t dims[3];
     double index_to_world[3][4];
     double spacing_min[3], spacing_max[3]; /* distances of neighbouring voxels; equal if even */
-    char space[8];                         /* "LPS", "RAS" or "" */
+    char space[8];                         /* "RAS" or "" */
     char modality[24];                     /* of DICOM: "CT", "MR", ..., or "" */
     char note[1024];                       /* choices made where the file leaves several, or "" */
 } triptych_description;

@@ -238,7 +238,7 @@ class Dicom(program.ProgramTest):
         self.assertIn("its folder holds 8 more", info["note"])
 
     def mosaic(self, normal):
-        """Writes the nine slices as tiles, and a zero in place of no tile."""
+        """Writes the nine slices as tiles. The first one is at (10, 20, 30) in LPS."""
         tiles = self.values.reshape(3, 3, ROWS, COLUMNS).transpose(0, 2, 1, 3)
         place = numpy.array([10, 20, 30]) - [COLUMNS, ROWS, 0]  # the large slice has this corner
         header = csa_header(NumberOfImagesInMosaic=[9], SliceNormalVector=[0, 0, normal])
@@ -254,7 +254,7 @@ class Dicom(program.ProgramTest):
         for normal, values, first in (1, self.values, 30), (-1, self.values[::-1], 30 - 2 * 8):
             info = self.mosaic(normal)
             self.assertEqual(info["dims"], [COLUMNS, ROWS, 9])
-            self.assertEqual([row[3] for row in info["index_to_world"]], [10, 20, first])
+            self.assertEqual([row[3] for row in info["index_to_world"]], [-10, -20, first])
             self.assertEqual(info["index_to_world"][2][2], 2)
             program.write_stack("plain", values, lambda path, image: write(
                 path, slice_of(image, (10, 20, first + 2 * int(path[-8:-4])),

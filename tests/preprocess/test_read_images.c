@@ -440,7 +440,7 @@ static void dicom_slices_at_uneven_distances_stay_there(void **state)
         assert_true(info->coordinates[1][k < NY ? k : 0] == (k < NY ? k : 0));
     }
     assert_map(&info->index_to_world,
-               (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 0.8, -1.2, 0 }, { 0, 0.6, 1.6, 0 } });
+               (const double[3][4]){ { -1, 0, 0, 0 }, { 0, -0.8, 1.2, 0 }, { 0, 0.6, 1.6, 0 } });
     trip_volume_close(v);
     trip_budget_destroy(budget);
 }
