@@ -43,8 +43,9 @@ enum trip_image_task {
     /* Reads a picture from a file. numbers: bytes the helper may use. Reply data: trip_image_size,
      * then float RGBA rows. */
     TRIP_IMAGE_READ,
-    /* Opens a stack of slices. numbers: bytes the helper may use; 1 to accept missing slices. Reply
-     * data: trip_image_stack. */
+    /* Opens a stack of slices. numbers: bytes the helper may use; 1 to accept missing slices; the
+     * number of the DICOM series, or 0; its time, from 0. Reply data: trip_image_stack, then the
+     * positions and the text that it announces. */
     TRIP_IMAGE_OPEN_STACK,
     /* Reads a slice. numbers: k. Reply data: the stored values in this machine's byte order. */
     TRIP_IMAGE_READ_SLICE,
@@ -96,7 +97,13 @@ typedef struct trip_image_stack {
     char space[8];         /* anatomical, as in anatomy.h; terminated */
     char modality[24];     /* from DICOM, at most 16 characters; terminated */
     uint64_t helper_bytes; /* part of the allowed memory used until the helper ends */
+    int32_t uneven;        /* 1: dims[2] doubles follow, the positions of the slices, ascending */
+    uint32_t parts_bytes;  /* of the list of series that follows, one a line */
+    char note[512];        /* choices made for the user, or ""; terminated */
 } trip_image_stack;
+
+/* Maximum of trip_image_stack.parts_bytes. */
+#define TRIP_IMAGE_PARTS_MAX ((uint32_t)1 << 20)
 
 typedef struct trip_image_netcdf {
     int64_t dims[3];

@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "budget.h"
 #include "slice_files.h"
@@ -41,18 +43,30 @@ class trip_slice_stack
     trip_scalar type = TRIP_U8;
     double slope = 1, inter = 0; /* value = slope * stored + inter */
     trip_affine index_to_world = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
-    char space[8] = "";     /* anatomical, as in anatomy.h */
-    char modality[24] = ""; /* from DICOM: "CT", "MR", ... */
-    bool oriented = false;  /* the file states the directions of the map */
+    char space[8] = "";        /* anatomical, as in anatomy.h */
+    char modality[24] = "";    /* from DICOM: "CT", "MR", ... */
+    bool oriented = false;     /* the file states the directions of the map */
+    std::vector<double> along; /* positions of slices at uneven distances, ascending, else empty */
+    std::string note;          /* choices made for the user */
+    std::string parts;         /* the series of a DICOM folder, one a line */
 };
 
 /* Opens TIFF, PNG or EXR files with OpenImageIO (picture_stack.cpp). The pages of a single TIFF
  * file are slices, too. */
 std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
                                                      trip_budget *budget);
-/* Opens DICOM files with DCMTK (dicom_stack.cpp). Slices are sorted by their position in space.
- * None may be missing in between, unless `allow_gaps` is set. */
-std::unique_ptr<trip_slice_stack> trip_dicom_stack(const trip_slice_files &files,
-                                                   trip_budget *budget, bool allow_gaps);
+/* Which part of DICOM files is read, and how. */
+struct trip_stack_choice {
+    bool allow_gaps; /* slices may be missing between others */
+    int series;      /* its number; 0 chooses the largest */
+    int time;        /* of slices that share their position, from 0 */
+};
+
+/* Opens DICOM files with GDCM (dicom_stack.cpp). Slices are sorted by their position in space.
+ * `path` is the one that the user gave. */
+std::unique_ptr<trip_slice_stack> trip_dicom_stack(const std::string &path,
+                                                   const trip_slice_files &files,
+                                                   trip_budget *budget,
+                                                   const trip_stack_choice &choice);
 
 #endif

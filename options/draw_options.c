@@ -273,6 +273,9 @@ static const trip_option volume_rows[] = {
     { "level-set", "HOW", "Selects how an OpenVDB level set becomes a density: filled or band",
       "filled", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_CHOICE, AT(level_set),
       .choices = level_sets, .first = TRIPTYCH_LEVEL_SET_FILLED },
+    { "series", "N", "Selects a series of a DICOM folder by the number in the list of `info`",
+      "the largest", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(series), .lo = 1,
+      .hi = INT32_MAX },
     { "spacing", "X,Y,Z", "Sets the distance of neighbouring voxels along each axis",
       "the distance in the file, else 1", .group = DRAW_GROUP_VOLUME, AT(spacing),
       CUSTOM(read_spacing) },
@@ -285,8 +288,11 @@ static const trip_option volume_rows[] = {
       "posterior, inferior and right",
       .group = DRAW_GROUP_VOLUME, AT(axes), CUSTOM(read_axes) },
     { "allow-gaps", NULL,
-      "Accepts a stack with missing slices, as if the neighbours of a gap touched",
+      "Accepts a stack with missing slices: the neighbours of a gap touch, but DICOM slices stay "
+      "where they are",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
+    { "time", "N", "Selects the time of a file with several, from 0", "0",
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
 };
 #undef AT
 

@@ -78,6 +78,9 @@ static int check_options(const char *path, const char *format, const trip_volume
     if (strcmp(format, "images") != 0 && p->allow_gaps)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s; --allow-gaps requires a stack of slices", format);
+    if (strcmp(format, "images") != 0 && (p->series || p->time))
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "its format is %s; --series and --time require DICOM", format);
     for (int a = 0; a < 3; a++)
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))
@@ -377,6 +380,7 @@ void trip_volume_close(trip_volume *v)
     if (v->state)
         v->reader->close(v->state);
     trip_volume_free_coordinates(&v->info);
+    free(v->info.parts);
     free(v->path);
     free(v);
 }

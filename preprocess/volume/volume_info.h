@@ -68,6 +68,7 @@ typedef struct trip_volume_info {
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
     char note[512];    /* tells the user which grid or variable was chosen by default, or "" */
+    char *parts;       /* the series of a DICOM folder, one a line, or NULL. The volume owns it. */
 } trip_volume_info;
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
@@ -117,6 +118,8 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks with missing slices */
+    int series;                /* --series, for DICOM: its number; 0 chooses the largest */
+    int time;                  /* --time, for DICOM: from 0, of slices that share their positions */
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;
