@@ -44,6 +44,8 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .raw_offset_bytes = o->raw_offset_bytes,
         .axes = o->axes,
         .allow_gaps = o->allow_gaps,
+        .channel = o->channel,
+        .time = o->time,
         .max_voxels = o->max_voxels,
     };
     if (o->in_memory)
@@ -133,6 +135,8 @@ static const char *fault_of_volume(const triptych_brick_options *o)
         if (o->raw_dims[a] < 0 || o->raw_dims[a] > INT32_MAX)
             return "raw data must have 1 to 2147483647 voxels along each axis";
     }
+    if (o->channel < 0 || o->time < 0)
+        return "channels and times count from 0";
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
         return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
     if (o->raw_type && !triptych_is_raw_type(o->raw_type))

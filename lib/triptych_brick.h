@@ -109,6 +109,8 @@ typedef struct triptych_brick_options {
      * and L, one of A and P, one of S and I, such as "PIR". */
     const char *axes;
     int allow_gaps; /* if not 0, a stack of slices may have gaps */
+    /* The channel or component, and the time, of a file with several; both count from 0. */
+    int channel, time;
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
     uint64_t max_voxels;

@@ -287,6 +287,11 @@ static const trip_option volume_rows[] = {
     { "allow-gaps", NULL,
       "Accepts a stack with missing slices, as if the neighbours of a gap touched",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
+    { "channel", "N", "Selects the channel or component of a file with several, from 0", "0",
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(channel), .lo = 0,
+      .hi = INT32_MAX },
+    { "time", "N", "Selects the time of a file with several, from 0", "0",
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
 };
 #undef AT
 

@@ -1,6 +1,7 @@
 #include "volume_info.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -209,6 +210,13 @@ void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter,
     decoders[type](stored, count, swap, slope, inter, values);
 }
 
+float trip_scalar_luma(trip_scalar type, bool swap, const void *stored)
+{
+    float c[3];
+    trip_scalar_decode(type, swap, 1, 0, stored, 3, c);
+    return (float)(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
+}
+
 int trip_volume_check_dims(const char *path, const trip_volume_info *info)
 {
     int64_t bytes = trip_scalar_bytes(info->type);
@@ -231,4 +239,26 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info)
                              "has more than %" PRId64 " voxels along an axis",
                              TRIP_VOLUME_AXIS_MAX);
     return 0;
+}
+
+int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count)
+{
+    if (index >= 0 && index < count)
+        return 0;
+    if (count == 1)
+        return trip_fail(TRIP_USAGE, "read", path, "has one %s; --%s %d does not exist", what, what,
+                         index);
+    return trip_fail(TRIP_USAGE, "read", path,
+                     "has %" PRId64 " %ss, from 0 to %" PRId64 "; --%s %d does not exist", count,
+                     what, count - 1, what, index);
+}
+
+void trip_volume_note_entry(trip_volume_info *info, const char *what, int index, int64_t count,
+                            const char *detail)
+{
+    const size_t used = strlen(info->note);
+    if (count > 1)
+        snprintf(info->note + used, sizeof info->note - used,
+                 "%s%s %d of %" PRId64 "%s is read (--%s N reads another, from 0)",
+                 used ? "; " : "", what, index, count, detail, what);
 }

@@ -48,6 +48,10 @@ const char *trip_scalar_name(trip_scalar type);
 void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
                         size_t count, float *values);
 
+/* Returns the luma (Rec. ITU-R BT.709-6, 3.2) of red, green and blue, which follow each other at
+ * `stored`. */
+float trip_scalar_luma(trip_scalar type, bool swap, const void *stored);
+
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
 #define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
 
@@ -74,6 +78,15 @@ typedef struct trip_volume_info {
 int trip_volume_check_dims(const char *path, const trip_volume_info *info);
 /* Reports and returns a negative status if an axis has more than TRIP_VOLUME_AXIS_MAX voxels. */
 int trip_volume_check_axes(const char *path, const trip_volume_info *info);
+
+#define TRIP_VOLUME_COLOUR_NOTE "the values are colours; their luma (Rec. 709) is read"
+
+/* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
+ * Reports and returns a negative status if `index` is none of them. */
+int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count);
+/* Appends a note about the entry to info->note if there are several. `detail` may be "". */
+void trip_volume_note_entry(trip_volume_info *info, const char *what, int index, int64_t count,
+                            const char *detail);
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
@@ -115,6 +128,7 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks with missing slices */
+    int channel, time;         /* --channel, --time: of files with several, from 0 */
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;
