@@ -241,6 +241,11 @@ static int parse_type(const trip_nrrd_parser *p, trip_nrrd_header *h)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_TYPE], "type \"%.40s\" is not a scalar type",
                               p->values[TRIP_NRRD_TYPE]);
     h->type = (trip_scalar)type;
+    return 0;
+}
+
+static int parse_endian(const trip_nrrd_parser *p, trip_nrrd_header *h)
+{
     if (h->type == TRIP_F16 && h->text == TRIP_TEXT_NUMBERS)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_TYPE],
                               "values of the type half cannot be numbers in a text");
@@ -248,7 +253,8 @@ static int parse_type(const trip_nrrd_parser *p, trip_nrrd_header *h)
         h->big_endian = trip_machine_is_big_endian();
         return 0;
     }
-    if ((status = trip_nrrd_require(p, TRIP_NRRD_ENDIAN, "endian")) < 0)
+    int status = trip_nrrd_require(p, TRIP_NRRD_ENDIAN, "endian");
+    if (status < 0)
         return status;
     h->big_endian = strcasecmp(p->values[TRIP_NRRD_ENDIAN], "big") == 0;
     if (!h->big_endian && strcasecmp(p->values[TRIP_NRRD_ENDIAN], "little") != 0)
@@ -283,8 +289,9 @@ static int parse(trip_nrrd_parser *p, trip_nrrd_header *h, bool ends)
     if (!magic || strncmp(magic, "NRRD000", 7) != 0 || magic[7] < '1' || magic[7] > '5' || magic[8])
         return trip_nrrd_fail(p, 0, "is not an NRRD file of version 1 to 5");
     if ((status = split_lines(p, ends)) < 0 || (status = trip_nrrd_parse_axes(p, h)) < 0 ||
-        (status = parse_encoding(p, h)) < 0 || (status = parse_type(p, h)) < 0 ||
-        (status = parse_skips(p, h)) < 0 || (status = trip_nrrd_parse_geometry(p, h)) < 0)
+        (status = parse_type(p, h)) < 0 || (status = parse_encoding(p, h)) < 0 ||
+        (status = parse_endian(p, h)) < 0 || (status = parse_skips(p, h)) < 0 ||
+        (status = trip_nrrd_parse_geometry(p, h)) < 0)
         return status;
     return trip_nrrd_parse_files(p, h, ends);
 }

@@ -21,10 +21,11 @@
 /* The default size of a portion. */
 #define PORTION_BYTES ((int64_t)16 << 20)
 
-/* In the order of probing: formats with a magic number first. */
+/* In the order of probing. NIfTI files are also known by their names, and raw data by names alone.
+ */
 static const trip_volume_reader *const readers[] = {
-    &trip_read_vdb,     &trip_read_nrrd, &trip_read_nifti,  &trip_read_netcdf,
-    &trip_read_netcdf4, &trip_read_vol,  &trip_read_images, &trip_read_raw,
+    &trip_read_vdb, &trip_read_nrrd,   &trip_read_netcdf, &trip_read_netcdf4,
+    &trip_read_vol, &trip_read_images, &trip_read_nifti,  &trip_read_raw,
 };
 
 /* The stored slices [first, first + count) of a portion, including one neighbour on each side. */

@@ -115,7 +115,7 @@ static void every_type_holds_the_sample(void **state)
 static void a_time_is_chosen(void **state)
 {
     (void)state;
-    const contents c = { .type = NC_SHORT, .chunks = true, .deeper = true, .time = 1 };
+    const contents c = { .type = NC_SHORT, .deeper = true, .time = 1 };
     const char *path = write_contents("t.nc", &c);
     float values[VOXELS];
     trip_volume_info info;
@@ -232,6 +232,8 @@ static void make_answer(int number)
     *v = (trip_image_netcdf){ .dims = { NX, NY, NZ },
                               .type = TRIP_I16,
                               .placed = 1,
+                              .times = 1,
+                              .channels = 1,
                               .slope = 1,
                               .name = "t",
                               .helper_bytes = 1000 };
