@@ -9,46 +9,59 @@
 
 #include "anatomy.h"
 #include "budget.h"
+#include "cached_volume.h"
+#include "draw_options.h"
 #include "geometry.h"
 #include "json.h"
 #include "library.h"
 #include "command_line.h"
 #include "report.h"
 #include "text.h"
+#include "volume_info_print.h"
 
 typedef struct options {
     const char *path;
-    bool verify, json;
+    int verify, json;
+    triptych_brick_options volume;
 } options;
 
-static const struct argp_option option_table[] = {
-    { "verify", 'v', NULL, 0, "Reads all bytes and checks them", 0 },
-    { "json", 'j', NULL, 0, "Prints JSON", 0 },
-    { 0 },
-};
+#define AT(member) .at = offsetof(options, member)
 
-static error_t parse_option(int key, char *argument, struct argp_state *state)
+static const trip_option info_rows[] = {
+    { "json", NULL, "Prints JSON", .short_name = 'j', .type = TRIP_OPTION_FLAG, AT(json) },
+    { "verify", NULL, "Reads all bytes and checks them", .short_name = 'v',
+      .type = TRIP_OPTION_FLAG, AT(verify) },
+};
+#undef AT
+
+static const trip_option_table info_table = { info_rows, sizeof info_rows / sizeof *info_rows };
+
+enum { OWN, VOLUME, SETS };
+
+typedef struct parse {
+    options *o;
+    option_set sets[SETS];
+} parse;
+
+static int add_input(void *user, char *path)
 {
-    options *o = state->input;
-    switch (key) {
-    case 'v':
-        o->verify = true;
-        return 0;
-    case 'j':
-        o->json = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        if (o->path)
-            return trip_option_fail(argument, "only one data set is possible at a time");
-        o->path = argument;
-        return 0;
-    case ARGP_KEY_END:
-        return o->path ? 0
-                       : trip_option_fail("NAME.trip",
-                                          "no data set given; use `triptych info NAME.trip`");
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+    options *o = ((parse *)user)->o;
+    if (o->path)
+        return trip_option_fail(path, "only one data set or volume is possible at a time");
+    o->path = path;
+    return 0;
+}
+
+static int check(void *user)
+{
+    const parse *p = user;
+    const options *o = p->o;
+    if (!o->path)
+        return trip_option_fail("NAME.trip",
+                                "no data set or volume given; use `triptych info NAME.trip`");
+    if (o->verify && cached_volume_wanted(o->path))
+        return trip_option_fail("--verify", "applies to data sets only");
+    return p->sets[VOLUME].given ? cached_volume_check_options(o->path) : 0;
 }
 
 /* The data set to print. */
@@ -427,29 +440,44 @@ static int show(const options *o, data_set *d, trip_budget *budget)
     return status;
 }
 
+static int show_data_set(const options *o, data_set *d)
+{
+    trip_budget *budget = NULL;
+    int status = trip_budget_create(&budget, 0);
+    if (status == 0)
+        status = show(o, d, budget);
+    trip_json_free(&d->source);
+    free(d->lists);
+    if (budget)
+        trip_budget_destroy(budget);
+    return status;
+}
+
 int trip_command_info(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse_option,
-        .args_doc = "NAME.trip",
-        .doc = "Prints the contents of a data set: grid, values, sizes and source.",
-    };
     options o = { 0 };
+    parse p = { .o = &o,
+                .sets = { [OWN] = { .table = &info_table, .base = &o },
+                          [VOLUME] = { .table = &volume_options_table, .base = &o.volume } } };
+    const command_line c = {
+        .args_doc = "NAME.trip|VOLUME",
+        .doc = "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
+               "prints the grid, and the series of a DICOM folder.",
+        .sets = p.sets,
+        .set_count = SETS,
+        .argument = add_input,
+        .end = check,
+        .user = &p,
+    };
     data_set d = { 0 };
-    trip_budget *budget = NULL;
-    int status = trip_options_parse(&argp, argc, argv, &o);
+    int status = command_line_parse(&c, argc, argv);
     d.path = o.path;
-    if (status == 0)
-        status = trip_budget_create(&budget, 0);
     if (status == 0)
         status = library_create(&d.t, NULL);
     if (status == 0)
-        status = show(&o, &d, budget);
-    trip_json_free(&d.source);
-    free(d.lists);
+        status = cached_volume_wanted(o.path)
+                     ? volume_info_print(d.t, o.path, &o.volume, o.json != 0)
+                     : show_data_set(&o, &d);
     triptych_destroy(d.t);
-    if (budget)
-        trip_budget_destroy(budget);
     return trip_exit_status(status);
 }

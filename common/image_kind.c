@@ -9,10 +9,11 @@ trip_image_kind trip_image_kind_of(const unsigned char *head, size_t bytes)
         size_t offset, bytes;
         const char *magic;
     } magics[] = {
+        /* The 128 bytes before the mark are free, and some programs put a TIFF header there. */
+        { TRIP_IMAGE_DICOM, 128, 4, "DICM" },
         { TRIP_IMAGE_TIFF, 0, 4, "II*\0" },   { TRIP_IMAGE_TIFF, 0, 4, "MM\0*" },
         { TRIP_IMAGE_TIFF, 0, 4, "II+\0" },   { TRIP_IMAGE_TIFF, 0, 4, "MM\0+" },
         { TRIP_IMAGE_EXR, 0, 4, "v/1\1" },    { TRIP_IMAGE_PNG, 0, 6, "\x89PNG\r\n" },
-        { TRIP_IMAGE_DICOM, 128, 4, "DICM" },
     };
     for (size_t i = 0; i < sizeof magics / sizeof magics[0]; i++)
         if (bytes >= magics[i].offset + magics[i].bytes &&

@@ -109,7 +109,10 @@ typedef struct triptych_brick_options {
      * and L, one of A and P, one of S and I, such as "PIR". */
     const char *axes;
     int allow_gaps; /* if not 0, a stack of slices may have gaps */
-    /* The channel or component, and the time, of a file with several; both count from 0. */
+    /* DICOM: the number of a series, as triptych_describe() lists it; default: the largest. */
+    int series;
+    /* The channel or component, and the time, of a file with several; both count from 0. In DICOM,
+     * slices that share their positions are times. */
     int channel, time;
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
@@ -240,6 +243,28 @@ typedef int (*triptych_file_callback)(void *user, const char *path);
 TRIPTYCH_API int triptych_list_files(triptych *t, const char *volume,
                                      const triptych_brick_options *options,
                                      triptych_file_callback found, void *user);
+
+/* The grid of a volume, as its file gives it. */
+typedef struct triptych_description {
+    const char *format; /* "nrrd", "images", ...; a constant */
+    const char *type;   /* of the stored values, as triptych_brick_options.raw_type; a constant */
+    int64_t dims[3];
+    double index_to_world[3][4];
+    double spacing_min[3], spacing_max[3]; /* distances of neighbouring voxels; equal if even */
+    char space[8];                         /* "LPS", "RAS" or "" */
+    char modality[24];                     /* of DICOM: "CT", "MR", ..., or "" */
+    char note[1024];                       /* choices made where the file leaves several, or "" */
+} triptych_description;
+
+/* Receives a line of text. A negative result ends the function that calls it. */
+typedef int (*triptych_text_callback)(void *user, const char *text);
+
+/* Describes a volume from its headers. Only the options for reading count; NULL is allowed. For
+ * DICOM, calls `series`, unless it is NULL, with a line for each series: its number, name, modality
+ * and size. */
+TRIPTYCH_API int triptych_describe(triptych *t, const char *volume,
+                                   const triptych_brick_options *options, triptych_description *out,
+                                   triptych_text_callback series, void *user);
 
 /* Returns 1 if `name` is a valid triptych_brick_options.raw_type, otherwise 0. */
 TRIPTYCH_API int triptych_is_raw_type(const char *name);

@@ -1,5 +1,6 @@
 #include "draw_options.h"
 
+#include <limits.h>
 #include <float.h>
 #include <string.h>
 
@@ -273,6 +274,9 @@ static const trip_option volume_rows[] = {
     { "level-set", "HOW", "Selects how an OpenVDB level set becomes a density: filled or band",
       "filled", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_CHOICE, AT(level_set),
       .choices = level_sets, .first = TRIPTYCH_LEVEL_SET_FILLED },
+    { "series", "N", "Selects a series of a DICOM folder by the number in the list of `info`",
+      "the largest", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(series), .lo = 1,
+      .hi = INT_MAX },
     { "spacing", "X,Y,Z", "Sets the distance of neighbouring voxels along each axis",
       "the distance in the file, else 1", .group = DRAW_GROUP_VOLUME, AT(spacing),
       CUSTOM(read_spacing) },
@@ -289,9 +293,9 @@ static const trip_option volume_rows[] = {
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
     { "channel", "N", "Selects the channel or component of a file with several, from 0", "0",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(channel), .lo = 0,
-      .hi = INT32_MAX },
+      .hi = INT_MAX },
     { "time", "N", "Selects the time of a file with several, from 0", "0",
-      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT_MAX },
 };
 #undef AT
 

@@ -491,7 +491,7 @@ static int choose_entries(const header *h, const variable *v, const trip_volume_
     for (unsigned i = 0; i < 2 && status == 0; i++) {
         const int64_t size = v->dims > 3 + i ? (int64_t)size_of(h, v->dim[i]) : 1;
         status = trip_volume_check_entry(h->path, names[i], wanted[i], size);
-        trip_volume_note_entry(info, names[i], wanted[i], size, "");
+        trip_entry_note(info->note, sizeof info->note, names[i], wanted[i], size, "");
     }
     return status;
 }

@@ -137,8 +137,8 @@ static int open_file(trip_helper_slices *s, const trip_volume_params *params,
         status = trip_volume_check_entry(s->path, "time", params->time, v.times);
     if (status == 0)
         status = trip_volume_check_entry(s->path, "channel", params->channel, v.channels);
-    trip_volume_note_entry(info, "time", params->time, v.times, "");
-    trip_volume_note_entry(info, "channel", params->channel, v.channels, "");
+    trip_entry_note(info->note, sizeof info->note, "time", params->time, v.times, "");
+    trip_entry_note(info->note, sizeof info->note, "channel", params->channel, v.channels, "");
     return status;
 }
 

@@ -200,8 +200,8 @@ static int set_dims(const char *path, const nifti_2_header *n, const trip_volume
     memcpy(info->dims, sizes + 1, sizeof info->dims);
     layout->count[TRIP_DENSE_AFTER_VOLUMES] = volumes;
     layout->index[TRIP_DENSE_AFTER_VOLUMES] = params->time + params->channel * sizes[4];
-    trip_volume_note_entry(info, "time", params->time, sizes[4], "");
-    trip_volume_note_entry(info, "channel", params->channel, sizes[5], "");
+    trip_entry_note(info->note, sizeof info->note, "time", params->time, sizes[4], "");
+    trip_entry_note(info->note, sizeof info->note, "channel", params->channel, sizes[5], "");
     for (int i = 6; i <= 7 && status == 0; i++)
         if (sizes[i] > 1)
             trip_warn(path, "axis %d has %" PRId64 " entries; only the first is read", i, sizes[i]);
@@ -228,10 +228,8 @@ static int set_type(const char *path, const nifti_2_header *n, trip_volume_info 
         layout->stored = known[i].type;
         layout->count[TRIP_DENSE_IN_VOXEL] = known[i].colours;
         info->type = layout->luma ? TRIP_F32 : known[i].type;
-        const size_t used = strlen(info->note);
         if (layout->luma)
-            snprintf(info->note + used, sizeof info->note - used, "%s%s", used ? "; " : "",
-                     TRIP_VOLUME_COLOUR_NOTE);
+            trip_append_note(info->note, sizeof info->note, TRIP_VOLUME_COLOUR_NOTE);
         return 0;
     }
     return trip_fail(TRIP_ERROR, "read", path,

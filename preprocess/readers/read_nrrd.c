@@ -175,12 +175,12 @@ static int choose_entries(const char *path, const trip_nrrd_header *h,
     if (status == 0)
         status = trip_volume_check_entry(path, "time", params->time, times);
     if (h->colour)
-        snprintf(info->note, sizeof info->note, "%s", TRIP_VOLUME_COLOUR_NOTE);
+        trip_append_note(info->note, sizeof info->note, TRIP_VOLUME_COLOUR_NOTE);
     char axis[32];
     snprintf(axis, sizeof axis, " (axis %d)", h->channel_axis);
-    trip_volume_note_entry(info, "channel", params->channel, channels, axis);
+    trip_entry_note(info->note, sizeof info->note, "channel", params->channel, channels, axis);
     snprintf(axis, sizeof axis, " (axis %d)", h->time_axis);
-    trip_volume_note_entry(info, "time", params->time, times, axis);
+    trip_entry_note(info->note, sizeof info->note, "time", params->time, times, axis);
     return status;
 }
 

@@ -80,6 +80,9 @@ static int check_options(const char *path, const char *format, const trip_volume
     if (strcmp(format, "images") != 0 && p->allow_gaps)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s; --allow-gaps requires a stack of slices", format);
+    if (strcmp(format, "images") != 0 && p->series)
+        return trip_fail(TRIP_USAGE, "read", path, "its format is %s; --series requires DICOM",
+                         format);
     static const char *const several[] = { "nrrd", "nifti", "netcdf", "images" };
     bool may_have_several = false;
     for (size_t i = 0; i < sizeof several / sizeof *several; i++)
@@ -415,6 +418,7 @@ void trip_volume_close(trip_volume *v)
     if (v->state)
         v->reader->close(v->state);
     trip_volume_free_coordinates(&v->info);
+    free(v->info.parts);
     free(v->path);
     free(v);
 }

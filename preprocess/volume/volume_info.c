@@ -241,24 +241,43 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info)
     return 0;
 }
 
-int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count)
+bool trip_entry_exists(char why[TRIP_ENTRY_WHY_BYTES], const char *what, int64_t index,
+                       int64_t count)
 {
     if (index >= 0 && index < count)
-        return 0;
+        return true;
     if (count == 1)
-        return trip_fail(TRIP_USAGE, "read", path, "has one %s; --%s %d does not exist", what, what,
-                         index);
-    return trip_fail(TRIP_USAGE, "read", path,
-                     "has %" PRId64 " %ss, from 0 to %" PRId64 "; --%s %d does not exist", count,
-                     what, count - 1, what, index);
+        snprintf(why, TRIP_ENTRY_WHY_BYTES, "has one %s; --%s %" PRId64 " does not exist", what,
+                 what, index);
+    else
+        snprintf(why, TRIP_ENTRY_WHY_BYTES,
+                 "has %" PRId64 " %ss, from 0 to %" PRId64 "; --%s %" PRId64 " does not exist",
+                 count, what, count - 1, what, index);
+    return false;
 }
 
-void trip_volume_note_entry(trip_volume_info *info, const char *what, int index, int64_t count,
-                            const char *detail)
+int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count)
 {
-    const size_t used = strlen(info->note);
+    char why[TRIP_ENTRY_WHY_BYTES];
+    return trip_entry_exists(why, what, index, count)
+               ? 0
+               : trip_fail(TRIP_USAGE, "read", path, "%s", why);
+}
+
+void trip_append_note(char *note, size_t room, const char *text)
+{
+    const size_t used = strlen(note);
+    if (*text)
+        snprintf(note + used, room - used, "%s%s", used ? "; " : "", text);
+}
+
+void trip_entry_note(char *note, size_t room, const char *what, int64_t index, int64_t count,
+                     const char *detail)
+{
+    char text[256] = "";
     if (count > 1)
-        snprintf(info->note + used, sizeof info->note - used,
-                 "%s%s %d of %" PRId64 "%s is read (--%s N reads another, from 0)",
-                 used ? "; " : "", what, index, count, detail, what);
+        snprintf(text, sizeof text,
+                 "%s %" PRId64 " of %" PRId64 "%s is read (--%s N reads another, from 0)", what,
+                 index, count, detail, what);
+    trip_append_note(note, room, text);
 }

@@ -70,6 +70,7 @@ typedef struct trip_volume_info {
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
     char note[512];    /* tells the user which grid or variable was chosen by default, or "" */
+    char *parts;       /* the series of a DICOM folder, one a line, or NULL. The volume owns it. */
 } trip_volume_info;
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
@@ -82,11 +83,18 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info);
 #define TRIP_VOLUME_COLOUR_NOTE "the values are colours; their luma (Rec. 709) is read"
 
 /* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
- * Reports and returns a negative status if `index` is none of them. */
+ * Returns false and fills `why` if `index` is none of them. The second function reports this and
+ * returns a negative status. */
+#define TRIP_ENTRY_WHY_BYTES 128
+bool trip_entry_exists(char why[TRIP_ENTRY_WHY_BYTES], const char *what, int64_t index,
+                       int64_t count);
 int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count);
-/* Appends a note about the entry to info->note if there are several. `detail` may be "". */
-void trip_volume_note_entry(trip_volume_info *info, const char *what, int index, int64_t count,
-                            const char *detail);
+/* Appends to a note of `room` bytes that one of `count` entries is read, if there are several.
+ * `detail` may be "". */
+void trip_entry_note(char *note, size_t room, const char *what, int64_t index, int64_t count,
+                     const char *detail);
+/* Appends a text to a note of `room` bytes. */
+void trip_append_note(char *note, size_t room, const char *text);
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
@@ -128,6 +136,7 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks with missing slices */
+    int series;                /* --series, for DICOM: its number; 0 chooses the largest */
     int channel, time;         /* --channel, --time: of files with several, from 0 */
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */

@@ -293,7 +293,7 @@ static void bad_volumes_are_refused(void **state)
                                        "--grid",
                                        "--channel and --time require",
                                        "--channel and --time require",
-                                       "count from 0" };
+                                       "times count from 0" };
     for (size_t n = 0; n < sizeof refused / sizeof *refused; n++)
         assert_fails(t, triptych_brick(t, "bad", "failed.trip", &refused[n], NULL), TRIPTYCH_USAGE,
                      why[n]);
