@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <OpenImageIO/imageio.h>
+#include <tiffio.h>
 
 #include "absent_value.h"
 #include "connection.h"
@@ -46,19 +47,14 @@ std::string message(std::string text)
     return text.empty() ? "cannot be read" : text;
 }
 
-/* Returns the faults among the library's messages. It remarks on tags that it does not know, such
- * as the private tags of microscopes and of GeoTIFF, and such a file is sound. */
-std::string faults(const std::string &messages)
+/* Silences what libtiff remarks on sound files, such as those with private tags, since OpenImageIO
+ * would report it as the reason for the end of the pages. OpenImageIO sets libtiff's handlers once,
+ * with its first reader. */
+void silence_remarks()
 {
-    std::string left;
-    for (size_t at = 0; at < messages.size();) {
-        const size_t end = std::min(messages.find('\n', at), messages.size());
-        const std::string line = messages.substr(at, end - at);
-        if (line.find("Unknown field with tag") == std::string::npos && !line.empty())
-            left += line + "\n";
-        at = end + 1;
-    }
-    return left;
+    OIIO::ImageInput::create("tiff");
+    OIIO::geterror();
+    TIFFSetWarningHandler(nullptr);
 }
 
 /* Whether a page of a TIFF is a smaller copy of another page: a thumbnail, or a level of a pyramid.
@@ -162,7 +158,7 @@ std::vector<int> PictureStack::find_pages(OIIO::ImageInput &in)
         }
     }
     /* After the last page the library reports only the file's name, which is no error. */
-    const std::string why = faults(in.geterror());
+    const std::string why = in.geterror();
     if (files_.kind == TRIP_IMAGE_TIFF && !why.empty() && message(why) != file)
         throw trip_slice_error(file, "after page " + std::to_string(page) + ": " + message(why));
     return pages;
@@ -254,6 +250,7 @@ PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget,
                            const trip_stack_choice &choice)
     : files_(files)
 {
+    silence_remarks();
     Input in = open(files.names[0]);
     const OIIO::ImageSpec first = in->spec();
     std::vector<int> pages;
