@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
@@ -222,6 +223,16 @@ int few_bits(const OIIO::ImageSpec &spec, trip_scalar type)
     return whole && !palette ? bits : 0;
 }
 
+/* Returns the bits of the values of a grey PNG if they are fewer than 8. The library scales such
+ * values up, too, and does not tell. Depth and kind are at a fixed place. */
+int few_bits_of_png(const std::string &file)
+{
+    char head[26] = "";
+    std::ifstream in(file, std::ios::binary);
+    const bool grey = in.read(head, sizeof head) && head[25] == 0;
+    return grey && head[24] > 0 && head[24] < 8 ? head[24] : 0;
+}
+
 void PictureStack::choose_type(const OIIO::ImageSpec &first, trip_budget *budget)
 {
     const std::string &file = files_.names[0];
@@ -231,6 +242,8 @@ void PictureStack::choose_type(const OIIO::ImageSpec &first, trip_budget *budget
         bits_ = few_bits(first, stored_);
         has_absent_ = !colour_ && trip_absent_value(file, absent_);
     }
+    if (files_.kind == TRIP_IMAGE_PNG && stored_ == TRIP_U8)
+        bits_ = few_bits_of_png(file);
     if (colour_)
         note = TRIP_VOLUME_COLOUR_NOTE;
     if (has_absent_) {
