@@ -216,8 +216,8 @@ void DicomStack::add_note(const std::string &text)
 
 void DicomStack::note_choices(const trip_dicom_series &series, int time)
 {
-    if (series.times() > 1)
-        add_note("time " + std::to_string(time) + " of " + std::to_string(series.times()) +
+    if (series.times() > 1 && !time)
+        add_note("time 0 of " + std::to_string(series.times()) +
                  " (--time N selects another, from 0)");
     double least, most;
     std::vector<double> depths = series.depths;
@@ -237,9 +237,8 @@ void DicomStack::choose(const std::string &path, const trip_stack_choice &choice
     std::vector<std::string> names;
     for (const trip_dicom_series &s : all)
         parts += s.text() + "\n";
-    if (all.size() > 1)
-        add_note("series " + series.text() + (choice.series ? "" : ", the largest") + " of " +
-                 std::to_string(all.size()) +
+    if (all.size() > 1 && !choice.series)
+        add_note("series " + series.text() + ", the largest of " + std::to_string(all.size()) +
                  " (--series N selects another: " + list_series(all, &series, named_series) + ")");
     slices_ = choose_time(path, series, (size_t)choice.time, depths);
     for (const trip_dicom_ref &r : slices_)

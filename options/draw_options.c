@@ -1,6 +1,5 @@
 #include "draw_options.h"
 
-#include <limits.h>
 #include <float.h>
 #include <string.h>
 
@@ -276,7 +275,7 @@ static const trip_option volume_rows[] = {
       .choices = level_sets, .first = TRIPTYCH_LEVEL_SET_FILLED },
     { "series", "N", "Selects a series of a DICOM folder by the number in the list of `info`",
       "the largest", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(series), .lo = 1,
-      .hi = INT_MAX },
+      .hi = INT32_MAX },
     { "spacing", "X,Y,Z", "Sets the distance of neighbouring voxels along each axis",
       "the distance in the file, else 1", .group = DRAW_GROUP_VOLUME, AT(spacing),
       CUSTOM(read_spacing) },
@@ -293,9 +292,9 @@ static const trip_option volume_rows[] = {
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
     { "channel", "N", "Selects the channel or component of a file with several, from 0", "0",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(channel), .lo = 0,
-      .hi = INT_MAX },
+      .hi = INT32_MAX },
     { "time", "N", "Selects the time of a file with several, from 0", "0",
-      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT_MAX },
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
 };
 #undef AT
 

@@ -68,7 +68,7 @@ static int open_stack(trip_helper_slices *s, const trip_volume_params *params,
     if (status < 0)
         return status;
     if (bytes < sizeof *stack)
-        return trip_image_helper_distrust(s->helper, "data of a wrong size");
+        return trip_image_helper_distrust(s->helper, "data of the wrong size");
     status = trip_image_helper_receive(s->helper, stack, sizeof *stack);
     const char *fault = status == 0 ? fault_of(stack) : NULL;
     if (!fault && status == 0 &&
@@ -76,7 +76,7 @@ static int open_stack(trip_helper_slices *s, const trip_volume_params *params,
                                 &expected) ||
          stack->parts_bytes > TRIP_IMAGE_PARTS_MAX || bytes - sizeof *stack < expected ||
          bytes - sizeof *stack - expected != stack->parts_bytes))
-        fault = "data of a wrong size";
+        fault = "data of the wrong size";
     return fault ? trip_image_helper_distrust(s->helper, fault) : status;
 }
 
