@@ -2,8 +2,10 @@
 
 #include <csetjmp>
 #include <cstdarg>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 extern "C" {
 #include <cmocka.h>
