@@ -1,5 +1,5 @@
-/* Parses what ImageJ and OME write into a TIFF about its pages: their order, channels, times,
- * distances and units. Works on memory only, so that it can be fuzzed. Throws trip_slice_error with
+/* Parses the descriptions of ImageJ and OME in a TIFF: order, channels, times, distances and units
+ * of its pages. Works on memory only, so that it can be fuzzed. Throws trip_slice_error with
  * the path of the file. Warns of descriptions that it cannot use. */
 #ifndef TRIP_PAGE_ORDER_H
 #define TRIP_PAGE_ORDER_H

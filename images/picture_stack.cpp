@@ -48,8 +48,8 @@ std::string message(std::string text)
     return text.empty() ? "cannot be read" : text;
 }
 
-/* Silences what libtiff remarks on sound files, such as those with private tags, since OpenImageIO
- * would report it as the reason for the end of the pages. OpenImageIO sets libtiff's handlers once,
+/* Silences libtiff's remarks on sound files, such as files with private tags. OpenImageIO would
+ * report the last remark as the reason for the end of the pages. It sets libtiff's handlers once,
  * with its first reader. */
 void silence_remarks()
 {
@@ -105,7 +105,7 @@ class PictureStack : public trip_slice_stack
     trip_scalar stored_ = TRIP_U8;
     Input current_;
     int64_t current_file_ = -1;
-    std::vector<std::string> misfits_; /* of a single file: what is wrong with a page, or "" */
+    std::vector<std::string> misfits_; /* of a single file: the fault of each page, or "" */
     std::vector<int> pages_;           /* of a single file: the page of each slice */
     bool colour_ = false;              /* the values of a pixel are a colour */
     int sample_ = 0;                   /* the value of a pixel that is read, unless colour */

@@ -59,7 +59,7 @@ struct trip_stack_choice {
     int channel;     /* from 0 */
 };
 
-/* Throws trip_slice_error unless `index` is one of `count` entries. `what` is "channel" or "time".
+/* Throws trip_slice_error unless `index` is one of `count` entries of "channel" or "time".
  */
 void trip_check_entry(const std::string &file, const char *what, int64_t index, int64_t count);
 

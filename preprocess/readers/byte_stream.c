@@ -77,7 +77,7 @@ const char *trip_byte_encoding_name(trip_byte_encoding encoding)
 int trip_byte_stream_refuse_twice(const char *path, trip_byte_encoding whole)
 {
     return trip_fail(TRIP_ERROR, "read", path,
-                     "holds compressed values and is compressed with %s as a whole: unpack it "
+                     "is compressed with %s and holds values that are compressed again: unpack it "
                      "first, with `%s -dc FILE >NAME`",
                      trip_byte_encoding_name(whole), trip_byte_encoding_name(whole));
 }

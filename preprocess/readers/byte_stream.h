@@ -55,7 +55,7 @@ trip_byte_encoding trip_byte_encoding_of(const char *path);
 /* Returns "gzip" or "bzip2", or "" for plain files. */
 const char *trip_byte_encoding_name(trip_byte_encoding encoding);
 
-/* Reports that compressed values lie in a file that is compressed as a whole. Returns TRIP_ERROR.
+/* Reports that a compressed file holds compressed values. Returns TRIP_ERROR.
  */
 int trip_byte_stream_refuse_twice(const char *path, trip_byte_encoding whole);
 

@@ -7,7 +7,7 @@
 /* How little an axis fits as an axis of the volume. */
 typedef enum rank {
     SPATIAL, /* or of a kind that says nothing */
-    ORDERED, /* a list or times, whose entries can be slices */
+    ORDERED, /* a list or times; the entries can be slices */
     WITHIN,  /* components of a vector, a colour or the like */
 } rank;
 

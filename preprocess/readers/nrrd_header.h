@@ -110,7 +110,7 @@ int trip_nrrd_require(const trip_nrrd_parser *p, trip_nrrd_field f, const char *
 /* Parses an integer, which a blank or the end of the text must follow. Returns false if there is
  * none. */
 bool trip_nrrd_parse_integer(char **text, int64_t *value);
-/* The same, but nothing may follow. */
+/* Parses an integer that fills the whole text. Returns false if there is none. */
 bool trip_nrrd_parse_lone_integer(char *text, int64_t *value);
 
 /* Fills sizes, axes, kept, channel_axis, time_axis, colour and dims. */

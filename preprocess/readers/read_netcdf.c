@@ -470,7 +470,8 @@ static void describe(const header *h, const variable *v, trip_volume_info *info)
 }
 
 /* Chooses the time and the channel from the first dimensions before the last three. *record gets
- * the index of the record, and *volume the volumes before the chosen one within a record. */
+ * the index of the record. *volume gets the number of volumes before the chosen one in its record.
+ */
 static int choose_entries(const header *h, const variable *v, const trip_volume_params *params,
                           trip_volume_info *info, uint64_t *record, uint64_t *volume)
 {

@@ -1,5 +1,5 @@
 /* Reads NRRD files with attached (.nrrd) and detached (.nhdr) headers, in all encodings of the
- * format, with one data file or many. The file may be compressed as a whole. */
+ * format, with one data file or many. A file with header and values may be compressed. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -95,7 +95,7 @@ static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t 
     return status; /* opening reports a file that is too short */
 }
 
-/* Values in a file that is compressed as a whole follow its header after decompression. */
+/* Finds the values in a compressed file. They follow its header after decompression. */
 static int locate_compressed(trip_byte_source *source, const trip_nrrd_header *h,
                              trip_byte_encoding whole)
 {
@@ -103,7 +103,7 @@ static int locate_compressed(trip_byte_source *source, const trip_nrrd_header *h
         return trip_byte_stream_refuse_twice(source->path, whole);
     if (h->line_skip || h->byte_skip < 0)
         return trip_fail(TRIP_ERROR, "read", source->path,
-                         "skips lines and is compressed with %s as a whole: unpack it first, with "
+                         "skips lines and is compressed with %s: unpack it first, with "
                          "`%s -dc FILE >NAME`",
                          trip_byte_encoding_name(whole), trip_byte_encoding_name(whole));
     source->encoding = whole;
@@ -165,7 +165,7 @@ static int open_data(const char *path, const trip_nrrd_header *h, const trip_vol
     return status;
 }
 
-/* Checks --channel and --time, and notes what is read. */
+/* Checks --channel and --time, and notes the chosen entries. */
 static int choose_entries(const char *path, const trip_nrrd_header *h,
                           const trip_volume_params *params, trip_volume_info *info)
 {

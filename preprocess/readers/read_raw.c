@@ -102,8 +102,8 @@ static int find_layout(const char *path, const trip_volume_params *params, trip_
 }
 
 /* The content tells whether a file is compressed. Values can look like the start of a compressed
- * file by chance, so a file of the exact length of the values is plain unless its name says
- * otherwise. A file with such a name may be plain if it has that length. */
+ * file by chance. A file of the exact length of the values is therefore plain, unless its name
+ * ends in .gz or .bz2. A file with such a name may be plain if it has that length. */
 static int find_encoding(const char *path, const trip_volume_params *params,
                          const trip_volume_info *info, trip_byte_encoding *out)
 {

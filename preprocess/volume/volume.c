@@ -102,7 +102,7 @@ static int check_options(const char *path, const char *format, const trip_volume
 }
 
 /* Reads the first bytes of a regular file, decompressed. A folder or a pattern has none. *encoding
- * gets the compression of the file as a whole. */
+ * gets the compression of the file. */
 static int read_head(const char *path, unsigned char *head, size_t *bytes_out,
                      trip_byte_encoding *encoding)
 {

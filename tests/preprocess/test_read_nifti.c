@@ -288,8 +288,8 @@ static void a_singular_sform_is_ignored_with_a_warning(void **state)
     assert_string_equal(info.space, "");
 }
 
-/* Writes 3 times of 2 channels. All values of a volume are 10 * channel + time, but those of time 1
- * in channel 1 are the sample. */
+/* Writes 3 times of 2 channels. All values of a volume are 10 * channel + time. The volume of time
+ * 1 in channel 1 is the sample instead. */
 static const char *write_several(bool gzip)
 {
     nifti n = sample_header(1, TRIP_I16, true);

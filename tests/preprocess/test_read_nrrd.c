@@ -398,7 +398,7 @@ static void endian_is_not_needed_for_numbers_in_a_text(void **state)
     assert_true(values[6] == 0.5F && values[7] == 1e-3F);
 }
 
-/* Where a header puts the axes beside those of the volume. */
+/* Axes beside the three axes of the volume. */
 typedef struct more_axes {
     const char *sizes, *kinds;
     int place[2]; /* of the channel and the time: the number of axes of the volume before them; -1
