@@ -582,6 +582,7 @@ std::string trip_dicom_file::size_text() const
 
 trip_dicom_file trip_dicom_read(const std::string &path)
 {
+    trip_connection_decode(path);
     auto source = std::make_unique<Source>(path, false);
     trip_dicom_file f;
     f.path = path;
@@ -602,20 +603,18 @@ trip_dicom_file trip_dicom_read(const std::string &path)
     return f;
 }
 
-std::string trip_dicom_series_of(const std::string &path)
+bool trip_dicom_is_of_series(const std::string &path, const std::string &series)
 {
-    const Tag series(0x20, 0x0e), frames(0x28, 0x08), rows(0x28, 0x10);
+    std::string head(65536, 0);
     std::ifstream stream(path, std::ios::binary);
-    gdcm::Reader reader;
-    reader.SetStream(stream);
-    try {
-        if (!stream || !reader.ReadSelectedTags({ series, frames, rows }))
-            return "";
-    } catch (const std::bad_alloc &) {
-        throw;
-    } catch (const std::exception &) {
-        return "";
+    stream.read(&head[0], (std::streamsize)head.size());
+    head.resize((size_t)stream.gcount());
+    const std::string padded = series + std::string(series.size() % 2, '\0');
+    const std::string big("\0\x20\0\x0e", 4), little("\x20\0\x0e\0", 4);
+    for (size_t at = 8; (at = head.find(padded, at)) != std::string::npos; at++) {
+        const std::string tag = head.substr(at - 8, 4);
+        if (tag == little || tag == big)
+            return true;
     }
-    const Set &set = reader.GetFile().GetDataSet();
-    return set.FindDataElement(rows) && number_of(set, frames, 1) == 1 ? text_of(set, series) : "";
+    return false;
 }

@@ -52,7 +52,7 @@ struct trip_dicom_palette {
 
 /* How the pixels are stored. */
 struct trip_dicom_pixels {
-    int64_t columns = 0, rows = 0, frames = 1;    /* of a frame as it is stored */
+    int64_t columns = 0, rows = 0, frames = 1;    /* of a stored frame */
     unsigned allocated = 0, stored = 0, high = 0; /* bits of a sample */
     unsigned samples = 1;                         /* of a pixel */
     bool is_signed = false, floating = false;
@@ -91,9 +91,9 @@ struct trip_dicom_file {
 
 /* Reads everything but the pixels. */
 trip_dicom_file trip_dicom_read(const std::string &path);
-/* Returns the UID of the file's series. Returns "" if there is none, or if the file has several
- * frames or no pixels. */
-std::string trip_dicom_series_of(const std::string &path);
+/* Returns whether a file belongs to the series with this UID. Looks for the UID in the first bytes,
+ * since GDCM aborts the process at some damaged files. */
+bool trip_dicom_is_of_series(const std::string &path, const std::string &series);
 
 /* ---- dicom_pixels.cpp ---- */
 

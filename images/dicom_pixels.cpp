@@ -11,6 +11,7 @@
 #include <gdcmReader.h>
 #include <gdcmSequenceOfFragments.h>
 
+#include "connection.h"
 #include "dicom_file.h"
 
 namespace
@@ -428,6 +429,7 @@ void trip_dicom_reader::state::load(const trip_dicom_file &f, int64_t number)
     open(f);
     if (frame == number)
         return;
+    trip_connection_decode(f.path);
     frame = -1;
     if (f.pixels.compressed)
         decompress(f, number);

@@ -182,7 +182,7 @@ size_t count_others(const trip_dicom_file &file)
         const std::string path = slash == std::string::npos ? name : folder + name;
         if (name[0] == '.' || path == file.path || !trip_slice_is_dicom(path))
             continue;
-        count += trip_dicom_series_of(path) == file.series;
+        count += trip_dicom_is_of_series(path, file.series);
         trip_connection_working();
     }
     return count;

@@ -221,6 +221,7 @@ void answer_one(Session &session)
     Descriptor file;
     const trip_image_request request = trip_connection_next(path, file.fd);
     memory_refused = false;
+    trip_connection_decode(path);
     try {
         session.answer(request, path, file.fd);
     } catch (const trip_slice_error &e) {
@@ -256,6 +257,7 @@ int main()
     std::signal(SIGXFSZ, SIG_IGN); /* write() then fails with EFBIG */
     (void)trip_sandbox_enter();    /* continues without a sandbox if the kernel has none */
     set_up_threads();
+    trip_connection_catch_abort();
     std::set_new_handler(on_memory_refused);
     trip_report_redirect(pass_warning, nullptr);
     Session session;

@@ -288,7 +288,8 @@ static const trip_option volume_rows[] = {
       "posterior, inferior and right",
       .group = DRAW_GROUP_VOLUME, AT(axes), CUSTOM(read_axes) },
     { "allow-gaps", NULL,
-      "Accepts a stack with missing slices, as if the neighbours of a gap touched",
+      "Accepts a stack with missing slices: the neighbours of a gap touch, but DICOM slices stay "
+      "where they are",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
     { "channel", "N", "Selects the channel or component of a file with several, from 0", "0",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(channel), .lo = 0,

@@ -16,6 +16,7 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 # Wrong values of each option. None marks an option without a value.
 BRICK = {
     "--allow-gaps": None,
+    "--series": COUNTS,
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
     "--channel": ["", "-1", "1.5", "x", "9" * 20],
     "--time": ["", "-1", "1.5", "x", "9" * 20],
@@ -59,6 +60,7 @@ RENDER = {
     "--max-bytes": ["", "-1", "0", "little"],
     "--max-ms": ["", "-1", "0", "1e10", "soon"],
     "--allow-gaps": None,
+    "--series": COUNTS,
     "--grid": [],
     "--level-set": NAMES + ["refuse"],
     "--spacing": POINTS + ["0,1,1", "-1,1,1"],
@@ -136,7 +138,13 @@ RENDER = {
     "--stats": [],
     "--depth": ["z.png", "z.jpg", "z"],
 }
-INFO = {"--verify": None, "--json": None}
+INFO = {
+    "--verify": None,
+    "--json": None,
+    **{name: RENDER[name] for name in (
+        "--allow-gaps", "--axes", "--coordinates", "--grid", "--level-set", "--series",
+        "--spacing", "--time")},
+}
 
 
 def options_of(command):
@@ -305,7 +313,7 @@ class Options(program.ProgramTest):
                 ["render", "a.trip", "b.trip", "-o", "a.png", "--max-ms=5"],
                 *([command, "a.trip", option] for command in ("view", "serve") for option in (
                     "--axes=PIR", "--grid=foo", "--spacing=4,1,1", "--coordinates=a,b,c",
-                    "--level-set=band", "--allow-gaps", "--channel=1", "--time=1")),
+                    "--level-set=band", "--series=1", "--channel=1", "--time=1", "--allow-gaps")),
                 *([command, "a.trip", "--error=1", "--classify=pre"] for command in ("view", "serve")),
                 render + ["--max-ms=5", "--renderer=integral"],
                 render + ["--field=source", "--renderer=integral"],

@@ -193,7 +193,7 @@ void positions_in_equal_steps_have_no_gap(void **)
     assert_string_equal(gap_in({ 0, 1.5, 3, 4.5 }).c_str(), "");
 }
 
-/* No step is two or three times its neighbours, or several in a row are. */
+/* Either no step is two or three times its neighbours, or several in a row are. */
 void positions_in_uneven_steps_have_no_gap(void **)
 {
     assert_string_equal(gap_in({ 0, 1, 2.3, 3.8 }).c_str(), "");
