@@ -142,7 +142,7 @@ INFO = {
     "--verify": None,
     "--json": None,
     **{name: RENDER[name] for name in (
-        "--allow-gaps", "--axes", "--coordinates", "--grid", "--level-set", "--series",
+        "--allow-gaps", "--axes", "--channel", "--coordinates", "--grid", "--level-set", "--series",
         "--spacing", "--time")},
 }
 
