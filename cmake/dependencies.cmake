@@ -26,6 +26,7 @@ pkg_check_modules(SECCOMP REQUIRED IMPORTED_TARGET libseccomp)
 pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
 # find_package() is not used, since OpenImageIO's CMake files require unneeded OpenCV headers.
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
+pkg_check_modules(TIFF REQUIRED IMPORTED_TARGET libtiff-4)
 if(TRIP_NETCDF)
     pkg_check_modules(NETCDF IMPORTED_TARGET netcdf)
     if(NOT NETCDF_FOUND)

@@ -133,16 +133,18 @@ class Session
             throw std::bad_alloc();
         trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
         const trip_stack_choice choice = { request.numbers[1] != 0, (int)request.numbers[2],
-                                           (int)request.numbers[3] };
+                                           (int)request.numbers[3], (int)request.numbers[4] };
         trip_slice_files files = trip_slice_find(path, choice.allow_gaps);
         const bool dicom = files.kind == TRIP_IMAGE_DICOM;
-        if (!dicom && (choice.series || choice.time))
+        if (!dicom && choice.series)
             throw trip_slice_error(path,
                                    std::string("holds ") + trip_image_kind_name(files.kind) +
-                                       "; --series and --time require DICOM",
+                                       "; --series requires DICOM",
                                    TRIP_USAGE);
+        if (dicom)
+            trip_check_entry(path, "channel", choice.channel, 1);
         stack_ = dicom ? trip_dicom_stack(path, files, budget_, choice)
-                       : trip_picture_stack(files, budget_);
+                       : trip_picture_stack(files, budget_, choice);
         if (choice.allow_gaps && files.names[0] == path && !(dicom && stack_->dims[2] > 1))
             throw trip_slice_error(
                 path, "is one file; --allow-gaps requires a stack of several files", TRIP_USAGE);

@@ -51,17 +51,23 @@ class trip_slice_stack
     std::string parts;         /* the series of a DICOM folder, one a line */
 };
 
-/* Opens TIFF, PNG or EXR files with OpenImageIO (picture_stack.cpp). The pages of a single TIFF
- * file are slices, too. */
-std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
-                                                     trip_budget *budget);
-/* Which part of DICOM files is read, and how. */
+/* Which part of the files is read, and how. */
 struct trip_stack_choice {
-    bool allow_gaps; /* slices may be missing between others */
-    int series;      /* its number; 0 chooses the largest */
-    int time;        /* of slices that share their position, from 0 */
+    bool allow_gaps; /* DICOM: slices may be missing between others */
+    int series;      /* DICOM: its number; 0 chooses the largest */
+    int time;        /* from 0; in DICOM, of slices that share their position */
+    int channel;     /* from 0 */
 };
 
+/* Throws trip_slice_error unless `index` is one of `count` entries of "channel" or "time".
+ */
+void trip_check_entry(const std::string &file, const char *what, int64_t index, int64_t count);
+
+/* Opens TIFF, PNG or EXR files with OpenImageIO (picture_stack.cpp). The pages of a single TIFF
+ * file are slices, too. Descriptions of ImageJ and OME give their order (page_order.h). */
+std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
+                                                     trip_budget *budget,
+                                                     const trip_stack_choice &choice);
 /* Opens DICOM files with GDCM (dicom_stack.cpp). Slices are sorted by their position in space.
  * `path` is the one that the user gave. */
 std::unique_ptr<trip_slice_stack> trip_dicom_stack(const std::string &path,

@@ -46,6 +46,7 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .axes = o->axes,
         .allow_gaps = o->allow_gaps,
         .series = o->series,
+        .channel = o->channel,
         .time = o->time,
         .max_voxels = o->max_voxels,
     };
@@ -142,8 +143,8 @@ static const char *fault_of_volume(const triptych_brick_options *o)
         return "unknown type of raw data";
     if (o->raw_offset_bytes > UINT64_C(1) << 62)
         return "raw data starts too far into the file";
-    if (o->series < 0 || o->time < 0)
-        return "the number of a series and its time must be at least 0";
+    if (o->series < 0 || o->channel < 0 || o->time < 0)
+        return "series, channels and times count from 0";
     if (o->level_set < TRIPTYCH_LEVEL_SET_DEFAULT || o->level_set > TRIPTYCH_LEVEL_SET_BAND ||
         o->raw_endian < TRIPTYCH_ENDIAN_NATIVE || o->raw_endian > TRIPTYCH_ENDIAN_BIG)
         return "unknown level set or byte order";

@@ -114,8 +114,9 @@ typedef struct triptych_brick_options {
     int allow_gaps; /* if not 0, a stack of slices may have gaps */
     /* DICOM: the number of a series, as triptych_describe() lists it; default: the largest. */
     int series;
-    /* DICOM: a time of slices that share their positions, from 0. */
-    int time;
+    /* The channel or component, and the time, of a file with several; both count from 0. In DICOM,
+     * slices that share their positions are times. */
+    int channel, time;
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
     uint64_t max_voxels;

@@ -291,6 +291,9 @@ static const trip_option volume_rows[] = {
       "Accepts a stack with missing slices: the neighbours of a gap touch, but DICOM slices stay "
       "where they are",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
+    { "channel", "N", "Selects the channel or component of a file with several, from 0", "0",
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(channel), .lo = 0,
+      .hi = INT32_MAX },
     { "time", "N", "Selects the time of a file with several, from 0", "0",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
 };

@@ -161,6 +161,8 @@ static void add_volume_options(cJSON *options, const trip_volume_params *v)
         add_option(options, "--allow-gaps");
     if (v->series)
         add_option(options, "--series=%d", v->series);
+    if (v->channel)
+        add_option(options, "--channel=%d", v->channel);
     if (v->time)
         add_option(options, "--time=%d", v->time);
 }

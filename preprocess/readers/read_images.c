@@ -58,7 +58,7 @@ static int open_stack(trip_helper_slices *s, const trip_volume_params *params,
                       trip_image_stack *stack)
 {
     const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), params->allow_gaps,
-                                 params->series, params->time };
+                                 params->series, params->time, params->channel };
     uint64_t bytes = 0, expected = 0;
     int status = trip_image_helper_start(&s->helper, "read");
     if (status == 0)

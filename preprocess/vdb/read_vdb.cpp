@@ -292,6 +292,7 @@ extern "C" const trip_volume_reader trip_vdb_reader = {
     .probe = nullptr,
     .list = nullptr,
     .open = open_vdb,
+    .decompresses = false,
     .close = close_vdb,
     .rewind = rewind_vdb,
     .read_slices = nullptr,

@@ -19,8 +19,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
     fprintf(f, "%s %d %s %d %" PRIu64 " %d\n", v->grid ? v->grid : "", (int)v->level_set,
             v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes, v->allow_gaps);
-    if (v->series || v->time)
-        fprintf(f, "series %d time %d\n", v->series, v->time);
+    if (v->series || v->channel || v->time)
+        fprintf(f, "series %d channel %d time %d\n", v->series, v->channel, v->time);
     if (v->axes)
         fprintf(f, "axes %s\n", v->axes);
     if (v->max_voxels)

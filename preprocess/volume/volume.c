@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "anatomy.h"
+#include "byte_stream.h"
 #include "report.h"
 #include "sampled.h"
 #include "volume_coordinates.h"
@@ -20,10 +21,11 @@
 /* The default size of a portion. */
 #define PORTION_BYTES ((int64_t)16 << 20)
 
-/* In the order of probing: formats with a magic number first. */
+/* In the order of probing. NIfTI files are also known by their names, and raw data by names alone.
+ */
 static const trip_volume_reader *const readers[] = {
-    &trip_read_vdb,     &trip_read_nrrd, &trip_read_nifti,  &trip_read_netcdf,
-    &trip_read_netcdf4, &trip_read_vol,  &trip_read_images, &trip_read_raw,
+    &trip_read_vdb, &trip_read_nrrd,   &trip_read_netcdf, &trip_read_netcdf4,
+    &trip_read_vol, &trip_read_images, &trip_read_nifti,  &trip_read_raw,
 };
 
 /* The stored slices [first, first + count) of a portion, including one neighbour on each side. */
@@ -78,9 +80,18 @@ static int check_options(const char *path, const char *format, const trip_volume
     if (strcmp(format, "images") != 0 && p->allow_gaps)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s; --allow-gaps requires a stack of slices", format);
-    if (strcmp(format, "images") != 0 && (p->series || p->time))
+    if (strcmp(format, "images") != 0 && p->series)
+        return trip_fail(TRIP_USAGE, "read", path, "its format is %s; --series requires DICOM",
+                         format);
+    static const char *const several[] = { "nrrd", "nifti", "netcdf", "images" };
+    bool may_have_several = false;
+    for (size_t i = 0; i < sizeof several / sizeof *several; i++)
+        may_have_several |= strcmp(format, several[i]) == 0;
+    if (!may_have_several && (p->channel || p->time))
         return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is %s; --series and --time require DICOM", format);
+                         "its format is %s; --channel and --time require NRRD, NIfTI, netCDF or "
+                         "a stack of slices",
+                         format);
     for (int a = 0; a < 3; a++)
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))
@@ -90,10 +101,13 @@ static int check_options(const char *path, const char *format, const trip_volume
     return 0;
 }
 
-/* Reads the first bytes of a regular file. A folder or a pattern has none. */
-static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
+/* Reads the first bytes of a regular file, decompressed. A folder or a pattern has none. *encoding
+ * gets the compression of the file. */
+static int read_head(const char *path, unsigned char *head, size_t *bytes_out,
+                     trip_byte_encoding *encoding)
 {
     *bytes_out = 0;
+    *encoding = TRIP_BYTES_PLAIN;
     struct stat st;
     if (stat(path, &st) != 0) {
         if (errno == ENOENT && strpbrk(path, "%*?["))
@@ -113,7 +127,42 @@ static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
     int status = n < 0 ? trip_fail_errno("read", path, "cannot read") : 0;
     close(fd);
     *bytes_out = n < 0 ? 0 : (size_t)n;
+    *encoding = trip_byte_encoding_of_head(head, *bytes_out);
+    if (status < 0 || *encoding == TRIP_BYTES_PLAIN)
+        return status;
+    unsigned char inner[HEAD_BYTES];
+    size_t inner_bytes = 0;
+    status = trip_byte_stream_head(path, inner, HEAD_BYTES, true, &inner_bytes);
+    if (inner_bytes > 0) {
+        memcpy(head, inner, inner_bytes);
+        *bytes_out = inner_bytes;
+    }
     return status;
+}
+
+/* Reports that the format cannot be read in order. */
+static int refuse_compressed(const char *path, const char *format, trip_byte_encoding encoding)
+{
+    const char *program = trip_byte_encoding_name(encoding);
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "is compressed with %s, and its format (%s) can only be read unpacked: unpack "
+                     "it first, with `%s -dc FILE >NAME`",
+                     program, format, program);
+}
+
+/* Reports that no reader knows the file, or that its compressed data are damaged. */
+static int refuse_unknown(const char *path, trip_byte_encoding encoding)
+{
+    unsigned char head[HEAD_BYTES];
+    size_t bytes;
+    int status = encoding == TRIP_BYTES_PLAIN
+                     ? 0
+                     : trip_byte_stream_head(path, head, sizeof head, false, &bytes);
+    return status < 0 ? status
+                      : trip_fail(TRIP_ERROR, "read", path,
+                                  "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); "
+                                  "describe raw data with `triptych brick FILE --size X,Y,Z "
+                                  "--type uint8`");
 }
 
 int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
@@ -125,19 +174,19 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
         *out = &trip_read_memory;
         return check_options(path, trip_read_memory.format, params);
     }
-    int status = read_head(path, head, &bytes);
+    trip_byte_encoding encoding;
+    int status = read_head(path, head, &bytes, &encoding);
     if (status < 0)
         return status;
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
         if (!readers[i]->probe(path, head, bytes, params))
             continue;
         *out = readers[i];
+        if (encoding != TRIP_BYTES_PLAIN && !readers[i]->decompresses)
+            return refuse_compressed(path, readers[i]->format, encoding);
         return check_options(path, readers[i]->format, params);
     }
-    return trip_fail(TRIP_ERROR, "read", path,
-                     "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe "
-                     "raw data with `triptych brick FILE --size X,Y,Z "
-                     "--type uint8`");
+    return refuse_unknown(path, encoding);
 }
 
 /* Returns the length of an index axis in world space, or 0 if the axis has no direction. */

@@ -48,6 +48,10 @@ const char *trip_scalar_name(trip_scalar type);
 void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
                         size_t count, float *values);
 
+/* Returns the luma (Rec. ITU-R BT.709-6, 3.2) of red, green and blue, which follow each other at
+ * `stored`. */
+float trip_scalar_luma(trip_scalar type, bool swap, const void *stored);
+
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
 #define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
 
@@ -77,6 +81,22 @@ typedef struct trip_volume_info {
 int trip_volume_check_dims(const char *path, const trip_volume_info *info);
 /* Reports and returns a negative status if an axis has more than TRIP_VOLUME_AXIS_MAX voxels. */
 int trip_volume_check_axes(const char *path, const trip_volume_info *info);
+
+#define TRIP_VOLUME_COLOUR_NOTE "the values are colours; their luma (Rec. 709) is read"
+
+/* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
+ * Returns false and fills `why` if `index` is none of them. The second function reports this and
+ * returns a negative status. */
+#define TRIP_ENTRY_WHY_BYTES 128
+bool trip_entry_exists(char why[TRIP_ENTRY_WHY_BYTES], const char *what, int64_t index,
+                       int64_t count);
+int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count);
+/* Appends to a note of `room` bytes that one of `count` entries is read, if there are several.
+ * `detail` may be "". */
+void trip_entry_note(char *note, size_t room, const char *what, int64_t index, int64_t count,
+                     const char *detail);
+/* Appends a text to a note of `room` bytes. */
+void trip_append_note(char *note, size_t room, const char *text);
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
@@ -119,7 +139,7 @@ typedef struct trip_volume_params {
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks with missing slices */
     int series;                /* --series, for DICOM: its number; 0 chooses the largest */
-    int time;                  /* --time, for DICOM: from 0, of slices that share their positions */
+    int channel, time;         /* --channel, --time: of files with several, from 0 */
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;

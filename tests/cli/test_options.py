@@ -17,8 +17,9 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 BRICK = {
     "--allow-gaps": None,
     "--series": COUNTS,
-    "--time": ["", "-1", "1.5", "x"],
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
+    "--channel": ["", "-1", "1.5", "x", "9" * 20],
+    "--time": ["", "-1", "1.5", "x", "9" * 20],
     "--endian": NAMES,
     "--level-set": NAMES + ["refuse"],
     "--offset": ["", "-1", "x", "1.5", "9" * 30],
@@ -50,6 +51,8 @@ BRICK = {
 }
 RENDER = {
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
+    "--channel": ["", "-1", "1.5", "x", "9" * 20],
+    "--time": ["", "-1", "1.5", "x", "9" * 20],
     "--clip-box": ["", "1", "1,2,3", "0,0,0,1,1,x", "0,0,0,1,1,0", "voxels:", "voxel:0,0,0,1,1,1"],
     "--clip-plane": ["", "1,2,3", "0,0,0,1", "1,2,3,x", "1,2,3,4,5"],
     "--show": NAMES,
@@ -58,7 +61,6 @@ RENDER = {
     "--max-ms": ["", "-1", "0", "1e10", "soon"],
     "--allow-gaps": None,
     "--series": COUNTS,
-    "--time": ["", "-1", "1.5", "x"],
     "--grid": [],
     "--level-set": NAMES + ["refuse"],
     "--spacing": POINTS + ["0,1,1", "-1,1,1"],
@@ -140,7 +142,7 @@ INFO = {
     "--verify": None,
     "--json": None,
     **{name: RENDER[name] for name in (
-        "--allow-gaps", "--axes", "--coordinates", "--grid", "--level-set", "--series",
+        "--allow-gaps", "--axes", "--channel", "--coordinates", "--grid", "--level-set", "--series",
         "--spacing", "--time")},
 }
 
@@ -311,7 +313,7 @@ class Options(program.ProgramTest):
                 ["render", "a.trip", "b.trip", "-o", "a.png", "--max-ms=5"],
                 *([command, "a.trip", option] for command in ("view", "serve") for option in (
                     "--axes=PIR", "--grid=foo", "--spacing=4,1,1", "--coordinates=a,b,c",
-                    "--level-set=band", "--series=1", "--time=1", "--allow-gaps")),
+                    "--level-set=band", "--series=1", "--channel=1", "--time=1", "--allow-gaps")),
                 *([command, "a.trip", "--error=1", "--classify=pre"] for command in ("view", "serve")),
                 render + ["--max-ms=5", "--renderer=integral"],
                 render + ["--field=source", "--renderer=integral"],

@@ -112,8 +112,184 @@ static void grey_is_taken_from_channels(void **state)
             write_file(name, &b);
         }
         snprintf(name, sizeof name, "c%d-%%d.png", channels);
-        assert_sample(path_of(name), TRIP_U8, channels == 2 ? TRIP_U8 : TRIP_F32, 1, 0, 1);
+        assert_sample(path_of(name), TRIP_U8, channels == 2 ? TRIP_U8 : TRIP_F32, 1, 0, 0);
     }
+}
+
+/* Appends values of few bits, packed from the highest bit on. Each row starts a byte. */
+static void append_packed(bytes *b, const uint32_t *values, int width, int height, int bits)
+{
+    for (int j = 0; j < height; j++) {
+        unsigned char row[64] = { 0 };
+        for (int i = 0; i < width * bits; i++)
+            row[i / 8] |=
+                (unsigned char)((values[j * width + i / bits] >> (bits - 1 - i % bits) & 1)
+                                << (7 - i % 8));
+        append(b, row, (size_t)(width * bits + 7) / 8);
+    }
+}
+
+/* Writes a TIFF of one page. Values of 24 bits have the byte order of the file, and values of other
+ * numbers of bits are packed. `absent` is the text of GDAL's tag, or NULL. */
+static const char *write_bits(const char *name, const uint32_t *values, int width, int height,
+                              int bits, bool big, const char *absent)
+{
+    bytes b = { .count = 0 };
+    append(&b, big ? "MM\0*" : "II*\0", 4);
+    append_word(&b, 8, 4, big);
+    const int tags = absent ? 11 : 10;
+    const size_t data = 8 + 2 + 12 * (size_t)tags + 4;
+    bytes rows = { .count = 0 };
+    if (bits == 24 || bits % 16 == 0)
+        for (int v = 0; v < width * height; v++)
+            append_word(&rows, values[v], (unsigned)bits / 8, big);
+    else
+        append_packed(&rows, values, width, height, bits);
+    const struct {
+        unsigned tag, type;
+        uint64_t count, value;
+    } all[] = { { 256, 4, 1, (uint64_t)width },
+                { 257, 4, 1, (uint64_t)height },
+                { 258, 4, 1, (uint64_t)bits },
+                { 259, 4, 1, 1 },
+                { 262, 4, 1, 1 },
+                { 273, 4, 1, data },
+                { 277, 4, 1, 1 },
+                { 278, 4, 1, (uint64_t)height },
+                { 279, 4, 1, rows.count },
+                { 339, 4, 1, 1 },
+                { 42113, 2, absent ? strlen(absent) + 1 : 0, data + rows.count } };
+    append_word(&b, (uint64_t)tags, 2, big);
+    for (int t = 0; t < tags; t++) {
+        append_word(&b, all[t].tag, 2, big);
+        append_word(&b, all[t].type, 2, big);
+        append_word(&b, all[t].count, 4, big);
+        char inside[4] = "";
+        if (absent && all[t].type == 2 && all[t].count <= 4) /* the tag itself holds a short text */
+            append(&b, memcpy(inside, absent, all[t].count), 4);
+        else
+            append_word(&b, all[t].value, 4, big);
+    }
+    append_word(&b, 0, 4, big);
+    append(&b, rows.data, rows.count);
+    if (absent)
+        append(&b, absent, strlen(absent) + 1);
+    return write_file(name, &b);
+}
+
+static void values_of_any_number_of_bits_stay_what_they_are(void **state)
+{
+    (void)state;
+    enum { WIDTH = 10, HEIGHT = 6, COUNT = WIDTH * HEIGHT };
+    static const int some[] = { 1, 2, 4, 6, 8, 10, 12, 14, 16, 24, 32 };
+    for (size_t n = 0; n < sizeof some / sizeof *some; n++)
+        for (int big = 0; big < 2; big++) {
+            const int bits = some[n];
+            const uint32_t most = bits == 32 ? 1 << 24 : (1u << bits) - 1;
+            uint32_t values[COUNT];
+            float got[COUNT];
+            for (uint32_t v = 0; v < COUNT; v++)
+                values[v] = v == 1 ? most : v * v * 7919 & most;
+            const char *path = write_bits("bits.tif", values, WIDTH, HEIGHT, bits, big, NULL);
+            assert_int_equal(read_volume(path, NULL, 1, got, COUNT, NULL), 0);
+            for (int v = 0; v < COUNT; v++)
+                if (got[v] != (float)values[v])
+                    fail_msg("%d bits: value %d is %g, not %u", bits, v, got[v], values[v]);
+        }
+}
+
+static void gdal_gives_the_absent_value(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        bool absent; /* whether the number is finite and among the values */
+    } tags[] = { { "7", true },   { " 7.0 ", true }, { "nan", false }, { "7x", false },
+                 { "-7", false }, { "", false },     { "7.5", false } };
+    const uint32_t values[4] = { 1, 7, 70, 7 };
+    for (size_t n = 0; n < sizeof tags / sizeof *tags; n++)
+        for (int bits = 12; bits <= 32; bits += 4) {
+            float got[4];
+            trip_volume_info info;
+            if (bits == 20 || bits == 28)
+                continue;
+            const char *path = write_bits("absent.tif", values, 2, 2, bits, n % 2, tags[n].text);
+            assert_int_equal(read_volume(path, NULL, 1, got, 4, &info), 0);
+            assert_true(got[0] == 1 && got[2] == 70);
+            assert_true(tags[n].absent ? isnan(got[1]) && isnan(got[3]) : got[1] == 7);
+            assert_true(!tags[n].absent || strstr(info.note, "the value 7 is absent"));
+        }
+}
+
+static void grey_png_values_of_few_bits_stay_what_they_are(void **state)
+{
+    (void)state;
+    for (int bits = 1; bits <= 4; bits *= 2) {
+        enum { WIDTH = 9, HEIGHT = 4, COUNT = WIDTH * HEIGHT };
+        bytes rows = { .count = 0 }, b = { .count = 0 };
+        uint32_t values[COUNT];
+        float got[COUNT];
+        for (uint32_t v = 0; v < COUNT; v++)
+            values[v] = (v * 5 + v / WIDTH) & ((1u << bits) - 1);
+        for (int j = 0; j < HEIGHT; j++) {
+            append(&rows, "", 1); /* no filter */
+            append_packed(&rows, values + j * WIDTH, WIDTH, 1, bits);
+        }
+        append_png_file(&b, WIDTH, HEIGHT, bits, 0, &rows);
+        assert_int_equal(read_volume(write_file("bits.png", &b), NULL, 1, got, COUNT, NULL), 0);
+        for (int v = 0; v < COUNT; v++)
+            assert_true(got[v] == (float)values[v]);
+    }
+}
+
+/* Descriptions and pages as in test_page_order.cpp. */
+static void pages_are_read_in_the_order_of_their_description(void **state)
+{
+    (void)state;
+    static const char description[] = "ImageJ=1\nimages=14\nchannels=2\nslices=7\nunit=nm\n"
+                                      "spacing=3";
+    bytes b = { .count = 0 }, other = { .count = 0 };
+    append(&b, "II*\0", 4);
+    size_t link = b.count;
+    append_u32(&b, 0);
+    const size_t text = b.count;
+    append(&b, description, sizeof description);
+    b.count += b.count % 2;
+    for (int page = 0; page < 2 * NZ; page++) {
+        const size_t data = b.count;
+        append_slices(&b, TRIP_U8, false, page % 2 ? page / 2 : 0, 1);
+        patch_u32(&b, link, b.count);
+        append_u16(&b, 10);
+        append_tag(&b, 256, TIFF_LONG, NX);
+        append_tag(&b, 257, TIFF_LONG, NY);
+        append_tag(&b, 258, TIFF_SHORT, 8);
+        append_tag(&b, 259, TIFF_SHORT, 1);
+        append_tag(&b, 262, TIFF_SHORT, 1);
+        append_u16(&b, 270);
+        append_u16(&b, 2);
+        append_u32(&b, sizeof description);
+        append_u32(&b, text);
+        append_tag(&b, 273, TIFF_LONG, data);
+        append_tag(&b, 277, TIFF_SHORT, 1);
+        append_tag(&b, 278, TIFF_LONG, NY);
+        append_tag(&b, 279, TIFF_LONG, NX * NY);
+        link = b.count;
+        append_u32(&b, 0);
+    }
+    const char *path = write_file("hyper.tif", &b);
+    float values[VOXELS];
+    trip_volume_info info;
+    assert_holds_sample(path, &(trip_volume_params){ .channel = 1 }, TRIP_U8);
+    assert_int_equal(read_volume(path, NULL, 2, values, VOXELS, &info), 0);
+    assert_true(values[VOXELS - 1] == (float)sample(TRIP_U8, NX - 1, NY - 1, 0));
+    assert_non_null(strstr(info.note, "channel 0 of 2"));
+    assert_map(&info.index_to_world,
+               (const double[3][4]){ { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 3, 0 } });
+    assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .channel = 2 }, "has 2 channels");
+    assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .time = 1 }, "has one time");
+    append_tiff(&other, TRIP_U8, 0, NZ, 0);
+    assert_refused_as(TRIP_USAGE, write_file("plain.tif", &other),
+                      &(trip_volume_params){ .channel = 1 }, "has one channel");
 }
 
 static void a_tiff_with_deep_tiles_is_refused(void **state)
@@ -412,7 +588,7 @@ static void dicom_slices_at_one_position_are_times(void **state)
                       "its times are 0 to 1");
     write_tiff("pages.tif", TRIP_U8, 0, NZ);
     assert_refused_as(TRIP_USAGE, path_of("pages.tif"), &(trip_volume_params){ .series = 1 },
-                      "require DICOM");
+                      "requires DICOM");
 }
 
 /* The positions are 0, 1, 2, 4.5, 7, 9.5 and 12 along a tilted direction. */
@@ -578,6 +754,10 @@ int main(void)
         cmocka_unit_test(a_folder_and_a_glob_are_read_in_natural_order),
         cmocka_unit_test(exr_gives_halves_and_floats),
         cmocka_unit_test(grey_is_taken_from_channels),
+        cmocka_unit_test(values_of_any_number_of_bits_stay_what_they_are),
+        cmocka_unit_test(gdal_gives_the_absent_value),
+        cmocka_unit_test(grey_png_values_of_few_bits_stay_what_they_are),
+        cmocka_unit_test(pages_are_read_in_the_order_of_their_description),
         cmocka_unit_test(a_tiff_with_deep_tiles_is_refused),
         cmocka_unit_test(dicom_slices_are_ordered_and_placed_in_space),
         cmocka_unit_test(a_missing_dicom_slice_is_refused_unless_gaps_are_allowed),
