@@ -176,7 +176,7 @@ typedef struct triptych_brick_summary {
     /* Written to temporary files and removed again. */
     uint64_t temporary_bytes;
     int resumed;
-    char note[1024]; /* choices made where the file leaves several, or "" */
+    char note[1536]; /* choices made where the file leaves several, or "" */
     triptych_brick_stage stages[TRIPTYCH_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* limit; maximum used */
 } triptych_brick_summary;

@@ -14,6 +14,8 @@
 #include "report.h"
 #include "text.h"
 
+enum { GUESS_BYTES = 500 };
+
 /* Prints numbers in their shortest exact form, because cJSON's form differs between versions. */
 static cJSON *number(double value)
 {
@@ -207,18 +209,18 @@ static const char *base_name(const char *path)
 /* Writes the orientation that drawing (render/dataset_metadata.c) derives, if it is not the
  * default. */
 static void print_guess(const trip_volume_info *info, trip_orientation u,
-                        char guess[TRIP_BRICK_NOTE_BYTES / 2])
+                        char guess[GUESS_BYTES])
 {
     guess[0] = 0;
     if (u.mirror == 2)
         snprintf(
-            guess, TRIP_BRICK_NOTE_BYTES / 2,
+            guess, GUESS_BYTES,
             "its file does not say what is up: being mirror-symmetric across z, its slices are "
             "taken for views from the side, with up at -y and the front at -x; --up, --view "
             "and --axes say otherwise");
     else if (u.footing >= 0 && u.footing != TRIP_ORIENTATION_BASE_LOW_Z &&
              !trip_anatomy_is_scan_from_above(&info->index_to_world))
-        snprintf(guess, TRIP_BRICK_NOTE_BYTES / 2,
+        snprintf(guess, GUESS_BYTES,
                  "its file does not say what is up: being level at %s alone, it is taken to stand "
                  "there, with up at %s; --up, --view and --axes say otherwise",
                  trip_orientation_base_name(u.footing), trip_orientation_base_name(u.footing ^ 1));
@@ -227,7 +229,7 @@ static void print_guess(const trip_volume_info *info, trip_orientation u,
 void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
                               char note[TRIP_BRICK_NOTE_BYTES])
 {
-    char guess[TRIP_BRICK_NOTE_BYTES / 2];
+    char guess[GUESS_BYTES];
     print_guess(info, upright, guess);
     snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s%s", info->note,
              guess[0] && info->note[0] ? "; " : "", guess);

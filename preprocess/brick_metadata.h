@@ -23,7 +23,7 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
 
 /* Writes the note for the user: the reader's choices, and the orientation guessed from the shape.
  * "" if there is none. */
-enum { TRIP_BRICK_NOTE_BYTES = 1024 };
+enum { TRIP_BRICK_NOTE_BYTES = 1536 };
 void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
                               char note[TRIP_BRICK_NOTE_BYTES]);
 

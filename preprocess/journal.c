@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -105,6 +106,11 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
             "--resume");
     if (s->scanned != p->scanned)
         return fail_false(j, "its kind");
+    bool sound = s->fills.count <= TRIP_FILLS_MAX && s->finite_before <= p->voxels;
+    for (uint64_t i = 0; i < s->fills.count && sound; i++)
+        sound = isfinite(s->fills.values[i]);
+    if (!sound)
+        return fail_false(j, "its list of fill values");
     if (!s->scanned)
         return 0;
     if (!trip_tally_check(&s->tally) || s->tally.finite == 0 || s->tally.voxels > p->voxels ||

@@ -7,6 +7,7 @@
 #define TRIP_LEVELS_H
 
 #include "brick_params.h"
+#include "codes.h"
 #include "list_builder.h"
 #include "normal.h"
 
@@ -27,7 +28,8 @@ typedef struct trip_levels_params {
     int64_t dims[3];                     /* voxels of level 0 along each axis */
     trip_affine index_to_world;
     unsigned levels;
-    double value_min, value_max; /* range of the volume's values */
+    double typical_min, typical_max; /* typical range of the volume's values */
+    trip_codes codes;                /* the same codes as the quantiser's */
     bool hidden_above;           /* dropped values lie mostly above the kept ones */
     const char *folder;          /* folder for temporary files */
     trip_writer *writer;         /* has the lists of trip_levels_lists() */

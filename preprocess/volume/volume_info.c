@@ -5,6 +5,7 @@
 #include <strings.h>
 
 #include "report.h"
+#include "text.h"
 
 static const struct {
     unsigned bytes;
@@ -231,4 +232,13 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info)
                              "has more than %" PRId64 " voxels along an axis",
                              TRIP_VOLUME_AXIS_MAX);
     return 0;
+}
+
+bool trip_fills_parse(const char *text, trip_fills *fills)
+{
+    *fills = (trip_fills){ 0 };
+    if (!strcmp(text, "none"))
+        return true;
+    fills->count = 1;
+    return trip_text_to_double(text, &fills->values[0]) && isfinite(fills->values[0]);
 }

@@ -48,6 +48,17 @@ const char *trip_scalar_name(trip_scalar type);
 void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
                         size_t count, float *values);
 
+/* Values that stand for "no value" in a volume. Their voxels count as absent. */
+enum { TRIP_FILLS_MAX = 8 };
+typedef struct trip_fills {
+    uint64_t count;
+    double values[TRIP_FILLS_MAX];
+} trip_fills;
+
+/* Parses the value of --fill. Sets *fills to the value, or to none for "none". Returns false for
+ * other texts. */
+bool trip_fills_parse(const char *text, trip_fills *fills);
+
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
 #define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
 
@@ -65,7 +76,8 @@ typedef struct trip_volume_info {
     bool oriented; /* the file gives the directions of its axes in world space */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
-    char note[512];    /* tells the user which grid or variable was chosen by default, or "" */
+    char note[1024];   /* tells the user what was chosen by default, such as a grid, or "" */
+    trip_fills fills;  /* decoded as NaN */
 } trip_volume_info;
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
@@ -115,6 +127,9 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks with missing slices */
+    /* --fill: a value that counts as absent, or "none". By default, known values far outside of
+     * everything else count as absent (typical.h). */
+    const char *fill;
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;
