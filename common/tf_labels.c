@@ -71,7 +71,8 @@ static double background_id(const trip_histogram *h)
     return h->ids[0] > 0 ? h->ids[i] : 0;
 }
 
-/* Returns the end of an id's colour: half a unit away, or half way to the next id if that is nearer. */
+/* Returns the end of an id's colour: half a unit away, or half way to the next id if that is
+ * nearer. */
 static double end_of(const trip_histogram *h, uint32_t i, int step)
 {
     const bool alone = step < 0 ? i == 0 : i + 1 == h->id_count;

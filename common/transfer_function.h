@@ -31,8 +31,8 @@ typedef struct trip_tf_point {
     trip_rgba colour;
 } trip_tf_point;
 
-/* Counts the finite values of a volume in equal bins over [value_min, value_max], its typical range.
- * Values outside are left out. `total` is the sum. */
+/* Counts the finite values of a volume in equal bins over [value_min, value_max], its typical
+ * range. Values outside are left out. `total` is the sum. */
 typedef struct trip_histogram {
     double value_min, value_max;
     uint64_t counts[1024];

@@ -109,6 +109,10 @@ typedef struct triptych_brick_options {
      * and L, one of A and P, one of S and I, such as "PIR". */
     const char *axes;
     int allow_gaps; /* if not 0, a stack of slices may have gaps */
+    /* A value that stands for "no value", as text, such as "-9999". Its voxels count as absent.
+     * "none" keeps all values. By default, known fill values that stand far outside of all other
+     * values count as absent, such as 1e20, -9999 or -32768. */
+    const char *fill;
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
     uint64_t max_voxels;

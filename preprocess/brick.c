@@ -268,7 +268,7 @@ static int check_tally(brick *b)
     /* With the automatic transfer function as the default, drawing checks the others when it uses
      * them. */
     for (size_t i = 0; i < b->params->function_count && !b->params->automatic; i++)
-        trip_tf_check_range(b->in.functions[i], t->value_min, t->value_max, b->params->input);
+        trip_tf_check_range(b->in.functions[i], t->typical_min, t->typical_max, b->params->input);
     return 0;
 }
 
@@ -447,6 +447,8 @@ static int finish_output(brick *b)
                                                                   .envelope = &b->in.envelope,
                                                                   .functions = b->in.functions,
                                                                   .histogram = &b->in.histogram,
+                                                                  .tally = b->in.tally,
+                                                                  .fills = &b->in.fills,
                                                                   .upright = b->upright });
     if (!text)
         return TRIP_ERROR;

@@ -82,7 +82,8 @@ void trip_brick_input_tell_fills(trip_brick_input *in)
     const uint64_t before = in->finite_before, now = in->tally->finite;
     if (in->fills.count == 0)
         return;
-    int used = snprintf(text, sizeof text, "%" PRIu64 " voxels with", before > now ? before - now : 0);
+    int used =
+        snprintf(text, sizeof text, "%" PRIu64 " voxels with", before > now ? before - now : 0);
     for (unsigned i = 0; i < in->fills.count; i++)
         used += snprintf(text + used, sizeof text - (size_t)used, "%s %s", i ? " or" : "",
                          trip_text_from_double(in->fills.values[i], number));
@@ -253,7 +254,7 @@ bool trip_brick_rounds_codes(const trip_brick_input *in)
 double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi)
 {
     const trip_tally *t = in->tally;
-    double range = t->typical_min <= t->typical_max ? t->typical_max - t->typical_min : 0;
+    double range = t->has_typical ? t->typical_max - t->typical_min : 0;
     if (in->ids.count && !in->ids.numbered)
         range = in->ids.count > 1 ? in->ids.count - 1 : 1;
     double voxel = cbrt(fabs(trip_affine_determinant(&in->info->index_to_world)));
@@ -360,7 +361,7 @@ int trip_brick_input_finish_tally(trip_brick_input *in)
     int status = 0;
     trip_histogram *h = &in->histogram;
     /* Labels have no outliers: a rare one may lie far from the others. */
-    if (!(t->typical_min <= t->typical_max)) {
+    if (!t->has_typical) {
         trip_typical_set_whole(t);
         trip_tally_histogram(t, h);
         add_ids(in);
@@ -422,6 +423,7 @@ static int scan_typical(trip_brick_input *in, const trip_scan_params *scan)
     p.clip_min = t->typical_min;
     p.clip_max = t->typical_max;
     status = scan_again(in, &p, NULL);
+    t->has_typical = 1;
     t->typical_min = t->value_min;
     t->typical_max = t->value_max;
     t->value_min = lo;
@@ -438,8 +440,8 @@ static bool are_ids(const trip_brick_input *in, const trip_id_set *s)
     const trip_tally *t = in->tally;
     const double unit = in->info->type < TRIP_F16 ? fabs(in->info->slope) : 1;
     const double step = 1.5 * (t->value_max - t->value_min) / 65535;
-    const bool merged = step >= unit / 2 ||
-                        fmax(fabs(t->value_min), fabs(t->value_max)) >= 0x1p24 * unit;
+    const bool merged =
+        step >= unit / 2 || fmax(fabs(t->value_min), fabs(t->value_max)) >= 0x1p24 * unit;
     const bool labels = trip_id_set_coherent(s) || (!s->many && s->count <= FEW);
     return !s->other && merged && labels && (s->many || s->count > 0);
 }
@@ -457,10 +459,11 @@ static int read_as_ids(trip_brick_input *in, const trip_id_set *s, const trip_sc
         return 0;
     }
     char text[200];
-    snprintf(text, sizeof text,
-             "more than %d ids: each is stored as a number from 1 to %d made from it, which sets its "
-             "colour",
-             TRIP_IDS_MAX, TRIP_IDS_NUMBERS - 1);
+    snprintf(
+        text, sizeof text,
+        "more than %d ids: each is stored as a number from 1 to %d made from it, which sets its "
+        "colour",
+        TRIP_IDS_MAX, TRIP_IDS_NUMBERS - 1);
     trip_volume_add_note(in->volume, text);
     return scan_again(in, scan, NULL);
 }

@@ -7,6 +7,7 @@
 #include "brick_params.h"
 #include "envelope.h"
 #include "orientation.h"
+#include "scan.h"
 
 typedef struct trip_brick_metadata {
     const trip_brick_params *params;
@@ -14,6 +15,8 @@ typedef struct trip_brick_metadata {
     const trip_envelope *envelope;
     trip_tf *const *functions; /* params->function_count transfer functions, in data units */
     const trip_histogram *histogram;
+    const trip_tally *tally;
+    const trip_fills *fills;  /* that nobody declared */
     trip_orientation upright; /* none if the file or its format gives the orientation */
 } trip_brick_metadata;
 

@@ -240,6 +240,18 @@ static trip_vec3 direction_at(const trip_dataset_metadata *t, const char *key)
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
 }
 
+size_t trip_dataset_metadata_fills(const trip_dataset_metadata *t, double *values, size_t max)
+{
+    const cJSON *fills = cJSON_GetObjectItemCaseSensitive(t->root, "fills"), *item;
+    size_t count = 0;
+    cJSON_ArrayForEach(item, fills)
+    {
+        if (count < max && isfinite(number_of(item)))
+            values[count++] = number_of(item);
+    }
+    return count;
+}
+
 /* If the object is mirror-symmetric across z, its slices are views from the side. They usually run
  * from the top down and from the front to the back. The left side is unknown. */
 static bool is_mirrored_across_z(const trip_dataset_metadata *t)

@@ -78,9 +78,8 @@ static void add_uneven(const trip_level_work *w, trip_coarse_uneven *to, uint32_
 /* Returns the code of a sum of shares. */
 static uint16_t code_of_sum(const trip_level_work *w, const trip_coarse_uneven *sum, double shares)
 {
-    return w->quantiser.ids
-               ? (uint16_t)sum->id
-               : (uint16_t)trip_knots_code(w->quantiser.knots, sum->values / shares);
+    return w->quantiser.ids ? (uint16_t)sum->id
+                            : (uint16_t)trip_knots_code(w->quantiser.knots, sum->values / shares);
 }
 
 /* Clears the sums of a voxel before its first contribution. */

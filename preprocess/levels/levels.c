@@ -532,8 +532,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level,
 }
 
 /* Makes a table with the value of each code, for codes that follow the values. */
-static int make_values_of_codes(const trip_levels_params *params, double **out,
-                                trip_budget *budget)
+static int make_values_of_codes(const trip_levels_params *params, double **out, trip_budget *budget)
 {
     double *value_of = *out = NULL;
     if (!params->quantiser.knots)

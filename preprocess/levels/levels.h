@@ -30,10 +30,10 @@ typedef struct trip_levels_params {
     unsigned levels;
     double typical_min, typical_max; /* typical range of the volume's values */
     trip_codes codes;                /* the same codes as the quantiser's */
-    bool hidden_above;           /* dropped values lie mostly above the kept ones */
-    const char *folder;          /* folder for temporary files */
-    trip_writer *writer;         /* has the lists of trip_levels_lists() */
-    trip_spill *spill;           /* its sequences are retired, because they are no longer needed */
+    bool hidden_above;               /* dropped values lie mostly above the kept ones */
+    const char *folder;              /* folder for temporary files */
+    trip_writer *writer;             /* has the lists of trip_levels_lists() */
+    trip_spill *spill; /* its sequences are retired, because they are no longer needed */
     trip_workers *workers;
     /* Called from time to time with the number of finished sheets. May be NULL. */
     void (*progress)(void *user, uint64_t done, uint64_t total);

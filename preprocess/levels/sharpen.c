@@ -111,7 +111,7 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
                                   other->known + at + shift, width);
         else
             add_differences(l->sums + at, here->values + at, other->values + at + shift,
-                        other->known + at + shift, width);
+                            other->known + at + shift, width);
     }
 }
 
@@ -169,8 +169,8 @@ static uint16_t sharpened_value(const trip_sharpen *s, const trip_sharpen_lane *
         const bool nearer = s->round ? by < 0 : by > 0;
         return voxel->known == 0 && nearer
                    ? voxel->value
-                   : (uint16_t)trip_quantise(s->quantiser, s->value_of[voxel->value] +
-                                                               by / TRIP_SHARPEN_PART);
+                   : (uint16_t)trip_quantise(s->quantiser,
+                                             s->value_of[voxel->value] + by / TRIP_SHARPEN_PART);
     }
     const int32_t sum = l->sums[at];
     const bool towards = s->round ? sum < 0 : sum > 0;

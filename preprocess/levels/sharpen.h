@@ -1,6 +1,7 @@
-/* Computes the values of a coarse level that its lists store. Ids stay as they are. Otherwise, linear interpolation of means is
- * smoother than the original values. Over the cube of a voxel the difference is an eighth of the
- * second differences along each axis. Each value is therefore moved the other way:
+/* Computes the values of a coarse level that its lists store. Ids stay as they are. Otherwise,
+ * linear interpolation of means is smoother than the original values. Over the cube of a voxel the
+ * difference is an eighth of the second differences along each axis. Each value is therefore moved
+ * the other way:
  *
  *   value + the sum over the six neighbours of (value - neighbour) / TRIP_SHARPEN_PART
  *

@@ -6,8 +6,8 @@
 enum {
     FROM_KEPT = TRIP_KNOT_INTERVALS / 2,
     FROM_ALL = TRIP_KNOT_INTERVALS / 4,
-    FROM_LIKELY = 40,
-    FROM_RANGE = TRIP_KNOT_INTERVALS - FROM_KEPT - FROM_ALL - FROM_LIKELY,
+    FROM_LIKELY = 36,
+    FROM_RANGE = TRIP_KNOT_INTERVALS - FROM_KEPT - FROM_ALL - FROM_LIKELY - 4,
 };
 
 /* One value may fill this part of an interval. Frequent values, such as a background, would
@@ -54,9 +54,12 @@ static double total_weight(const float *values, size_t count, double max)
 static size_t add_values(double *knots, size_t n, const float *values, size_t count,
                          size_t intervals)
 {
+    if (count == 0)
+        return n;
+    knots[n++] = (double)values[0];
+    knots[n++] = (double)values[count - 1];
     const double max = fmax(1, one_value * (double)count / (double)intervals);
-    return add_quantiles(knots, n, values, count, intervals, max,
-                         total_weight(values, count, max));
+    return add_quantiles(knots, n, values, count, intervals, max, total_weight(values, count, max));
 }
 
 static size_t add_even(double *knots, size_t n, double lo, double hi, size_t intervals)

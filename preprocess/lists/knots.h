@@ -1,5 +1,5 @@
-/* Codes that follow the values of a volume: 256 intervals with 256 even codes each. Where values are
- * dense, intervals are short. Pure functions. */
+/* Codes that follow the values of a volume: 256 intervals with 256 even codes each. Where values
+ * are dense, intervals are short. Pure functions. */
 #ifndef TRIP_KNOTS_H
 #define TRIP_KNOTS_H
 
@@ -19,7 +19,7 @@ typedef struct trip_knots {
 typedef struct trip_knots_params {
     const float *kept, *all; /* sorted samples: values of kept voxels, and of all voxels */
     size_t kept_count, all_count;
-    double lo, hi;             /* all values lie between them, and hi is above lo */
+    double lo, hi;               /* all values lie between them, and hi is above lo */
     double likely_lo, likely_hi; /* range with even codes of its own */
 } trip_knots_params;
 
@@ -34,8 +34,8 @@ static inline uint32_t trip_knots_code(const trip_knots *k, double value)
     for (size_t step = TRIP_KNOT_INTERVALS / 2; step > 0; step /= 2)
         knot = knot[step] <= value ? knot + step : knot;
     const size_t at = (size_t)(knot - k->values);
-    const double code = (double)(at << TRIP_KNOT_STEP_LOG2) +
-                        (value - *knot) * k->codes_per_value[at] + 0.5;
+    const double code =
+        (double)(at << TRIP_KNOT_STEP_LOG2) + (value - *knot) * k->codes_per_value[at] + 0.5;
     return !(code > 0) ? 0 : code >= 65535 ? 65535 : (uint32_t)code;
 }
 

@@ -41,11 +41,11 @@ enum {
  * normals. */
 typedef struct trip_quantiser {
     double lo, hi;
-    double gradient_full; /* `full` of 4-byte normals (normal.h) */
-    double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
-    bool bytes;           /* use only the codes that 8 bits can express (format.h) */
+    double gradient_full;    /* `full` of 4-byte normals (normal.h) */
+    double gradient_unit;    /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
+    bool bytes;              /* use only the codes that 8 bits can express (format.h) */
     const trip_knots *knots; /* NULL means even codes */
-    bool ids;                /* codes are ranks of ids (ids.h), which have no mean */
+    bool ids;                /* codes are ranks or numbers of ids (ids.h), which have no mean */
 } trip_quantiser;
 
 /* Sets the values of codes 0 and 65535 from the values of the first and the last 8-bit code. */

@@ -16,8 +16,8 @@ typedef struct summing {
     const trip_occupancy_params *params;
     unsigned level;
     trip_mean_scale scale; /* of the codes of means */
-    int shift[3]; /* a voxel of the level lies in bin index >> shift */
-    int dims[3];  /* bins along each axis */
+    int shift[3];          /* a voxel of the level lies in bin index >> shift */
+    int dims[3];           /* bins along each axis */
     uint64_t weights[TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE];
 } summing;
 
@@ -63,7 +63,8 @@ static double distance_of(const summing *s, double code)
     return fmin(1, fmax(0, width > 0 ? (code - lo) / width : 1)) * WHOLE_VOXEL;
 }
 
-/* Returns the weight of a code. Multiplies the distance of a mean by the kept share of the voxel. */
+/* Returns the weight of a code. Multiplies the distance of a mean by the kept share of the voxel.
+ */
 static uint64_t weight_of(const summing *s, unsigned code)
 {
     if (!has_means(s))

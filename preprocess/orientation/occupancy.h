@@ -31,7 +31,7 @@ typedef struct trip_occupancy_params {
     unsigned levels; /* number of coarse levels written */
     bool halo;       /* level 0 has lists of halo voxels */
     trip_level_kinds kinds;
-    unsigned tile_log2;    /* tiles have an edge of 1 << tile_log2 voxels */
+    unsigned tile_log2; /* tiles have an edge of 1 << tile_log2 voxels */
     trip_codes codes;
     double typical_min, typical_max; /* typical range of the volume's values */
 } trip_occupancy_params;

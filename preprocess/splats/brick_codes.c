@@ -128,7 +128,8 @@ int trip_brick_codes_set_range(trip_brick_codes *c, const trip_brick_input *in)
         return 0;
     }
     set_even(c, in, t->value_min, t->value_max);
-    return follow_values(c, in);
+    c->quantiser.ids = in->ids.numbered;
+    return in->ids.numbered ? 0 : follow_values(c, in);
 }
 
 /* Decoding gives ranks, which are the codes. */

@@ -145,11 +145,13 @@ static bool is_signed(trip_scalar type)
 
 static double value_of(uint64_t key, const trip_volume_info *info)
 {
-    const double stored = is_signed(info->type) ? (double)(int64_t)(key ^ UINT64_C(1) << 63) : (double)key;
+    const double stored =
+        is_signed(info->type) ? (double)(int64_t)(key ^ UINT64_C(1) << 63) : (double)key;
     return info->type >= TRIP_F16 ? stored : info->slope * stored + info->inter;
 }
 
-/* Ids beyond 2^53 may round to one double. Each then gets the next double, so that values ascend. */
+/* Ids beyond 2^53 may round to one double. Each then gets the next double, so that values ascend.
+ */
 static void fill_values(trip_ids *ids, const trip_volume_info *info)
 {
     ids->descending = info->type < TRIP_F16 && info->slope < 0;

@@ -17,9 +17,9 @@ typedef struct trip_id_set {
     uint64_t *keys; /* a hash table with `room` entries, from the budget */
     bool *used;
     uint32_t room, count;
-    bool many;    /* there are more than TRIP_IDS_MAX; `keys` is empty */
-    bool other;   /* there are values other than integers */
-    bool starved; /* memory was exhausted */
+    bool many;             /* there are more than TRIP_IDS_MAX; `keys` is empty */
+    bool other;            /* there are values other than integers */
+    bool starved;          /* memory was exhausted */
     uint64_t pairs, equal; /* pairs of neighbours that are not both 0; the equal ones among them */
 } trip_id_set;
 

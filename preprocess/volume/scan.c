@@ -12,8 +12,8 @@ enum { SCAN_EDGE = 64, SCAN_HEIGHT = 16, SCAN_VOXELS = SCAN_EDGE * SCAN_EDGE * S
 void trip_tally_clear(trip_tally *t)
 {
     memset(t, 0, sizeof *t);
-    t->value_min = t->typical_min = INFINITY;
-    t->value_max = t->typical_max = -INFINITY;
+    t->value_min = INFINITY;
+    t->value_max = -INFINITY;
 }
 
 /* Explicit vectors of four, because compilers do not vectorise these loops. */
@@ -232,11 +232,6 @@ void trip_tally_add(trip_tally *t, const trip_tally *other)
     t->counted += other->counted;
 }
 
-static bool has_typical(const trip_tally *t)
-{
-    return t->typical_min <= t->typical_max;
-}
-
 /* Checks that the bounds are ordered and fit in floats. */
 static bool check_range(double lo, double hi)
 {
@@ -249,8 +244,8 @@ static bool check_range(double lo, double hi)
 static bool check_bins(const trip_tally *t)
 {
     const int64_t max = INT64_C(1) << 26; /* see last_bit() */
-    const double lo = has_typical(t) ? t->typical_min : t->value_min;
-    const double hi = has_typical(t) ? t->typical_max : t->value_max;
+    const double lo = t->has_typical ? t->typical_min : t->value_min;
+    const double hi = t->has_typical ? t->typical_max : t->value_max;
     uint64_t sum = 0;
     if (!check_range(lo, hi) || t->exponent < -149 || t->first < -max || t->first > max ||
         t->exponent > exponent_for(lo, hi))
@@ -269,22 +264,20 @@ static bool check_bins(const trip_tally *t)
 
 static bool has_range(const trip_tally *t)
 {
-    const bool typical = t->typical_min != INFINITY || t->typical_max != -INFINITY;
     return check_range(t->value_min, t->value_max) &&
-           (!typical || (check_range(t->typical_min, t->typical_max) &&
-                         t->typical_min >= t->value_min && t->typical_max <= t->value_max));
+           (!t->has_typical || (check_range(t->typical_min, t->typical_max) &&
+                                t->typical_min >= t->value_min && t->typical_max <= t->value_max));
 }
 
 bool trip_tally_check(const trip_tally *t)
 {
     if (t->finite > t->voxels || t->counted > t->finite || t->kept > t->voxels ||
-        t->borders > 2 * t->voxels || t->below > t->finite || t->above > t->finite - t->below ||
-        t->counted > t->finite - t->below - t->above)
+        t->borders > 2 * t->voxels || t->has_typical > 1 || t->below > t->finite ||
+        t->above > t->finite - t->below || t->counted > t->finite - t->below - t->above)
         return false;
     if (t->finite == 0)
-        return t->value_min == INFINITY && t->value_max == -INFINITY &&
-               t->typical_min == INFINITY && t->typical_max == -INFINITY && t->sample.count == 0 &&
-               trip_value_sample_check(&t->sample, 0, 0, 0);
+        return t->value_min == INFINITY && t->value_max == -INFINITY && !t->has_typical &&
+               t->sample.count == 0 && trip_value_sample_check(&t->sample, 0, 0, 0);
     return has_range(t) &&
            trip_value_sample_check(&t->sample, t->finite, t->value_min, t->value_max) &&
            (t->counted == 0 || check_bins(t));
@@ -320,7 +313,7 @@ static void count_sample(const trip_tally *t, uint64_t inside, trip_histogram *h
 
 void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
 {
-    const bool typical = has_typical(t);
+    const bool typical = t->has_typical;
     memset(histogram, 0, sizeof *histogram);
     histogram->value_min = typical ? t->typical_min : t->value_min;
     histogram->value_max = typical ? t->typical_max : t->value_max;
@@ -395,8 +388,8 @@ static int add_ids(const scan *s, unsigned thread, const trip_box *box, const in
             keys[n++] = type < TRIP_F16 ? keys[i] : trip_id_key((double)values[i], &integers);
     set->other = !integers;
     if (integers)
-        trip_id_set_add_row(set, keys, n, type == TRIP_U32 || type == TRIP_U64 ? 0 : UINT64_C(1) << 63,
-                            s->budget);
+        trip_id_set_add_row(
+            set, keys, n, type == TRIP_U32 || type == TRIP_U64 ? 0 : UINT64_C(1) << 63, s->budget);
     return 0;
 }
 

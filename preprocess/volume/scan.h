@@ -22,16 +22,16 @@ typedef struct trip_tally {
      * Both are 0 without an envelope. */
     uint64_t kept, borders;
     double value_min, value_max; /* infinity and -infinity without a finite value */
-    /* Numbers of values outside of the range that the fine bins and the sample cover. */
-    uint64_t below, above;
     uint64_t counted;            /* values in the fine bins */
     double fit_min, fit_max;     /* range at the last fit of the bins */
     int exponent;
     int64_t first;
     uint64_t counts[TRIP_TALLY_BINS];
-    /* Range of the values without the few that stand far outside (typical.h). Infinity and
-     * -infinity until trip_typical_set(). */
+    /* Range of the values without the few that stand far outside (typical.h), and the numbers of
+     * values outside. Not set before trip_typical_set(). */
+    uint64_t has_typical; /* 1 if set */
     double typical_min, typical_max;
+    uint64_t below, above;
     trip_value_sample sample;
 } trip_tally;
 

@@ -11,7 +11,7 @@ static const double outside = 0.001;
 /* A gap ends the typical range if it is larger than this part of the range between the quantiles,
  * and this much larger than the range of the values just before it. */
 static const double gap_part = 0.25, gap_times = 8;
-enum { VALUES_BEFORE = 10, FEW = 64 };
+enum { VALUES_BEFORE = 4, FEW = 64 };
 
 /* Values of a volume in ascending order. */
 typedef struct sorted {
@@ -79,6 +79,15 @@ static double at(const walk_outward *w, size_t i)
     return w->sign > 0 ? (double)v->all[i] : -(double)v->all[v->count - 1 - i];
 }
 
+/* Returns whether all values beyond `from` are known: the sample has all, or they are among the
+ * extremes. */
+static bool is_exact(const walk_outward *w, double from)
+{
+    const trip_value_sample *s = &w->tally->sample;
+    return s->log2 == 0 ||
+           (w->sign > 0 ? from >= (double)s->greatest[0] : -from <= (double)s->least[0]);
+}
+
 /* Returns where the values end below a gap in the sample, by the fine bins. They count the values
  * that the sample lacks. Returns INFINITY if no gap is too large. */
 static double end_by_bins(const walk_outward *w, double from, double to)
@@ -86,19 +95,30 @@ static double end_by_bins(const walk_outward *w, double from, double to)
     const trip_tally *t = w->tally;
     const double width = ldexp(1, t->exponent);
     double end = from;
-    if (t->sample.log2 == 0 || t->counted == 0 || width > w->max_gap / 2)
+    if (is_exact(w, from) || t->counted == 0 || width > w->max_gap / 2)
         return from;
     for (int i = 0; i < TRIP_TALLY_BINS; i++) {
         const int b = w->sign > 0 ? i : TRIP_TALLY_BINS - 1 - i;
         const double low = ldexp((double)(t->first + b), t->exponent);
         const double near = w->sign > 0 ? low : -low - width;
-        if (t->counts[b] == 0 || near + width <= from || near >= to)
+        if (t->counts[b] == 0 || near <= from || near >= to)
             continue;
         if (near - end > w->max_gap)
             return end;
         end = fmax(end, fmin(near + width, to));
     }
     return to - end > w->max_gap ? end : INFINITY;
+}
+
+/* Returns the range of the few distinct values before number `i`. */
+static double range_before(const walk_outward *w, size_t i)
+{
+    const size_t last = i > 0 ? i - 1 : 0;
+    unsigned distinct = 1;
+    size_t n = last;
+    for (; n > 0 && distinct < VALUES_BEFORE; n--)
+        distinct += at(w, n - 1) < at(w, n);
+    return at(w, last) - at(w, n);
 }
 
 /* Returns the end of the typical range beyond `from`. */
@@ -109,8 +129,7 @@ static double walk_until_gap(const walk_outward *w, double from)
         i++;
     for (; i < w->values->count; i++) {
         const double here = i > 0 ? at(w, i - 1) : from, gap = at(w, i) - here;
-        const double before = here - (i > VALUES_BEFORE ? at(w, i - 1 - VALUES_BEFORE) : here);
-        if (!(gap > w->max_gap && gap > gap_times * before))
+        if (!(gap > w->max_gap && gap > gap_times * range_before(w, i)))
             continue;
         const double end = end_by_bins(w, here, at(w, i));
         if (end < INFINITY)
@@ -141,6 +160,7 @@ static void find_range(const sorted *v, const trip_tally *t, double range[2])
 
 void trip_typical_set_whole(trip_tally *t)
 {
+    t->has_typical = 1;
     t->typical_min = t->value_min;
     t->typical_max = t->value_max;
     t->below = t->above = 0;
@@ -232,19 +252,21 @@ static const double known[] = {
     -9223372036854775808.,
 };
 
-/* Returns the known fill value that a float stands for, or NaN. */
+/* Returns the known fill value that a float stands for, scaled or not, or NaN. */
 static double known_fill(float value, const trip_volume_info *info)
 {
-    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
-        if (value == (float)known[i] || value == (float)(info->slope * known[i] + info->inter))
-            return (double)value;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        const double scaled = info->slope * known[i] + info->inter;
+        if (value == (float)known[i] || value == (float)scaled)
+            return value == (float)known[i] ? known[i] : scaled;
+    }
     return NAN;
 }
 
-static bool is_among(const trip_fills *fills, double value)
+static bool is_among(const trip_fills *fills, float value)
 {
     for (unsigned i = 0; i < fills->count; i++)
-        if (fills->values[i] == value)
+        if ((float)fills->values[i] == value)
             return true;
     return false;
 }
@@ -264,7 +286,7 @@ static size_t without(const trip_fills *fills, float *values, size_t count)
 {
     size_t kept = 0;
     for (size_t i = 0; i < count; i++)
-        if (!is_among(fills, (double)values[i]))
+        if (!is_among(fills, values[i]))
             values[kept++] = values[i];
     return kept;
 }
@@ -297,7 +319,7 @@ int trip_typical_find_fills(const trip_tally *t, const trip_volume_info *info, t
     for (unsigned i = 0; i < candidates.count && v.count > 0; i++) {
         const double fill = candidates.values[i], width = range[1] - range[0];
         const bool far = distance_to(&v, fill) > width && (width > 0 || fabs(fill) >= huge);
-        if (!far || is_among(fills, fill) || fills->count == TRIP_FILLS_MAX)
+        if (!far || is_among(fills, (float)fill) || fills->count == TRIP_FILLS_MAX)
             continue;
         fills->values[fills->count++] = fill;
         found++;

@@ -12,7 +12,8 @@ typedef int32_t four_ints __attribute__((vector_size(16)));
 
 static uint64_t hash(int64_t y, int64_t z)
 {
-    uint64_t h = (uint64_t)y * UINT64_C(0x9e3779b97f4a7c15) ^ (uint64_t)z * UINT64_C(0xc2b2ae3d27d4eb4f);
+    uint64_t h =
+        (uint64_t)y * UINT64_C(0x9e3779b97f4a7c15) ^ (uint64_t)z * UINT64_C(0xc2b2ae3d27d4eb4f);
     h = (h ^ h >> 32) * UINT64_C(0xd6e8feb86659fd93);
     return h ^ h >> 32;
 }

@@ -8,10 +8,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { TRIP_SAMPLE_MAX = 65536, TRIP_EXTREMES = 128 };
+enum { TRIP_SAMPLE_MAX = 32768, TRIP_EXTREMES = 128 };
 
-/* All zero is an empty sample. Voxel x of row (y, z) has a rank, the number of trailing zeros of x +
- * hash(y, z). The sample holds the values of all voxels with a rank of at least `log2`. It is the
+/* All zero is an empty sample. Voxel x of row (y, z) has a rank, the number of trailing zeros of x
+ * + hash(y, z). The sample holds the values of all voxels with a rank of at least `log2`. It is the
  * lowest number for which they fit. */
 typedef struct trip_value_sample {
     uint32_t log2, count;

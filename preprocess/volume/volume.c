@@ -42,6 +42,7 @@ struct trip_volume {
     char *path;
 
     const trip_ids *ids; /* decode ranks of these; NULL means values */
+    bool exact_fills;    /* the user gave the fill value, so that not the nearest float counts */
 
     /* All further fields are for slice readers. */
     size_t slice_bytes;
@@ -260,8 +261,7 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
     v->info = (trip_volume_info){ .index_to_world = trip_affine_identity(),
                                   .slope = 1,
                                   .format = v->reader->format };
-    if (params->fill)
-        trip_fills_parse(params->fill, &v->info.fills);
+    v->exact_fills = params->fill && trip_fills_parse(params->fill, &v->info.fills);
     status = v->reader->open(v->path, params, v->budget, &v->info, &v->state);
     if (status < 0)
         return status;
@@ -311,6 +311,7 @@ const trip_volume_info *trip_volume_get_info(const trip_volume *v)
 void trip_volume_set_fills(trip_volume *v, const trip_fills *fills)
 {
     v->info.fills = *fills;
+    v->exact_fills = false;
 }
 
 void trip_volume_set_ids(trip_volume *v, const trip_ids *ids)
@@ -488,7 +489,8 @@ static int64_t clamp(int64_t v, int64_t lo, int64_t hi)
 static uint64_t key_of(trip_scalar type, bool swap, const unsigned char *stored)
 {
     const unsigned bytes = trip_scalar_bytes(type);
-    const bool is_signed = type == TRIP_I8 || type == TRIP_I16 || type == TRIP_I32 || type == TRIP_I64;
+    const bool is_signed =
+        type == TRIP_I8 || type == TRIP_I16 || type == TRIP_I32 || type == TRIP_I64;
     uint64_t key = 0;
     for (unsigned i = 0; i < bytes; i++) {
         const bool first_is_low = trip_machine_is_big_endian() == swap;
@@ -568,7 +570,7 @@ static void decode_values(const trip_volume *v, const unsigned char *stored, siz
 {
     const trip_volume_info *info = &v->info;
     trip_scalar_decode(info->type, v->swap, info->slope, info->inter, stored, count, values);
-    if (info->fills.count && is_wide_integer(info->type))
+    if (v->exact_fills && is_wide_integer(info->type))
         drop_exact_fills(v, stored, count, values);
     else
         drop_fills(&info->fills, values, count);
@@ -638,8 +640,8 @@ void trip_portion_keys(const trip_volume *v, const trip_volume_portion *portion,
 {
     const stored_slices *s = portion->data;
     const size_t row_bytes = v->slice_bytes / (size_t)v->info.dims[1];
-    const unsigned char *row = s->slices + (size_t)(at[2] - s->first) * v->slice_bytes +
-                               (size_t)at[1] * row_bytes;
+    const unsigned char *row =
+        s->slices + (size_t)(at[2] - s->first) * v->slice_bytes + (size_t)at[1] * row_bytes;
     keys_of(v, row + (size_t)at[0] * trip_scalar_bytes(v->info.type), (size_t)count, keys);
 }
 
