@@ -30,12 +30,11 @@ void trip_knots_make(trip_knots *k, const trip_knots_params *params);
 /* Returns the nearest code. Values outside get the first or last code, NaN gets the first. */
 static inline uint32_t trip_knots_code(const trip_knots *k, double value)
 {
-    const double *knot = k->values;
+    size_t at = 0; /* the search has no branches, since they could not be predicted */
     for (size_t step = TRIP_KNOT_INTERVALS / 2; step > 0; step /= 2)
-        knot = knot[step] <= value ? knot + step : knot;
-    const size_t at = (size_t)(knot - k->values);
-    const double code =
-        (double)(at << TRIP_KNOT_STEP_LOG2) + (value - *knot) * k->codes_per_value[at] + 0.5;
+        at += step & -(size_t)(k->values[at + step] <= value);
+    const double code = (double)(at << TRIP_KNOT_STEP_LOG2) +
+                        (value - k->values[at]) * k->codes_per_value[at] + 0.5;
     return !(code > 0) ? 0 : code >= 65535 ? 65535 : (uint32_t)code;
 }
 
