@@ -433,17 +433,15 @@ static int scan_typical(trip_brick_input *in, const trip_scan_params *scan)
 }
 
 /* Returns whether even codes or floats would merge the distinct integers of the volume, and these
- * are labels by intent or few. */
+ * are labels by intent. */
 static bool are_ids(const trip_brick_input *in, const trip_id_set *s)
 {
-    enum { FEW = 256 };
     const trip_tally *t = in->tally;
     const double unit = in->info->type < TRIP_F16 ? fabs(in->info->slope) : 1;
     const double step = 1.5 * (t->value_max - t->value_min) / 65535;
     const bool merged =
         step >= unit / 2 || fmax(fabs(t->value_min), fabs(t->value_max)) >= 0x1p24 * unit;
-    const bool labels = trip_id_set_coherent(s) || (!s->many && s->count <= FEW);
-    return !s->other && merged && labels && (s->many || s->count > 0);
+    return !s->other && merged && (s->many || s->count > 0) && trip_id_set_coherent(s);
 }
 
 static int read_as_ids(trip_brick_input *in, const trip_id_set *s, const trip_scan_params *scan)

@@ -8,11 +8,12 @@
 
 enum { FIRST_ROOM = 1024 };
 
-/* Part of the pairs of different voxels that are equal in labels. Supervoxels of 5 voxels across
- * have 0.8; values that were measured have less than 0.1. */
-static const double coherent_part = 0.6;
-/* Fewer pairs prove nothing. */
-enum { COHERENT_PAIRS = 64 };
+/* At least this part of a label's voxels equal their neighbour: those of objects of two voxels
+ * across. Of measured values beside the background, hardly any do. */
+static const double equal_part = 0.5;
+/* At least this part of the keys must be such labels. Too few keys are labels in any case. */
+static const double label_part = 0.5;
+enum { FEW_KEYS = 16 };
 
 static uint64_t mix(uint64_t key)
 {
@@ -28,23 +29,20 @@ uint64_t trip_id_key(double value, bool *integer)
     return is ? (uint64_t)(int64_t)value ^ UINT64_C(1) << 63 : 0;
 }
 
-/* Returns the place of a key in the table, or the free place for it. */
-static uint32_t place_of(const trip_id_set *s, uint64_t key)
+/* Returns the entry of a key in the table, or the free entry for it. */
+static trip_id_entry *entry_of(const trip_id_set *s, uint64_t key)
 {
     uint32_t at = (uint32_t)mix(key) & (s->room - 1);
-    while (s->used[at] && s->keys[at] != key)
+    while (s->entries[at].voxels && s->entries[at].key != key)
         at = (at + 1) & (s->room - 1);
-    return at;
+    return &s->entries[at];
 }
 
 static void release(trip_id_set *s, trip_budget *budget)
 {
-    if (s->keys)
-        trip_budget_release(budget, s->keys, s->room * sizeof *s->keys);
-    if (s->used)
-        trip_budget_release(budget, s->used, s->room * sizeof *s->used);
-    s->keys = NULL;
-    s->used = NULL;
+    if (s->entries)
+        trip_budget_release(budget, s->entries, s->room * sizeof *s->entries);
+    s->entries = NULL;
     s->room = 0;
 }
 
@@ -66,24 +64,18 @@ static bool grow(trip_id_set *s, trip_budget *budget)
 {
     trip_id_set larger = *s;
     larger.room = s->room ? 2 * s->room : FIRST_ROOM;
-    larger.keys = trip_budget_take(budget, larger.room * sizeof *larger.keys);
-    larger.used = trip_budget_take(budget, larger.room * sizeof *larger.used);
-    if (!larger.keys || !larger.used) {
-        release(&larger, budget);
+    larger.entries = trip_budget_take(budget, larger.room * sizeof *larger.entries);
+    if (!larger.entries)
         return false;
-    }
     for (uint32_t i = 0; i < s->room; i++)
-        if (s->used[i]) {
-            const uint32_t at = place_of(&larger, s->keys[i]);
-            larger.keys[at] = s->keys[i];
-            larger.used[at] = true;
-        }
+        if (s->entries[i].voxels)
+            *entry_of(&larger, s->entries[i].key) = s->entries[i];
     release(s, budget);
     *s = larger;
     return true;
 }
 
-static void add_key(trip_id_set *s, uint64_t key, trip_budget *budget)
+static void add_entry(trip_id_set *s, trip_id_entry e, trip_budget *budget)
 {
     if (s->many || s->other || s->starved)
         return;
@@ -91,45 +83,51 @@ static void add_key(trip_id_set *s, uint64_t key, trip_budget *budget)
         s->starved = true;
         return;
     }
-    const uint32_t at = place_of(s, key);
-    if (s->used[at])
-        return;
-    s->used[at] = true;
-    s->keys[at] = key;
-    if (++s->count > TRIP_IDS_MAX)
+    trip_id_entry *to = entry_of(s, e.key);
+    s->count += to->voxels == 0;
+    to->key = e.key;
+    to->voxels += e.voxels;
+    to->equal += e.equal;
+    if (s->count > TRIP_IDS_MAX)
         give_up(s, budget);
 }
 
 void trip_id_set_add_row(trip_id_set *s, const uint64_t *keys, size_t count, uint64_t zero,
                          trip_budget *budget)
 {
-    for (size_t i = 0; i < count; i++) {
-        const bool same = i > 0 && keys[i] == keys[i - 1];
-        if (!same)
-            add_key(s, keys[i], budget);
-        if (i > 0 && !(same && keys[i] == zero)) {
-            s->pairs++;
-            s->equal += same;
-        }
+    for (size_t i = 0, past; i < count; i = past) {
+        for (past = i + 1; past < count && keys[past] == keys[i];)
+            past++;
+        const trip_id_entry run = { keys[i], past - i, past - i - 1 };
+        add_entry(s, run, budget);
+        s->voxels += run.key == zero ? 0 : run.voxels;
+        s->equal += run.key == zero ? 0 : run.equal;
     }
 }
 
 void trip_id_set_add(trip_id_set *s, const trip_id_set *other, trip_budget *budget)
 {
-    s->pairs += other->pairs;
+    s->voxels += other->voxels;
     s->equal += other->equal;
     s->other |= other->other;
     s->starved |= other->starved;
     if (other->many)
         give_up(s, budget);
     for (uint32_t i = 0; i < other->room; i++)
-        if (other->used[i])
-            add_key(s, other->keys[i], budget);
+        if (other->entries[i].voxels)
+            add_entry(s, other->entries[i], budget);
 }
 
 bool trip_id_set_coherent(const trip_id_set *s)
 {
-    return s->pairs >= COHERENT_PAIRS && (double)s->equal >= coherent_part * (double)s->pairs;
+    uint32_t labels = 0;
+    if (s->many)
+        return (double)s->equal >= equal_part * (double)s->voxels;
+    for (uint32_t i = 0; i < s->room; i++) {
+        const trip_id_entry *e = &s->entries[i];
+        labels += e->voxels && (double)e->equal >= equal_part * (double)e->voxels;
+    }
+    return s->count <= FEW_KEYS || labels >= label_part * s->count;
 }
 
 static int compare(const void *a, const void *b)
@@ -180,8 +178,8 @@ int trip_ids_make(trip_ids *out, const trip_id_set *s, const trip_volume_info *i
                          "--memory");
     }
     for (uint32_t i = 0; i < s->room && !s->many; i++)
-        if (s->used[i])
-            ids.keys[n++] = s->keys[i];
+        if (s->entries[i].voxels)
+            ids.keys[n++] = s->entries[i].key;
     if (ids.keys) {
         qsort(ids.keys, ids.count, sizeof *ids.keys, compare);
         fill_values(&ids, info);

@@ -11,16 +11,19 @@
 
 enum { TRIP_IDS_MAX = 65535, TRIP_IDS_NUMBERS = 16384 };
 
-/* The distinct keys that one thread has met, and how often neighbours along x are equal. All zero
- * is empty. */
+/* A key, its voxels, and those of them that equal the previous voxel along x. */
+typedef struct trip_id_entry {
+    uint64_t key, voxels, equal;
+} trip_id_entry;
+
+/* The distinct keys that one thread has met. All zero is empty. */
 typedef struct trip_id_set {
-    uint64_t *keys; /* a hash table with `room` entries, from the budget */
-    bool *used;
+    trip_id_entry *entries; /* a hash table of `room`, from the budget; free ones have no voxels */
     uint32_t room, count;
-    bool many;             /* there are more than TRIP_IDS_MAX; `keys` is empty */
-    bool other;            /* there are values other than integers */
-    bool starved;          /* memory was exhausted */
-    uint64_t pairs, equal; /* pairs of neighbours that are not both 0; the equal ones among them */
+    bool many;              /* there are more than TRIP_IDS_MAX; the table is empty */
+    bool other;             /* there are values other than integers */
+    bool starved;           /* memory was exhausted */
+    uint64_t voxels, equal; /* sums over all keys but 0 */
 } trip_id_set;
 
 /* Returns the key of an integer value, for float types. Sets *integer to false for other values. */
@@ -43,7 +46,7 @@ typedef struct trip_ids {
     double *values; /* strictly ascending */
 } trip_ids;
 
-/* Whether keys of a set are labels by intent: in most pairs of neighbours, both are equal. */
+/* Whether the keys of a set are labels by intent: the voxels of most keys lie together. */
 bool trip_id_set_coherent(const trip_id_set *s);
 /* Makes the ids of a set. Takes memory from the budget. */
 int trip_ids_make(trip_ids *out, const trip_id_set *s, const trip_volume_info *info,
