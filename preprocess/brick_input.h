@@ -75,8 +75,9 @@ double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi
 bool trip_brick_choose_compact(const trip_brick_input *in, double full, double step[3]);
 /* Returns the values of the lowest and highest code for types of 8 or 16 bits. */
 void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi);
-/* Returns whether the volume must be scanned first: the envelope is automatic, a transfer function
- * depends on the values, normals depend on their range, or integers may be ids. */
+/* Returns whether the volume must be scanned first. It must if the envelope is automatic, a
+ * transfer function depends on the values, normals depend on their range, or integers may be ids.
+ */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
 /* Returns whether the range of codes is known before pieces are made, from the type or the scan. */
 bool trip_brick_will_be_quantised(const trip_brick_input *in);

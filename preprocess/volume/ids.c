@@ -8,8 +8,8 @@
 
 enum { FIRST_ROOM = 1024 };
 
-/* At least this part of a label's voxels equal their neighbour: those of objects of two voxels
- * across. Of measured values beside the background, hardly any do. */
+/* Minimum part of the voxels of a label that equal the voxel before. Objects of two voxels across
+ * have this part. Measured values have far less, apart from the background. */
 static const double equal_part = 0.5;
 /* At least this part of the keys must be such labels. Too few keys are labels in any case. */
 static const double label_part = 0.5;

@@ -1,6 +1,6 @@
 /* The distinct values of a volume of labels. Integers of 32 and 64 bits do not fit in floats, and
- * 16-bit codes over their range merge them. Such a volume is read as ranks instead: the number of
- * smaller ids in the volume.
+ * 16-bit codes over their range merge them. Such a volume is therefore read as ranks. The rank of
+ * an id is the number of smaller ids in the volume.
  *
  * A key stands for an integer and ascends with it. */
 #ifndef TRIP_IDS_H
@@ -11,7 +11,7 @@
 
 enum { TRIP_IDS_MAX = 65535, TRIP_IDS_NUMBERS = 16384 };
 
-/* A key, its voxels, and those of them that equal the previous voxel along x. */
+/* A key, the number of its voxels, and the number of its voxels that follow another one along x. */
 typedef struct trip_id_entry {
     uint64_t key, voxels, equal;
 } trip_id_entry;

@@ -8,8 +8,8 @@
 
 /* Fraction of the values on each side that may stand far outside. */
 static const double outside = 0.001;
-/* A gap ends the typical range if it is larger than this part of the range between the quantiles,
- * and this much larger than the range of the values just before it. */
+/* A gap that ends the typical range is larger than this part of the range between the quantiles. It
+ * is also this many times larger than the range of the values just before it. */
 static const double gap_part = 0.25, gap_times = 8;
 enum { VALUES_BEFORE = 4, FEW = 64 };
 

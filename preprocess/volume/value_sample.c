@@ -47,8 +47,8 @@ static void take(trip_value_sample *s, float value, unsigned rank)
     s->ranks[s->count++] = (uint8_t)rank;
 }
 
-/* Puts a value into a heap of extremes. The first is the last one to keep: the greatest of the
- * least values (sign 1) or the least of the greatest (sign -1). */
+/* Puts a value into a heap of extremes. The heap's first value leaves first. Sign 1 keeps the
+ * least values, sign -1 the greatest. */
 static void put(float *heap, uint32_t *count, float value, float sign)
 {
     uint32_t at;

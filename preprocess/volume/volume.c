@@ -41,7 +41,7 @@ struct trip_volume {
     trip_budget *budget;
     char *path;
 
-    const trip_ids *ids; /* decode ranks of these; NULL means values */
+    const trip_ids *ids; /* decoding gives ranks of ids; NULL means values */
     bool exact_fills;    /* the user gave the fill value, so that not the nearest float counts */
 
     /* All further fields are for slice readers. */

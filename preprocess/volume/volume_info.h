@@ -76,7 +76,7 @@ typedef struct trip_volume_info {
     bool oriented; /* the file gives the directions of its axes in world space */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
-    char note[1024];   /* tells the user what was chosen by default, such as a grid, or "" */
+    char note[1024];   /* tells the user the choices made by default, or "" */
     trip_fills fills;  /* decoded as NaN */
 } trip_volume_info;
 

@@ -1,5 +1,5 @@
-/* Codes that follow the values: any window that holds 1 % of the sorted values has at least 64
- * codes, and a value and the value of its code differ by at most half a step. */
+/* Codes that follow the values. Any window that holds 1 % of the sorted values has at least 64
+ * codes. A value differs from the value of its code by at most half a step. */
 #include "brick_files.h"
 
 #include <math.h>

@@ -253,7 +253,7 @@ static void other_values_are_no_fill_values(void **state)
     assert_int_equal(find(values, COUNT, &plain, &fills), 0);
 }
 
-/* A scan with slope 1 and intercept -1024, whose padding is stored as -32768. */
+/* A scan with slope 1 and intercept -1024. Its padding is stored as -32768. */
 static void scaled_fill_values_are_found(void **state)
 {
     (void)state;
