@@ -111,7 +111,9 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
         sound = isfinite(s->fills.values[i]);
     if (!sound)
         return fail_false(j, "its list of fill values");
-    if (!s->scanned)
+    if (s->ids > 1)
+        return fail_false(j, "its kind");
+    if (!s->scanned || s->ids) /* a resumed run scans ids again */
         return 0;
     if (!trip_tally_check(&s->tally) || s->tally.finite == 0 || s->tally.voxels > p->voxels ||
         (p->slice_voxels && s->tally.voxels != p->voxels))

@@ -1,5 +1,5 @@
-/* Codes that follow the values of a volume: 256 intervals with 256 even codes each. Where values
- * are dense, intervals are short. Pure functions. */
+/* Codes that follow the values of a volume: 256 intervals with 256 even codes each. Dense
+ * values have short intervals. Pure functions. */
 #ifndef TRIP_KNOTS_H
 #define TRIP_KNOTS_H
 

@@ -34,6 +34,25 @@ static void make_floats(void)
     test_write("v.raw", floats, sizeof floats);
 }
 
+/* A slice of fill values that nobody declared, and one value far outside. */
+static void make_strange_floats(void)
+{
+    make_floats();
+    for (int i = 0; i < NX * NY; i++)
+        floats[i] = 1e20f;
+    floats[N / 2] = 1e6f;
+    test_write("v.raw", floats, sizeof floats);
+}
+
+/* Blocks of 8 ids, some of which share a float. */
+static void make_ids(void)
+{
+    static uint32_t ids[N];
+    for (int i = 0; i < N; i++)
+        ids[i] = i % NX / 8 ? 4000000000u + (uint32_t)(i % NX / 8 % 3 + i / NX % NY / 8 % 3) : 0;
+    test_write("v.raw", ids, sizeof ids);
+}
+
 static trip_brick_params params_for(const char *type, const char *output)
 {
     static char input_path[128], output_path[128];
@@ -556,6 +575,13 @@ static void memory_threads_and_slabs_do_not_change_the_result(void **state)
     check_ways(&p);
     p = params_for("float", "a.trip");
     check_ways(&p);
+    make_strange_floats();
+    check_ways(&p);
+    p.keep_all = true;
+    check_ways(&p);
+    make_ids();
+    p = params_for("uint32", "a.trip");
+    check_ways(&p);
 }
 
 static void the_order_of_splats_does_not_depend_on_tiles(void **state)
@@ -736,13 +762,17 @@ static void killed_runs_resume_and_give_the_same_bytes(void **state)
 {
     (void)state;
     bool resumed = false;
-    for (int kind = 0; kind < 3; kind++) {
-        trip_brick_params p = params_for(kind < 2 ? "uint8" : "float", "a.trip");
-        if (kind < 2)
-            make_bytes();
-        else
-            make_floats();
-        p.keep_all = kind > 0;
+    static const struct {
+        const char *type;
+        void (*make)(void);
+        bool keep_all;
+    } kinds[] = { { "uint8", make_bytes, false },         { "uint8", make_bytes, true },
+                  { "float", make_floats, true },         { "float", make_strange_floats, false },
+                  { "float", make_strange_floats, true }, { "uint32", make_ids, false } };
+    for (size_t kind = 0; kind < sizeof kinds / sizeof *kinds; kind++) {
+        trip_brick_params p = params_for(kinds[kind].type, "a.trip");
+        kinds[kind].make();
+        p.keep_all = kinds[kind].keep_all;
         p.threads = 1;
         p.slices = 4;
         p.memory_bytes = 29 << 20;
