@@ -17,6 +17,7 @@ SIZES = ["", "0", "-5", "x", "5Q", "5MM", "nan", "99999999999999999999999G", "M"
 BRICK = {
     "--allow-gaps": None,
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
+    "--fill": ["", "much", "nan", "1,2"],
     "--endian": NAMES,
     "--level-set": NAMES + ["refuse"],
     "--offset": ["", "-1", "x", "1.5", "9" * 30],
@@ -48,6 +49,7 @@ BRICK = {
 }
 RENDER = {
     "--axes": NAMES + ["PI", "PIRS", "pir", "PAR"],
+    "--fill": ["", "much", "nan", "1,2"],
     "--clip-box": ["", "1", "1,2,3", "0,0,0,1,1,x", "0,0,0,1,1,0", "voxels:", "voxel:0,0,0,1,1,1"],
     "--clip-plane": ["", "1,2,3", "0,0,0,1", "1,2,3,x", "1,2,3,4,5"],
     "--show": NAMES,
@@ -301,7 +303,7 @@ class Options(program.ProgramTest):
                 ["render", "a.trip", "b.trip", "-o", "a.png", "--max-ms=5"],
                 *([command, "a.trip", option] for command in ("view", "serve") for option in (
                     "--axes=PIR", "--grid=foo", "--spacing=4,1,1", "--coordinates=a,b,c",
-                    "--level-set=band", "--allow-gaps")),
+                    "--level-set=band", "--allow-gaps", "--fill=5")),
                 *([command, "a.trip", "--error=1", "--classify=pre"] for command in ("view", "serve")),
                 render + ["--max-ms=5", "--renderer=integral"],
                 render + ["--field=source", "--renderer=integral"],
