@@ -448,7 +448,7 @@ static int finish_output(brick *b)
                                                                   .functions = b->in.functions,
                                                                   .histogram = &b->in.histogram,
                                                                   .tally = b->in.tally,
-                                                                  .fills = &b->in.fills,
+                                                                  .fills = &b->in.info->fills,
                                                                   .upright = b->upright });
     if (!text)
         return TRIP_ERROR;

@@ -16,7 +16,7 @@ typedef struct trip_brick_metadata {
     trip_tf *const *functions; /* params->function_count transfer functions, in data units */
     const trip_histogram *histogram;
     const trip_tally *tally;
-    const trip_fills *fills;  /* that nobody declared */
+    const trip_fills *fills;  /* given or found */
     trip_orientation upright; /* none if the file or its format gives the orientation */
 } trip_brick_metadata;
 

@@ -20,8 +20,8 @@
  *   "envelope"           [[lo, hi], ...]: the kept values, closed intervals
  *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: finite values in [a,
  *                        b], kept or not, in at most 65536 equal bins
- *   "fills"              [value, ...]: values that were taken for "no value", though nobody
- *                        declared them */
+ *   "fills"              [value, ...]: values that were taken for "no value", given to
+ *                        `brick` or found by it */
 #ifndef TRIP_DATASET_METADATA_H
 #define TRIP_DATASET_METADATA_H
 

@@ -212,6 +212,7 @@ class Fills(program.ProgramTest):
         self.assertEqual(json.loads(run.stdout)["not_finite"], count)
         self.assertIn(f"{count} values are not finite or are the fill value", run.stderr)
         self.assertIn("--fill=16777217", self.info("v.trip")["source"]["source_options"])
+        self.assertEqual(self.info("v.trip")["source"]["fills"], [16777217])
         self.fails(2, "brick", "v.nrrd", "-o", "w.trip", "--fill", "much", says="--fill")
 
     def test_values_near_the_others_are_kept(self):
