@@ -221,6 +221,16 @@ static bool is_uneven(const triptych_info *info)
     return false;
 }
 
+/* Returns the number of values outside of the typical range. */
+static double outside(const cJSON *root)
+{
+    const cJSON *histogram = cJSON_GetObjectItemCaseSensitive(root, "histogram");
+    const cJSON *below = cJSON_GetObjectItemCaseSensitive(histogram, "below");
+    const cJSON *above = cJSON_GetObjectItemCaseSensitive(histogram, "above");
+    return (cJSON_IsNumber(below) ? below->valuedouble : 0) +
+           (cJSON_IsNumber(above) ? above->valuedouble : 0);
+}
+
 static cJSON *to_json(const data_set *d, bool verified)
 {
     const triptych_info *info = &d->info;
@@ -240,8 +250,16 @@ static cJSON *to_json(const data_set *d, bool verified)
     add_world(root, info, d->source.root);
     cJSON_AddItemToObject(root, "value_min", number(info->value_min));
     cJSON_AddItemToObject(root, "value_max", number(info->value_max));
+    cJSON_AddItemToObject(root, "typical_min", number(info->typical_min));
+    cJSON_AddItemToObject(root, "typical_max", number(info->typical_max));
+    cJSON_AddItemToObject(root, "outside", number(outside(d->source.root)));
     cJSON_AddItemToObject(root, "code_lo", number(info->code_lo));
     cJSON_AddItemToObject(root, "code_hi", number(info->code_hi));
+    cJSON_AddStringToObject(root, "codes", info->codes);
+    cJSON_AddItemToObject(root, "code_step_min", number(info->code_step_min));
+    cJSON_AddItemToObject(root, "code_step_max", number(info->code_step_max));
+    if (info->ids)
+        cJSON_AddItemToObject(root, "ids", number(info->ids));
     add_normals(root, info);
     cJSON_AddItemToObject(root, "voxels", number((double)info->voxels));
     cJSON_AddItemToObject(root, "kept", number((double)info->kept));
@@ -410,6 +428,34 @@ static void print_list(const triptych_info *info, const triptych_list *list)
     putchar('\n');
 }
 
+/* Prints the typical range if some values lie outside. */
+static void print_typical(const data_set *d)
+{
+    const triptych_info *info = &d->info;
+    char lo[32], hi[32];
+    if (info->typical_min == info->value_min && info->typical_max == info->value_max)
+        return;
+    printf("%-12s %s to %s, without %.0f values far outside\n", "typical",
+           shortest(info->typical_min, lo), shortest(info->typical_max, hi),
+           outside(d->source.root));
+}
+
+static void print_codes(const triptych_info *info)
+{
+    char lo[32], hi[32], least[32], most[32];
+    shortest(info->code_lo, lo);
+    shortest(info->code_hi, hi);
+    shortest(info->code_step_min, least);
+    shortest(info->code_step_max, most);
+    if (info->ids)
+        printf("%-12s %u ids, %s to %s, exactly\n", "codes for", info->ids, lo, hi);
+    else if (info->code_step_min < info->code_step_max)
+        printf("%-12s %s to %s, finer where values are dense: %s to %s apart\n", "codes for", lo,
+               hi, least, most);
+    else
+        printf("%-12s %s to %s, %s apart\n", "codes for", lo, hi, least);
+}
+
 static void print_text(const data_set *d)
 {
     const triptych_info *info = &d->info;
@@ -424,7 +470,8 @@ static void print_text(const data_set *d)
         print_anatomy(info, space_of(d->source.root));
     print_orientation(orientation_of(d->source.root));
     print_range("values", info->value_min, info->value_max);
-    print_range("codes for", info->code_lo, info->code_hi);
+    print_typical(d);
+    print_codes(info);
     printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);
     printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
            100.0 * (double)info->kept / voxels);

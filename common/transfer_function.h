@@ -31,12 +31,16 @@ typedef struct trip_tf_point {
     trip_rgba colour;
 } trip_tf_point;
 
-/* Counts the finite values of a volume in equal bins over [value_min, value_max]. `total` is the
- * sum. */
+/* Counts the finite values of a volume in equal bins over [value_min, value_max], its typical
+ * range. Values outside are left out. `total` is the sum. */
 typedef struct trip_histogram {
     double value_min, value_max;
     uint64_t counts[1024];
     uint64_t total;
+    /* The distinct values of a volume of ids, ascending. NULL if they are not known. The caller
+     * owns them. */
+    const double *ids;
+    uint32_t id_count; /* 0 if the values are no ids */
 } trip_histogram;
 
 /* Kinds of volumes. Each kind has an automatic transfer function. */

@@ -48,6 +48,7 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .series = o->series,
         .channel = o->channel,
         .time = o->time,
+        .fill = o->fill,
         .max_voxels = o->max_voxels,
     };
     if (o->in_memory)
@@ -139,6 +140,9 @@ static const char *fault_of_volume(const triptych_brick_options *o)
     }
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
         return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
+    trip_fills fills;
+    if (o->fill && !trip_fills_parse(o->fill, &fills))
+        return "the fill value must be a number or \"none\"";
     if (o->raw_type && !triptych_is_raw_type(o->raw_type))
         return "unknown type of raw data";
     if (o->raw_offset_bytes > UINT64_C(1) << 62)

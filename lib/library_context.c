@@ -370,12 +370,27 @@ static void describe_spacing(const trip_dataset *d, triptych_info *out)
     }
 }
 
+static void describe_codes(const trip_dataset *d, triptych_info *out)
+{
+    const trip_codes *c = &d->codes;
+    out->codes = trip_codes_even(c) ? "even" : trip_codes_ids(c) ? "ids" : "knots";
+    out->ids = trip_codes_ids(c) ? c->entries : 0;
+    out->code_step_min = out->code_step_max = (c->hi - c->lo) / (TRIP_CODES - 1);
+    for (uint32_t i = 0; i + 1 < c->entries; i++) {
+        const double step = ldexp(c->table[i + 1] - c->table[i], -(int)c->step_log2);
+        out->code_step_min = i > 0 ? fmin(out->code_step_min, step) : step;
+        out->code_step_max = i > 0 ? fmax(out->code_step_max, step) : step;
+    }
+}
+
 static triptych_info info_of(const trip_dataset *d)
 {
     const trip_file_header *h = &d->header;
     triptych_info info = {
         .value_min = h->value_min,
         .value_max = h->value_max,
+        .typical_min = h->typical_min,
+        .typical_max = h->typical_max,
         .code_lo = h->code_lo,
         .code_hi = h->code_hi,
         .voxels = h->voxels,
@@ -399,6 +414,7 @@ static triptych_info info_of(const trip_dataset *d)
         info.gradient_step[a] = h->gradient_step[a];
     }
     memcpy(info.index_to_world, d->index_to_world.m, sizeof info.index_to_world);
+    describe_codes(d, &info);
     describe_kept(d, &info);
     describe_spacing(d, &info);
     return info;

@@ -129,7 +129,7 @@ int session_use_function(session *s, const session_look *look)
     if (!status)
         status = load_function(s, look, &tf);
     if (!status && !find_missing(s, tf, look)) {
-        trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
+        trip_tf_check_range(tf, h->typical_min, h->typical_max, s->input);
         for (unsigned i = 0; i < s->part_count; i++)
             warn_of_culled_values(s, i, tf, look);
         warn_of_lost_peak(s, tf);

@@ -19,7 +19,7 @@ double trip_rounding_opacity(const session *s, const trip_settings *settings)
     const double share =
         trip_settings_sum_sheets(settings) ? 1 : 1 / (2 * 3.14159265358979323846 * sigma * sigma);
     double max = 0;
-    for (int code = code_of(h, h->value_min); code <= code_of(h, h->value_max); code++)
+    for (int code = code_of(h, h->typical_min); code <= code_of(h, h->typical_max); code++)
         max = fmax(max, (double)s->table[code].extinction);
     return -expm1(-max * voxel * share);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "dataset_metadata.h"
 #include "report.h"
 
 enum { EDGE = 64, SLICES = 16 };
@@ -124,6 +125,20 @@ static int read_volume(reading *r, const char *path)
                                            .value_per_code = (h->code_hi - h->code_lo) / 65535 });
 }
 
+/* Makes the volume lack the values that bricking took for fill values. */
+static int use_fills(const reading *r)
+{
+    trip_dataset_metadata *text;
+    trip_fills fills = { 0 };
+    int status = trip_dataset_metadata_parse(&text, r->data);
+    if (status)
+        return status;
+    fills.count = trip_dataset_metadata_fills(text, fills.values, TRIP_FILLS_MAX);
+    trip_dataset_metadata_destroy(text);
+    trip_volume_set_fills(r->volume, &fills);
+    return 0;
+}
+
 int trip_source_field_read(trip_field **out, const trip_dataset *data, const char *path,
                            const trip_volume_params *params, trip_budget *budget)
 {
@@ -134,10 +149,11 @@ int trip_source_field_read(trip_field **out, const trip_dataset *data, const cha
     if (!r.values)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory; raise --memory");
     int status = trip_volume_open(&r.volume, path, params, budget);
-    if (!status) {
+    if (!status && !params->fill)
+        status = use_fills(&r);
+    if (!status)
         status = read_volume(&r, path);
-        trip_volume_close(r.volume);
-    }
+    trip_volume_close(r.volume);
     trip_budget_release(budget, r.values, values_bytes);
     if (status)
         trip_field_destroy(r.field);

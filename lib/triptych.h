@@ -170,10 +170,18 @@ typedef struct triptych_info {
      */
     double edges[2][3], grid_edges[2][3];
     double value_min, value_max; /* minimum and maximum of the volume */
-    double code_lo, code_hi;     /* values of codes 0 and 65535 (FORMAT.md) */
-    uint64_t voxels;             /* of the volume */
-    uint64_t kept; /* kept voxels, which are visible with a transfer function given to `brick` */
-    uint64_t halo; /* transparent neighbours of kept voxels, stored for interpolation */
+    /* Range of the values without the few that stand far outside. Functions that are made for the
+     * data cover it. */
+    double typical_min, typical_max;
+    double code_lo, code_hi; /* values of codes 0 and 65535 (FORMAT.md) */
+    /* "even": code_step_min apart. "knots": at least code_step_min and at most code_step_max apart.
+     * "ids": a code for each of `ids` values. */
+    const char *codes;
+    double code_step_min, code_step_max;
+    unsigned ids;
+    uint64_t voxels; /* of the volume */
+    uint64_t kept;   /* kept voxels, which are visible with a transfer function given to `brick` */
+    uint64_t halo;   /* transparent neighbours of kept voxels, stored for interpolation */
     uint64_t bytes, index_bytes; /* size on disk of the whole data set and of its index */
     /* Checksum of the index, which contains the checksums of all other bytes. Equal data sets have
      * equal checksums. */
@@ -216,9 +224,9 @@ TRIPTYCH_API int triptych_verify(triptych *t);
 enum { TRIPTYCH_HISTOGRAM_BINS = 1024 };
 
 typedef struct triptych_histogram {
-    /* Bins divide the range from lo to hi equally. */
+    /* Bins divide the typical range from lo to hi equally. */
     double lo, hi;
-    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* finite values of the volume, kept or not */
+    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* finite values in the range, kept or not */
     uint64_t total;
 } triptych_histogram;
 

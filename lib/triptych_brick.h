@@ -117,6 +117,10 @@ typedef struct triptych_brick_options {
     /* The channel or component, and the time, of a file with several; both count from 0. In DICOM,
      * slices that share their positions are times. */
     int channel, time;
+    /* A value that stands for "no value", as text, such as "-9999". Its voxels count as absent.
+     * "none" keeps all values. By default, known fill values that stand far outside of all other
+     * values count as absent, such as 1e20, -9999 or -32768. */
+    const char *fill;
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
     uint64_t max_voxels;
@@ -184,7 +188,7 @@ typedef struct triptych_brick_summary {
     /* Written to temporary files and removed again. */
     uint64_t temporary_bytes;
     int resumed;
-    char note[1024]; /* choices made where the file leaves several, or "" */
+    char note[1536]; /* choices made where the file leaves several, or "" */
     triptych_brick_stage stages[TRIPTYCH_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* limit; maximum used */
 } triptych_brick_summary;

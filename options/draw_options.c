@@ -1,6 +1,7 @@
 #include "draw_options.h"
 
 #include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "anatomy.h"
@@ -261,6 +262,16 @@ static int read_axes(const trip_option *row, const char *text, void *base)
                                          : trip_option_fail("--axes", "takes " TRIP_ANATOMY_AXES);
 }
 
+static int read_fill(const trip_option *row, const char *text, void *base)
+{
+    double value;
+    (void)row;
+    ((triptych_brick_options *)base)->fill = text;
+    return !strcmp(text, "none") || (trip_text_to_double(text, &value) && isfinite(value))
+               ? 0
+               : trip_option_fail("--fill", "takes a number or none");
+}
+
 static const char *const level_sets[] = { "filled", "band", NULL };
 
 #define AT(member) .at = offsetof(triptych_brick_options, member)
@@ -296,6 +307,10 @@ static const trip_option volume_rows[] = {
       .hi = INT32_MAX },
     { "time", "N", "Selects the time of a file with several, from 0", "0",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
+    { "fill", "VALUE|none",
+      "Names the value that stands for \"no value\", or keeps all values with none",
+      "known fill values far outside of all other values: 1e20, -9999, -32768, ...",
+      .group = DRAW_GROUP_VOLUME, AT(fill), CUSTOM(read_fill) },
 };
 #undef AT
 

@@ -15,6 +15,7 @@
 #include "report.h"
 #include "text.h"
 
+
 /* Prints numbers in their shortest exact form, because cJSON's form differs between versions. */
 static cJSON *number(double value)
 {
@@ -46,11 +47,22 @@ static void add_envelope(cJSON *root, const trip_brick_metadata *t)
     }
 }
 
-static void add_histogram(cJSON *root, const trip_histogram *h)
+static void add_fills(cJSON *root, const trip_fills *fills)
+{
+    cJSON *values = fills->count ? cJSON_AddArrayToObject(root, "fills") : NULL;
+    for (unsigned i = 0; i < fills->count; i++)
+        cJSON_AddItemToArray(values, number(fills->values[i]));
+}
+
+static void add_histogram(cJSON *root, const trip_histogram *h, const trip_tally *t)
 {
     cJSON *histogram = cJSON_AddObjectToObject(root, "histogram");
     add_number(histogram, "value_min", h->value_min);
     add_number(histogram, "value_max", h->value_max);
+    if (t->below)
+        add_number(histogram, "below", (double)t->below);
+    if (t->above)
+        add_number(histogram, "above", (double)t->above);
     cJSON *counts = cJSON_AddArrayToObject(histogram, "counts");
     for (size_t i = 0; i < sizeof h->counts / sizeof *h->counts; i++)
         cJSON_AddItemToArray(counts, number((double)h->counts[i]));
@@ -165,6 +177,8 @@ static void add_volume_options(cJSON *options, const trip_volume_params *v)
         add_option(options, "--channel=%d", v->channel);
     if (v->time)
         add_option(options, "--time=%d", v->time);
+    if (v->fill)
+        add_option(options, "--fill=%s", v->fill);
 }
 
 static void add_region(cJSON *options, const trip_region *r)
@@ -343,7 +357,8 @@ char *trip_brick_metadata_make(const trip_brick_metadata *t)
     add_envelope(root, t);
     add_functions(root, t);
     int status = add_default_function(root, t);
-    add_histogram(root, t->histogram);
+    add_fills(root, t->fills);
+    add_histogram(root, t->histogram, t->tally);
     char *text = status == 0 ? trip_json_print(root, false) : NULL;
     cJSON_Delete(root);
     if (status == 0 && !text)

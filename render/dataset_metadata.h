@@ -19,8 +19,10 @@
  *   "front"              "+x" ... "-z": the world direction that the object faces
  *   "transfer_function"  the default transfer function as `.tf` text in data units
  *   "envelope"           [[lo, hi], ...]: the kept values, closed intervals
- *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: all finite values,
- *                        kept or not, in at most 65536 equal bins over [a, b] */
+ *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: finite values in [a,
+ *                        b], kept or not, in at most 65536 equal bins
+ *   "fills"              [value, ...]: values that were taken for "no value", given to
+ *                        `brick` or found by it */
 #ifndef TRIP_DATASET_METADATA_H
 #define TRIP_DATASET_METADATA_H
 
@@ -64,5 +66,8 @@ double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_t
  * the default of a view. */
 void trip_dataset_metadata_orient(const trip_dataset_metadata *t, const trip_dataset *d,
                                   trip_vec3 *up, trip_vec3 *front);
+
+/* Writes the values of "fills", at most `max`, and returns their number. */
+size_t trip_dataset_metadata_fills(const trip_dataset_metadata *t, double *values, size_t max);
 
 #endif

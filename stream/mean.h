@@ -2,8 +2,8 @@
  * voxels of level 0, some of which were kept. For any transfer function, its opacity along an axis
  * depends on three numbers, which are stored in a 16-bit code:
  *
- *   bits 6-15  m, the mean of the kept values: m / 1023 of the way from the code of the volume's
- *              minimum to the code of its maximum
+ *   bits 6-15  m, the mean of the kept values: m / 1023 of the way from the code of the typical
+ *              minimum to the code of the typical maximum
  *   bits 3-5   d, the mean depth: in the columns along the list's axis that hold kept voxels, the
  *              fraction that is kept, (d + 1) / 8
  *   bits 0-2   c, the cover: the fraction of columns that hold kept voxels, 1/64, 1/32, 1/16, 1/8,

@@ -332,8 +332,8 @@ void draw_editor(trip_panel *p, trip_document *d)
     Canvas c;
     c.lo = ImGui::GetCursorScreenPos();
     c.hi = ImVec2(c.lo.x + ImGui::GetContentRegionAvail().x, c.lo.y + height);
-    c.value_lo = d->info.value_min;
-    c.value_hi = d->info.value_max > d->info.value_min ? d->info.value_max : d->info.value_min + 1;
+    c.value_lo = d->info.typical_min;
+    c.value_hi = d->info.typical_max > c.value_lo ? d->info.typical_max : c.value_lo + 1;
     ImGui::InvisibleButton("Function editor", ImVec2(c.hi.x - c.lo.x, height),
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
     mark(p, "Function editor", false);

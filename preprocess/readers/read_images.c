@@ -112,7 +112,7 @@ static void describe(const trip_image_stack *stack, trip_volume_info *info)
     memcpy(info->index_to_world.m, stack->index_to_world, sizeof info->index_to_world.m);
     memcpy(info->space, stack->space, sizeof info->space);
     memcpy(info->modality, stack->modality, sizeof info->modality);
-    memcpy(info->note, stack->note, sizeof info->note);
+    snprintf(info->note, sizeof info->note, "%s", stack->note);
     info->oriented = stack->oriented != 0;
     info->type = (trip_scalar)stack->type;
     info->slope = stack->slope;

@@ -13,7 +13,7 @@
 
 /* Raise this with every change that makes the same input and parameters give other bytes: in a
  * reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 22 };
+enum { BRICKER_VERSION = 23 };
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
@@ -25,6 +25,8 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
         fprintf(f, "axes %s\n", v->axes);
     if (v->max_voxels)
         fprintf(f, "at most %" PRIu64 "\n", v->max_voxels);
+    if (v->fill)
+        fprintf(f, "fill %s\n", v->fill);
     if (v->coordinates)
         fprintf(f, "%s\n", v->coordinates);
     for (int a = 0; a < 3; a++)

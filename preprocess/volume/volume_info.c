@@ -6,6 +6,7 @@
 #include <strings.h>
 
 #include "report.h"
+#include "text.h"
 
 static const struct {
     unsigned bytes;
@@ -280,4 +281,13 @@ void trip_entry_note(char *note, size_t room, const char *what, int64_t index, i
                  "%s %" PRId64 " of %" PRId64 "%s is read (--%s N reads another, from 0)", what,
                  index, count, detail, what);
     trip_append_note(note, room, text);
+}
+
+bool trip_fills_parse(const char *text, trip_fills *fills)
+{
+    *fills = (trip_fills){ 0 };
+    if (!strcmp(text, "none"))
+        return true;
+    fills->count = 1;
+    return trip_text_to_double(text, &fills->values[0]) && isfinite(fills->values[0]);
 }

@@ -52,6 +52,17 @@ void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter,
  * `stored`. */
 float trip_scalar_luma(trip_scalar type, bool swap, const void *stored);
 
+/* Values that stand for "no value" in a volume. Their voxels count as absent. */
+enum { TRIP_FILLS_MAX = 8 };
+typedef struct trip_fills {
+    uint64_t count;
+    double values[TRIP_FILLS_MAX];
+} trip_fills;
+
+/* Parses the value of --fill. Sets *fills to the value, or to none for "none". Returns false for
+ * other texts. */
+bool trip_fills_parse(const char *text, trip_fills *fills);
+
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
 #define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
 
@@ -71,8 +82,9 @@ typedef struct trip_volume_info {
     char up[3];    /* "+y" or "+z", which is up in the program that wrote the file; "" if unknown */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
-    char note[512];    /* tells the user which grid or variable was chosen by default, or "" */
+    char note[1024];   /* tells the user the choices made by default, or "" */
     char *parts;       /* the series of a DICOM folder, one a line, or NULL. The volume owns it. */
+    trip_fills fills;  /* decoded as NaN */
 } trip_volume_info;
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
@@ -140,6 +152,9 @@ typedef struct trip_volume_params {
     bool allow_gaps;           /* accept stacks with missing slices */
     int series;                /* --series, for DICOM: its number; 0 chooses the largest */
     int channel, time;         /* --channel, --time: of files with several, from 0 */
+    /* --fill: a value that counts as absent, or "none". By default, known values far outside of
+     * everything else count as absent (typical.h). */
+    const char *fill;
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;

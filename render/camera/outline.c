@@ -136,7 +136,7 @@ static void fill_masses(summing *s)
     const trip_affine *m = &s->list->index_to_world;
     const trip_file_header *h = &s->params->data->header;
     const trip_mean_scale scale =
-        trip_mean_scale_make(h->value_min, h->value_max, &s->params->data->codes);
+        trip_mean_scale_make(h->typical_min, h->typical_max, &s->params->data->codes);
     const double length = trip_length(column(m, AXIS));
     const double area = fabs(trip_affine_determinant(m)) / length;
     double extinctions[TRIP_MEAN_SHARES];

@@ -87,7 +87,8 @@ static void fill(trip_tf_entry *to, const trip_dataset *data, const trip_tf_entr
                  double length)
 {
     const trip_file_header *h = &data->header;
-    const trip_mean_scale scale = trip_mean_scale_make(h->value_min, h->value_max, &data->codes);
+    const trip_mean_scale scale =
+        trip_mean_scale_make(h->typical_min, h->typical_max, &data->codes);
     double extinctions[TRIP_MEAN_SHARES] = { 0 };
     float of_mean = 0;
     for (unsigned code = 0; code < ENTRIES; code += TRIP_MEAN_SHARES) {

@@ -199,7 +199,7 @@ static double world_length(const trip_camera *c, int axis)
 static void set_means(trip_gl_frame_double *out, const trip_dataset *d, double length)
 {
     const trip_mean_scale scale =
-        trip_mean_scale_make(d->header.value_min, d->header.value_max, &d->codes);
+        trip_mean_scale_make(d->header.typical_min, d->header.typical_max, &d->codes);
     out->means = (trip_gl_double4){ { length, scale.lo, scale.width } };
 }
 

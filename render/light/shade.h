@@ -34,7 +34,7 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
                                               unsigned level)
 {
     double range =
-        h->value_max > h->value_min ? h->value_max - h->value_min : h->code_hi - h->code_lo;
+        h->typical_max > h->typical_min ? h->typical_max - h->typical_min : h->code_hi - h->code_lo;
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 

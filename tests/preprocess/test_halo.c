@@ -220,8 +220,7 @@ static int32_t code_of_field(const test_lists *l, size_t voxel)
     int64_t z = (int64_t)(voxel / l->header.dims[0] / l->header.dims[1]) + corner[2];
     bool within = x >= 0 && y >= 0 && z >= 0 && x < EDGE && y < EDGE && z < EDGE;
     double value = within ? field[(z * EDGE + y) * EDGE + x] : 0;
-    double code = (value - l->header.code_lo) / (l->header.code_hi - l->header.code_lo) * 65535;
-    return (int32_t)fmin(65535, fmax(0, floor(code + 0.5)));
+    return (int32_t)trip_codes_nearest(&l->scale, value);
 }
 
 static void a_sparse_volume_has_background_around_kept_voxels(void **state)

@@ -33,6 +33,8 @@ static const trip_brick_params different[] = {
     { .volume.spacing = { 1, 1, 2 } },
     { .volume.spacing = { 2, 1, 1 } },
     { .volume.axes = "PIR" },
+    { .volume.fill = "none" },
+    { .volume.fill = "-9999" },
     { .volume.max_voxels = 1000 },
     { .functions = functions, .function_count = 1 },
     { .functions = functions + 1, .function_count = 1 },
