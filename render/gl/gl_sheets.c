@@ -56,7 +56,7 @@ int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
     }
     return trip_gl_sheet_tf_set(&s->function, frame->table,
                                 frame->plan->not_closed ? NULL : &frame->plan->closed,
-                                frame->camera->voxel_world);
+                                &frame->plan->draw, frame->camera->voxel_world);
 }
 
 void trip_gl_sheets_release(trip_gl_sheets *s)
@@ -221,13 +221,15 @@ static void begin_sheet(trip_gl_sheets *s, int64_t number)
     trip_gl_sheet_textures_clear(&s->textures, layer, (int)s->size[0], (int)s->size[1]);
 }
 
-/* Widens the code range of the last sheet by the range of the run's brick. */
+/* Widens the range of draw codes of the last sheet by the range of the run's brick. */
 static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_run *run)
 {
     const trip_file_brick *brick = &trip_batch_list(batch, run)->bricks[run->brick];
+    const trip_code_range range =
+        trip_draw_codes_range(&s->frame->plan->draw, brick->code_min, brick->code_max);
     trip_gl_sheet *sheet = &s->held[s->count - 1];
-    sheet->min = brick->code_min < sheet->min ? brick->code_min : sheet->min;
-    sheet->max = brick->code_max > sheet->max ? brick->code_max : sheet->max;
+    sheet->min = range.min < sheet->min ? range.min : sheet->min;
+    sheet->max = range.max > sheet->max ? range.max : sheet->max;
 }
 
 static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
@@ -244,7 +246,11 @@ static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
                       (GLsizeiptr)(slot->bytes - s->batch.codes_offset));
     glBindImageTexture(TRIP_GL_IMAGE, s->textures.codes, 0, GL_FALSE, s->held[s->count - 1].layer,
                        GL_WRITE_ONLY, GL_R32F);
-    glUniform2ui(TRIP_GL_SHEET, first, trip_block_step(&form));
+    const bool maps = s->frame->plan->draw.of_stored != NULL;
+    /* GL needs a buffer even if the shader reads none. */
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_DRAW_CODES,
+                     maps ? s->function.draw_codes : slot->buffer);
+    glUniform3ui(TRIP_GL_SHEET, first, trip_block_step(&form), maps);
     glDispatchCompute(count, 1, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
     status = trip_gl_queue_end_part(s->queue);

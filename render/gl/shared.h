@@ -25,6 +25,7 @@
 /* Reused by `post`, which draws no splats. */
 #define TRIP_GL_SUMS 7
 #define TRIP_GL_POSITIONS 5
+#define TRIP_GL_DRAW_CODES 4
 /* Reused for splats of grids with uneven spacing; indexed lists use the second number. */
 #define TRIP_GL_VOXEL_POSITIONS 7
 #define TRIP_GL_VOXEL_POSITIONS_INDEXED 0

@@ -58,9 +58,9 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
  * index_to_world. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
-    const trip_file_header *h = &frame->data->header;
-    double full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
-    double unit = (h->code_hi - h->code_lo) / 65535 / full;
+    double full = trip_shade_gradient_full(&frame->data->header, frame->camera->voxel_world,
+                                           frame->plan->level);
+    double unit = trip_draw_value_per_code(&frame->plan->draw) / full;
     trip_gl_float4 *columns[3] = { &v->constants.gradient_0, &v->constants.gradient_1,
                                    &v->constants.gradient_2 };
     trip_affine to_index;

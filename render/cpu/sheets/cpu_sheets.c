@@ -73,6 +73,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->run_count = s->taken_count = 0;
     const trip_plan *plan = r->frame->plan;
     const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
+    s->store.drawn = plan->draw.of_stored;
     s->store.codes = trip_cpu_codes_of(plan->code_min, plan->code_max);
     s->store.coordinates = &r->frame->data->coordinates;
     s->sheet_pane = trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects

@@ -211,14 +211,18 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 static const uint16_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
-/* Writes the codes of a square's records, stretched and biased. The local arrays cannot alias, so
- * the compiler vectorises the loops. */
-static void square_codes(const trip_square *at, trip_cpu_codes stretch, int16_t out[64])
+/* Writes the draw codes of a square's records, stretched and biased. The local arrays cannot alias,
+ * so the compiler vectorises the loops. */
+static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t out[64])
 {
     uint16_t codes[64];
     int16_t biased[64];
     const uint32_t count = at->count;
+    const trip_cpu_codes stretch = s->codes;
     trip_square_codes(at, codes);
+    if (s->drawn)
+        for (uint32_t i = 0; i < count; i++)
+            codes[i] = s->drawn[codes[i]];
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
@@ -227,11 +231,11 @@ static void square_codes(const trip_square *at, trip_cpu_codes stretch, int16_t 
     memcpy(out, biased, sizeof *out * count);
 }
 
-static void decode_square(int16_t *to, const trip_square *at, trip_cpu_codes stretch)
+static void decode_square(const trip_cpu_store *s, int16_t *to, const trip_square *at)
 {
     int16_t codes[64];
     const int16_t *next = codes;
-    square_codes(at, stretch, codes);
+    square_codes(s, at, codes);
     if (at->mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
         for (unsigned i = 0; i < 64; i += 2)
             memcpy(to + positions[i], codes + i, 2 * sizeof *codes);
@@ -264,8 +268,8 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         const uint64_t bit = UINT64_C(1) << (v / 8 * TRIP_CPU_SQUARES_ACROSS + u / 8);
         if (!sheet->rasters[at] || !(s->open[at] & bit))
             continue;
-        decode_square(s->voxels[sheet->rasters[at]].codes + v * TRIP_CPU_RASTER_STRIDE + u, square,
-                      s->codes);
+        decode_square(s, s->voxels[sheet->rasters[at]].codes + v * TRIP_CPU_RASTER_STRIDE + u,
+                      square);
         atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
     }
 }

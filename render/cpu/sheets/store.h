@@ -52,7 +52,8 @@ typedef struct trip_cpu_store {
     trip_budget *budget;
     const trip_cpu_kernels *kernels;
     trip_cpu_pool *pool;
-    trip_cpu_codes codes; /* stretch of the frame's codes */
+    const uint16_t *drawn; /* draw code of each stored code; NULL if the two are the same */
+    trip_cpu_codes codes;  /* stretch of the frame's draw codes */
     const trip_coordinates *coordinates;
     int axis; /* axis of the layer's lists */
 

@@ -1,0 +1,163 @@
+#include "draw_codes.h"
+
+#include <math.h>
+
+enum { LAST = TRIP_CODES - 1 };
+
+/* Limit of exact codes. Single precision and its products hold them. */
+#define FARTHEST 1e15
+
+/* ---- the part in which a function changes ---- */
+
+static bool same_colour(const trip_rgba *a, const trip_rgba *b)
+{
+    return a->r == b->r && a->g == b->g && a->b == b->b && a->opacity == b->opacity;
+}
+
+/* Whether the function looks the same at two points: nothing is visible, or the colours are equal.
+ */
+static bool look_alike(const trip_tf_point *a, const trip_tf_point *b)
+{
+    return (a->colour.opacity == 0 && b->colour.opacity == 0) ||
+           same_colour(&a->colour, &b->colour);
+}
+
+typedef struct span {
+    double lo, hi;
+} span;
+
+static double within(span s, double value)
+{
+    return fmin(s.hi, fmax(s.lo, value));
+}
+
+/* Finds the smallest interval outside of which the function is constant. */
+static span changing_part(const trip_tf *tf)
+{
+    size_t count;
+    const trip_tf_point *points = trip_tf_points(tf, &count);
+    size_t first = 0, last = count - 1;
+    while (first < last && look_alike(&points[first], &points[first + 1]))
+        first++;
+    while (last > first && look_alike(&points[last], &points[last - 1]))
+        last--;
+    return (span){ points[first].value, points[last].value };
+}
+
+/* ---- the range of draw codes ---- */
+
+/* Returns the distance between the codes of the data set about a value. */
+static double apart_at(const trip_codes *c, double value)
+{
+    const double code = floor(trip_codes_code(c, value));
+    double apart = 0;
+    for (double reach = 1; !(apart > 0) && reach < TRIP_CODES; reach *= 2)
+        apart = (trip_codes_value(c, code + reach) - trip_codes_value(c, code - reach)) /
+                (fmin(LAST, code + reach) - fmax(0, code - reach));
+    return apart;
+}
+
+/* Returns the range of values that the draw codes cover. */
+static span choose_range(const span data, const span part, double apart)
+{
+    const double width = part.hi - part.lo;
+    const double code = fmax(width / (LAST / TRIP_DRAW_WIDTHS), apart / TRIP_DRAW_CODES_PER_STORED);
+    const double room = LAST * code - width;
+    const double below = part.lo - data.lo, above = data.hi - part.hi;
+    if (!(below + above > room))
+        return data;
+    if (below < room / 2)
+        return (span){ data.lo, part.hi + (room - below) };
+    if (above < room / 2)
+        return (span){ part.lo - (room - above), data.hi };
+    return (span){ part.lo - room / 2, part.hi + room / 2 };
+}
+
+trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored)
+{
+    return (trip_draw_codes){ .lo = stored->lo, .hi = stored->hi, .stored = *stored };
+}
+
+trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
+                                    uint16_t map[TRIP_CODES])
+{
+    trip_draw_codes d = trip_draw_codes_as_stored(stored);
+    const span data = { stored->lo, stored->hi };
+    if (trip_codes_even(stored))
+        return d;
+    span part = changing_part(tf);
+    const bool inside = part.hi >= data.lo && part.lo <= data.hi;
+    part = (span){ within(data, part.lo), within(data, part.hi) };
+    if (inside && data.lo < data.hi) {
+        const span range =
+            choose_range(data, part, fmin(apart_at(stored, part.lo), apart_at(stored, part.hi)));
+        d.lo = range.lo;
+        d.hi = range.hi;
+    }
+    d.of_stored = map;
+    for (unsigned code = 0; code < TRIP_CODES; code++)
+        map[code] = (uint16_t)(fmin(LAST, fmax(0, trip_draw_code_exact(&d, code))) + 0.5);
+    return d;
+}
+
+double trip_draw_code_exact(const trip_draw_codes *d, unsigned stored)
+{
+    if (!d->of_stored)
+        return stored;
+    if (!(d->hi > d->lo))
+        return 0;
+    const double code = LAST * ((trip_codes_value(&d->stored, stored) - d->lo) / (d->hi - d->lo));
+    return fmin(FARTHEST, fmax(-FARTHEST, code));
+}
+
+/* ---- tables ---- */
+
+void trip_draw_codes_stored_table(const trip_draw_codes *d, const trip_tf *tf, double voxel_world,
+                                  trip_tf_entry table[TRIP_CODES])
+{
+    if (trip_codes_even(&d->stored)) {
+        trip_tf_fill_table(tf, d->stored.lo, d->stored.hi, voxel_world, table);
+        return;
+    }
+    for (unsigned code = 0; code < TRIP_CODES; code++)
+        table[code] = trip_tf_entry_at(tf, trip_codes_value(&d->stored, code), voxel_world);
+}
+
+void trip_draw_codes_table(const trip_draw_codes *d, const trip_tf *tf, double voxel_world,
+                           trip_tf_entry table[TRIP_CODES])
+{
+    if (d->of_stored)
+        trip_tf_fill_table(tf, d->lo, d->hi, voxel_world, table);
+    else
+        trip_draw_codes_stored_table(d, tf, voxel_world, table);
+}
+
+/* ---- what is lost ---- */
+
+/* Changes below 1/8 in opacity or in visible colour are not reported. */
+static bool differ_much(const trip_rgba *a, const trip_rgba *b)
+{
+    const double much = 0.125, opacity = fmax(a->opacity, b->opacity);
+    return fabs(a->opacity - b->opacity) > much * opacity ||
+           (opacity > 0 &&
+            fmax(fabs(a->r - b->r), fmax(fabs(a->g - b->g), fabs(a->b - b->b))) > much);
+}
+
+bool trip_draw_codes_loss(const trip_draw_codes *d, const trip_tf *tf, trip_draw_loss *out)
+{
+    enum { FEW = 16, TIMES = 4 };
+    size_t count;
+    const trip_tf_point *points = trip_tf_points(tf, &count);
+    const span data = { d->stored.lo, d->stored.hi }, part = changing_part(tf);
+    for (size_t i = 1; i < count && d->of_stored; i++) {
+        const span s = { within(data, points[i - 1].value), within(data, points[i].value) };
+        const double drawn = (s.hi - s.lo) / trip_draw_value_per_code(d);
+        const double stored = trip_codes_code(&d->stored, s.hi) - trip_codes_code(&d->stored, s.lo);
+        if (drawn < FEW && stored >= TIMES * FEW && stored >= TIMES * drawn &&
+            differ_much(&points[i - 1].colour, &points[i].colour)) {
+            *out = (trip_draw_loss){ s.lo, s.hi, drawn, part.lo, part.hi };
+            return true;
+        }
+    }
+    return false;
+}

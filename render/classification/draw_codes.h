@@ -1,0 +1,82 @@
+/* The codes that a frame interpolates. Interpolation needs even codes: the mean of two codes must
+ * stand for the mean of their values. If the codes of a data set are even, draw codes are the
+ * stored codes. Otherwise a map converts each stored code to a draw code. The draw codes then cover
+ * the values between which the transfer function changes, and a margin around them.
+ *
+ * Beyond the range of draw codes the function is constant, and values there count as the nearest
+ * end. This moves a surface in a cell only if the cell's values leave the range: by at most 1/128
+ * of the cell if one of its ends lies where the function changes. Any range of at most
+ * TRIP_DRAW_WIDTHS widths of the function is covered as a whole.
+ *
+ * Plain values and pure functions. */
+#ifndef TRIP_DRAW_CODES_H
+#define TRIP_DRAW_CODES_H
+
+#include "code_set.h"
+#include "codes.h"
+#include "transfer_function.h"
+
+/* A range of draw codes holds at most so many widths of the part in which the function changes. The
+ * part then has at least 65535 / 256 = 256 codes. */
+#define TRIP_DRAW_WIDTHS 256.0
+
+/* Number of draw codes between two stored codes where the function changes, if the width of the
+ * part asks for more. Finer draw codes would resolve values that the data set does not hold. */
+#define TRIP_DRAW_CODES_PER_STORED 8.0
+
+typedef struct trip_draw_codes {
+    double lo, hi; /* values of draw codes 0 and 65535 */
+    /* The draw code of each of 65536 stored codes. NULL means that draw codes are stored codes. */
+    const uint16_t *of_stored;
+    trip_codes stored; /* the codes of the data set */
+} trip_draw_codes;
+
+/* Returns draw codes that are the stored codes: for even codes, and for frames that do not
+ * interpolate. */
+trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored);
+/* Chooses the range for a function in data units and fills `map`, which must outlive the result. If
+ * the codes are even, returns trip_draw_codes_as_stored() and leaves `map` alone. */
+trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
+                                    uint16_t map[TRIP_CODES]);
+
+static inline unsigned trip_draw_code(const trip_draw_codes *d, unsigned stored)
+{
+    return d->of_stored ? d->of_stored[stored] : stored;
+}
+
+/* Returns the draw codes of the stored codes from `min` to `max`. */
+static inline trip_code_range trip_draw_codes_range(const trip_draw_codes *d, unsigned min,
+                                                    unsigned max)
+{
+    return (trip_code_range){ (uint16_t)trip_draw_code(d, min), (uint16_t)trip_draw_code(d, max) };
+}
+
+/* Returns the code of a stored code before rounding and clamping. It may lie far outside of [0,
+ * 65535]. */
+double trip_draw_code_exact(const trip_draw_codes *d, unsigned stored);
+
+static inline double trip_draw_value_per_code(const trip_draw_codes *d)
+{
+    return (d->hi - d->lo) / (TRIP_CODES - 1);
+}
+
+/* Fills the table of a function: entry c belongs to the value of stored code c, or of draw code c.
+ * `voxel_world` is the length of one voxel. The two tables are equal if draw codes are stored
+ * codes. */
+void trip_draw_codes_stored_table(const trip_draw_codes *d, const trip_tf *tf, double voxel_world,
+                                  trip_tf_entry table[TRIP_CODES]);
+void trip_draw_codes_table(const trip_draw_codes *d, const trip_tf *tf, double voxel_world,
+                           trip_tf_entry table[TRIP_CODES]);
+
+/* A part of a function that draw codes are too coarse for. */
+typedef struct trip_draw_loss {
+    double lo, hi;      /* the values between which the function changes */
+    double codes;       /* number of draw codes between them */
+    double first, last; /* the values between which the whole function changes */
+} trip_draw_loss;
+
+/* Finds a part between two neighbouring points with a visible change, fewer than 16 draw codes, and
+ * at least 4 times as many stored codes. Returns false if there is none. */
+bool trip_draw_codes_loss(const trip_draw_codes *d, const trip_tf *tf, trip_draw_loss *out);
+
+#endif
