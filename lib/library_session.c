@@ -9,7 +9,7 @@
 #include "report.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
-static const size_t map_bytes = TRIP_CODES * sizeof(uint16_t);
+static const size_t maps_bytes = sizeof(trip_draw_maps);
 
 enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MAX };
 
@@ -95,9 +95,9 @@ static void release_tables(session *s)
 {
     trip_budget_release(s->budget, s->table, table_bytes);
     trip_budget_release(s->budget, s->draw_table, table_bytes);
-    trip_budget_release(s->budget, s->draw_map, map_bytes);
+    trip_budget_release(s->budget, s->draw_maps, maps_bytes);
     s->table = s->draw_table = NULL;
-    s->draw_map = NULL;
+    s->draw_maps = NULL;
 }
 
 static int take_tables(session *s)
@@ -107,8 +107,8 @@ static int take_tables(session *s)
     if (!even)
         s->draw_table = trip_budget_take(s->budget, table_bytes);
     if (!even)
-        s->draw_map = trip_budget_take(s->budget, map_bytes);
-    if (s->table && (even || (s->draw_table && s->draw_map)))
+        s->draw_maps = trip_budget_take(s->budget, maps_bytes);
+    if (s->table && (even || (s->draw_table && s->draw_maps)))
         return 0;
     release_tables(s);
     return trip_fail(TRIP_ERROR, "render", s->input,
@@ -145,7 +145,8 @@ void session_keep_tables(session *s)
 static void fill_tables(session *s, const trip_tf *tf, double opacity_scale)
 {
     const double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
-    s->draw = trip_draw_codes_for(tf, &s->data->codes, s->draw_map);
+    const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
+    s->draw = trip_draw_codes_for(tf, &s->data->codes, typical, s->draw_maps);
     trip_draw_codes_stored_table(&s->draw, tf, voxel_world, s->table);
     scale_extinction(s->table, opacity_scale);
     if (!s->draw_table)

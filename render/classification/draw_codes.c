@@ -31,8 +31,14 @@ static double within(span s, double value)
     return fmin(s.hi, fmax(s.lo, value));
 }
 
-/* Finds the smallest interval outside of which the function is constant. */
-static span changing_part(const trip_tf *tf)
+/* The smallest interval outside of which the function is constant, and the distance between the
+ * nearest two of its points there that do not coincide. */
+typedef struct part {
+    span of;
+    double nearest;
+} part;
+
+static part changing_part(const trip_tf *tf)
 {
     size_t count;
     const trip_tf_point *points = trip_tf_points(tf, &count);
@@ -41,7 +47,13 @@ static span changing_part(const trip_tf *tf)
         first++;
     while (last > first && look_alike(&points[last], &points[last - 1]))
         last--;
-    return (span){ points[first].value, points[last].value };
+    part p = { { points[first].value, points[last].value }, 0 };
+    for (size_t i = first + 1; i <= last; i++) {
+        const double apart = points[i].value - points[i - 1].value;
+        if (apart > 0 && (p.nearest == 0 || apart < p.nearest))
+            p.nearest = apart;
+    }
+    return p;
 }
 
 /* ---- the range of draw codes ---- */
@@ -58,19 +70,45 @@ static double apart_at(const trip_codes *c, double value)
 }
 
 /* Returns the range of values that the draw codes cover. */
-static span choose_range(const span data, const span part, double apart)
+static span choose_range(span data, span of, double nearest, double apart)
 {
-    const double width = part.hi - part.lo;
-    const double code = fmax(width / (LAST / TRIP_DRAW_WIDTHS), apart / TRIP_DRAW_CODES_PER_STORED);
-    const double room = LAST * code - width;
-    const double below = part.lo - data.lo, above = data.hi - part.hi;
+    const double width = of.hi - of.lo;
+    const double finest = width / TRIP_DRAW_PART_MAX, coarsest = width / TRIP_DRAW_PART_MIN;
+    const double wanted = fmin(coarsest, fmax(finest, nearest / TRIP_DRAW_PART_MIN));
+    const double room = LAST * fmax(wanted, apart / TRIP_DRAW_CODES_PER_STORED) - width;
+    const double below = of.lo - data.lo, above = data.hi - of.hi;
     if (!(below + above > room))
         return data;
     if (below < room / 2)
-        return (span){ data.lo, part.hi + (room - below) };
+        return (span){ data.lo, of.hi + (room - below) };
     if (above < room / 2)
-        return (span){ part.lo - (room - above), data.hi };
-    return (span){ part.lo - room / 2, part.hi + room / 2 };
+        return (span){ of.lo - (room - above), data.hi };
+    return (span){ of.lo - room / 2, of.hi + room / 2 };
+}
+
+static void fill_map(const trip_draw_codes *d, uint16_t map[TRIP_CODES])
+{
+    for (unsigned code = 0; code < TRIP_CODES; code++)
+        map[code] = (uint16_t)(fmin(LAST, fmax(0, trip_draw_code_exact(d, code))) + 0.5);
+}
+
+/* Fills the map of slope codes, unless draw codes cover the same range. */
+static void set_slopes(trip_draw_codes *d, span data, const double typical[2],
+                       uint16_t map[TRIP_CODES])
+{
+    const double width = typical[1] - typical[0];
+    if (!(width > 0))
+        return;
+    d->slope_lo = within(data, typical[0] - width);
+    d->slope_hi = within(data, typical[1] + width);
+    const bool fine = d->hi - d->lo <= TRIP_DRAW_SLOPES * (d->slope_hi - d->slope_lo);
+    if (d->lo <= d->slope_lo && d->hi >= d->slope_hi && fine)
+        return;
+    const trip_draw_codes slopes = {
+        .lo = d->slope_lo, .hi = d->slope_hi, .of_stored = map, .stored = d->stored
+    };
+    fill_map(&slopes, map);
+    d->slope_of_stored = map;
 }
 
 trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored)
@@ -79,24 +117,24 @@ trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored)
 }
 
 trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
-                                    uint16_t map[TRIP_CODES])
+                                    const double typical[2], trip_draw_maps *maps)
 {
     trip_draw_codes d = trip_draw_codes_as_stored(stored);
     const span data = { stored->lo, stored->hi };
     if (trip_codes_even(stored))
         return d;
-    span part = changing_part(tf);
-    const bool inside = part.hi >= data.lo && part.lo <= data.hi;
-    part = (span){ within(data, part.lo), within(data, part.hi) };
+    part p = changing_part(tf);
+    const bool inside = p.of.hi >= data.lo && p.of.lo <= data.hi;
+    p.of = (span){ within(data, p.of.lo), within(data, p.of.hi) };
     if (inside && data.lo < data.hi) {
-        const span range =
-            choose_range(data, part, fmin(apart_at(stored, part.lo), apart_at(stored, part.hi)));
+        const double apart = fmin(apart_at(stored, p.of.lo), apart_at(stored, p.of.hi));
+        const span range = choose_range(data, p.of, p.nearest, apart);
         d.lo = range.lo;
         d.hi = range.hi;
     }
-    d.of_stored = map;
-    for (unsigned code = 0; code < TRIP_CODES; code++)
-        map[code] = (uint16_t)(fmin(LAST, fmax(0, trip_draw_code_exact(&d, code))) + 0.5);
+    d.of_stored = maps->draw;
+    fill_map(&d, maps->draw);
+    set_slopes(&d, data, typical, maps->slope);
     return d;
 }
 
@@ -148,14 +186,15 @@ bool trip_draw_codes_loss(const trip_draw_codes *d, const trip_tf *tf, trip_draw
     enum { FEW = 16, TIMES = 4 };
     size_t count;
     const trip_tf_point *points = trip_tf_points(tf, &count);
-    const span data = { d->stored.lo, d->stored.hi }, part = changing_part(tf);
+    const span data = { d->stored.lo, d->stored.hi };
+    const part p = changing_part(tf);
     for (size_t i = 1; i < count && d->of_stored; i++) {
         const span s = { within(data, points[i - 1].value), within(data, points[i].value) };
         const double drawn = (s.hi - s.lo) / trip_draw_value_per_code(d);
         const double stored = trip_codes_code(&d->stored, s.hi) - trip_codes_code(&d->stored, s.lo);
         if (drawn < FEW && stored >= TIMES * FEW && stored >= TIMES * drawn &&
             differ_much(&points[i - 1].colour, &points[i].colour)) {
-            *out = (trip_draw_loss){ s.lo, s.hi, drawn, part.lo, part.hi };
+            *out = (trip_draw_loss){ s.lo, s.hi, drawn, p.of.lo, p.of.hi };
             return true;
         }
     }

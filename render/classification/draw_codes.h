@@ -3,10 +3,10 @@
  * stored codes. Otherwise a map converts each stored code to a draw code. The draw codes then cover
  * the values between which the transfer function changes, and a margin around them.
  *
- * Beyond the range of draw codes the function is constant, and values there count as the nearest
- * end. This moves a surface in a cell only if the cell's values leave the range: by at most 1/128
- * of the cell if one of its ends lies where the function changes. Any range of at most
- * TRIP_DRAW_WIDTHS widths of the function is covered as a whole.
+ * Beyond the range of draw codes the function is constant. Renderers with 16-bit codes count values
+ * there as the nearest end. This moves a surface in a cell whose values leave the range. If the
+ * values of a whole cell lie on both sides outside, the surface lies in its middle. The reference,
+ * the integral and gl have exact codes beyond the range instead.
  *
  * Plain values and pure functions. */
 #ifndef TRIP_DRAW_CODES_H
@@ -16,9 +16,15 @@
 #include "codes.h"
 #include "transfer_function.h"
 
-/* A range of draw codes holds at most so many widths of the part in which the function changes. The
- * part then has at least 65535 / 256 = 256 codes. */
-#define TRIP_DRAW_WIDTHS 256.0
+/* The number of draw codes between the two nearest points of the function, and the maximum number
+ * in the whole part in which it changes. The fewer codes the part has, the more widths of it lie
+ * within the range. Coarser codes suffice if the data set has no value outside of the range. */
+#define TRIP_DRAW_PART_MIN 64.0
+#define TRIP_DRAW_PART_MAX 1024.0
+
+/* How many times wider than the range of slope codes the range of draw codes may be and replace it.
+ */
+#define TRIP_DRAW_SLOPES 16.0
 
 /* Number of draw codes between two stored codes where the function changes, if the width of the
  * part asks for more. Finer draw codes would resolve values that the data set does not hold. */
@@ -28,16 +34,28 @@ typedef struct trip_draw_codes {
     double lo, hi; /* values of draw codes 0 and 65535 */
     /* The draw code of each of 65536 stored codes. NULL means that draw codes are stored codes. */
     const uint16_t *of_stored;
+    /* Even codes whose differences are gradients, for renderers that interpolate 16-bit codes:
+     * slope codes 0 and 65535 stand for these values. They cover the typical values and as much
+     * again on either side, while draw codes may cover few values. NULL if draw codes cover this
+     * range. */
+    double slope_lo, slope_hi;
+    const uint16_t *slope_of_stored;
     trip_codes stored; /* the codes of the data set */
 } trip_draw_codes;
 
 /* Returns draw codes that are the stored codes: for even codes, and for frames that do not
  * interpolate. */
 trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored);
-/* Chooses the range for a function in data units and fills `map`, which must outlive the result. If
- * the codes are even, returns trip_draw_codes_as_stored() and leaves `map` alone. */
+/* The maps of draw codes and slope codes. */
+typedef struct trip_draw_maps {
+    uint16_t draw[TRIP_CODES], slope[TRIP_CODES];
+} trip_draw_maps;
+
+/* Chooses the ranges for a function in data units and fills `maps`, which must outlive the result.
+ * If the codes are even, returns trip_draw_codes_as_stored() and leaves `maps` alone. `typical` has
+ * the typical range of the data set (format.h). */
 trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
-                                    uint16_t map[TRIP_CODES]);
+                                    const double typical[2], trip_draw_maps *maps);
 
 static inline unsigned trip_draw_code(const trip_draw_codes *d, unsigned stored)
 {

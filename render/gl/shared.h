@@ -51,6 +51,10 @@
 #define TRIP_GL_SHEET 0
 #define TRIP_GL_SHEET_SIZE 1
 #define TRIP_GL_SHEET_APART 2
+#define TRIP_GL_SHEET_SCALE 3
+/* Codes of missing voxels in a sheet, for whole codes and for exact draw codes. */
+#define TRIP_GL_MISSING_WHOLE -1.0
+#define TRIP_GL_MISSING_EXACT -3e38
 /* Directions of rays, as in trip_way. */
 #define TRIP_GL_WAY_ANY 0
 #define TRIP_GL_WAY_UP 1

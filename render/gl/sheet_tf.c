@@ -9,7 +9,7 @@
 enum {
     CODES = 65536,
     SUMS_BYTES = CODES * sizeof(struct trip_gl_sum),
-    DRAW_CODES_BYTES = CODES * sizeof(uint16_t)
+    DRAW_CODES_BYTES = CODES * sizeof(float)
 };
 
 /* Approximate maximum of the sums. Sums are integers, so their differences are exact. */
@@ -143,7 +143,13 @@ static int set_draw_codes(trip_gl_sheet_tf *f, const trip_draw_codes *draw)
         glCreateBuffers(1, &f->draw_codes);
         glNamedBufferStorage(f->draw_codes, DRAW_CODES_BYTES, NULL, GL_DYNAMIC_STORAGE_BIT);
     }
-    glNamedBufferSubData(f->draw_codes, 0, DRAW_CODES_BYTES, draw->of_stored);
+    float *codes = trip_budget_take(f->budget, DRAW_CODES_BYTES);
+    if (!codes)
+        return no_memory();
+    for (unsigned code = 0; code < CODES; code++)
+        codes[code] = (float)trip_draw_code_exact(draw, code);
+    glNamedBufferSubData(f->draw_codes, 0, DRAW_CODES_BYTES, codes);
+    trip_budget_release(f->budget, codes, DRAW_CODES_BYTES);
     return TRIP_OK;
 }
 

@@ -26,7 +26,9 @@ static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, tri
 {
     const trip_draw_codes *draw = &frame->plan->draw;
     double full = trip_shade_gradient_full(&frame->data->header, 1, frame->plan->level);
-    double unit = ldexp(0.5 * (draw->hi - draw->lo) / 65535 / full, -(int)codes.shift) /
+    const bool sloped = draw->slope_of_stored != NULL;
+    const double range = sloped ? draw->slope_hi - draw->slope_lo : draw->hi - draw->lo;
+    double unit = ldexp(0.5 * range / 65535 / full, sloped ? 0 : -(int)codes.shift) /
                   trip_cpu_gradient_unit(&frame->data->coordinates);
     const double(*m)[3] = (const double(*)[3])view->world;
     double adjugate[3][3];
