@@ -69,21 +69,43 @@ static double apart_at(const trip_codes *c, double value)
     return apart;
 }
 
-/* Returns the range of values that the draw codes cover. */
-static span choose_range(span data, span of, double nearest, double apart)
+static double width_of(span s)
 {
-    const double width = of.hi - of.lo;
-    const double finest = width / TRIP_DRAW_PART_MAX, coarsest = width / TRIP_DRAW_PART_MIN;
-    const double wanted = fmin(coarsest, fmax(finest, nearest / TRIP_DRAW_PART_MIN));
-    const double room = LAST * fmax(wanted, apart / TRIP_DRAW_CODES_PER_STORED) - width;
-    const double below = of.lo - data.lo, above = data.hi - of.hi;
+    return s.hi - s.lo;
+}
+
+/* Widens a range by `room` on both sides together, and by as much as possible within `limits`. */
+static span widened(span s, double room, span limits)
+{
+    const double below = s.lo - limits.lo, above = limits.hi - s.hi;
     if (!(below + above > room))
-        return data;
+        return limits;
     if (below < room / 2)
-        return (span){ data.lo, of.hi + (room - below) };
+        return (span){ limits.lo, s.hi + (room - below) };
     if (above < room / 2)
-        return (span){ of.lo - (room - above), data.hi };
-    return (span){ of.lo - room / 2, of.hi + room / 2 };
+        return (span){ s.lo - (room - above), limits.hi };
+    return (span){ s.lo - room / 2, s.hi + room / 2 };
+}
+
+static span hull(span a, span b)
+{
+    return (span){ fmin(a.lo, b.lo), fmax(a.hi, b.hi) };
+}
+
+/* Returns the range of values that the draw codes cover. `typical` lies within `data`. */
+static span choose_range(span data, span typical, span changing, double nearest, double apart)
+{
+    const double width = width_of(changing);
+    const double finest = width / TRIP_DRAW_PART_MAX, coarsest = width / TRIP_DRAW_PART_MIN;
+    const double code = fmax(fmin(coarsest, fmax(finest, nearest / TRIP_DRAW_PART_MIN)),
+                             apart / TRIP_DRAW_CODES_PER_STORED);
+    const span most = hull(typical, changing);
+    const double room = LAST * code - width_of(most);
+    if (width_of(data) <= LAST * code)
+        return data;
+    if (room >= 0)
+        return widened(most, fmin(room, 2 * width_of(most)), data);
+    return widened(changing, LAST * code * TRIP_DRAW_COARSER - width, most);
 }
 
 static void fill_map(const trip_draw_codes *d, uint16_t map[TRIP_CODES])
@@ -128,7 +150,9 @@ trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
     p.of = (span){ within(data, p.of.lo), within(data, p.of.hi) };
     if (inside && data.lo < data.hi) {
         const double apart = fmin(apart_at(stored, p.of.lo), apart_at(stored, p.of.hi));
-        const span range = choose_range(data, p.of, p.nearest, apart);
+        const bool known = typical[1] > typical[0];
+        const span most = { within(data, typical[0]), within(data, typical[1]) };
+        const span range = choose_range(data, known ? most : data, p.of, p.nearest, apart);
         d.lo = range.lo;
         d.hi = range.hi;
     }

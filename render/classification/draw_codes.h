@@ -22,6 +22,9 @@
 #define TRIP_DRAW_PART_MIN 64.0
 #define TRIP_DRAW_PART_MAX 1024.0
 
+/* How many times coarser draw codes are if the range would lack a part of the typical values. */
+#define TRIP_DRAW_COARSER 2.0
+
 /* How many times wider than the range of slope codes the range of draw codes may be and replace it.
  */
 #define TRIP_DRAW_SLOPES 16.0
