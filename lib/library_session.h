@@ -50,7 +50,7 @@ int session_read_text(session *s);
 /* Sets the transfer function for later frames. Reads the texts and allocates the table if needed.
  * Warns about visible values that bricking dropped, with the command that bricks again. */
 int session_use_function(session *s, const session_look *look);
-/* Returns the table of frames that interpolate values, or of those that draw voxels as stored. */
+/* Returns the table of frames that interpolate values, or of frames that draw stored voxels. */
 const trip_tf_entry *session_table(const session *s, bool interpolates);
 /* Called between frames. Keeps the tables of coarse levels only if they are a small part of the
  * memory left. */

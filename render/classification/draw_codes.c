@@ -194,7 +194,7 @@ void trip_draw_codes_table(const trip_draw_codes *d, const trip_tf *tf, double v
         trip_draw_codes_stored_table(d, tf, voxel_world, table);
 }
 
-/* ---- what is lost ---- */
+/* ---- losses ---- */
 
 /* Changes below 1/8 in opacity or in visible colour are not reported. */
 static bool differ_much(const trip_rgba *a, const trip_rgba *b)

@@ -3,10 +3,11 @@
  * stored codes. Otherwise a map converts each stored code to a draw code. The draw codes then cover
  * the values between which the transfer function changes, and a margin around them.
  *
- * Beyond the range of draw codes the function is constant. Renderers with 16-bit codes count values
- * there as the nearest end. This moves a surface in a cell whose values leave the range. If the
- * values of a whole cell lie on both sides outside, the surface lies in its middle. The reference,
- * the integral and gl have exact codes beyond the range instead.
+ * Beyond the range of draw codes the function is constant. The CPU renderer has codes of 16 bits,
+ * so it counts values there as the nearest end. A surface moves only in cells that have values
+ * beyond the range. If a cell has values beyond both ends, its surface lies in the middle. The
+ * range therefore covers all typical values, unless the function changes within a small part of
+ * them. The reference, the integral and gl use exact codes beyond the range.
  *
  * Plain values and pure functions. */
 #ifndef TRIP_DRAW_CODES_H
@@ -37,10 +38,10 @@ typedef struct trip_draw_codes {
     double lo, hi; /* values of draw codes 0 and 65535 */
     /* The draw code of each of 65536 stored codes. NULL means that draw codes are stored codes. */
     const uint16_t *of_stored;
-    /* Even codes whose differences are gradients, for renderers that interpolate 16-bit codes:
-     * slope codes 0 and 65535 stand for these values. They cover the typical values and as much
-     * again on either side, while draw codes may cover few values. NULL if draw codes cover this
-     * range. */
+    /* Slope codes are even. The gradients of the CPU renderer are differences of slope codes. Slope
+     * codes 0 and 65535 stand for the values slope_lo and slope_hi. They cover the typical values
+     * and as much again on either side, while draw codes may cover few values. The map is NULL if
+     * draw codes cover this range too. */
     double slope_lo, slope_hi;
     const uint16_t *slope_of_stored;
     trip_codes stored; /* the codes of the data set */

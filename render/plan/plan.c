@@ -616,6 +616,14 @@ static void explain_kernel(const trip_dataset *data, const trip_settings *s, FIL
                 : "");
 }
 
+static void explain_codes(const trip_plan *plan, FILE *out)
+{
+    const trip_draw_codes *d = &plan->draw;
+    if (d->of_stored)
+        fprintf(out, "codes       uneven, drawn as even codes of the values from %.9g to %.9g\n",
+                d->lo, d->hi);
+}
+
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     if (plan->gathers) {
@@ -633,6 +641,7 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
             out,
             "classify    post: values are interpolated at %d sample%s per sheet, then classified\n",
             s->samples_per_sheet, s->samples_per_sheet == 1 ? "" : "s");
+    explain_codes(plan, out);
     if (trip_settings_sum_sheets(s))
         fprintf(
             out,

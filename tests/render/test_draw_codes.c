@@ -1,10 +1,11 @@
-/* Draws fields whose values spread over decades, with uneven codes. The truth is the picture of the
- * values themselves: the integral of a field of them, or a data set with a table that holds every
- * value. A window over any 1 % of the sorted values must give the same picture. */
+/* Draws fields with uneven codes and values that spread over decades. The truth is the picture of
+ * the values themselves: the integral of a field of them, or a data set with a table that holds
+ * every value. A window over any 1 % of the sorted values must give the same picture. */
 #include "test.h"
 
 #include "cpu/kernels/isa.h"
 #include "cpu_scenes.h"
+#include "dataset_level.h"
 #include "ray_probe.h"
 
 #include <stdlib.h>
@@ -152,6 +153,13 @@ static void write_tiled(scene *s, const values *v, const trip_codes *codes, unsi
                                   .voxel = voxel,
                                   .user = &w,
                                   .tile_voxels = tile_voxels });
+}
+
+static bool lone_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)gradient;
+    *code = 0;
+    return i + j + k == 0;
 }
 
 static void write_scene(scene *s, const values *v, const trip_codes *codes)
@@ -406,6 +414,56 @@ static void a_field_of_values_is_converted_when_it_is_drawn(void **state)
     }
     trip_field_destroy(field);
     end_drawn(&uneven);
+    free(v);
+}
+
+/* ---- coarse levels ---- */
+
+/* Writes the same values as the coarse level of a grid of twice the size along each axis. */
+static void write_coarse(scene *fine, const values *v, const trip_codes *codes)
+{
+    writing w = { v, codes };
+    const scene_part part = {
+        .level = 1, .kind = TRIP_KIND_VALUES, .by = { 2, 2, 2 }, .voxel = voxel, .user = &w
+    };
+    scene_create(fine, &(scene_params){ .dims = { 2 * EDGE, 2 * EDGE, 2 * EDGE },
+                                        .codes = codes,
+                                        .voxel = lone_voxel,
+                                        .tile_voxels = 16,
+                                        .parts = &part,
+                                        .part_count = 1 });
+}
+
+static void coarse_levels_show_the_values(void **state)
+{
+    (void)state;
+    static scene_function f[2];
+    const trip_settings settings = scene_post(2);
+    values *v = make_values(exponential);
+    const trip_codes *codes[2] = { &v->exact, &v->uneven };
+    scene fine[2], coarse[2];
+    trip_tf_point points[2];
+    window_at(v, 0.25, points);
+    for (int n = 0; n < 2; n++) {
+        write_coarse(&fine[n], v, codes[n]);
+        coarse[n] = fine[n];
+        assert_int_equal(trip_dataset_level_open(&coarse[n].data, fine[n].data, 1), 0);
+        coarse[n].level = 1;
+        scene_use_function(&coarse[n], &f[n], points, 2);
+    }
+    trip_camera_params view = scene_view(&fine[0], trip_v3(1, 0.4, 0.7), 180, 30, 48);
+    scene_picture truth = scene_draw(&coarse[0], scene_renderers(), &view, &settings);
+    assert_true(scene_max_opaque(&truth) > 0.2);
+    for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
+        scene_picture p = scene_draw(&coarse[1], r, &view, &settings);
+        assert_true(mean_difference(&p, &truth) < 0.25);
+        scene_picture_free(&p);
+    }
+    scene_picture_free(&truth);
+    for (int n = 0; n < 2; n++) {
+        trip_dataset_level_close(coarse[n].data);
+        scene_destroy(&fine[n]);
+    }
     free(v);
 }
 
@@ -675,6 +733,7 @@ int main(void)
         cmocka_unit_test(exact_values_equal_a_clipped_data_set_with_even_codes),
         cmocka_unit_test(the_integral_shows_the_values),
         cmocka_unit_test(a_field_of_values_is_converted_when_it_is_drawn),
+        cmocka_unit_test(coarse_levels_show_the_values),
         cmocka_unit_test(a_hot_voxel_changes_only_the_pixels_of_its_cells),
         cmocka_unit_test(threads_tiles_and_kernels_of_the_cpu_draw_the_same),
         cmocka_unit_test(the_probe_interpolates_values),
