@@ -69,6 +69,14 @@ static double apart_at(const trip_codes *c, double value)
     return apart;
 }
 
+/* Returns the distance between the codes of the data set in a part of its values. */
+static double apart_in(const trip_codes *c, span of)
+{
+    const double codes = trip_codes_code(c, of.hi) - trip_codes_code(c, of.lo);
+    const double apart = fmin(apart_at(c, of.lo), apart_at(c, of.hi));
+    return codes > 0 ? fmin(apart, (of.hi - of.lo) / codes) : apart;
+}
+
 static double width_of(span s)
 {
     return s.hi - s.lo;
@@ -97,8 +105,7 @@ static span choose_range(span data, span typical, span changing, double nearest,
 {
     const double width = width_of(changing);
     const double finest = width / TRIP_DRAW_PART_MAX, coarsest = width / TRIP_DRAW_PART_MIN;
-    const double code = fmax(fmin(coarsest, fmax(finest, nearest / TRIP_DRAW_PART_MIN)),
-                             apart / TRIP_DRAW_CODES_PER_STORED);
+    const double code = fmax(fmin(coarsest, fmax(finest, nearest / TRIP_DRAW_PART_MIN)), apart);
     const span most = hull(typical, changing);
     const double room = LAST * code - width_of(most);
     if (width_of(data) <= LAST * code)
@@ -149,7 +156,7 @@ trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
     const bool inside = p.of.hi >= data.lo && p.of.lo <= data.hi;
     p.of = (span){ within(data, p.of.lo), within(data, p.of.hi) };
     if (inside && data.lo < data.hi) {
-        const double apart = fmin(apart_at(stored, p.of.lo), apart_at(stored, p.of.hi));
+        const double apart = apart_in(stored, p.of);
         const bool known = typical[1] > typical[0];
         const span most = { within(data, typical[0]), within(data, typical[1]) };
         const span range = choose_range(data, known ? most : data, p.of, p.nearest, apart);

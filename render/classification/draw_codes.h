@@ -19,7 +19,7 @@
 
 /* The number of draw codes between the two nearest points of the function, and the maximum number
  * in the whole part in which it changes. The fewer codes the part has, the more widths of it lie
- * within the range. Coarser codes suffice if the data set has no value outside of the range. */
+ * within the range. Draw codes are never finer than the stored codes of the part. */
 #define TRIP_DRAW_PART_MIN 64.0
 #define TRIP_DRAW_PART_MAX 1024.0
 
@@ -29,10 +29,6 @@
 /* How many times wider than the range of slope codes the range of draw codes may be and replace it.
  */
 #define TRIP_DRAW_SLOPES 16.0
-
-/* Number of draw codes between two stored codes where the function changes, if the width of the
- * part asks for more. Finer draw codes would resolve values that the data set does not hold. */
-#define TRIP_DRAW_CODES_PER_STORED 8.0
 
 typedef struct trip_draw_codes {
     double lo, hi; /* values of draw codes 0 and 65535 */

@@ -606,12 +606,12 @@ static void the_range_of_draw_codes_holds_the_function_and_a_wide_margin(void **
     assert_close((0.51 - 0.5) / trip_draw_value_per_code(&d), 64, 0.1);
     assert_true(d.slope_hi == 18);
 
-    /* Three points have more codes. */
+    /* Three points have more codes, but not more than stored codes, 1 / 32768 apart. */
     const trip_tf_point tent[3] = { { 0.5, { 0, 0, 0, 0 } },
                                     { 0.501, { 1, 1, 1, 1 } },
                                     { 0.51, { 0, 0, 0, 0 } } };
     d = codes_for(&stored, tent, 3, &maps);
-    assert_close(0.001 / trip_draw_value_per_code(&d), 32, 0.1);
+    assert_close(0.001 / trip_draw_value_per_code(&d), 0.001 * 32768 / 2, 0.1);
 
     /* Equal ends of the function do not count. */
     const trip_tf_point flat[4] = { { -1e6, { 1, 0, 0, 0 } },
@@ -629,7 +629,14 @@ static void the_range_of_draw_codes_holds_the_function_and_a_wide_margin(void **
     /* A step takes the distance of the stored codes, 1 / 32768. */
     const trip_tf_point step[2] = { { 0.5, { 0, 0, 0, 0 } }, { 0.5, { 1, 1, 1, 1 } } };
     d = codes_for(&stored, step, 2, &maps);
-    assert_close(trip_draw_value_per_code(&d), 1.0 / 32768 / 4, 1e-9);
+    assert_close(trip_draw_value_per_code(&d), 2.0 / 32768, 1e-9);
+
+    /* A part of few stored codes has as many draw codes. */
+    const double apart = (1000 - 1) / 32768.0;
+    const trip_tf_point sparse[2] = { { 500, { 0, 0, 0, 0 } },
+                                      { 500 + 9 * apart, { 1, 1, 1, 1 } } };
+    d = codes_for(&stored, sparse, 2, &maps);
+    assert_true(d.lo == 0 && d.hi == stored.hi); /* 65536 such codes hold all values */
 
     /* No value is where the function changes. */
     const trip_tf_point outside[2] = { { 2000, { 0, 0, 0, 0 } }, { 2001, { 1, 1, 1, 1 } } };
