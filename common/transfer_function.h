@@ -172,12 +172,14 @@ int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, ch
  */
 double trip_extinction(double opacity);
 
-/* One entry per code of a data set: r, g, b in [0, 1] and extinction per world unit, as floats.
- * Code c, 0 to 65535, stands for value lo + (hi - lo) * c / 65535. `voxel_world` is the length of
- * one voxel. */
+/* One entry per code: r, g, b in [0, 1] and extinction per world unit, as floats. `voxel_world` is
+ * the length of one voxel. */
 typedef struct trip_tf_entry {
     float r, g, b, extinction;
 } trip_tf_entry;
+/* Returns the entry of a value in data units. */
+trip_tf_entry trip_tf_entry_at(const trip_tf *tf, double value, double voxel_world);
+/* Fills a table for even codes. Code c, 0 to 65535, stands for value lo + (hi - lo) * c / 65535. */
 void trip_tf_fill_table(const trip_tf *tf, double lo, double hi, double voxel_world,
                         trip_tf_entry table[65536]);
 

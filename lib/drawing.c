@@ -265,8 +265,9 @@ static int plan_field(triptych *t)
         return trip_fail(
             TRIP_USAGE, "render", "field",
             "the sum of the splats needs the values of the data set; do not give a volume");
+    const bool values = trip_settings_interpolates(&t->drawn_settings, true);
     return trip_plan_make_field(&t->plan, s->data, &t->camera, &t->drawn_settings, kinds,
-                                s->budget);
+                                values ? &s->draw : NULL, s->budget);
 }
 
 /* Computes the common size of fixed footprints. */
@@ -286,6 +287,13 @@ static int choose_sprites(triptych *t)
                      "behind the eye; move the eye");
 }
 
+/* Returns the table of the frame's codes. */
+static const trip_tf_entry *table_of(const triptych *t)
+{
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    return session_table(&t->session, trip_settings_interpolates(&t->drawn_settings, integral));
+}
+
 static int plan_frame(triptych *t)
 {
     session *s = &t->session;
@@ -297,9 +305,9 @@ static int plan_frame(triptych *t)
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST ||
         !trip_settings_has_levels(&t->drawn_settings)) /* these frames get all the memory */
         trip_mean_tables_release(&s->mean_tables, s->budget);
-    status =
-        trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
-                            s->table, session_classified(s, t->level), &s->mean_tables, s->budget);
+    status = trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
+                                 table_of(t), session_classified(s, t->level), &s->mean_tables,
+                                 s->budget);
     t->plan.level = t->level;
     return status;
 }
@@ -396,9 +404,20 @@ static void warn_of_levels(triptych *t)
               post ? "post" : "pre");
 }
 
+/* Sets the unit of the source's values by the draw codes. */
+static void place_source(triptych *t)
+{
+    const trip_draw_codes *draw = &t->session.draw;
+    const double per_code = trip_draw_value_per_code(draw);
+    if (t->source && draw->of_stored)
+        trip_field_set_unit(t->source,
+                            (trip_field_unit){ draw->lo, per_code > 0 ? 1 / per_code : 0 });
+}
+
 static int start(triptych *t)
 {
     int status = trip_context_begin_light(t);
+    place_source(t);
     if (!status)
         status = make_reader(t, t->plan.planes);
     t->frame = (trip_frame){
@@ -406,7 +425,7 @@ static int start(triptych *t)
         .camera = &t->camera,
         .settings = &t->drawn_settings,
         .plan = &t->plan,
-        .table = t->session.table,
+        .table = table_of(t),
         .field = t->source,
         .light = t->light,
         .emission = t->drawn_settings.effects.emission ? t->heat : NULL,

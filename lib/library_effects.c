@@ -9,8 +9,10 @@ static bool is_of_surfaces(const triptych *t)
 {
     const trip_tf_entry *table = t->session.table;
     const double voxel = t->camera.voxel_world;
+    const trip_codes *codes = &t->session.data->codes;
+    const int count = trip_codes_ids(codes) ? (int)codes->entries : CODES;
     int shown = 0, opaque = 0;
-    for (int code = 0; code < CODES; code++) {
+    for (int code = 0; code < count && code < CODES; code++) {
         shown += table[code].extinction > 0;
         opaque += (double)table[code].extinction * voxel > 0.69314718055994531; /* opacity 1/2 */
     }

@@ -11,6 +11,7 @@
 #include "report.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
+static const size_t maps_bytes = sizeof(trip_draw_maps);
 
 enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MAX };
 
@@ -54,18 +55,25 @@ static void warn_of_culled_values(const session *s, unsigned part, const trip_tf
     free(command);
 }
 
-/* Opacity o becomes 1 - (1 - o)^scale. */
 static void warn_of_lost_peak(const session *s, const trip_tf *tf)
 {
-    const trip_file_header *h = &s->data->header;
+    const trip_draw_codes *d = &s->draw;
+    trip_draw_loss loss;
     trip_tf_point peak;
-    if (trip_tf_lost_peak(tf, h->code_lo, h->code_hi, &peak))
+    if (trip_draw_codes_loss(d, tf, &loss))
+        trip_warn(s->input,
+                  "the transfer function changes from %.9g to %.9g, but post draws only %.2g steps "
+                  "there, since the whole function spans %.9g to %.9g; narrow it, or use "
+                  "--classify pre",
+                  loss.lo, loss.hi, fmax(1, loss.codes), loss.first, loss.last);
+    else if (trip_tf_lost_peak(tf, d->lo, d->hi, &peak))
         trip_warn(s->input,
                   "the transfer function has a peak at %.9g that is narrower than the %.3g between "
                   "two codes, so it is not drawn; make it wider",
-                  peak.value, (h->code_hi - h->code_lo) / 65535);
+                  peak.value, trip_draw_value_per_code(d));
 }
 
+/* Opacity o becomes 1 - (1 - o)^scale. */
 static void scale_extinction(trip_tf_entry *table, double scale)
 {
     if (scale > 0 && scale != 1)
@@ -85,11 +93,26 @@ static int load_function(const session *s, const session_look *look, trip_tf **t
     return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 
-static int take_table(session *s)
+static void release_tables(session *s)
 {
+    trip_budget_release(s->budget, s->table, table_bytes);
+    trip_budget_release(s->budget, s->draw_table, table_bytes);
+    trip_budget_release(s->budget, s->draw_maps, maps_bytes);
+    s->table = s->draw_table = NULL;
+    s->draw_maps = NULL;
+}
+
+static int take_tables(session *s)
+{
+    const bool even = trip_codes_even(&s->data->codes);
     s->table = trip_budget_take(s->budget, table_bytes);
-    if (s->table)
+    if (!even)
+        s->draw_table = trip_budget_take(s->budget, table_bytes);
+    if (!even)
+        s->draw_maps = trip_budget_take(s->budget, maps_bytes);
+    if (s->table && (even || (s->draw_table && s->draw_maps)))
         return 0;
+    release_tables(s);
     return trip_fail(TRIP_ERROR, "render", s->input,
                      "the table of the transfer function does not fit in memory; raise --memory");
 }
@@ -104,6 +127,11 @@ int session_read_text(session *s)
     return status;
 }
 
+const trip_tf_entry *session_table(const session *s, bool interpolates)
+{
+    return interpolates && s->draw_table ? s->draw_table : s->table;
+}
+
 trip_classification *session_classified(const session *s, unsigned level)
 {
     return &s->classified[level];
@@ -116,26 +144,39 @@ void session_keep_tables(session *s)
         trip_mean_tables_release(&s->mean_tables, s->budget);
 }
 
+static void fill_tables(session *s, const trip_tf *tf, double opacity_scale)
+{
+    const double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
+    s->draw = trip_draw_codes_for(tf, &s->data->codes, typical, s->draw_maps);
+    trip_draw_codes_stored_table(&s->draw, tf, voxel_world, s->table);
+    scale_extinction(s->table, opacity_scale);
+    if (!s->draw_table)
+        return;
+    trip_draw_codes_table(&s->draw, tf, voxel_world, s->draw_table);
+    scale_extinction(s->draw_table, opacity_scale);
+}
+
 int session_use_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
     int status = session_read_text(s);
-    for (int i = 0; i < LEVELS; i++)
+    for (int i = 0; i < LEVELS; i++) {
         trip_classification_forget_table(&s->classified[i]);
+        s->classified[i].draw = &s->draw;
+    }
     trip_mean_tables_release(&s->mean_tables, s->budget);
     if (!status && !s->table)
-        status = take_table(s);
+        status = take_tables(s);
     if (!status)
         status = load_function(s, look, &tf);
     if (!status && !find_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->typical_min, h->typical_max, s->input);
         for (unsigned i = 0; i < s->part_count; i++)
             warn_of_culled_values(s, i, tf, look);
+        fill_tables(s, tf, look->opacity_scale);
         warn_of_lost_peak(s, tf);
-        double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
-        trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
-        scale_extinction(s->table, look->opacity_scale);
     }
     trip_tf_destroy(tf);
     return status;
@@ -238,8 +279,8 @@ int session_open(session *s, const char *input, const session_look *look, uint64
 
 void session_close(session *s)
 {
-    if (s->table)
-        trip_budget_release(s->budget, s->table, table_bytes);
+    if (s->budget)
+        release_tables(s);
     if (s->budget)
         trip_mean_tables_release(&s->mean_tables, s->budget);
     trip_dataset_normals_close(s->with_normals);

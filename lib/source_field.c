@@ -18,11 +18,14 @@ typedef struct reading {
     trip_budget *budget;
 } reading;
 
-static double code_of(const trip_dataset *data, double value)
+/* Returns the code of a value. If codes are uneven, returns the value. */
+static double number_of(const trip_dataset *data, double value)
 {
-    const trip_file_header *h = &data->header;
-    double range = h->code_hi - h->code_lo;
-    return range > 0 ? (value - h->code_lo) / range * 65535 : 0;
+    const trip_codes *c = &data->codes;
+    const double range = c->hi - c->lo;
+    if (!trip_codes_even(c))
+        return value;
+    return range > 0 ? (value - c->lo) / range * 65535 : 0;
 }
 
 static int put_box(reading *r, const int64_t lo[3], const int64_t size[3])
@@ -34,7 +37,7 @@ static int put_box(reading *r, const int64_t lo[3], const int64_t size[3])
             for (int64_t i = lo[0]; i < lo[0] + size[0] && !status; i++, value++) {
                 const int64_t at[3] = { i, j, k };
                 if (isfinite(*value) && !trip_field_at(r->field, i, j, k))
-                    status = trip_field_put(r->field, at, code_of(r->data, *value), NULL);
+                    status = trip_field_put(r->field, at, number_of(r->data, *value), NULL);
             }
     return status;
 }
@@ -111,7 +114,7 @@ static int check_grid(const reading *r, const char *path)
 static int read_volume(reading *r, const char *path)
 {
     const int64_t *dims = trip_volume_get_info(r->volume)->dims;
-    const trip_file_header *h = &r->data->header;
+    const trip_codes *c = &r->data->codes;
     int status = check_grid(r, path);
     if (!status)
         status = trip_field_create(&r->field, dims, r->budget);
@@ -122,7 +125,8 @@ static int read_volume(reading *r, const char *path)
                         r->field,
                         &(trip_field_map){ .index_to_world = r->data->index_to_world,
                                            .coordinates = &r->data->coordinates,
-                                           .value_per_code = (h->code_hi - h->code_lo) / 65535 });
+                                           .value_per_code =
+                                               trip_codes_even(c) ? (c->hi - c->lo) / 65535 : 1 });
 }
 
 /* Makes the volume lack the values that bricking took for fill values. */

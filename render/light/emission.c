@@ -24,7 +24,7 @@ static void set_table(trip_emission *e)
 {
     const trip_file_header *h = &e->data->header;
     for (int code = 0; code < CODES; code++) {
-        const double value = h->code_lo + (h->code_hi - h->code_lo) * code / (CODES - 1);
+        const double value = trip_codes_value(&e->data->codes, code);
         e->table[code] =
             (trip_tf_entry){ .extinction = (float)fmin(1, fmax(0, value / h->typical_max)) };
     }

@@ -29,7 +29,8 @@
 #define TRIP_FACING 4.0
 
 /* Returns |gradient| in value per world unit at which shading is full. It is the same at every
- * level. `voxel_world` is the voxel size of `level` in world units. */
+ * level. `voxel_world` is the voxel size of `level` in world units. A table of codes tells that few
+ * values lie far from the others; these do not count. */
 static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world,
                                               unsigned level)
 {

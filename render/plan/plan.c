@@ -360,7 +360,7 @@ static int plan_layer(planning *p, int axis)
 static int plan_sheets(planning *p, int axis)
 {
     trip_brick_ranges about;
-    trip_brick_ranges_create(&about, p->data, axis, p->settings->kernel, p->budget);
+    trip_brick_ranges_create(&about, p->data, &p->plan->draw, axis, p->settings->kernel, p->budget);
     p->about = &about;
     int status = plan_layer(p, axis);
     p->about = NULL;
@@ -410,6 +410,12 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
              s->method == TRIP_METHOD_IMAGE)
         why = "fixed footprints, vertex weights and image-aligned sheets cannot draw it";
     return why ? trip_fail(TRIP_USAGE, "render", data->path, "has uneven spacing: %s", why) : 0;
+}
+
+/* Returns the draw codes of a frame that interpolates values. */
+static trip_draw_codes draw_codes_of(const trip_dataset *data, const trip_draw_codes *draw)
+{
+    return draw ? *draw : trip_draw_codes_as_stored(&data->codes);
 }
 
 /* Decides whether classification has a closed form or looks up its integrals. */
@@ -470,9 +476,11 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
                    .tables = tables ? tables : &plan->own_tables,
                    .budget = budget,
                    .classified = classified };
+    const bool post = settings->classify == TRIP_CLASSIFY_POST;
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
-                         .planes = planes_of(data, settings) };
+                         .planes = planes_of(data, settings),
+                         .draw = draw_codes_of(data, post ? classified->draw : NULL) };
     place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
     if (!status)
@@ -551,7 +559,8 @@ static unsigned planes_gathered(const trip_dataset *data, const trip_settings *s
 }
 
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, unsigned kinds, trip_budget *budget)
+                         const trip_settings *settings, unsigned kinds, const trip_draw_codes *draw,
+                         trip_budget *budget)
 {
     const planning p = {
         .plan = plan, .data = data, .camera = camera, .settings = settings, .budget = budget
@@ -559,6 +568,7 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .gathers = true,
+                         .draw = draw_codes_of(data, draw),
                          .planes = planes_gathered(data, settings) };
     place_whole_clip(plan, data, camera, settings);
     int status = trip_light_check(settings, &data->index_to_world);
@@ -623,6 +633,14 @@ static void explain_kernel(const trip_dataset *data, const trip_settings *s, FIL
                 : "");
 }
 
+static void explain_codes(const trip_plan *plan, FILE *out)
+{
+    const trip_draw_codes *d = &plan->draw;
+    if (d->of_stored)
+        fprintf(out, "codes       uneven, drawn as even codes of the values from %.9g to %.9g\n",
+                d->lo, d->hi);
+}
+
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     if (plan->gathers) {
@@ -640,6 +658,7 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
             out,
             "classify    post: values are interpolated at %d sample%s per sheet, then classified\n",
             s->samples_per_sheet, s->samples_per_sheet == 1 ? "" : "s");
+    explain_codes(plan, out);
     if (trip_settings_sum_sheets(s))
         fprintf(
             out,
