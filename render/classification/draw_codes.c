@@ -104,6 +104,7 @@ static span hull(span a, span b)
 static span choose_range(span data, span typical, span changing, double nearest, double apart)
 {
     const double width = width_of(changing);
+    const bool two_ends = changing.lo - typical.lo > width && typical.hi - changing.hi > width;
     const double finest = width / TRIP_DRAW_PART_MAX, coarsest = width / TRIP_DRAW_PART_MIN;
     const double code = fmax(fmin(coarsest, fmax(finest, nearest / TRIP_DRAW_PART_MIN)), apart);
     const span most = hull(typical, changing);
@@ -112,7 +113,9 @@ static span choose_range(span data, span typical, span changing, double nearest,
         return data;
     if (room >= 0)
         return widened(most, fmin(room, 2 * width_of(most)), data);
-    return widened(changing, LAST * code * TRIP_DRAW_COARSER - width, most);
+    const double widest =
+        two_ends ? LAST * code * TRIP_DRAW_COARSER : LAST * width / TRIP_DRAW_PART_FINE;
+    return widened(changing, widest - width, most);
 }
 
 static void fill_map(const trip_draw_codes *d, uint16_t map[TRIP_CODES])

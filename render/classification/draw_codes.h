@@ -26,6 +26,11 @@
 /* How many times coarser draw codes are if the range would lack a part of the typical values. */
 #define TRIP_DRAW_COARSER 2.0
 
+/* The number of draw codes in the part if typical values lie beyond one of its ends only. Surfaces
+ * then move by less than a hundredth of a voxel, and thin matter at the other end needs fine codes.
+ */
+#define TRIP_DRAW_PART_FINE 512.0
+
 /* How many times wider than the range of slope codes the range of draw codes may be and replace it.
  */
 #define TRIP_DRAW_SLOPES 16.0
