@@ -63,6 +63,7 @@ typedef enum trip_kernel {
     TRIP_KERNEL_CUBIC,    /* Catmull-Rom, between 64 voxels */
     TRIP_KERNEL_GAUSSIAN, /* profile of a splat over 64 voxels, which smooths (kernel.h); not for
                              the integral */
+    TRIP_KERNEL_NEAREST,  /* the nearest voxel's value, for labels (sheet.h) */
 } trip_kernel;
 
 /* The order of classification by the transfer function and reconstruction from voxels. */
@@ -120,7 +121,7 @@ typedef struct trip_settings {
     /* Merge: interpolates the weights of a splat's corners over the splat (2008, 4.2). Near splats
      * use the weights of pixels. */
     bool vertex_weights;
-    int samples_per_sheet; /* post: 1 to TRIP_SHEET_SAMPLES_MAX */
+    int samples_per_sheet; /* post: 1 to TRIP_SHEET_SAMPLES_MAX; even with the nearest value */
     trip_method method;
     trip_traversal traversal;
     trip_target target;

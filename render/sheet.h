@@ -12,9 +12,9 @@
  *
  * A cell is the cube between eight voxels. It is empty unless all eight are present. Within a cell
  * settings.kernel (kernel.h) interpolates codes and gradients along each axis: linearly between the
- * corners, or from the 4 x 4 x 4 voxels around as in field.h. Beyond the grid its edge repeats. Any
- * other missing voxel counts as the corner next to it. A halo of one voxel holds all corners of the
- * cells with a kept voxel, but not all voxels around them.
+ * corners, from the 4 x 4 x 4 voxels around as in field.h, or not at all (`Nearest value`). Beyond
+ * the grid its edge repeats. Any other missing voxel counts as the corner next to it. A halo of one
+ * voxel holds all corners of the cells with a kept voxel, but not all voxels around them.
  *
  * Samples
  * -------
@@ -46,6 +46,25 @@
  * The integrals are looked up in sums over the codes (segments.h). If extinction and colours are
  * linear in the value, or nearly, cpu and gl use a closed form instead, within 0.16/255 of a
  * picture (closed_form.h).
+ *
+ * Nearest value
+ * -------------
+ * Values between two labels are no labels. With TRIP_KERNEL_NEAREST the field in a cell is the code
+ * of the nearest corner. So each voxel fills a box that ends half-way to its neighbours. A point
+ * half-way between two voxels belongs to the voxel with the greater index. A voxel beside a missing
+ * one, or at the edge of the grid, has only the part of its box that lies in cells with all
+ * corners.
+ *
+ * S is even, so that a plane lies half-way between two sheets, and no segment crosses it. A segment
+ * has the code at its middle throughout, clipped or not. It is empty if its middle lies in an empty
+ * cell or beyond the grid. The error is the shift of a label's border along the ray, by less than
+ * half a segment. It falls as S rises.
+ *
+ * Differences of label numbers are no gradient. A segment's gradient points into its label and has
+ * one length. Along each axis it is the difference of an indicator between the voxel's neighbours,
+ * over the voxel's length (trip_coordinates_width()). The indicator is 1 for the voxel's code and 0
+ * for any other code, visible or not, and for a missing voxel. If the gradient is not 0, the
+ * segment is lit fully (trip_shade_outline_full()).
  *
  * Compositing
  * -----------

@@ -59,6 +59,12 @@ struct position {
     vec2 part; // fraction within the cell
     bool there; // all voxels of the cell are present
     float code;
+#ifdef NEAREST
+    // Where the ray crosses the plane: whole part and rest. Of a segment's middle: the voxel.
+    ivec2 base;
+    vec2 rest;
+    ivec3 voxel;
+#endif
 };
 
 ray ray_of(vec2 p)
@@ -200,21 +206,15 @@ int find_cell(int first, int count, int base, inout float rest)
 }
 #endif
 
-position position_at(ray r, trip_gl_sheet_end end)
+// Finds the cell of a position, given as whole part and rest, and the fraction within the cell.
+void place(ivec2 base, vec2 p, inout position at)
 {
-    position at;
-#ifdef PARALLEL
-    vec2 p = vec2(end.first_u, end.first_v) + r.shift;
-#else
-    vec2 p = vec2(end.first_u, end.first_v) + end.along * r.shift;
-#endif
-    p = clamp(p, -268435456.0, 268435456.0);
 #ifdef UNEVEN
-    at.cell = ivec2(find_cell(0, extent.x, end.base_u, p.x), find_cell(extent.x, extent.y, end.base_v, p.y));
+    at.cell = ivec2(find_cell(0, extent.x, base.x, p.x), find_cell(extent.x, extent.y, base.y, p.y));
     at.part = p;
 #else
     vec2 whole = floor(p);
-    at.cell = ivec2(end.base_u, end.base_v) + ivec2(whole);
+    at.cell = base + ivec2(whole);
     at.part = p - whole;
     // The last voxels of the grid belong to the last cell.
     for (int i = 0; i < 2; i++)
@@ -225,7 +225,29 @@ position position_at(ray r, trip_gl_sheet_end end)
 #endif
     at.there = false;
     at.code = 0.0;
-    if (any(lessThan(at.cell, ivec2(0))) || any(greaterThanEqual(at.cell + 1, extent.xy)))
+}
+
+bool is_within(ivec2 cell)
+{
+    return all(greaterThanEqual(cell, ivec2(0))) && all(lessThan(cell + 1, extent.xy));
+}
+
+position position_at(ray r, trip_gl_sheet_end end)
+{
+    position at;
+#ifdef PARALLEL
+    vec2 p = vec2(end.first_u, end.first_v) + r.shift;
+#else
+    vec2 p = vec2(end.first_u, end.first_v) + end.along * r.shift;
+#endif
+    p = clamp(p, -268435456.0, 268435456.0);
+    place(ivec2(end.base_u, end.base_v), p, at);
+#ifdef NEAREST
+    at.base = ivec2(end.base_u, end.base_v);
+    at.rest = p;
+    return at;
+#endif
+    if (!is_within(at.cell))
         return at;
 #ifdef WIDE
     vec4 before = corners_at(at.cell, end.before), behind = corners_at(at.cell, end.behind);
@@ -245,8 +267,31 @@ position position_at(ray r, trip_gl_sheet_end end)
     return at;
 }
 
+#ifdef NEAREST
+// Returns the sample at the middle of a segment: the nearest corner of its cell, if all corners are
+// present. The plane half-way between two sheets ends segments, so one sheet is nearest throughout.
+position nearest_between(position a, position b, trip_gl_sheet_end from, trip_gl_sheet_end to)
+{
+    position at = a;
+    place(a.base, 0.5 * (a.rest + b.rest + vec2(b.base - a.base)), at);
+    if (!is_within(at.cell))
+        return at;
+    vec4 corners = min(corners_at(at.cell, to.before), corners_at(at.cell, to.behind));
+    at.voxel = ivec3(at.cell + ivec2(greaterThanEqual(at.part, vec2(0.5))),
+                     from.part + to.part < 1.0 ? to.before : to.behind);
+    at.there = all(greaterThanEqual(corners, vec4(0.0)));
+    at.code = texelFetch(codes, at.voxel, 0).r;
+    return at;
+}
+#endif
+
 #ifdef SHADED
-#ifdef WIDE
+#ifdef NEAREST
+vec3 gradient_at(position at, trip_gl_sheet_end end)
+{
+    return texelFetch(gradients, at.voxel, 0).xyz;
+}
+#elif defined(WIDE)
 vec3 gradient_at(position at, trip_gl_sheet_end end)
 {
     vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
@@ -301,7 +346,9 @@ float place_between(int voxel, float part)
 // Returns the position in the grid, list axes.
 vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
-#ifdef UNEVEN
+#ifdef NEAREST
+    return vec3(end.sheet, vec2(at.base - clips.yz) + at.rest); // clips.yz are 0 with UNEVEN
+#elif defined(UNEVEN)
     return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
 #else
     return vec3(end.sheet, vec2(at.cell - clips.yz) + at.part);
@@ -323,6 +370,13 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a
     }
     if (!(first < last))
         return;
+#ifdef NEAREST
+    position middle_at = nearest_between(a, b, from, to);
+    if (!middle_at.there)
+        return;
+    a.code = b.code = middle_at.code;
+    a.voxel = b.voxel = middle_at.voxel;
+#endif
     vec4 medium = segment_between(first > 0.0 ? mix(a.code, b.code, first) : a.code,
                                   last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
     if (!(medium.a > 0.0))
@@ -381,7 +435,11 @@ void main()
     last.there = false;
     for (int i = 0; i < rows.w && pixel.a < 1.0; i++) {
         position next = position_at(r, ends[i]);
+#ifdef NEAREST
+        bool visible = ends[i].step != 0.0;
+#else
         bool visible = ends[i].step != 0.0 && next.there && last.there;
+#endif
 #ifdef PARALLEL
         // Segments that start behind the eye's plane are omitted.
         visible = visible && (ends[i].along - ends[i].step - r.start) * along.w >= 0.0;

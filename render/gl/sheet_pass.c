@@ -54,13 +54,17 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
     v->slope[1] = usable ? w : 0;
 }
 
-/* Maps differences of codes (list axes) to world space. The map is the inverse transpose of
- * index_to_world. */
+/* Maps differences of codes, or of indicators with the nearest value, from list axes to world
+ * space, relative to full shading. The map is the inverse transpose of index_to_world. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
     const trip_file_header *h = &frame->data->header;
+    const bool nearest = frame->settings->kernel == TRIP_KERNEL_NEAREST;
     double full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     double unit = (h->code_hi - h->code_lo) / 65535 / full;
+    if (nearest)
+        unit = 1 / trip_shade_outline_full(&frame->data->index_to_world,
+                                           frame->data->coordinates.widest);
     trip_gl_float4 *columns[3] = { &v->constants.gradient_0, &v->constants.gradient_1,
                                    &v->constants.gradient_2 };
     trip_affine to_index;

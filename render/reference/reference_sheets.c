@@ -17,8 +17,8 @@ struct trip_reference_sheets {
     const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
     double early_termination;
-    trip_field *field; /* gradients are in index space, codes per index */
-    bool has_gradients;
+    trip_field *field; /* gradients are in index space, codes per index; or of outlines */
+    bool nearest, has_gradients;
     trip_field_fill fill;
     trip_segments segments;
     trip_effects_view effects;
@@ -39,8 +39,11 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     trip_affine_invert(&data->index_to_world, &s->to_index); /* invertible: checked on opening */
     s->coordinates = &data->coordinates;
     s->early_termination = trip_settings_early_termination(frame->settings);
-    s->value_per_code = (h->code_hi - h->code_lo) / 65535;
-    s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
+    s->nearest = frame->settings->kernel == TRIP_KERNEL_NEAREST;
+    s->value_per_code = s->nearest ? 1 : (h->code_hi - h->code_lo) / 65535;
+    s->gradient_full =
+        s->nearest ? trip_shade_outline_full(&data->index_to_world, data->coordinates.widest)
+                   : trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
     if (status) {
         trip_reference_sheets_destroy(s);
@@ -88,14 +91,19 @@ static double difference(const trip_reference_sheets *s, const int64_t at[3], in
                         : 0;
 }
 
-/* Sets the gradient of a voxel. The field's single precision holds differences of codes exactly. */
+/* Sets the gradient of a voxel, or with the nearest value the gradient of its outline. The field's
+ * single precision holds differences of codes exactly. */
 static int set_gradient(const trip_reference_sheets *s, const int64_t at[3])
 {
     trip_field *field = s->field;
     const trip_field_voxel *v = trip_field_at(field, at[0], at[1], at[2]);
     if (!v)
         return 0;
-    const double g[3] = { difference(s, at, 0), difference(s, at, 1), difference(s, at, 2) };
+    double g[3];
+    if (s->nearest)
+        trip_field_outline(field, s->coordinates, at, g);
+    for (int a = 0; a < 3 && !s->nearest; a++)
+        g[a] = difference(s, at, a);
     return trip_field_put(field, at, v->code, g);
 }
 
@@ -183,8 +191,8 @@ static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point
                         position *at)
 {
     const trip_kernel kernel = p->s->frame->settings->kernel;
-    if (kernel == TRIP_KERNEL_LINEAR ? !take_corners(p, cell, coordinate, &at->cell)
-                                     : !trip_field_take_cell(p->s->field, kernel, cell, &at->cell))
+    if (kernel != TRIP_KERNEL_LINEAR ? !trip_field_take_cell(p->s->field, kernel, cell, &at->cell)
+                                     : !take_corners(p, cell, coordinate, &at->cell))
         return false;
     set_weights(kernel, at, point);
     at->code = 0;
@@ -265,6 +273,20 @@ static double code_at(const position ends[2], double t0, double t1, double t)
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
 }
 
+/* Computes the samples at both ends of a segment. With the nearest value both are the sample at its
+ * middle. Returns false if the segment is empty. */
+static bool find_ends(const passage *p, double first, double last, int64_t cells, position ends[2])
+{
+    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
+    if (!p->s->nearest)
+        return find_position(p, first, t0, cells, &ends[0]) &&
+               find_position(p, last, t1, cells, &ends[1]);
+    if (!find_position(p, 0.5 * (first + last), 0.5 * (t0 + t1), cells, &ends[0]))
+        return false;
+    ends[1] = ends[0];
+    return true;
+}
+
 /* Adds the segment between two coordinates. Returns false once the pixel takes no more. */
 static bool add_segment(passage *p, double first, double last, int64_t cells)
 {
@@ -274,8 +296,7 @@ static bool add_segment(passage *p, double first, double last, int64_t cells)
     double own[3];
     if (!(from < to))
         return true;
-    if (!find_position(p, first, t0, cells, &ends[0]) ||
-        !find_position(p, last, t1, cells, &ends[1]))
+    if (!find_ends(p, first, last, cells, ends))
         return true;
     trip_segment segment =
         trip_segment_of(&p->s->segments, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to));

@@ -106,6 +106,13 @@ typedef struct trip_cpu_about {
     int64_t number; /* sheet index of rasters[1] */
 } trip_cpu_about;
 
+/* The two sheets of a segment with the nearest value: the nearer one, and the rasters of the other.
+ */
+typedef struct trip_cpu_pair {
+    const trip_cpu_making *near;
+    const int32_t *other;
+} trip_cpu_pair;
+
 /* Integrals of the transfer function from code 0 to each entry: of extinction, and of extinction
  * times each colour component. They are scaled so that the largest is 2^30. Differences are exact
  * except for the rounding of each integral. Entries are 1, 2 or 4 codes apart, if the function is
@@ -148,7 +155,8 @@ typedef struct trip_cpu_group {
     const uint64_t *needed[TRIP_CPU_SEGMENTS]; /* squares with voxels that rays may read */
     bool leaps;                  /* at a sheet, rays may read gradients outside `needed` */
     const trip_cpu_about *about; /* for each segment; NULL selects the linear kernel */
-    const uint64_t *some;        /* squares visible in any segment */
+    trip_cpu_pair nearest[TRIP_CPU_SEGMENTS]; /* set for the nearest value only */
+    const uint64_t *some;                     /* squares visible in any segment */
     /* If set, only rays with a cell in [lo, hi) at the first sample plane are drawn. Units: voxels
      * of the grid of rasters. */
     bool windowed;

@@ -294,11 +294,17 @@ INLINE vh differences(vh codes, vh below, vh above)
     return vh_select(no_below | no_above, half >> 1, half);
 }
 
-static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares,
-                                                      const trip_cpu_voxels *left,
-                                                      const trip_cpu_voxels *above,
-                                                      const trip_cpu_voxels *sheet_before,
-                                                      const trip_cpu_voxels *sheet_behind)
+/* Returns the difference of the indicators of a code at the neighbours: 1, 0 or -1. */
+INLINE vh outline(vh codes, vh below, vh above)
+{
+    return (vh)(below == codes) - (vh)(above == codes);
+}
+
+/* Finds gradients, or with `outlines` the gradients of outlines. */
+INLINE void squares_gradients(trip_cpu_voxels *raster, uint64_t squares, bool outlines,
+                              const trip_cpu_voxels *left, const trip_cpu_voxels *above,
+                              const trip_cpu_voxels *sheet_before,
+                              const trip_cpu_voxels *sheet_behind)
 {
     /* The voxels before the first column and row come from the neighbouring rasters. */
     int16_t first[8];
@@ -323,14 +329,33 @@ static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, u
                 { vh_load(at + 1), vh_load(at + TRIP_CPU_RASTER_STRIDE),
                   vh_load(sheet_behind->codes + i) },
             };
-            const bool lacks = some_is_missing(&n);
+            const bool lacks = !outlines && some_is_missing(&n);
             vh d[3];
             for (int a = 0; a < 3; a++)
-                d[a] = lacks ? differences(vh_load(at), n.before[a], n.behind[a])
-                             : vh_half_difference(n.behind[a], n.before[a]) >> 1;
+                d[a] = outlines ? outline(vh_load(at), n.before[a], n.behind[a])
+                       : lacks  ? differences(vh_load(at), n.before[a], n.behind[a])
+                                : vh_half_difference(n.behind[a], n.before[a]) >> 1;
             vh_store_3((int16_t *)&raster->gradients[i], d[0], d[1], d[2]);
         }
     }
+}
+
+static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares,
+                                                      const trip_cpu_voxels *left,
+                                                      const trip_cpu_voxels *above,
+                                                      const trip_cpu_voxels *sheet_before,
+                                                      const trip_cpu_voxels *sheet_behind)
+{
+    squares_gradients(raster, squares, false, left, above, sheet_before, sheet_behind);
+}
+
+static __attribute__((noinline)) void sheet_outlines(trip_cpu_voxels *raster, uint64_t squares,
+                                                     const trip_cpu_voxels *left,
+                                                     const trip_cpu_voxels *above,
+                                                     const trip_cpu_voxels *sheet_before,
+                                                     const trip_cpu_voxels *sheet_behind)
+{
+    squares_gradients(raster, squares, true, left, above, sheet_before, sheet_behind);
 }
 
 INLINE vh mean_or_between(vh a, vh b, int32_t weights)

@@ -73,6 +73,9 @@ INLINE bool is_uneven(const pane_path *path)
     return TRIP_SIMD == TRIP_SIMD_PLAIN && path->coordinates;
 }
 
+/* A kernel of its own draws the nearest value. So the other kernels cost no extra instruction. */
+#define NEAREST TRIP_CPU_NEAREST
+
 /* Only the plain kernels sample with 64 voxels, so that linear sampling costs no extra instruction.
  */
 INLINE bool is_wide(const trip_cpu_group *g)
@@ -524,6 +527,23 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
         (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
 
+/* Finds the raster of segment n for the nearest value: the raster that contains the patch's cells
+ * at both sample planes. It repeats the first column and row of its neighbours, so it also contains
+ * all corners of these cells. */
+static void find_nearest_raster(const trip_cpu_group *g, const pane_path *path, unsigned n,
+                                bool whole, const cell_boxes *boxes, patch_path *area)
+{
+    const int log2 = TRIP_CPU_RASTER_LOG2;
+    const cell_box box = both_boxes(boxes, n, n + 1);
+    const int32_t u = box.lo[0] >> log2, v = box.lo[1] >> log2;
+    area->raster[n] = -1;
+    if (!whole || u != box.hi[0] >> log2 || v != box.hi[1] >> log2 || !is_within(g, u, v))
+        return;
+    area->raster[n] = v * g->across + u;
+    area->within[n] =
+        (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
+}
+
 typedef struct pane_segments {
     uint64_t some;    /* segments with a square that may be visible */
     uint64_t made;    /* segments with all voxels made that rays read */
@@ -564,6 +584,10 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (!cells_show(g, n, box))
             continue;
         area->segments |= UINT64_C(1) << n;
+        if (NEAREST) {
+            find_nearest_raster(g, path, n, r.whole, &samples, area);
+            continue;
+        }
         if (placed != n)
             find_raster(g, path, n, r.whole, &samples, area);
         find_raster(g, path, n + 1, r.whole, &samples, area);
@@ -643,6 +667,23 @@ static corners uneven_corners(const pane_path *path, unsigned n, corners at, int
 INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
 {
     corners c = corners_at(path, l, n);
+    return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
+}
+
+/* Returns the cells of the rays at the middle of segment n, relative to pane_path.base of its first
+ * sample plane. */
+INLINE corners middle_of(const pane_path *path, const stamp_rays *l, unsigned n)
+{
+    corners c;
+    for (int a = 0; a < 2; a++) {
+        vf at = v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
+        vf end = v_fma(l->slope[a], v_set(path->along[n + 1]),
+                       v_set(path->first[a][n + 1]) + l->shift[a]);
+        at = v_set(0.5f) * (at + (end + v_set((float)(path->base[a][n + 1] - path->base[a][n]))));
+        at = v_max(at, v_set(-0x1p28f)); /* rays that are not drawn */
+        c.whole[a] = v_floor_within(at);
+        c.part[a] = at - v_from_int(c.whole[a]);
+    }
     return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
@@ -759,6 +800,7 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
     s->lit = s->summed = false;
 }
 
+#include "cpu/kernels/nearest_tmpl.h"
 #include "cpu/kernels/wide_tmpl.h"
 
 /* ---- a segment ---- */
@@ -936,7 +978,9 @@ INLINE vf ray_depth(const stamp_rays *l, vf along)
 
 INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g, sample *s)
 {
-    if (!s->lit && is_wide(g))
+    if (!s->lit && NEAREST)
+        find_nearest_gradients(g, s);
+    else if (!s->lit && is_wide(g))
         find_wide_gradients(view, g, s);
     else if (!s->lit)
         find_gradients(g, s);
@@ -1020,7 +1064,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     light_way of_position;
     const light_way *way = &l->way;
     vf at[3];
-    if (TRIP_CPU_EFFECTS || view->point_light)
+    const bool effects = TRIP_CPU_EFFECTS || (NEAREST && view->effects.some);
+    if (effects || view->point_light)
         positions_at(g, path, l, n, middle - v_set(path->along[n]), at);
     if (view->point_light) {
         find_way(view, at, l->to_eye, &of_position);
@@ -1031,7 +1076,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         find_light(view, g, b);
         lit = surface_between(view, path, l, way, a, b);
     }
-    if (TRIP_CPU_EFFECTS) {
+    if (effects) {
         effects_on(&view->effects, at, &lit, way->light, l->to_eye, s.rgb);
     } else if (view->shading) {
         light_segment(&lit, &s);
@@ -1161,7 +1206,11 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             make_segment(g, view->shading, box_of_segment(&passed->boxes, n), n);
             passed->made |= UINT64_C(1) << n;
         }
-        if (is_wide(g)) {
+        if (NEAREST) {
+            nearest_at(g, view->integrals, path, area, l, n, &ends[0]);
+            if (!composite_segment(view, g, l, path, n, &ends[0], &ends[0], pixel))
+                continue;
+        } else if (is_wide(g)) {
             if (sampled != n || !in_the_same_cells(g, n, &ends[n % 2]))
                 wide_sample_at(view, g, path, l, n, n, &ends[n % 2]);
             wide_sample_at(view, g, path, l, next, n, &ends[next % 2]);
@@ -1171,7 +1220,8 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
         }
         sampled = next;
-        if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
+        if (!NEAREST &&
+            !composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
             continue;
         finish_terminated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
