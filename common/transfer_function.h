@@ -66,6 +66,9 @@ typedef struct trip_tf_origin {
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
 
+/* Whether at most two values occur in a volume of labels: a solid and its surroundings. */
+bool trip_tf_is_solid(const trip_histogram *histogram);
+
 /* Loads a transfer function. `path_or_preset` may be:
  * - the name of a preset ("bone", "preset:bone"), even if there is a file with this name
  * - a file, recognised by its content: `.tf` text, JSON of ParaView or 3D Slicer, a .vp, or XML

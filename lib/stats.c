@@ -48,7 +48,14 @@ static void explain_choices(const triptych *t, FILE *out)
     if (t->why_pre)
         fprintf(out, "default     pre instead of post: %s\n", t->why_pre);
     explain_parts(t, out);
-    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
+    const bool nearest = t->drawn_settings.kernel == TRIP_KERNEL_NEAREST;
+    if (t->nearest_chosen)
+        fputs("default     nearest instead of linear interpolation: the values are labels\n", out);
+    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet &&
+        nearest)
+        fprintf(out, "samples     %d per sheet, as always with the nearest value\n",
+                t->drawn_settings.samples_per_sheet);
+    else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
         fprintf(out,
                 "samples     %d per sheet, by the view: between sheets rays move up to %.2f voxels "
                 "sideways; voxels are up to %.3g %s wide\n",
@@ -141,6 +148,9 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
                                  ? t->drawn_settings.samples_per_sheet
                                  : 0,
+        .interpolation = t->plan.gathers || t->drawn_settings.classify == TRIP_CLASSIFY_POST
+                             ? (triptych_interpolation)(t->drawn_settings.kernel + 1)
+                             : TRIPTYCH_INTERPOLATION_DEFAULT,
         .footprint = (triptych_footprint)(t->drawn_settings.footprint + 1),
         .early_termination =
             t->plan.gathers ? -1 : trip_settings_early_termination(&t->drawn_settings),

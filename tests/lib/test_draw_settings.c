@@ -47,7 +47,7 @@ static void options_set_the_members_of_their_names(void **state)
     assert_int_equal(s.clip.planes, 2);
     assert_int_equal(s.all.quality, TRIPTYCH_QUALITY_HIGH);
     assert_int_equal(s.all.classify, TRIPTYCH_CLASSIFY_PRE);
-    assert_int_equal(s.all.kernel, TRIPTYCH_KERNEL_CUBIC);
+    assert_int_equal(s.all.interpolation, TRIPTYCH_INTERPOLATION_CUBIC);
     assert_int_equal(s.splat.footprint, TRIPTYCH_FOOTPRINT_EWA);
     assert_true(s.all.early_termination == TRIPTYCH_ZERO && s.all.h == TRIPTYCH_ZERO);
     assert_int_equal(s.sheet.samples, -1);
