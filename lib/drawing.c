@@ -167,8 +167,6 @@ static int choose_interpolation(triptych *t)
     }
     if (t->nearest_chosen)
         s->kernel = TRIP_KERNEL_NEAREST;
-    if (s->kernel == TRIP_KERNEL_NEAREST && t->given.all.method == TRIPTYCH_METHOD_DEFAULT)
-        s->method = TRIP_METHOD_CLIP;
     if (t->nearest_chosen && !t->nearest_noted)
         trip_note(t->session.input, "the values are labels, so each point takes the value of the "
                                     "nearest voxel (--interpolation linear interpolates)");
@@ -230,9 +228,8 @@ static int enter_part(triptych *t)
     t->drawn_settings.samples_per_sheet = t->settings.samples_per_sheet
                                               ? t->settings.samples_per_sheet
                                               : t->samples_per_sheet.samples_per_sheet;
-    if (t->drawn_settings.kernel == TRIP_KERNEL_NEAREST)
-        t->drawn_settings.samples_per_sheet =
-            trip_sheet_samples_nearest(t->settings.samples_per_sheet);
+    if (t->drawn_settings.kernel == TRIP_KERNEL_NEAREST) /* boxes are exact (sheet.h) */
+        t->drawn_settings.samples_per_sheet = 2;
     t->drawn_settings.clip = trip_context_clip(t);
     trip_lod_parts_clip(&t->parts, t->part, &t->drawn_settings.clip);
     return 0;

@@ -51,10 +51,9 @@ static void explain_choices(const triptych *t, FILE *out)
     const bool nearest = t->drawn_settings.kernel == TRIP_KERNEL_NEAREST;
     if (t->nearest_chosen)
         fputs("default     nearest instead of linear interpolation: the values are labels\n", out);
-    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet &&
-        nearest)
-        fprintf(out, "samples     %d per sheet, as always with the nearest value\n",
-                t->drawn_settings.samples_per_sheet);
+    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && nearest)
+        fputs("samples     one per voxel that a ray meets, as always with the nearest value\n",
+              out);
     else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
         fprintf(out,
                 "samples     %d per sheet, by the view: between sheets rays move up to %.2f voxels "

@@ -310,7 +310,7 @@ typedef enum triptych_classify {
 TRIPTYCH_API int triptych_count_levels(triptych *t, triptych_classify classify, unsigned *levels);
 
 typedef enum triptych_method {
-    TRIPTYCH_METHOD_DEFAULT, /* merge; clip with the nearest value */
+    TRIPTYCH_METHOD_DEFAULT, /* merge */
     TRIPTYCH_METHOD_MERGE,   /* blends the layers of up to three lists */
     TRIPTYCH_METHOD_CLIP,    /* draws each pixel from one list */
     TRIPTYCH_METHOD_AXIS,    /* draws the whole picture from one list */
@@ -334,9 +334,8 @@ typedef enum triptych_interpolation {
     TRIPTYCH_INTERPOLATION_CUBIC,  /* Catmull-Rom, between 64 voxels */
     /* The profile of a splat over 64 voxels, which smooths. Not for the integral. */
     TRIPTYCH_INTERPOLATION_GAUSSIAN,
-    /* The value of the nearest voxel, for labels: no point has a value that no voxel has. An odd
-     * number of samples per sheet counts as the next even one. The default method is clip, since
-     * merge would mix the colours of two labels. */
+    /* The value of the nearest voxel, for labels: no point has a value that no voxel has. Rays are
+     * followed from voxel to voxel, whatever the quality and the samples per sheet. */
     TRIPTYCH_INTERPOLATION_NEAREST,
 } triptych_interpolation;
 

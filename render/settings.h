@@ -121,7 +121,7 @@ typedef struct trip_settings {
     /* Merge: interpolates the weights of a splat's corners over the splat (2008, 4.2). Near splats
      * use the weights of pixels. */
     bool vertex_weights;
-    int samples_per_sheet; /* post: 1 to TRIP_SHEET_SAMPLES_MAX; even with the nearest value */
+    int samples_per_sheet; /* post: 1 to TRIP_SHEET_SAMPLES_MAX; 2 with the nearest value */
     trip_method method;
     trip_traversal traversal;
     trip_target target;

@@ -55,16 +55,16 @@
  * one, or at the edge of the grid, has only the part of its box that lies in cells with all
  * corners.
  *
- * S is even, so that a plane lies half-way between two sheets, and no segment crosses it. A segment
- * has the code at its middle throughout, clipped or not. It is empty if its middle lies in an empty
- * cell or beyond the grid. The error is the shift of a label's border along the ray, by less than
- * half a segment. It falls as S rises.
+ * S is 2, so that a plane lies half-way between two sheets, and no segment crosses it. A segment is
+ * divided where the ray leaves a box through a face along u or v, and cut at the sides of the grid.
+ * Each part has the code of its box, so it equals the integral. It is empty if its middle lies in
+ * an empty cell.
  *
- * Differences of label numbers are no gradient. A segment's gradient points into its label and has
- * one length. Along each axis it is the difference of an indicator between the voxel's neighbours,
- * over the voxel's length (trip_coordinates_width()). The indicator is 1 for the voxel's code and 0
- * for any other code, visible or not, and for a missing voxel. If the gradient is not 0, the
- * segment is lit fully (trip_shade_outline_full()).
+ * Differences of label numbers are no gradient. A part is lit at its middle. Its gradient points
+ * into its label. Along each axis it is the difference of an indicator between the voxel's
+ * neighbours, over the voxel's length (trip_coordinates_width()). The indicator is 1 for the
+ * voxel's code and 0 for any other code, visible or not, and for a missing voxel. If the gradient
+ * is not 0, the segment is lit fully (trip_shade_outline_full()).
  *
  * Compositing
  * -----------

@@ -268,12 +268,13 @@ position position_at(ray r, trip_gl_sheet_end end)
 }
 
 #ifdef NEAREST
-// Returns the sample at the middle of a segment: the nearest corner of its cell, if all corners are
-// present. The plane half-way between two sheets ends segments, so one sheet is nearest throughout.
-position nearest_between(position a, position b, trip_gl_sheet_end from, trip_gl_sheet_end to)
+// Finds the sample at a fraction of the way between two planes: the nearest corner of its cell, if
+// all corners are present. The plane half-way between two sheets ends segments, so one sheet is
+// nearest throughout.
+position nearest_between(position a, position b, float share, trip_gl_sheet_end from, trip_gl_sheet_end to)
 {
     position at = a;
-    place(a.base, 0.5 * (a.rest + b.rest + vec2(b.base - a.base)), at);
+    place(a.base, mix(a.rest, b.rest + vec2(b.base - a.base), share), at);
     if (!is_within(at.cell))
         return at;
     vec4 corners = min(corners_at(at.cell, to.before), corners_at(at.cell, to.behind));
@@ -282,6 +283,48 @@ position nearest_between(position a, position b, trip_gl_sheet_end from, trip_gl
     at.there = all(greaterThanEqual(corners, vec4(0.0)));
     at.code = texelFetch(codes, at.voxel, 0).r;
     return at;
+}
+
+// Returns the position of the face between a voxel and the next, along u (axis 0) or v, relative to
+// a whole position.
+float face_behind(int voxel, int axis, int base)
+{
+#ifdef UNEVEN
+    int first = axis * extent.x, last = extent[axis] - 1;
+    return -0.5 * (beyond(first + clamp(voxel, 0, last), base, 0.0) +
+                   beyond(first + clamp(voxel + 1, 0, last), base, 0.0));
+#else
+    return float(voxel - base) + 0.5;
+#endif
+}
+
+// Returns the voxel nearest to a position along u (axis 0) or v.
+int voxel_near(int base, float rest, int axis)
+{
+#ifdef UNEVEN
+    int first = axis * extent.x, cell = find_cell(first, extent[axis], base, rest);
+    if (cell < 0)
+        return beyond(first, base, rest) < 0.0 ? 0 : extent[axis] - 1;
+    return cell + (rest >= 0.5 ? 1 : 0);
+#else
+    return base + int(floor(rest + 0.5));
+#endif
+}
+
+// Cuts the fractions `part` of a segment at the sides of the grid.
+void cut_at_sides(position a, position b, inout vec2 part)
+{
+    for (int i = 0; i < 2; i++) {
+        float from = a.rest[i], way = b.rest[i] + float(b.base[i] - a.base[i]) - from;
+#ifdef UNEVEN
+        float lo = -beyond(i * extent.x, a.base[i], 0.0), hi = -beyond(i * extent.x + extent[i] - 1, a.base[i], 0.0);
+#else
+        float lo = float(clips[1 + i] - a.base[i]), hi = float(extent[2 + i] - a.base[i]);
+#endif
+        float x = ((way > 0.0 ? lo : hi) - from) / way, y = ((way > 0.0 ? hi : lo) - from) / way;
+        if (way != 0.0)
+            part = vec2(max(part.x, x), min(part.y, y));
+    }
 }
 #endif
 
@@ -346,8 +389,10 @@ float place_between(int voxel, float part)
 // Returns the position in the grid, list axes.
 vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
-#ifdef NEAREST
-    return vec3(end.sheet, vec2(at.base - clips.yz) + at.rest); // clips.yz are 0 with UNEVEN
+#if defined(NEAREST) && defined(UNEVEN)
+    return vec3(end.sheet, vec2(at.base) + at.rest);
+#elif defined(NEAREST)
+    return vec3(end.sheet, vec2(at.base - clips.yz) + at.rest);
 #elif defined(UNEVEN)
     return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
 #else
@@ -356,22 +401,17 @@ vec3 voxel_of(position at, trip_gl_sheet_end end)
 }
 #endif
 
-// Composites the segment between two ends behind the pixel's colour, opacity and depth.
-void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
-                 inout float pixel_depth)
+// Composites the part of a segment from fraction `first` to `last` behind the pixel's colour,
+// opacity and depth.
+void add_part(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, float first, float last,
+              inout vec4 pixel, inout float pixel_depth)
 {
-    // start and end are depths; first and last are fractions of the segment that the clipping
-    // keeps.
+    // start and end are depths.
     float start = (to.along - to.step - r.start) / r.along, end = (to.along - r.start) / r.along;
-    float first = 0.0, last = 1.0;
-    if (clips.x > 0) {
-        first = clamp((r.from - start) / (end - start), 0.0, 1.0);
-        last = clamp((r.to - start) / (end - start), 0.0, 1.0);
-    }
     if (!(first < last))
         return;
 #ifdef NEAREST
-    position middle_at = nearest_between(a, b, from, to);
+    position middle_at = nearest_between(a, b, 0.5 * (first + last), from, to);
     if (!middle_at.there)
         return;
     a.code = b.code = middle_at.code;
@@ -414,6 +454,48 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a
         pixel_depth /= pixel.a;
         pixel = vec4(pixel.rgb / pixel.a, 1.0);
     }
+}
+
+#ifdef NEAREST
+// Adds the parts of a segment between fractions, box by box.
+void add_boxes(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, vec2 part,
+               inout vec4 pixel, inout float pixel_depth)
+{
+    vec2 way = b.rest + vec2(b.base - a.base) - a.rest;
+    cut_at_sides(a, b, part);
+    ivec2 voxel = ivec2(0), step = ivec2(sign(way));
+    for (int i = 0; i < 2; i++)
+        voxel[i] = voxel_near(a.base[i], a.rest[i] + part.x * way[i], i);
+    for (float x = part.x; x < part.y && pixel.a < 1.0;) {
+        vec2 face = vec2(2.0);
+        for (int i = 0; i < 2; i++)
+            if (step[i] != 0)
+                face[i] = (face_behind(voxel[i] - (step[i] < 0 ? 1 : 0), i, a.base[i]) - a.rest[i]) / way[i];
+        float next = max(x, min(part.y, min(face.x, face.y)));
+        add_part(r, from, to, a, b, x, next, pixel, pixel_depth);
+        x = next;
+        int leaving = face.x <= face.y ? 0 : 1;
+        voxel[leaving] += step[leaving];
+        if (face[leaving] > part.y)
+            break;
+    }
+}
+#endif
+
+// Composites the segment between two ends, where the clipping keeps it.
+void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
+                 inout float pixel_depth)
+{
+    vec2 part = vec2(0.0, 1.0);
+    if (clips.x > 0) {
+        float start = (to.along - to.step - r.start) / r.along, end = (to.along - r.start) / r.along;
+        part = clamp((vec2(r.from, r.to) - start) / (end - start), 0.0, 1.0);
+    }
+#ifdef NEAREST
+    add_boxes(r, from, to, a, b, part, pixel, pixel_depth);
+#else
+    add_part(r, from, to, a, b, part.x, part.y, pixel, pixel_depth);
+#endif
 }
 
 void main()

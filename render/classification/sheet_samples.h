@@ -8,8 +8,6 @@
 #include "camera.h"
 #include "settings.h"
 
-#define TRIP_SHEET_SAMPLES_NEAREST 4
-
 typedef struct trip_view_samples_per_sheet {
     int samples_per_sheet;
     double slope;    /* maximum distance that a ray with weight moves along u or v over a sheet */
@@ -29,14 +27,6 @@ typedef struct trip_view_samples_per_sheet {
 trip_view_samples_per_sheet trip_sheet_samples_of_view(const trip_camera *camera,
                                                        const trip_settings *settings,
                                                        const uint64_t dims[3]);
-
-/* Returns the samples per sheet for the nearest value, which needs an even number. An odd one
- * counts as the next even one. 0 selects TRIP_SHEET_SAMPLES_NEAREST: labels change abruptly in
- * every view, and the error falls only in proportion to the number. */
-static inline int trip_sheet_samples_nearest(int given)
-{
-    return given ? given + given % 2 : TRIP_SHEET_SAMPLES_NEAREST;
-}
 
 #define TRIP_SHEET_SAMPLES_STRAIGHT 0.125
 #define TRIP_SHEET_SAMPLES_EACH_PX 4.0

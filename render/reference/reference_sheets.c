@@ -273,33 +273,12 @@ static double code_at(const position ends[2], double t0, double t1, double t)
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
 }
 
-/* Computes the samples at both ends of a segment. With the nearest value both are the sample at its
- * middle. Returns false if the segment is empty. */
-static bool find_ends(const passage *p, double first, double last, int64_t cells, position ends[2])
+/* Adds the part of a ray between `from` and `to` with the code from `a` to `b`. Returns false once
+ * the pixel takes no more. */
+static bool add_part(passage *p, const position ends[2], double a, double b, double from, double to)
 {
-    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
-    if (!p->s->nearest)
-        return find_position(p, first, t0, cells, &ends[0]) &&
-               find_position(p, last, t1, cells, &ends[1]);
-    if (!find_position(p, 0.5 * (first + last), 0.5 * (t0 + t1), cells, &ends[0]))
-        return false;
-    ends[1] = ends[0];
-    return true;
-}
-
-/* Adds the segment between two coordinates. Returns false once the pixel takes no more. */
-static bool add_segment(passage *p, double first, double last, int64_t cells)
-{
-    position ends[2];
-    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
-    const double from = fmax(t0, p->from), to = fmin(t1, p->to);
+    trip_segment segment = trip_segment_of(&p->s->segments, a, b);
     double own[3];
-    if (!(from < to))
-        return true;
-    if (!find_ends(p, first, last, cells, ends))
-        return true;
-    trip_segment segment =
-        trip_segment_of(&p->s->segments, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to));
     if (!(segment.extinction > 0))
         return true;
     double t = 0.5 * (from + to);
@@ -314,6 +293,70 @@ static bool add_segment(passage *p, double first, double last, int64_t cells)
     };
     return composite(p->s, p->layer, fragment,
                      -expm1(-segment.extinction * (to - from) * p->world_per_t));
+}
+
+/* Returns where the ray leaves the box that it is in behind t, along an axis. The faces of boxes
+ * lie half-way between voxels. */
+static double next_face(const passage *p, int axis, double t)
+{
+    const trip_coordinates *c = p->s->coordinates;
+    const double o = trip_component(p->origin, axis), d = trip_component(p->direction, axis);
+    const double step = d > 0 ? 1 : -1;
+    if (d == 0)
+        return INFINITY;
+    double face = step * (floor(step * trip_coordinates_index(c, axis, o + t * d) + 0.5) + 0.5);
+    double at = (trip_coordinates_position(c, axis, face) - o) / d;
+    return at > t ? at : (trip_coordinates_position(c, axis, face + step) - o) / d;
+}
+
+/* Cuts a part of the ray at the sides of the grid along u and v. */
+static void cut_at_sides(const passage *p, double *from, double *to)
+{
+    const trip_coordinates *c = p->s->coordinates;
+    for (int a = 0; a < 3; a++) {
+        const double o = trip_component(p->origin, a), d = trip_component(p->direction, a);
+        const double last =
+            trip_coordinates_position(c, a, (double)trip_field_dims(p->s->field)[a] - 1);
+        if (a == p->axis || d == 0)
+            continue;
+        *from = fmax(*from, ((d > 0 ? 0 : last) - o) / d);
+        *to = fmin(*to, ((d > 0 ? last : 0) - o) / d);
+    }
+}
+
+/* Adds a segment with the nearest value, box by box. */
+static bool add_boxes(passage *p, double middle, int64_t cells, double from, double to)
+{
+    position ends[2];
+    cut_at_sides(p, &from, &to);
+    while (from < to) {
+        double next = to;
+        for (int a = 0; a < 3; a++)
+            next = a == p->axis ? next : fmin(next, next_face(p, a, from));
+        if (find_position(p, middle, 0.5 * (from + next), cells, &ends[0])) {
+            ends[1] = ends[0];
+            if (!add_part(p, ends, ends[0].code, ends[0].code, from, next))
+                return false;
+        }
+        from = next;
+    }
+    return true;
+}
+
+/* Adds the segment between two coordinates. Returns false once the pixel takes no more. */
+static bool add_segment(passage *p, double first, double last, int64_t cells)
+{
+    position ends[2];
+    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
+    const double from = fmax(t0, p->from), to = fmin(t1, p->to);
+    if (!(from < to))
+        return true;
+    if (p->s->nearest)
+        return add_boxes(p, 0.5 * (first + last), cells, from, to);
+    if (!find_position(p, first, t0, cells, &ends[0]) ||
+        !find_position(p, last, t1, cells, &ends[1]))
+        return true;
+    return add_part(p, ends, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to), from, to);
 }
 
 /* Adds all segments in front of the eye. They lie between coordinates n / samples_per_sheet, and

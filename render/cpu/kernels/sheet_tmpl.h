@@ -670,23 +670,6 @@ INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
     return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
-/* Returns the cells of the rays at the middle of segment n, relative to pane_path.base of its first
- * sample plane. */
-INLINE corners middle_of(const pane_path *path, const stamp_rays *l, unsigned n)
-{
-    corners c;
-    for (int a = 0; a < 2; a++) {
-        vf at = v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
-        vf end = v_fma(l->slope[a], v_set(path->along[n + 1]),
-                       v_set(path->first[a][n + 1]) + l->shift[a]);
-        at = v_set(0.5f) * (at + (end + v_set((float)(path->base[a][n + 1] - path->base[a][n]))));
-        at = v_max(at, v_set(-0x1p28f)); /* rays that are not drawn */
-        c.whole[a] = v_floor_within(at);
-        c.part[a] = at - v_from_int(c.whole[a]);
-    }
-    return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
-}
-
 /* The cells of the rays in the grid of rasters, for kernels of 64 voxels. The positions in a cell
  * are `part` along u and v, and `between` along the sheets. */
 typedef struct wide_position {
@@ -800,10 +783,17 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
     s->lit = s->summed = false;
 }
 
-#include "cpu/kernels/nearest_tmpl.h"
 #include "cpu/kernels/wide_tmpl.h"
 
 /* ---- a segment ---- */
+
+/* The part of a segment that is not clipped. */
+typedef struct remnant {
+    vf from, to; /* positions in the segment, 0 to 1 */
+    vm some;
+} remnant;
+
+#include "cpu/kernels/nearest_tmpl.h"
 
 typedef struct medium {
     vf extinction; /* 0 if the segment is transparent */
@@ -987,12 +977,6 @@ INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     s->lit = true;
 }
 
-/* The part of a segment that is not clipped. */
-typedef struct remnant {
-    vf from, to; /* positions in the segment, 0 to 1 */
-    vm some;
-} remnant;
-
 INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
                           const pane_path *path, unsigned n)
 {
@@ -1027,11 +1011,11 @@ INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const s
     at[2] = v_set((float)g->samples[n].coordinate) + further;
 }
 
-/* Composites a segment behind the pixels' contents. Returns false if it is visible in none of the
- * pixels. */
+/* Composites a segment behind the pixels' contents. With the nearest value only its part `box`
+ * counts. Returns false if it is visible in none of the pixels. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                               const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
-                              sample *b, vf pixel[CHANNELS])
+                              sample *b, const remnant *box, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, TRIP_CPU_CLOSED
@@ -1042,11 +1026,13 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
-    if (view->clips > 0) {
-        remnant r = remnant_of(view, l, path, n);
+    if (NEAREST || view->clips > 0) {
+        remnant r = NEAREST ? *box : remnant_of(view, l, path, n);
         open = vm_and(open, r.some);
-        cut_sample(a, b, r.from, first = &cut[0]);
-        cut_sample(a, b, r.to, last = &cut[1]);
+        if (!NEAREST) {
+            cut_sample(a, b, r.from, first = &cut[0]);
+            cut_sample(a, b, r.to, last = &cut[1]);
+        }
         middle =
             v_set(path->along[n]) + v_set(0.5f * (float)view->direction) * (r.from + r.to) * sheets;
         sheets = sheets * (r.to - r.from);
@@ -1185,6 +1171,23 @@ INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_
     return in;
 }
 
+/* Composites a segment with the nearest value, box by box. */
+INLINE void composite_boxes(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                            const stamp_rays *l, const pane_path *path, const patch_path *area,
+                            unsigned n, vf pixel[CHANNELS])
+{
+    const remnant whole = { v_set(0), v_set(1), l->along };
+    box_walk w =
+        begin_boxes(view, g, path, l, n, view->clips > 0 ? remnant_of(view, l, path, n) : whole);
+    while (vm_any(vm_and(w.part.some, v_gt(pixel[3], v_set(0))))) {
+        remnant box = next_box(path, n, &w);
+        sample s;
+        nearest_at(g, view->integrals, path, area, n, &w, &box, &s);
+        if (composite_segment(view, g, l, path, n, &s, &s, &box, pixel))
+            finish_terminated(view, pixel);
+    }
+}
+
 static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const pane_path *path, pane_segments *passed, const patch_path *area,
                        const stamp_rays *l, float *stamp)
@@ -1207,9 +1210,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             passed->made |= UINT64_C(1) << n;
         }
         if (NEAREST) {
-            nearest_at(g, view->integrals, path, area, l, n, &ends[0]);
-            if (!composite_segment(view, g, l, path, n, &ends[0], &ends[0], pixel))
-                continue;
+            composite_boxes(view, g, l, path, area, n, pixel);
         } else if (is_wide(g)) {
             if (sampled != n || !in_the_same_cells(g, n, &ends[n % 2]))
                 wide_sample_at(view, g, path, l, n, n, &ends[n % 2]);
@@ -1221,7 +1222,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         }
         sampled = next;
         if (!NEAREST &&
-            !composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
+            !composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], NULL, pixel))
             continue;
         finish_terminated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))
