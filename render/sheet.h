@@ -57,8 +57,9 @@
  *
  * S is 2, so that a plane lies half-way between two sheets, and no segment crosses it. A segment is
  * divided where the ray leaves a box through a face along u or v, and cut at the sides of the grid.
- * Each part has the code of its box, so it equals the integral. It is empty if its middle lies in
- * an empty cell.
+ * Each part has the code of its box, so it equals the integral. It is empty if the point at
+ * TRIP_SHEET_BOX_POINT of it lies in an empty cell. The point is not the middle, since the middle
+ * of a box is the face of two cells.
  *
  * Differences of label numbers are no gradient. A part is lit at its middle. Its gradient points
  * into its label. Along each axis it is the difference of an indicator between the voxel's
@@ -84,6 +85,8 @@ static inline int trip_sheet_reach(trip_kernel kernel)
     return trip_kernel_reach(kernel) + 1;
 }
 enum { TRIP_SHEET_REACH_MAX = 3 };
+
+#define TRIP_SHEET_BOX_POINT 0.4
 
 /* Returns the distance, in indices, of the farthest ray that a voxel changes. */
 static inline double trip_sheet_radius(trip_kernel kernel)

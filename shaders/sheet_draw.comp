@@ -411,7 +411,7 @@ void add_part(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, p
     if (!(first < last))
         return;
 #ifdef NEAREST
-    position middle_at = nearest_between(a, b, 0.5 * (first + last), from, to);
+    position middle_at = nearest_between(a, b, mix(first, last, BOX_POINT), from, to);
     if (!middle_at.there)
         return;
     a.code = b.code = middle_at.code;

@@ -9,6 +9,7 @@
 #include "gl/program.h"
 #include "report.h"
 #include "shade.h"
+#include "sheet.h"
 #include "splat.h"
 #include "text.h"
 
@@ -71,6 +72,8 @@ static void write_defines(FILE *out, const trip_gl_variant *variant)
     if (variant->effects & TRIP_GL_WIDE)
         fprintf(out, "#define CUBIC %d\n#define CUTOFF %.9f\n", (int)TRIP_KERNEL_CUBIC,
                 TRIP_CUTOFF);
+    if (variant->effects & TRIP_GL_NEAREST)
+        fprintf(out, "#define BOX_POINT %.9f\n", TRIP_SHEET_BOX_POINT);
     if (variant->effects & (TRIP_GL_SHADED | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION))
         fprintf(out,
                 "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"

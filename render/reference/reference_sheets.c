@@ -333,7 +333,8 @@ static bool add_boxes(passage *p, double middle, int64_t cells, double from, dou
         double next = to;
         for (int a = 0; a < 3; a++)
             next = a == p->axis ? next : fmin(next, next_face(p, a, from));
-        if (find_position(p, middle, 0.5 * (from + next), cells, &ends[0])) {
+        if (find_position(p, middle, from + TRIP_SHEET_BOX_POINT * (next - from), cells,
+                          &ends[0])) {
             ends[1] = ends[0];
             if (!add_part(p, ends, ends[0].code, ends[0].code, from, next))
                 return false;

@@ -170,6 +170,11 @@ typedef struct trip_cpu_sheet_view {
     const trip_coordinates *coordinates; /* NULL with even spacing */
     int axis;
     trip_kernel kernel;
+    /* For the nearest value: the table of the transfer function, and the map from stretched codes
+     * to its entries, code = (stretched >> code_shift) + code_first. */
+    const struct trip_tf_entry *table;
+    int code_shift, code_first;
+    float voxel_world;
     int64_t voxels[2]; /* size of the grid along u and v */
     bool ortho, shading, headlight, point_light;
     float early_termination; /* trip_cpu_early_termination() */

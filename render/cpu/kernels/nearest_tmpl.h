@@ -121,23 +121,24 @@ INLINE vi first_corners(const trip_cpu_group *g, const int32_t *rasters, const p
     return raster_starts(g, rasters, whole) + position_in_raster(whole);
 }
 
-/* Returns the cells of the rays in the middle of their boxes. */
+/* Returns the cells of the rays in their boxes, at TRIP_SHEET_BOX_POINT. */
 INLINE corners box_cells(const pane_path *path, unsigned n, const box_walk *w, const remnant *box)
 {
-    const vf middle = v_set(0.5f) * (box->from + box->to);
+    const vf point = v_fma(v_set((float)TRIP_SHEET_BOX_POINT), box->to - box->from, box->from);
     corners c;
     for (int a = 0; a < 2; a++) {
-        const vf at = v_fma(middle, w->way[a], w->from[a]);
+        const vf at = v_fma(point, w->way[a], w->from[a]);
         c.whole[a] = v_floor_within(at);
         c.part[a] = at - v_from_int(c.whole[a]);
     }
     return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
-/* Computes the sample of a box: the nearest corner of the cell in its middle. */
-static void nearest_at(const trip_cpu_group *g, const trip_cpu_integrals *in, const pane_path *path,
-                       const patch_path *area, unsigned n, const box_walk *w, const remnant *box,
-                       sample *s)
+/* Computes the sample of a box: the nearest corner of its cell. Its index is the
+ * entry of the transfer function's table. */
+static void nearest_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                       const pane_path *path, const patch_path *area, unsigned n, const box_walk *w,
+                       const remnant *box, sample *s)
 {
     const corners c = box_cells(path, n, w, box);
     const trip_cpu_pair *pair = &g->nearest[n];
@@ -154,7 +155,7 @@ static void nearest_at(const trip_cpu_group *g, const trip_cpu_integrals *in, co
     vi_store(at, s->gradient_at);
     for (int i = 0; i < V; i++)
         codes[i] = ((const int16_t *)g->pool)[at[i]];
-    s->index = index_of(in, vi_load(codes) * (1 << WEIGHT_LOG2));
+    s->index = ((vi_load(codes) + TRIP_CPU_CODE_BIAS) >> view->code_shift) + view->code_first;
     s->lit = s->summed = false;
 }
 

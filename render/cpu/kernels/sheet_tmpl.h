@@ -883,6 +883,18 @@ INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sa
     return s;
 }
 
+/* Looks up the box of a voxel. Lanes that are not open may have any index. */
+INLINE medium classified_nearest(const trip_cpu_sheet_view *view, vm open, const sample *a)
+{
+    const vi zero = { 0 };
+    vi row[4];
+    static_assert(sizeof *view->table == 4 * sizeof(float), "a row of four floats");
+    find_rows((int32_t(*)[4])(uintptr_t)view->table, (vi)v_select(open, (vf)a->index, (vf)zero),
+              row);
+    return (medium){ .extinction = (vf)row[3] * v_set(view->voxel_world),
+                     .rgb = { (vf)row[0], (vf)row[1], (vf)row[2] } };
+}
+
 INLINE vf dot3(const vf a[3], const vf b[3])
 {
     return v_fma(a[0], b[0], v_fma(a[1], b[1], a[2] * b[2]));
@@ -1018,7 +1030,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
                               sample *b, const remnant *box, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
-    open = vm_and(open, TRIP_CPU_CLOSED
+    open = vm_and(open, TRIP_CPU_CLOSED || NEAREST
                             ? l->along
                             : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* leaves out segments that begin behind the eye's plane */
@@ -1039,8 +1051,9 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     }
     if (!vm_any(open))
         return false;
-    medium s = TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
-                               : classified(view->integrals, first, last);
+    medium s = NEAREST           ? classified_nearest(view, open, first)
+               : TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
+                                 : classified(view->integrals, first, last);
     for (int k = 0; k < 3 && view->has_debug_colour; k++)
         s.rgb[k] = v_set(view->debug_colour[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
@@ -1182,7 +1195,7 @@ INLINE void composite_boxes(const trip_cpu_sheet_view *view, const trip_cpu_grou
     while (vm_any(vm_and(w.part.some, v_gt(pixel[3], v_set(0))))) {
         remnant box = next_box(path, n, &w);
         sample s;
-        nearest_at(g, view->integrals, path, area, n, &w, &box, &s);
+        nearest_at(view, g, path, area, n, &w, &box, &s);
         if (composite_segment(view, g, l, path, n, &s, &s, &box, pixel))
             finish_terminated(view, pixel);
     }
