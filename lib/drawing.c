@@ -143,8 +143,7 @@ static const char *needs_splats(triptych *t)
     return NULL;
 }
 
-/* Whether the picture shows values, not splats. */
-static bool draws_values(const triptych *t)
+bool trip_context_draws_values(const triptych *t)
 {
     return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
                ? t->drawn_settings.field == TRIP_FIELD_VALUES
@@ -158,7 +157,8 @@ static int choose_interpolation(triptych *t)
     trip_histogram histogram;
     int status = 0;
     t->nearest_chosen = false;
-    if (t->given.all.interpolation == TRIPTYCH_INTERPOLATION_DEFAULT && draws_values(t)) {
+    if (t->given.all.interpolation == TRIPTYCH_INTERPOLATION_DEFAULT &&
+        trip_context_draws_values(t)) {
         status = session_read_text(&t->session);
         t->nearest_chosen = !status &&
                             trip_dataset_metadata_kind(t->session.text) == TRIP_TF_LABELS &&

@@ -38,6 +38,7 @@ enum {
     SEVERAL_SAMPLES = 1 << 24,
     INDEXED = 1 << 25,
     MAY_EMIT = 1 << 26,
+    NEAREST = 1 << 27,
 };
 
 static const uint64_t of_splats = ROW(COMPOSITING) | ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN) |
@@ -123,6 +124,8 @@ static const struct rule {
       true },
     { ROW(INTERPOLATION), ALL & ~RENDERER(INTEGRAL), PRE, 0,
       "requires --classify post or --renderer integral", IDLE },
+    { ROW(SAMPLES_PER_SHEET), ALL, NEAREST, 0,
+      "does not apply to --interpolation nearest, which follows rays from voxel to voxel", IDLE },
     { ROW(SAMPLES_PER_SHEET), ALL, PRE, 0, "requires --classify post", IDLE },
     { ROW(TRAVERSAL), ALL, POST | ASCENDING, 0, "must be outward with --classify post", CONFLICT },
     { ROW(METHOD), ALL, POST | IMAGE, 0, "image requires --classify pre", CONFLICT },
@@ -202,6 +205,7 @@ static int facts_of(const draw_settings *s)
            (s->all.method == TRIPTYCH_METHOD_IMAGE ? IMAGE : 0) |
            (s->all.traversal == TRIPTYCH_TRAVERSAL_ASCENDING ? ASCENDING : 0) |
            (s->all.interpolation == TRIPTYCH_INTERPOLATION_GAUSSIAN ? GAUSSIAN : 0) |
+           (s->all.interpolation == TRIPTYCH_INTERPOLATION_NEAREST ? NEAREST : 0) |
            (s->integral.field == TRIPTYCH_FIELD_SPLATS ? FIELD_OF_SPLATS : 0) |
            (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
            (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |

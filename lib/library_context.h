@@ -154,4 +154,7 @@ static inline unsigned trip_context_threads(unsigned wanted)
     return wanted < TRIP_CONTEXT_MAX_THREADS ? wanted : TRIP_CONTEXT_MAX_THREADS;
 }
 
+/* Whether the frame shows values, not splats. Valid once its settings are chosen. */
+bool trip_context_draws_values(const triptych *t);
+
 #endif

@@ -147,7 +147,7 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
                                  ? t->drawn_settings.samples_per_sheet
                                  : 0,
-        .interpolation = t->plan.gathers || t->drawn_settings.classify == TRIP_CLASSIFY_POST
+        .interpolation = trip_context_draws_values(t)
                              ? (triptych_interpolation)(t->drawn_settings.kernel + 1)
                              : TRIPTYCH_INTERPOLATION_DEFAULT,
         .footprint = (triptych_footprint)(t->drawn_settings.footprint + 1),
