@@ -341,6 +341,9 @@ static int make_levels(brick *b)
                              .value_min = b->in.tally->value_min,
                              .value_max = b->in.tally->value_max,
                              .hidden_above = is_hidden_above(b),
+                             .labels =
+                                 trip_brick_kind(b->in.info, &b->in.histogram) == TRIP_TF_LABELS &&
+                                 !trip_tf_is_solid(&b->in.histogram),
                              .folder = b->temporary.partial_path,
                              .writer = b->writer,
                              .spill = b->temporary.spill,

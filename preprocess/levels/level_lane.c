@@ -17,6 +17,10 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     l->value_sums = trip_level_carve(memory, &used, plane * sizeof *l->value_sums);
     l->values = trip_level_carve(memory, &used, plane * sizeof *l->values);
     l->touched = trip_level_carve(memory, &used, plane / 8);
+    if (w->labels)
+        l->value_votes = trip_level_carve(memory, &used, plane * sizeof *l->value_votes);
+    if (w->labels && w->means)
+        l->mean_votes = trip_level_carve(memory, &used, plane * sizeof *l->mean_votes);
     if (w->means) {
         l->mean_sums = trip_level_carve(memory, &used, plane * sizeof *l->mean_sums);
         l->means = trip_level_carve(memory, &used, plane * sizeof *l->means);
@@ -70,6 +74,10 @@ static void touch(trip_level_lane *l, size_t at)
     l->value_sums[at] = (trip_coarse_value_sum){ 0 };
     if (l->mean_sums)
         trip_coarse_mean_clear(&l->mean_sums[at]);
+    if (l->value_votes)
+        l->value_votes[at] = (trip_coarse_votes){ .used = 0 };
+    if (l->mean_votes)
+        l->mean_votes[at] = (trip_coarse_votes){ .used = 0 };
 }
 
 /* Maps a voxel of the level below: index of its coarse voxel in the sums, and parity of its
@@ -139,6 +147,8 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
                                     square->kept);
         if (!square->kept)
             trip_coarse_value_add_around(&l->value_sums[at], around[n]);
+        for (uint32_t i = before; i < before + count && l->value_votes; i++)
+            trip_coarse_votes_add(&l->value_votes[at], codes[i], TRIP_COARSE_ALL);
         before += count;
     }
 }
@@ -157,6 +167,9 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
             gradient_of(w, normals[i], gradient);
         trip_coarse_mean_add_whole(&l->mean_sums[p.at], (uint16_t)trip_voxel_code(voxels[i]), p.odd,
                                    run->normals ? gradient : NULL);
+        if (l->mean_votes)
+            trip_coarse_votes_add(&l->mean_votes[p.at], (uint16_t)trip_voxel_code(voxels[i]),
+                                  TRIP_COARSE_ALL);
     }
 }
 
@@ -208,12 +221,17 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         const position p = position_of(w, square, value->u, value->v);
         touch(l, p.at);
         trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
+        if (l->value_votes)
+            trip_coarse_votes_add(&l->value_votes[p.at], value->value, value->known);
         if (!l->means_below || !l->means_below[i].kept)
             continue;
         if (w->format.normals)
             gradient_of(w, l->means_below[i].normal, gradient);
         trip_coarse_mean_add(&l->mean_sums[p.at], &l->means_below[i], p.odd,
                              w->format.normals ? gradient : NULL);
+        if (l->mean_votes)
+            trip_coarse_votes_add(&l->mean_votes[p.at], l->means_below[i].mean,
+                                  l->means_below[i].kept);
     }
     return status;
 }
@@ -229,6 +247,8 @@ static void take_mean(const trip_level_lane *l, const trip_level_work *w, size_t
 {
     double gradient[3];
     trip_coarse_mean_get(&l->mean_sums[at], mean);
+    if (l->mean_votes && mean->kept)
+        mean->mean = trip_coarse_votes_get(&l->mean_votes[at]);
     trip_coarse_mean_gradient(&l->mean_sums[at], gradient);
     if (mean->kept && w->format.normals)
         mean->normal = normal_of(w, gradient);
@@ -244,6 +264,8 @@ TRIP_ALSO_V3 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_
             l->values[n].u = (uint8_t)(at & (edge - 1));
             l->values[n].v = (uint8_t)(at >> w->edge_log2);
             trip_coarse_value_get(&l->value_sums[at], &l->values[n]);
+            if (l->value_votes)
+                l->values[n].value = trip_coarse_votes_get(&l->value_votes[at]);
             if (l->means)
                 take_mean(l, w, at, &l->means[n]);
             n++;

@@ -464,6 +464,7 @@ static int open_sharpen(making *m)
     int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
     trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file, m->params->kinds.means && !own,
                       m->params->hidden_above, m->work.edge_log2, m->budget);
+    m->sharpen.labels = m->params->labels;
     return status;
 }
 
@@ -515,6 +516,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     w->means = params->kinds.means;
     w->values = params->kinds.values;
     w->hidden_above = params->hidden_above;
+    w->labels = params->labels;
     w->quantiser = params->quantiser;
     w->compact = params->compact;
     w->index_to_world = params->index_to_world;

@@ -29,6 +29,7 @@ typedef struct trip_levels_params {
     unsigned levels;
     double value_min, value_max; /* range of the volume's values */
     bool hidden_above;           /* dropped values lie mostly above the kept ones */
+    bool labels;                 /* coarse voxels take the most frequent code, not the mean */
     const char *folder;          /* folder for temporary files */
     trip_writer *writer;         /* has the lists of trip_levels_lists() */
     trip_spill *spill;           /* its sequences are retired, because they are no longer needed */

@@ -51,7 +51,8 @@ typedef struct trip_sharpen_lane {
 typedef struct trip_sharpen {
     const trip_output *file;
     unsigned edge_log2;
-    bool round; /* codes in `around` are reversed, as dropped values lie above kept ones */
+    bool labels; /* values stay as they are: a sharpened label is another one */
+    bool round;  /* codes in `around` are reversed, as dropped values lie above kept ones */
     trip_level_positions positions;
     uint64_t sheet; /* first sheet of the current columns; UINT64_MAX if there are none yet */
     size_t next[TRIP_SHARPEN_SHEETS]; /* next square in each of the sheets */
