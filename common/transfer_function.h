@@ -62,6 +62,8 @@ typedef struct trip_tf_origin {
     bool sparse;          /* only some voxels exist, and the histogram counts only these */
     bool integers;        /* values are integers */
     bool patient;         /* world space is anatomical */
+    bool labels;          /* the file states that its values are labels */
+    bool named_labels;    /* the name of the file does */
     const char *modality; /* from DICOM: "CT", "MR", ...; NULL or "" if unknown */
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);

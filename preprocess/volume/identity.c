@@ -60,6 +60,8 @@ static int make_text(const trip_brick_params *p, const char *input, trip_tf *con
     if (!f)
         return fail_memory(p);
     fputs(input, f);
+    if (p->input && trip_volume_is_named_labels(p->input)) /* chooses the kind of the volume */
+        fputs("labels\n", f);
     locale_t before = trip_text_use_points();
     write_volume_params(f, &p->volume);
     write_params(f, p, functions);

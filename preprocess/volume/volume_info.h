@@ -64,9 +64,14 @@ typedef struct trip_volume_info {
     char space[8]; /* orientation of world space in the patient, as in anatomy.h; "" if unknown */
     bool oriented; /* the file gives the directions of its axes in world space */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
+    bool labels;       /* the file states that its values are labels */
+    bool named_labels; /* its name does */
     char name[128];    /* grid name, if the format has one */
     char note[512];    /* tells the user which grid or variable was chosen by default, or "" */
 } trip_volume_info;
+
+/* Returns whether a word of a file's name says that its values are labels: "labels", "seg", ... */
+bool trip_volume_is_named_labels(const char *path);
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
  * fits in an int64_t. Readers that compute sizes call it first. In any case volume.c calls it for
