@@ -11,8 +11,9 @@
  * - 0 without neighbours.
  *
  * A cell is the cube between eight voxels. It is empty unless all eight are present. Within a cell
- * settings.kernel (kernel.h) interpolates codes and gradients along each axis: linearly between the
- * corners, from the 4 x 4 x 4 voxels around as in field.h, or not at all (`Nearest value`). Beyond
+ * settings.kernel (kernel.h) interpolates codes and gradients along each axis. It does so linearly
+ * between the corners, or from the 4 x 4 x 4 voxels around as in field.h. `Nearest value` below
+ * interpolates nothing. Beyond
  * the grid its edge repeats. Any other missing voxel counts as the corner next to it. A halo of one
  * voxel holds all corners of the cells with a kept voxel, but not all voxels around them.
  *

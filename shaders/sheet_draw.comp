@@ -60,7 +60,7 @@ struct position {
     bool there; // all voxels of the cell are present
     float code;
 #ifdef NEAREST
-    // Where the ray crosses the plane: whole part and rest. Of a segment's middle: the voxel.
+    // Where the ray crosses the plane: whole part and rest. nearest_between() sets the voxel.
     ivec2 base;
     vec2 rest;
     ivec3 voxel;

@@ -244,8 +244,8 @@ static void holes_and_effects_agree_with_the_reference(void **state)
     scene_destroy(&s);
 }
 
-/* A face of label 3 towards the eye and the light is lit fully, whatever the distance of the codes:
- * its colour is multiplied by ambient plus diffuse, and the highlight added. */
+/* A face of label 3 towards the eye and the light is lit fully, whatever the distance of the codes.
+ * Its colour is multiplied by ambient plus diffuse. The highlight is added. */
 static void outlines_are_lit_fully(void **state)
 {
     (void)state;
