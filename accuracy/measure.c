@@ -267,7 +267,7 @@ static int need_field(sweep *s, const accuracy_row *row, bool splats)
         field.integral.field = TRIPTYCH_FIELD_SPLATS;
         field.splat.kernel_radius = drawn->splat.kernel_radius;
     } else {
-        field.all.kernel = drawn->all.kernel;
+        field.all.interpolation = drawn->all.interpolation;
     }
     if (s->field_data == row->data && draw_settings_same(&s->field, &field))
         return 0;
@@ -324,9 +324,10 @@ static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
     }
     /* The integral has no Gaussian interpolation. The smoothing by that kernel counts as a
      * method error. */
-    const bool pre = is_pre(stats),
-               cubic = row->setting.settings.all.kernel == TRIPTYCH_KERNEL_CUBIC;
-    which drawn = pre || cubic ? FIELD : STORED;
+    const triptych_interpolation interpolation = row->setting.settings.all.interpolation;
+    const bool pre = is_pre(stats), own = interpolation != TRIPTYCH_INTERPOLATION_DEFAULT &&
+                                          interpolation != TRIPTYCH_INTERPOLATION_GAUSSIAN;
+    which drawn = pre || own ? FIELD : STORED;
     if (drawn == FIELD)
         status = need_field(s, row, pre);
     if (status)

@@ -123,9 +123,9 @@ static void add_kernels(sweep *w)
         add(w, TRIPTYCH_RENDERER_CPU, s, "pre-radius-%g", radii[i]);
     }
     s = w->post;
-    s.all.kernel = TRIPTYCH_KERNEL_CUBIC;
+    s.all.interpolation = TRIPTYCH_INTERPOLATION_CUBIC;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-cubic");
-    s.all.kernel = TRIPTYCH_KERNEL_GAUSSIAN;
+    s.all.interpolation = TRIPTYCH_INTERPOLATION_GAUSSIAN;
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-gaussian");
 }
 

@@ -236,8 +236,17 @@ static int write_file(const char *path, const char *text)
     return status;
 }
 
+static void add_interpolation(cJSON *root, triptych_interpolation drawn)
+{
+    const draw_settings s = { .all.interpolation = drawn };
+    if (drawn)
+        cJSON_AddStringToObject(root, "interpolation",
+                                draw_settings_choice(&s, DRAW_INTERPOLATION));
+}
+
 static void add_method(cJSON *root, const render_options *o, const triptych_frame_stats *frame)
 {
+    add_interpolation(root, frame->interpolation);
     if (o->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL) {
         static const char *const fields[] = { [RENDER_FIELD_UNSET] = "stored",
                                               [RENDER_FIELD_STORED] = "stored",

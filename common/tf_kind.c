@@ -123,7 +123,8 @@ trip_tf_kind trip_tf_recognise(const trip_tf_origin *o, const trip_histogram *h)
         return TRIP_TF_MR;
     if (is_stated_ct(modality, h))
         return TRIP_TF_CT;
-    if (!strcmp(modality, "SEG") || (o->integers && are_labels(h)))
+    const bool named = o->named_labels && o->integers && h->value_min >= 0;
+    if (!strcmp(modality, "SEG") || o->labels || named || (o->integers && are_labels(h)))
         return TRIP_TF_LABELS;
     if (strcmp(modality, "MR") != 0 && is_ct(h))
         return TRIP_TF_CT;

@@ -102,17 +102,25 @@ static int make_from_ids(trip_tf **out, const trip_histogram *h)
     return status;
 }
 
+bool trip_tf_is_solid(const trip_histogram *h)
+{
+    int occurring = 0;
+    if (h->ids && h->id_count > 2)
+        return false;
+    for (int i = 0; i < BINS; i++)
+        occurring += h->counts[i] > 0;
+    /* Far apart, several values share a bin. */
+    return occurring <= 2 && h->value_max - h->value_min < 16384;
+}
+
 int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *h)
 {
     double range = h->value_max - h->value_min, background = background_of(h);
-    int occurring = 0;
     if (h->ids && h->id_count > 2)
         return make_from_ids(out, h);
-    for (int i = 0; i < BINS; i++)
-        occurring += h->counts[i] > 0;
     const bool counts =
-        fmax(fabs(h->value_min), fabs(h->value_max)) < 0x1p52;       /* integers are exact */
-    if (occurring <= 2 || !(range >= 1 && range < 16384) || !counts) /* solid, or not labels */
+        fmax(fabs(h->value_min), fabs(h->value_max)) < 0x1p52;            /* integers are exact */
+    if (trip_tf_is_solid(h) || !(range >= 1 && range < 16384) || !counts) /* solid, or not labels */
         return trip_tf_from_histogram(out, h);
     trip_tf_point *points = calloc(2 * (size_t)range + 4, sizeof *points);
     if (!points)

@@ -66,9 +66,14 @@ typedef struct trip_tf_origin {
     bool sparse;          /* only some voxels exist, and the histogram counts only these */
     bool integers;        /* values are integers */
     bool patient;         /* world space is anatomical */
+    bool labels;          /* the file states that its values are labels */
+    bool named_labels;    /* the name of the file does */
     const char *modality; /* from DICOM: "CT", "MR", ...; NULL or "" if unknown */
 } trip_tf_origin;
 trip_tf_kind trip_tf_recognise(const trip_tf_origin *origin, const trip_histogram *histogram);
+
+/* Whether at most two values occur in a volume of labels: a solid and its surroundings. */
+bool trip_tf_is_solid(const trip_histogram *histogram);
 
 /* Loads a transfer function. `path_or_preset` may be:
  * - the name of a preset ("bone", "preset:bone"), even if there is a file with this name

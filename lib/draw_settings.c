@@ -214,7 +214,7 @@ static bool same_background(const void *a, const void *b)
 
 static const char *const qualities[] = { "draft", "normal", "high", "exact", NULL };
 static const char *const classifies[] = { "auto", "pre", "post", NULL };
-static const char *const kernels[] = { "linear", "cubic", "gaussian", NULL };
+static const char *const interpolations[] = { "linear", "cubic", "gaussian", "nearest", NULL };
 static const char *const footprints[] = { "exact", "ewa", "fixed", NULL };
 static const char *const shows[] = { "picture", "lists", "merge", "levels", NULL };
 static const char *const fields[] = { "stored", "splats", NULL };
@@ -306,13 +306,16 @@ static const trip_option rows[DRAW_OPTIONS] = {
                                  .alias = "saturation", .group = DRAW_GROUP_ACCURACY,
                                  .measured = true, .type = TRIP_OPTION_PART,
                                  AT(all.early_termination), .lo = 0, .hi = 0.1 },
-    [DRAW_KERNEL] = { "kernel", "NAME",
-                      "Selects the interpolation of post and integral: linear, cubic or gaussian "
-                      "(post only); or the footprints of pre: exact, ewa or fixed",
-                      "linear; exact", .group = DRAW_GROUP_ACCURACY, .measured = true,
-                      AT(all.kernel), CHOICE(kernels) },
-    [DRAW_FOOTPRINT] = { "kernel", .group = DRAW_GROUP_ACCURACY, .measured = true,
+    [DRAW_FOOTPRINT] = { "kernel", "NAME", "Selects the footprints of splats: exact, ewa or fixed",
+                         "exact", "pre only", .group = DRAW_GROUP_ACCURACY, .measured = true,
                          AT(splat.footprint), CHOICE(footprints) },
+    [DRAW_INTERPOLATION] = { "interpolation", "NAME",
+                             "Selects the interpolation of post and integral: nearest (for "
+                             "labels), "
+                             "linear, cubic or gaussian (post only)",
+                             "nearest for labels, otherwise linear", .alias = "kernel",
+                             .group = DRAW_GROUP_ACCURACY, .measured = true, AT(all.interpolation),
+                             CHOICE(interpolations) },
     [DRAW_LOD] = { "lod", "PX",
                    "Draws distant parts by coarse levels with voxels at most PX pixels wide",
                    "0, only the finest level", .group = DRAW_GROUP_ACCURACY, .measured = true,

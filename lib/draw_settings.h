@@ -65,8 +65,8 @@ enum {
     DRAW_QUALITY,
     DRAW_CLASSIFY,
     DRAW_EARLY_TERMINATION,
-    DRAW_KERNEL,
-    DRAW_FOOTPRINT, /* also named "kernel" */
+    DRAW_FOOTPRINT, /* named "kernel" */
+    DRAW_INTERPOLATION,
     DRAW_LOD,
     DRAW_MAX_BYTES,
     DRAW_MAX_MS,

@@ -143,8 +143,39 @@ static const char *needs_splats(triptych *t)
     return NULL;
 }
 
+bool trip_context_draws_values(const triptych *t)
+{
+    return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL
+               ? t->drawn_settings.field == TRIP_FIELD_VALUES
+               : t->drawn_settings.classify == TRIP_CLASSIFY_POST;
+}
+
+/* Selects the nearest value for labels if no interpolation was given. Says so once per data set. */
+static int choose_interpolation(triptych *t)
+{
+    trip_settings *s = &t->drawn_settings;
+    trip_histogram histogram;
+    int status = 0;
+    t->nearest_chosen = false;
+    if (t->given.all.interpolation == TRIPTYCH_INTERPOLATION_DEFAULT &&
+        trip_context_draws_values(t)) {
+        status = session_read_text(&t->session);
+        t->nearest_chosen = !status &&
+                            trip_dataset_metadata_kind(t->session.text) == TRIP_TF_LABELS &&
+                            trip_dataset_metadata_histogram(t->session.text, &histogram) &&
+                            !trip_tf_is_solid(&histogram);
+    }
+    if (t->nearest_chosen)
+        s->kernel = TRIP_KERNEL_NEAREST;
+    if (t->nearest_chosen && !t->nearest_noted)
+        trip_note(t->session.input, "the values are labels, so each point takes the value of the "
+                                    "nearest voxel (--interpolation linear interpolates)");
+    t->nearest_noted |= t->nearest_chosen;
+    return status;
+}
+
 /* Chooses the settings that do not depend on the level, and the classification. */
-static void choose_settings(triptych *t)
+static int choose_settings(triptych *t)
 {
     const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
     const bool automatic = draw_settings_classify(&t->given) == TRIPTYCH_CLASSIFY_AUTO;
@@ -161,6 +192,7 @@ static void choose_settings(triptych *t)
             .normalise) /* normalising adds the background later; depth cueing still uses its colour
                          */
         t->drawn_settings.background[3] = 0;
+    return choose_interpolation(t);
 }
 
 /* Chooses the levels of the frame by the camera of level 0. A frame with distances or with a light
@@ -195,6 +227,8 @@ static int enter_part(triptych *t)
     t->drawn_settings.samples_per_sheet = t->settings.samples_per_sheet
                                               ? t->settings.samples_per_sheet
                                               : t->samples_per_sheet.samples_per_sheet;
+    if (t->drawn_settings.kernel == TRIP_KERNEL_NEAREST) /* boxes are exact (sheet.h) */
+        t->drawn_settings.samples_per_sheet = 2;
     t->drawn_settings.clip = trip_context_clip(t);
     trip_lod_parts_clip(&t->parts, t->part, &t->drawn_settings.clip);
     return 0;
@@ -358,9 +392,10 @@ static int plan(triptych *t)
 static int plan_first(triptych *t)
 {
     uint64_t start = trip_now_ns();
-    choose_settings(t);
+    int status = choose_settings(t);
     check_rounding(t);
-    int status = make_camera(t, t->session.data);
+    if (!status)
+        status = make_camera(t, t->session.data);
     if (!status)
         status = trip_context_choose_effects(t);
     if (!status)

@@ -38,6 +38,7 @@ enum {
     SEVERAL_SAMPLES = 1 << 24,
     INDEXED = 1 << 25,
     MAY_EMIT = 1 << 26,
+    NEAREST = 1 << 27,
 };
 
 static const uint64_t of_splats = ROW(COMPOSITING) | ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN) |
@@ -74,10 +75,10 @@ static const struct rule {
     /* the integral renderer */
     { ROW(FIELD) | ROW(TOLERANCE), ALL & ~RENDERER(INTEGRAL), 0, 0, "requires --renderer integral",
       true },
-    { ROW(KERNEL), RENDERER(INTEGRAL), FIELD_OF_SPLATS, 0, "does not apply to --field splats",
-      true },
-    { ROW(KERNEL), RENDERER(INTEGRAL), GAUSSIAN, 0,
-      "must be linear or cubic with --renderer integral", CONFLICT },
+    { ROW(INTERPOLATION), RENDERER(INTEGRAL), FIELD_OF_SPLATS, 0,
+      "does not apply to --field splats", true },
+    { ROW(INTERPOLATION), RENDERER(INTEGRAL), GAUSSIAN, 0,
+      "must be nearest, linear or cubic with --renderer integral", CONFLICT },
     { ROW(CLASSIFY), RENDERER(INTEGRAL), 0, 0, "does not apply to --renderer integral", IDLE },
     { ROW(SAMPLES_PER_SHEET), RENDERER(INTEGRAL), 0, 0,
       "does not apply to --renderer integral, which has no sheets", IDLE },
@@ -115,13 +116,16 @@ static const struct rule {
     { ROW(FOOTPRINT), RENDERER(CPU), FIXED, 0, "fixed requires --renderer reference or gl",
       CONFLICT },
     /* pre and post */
-    { ROW(SAMPLES_PER_SHEET) | ROW(KERNEL), ALL & ~RENDERER(INTEGRAL), FOR_SPLATS, PRE | POST,
+    { ROW(SAMPLES_PER_SHEET) | ROW(INTERPOLATION), ALL & ~RENDERER(INTEGRAL), FOR_SPLATS,
+      PRE | POST,
       "does not apply with options for splats: --kernel exact, ewa or fixed, --low-pass, "
       "--flatten, --kernel-radius, --method image, --weights, --compositing, --target, --submit, "
       "--count and --traversal ascending",
       true },
-    { ROW(KERNEL), ALL & ~RENDERER(INTEGRAL), PRE, 0,
-      "linear, cubic and gaussian require --classify post or --renderer integral", IDLE },
+    { ROW(INTERPOLATION), ALL & ~RENDERER(INTEGRAL), PRE, 0,
+      "requires --classify post or --renderer integral", IDLE },
+    { ROW(SAMPLES_PER_SHEET), ALL, NEAREST, 0,
+      "does not apply to --interpolation nearest, which follows rays from voxel to voxel", IDLE },
     { ROW(SAMPLES_PER_SHEET), ALL, PRE, 0, "requires --classify post", IDLE },
     { ROW(TRAVERSAL), ALL, POST | ASCENDING, 0, "must be outward with --classify post", CONFLICT },
     { ROW(METHOD), ALL, POST | IMAGE, 0, "image requires --classify pre", CONFLICT },
@@ -200,7 +204,8 @@ static int facts_of(const draw_settings *s)
            (s->all.method <= TRIPTYCH_METHOD_MERGE ? MERGE : 0) |
            (s->all.method == TRIPTYCH_METHOD_IMAGE ? IMAGE : 0) |
            (s->all.traversal == TRIPTYCH_TRAVERSAL_ASCENDING ? ASCENDING : 0) |
-           (s->all.kernel == TRIPTYCH_KERNEL_GAUSSIAN ? GAUSSIAN : 0) |
+           (s->all.interpolation == TRIPTYCH_INTERPOLATION_GAUSSIAN ? GAUSSIAN : 0) |
+           (s->all.interpolation == TRIPTYCH_INTERPOLATION_NEAREST ? NEAREST : 0) |
            (s->integral.field == TRIPTYCH_FIELD_SPLATS ? FIELD_OF_SPLATS : 0) |
            (s->all.show > TRIPTYCH_SHOW_PICTURE ? DEBUG_VIEW : 0) |
            (s->all.show == TRIPTYCH_SHOW_MERGE ? SHOW_MERGE : 0) |

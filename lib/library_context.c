@@ -247,6 +247,7 @@ static void close_data(triptych *t)
     free(t->name);
     t->name = NULL;
     t->open = t->has_function = t->has_view = t->levels_warned = t->kernel_warned = false;
+    t->nearest_noted = false;
 }
 
 void triptych_close(triptych *t)

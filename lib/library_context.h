@@ -83,6 +83,8 @@ struct triptych {
 
     trip_settings drawn_settings; /* of the begun frame, with all choices made */
     const char *why_pre;          /* reason if auto chose pre, otherwise NULL */
+    bool nearest_chosen;          /* for labels, because no interpolation was given */
+    bool nearest_noted;           /* a note named the choice */
     char why_splats[64];
     trip_view_samples_per_sheet samples_per_sheet; /* for the view */
     /* `begun`: camera and plan exist. `drawn`: the drawing exists, too. */
@@ -153,5 +155,8 @@ static inline unsigned trip_context_threads(unsigned wanted)
 {
     return wanted < TRIP_CONTEXT_MAX_THREADS ? wanted : TRIP_CONTEXT_MAX_THREADS;
 }
+
+/* Whether the frame shows values, not splats. Valid once its settings are chosen. */
+bool trip_context_draws_values(const triptych *t);
 
 #endif

@@ -115,7 +115,7 @@ trip_settings trip_settings_of(const draw_settings *s)
     out.lod_px = s->lod.voxel_px;
     out.max_bytes = s->lod.max_bytes;
     out.field = CHOSEN(trip_field_kind, s->integral.field);
-    out.kernel = CHOSEN(trip_kernel, s->all.kernel);
+    out.kernel = CHOSEN(trip_kernel, s->all.interpolation);
     out.tolerance = number_or(s->integral.tolerance, out.tolerance);
     out.samples = s->all.samples ? s->all.samples : 1;
     out.show = CHOSEN(trip_show, s->all.show);

@@ -48,7 +48,13 @@ static void explain_choices(const triptych *t, FILE *out)
     if (t->why_pre)
         fprintf(out, "default     pre instead of post: %s\n", t->why_pre);
     explain_parts(t, out);
-    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
+    const bool nearest = t->drawn_settings.kernel == TRIP_KERNEL_NEAREST;
+    if (t->nearest_chosen)
+        fputs("default     nearest instead of linear interpolation: the values are labels\n", out);
+    if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && nearest)
+        fputs("samples     one per voxel that a ray meets, as always with the nearest value\n",
+              out);
+    else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
         fprintf(out,
                 "samples     %d per sheet, by the view: between sheets rays move up to %.2f voxels "
                 "sideways; voxels are up to %.3g %s wide\n",
@@ -142,6 +148,9 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
                                  ? t->drawn_settings.samples_per_sheet
                                  : 0,
+        .interpolation = trip_context_draws_values(t)
+                             ? (triptych_interpolation)(t->drawn_settings.kernel + 1)
+                             : TRIPTYCH_INTERPOLATION_DEFAULT,
         .footprint = (triptych_footprint)(t->drawn_settings.footprint + 1),
         .early_termination =
             t->plan.gathers ? -1 : trip_settings_early_termination(&t->drawn_settings),

@@ -335,13 +335,18 @@ typedef enum triptych_traversal {
 } triptych_traversal;
 
 /* Interpolation of values, in post and the integral. */
-typedef enum triptych_kernel {
-    TRIPTYCH_KERNEL_DEFAULT, /* linear */
-    TRIPTYCH_KERNEL_LINEAR,  /* between the 8 nearest voxels */
-    TRIPTYCH_KERNEL_CUBIC,   /* Catmull-Rom, between 64 voxels */
+typedef enum triptych_interpolation {
+    /* Nearest if the data set holds labels of more than two values, otherwise linear. Between two
+     * values lies only the surface of a solid. */
+    TRIPTYCH_INTERPOLATION_DEFAULT,
+    TRIPTYCH_INTERPOLATION_LINEAR, /* between the 8 nearest voxels */
+    TRIPTYCH_INTERPOLATION_CUBIC,  /* Catmull-Rom, between 64 voxels */
     /* The profile of a splat over 64 voxels, which smooths. Not for the integral. */
-    TRIPTYCH_KERNEL_GAUSSIAN,
-} triptych_kernel;
+    TRIPTYCH_INTERPOLATION_GAUSSIAN,
+    /* The value of the nearest voxel, for labels: no point has a value that no voxel has. Rays are
+     * followed from voxel to voxel, whatever the quality and the samples per sheet. */
+    TRIPTYCH_INTERPOLATION_NEAREST,
+} triptych_interpolation;
 
 /* The colours of a picture. */
 typedef enum triptych_show {
@@ -529,7 +534,7 @@ typedef struct triptych_settings {
     triptych_classify classify;
     triptych_method method;
     triptych_traversal traversal;
-    triptych_kernel kernel;
+    triptych_interpolation interpolation;
     triptych_show show; /* not with the integral, which has no lists and no levels */
     /* Merge: weight at which layers begin to blend, 0 (TRIPTYCH_ZERO) to below 1. The default is
      * 0.85 for pre and 0.99 for post. */
@@ -696,9 +701,11 @@ typedef struct triptych_frame_stats {
     uint64_t memory_bytes, peak_memory_bytes; /* limit, and maximum since the data set was opened */
     /* Examples: "cpu", "8 threads, AVX2" and "io_uring+O_DIRECT". */
     const char *renderer, *device, *engine;
-    const char *ring;             /* memory into which blocks are read, in words */
-    triptych_classify classify;   /* pre or post, as drawn */
-    int samples_per_sheet;        /* post; 0 in pre */
+    const char *ring;           /* memory into which blocks are read, in words */
+    triptych_classify classify; /* pre or post, as drawn */
+    int samples_per_sheet;      /* post; 0 in pre */
+    /* Post, and the integral of values, as drawn; otherwise TRIPTYCH_INTERPOLATION_DEFAULT. */
+    triptych_interpolation interpolation;
     triptych_footprint footprint; /* pre, as drawn */
     /* Transmittance below which pixels took no more samples; -1 with the integral. */
     double early_termination;

@@ -362,6 +362,9 @@ static int make_levels(brick *b)
                              .typical_max = b->in.tally->typical_max,
                              .codes = trip_brick_codes_get(&b->codes),
                              .hidden_above = is_hidden_above(b),
+                             .labels =
+                                 trip_brick_kind(b->in.info, &b->in.histogram) == TRIP_TF_LABELS &&
+                                 !trip_tf_is_solid(&b->in.histogram),
                              .folder = b->temporary.partial_path,
                              .writer = b->writer,
                              .spill = b->temporary.spill,

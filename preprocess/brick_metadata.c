@@ -94,6 +94,8 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
         .integers = info->type < TRIP_F16 && info->slope == floor(info->slope) &&
                     info->inter == floor(info->inter),
         .modality = info->modality,
+        .labels = info->labels,
+        .named_labels = info->named_labels,
         .patient = info->space[0] || !strcmp(info->format, "nifti"),
     };
     return trip_tf_recognise(&origin, h);

@@ -29,6 +29,10 @@ void trip_kernel_weights(trip_kernel kernel, double position, double weights[TRI
         cubic_weights(position, weights);
     } else if (kernel == TRIP_KERNEL_GAUSSIAN) {
         gaussian_weights(position, weights);
+    } else if (kernel == TRIP_KERNEL_NEAREST) {
+        weights[0] = weights[3] = 0;
+        weights[2] = position >= 0.5;
+        weights[1] = 1 - weights[2];
     } else {
         weights[0] = weights[3] = 0;
         weights[1] = 1 - position;
@@ -38,6 +42,6 @@ void trip_kernel_weights(trip_kernel kernel, double position, double weights[TRI
 
 const char *trip_kernel_name(trip_kernel kernel)
 {
-    static const char *const names[] = { "linear", "cubic", "gaussian" };
+    static const char *const names[] = { "linear", "cubic", "gaussian", "nearest" };
     return names[kernel];
 }

@@ -68,6 +68,9 @@ int trip_settings_check(const trip_settings *s)
         return trip_fail(TRIP_USAGE, "render", "flatten", "flat kernels require kernel ewa");
     if (s->classify == TRIP_CLASSIFY_PRE)
         return 0;
+    if (s->kernel == TRIP_KERNEL_NEAREST && s->samples_per_sheet != 2)
+        return trip_fail(TRIP_USAGE, "render", "samples-per-sheet",
+                         "nearest interpolation requires 2 samples per sheet");
     if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
         return trip_fail(TRIP_USAGE, "render", "kernel",
                          "footprints and their low-pass filter apply to splats; use classify pre");

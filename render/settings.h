@@ -63,6 +63,7 @@ typedef enum trip_kernel {
     TRIP_KERNEL_CUBIC,    /* Catmull-Rom, between 64 voxels */
     TRIP_KERNEL_GAUSSIAN, /* profile of a splat over 64 voxels, which smooths (kernel.h); not for
                              the integral */
+    TRIP_KERNEL_NEAREST,  /* the nearest voxel's value, for labels (sheet.h) */
 } trip_kernel;
 
 /* The order of classification by the transfer function and reconstruction from voxels. */
@@ -120,7 +121,7 @@ typedef struct trip_settings {
     /* Merge: interpolates the weights of a splat's corners over the splat (2008, 4.2). Near splats
      * use the weights of pixels. */
     bool vertex_weights;
-    int samples_per_sheet; /* post: 1 to TRIP_SHEET_SAMPLES_MAX */
+    int samples_per_sheet; /* post: 1 to TRIP_SHEET_SAMPLES_MAX; 2 with the nearest value */
     trip_method method;
     trip_traversal traversal;
     trip_target target;
@@ -210,7 +211,9 @@ static inline bool trip_settings_has_one_list(const trip_settings *s)
 /* Whether a frame interpolates values between voxels, so that it needs draw codes. */
 static inline bool trip_settings_interpolates(const trip_settings *s, bool integral)
 {
-    return integral ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;
+    const bool values =
+        integral ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;
+    return values && s->kernel != TRIP_KERNEL_NEAREST;
 }
 
 /* Whether coarse levels may be drawn. */

@@ -11,10 +11,11 @@
  * - 0 without neighbours.
  *
  * A cell is the cube between eight voxels. It is empty unless all eight are present. Within a cell
- * settings.kernel (kernel.h) interpolates codes and gradients along each axis: linearly between the
- * corners, or from the 4 x 4 x 4 voxels around as in field.h. Beyond the grid its edge repeats. Any
- * other missing voxel counts as the corner next to it. A halo of one voxel holds all corners of the
- * cells with a kept voxel, but not all voxels around them.
+ * settings.kernel (kernel.h) interpolates codes and gradients along each axis. It does so linearly
+ * between the corners, or from the 4 x 4 x 4 voxels around as in field.h. `Nearest value` below
+ * interpolates nothing. Beyond
+ * the grid its edge repeats. Any other missing voxel counts as the corner next to it. A halo of one
+ * voxel holds all corners of the cells with a kept voxel, but not all voxels around them.
  *
  * Samples
  * -------
@@ -47,6 +48,26 @@
  * linear in the value, or nearly, cpu and gl use a closed form instead, within 0.16/255 of a
  * picture (closed_form.h).
  *
+ * Nearest value
+ * -------------
+ * Values between two labels are no labels. With TRIP_KERNEL_NEAREST the field in a cell is the code
+ * of the nearest corner. So each voxel fills a box that ends half-way to its neighbours. A point
+ * half-way between two voxels belongs to the voxel with the greater index. A voxel beside a missing
+ * one, or at the edge of the grid, has only the part of its box that lies in cells with all
+ * corners.
+ *
+ * S is 2, so that a plane lies half-way between two sheets, and no segment crosses it. A segment is
+ * divided where the ray leaves a box through a face along u or v, and cut at the sides of the grid.
+ * Each part has the code of its box, so it equals the integral. It is empty if the point at
+ * TRIP_SHEET_BOX_POINT of it lies in an empty cell. The point is not the middle, since the middle
+ * of a box is the face of two cells.
+ *
+ * Differences of label numbers are no gradient. A part is lit at its middle. Its gradient points
+ * into its label. Along each axis it is the difference of an indicator between the voxel's
+ * neighbours, over the voxel's length (trip_coordinates_width()). The indicator is 1 for the
+ * voxel's code and 0 for any other code, visible or not, and for a missing voxel. If the gradient
+ * is not 0, the segment is lit fully (trip_shade_outline_full()).
+ *
  * Compositing
  * -----------
  * Segments are composited front to back, outward from the eye. A pixel takes no more segments once
@@ -65,6 +86,8 @@ static inline int trip_sheet_reach(trip_kernel kernel)
     return trip_kernel_reach(kernel) + 1;
 }
 enum { TRIP_SHEET_REACH_MAX = 3 };
+
+#define TRIP_SHEET_BOX_POINT 0.4
 
 /* Returns the distance, in indices, of the farthest ray that a voxel changes. */
 static inline double trip_sheet_radius(trip_kernel kernel)

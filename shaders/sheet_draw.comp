@@ -60,6 +60,12 @@ struct position {
     vec2 part; // fraction within the cell
     bool there; // all voxels of the cell are present
     float code;
+#ifdef NEAREST
+    // Where the ray crosses the plane: whole part and rest. nearest_between() sets the voxel.
+    ivec2 base;
+    vec2 rest;
+    ivec3 voxel;
+#endif
 };
 
 ray ray_of(vec2 p)
@@ -201,21 +207,15 @@ int find_cell(int first, int count, int base, inout float rest)
 }
 #endif
 
-position position_at(ray r, trip_gl_sheet_end end)
+// Finds the cell of a position, given as whole part and rest, and the fraction within the cell.
+void place(ivec2 base, vec2 p, inout position at)
 {
-    position at;
-#ifdef PARALLEL
-    vec2 p = vec2(end.first_u, end.first_v) + r.shift;
-#else
-    vec2 p = vec2(end.first_u, end.first_v) + end.along * r.shift;
-#endif
-    p = clamp(p, -268435456.0, 268435456.0);
 #ifdef UNEVEN
-    at.cell = ivec2(find_cell(0, extent.x, end.base_u, p.x), find_cell(extent.x, extent.y, end.base_v, p.y));
+    at.cell = ivec2(find_cell(0, extent.x, base.x, p.x), find_cell(extent.x, extent.y, base.y, p.y));
     at.part = p;
 #else
     vec2 whole = floor(p);
-    at.cell = ivec2(end.base_u, end.base_v) + ivec2(whole);
+    at.cell = base + ivec2(whole);
     at.part = p - whole;
     // The last voxels of the grid belong to the last cell.
     for (int i = 0; i < 2; i++)
@@ -226,7 +226,29 @@ position position_at(ray r, trip_gl_sheet_end end)
 #endif
     at.there = false;
     at.code = 0.0;
-    if (any(lessThan(at.cell, ivec2(0))) || any(greaterThanEqual(at.cell + 1, extent.xy)))
+}
+
+bool is_within(ivec2 cell)
+{
+    return all(greaterThanEqual(cell, ivec2(0))) && all(lessThan(cell + 1, extent.xy));
+}
+
+position position_at(ray r, trip_gl_sheet_end end)
+{
+    position at;
+#ifdef PARALLEL
+    vec2 p = vec2(end.first_u, end.first_v) + r.shift;
+#else
+    vec2 p = vec2(end.first_u, end.first_v) + end.along * r.shift;
+#endif
+    p = clamp(p, -268435456.0, 268435456.0);
+    place(ivec2(end.base_u, end.base_v), p, at);
+#ifdef NEAREST
+    at.base = ivec2(end.base_u, end.base_v);
+    at.rest = p;
+    return at;
+#endif
+    if (!is_within(at.cell))
         return at;
 #ifdef WIDE
     vec4 before = corners_at(at.cell, end.before), behind = corners_at(at.cell, end.behind);
@@ -246,8 +268,74 @@ position position_at(ray r, trip_gl_sheet_end end)
     return at;
 }
 
+#ifdef NEAREST
+// Finds the sample at a fraction of the way between two planes: the nearest corner of its cell, if
+// all corners are present. The plane half-way between two sheets ends segments, so one sheet is
+// nearest throughout.
+position nearest_between(position a, position b, float share, trip_gl_sheet_end from, trip_gl_sheet_end to)
+{
+    position at = a;
+    place(a.base, mix(a.rest, b.rest + vec2(b.base - a.base), share), at);
+    if (!is_within(at.cell))
+        return at;
+    vec4 corners = min(corners_at(at.cell, to.before), corners_at(at.cell, to.behind));
+    at.voxel = ivec3(at.cell + ivec2(greaterThanEqual(at.part, vec2(0.5))),
+                     from.part + to.part < 1.0 ? to.before : to.behind);
+    at.there = all(greaterThanEqual(corners, vec4(0.0)));
+    at.code = texelFetch(codes, at.voxel, 0).r;
+    return at;
+}
+
+// Returns the position of the face between a voxel and the next, along u (axis 0) or v, relative to
+// a whole position.
+float face_behind(int voxel, int axis, int base)
+{
+#ifdef UNEVEN
+    int first = axis * extent.x, last = extent[axis] - 1;
+    return -0.5 * (beyond(first + clamp(voxel, 0, last), base, 0.0) +
+                   beyond(first + clamp(voxel + 1, 0, last), base, 0.0));
+#else
+    return float(voxel - base) + 0.5;
+#endif
+}
+
+// Returns the voxel nearest to a position along u (axis 0) or v.
+int voxel_near(int base, float rest, int axis)
+{
+#ifdef UNEVEN
+    int first = axis * extent.x, cell = find_cell(first, extent[axis], base, rest);
+    if (cell < 0)
+        return beyond(first, base, rest) < 0.0 ? 0 : extent[axis] - 1;
+    return cell + (rest >= 0.5 ? 1 : 0);
+#else
+    return base + int(floor(rest + 0.5));
+#endif
+}
+
+// Cuts the fractions `part` of a segment at the sides of the grid.
+void cut_at_sides(position a, position b, inout vec2 part)
+{
+    for (int i = 0; i < 2; i++) {
+        float from = a.rest[i], way = b.rest[i] + float(b.base[i] - a.base[i]) - from;
+#ifdef UNEVEN
+        float lo = -beyond(i * extent.x, a.base[i], 0.0), hi = -beyond(i * extent.x + extent[i] - 1, a.base[i], 0.0);
+#else
+        float lo = float(clips[1 + i] - a.base[i]), hi = float(extent[2 + i] - a.base[i]);
+#endif
+        float x = ((way > 0.0 ? lo : hi) - from) / way, y = ((way > 0.0 ? hi : lo) - from) / way;
+        if (way != 0.0)
+            part = vec2(max(part.x, x), min(part.y, y));
+    }
+}
+#endif
+
 #ifdef SHADED
-#ifdef WIDE
+#ifdef NEAREST
+vec3 gradient_at(position at, trip_gl_sheet_end end)
+{
+    return texelFetch(gradients, at.voxel, 0).xyz;
+}
+#elif defined(WIDE)
 vec3 gradient_at(position at, trip_gl_sheet_end end)
 {
     vec4 weights[3] = vec4[3](kernel_weights(at.part.x), kernel_weights(at.part.y), kernel_weights(end.part));
@@ -302,7 +390,11 @@ float place_between(int voxel, float part)
 // Returns the position in the grid, list axes.
 vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
-#ifdef UNEVEN
+#if defined(NEAREST) && defined(UNEVEN)
+    return vec3(end.sheet, vec2(at.base) + at.rest);
+#elif defined(NEAREST)
+    return vec3(end.sheet, vec2(at.base - clips.yz) + at.rest);
+#elif defined(UNEVEN)
     return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
 #else
     return vec3(end.sheet, vec2(at.cell - clips.yz) + at.part);
@@ -310,20 +402,22 @@ vec3 voxel_of(position at, trip_gl_sheet_end end)
 }
 #endif
 
-// Composites the segment between two ends behind the pixel's colour, opacity and depth.
-void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
-                 inout float pixel_depth)
+// Composites the part of a segment from fraction `first` to `last` behind the pixel's colour,
+// opacity and depth.
+void add_part(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, float first, float last,
+              inout vec4 pixel, inout float pixel_depth)
 {
-    // start and end are depths; first and last are fractions of the segment that the clipping
-    // keeps.
+    // start and end are depths.
     float start = (to.along - to.step - r.start) / r.along, end = (to.along - r.start) / r.along;
-    float first = 0.0, last = 1.0;
-    if (clips.x > 0) {
-        first = clamp((r.from - start) / (end - start), 0.0, 1.0);
-        last = clamp((r.to - start) / (end - start), 0.0, 1.0);
-    }
     if (!(first < last))
         return;
+#ifdef NEAREST
+    position middle_at = nearest_between(a, b, mix(first, last, BOX_POINT), from, to);
+    if (!middle_at.there)
+        return;
+    a.code = b.code = middle_at.code;
+    a.voxel = b.voxel = middle_at.voxel;
+#endif
     vec4 medium = segment_between(first > 0.0 ? mix(a.code, b.code, first) : a.code,
                                   last < 1.0 ? mix(a.code, b.code, last) : b.code, across_u.w);
     if (!(medium.a > 0.0))
@@ -363,6 +457,48 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a
     }
 }
 
+#ifdef NEAREST
+// Adds the parts of a segment between fractions, box by box.
+void add_boxes(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, vec2 part,
+               inout vec4 pixel, inout float pixel_depth)
+{
+    vec2 way = b.rest + vec2(b.base - a.base) - a.rest;
+    cut_at_sides(a, b, part);
+    ivec2 voxel = ivec2(0), step = ivec2(sign(way));
+    for (int i = 0; i < 2; i++)
+        voxel[i] = voxel_near(a.base[i], a.rest[i] + part.x * way[i], i);
+    for (float x = part.x; x < part.y && pixel.a < 1.0;) {
+        vec2 face = vec2(2.0);
+        for (int i = 0; i < 2; i++)
+            if (step[i] != 0)
+                face[i] = (face_behind(voxel[i] - (step[i] < 0 ? 1 : 0), i, a.base[i]) - a.rest[i]) / way[i];
+        float next = max(x, min(part.y, min(face.x, face.y)));
+        add_part(r, from, to, a, b, x, next, pixel, pixel_depth);
+        x = next;
+        int leaving = face.x <= face.y ? 0 : 1;
+        voxel[leaving] += step[leaving];
+        if (face[leaving] > part.y)
+            break;
+    }
+}
+#endif
+
+// Composites the segment between two ends, where the clipping keeps it.
+void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
+                 inout float pixel_depth)
+{
+    vec2 part = vec2(0.0, 1.0);
+    if (clips.x > 0) {
+        float start = (to.along - to.step - r.start) / r.along, end = (to.along - r.start) / r.along;
+        part = clamp((vec2(r.from, r.to) - start) / (end - start), 0.0, 1.0);
+    }
+#ifdef NEAREST
+    add_boxes(r, from, to, a, b, part, pixel, pixel_depth);
+#else
+    add_part(r, from, to, a, b, part.x, part.y, pixel, pixel_depth);
+#endif
+}
+
 void main()
 {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, rows.y);
@@ -382,7 +518,11 @@ void main()
     last.there = false;
     for (int i = 0; i < rows.w && pixel.a < 1.0; i++) {
         position next = position_at(r, ends[i]);
+#ifdef NEAREST
+        bool visible = ends[i].step != 0.0;
+#else
         bool visible = ends[i].step != 0.0 && next.there && last.there;
+#endif
 #ifdef PARALLEL
         // Segments that start behind the eye's plane are omitted.
         visible = visible && (ends[i].along - ends[i].step - r.start) * along.w >= 0.0;

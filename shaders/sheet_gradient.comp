@@ -46,12 +46,22 @@ vec2 voxels_apart(int first, int i, int count)
 #endif
 }
 
+#ifdef NEAREST
+// Returns the gradient of an outline. A voxel at the edge has a distance of 0 to the missing
+// neighbour. Mirrors trip_field_outline() in render/field/field.c.
+float difference(float before, float here, float after, vec2 apart)
+{
+    float width = (apart.x + apart.y) * (apart.x > 0.0 && apart.y > 0.0 ? 0.5 : 1.0);
+    return (float(after == here) - float(before == here)) / width;
+}
+#else
 float difference(float before, float here, float after, vec2 apart)
 {
     if (before >= NO_CODE && after >= NO_CODE)
         return (after - before) / (apart.x + apart.y);
     return after >= NO_CODE ? (after - here) / apart.y : before >= NO_CODE ? (here - before) / apart.x : 0.0;
 }
+#endif
 
 void main()
 {

@@ -541,6 +541,9 @@ bool draw_quality(trip_panel *p, trip_document *d)
     bool changed = choose_setting(p, "Quality preset", &s->all.quality, qualities, 4, normal);
     changed |= choose(p, "Classification", &s->all.classify, classes, 3);
     if (draw_settings_may_use_sheets(s)) {
+        static const char *const values[] = { "Automatic", "Linear", "Cubic", "Gaussian",
+                                              "Nearest (labels)" };
+        changed |= choose(p, "Interpolation", &s->all.interpolation, values, 5);
         int samples = s->sheet.samples > 0 ? s->sheet.samples : 0;
         changed |= mark_beside(
             p, "Samples per sheet",

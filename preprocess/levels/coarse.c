@@ -20,6 +20,28 @@ void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *ou
         out->around = TRIP_COARSE_NONE_KEPT;
 }
 
+void trip_coarse_votes_add(trip_coarse_votes *v, uint16_t code, uint32_t count)
+{
+    unsigned i = 0;
+    while (i < v->used && v->codes[i] != code)
+        i++;
+    if (i == v->used) { /* a coarse voxel has at most eight voxels */
+        v->codes[i] = code;
+        v->counts[v->used++] = 0;
+    }
+    v->counts[i] += count;
+}
+
+uint16_t trip_coarse_votes_get(const trip_coarse_votes *v)
+{
+    unsigned best = 0;
+    for (unsigned i = 1; i < v->used; i++)
+        if (v->counts[i] > v->counts[best] ||
+            (v->counts[i] == v->counts[best] && v->codes[i] > v->codes[best]))
+            best = i;
+    return v->codes[best];
+}
+
 void trip_coarse_mean_clear(trip_coarse_mean_sum *s)
 {
     memset(s, 0, sizeof *s);

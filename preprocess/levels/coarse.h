@@ -109,6 +109,19 @@ static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_
  * codes, the caller sets `value` instead. */
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out);
 
+/* Counts the codes of one coarse voxel of labels, since a mean of labels is another label.
+ * Zero-initialise it. */
+typedef struct trip_coarse_votes {
+    uint16_t codes[8];
+    uint32_t counts[8];
+    unsigned used;
+} trip_coarse_votes;
+
+/* Adds a code that `count` of the voxels of level 0 have, in any unit. */
+void trip_coarse_votes_add(trip_coarse_votes *v, uint16_t code, uint32_t count);
+/* Returns the most frequent code, and of equally frequent ones the greatest. */
+uint16_t trip_coarse_votes_get(const trip_coarse_votes *v);
+
 /* Sums for the means of one coarse voxel. Call trip_coarse_mean_clear() before adding voxels. */
 typedef struct trip_coarse_mean_sum {
     trip_coarse_uneven uneven;

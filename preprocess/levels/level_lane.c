@@ -17,6 +17,10 @@ size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsign
     l->value_sums = trip_level_carve(memory, &used, plane * sizeof *l->value_sums);
     l->values = trip_level_carve(memory, &used, plane * sizeof *l->values);
     l->touched = trip_level_carve(memory, &used, plane / 8);
+    if (w->labels)
+        l->value_votes = trip_level_carve(memory, &used, plane * sizeof *l->value_votes);
+    if (w->labels && w->means)
+        l->mean_votes = trip_level_carve(memory, &used, plane * sizeof *l->mean_votes);
     if (w->means) {
         l->mean_sums = trip_level_carve(memory, &used, plane * sizeof *l->mean_sums);
         l->means = trip_level_carve(memory, &used, plane * sizeof *l->means);
@@ -92,6 +96,10 @@ static void touch(trip_level_lane *l, size_t at)
     l->value_sums[at] = (trip_coarse_value_sum){ 0 };
     if (l->mean_sums)
         trip_coarse_mean_clear(&l->mean_sums[at]);
+    if (l->value_votes)
+        l->value_votes[at] = (trip_coarse_votes){ .used = 0 };
+    if (l->mean_votes)
+        l->mean_votes[at] = (trip_coarse_votes){ .used = 0 };
 }
 
 /* Maps a voxel of the level below: index of its coarse voxel in the sums, and parity of its
@@ -166,6 +174,8 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
             add_uneven(w, &l->value_sums[at].uneven, TRIP_COARSE_ALL, codes[i]);
         if (!square->kept)
             trip_coarse_value_add_around(&l->value_sums[at], around[n]);
+        for (uint32_t i = before; i < before + count && l->value_votes; i++)
+            trip_coarse_votes_add(&l->value_votes[at], codes[i], TRIP_COARSE_ALL);
         before += count;
     }
 }
@@ -187,6 +197,9 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
         if (has_table(w))
             add_uneven(w, &l->mean_sums[p.at].uneven, TRIP_COARSE_ALL,
                        (uint16_t)trip_voxel_code(voxels[i]));
+        if (l->mean_votes)
+            trip_coarse_votes_add(&l->mean_votes[p.at], (uint16_t)trip_voxel_code(voxels[i]),
+                                  TRIP_COARSE_ALL);
     }
 }
 
@@ -243,6 +256,8 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         } else {
             trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
         }
+        if (l->value_votes)
+            trip_coarse_votes_add(&l->value_votes[p.at], value->value, value->known);
         if (!l->means_below || !l->means_below[i].kept)
             continue;
         if (w->format.normals)
@@ -252,6 +267,9 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         if (has_table(w))
             add_uneven(w, &l->mean_sums[p.at].uneven, l->means_below[i].kept,
                        l->means_below[i].mean);
+        if (l->mean_votes)
+            trip_coarse_votes_add(&l->mean_votes[p.at], l->means_below[i].mean,
+                                  l->means_below[i].kept);
     }
     return status;
 }
@@ -270,6 +288,8 @@ static void take_mean(const trip_level_lane *l, const trip_level_work *w, size_t
     trip_coarse_mean_get(sum, mean);
     if (has_table(w) && mean->kept)
         mean->mean = code_of_sum(w, &sum->uneven, (double)sum->kept);
+    if (l->mean_votes && mean->kept)
+        mean->mean = trip_coarse_votes_get(&l->mean_votes[at]);
     trip_coarse_mean_gradient(&l->mean_sums[at], gradient);
     if (mean->kept && w->format.normals)
         mean->normal = normal_of(w, gradient);
@@ -288,6 +308,8 @@ TRIP_ALSO_V3 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_
             if (has_table(w))
                 l->values[n].value =
                     code_of_sum(w, &l->value_sums[at].uneven, l->value_sums[at].known);
+            if (l->value_votes)
+                l->values[n].value = trip_coarse_votes_get(&l->value_votes[at]);
             if (l->means)
                 take_mean(l, w, at, &l->means[n]);
             n++;

@@ -15,6 +15,7 @@ typedef struct trip_level_work {
     trip_piece_format format; /* format of the level's pieces */
     bool means, values;       /* the kinds of lists */
     bool hidden_above;        /* as in trip_levels_params */
+    bool labels;              /* as in trip_levels_params */
     trip_quantiser quantiser;
     const double *value_of;              /* value of each code; NULL if codes are even or ids */
     const trip_compact_normals *compact; /* NULL means 4 bytes */
@@ -41,7 +42,8 @@ typedef struct trip_level_lane {
      */
     trip_coarse_value_sum *value_sums;
     trip_coarse_mean_sum *mean_sums;
-    uint64_t *touched; /* bit mask of the voxels with sums */
+    trip_coarse_votes *value_votes, *mean_votes; /* of labels; otherwise NULL */
+    uint64_t *touched;                           /* bit mask of the voxels with sums */
     /* The square's finished voxels, by row. `means` is NULL without lists of means. */
     trip_coarse_value *values;
     trip_coarse_mean *means;

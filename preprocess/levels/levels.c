@@ -466,6 +466,7 @@ static int open_sharpen(making *m)
                       m->params->hidden_above, m->work.edge_log2, m->budget);
     m->sharpen.value_of = m->work.value_of;
     m->sharpen.quantiser = &m->work.quantiser;
+    m->sharpen.labels = m->params->labels;
     return status;
 }
 
@@ -518,6 +519,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level,
     w->means = params->kinds.means;
     w->values = params->kinds.values;
     w->hidden_above = params->hidden_above;
+    w->labels = params->labels;
     w->quantiser = params->quantiser;
     w->compact = params->compact;
     w->index_to_world = params->index_to_world;

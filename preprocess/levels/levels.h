@@ -31,6 +31,7 @@ typedef struct trip_levels_params {
     double typical_min, typical_max; /* typical range of the volume's values */
     trip_codes codes;                /* the same codes as the quantiser's */
     bool hidden_above;               /* dropped values lie mostly above the kept ones */
+    bool labels;                     /* coarse voxels take the most frequent code, not the mean */
     const char *folder;              /* folder for temporary files */
     trip_writer *writer;             /* has the lists of trip_levels_lists() */
     trip_spill *spill; /* its sequences are retired, because they are no longer needed */

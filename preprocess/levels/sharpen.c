@@ -182,7 +182,7 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
 {
     const trip_level_position *position = &of->square;
     int status = read_square(s, position, l->values, &l->squares[0]);
-    if (s->quantiser && s->quantiser->ids)
+    if (s->labels || (s->quantiser && s->quantiser->ids))
         return status;
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     memset(l->value_sums, 0, sizeof *l->value_sums << 2 * s->edge_log2);

@@ -55,7 +55,8 @@ typedef struct trip_sharpen_lane {
 typedef struct trip_sharpen {
     const trip_output *file;
     unsigned edge_log2;
-    bool round; /* codes in `around` are reversed, as dropped values lie above kept ones */
+    bool labels; /* values stay as they are: a sharpened label is another one */
+    bool round;  /* codes in `around` are reversed, as dropped values lie above kept ones */
     const trip_quantiser *quantiser; /* NULL means even codes */
     const double *value_of;          /* value of each code, for knots */
     trip_level_positions positions;

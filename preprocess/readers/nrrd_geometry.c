@@ -215,6 +215,7 @@ int trip_nrrd_parse_geometry(const trip_nrrd_parser *p, trip_nrrd_header *h)
     char *text = p->values[TRIP_NRRD_ORIGIN];
     const space s = find_space(p);
     h->index_to_world = trip_affine_identity();
+    h->segments = p->segments;
     h->oriented = s.name || p->values[TRIP_NRRD_DIRECTIONS];
     int status =
         p->values[TRIP_NRRD_DIRECTIONS] ? parse_directions(p, &s, h) : parse_spacings(p, h);

@@ -103,12 +103,13 @@ char *trip_nrrd_trim(char *text)
 }
 
 /* Keeps the key "coordinates N:=x0 x1 ...", which gives the positions of the samples of axis N.
- * Headers have no field for them. Ignores all other keys. */
+ * Headers have no field for them. Notes whether keys name segments. Ignores all other keys. */
 static int keep_key(trip_nrrd_parser *p, char *line, char *colon)
 {
     static const char key[] = "coordinates ";
     char *number = line + sizeof key - 1;
     *colon = '\0';
+    p->segments |= !strcmp(line, "Segment0_ID"); /* a segmentation of 3D Slicer */
     if (strncmp(line, key, sizeof key - 1) != 0)
         return 0;
     int64_t axis;

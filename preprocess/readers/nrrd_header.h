@@ -28,6 +28,7 @@ typedef struct trip_nrrd_header {
     char space[8];          /* anatomical, as in anatomy.h; "" if the header names no such space */
     double *coordinates[3]; /* of the samples in world space; NULL if even */
     bool oriented;          /* the header gives the directions of the axes in space */
+    bool segments;          /* keys name segments */
     trip_scalar type;
     bool big_endian; /* meaningless for types of one byte */
     trip_byte_encoding encoding;
@@ -87,6 +88,7 @@ typedef struct trip_nrrd_parser {
     /* Text after "coordinates N:=", and its line. */
     char *coordinates[TRIP_NRRD_AXES_MAX];
     int coordinate_lines[TRIP_NRRD_AXES_MAX];
+    bool segments; /* keys name segments */
     int axes;
     int kept[3]; /* the axes that are i, j and k of the volume */
 } trip_nrrd_parser;

@@ -115,6 +115,7 @@ static nifti_2_header widen(const nifti_1_header *h)
         n.srow_z[i] = h->srow_z[i];
     }
     n.datatype = h->datatype;
+    n.intent_code = h->intent_code;
     /* The offset is a float on disk. An impossible one becomes negative, which a later check
      * refuses. */
     n.vox_offset = h->vox_offset >= 0 && h->vox_offset < 0x1p62f ? (int64_t)h->vox_offset : -1;
@@ -284,6 +285,7 @@ static void set_map(const char *path, const nifti_2_header *n, trip_volume_info 
     }
     info->index_to_world = has_sform ? sform : from_qform(n);
     info->oriented = has_sform || n->qform_code > 0;
+    info->labels = n->intent_code == NIFTI_INTENT_LABEL;
     snprintf(info->space, sizeof info->space, "%s", info->oriented ? "RAS" : "");
 }
 

@@ -195,6 +195,7 @@ static int nrrd_open(const char *path, const trip_volume_params *params, trip_bu
     memcpy(info->dims, h.dims, sizeof info->dims);
     info->index_to_world = h.index_to_world;
     info->oriented = h.oriented;
+    info->labels = h.segments;
     memcpy(info->space, h.space, sizeof info->space);
     info->type = h.colour ? TRIP_F32 : h.type;
     status = choose_entries(path, &h, params, info);

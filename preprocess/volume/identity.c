@@ -13,7 +13,7 @@
 
 /* Raise this with every change that makes the same input and parameters give other bytes: in a
  * reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 23 };
+enum { BRICKER_VERSION = 24 };
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
@@ -64,6 +64,8 @@ static int make_text(const trip_brick_params *p, const char *input, trip_tf *con
     if (!f)
         return fail_memory(p);
     fputs(input, f);
+    if (p->input && trip_volume_is_named_labels(p->input)) /* chooses the kind of the volume */
+        fputs("labels\n", f);
     locale_t before = trip_text_use_points();
     write_volume_params(f, &p->volume);
     write_params(f, p, functions);

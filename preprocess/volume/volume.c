@@ -1,5 +1,7 @@
 #include "volume.h"
 
+#include <strings.h>
+#include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -315,6 +317,23 @@ static int check_info(const trip_volume *v)
     return check_lengths(v);
 }
 
+bool trip_volume_is_named_labels(const char *path)
+{
+    static const char *const words[] = { "label", "labels",       "labelmap", "seg",
+                                         "dseg",  "segmentation", "aseg",     "parcellation" };
+    const char *slash = strrchr(path, '/'), *word = slash ? slash + 1 : path;
+    while (*word) {
+        size_t length = 0;
+        while (isalpha((unsigned char)word[length]))
+            length++;
+        for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+            if (strlen(words[i]) == length && !strncasecmp(word, words[i], length))
+                return true;
+        word += length + (word[length] != 0);
+    }
+    return false;
+}
+
 static int open_with_reader(trip_volume *v, const trip_volume_params *params)
 {
     int status = trip_volume_choose_reader(&v->reader, v->path, params);
@@ -327,6 +346,7 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
     status = v->reader->open(v->path, params, v->budget, &v->info, &v->state);
     if (status < 0)
         return status;
+    v->info.named_labels = trip_volume_is_named_labels(v->path);
     if (params->spacing[0] > 0)
         override_spacing(&v->info.index_to_world, params->spacing);
     if (params->coordinates && !(status = trip_volume_check_dims(v->path, &v->info)))

@@ -81,11 +81,16 @@ typedef struct trip_volume_info {
     bool oriented; /* the file gives the directions of its axes in world space */
     char up[3];    /* "+y" or "+z", which is up in the program that wrote the file; "" if unknown */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
+    bool labels;       /* the file states that its values are labels */
+    bool named_labels; /* its name does */
     char name[128];    /* grid name, if the format has one */
     char note[1024];   /* tells the user the choices made by default, or "" */
     char *parts;       /* the series of a DICOM folder, one a line, or NULL. The volume owns it. */
     trip_fills fills;  /* decoded as NaN */
 } trip_volume_info;
+
+/* Returns whether a word of a file's name says that its values are labels: "labels", "seg", ... */
+bool trip_volume_is_named_labels(const char *path);
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
  * fits in an int64_t. Readers that compute sizes call it first. In any case volume.c calls it for

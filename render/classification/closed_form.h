@@ -51,6 +51,7 @@ typedef enum trip_closed_form_fault {
                               codes */
     TRIP_CLOSED_FORM_EXTINCTION, /* extinction is not such a polynomial */
     TRIP_CLOSED_FORM_COLOUR,     /* colour is not linear */
+    TRIP_CLOSED_FORM_NEAREST,    /* not tried: the nearest value has one code a segment */
     TRIP_CLOSED_FORM_EFFECTS,    /* not tried: frames with effects use tables */
 } trip_closed_form_fault;
 

@@ -237,7 +237,7 @@ static void choose_kernels(trip_cpu *r)
     const trip_settings *s = r->frame->settings;
     r->draws_plain =
         s->classify == TRIP_CLASSIFY_POST &&
-        (trip_coordinates_uneven(&r->frame->data->coordinates) || s->kernel != TRIP_KERNEL_LINEAR);
+        (trip_coordinates_uneven(&r->frame->data->coordinates) || trip_kernel_is_wide(s->kernel));
     const trip_cpu_kernels *isa = r->draws_plain ? &trip_cpu_plain : r->isa;
     r->kernels = s->depth ? isa->with_depth : isa;
     r->project = trip_effects_some(&s->effects) ? r->kernels->project_effects : r->kernels->project;

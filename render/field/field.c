@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "kernel.h"
 #include "report.h"
 
 enum {
@@ -255,8 +256,28 @@ int trip_field_finish(trip_field *f, const trip_field_map *map)
     return 0;
 }
 
-/* Linear and gaussian weights form a mean. The absolute cubic weights add up to at most 1.25 along
- * each axis. */
+/* Returns 1 if there is a voxel with this code, otherwise 0. */
+static int has_code(const trip_field *f, const int64_t at[3], float code)
+{
+    const trip_field_voxel *v = trip_field_at(f, at[0], at[1], at[2]);
+    return v && v->code == code;
+}
+
+void trip_field_outline(const trip_field *f, const trip_coordinates *coordinates,
+                        const int64_t at[3], double gradient[3])
+{
+    const float code = trip_field_at(f, at[0], at[1], at[2])->code;
+    for (int a = 0; a < 3; a++) {
+        int64_t after[3] = { at[0], at[1], at[2] }, before[3] = { at[0], at[1], at[2] };
+        after[a]++;
+        before[a]--;
+        gradient[a] = (has_code(f, after, code) - has_code(f, before, code)) /
+                      trip_coordinates_width(coordinates, a, at[a]);
+    }
+}
+
+/* Linear, gaussian and nearest weights form a mean. The absolute cubic weights add up to at
+ * most 1.25 along each axis. */
 void trip_field_code_bounds(trip_kernel kernel, double min, double max, double bounds[2])
 {
     double sum = kernel == TRIP_KERNEL_CUBIC ? 1.25 * 1.25 * 1.25 : 1;
@@ -345,7 +366,7 @@ bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t
     if (!take_corners(f, at, corners))
         return false;
     memcpy(out->at, at, sizeof out->at);
-    out->edge = kernel == TRIP_KERNEL_LINEAR ? 2 : 4;
+    out->edge = trip_kernel_is_wide(kernel) ? 4 : 2;
     if (out->edge == 2)
         memcpy(out->voxels, corners, sizeof corners);
     else

@@ -99,6 +99,11 @@ typedef struct trip_field_cell {
     double min, max; /* range of draw codes in the cell */
 } trip_field_cell;
 
+/* Computes the gradient of the outline of a present voxel (sheet.h, `Nearest value`), per index or
+ * per unit of position. */
+void trip_field_outline(const trip_field *f, const trip_coordinates *coordinates,
+                        const int64_t at[3], double gradient[3]);
+
 /* Widens [min, max] to the range of interpolated values. */
 void trip_field_code_bounds(trip_kernel kernel, double min, double max, double bounds[2]);
 

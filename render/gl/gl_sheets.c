@@ -24,7 +24,8 @@ static int sheets_about(const trip_settings *s)
 static unsigned effects_of(const trip_frame *frame)
 {
     const trip_settings *s = frame->settings;
-    return (s->kernel != TRIP_KERNEL_LINEAR ? TRIP_GL_WIDE : 0) |
+    return (trip_kernel_is_wide(s->kernel) ? TRIP_GL_WIDE : 0) |
+           (s->kernel == TRIP_KERNEL_NEAREST ? TRIP_GL_NEAREST : 0) |
            (frame->camera->ortho ? TRIP_GL_PARALLEL : 0) | (s->shading ? TRIP_GL_SHADED : 0) |
            (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
            trip_gl_frame_placed(s) |
@@ -382,7 +383,8 @@ static double position_at(const trip_gl_sheets *s, const trip_gl_sheet *from, do
 
 /* Appends the ends of the segments between held[i] and the next sheet. Returns the new count. An
  * interval needs its own first end if `first` is set, because the previous interval is not drawn.
- * Kernels of 64 voxels always need it, because their sheets differ. Otherwise the last end of the
+ * Kernels of 64 voxels always need it, because their sheets differ. So does the nearest value,
+ * because a segment reads the sheets at its two ends. Otherwise the last end of the
  * previous interval serves. */
 static int add_ends(const trip_gl_sheets *s, int i, bool first, trip_gl_sheet_end *ends, int count)
 {
@@ -475,7 +477,7 @@ static int draw_rows(trip_gl_sheets *s)
 static void end_group(trip_gl_sheets *s)
 {
     trip_gl_sheet_drawing *d = &s->drawing;
-    const int kept = s->frame->settings->kernel == TRIP_KERNEL_LINEAR ? 0 : 1;
+    const int kept = trip_kernel_is_wide(s->frame->settings->kernel) ? 1 : 0;
     const int drop = d->done > kept ? d->done - kept : 0;
     s->count -= drop;
     memmove(s->held, s->held + drop, (size_t)s->count * sizeof *s->held);

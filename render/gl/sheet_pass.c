@@ -57,16 +57,19 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
 /* The length of a stored gradient of full shading, if codes are exact. */
 #define STORED_FULL 64.0
 
-/* Maps differences of codes (list axes) to world space. The map is the inverse transpose of
- * index_to_world. */
+/* Maps differences of codes, or of indicators with the nearest value, from list axes to world
+ * space, relative to full shading. The map is the inverse transpose of index_to_world. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
     double full = trip_shade_gradient_full(&frame->data->header, frame->camera->voxel_world,
                                            frame->plan->level);
     double unit = trip_draw_value_per_code(&frame->plan->draw) / full;
     v->gradient_scale = 1;
-    if (frame->plan->draw
-            .of_stored) { /* exact draw codes may exceed the range of stored gradients */
+    if (frame->settings->kernel == TRIP_KERNEL_NEAREST)
+        unit = 1 / trip_shade_outline_full(&frame->data->index_to_world,
+                                           frame->data->coordinates.widest);
+    else if (frame->plan->draw
+                 .of_stored) { /* exact draw codes may exceed the range of stored gradients */
         v->gradient_scale = STORED_FULL * unit / frame->camera->voxel_world;
         unit = frame->camera->voxel_world / STORED_FULL;
     }

@@ -9,6 +9,7 @@
 #include "gl/program.h"
 #include "report.h"
 #include "shade.h"
+#include "sheet.h"
 #include "splat.h"
 #include "text.h"
 
@@ -27,12 +28,12 @@ static const struct {
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
     [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", TRIP_GL_EXACT, false },
     [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp",
-                                      TRIP_GL_UNEVEN | TRIP_GL_EXACT, false },
+                                      TRIP_GL_UNEVEN | TRIP_GL_EXACT | TRIP_GL_NEAREST, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
                                       TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN |
                                       TRIP_GL_EXACT | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION |
-                                      TRIP_GL_EMISSION | TRIP_GL_CLOSED,
+                                      TRIP_GL_EMISSION | TRIP_GL_CLOSED | TRIP_GL_NEAREST,
                                   false },
 };
 
@@ -53,6 +54,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_UNEVEN, "UNEVEN" },       { TRIP_GL_SHADOWS, "SHADOWS" },
         { TRIP_GL_OCCLUSION, "OCCLUSION" }, { TRIP_GL_EMISSION, "EMISSION" },
         { TRIP_GL_CLOSED, "CLOSED" },       { TRIP_GL_EXACT, "EXACT" },
+        { TRIP_GL_NEAREST, "NEAREST" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -71,6 +73,8 @@ static void write_defines(FILE *out, const trip_gl_variant *variant)
     if (variant->effects & TRIP_GL_WIDE)
         fprintf(out, "#define CUBIC %d\n#define CUTOFF %.9f\n", (int)TRIP_KERNEL_CUBIC,
                 TRIP_CUTOFF);
+    if (variant->effects & TRIP_GL_NEAREST)
+        fprintf(out, "#define BOX_POINT %.9f\n", TRIP_SHEET_BOX_POINT);
     if (variant->effects & (TRIP_GL_SHADED | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION))
         fprintf(out,
                 "#define AMBIENT %f\n#define DIFFUSE %f\n#define SPECULAR %f\n"

@@ -115,6 +115,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     integral *r = (integral *)base;
     const trip_file_header *header = &frame->data->header;
+    const bool nearest = frame->settings->kernel == TRIP_KERNEL_NEAREST &&
+                         frame->settings->field == TRIP_FIELD_VALUES;
     r->frame = frame;
     memset(r->splats, 0, sizeof r->splats);
     int status = check_frame(frame);
@@ -131,9 +133,13 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .clip = &frame->plan->clip,
         .shaded = frame->settings->shading && (frame->settings->field == TRIP_FIELD_VALUES ||
                                                header->planes >> TRIP_PLANE_NORMALS & 1),
-        .gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
+        .nearest = nearest,
+        .gradient_full = nearest ? trip_shade_outline_full(&frame->camera->index_to_world,
+                                                           frame->data->coordinates.widest)
+                                 : trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
         .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };
+    trip_affine_invert(&frame->camera->index_to_world, &r->in.to_index); /* checked on opening */
     if (frame->settings->effects.emission)
         r->in.effects.emission = trip_emission_view_of(frame->emission);
     return status;

@@ -1,6 +1,8 @@
 #include "cell.h"
 #include "integrand.h"
 
+#include <string.h>
+
 /* A ray through the values. */
 typedef struct passage {
     const trip_integrand *in;
@@ -8,6 +10,7 @@ typedef struct passage {
     trip_light light; /* the same along the whole ray, except for a point light */
     trip_effects_view effects;
     trip_cell_line line; /* of the current cell */
+    double box[4];       /* nearest value: code and gradient in the current box */
     trip_ray_sum sum;
 } passage;
 
@@ -20,7 +23,10 @@ static void sample(void *user, double t, trip_ray_sample *out)
 {
     const passage *p = user;
     double here[4]; /* code, gradient */
-    trip_cell_line_at(&p->line, t, here);
+    if (p->in->nearest)
+        memcpy(here, p->box, sizeof here);
+    else
+        trip_cell_line_at(&p->line, t, here);
     double extinction = trip_classes_at(p->in->classes, here[0], out->rgb);
     const bool effects = trip_effects_some(&p->effects.effects);
     out->extinction = extinction * p->ray->world_per_t;
@@ -78,6 +84,58 @@ static void add_between(passage *p, position first, position last)
     }
 }
 
+/* Adds the part of a ray in the box of one of the cell's corners, where code and gradient are
+ * constant. */
+static void add_box(passage *p, const trip_field_cell *cell, double from, double to)
+{
+    const trip_integrand *in = p->in;
+    const trip_vec3 middle = trip_ray_at(p->ray, 0.5 * (from + to));
+    int64_t at[3];
+    for (int a = 0; a < 3; a++) {
+        const double x =
+            trip_coordinates_index(in->coordinates, a, trip_component(middle, a)) + 0.5;
+        at[a] = cell->at[a] + (x >= (double)(cell->at[a] + 1));
+    }
+    p->box[0] = trip_field_at(in->field, at[0], at[1], at[2])->code;
+    if (!trip_classes_visible(in->classes, p->box[0], p->box[0]))
+        return;
+    if (in->shaded) {
+        double g[3];
+        trip_field_outline(in->field, in->coordinates, at, g);
+        const trip_vec3 world =
+            trip_affine_transpose_vector(&in->to_index, trip_v3(g[0], g[1], g[2]));
+        p->box[1] = world.x;
+        p->box[2] = world.y;
+        p->box[3] = world.z;
+    }
+    const trip_ray_end first = trip_ray_end_at(from, sample, p),
+                       last = trip_ray_end_at(to, sample, p);
+    trip_ray_sum_add(&p->sum, &first, &last, sample, p);
+}
+
+/* Adds a cell box by box. The boxes of its corners meet half-way along each axis. */
+static void add_boxes(passage *p, const trip_field_cell *cell, double from, double to)
+{
+    double ends[5] = { from };
+    int count = 1;
+    for (int a = 0; a < 3; a++) {
+        const double d = trip_component(p->ray->direction, a);
+        const double half =
+            trip_coordinates_position(p->in->coordinates, a, (double)cell->at[a] + 0.5);
+        const double t = (half - trip_component(p->ray->origin, a)) / d;
+        if (!(d != 0 && t > from && t < to))
+            continue;
+        int n = count++;
+        for (; n > 1 && ends[n - 1] > t; n--)
+            ends[n] = ends[n - 1];
+        ends[n] = t;
+    }
+    ends[count] = to;
+    for (int n = 0; n < count && !trip_ray_sum_is_over(&p->sum); n++)
+        if (ends[n] < ends[n + 1])
+            add_box(p, cell, ends[n], ends[n + 1]);
+}
+
 static bool visit_cell(void *user, const int64_t at[3], double from, double to)
 {
     passage *p = user;
@@ -87,6 +145,10 @@ static bool visit_cell(void *user, const int64_t at[3], double from, double to)
     if (!(from < to) || !trip_field_take_cell(in->field, in->settings->kernel, at, &cell) ||
         !trip_classes_visible(in->classes, cell.min, cell.max))
         return true;
+    if (in->nearest) {
+        add_boxes(p, &cell, from, to);
+        return !trip_ray_sum_is_over(&p->sum);
+    }
     p->line = trip_cell_along(&cell, in->coordinates, p->ray, from, to);
     int count = trip_polynomial_turns(&p->line.code, turns);
     position here = position_at(p, 0);

@@ -19,6 +19,8 @@ typedef struct trip_integrand {
     const trip_camera *camera; /* of the field's grid */
     const trip_clip *clip;     /* for rays (values) or voxels (splats); index space */
     bool shaded;
+    bool nearest;         /* the value of the nearest voxel (sheet.h), with gradients of outlines */
+    trip_affine to_index; /* from world space; for gradients of outlines */
     double gradient_full; /* as for trip_shade() */
     trip_effects_view effects;
 } trip_integrand;
@@ -30,7 +32,8 @@ typedef struct trip_integrand {
  * - where the value turns,
  * - where the value passes a knot of the transfer function.
  *
- * Each piece is then smooth except for kinks of the light. */
+ * Each piece is then smooth except for kinks of the light. The nearest value and its gradient are
+ * constant in the box of each voxel, so the ray is divided at the faces of boxes only. */
 /* If effects depend on light that passes through the volume, each point has integrals of its own,
  * to the same tolerance. */
 trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray);

@@ -9,6 +9,9 @@
  *     colour'  = colour (1 + strength (AMBIENT + DIFFUSE diffuse - 1)) + strength SPECULAR specular
  * Colours are clamped to [0, 1].
  *
+ * Labels that are not interpolated have no gradient of values. They are lit by the gradient of
+ * their outline, which counts as full (trip_shade_outline_full(), sheet.h).
+ *
  * The highlight lies on the side towards the light. It is visible only if light and eye are on the
  * same side of the surface. `facing` lets the highlight fade towards grazing light. Up to an
  * angle of 120 degrees between light and eye, `facing` leaves the brightness at the middle of the
@@ -37,6 +40,18 @@ static inline double trip_shade_gradient_full(const trip_file_header *h, double 
     double range =
         h->typical_max > h->typical_min ? h->typical_max - h->typical_min : h->code_hi - h->code_lo;
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
+}
+
+/* Returns a length of gradients that no gradient of an outline (trip_field_outline()) falls below,
+ * world space. `widest` is the greatest length of a voxel along an axis, as in trip_coordinates.
+ * The norm of the map bounds the stretch of vectors, so the inverse map shrinks none by more. */
+static inline double trip_shade_outline_full(const trip_affine *index_to_world, double widest)
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            sum += index_to_world->m[i][k] * index_to_world->m[i][k];
+    return 1 / (sqrt(sum) * widest);
 }
 
 /* Limits x so that squares of 65536 times x fit a float. Steeper gradients are lit the same. */

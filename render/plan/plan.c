@@ -404,8 +404,8 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
     const char *why = NULL;
     if (!trip_coordinates_uneven(&data->coordinates))
         return 0;
-    if (s->kernel != TRIP_KERNEL_LINEAR)
-        why = "only linear interpolation draws it";
+    if (trip_kernel_is_wide(s->kernel))
+        why = "only linear and nearest interpolation draw it";
     else if (s->footprint == TRIP_FOOTPRINT_FIXED || s->vertex_weights ||
              s->method == TRIP_METHOD_IMAGE)
         why = "fixed footprints, vertex weights and image-aligned sheets cannot draw it";
@@ -424,13 +424,16 @@ static void plan_classification(const planning *p)
     trip_plan *plan = p->plan;
     trip_classification *c = p->classified;
     const bool effects = trip_effects_some(&p->settings->effects);
-    if (effects)
+    const bool nearest = p->settings->kernel == TRIP_KERNEL_NEAREST;
+    if (effects || nearest)
         trip_classification_codes(c, p->data, p->settings->kernel);
     else
         trip_classification_form(c, p->data, p->settings->kernel, p->table);
     plan->code_min = c->code_min;
     plan->code_max = c->code_max;
-    plan->not_closed = effects ? TRIP_CLOSED_FORM_EFFECTS : c->not_closed;
+    plan->not_closed = effects   ? TRIP_CLOSED_FORM_EFFECTS
+                       : nearest ? TRIP_CLOSED_FORM_NEAREST
+                                 : c->not_closed;
     plan->closed = c->closed;
 }
 
@@ -476,11 +479,11 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
                    .tables = tables ? tables : &plan->own_tables,
                    .budget = budget,
                    .classified = classified };
-    const bool post = settings->classify == TRIP_CLASSIFY_POST;
+    const bool interpolates = trip_settings_interpolates(settings, false);
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .planes = planes_of(data, settings),
-                         .draw = draw_codes_of(data, post ? classified->draw : NULL) };
+                         .draw = draw_codes_of(data, interpolates ? classified->draw : NULL) };
     place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
     if (!status)
@@ -619,13 +622,16 @@ static void explain_footprints(const trip_settings *s, FILE *out)
 bool trip_plan_halo_is_short(const trip_dataset *data, const trip_settings *s)
 {
     const trip_file_header *h = &data->header;
-    return s->classify == TRIP_CLASSIFY_POST && s->kernel != TRIP_KERNEL_LINEAR &&
+    return s->classify == TRIP_CLASSIFY_POST && trip_kernel_is_wide(s->kernel) &&
            h->kept < h->dims[0] * h->dims[1] * h->dims[2];
 }
 
 static void explain_kernel(const trip_dataset *data, const trip_settings *s, FILE *out)
 {
-    if (s->classify != TRIP_CLASSIFY_POST || s->kernel == TRIP_KERNEL_LINEAR)
+    if (s->classify == TRIP_CLASSIFY_POST && s->kernel == TRIP_KERNEL_NEAREST)
+        fprintf(out, "kernel      nearest: each voxel has its own value up to half-way to the "
+                     "next\n");
+    if (s->classify != TRIP_CLASSIFY_POST || !trip_kernel_is_wide(s->kernel))
         return;
     fprintf(out, "kernel      %s: interpolates between 64 voxels%s\n", trip_kernel_name(s->kernel),
             trip_plan_halo_is_short(data, s)
@@ -699,6 +705,7 @@ static void explain_classification(const trip_plan *plan, const trip_settings *s
         [TRIP_CLOSED_FORM_ENDS] = "neither the minimum nor the maximum value is visible",
         [TRIP_CLOSED_FORM_EXTINCTION] = "extinction is not linear in the value, nor close to it",
         [TRIP_CLOSED_FORM_COLOUR] = "colours are not linear in the value",
+        [TRIP_CLOSED_FORM_NEAREST] = "values are not interpolated",
         [TRIP_CLOSED_FORM_EFFECTS] = "frames with effects always do so",
     };
     const double *k = plan->closed.k;

@@ -17,8 +17,8 @@ struct trip_reference_sheets {
     const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
     double early_termination;
-    trip_field *field; /* gradients are in index space, codes per index */
-    bool has_gradients;
+    trip_field *field; /* gradients are in index space, codes per index; or of outlines */
+    bool nearest, has_gradients;
     trip_field_fill fill;
     trip_segments segments;
     trip_effects_view effects;
@@ -39,8 +39,11 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     trip_affine_invert(&data->index_to_world, &s->to_index); /* invertible: checked on opening */
     s->coordinates = &data->coordinates;
     s->early_termination = trip_settings_early_termination(frame->settings);
-    s->value_per_code = trip_draw_value_per_code(&frame->plan->draw);
-    s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
+    s->nearest = frame->settings->kernel == TRIP_KERNEL_NEAREST;
+    s->value_per_code = s->nearest ? 1 : trip_draw_value_per_code(&frame->plan->draw);
+    s->gradient_full =
+        s->nearest ? trip_shade_outline_full(&data->index_to_world, data->coordinates.widest)
+                   : trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
     if (status) {
         trip_reference_sheets_destroy(s);
@@ -88,15 +91,19 @@ static double difference(const trip_reference_sheets *s, const int64_t at[3], in
                         : 0;
 }
 
-/* Sets the gradient of a voxel. The field's single precision holds differences of whole codes
- * exactly. */
+/* Sets the gradient of a voxel, or with the nearest value the gradient of its outline. The field's
+ * single precision holds differences of whole codes exactly. */
 static int set_gradient(const trip_reference_sheets *s, const int64_t at[3])
 {
     trip_field *field = s->field;
     const trip_field_voxel *v = trip_field_at(field, at[0], at[1], at[2]);
     if (!v)
         return 0;
-    const double g[3] = { difference(s, at, 0), difference(s, at, 1), difference(s, at, 2) };
+    double g[3];
+    if (s->nearest)
+        trip_field_outline(field, s->coordinates, at, g);
+    for (int a = 0; a < 3 && !s->nearest; a++)
+        g[a] = difference(s, at, a);
     return trip_field_put(field, at, v->code, g);
 }
 
@@ -184,8 +191,8 @@ static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point
                         position *at)
 {
     const trip_kernel kernel = p->s->frame->settings->kernel;
-    if (kernel == TRIP_KERNEL_LINEAR ? !take_corners(p, cell, coordinate, &at->cell)
-                                     : !trip_field_take_cell(p->s->field, kernel, cell, &at->cell))
+    if (kernel != TRIP_KERNEL_LINEAR ? !trip_field_take_cell(p->s->field, kernel, cell, &at->cell)
+                                     : !take_corners(p, cell, coordinate, &at->cell))
         return false;
     set_weights(kernel, at, point);
     at->code = 0;
@@ -266,20 +273,12 @@ static double code_at(const position ends[2], double t0, double t1, double t)
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
 }
 
-/* Adds the segment between two coordinates. Returns false once the pixel takes no more. */
-static bool add_segment(passage *p, double first, double last, int64_t cells)
+/* Adds the part of a ray between `from` and `to` with the code from `a` to `b`. Returns false once
+ * the pixel takes no more. */
+static bool add_part(passage *p, const position ends[2], double a, double b, double from, double to)
 {
-    position ends[2];
-    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
-    const double from = fmax(t0, p->from), to = fmin(t1, p->to);
+    trip_segment segment = trip_segment_of(&p->s->segments, a, b);
     double own[3];
-    if (!(from < to))
-        return true;
-    if (!find_position(p, first, t0, cells, &ends[0]) ||
-        !find_position(p, last, t1, cells, &ends[1]))
-        return true;
-    trip_segment segment =
-        trip_segment_of(&p->s->segments, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to));
     if (!(segment.extinction > 0))
         return true;
     double t = 0.5 * (from + to);
@@ -294,6 +293,71 @@ static bool add_segment(passage *p, double first, double last, int64_t cells)
     };
     return composite(p->s, p->layer, fragment,
                      -expm1(-segment.extinction * (to - from) * p->world_per_t));
+}
+
+/* Returns where the ray leaves the box that it is in behind t, along an axis. The faces of boxes
+ * lie half-way between voxels. */
+static double next_face(const passage *p, int axis, double t)
+{
+    const trip_coordinates *c = p->s->coordinates;
+    const double o = trip_component(p->origin, axis), d = trip_component(p->direction, axis);
+    const double step = d > 0 ? 1 : -1;
+    if (d == 0)
+        return INFINITY;
+    double face = step * (floor(step * trip_coordinates_index(c, axis, o + t * d) + 0.5) + 0.5);
+    double at = (trip_coordinates_position(c, axis, face) - o) / d;
+    return at > t ? at : (trip_coordinates_position(c, axis, face + step) - o) / d;
+}
+
+/* Cuts a part of the ray at the sides of the grid along u and v. */
+static void cut_at_sides(const passage *p, double *from, double *to)
+{
+    const trip_coordinates *c = p->s->coordinates;
+    for (int a = 0; a < 3; a++) {
+        const double o = trip_component(p->origin, a), d = trip_component(p->direction, a);
+        const double last =
+            trip_coordinates_position(c, a, (double)trip_field_dims(p->s->field)[a] - 1);
+        if (a == p->axis || d == 0)
+            continue;
+        *from = fmax(*from, ((d > 0 ? 0 : last) - o) / d);
+        *to = fmin(*to, ((d > 0 ? last : 0) - o) / d);
+    }
+}
+
+/* Adds a segment with the nearest value, box by box. */
+static bool add_boxes(passage *p, double middle, int64_t cells, double from, double to)
+{
+    position ends[2];
+    cut_at_sides(p, &from, &to);
+    while (from < to) {
+        double next = to;
+        for (int a = 0; a < 3; a++)
+            next = a == p->axis ? next : fmin(next, next_face(p, a, from));
+        if (find_position(p, middle, from + TRIP_SHEET_BOX_POINT * (next - from), cells,
+                          &ends[0])) {
+            ends[1] = ends[0];
+            if (!add_part(p, ends, ends[0].code, ends[0].code, from, next))
+                return false;
+        }
+        from = next;
+    }
+    return true;
+}
+
+/* Adds the segment between two coordinates. Returns false once the pixel takes no more. */
+static bool add_segment(passage *p, double first, double last, int64_t cells)
+{
+    position ends[2];
+    const double t0 = reached_at(p, first), t1 = reached_at(p, last);
+    const double from = fmax(t0, p->from), to = fmin(t1, p->to);
+    if (!(from < to))
+        return true;
+    if (p->s->nearest)
+        return add_boxes(p, 0.5 * (first + last), cells, from, to);
+    if (!find_position(p, first, t0, cells, &ends[0]) ||
+        !find_position(p, last, t1, cells, &ends[1]))
+        return true;
+    return add_part(p, ends, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to), from, to);
 }
 
 /* Adds all segments in front of the eye. They lie between coordinates n / samples_per_sheet, and

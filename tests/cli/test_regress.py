@@ -26,7 +26,7 @@ class Regress(program.ProgramTest):
 
     def draw(self, *arguments, **options):
         process = program.start("render", "block.trip", "-o", "p.png", "--renderer=cpu",
-                                "--size=16x16", *arguments, **options)
+                                "--size=16x16", "--interpolation=linear", *arguments, **options)
         err = process.communicate()[1]
         self.assertEqual((process.returncode, err), (0, b""))
         return process.pid

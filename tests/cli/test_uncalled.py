@@ -31,7 +31,8 @@ CALLED_FOR = {
     "OCCLUSION": [["--effects", "occlusion"], ["--effects", "occlusion", "--classify", "pre"]],
     "EMISSION": [["--effects", "emission", "--emission", "heat.trip"],
                  ["--effects", "emission", "--emission", "heat.trip", "--classify", "pre"]],
-    "WIDE": [["--kernel", "cubic"]],
+    "NEAREST": [["--interpolation", "nearest"]],
+    "WIDE": [["--interpolation", "cubic"]],
     "AFFINE": [["--kernel", "ewa", "--classify", "pre"]],
     "UNEVEN": [["uneven.trip"], ["uneven.trip", "--classify", "pre"]],
     "SUMS": [["--compositing", "sheet", "--classify", "pre"]],
@@ -126,7 +127,7 @@ class Uncalled(program.ProgramTest):
         usual = device("ball.trip")
         self.assertEqual(device("uneven.trip", "--classify", "pre"), usual)
         self.assertEqual(device("uneven.trip"), "CPU, plain, 1 thread")
-        _, said = self.draw("--renderer", "cpu", "--kernel", "cubic", "--explain")
+        _, said = self.draw("--renderer", "cpu", "--interpolation", "cubic", "--explain")
         self.assertRegex(said, "(?m)^drawn by    cpu: CPU, plain, 1 thread$")
 
     def test_effects_change_nothing_in_faint_fog(self):

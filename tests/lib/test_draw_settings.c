@@ -11,7 +11,7 @@ static draw_settings full(void)
         " --background 0.25,0.5,0.75,1 --light point:1,-2,0.1 --effects shadows,emission"
         " --anisotropy -0.5 --cueing 0.25 --light-cells 64 --temperature 100:3000 --no-shading"
         " --clip-box voxels:1,2,3,4,5.5,6 --clip-plane 1,0,0,-3 --clip-plane 0,1,0,0.1"
-        " --quality high --classify pre --early-termination 0 --kernel cubic --kernel ewa"
+        " --quality high --classify pre --early-termination 0 --kernel ewa --interpolation cubic"
         " --lod 1.5 --max-bytes 1048576 --max-ms 20 --samples 3 --samples-per-sheet auto"
         " --depth --count --show levels --field splats --tolerance 0.001 --compositing sheet"
         " --flatten 3 --h 0 --kernel-radius 2.5 --low-pass none --method clip --normalise"
@@ -47,7 +47,7 @@ static void options_set_the_members_of_their_names(void **state)
     assert_int_equal(s.clip.planes, 2);
     assert_int_equal(s.all.quality, TRIPTYCH_QUALITY_HIGH);
     assert_int_equal(s.all.classify, TRIPTYCH_CLASSIFY_PRE);
-    assert_int_equal(s.all.kernel, TRIPTYCH_KERNEL_CUBIC);
+    assert_int_equal(s.all.interpolation, TRIPTYCH_INTERPOLATION_CUBIC);
     assert_int_equal(s.splat.footprint, TRIPTYCH_FOOTPRINT_EWA);
     assert_true(s.all.early_termination == TRIPTYCH_ZERO && s.all.h == TRIPTYCH_ZERO);
     assert_int_equal(s.sheet.samples, -1);

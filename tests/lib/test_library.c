@@ -1299,7 +1299,7 @@ static void the_closed_form_depends_on_the_current_settings(void **state)
     static const char *const bent = LOOK "140 .9 .6 .3 .054902\n255 .1 .6 .9 .9\n";
     draw_settings defaults = { 0 }, cued = defaults, cubic = defaults;
     cued.effects.which = TRIPTYCH_EFFECT_CUEING;
-    cubic.all.kernel = TRIPTYCH_KERNEL_CUBIC; /* overshoots the maximum value */
+    cubic.all.interpolation = TRIPTYCH_INTERPOLATION_CUBIC; /* overshoots the maximum value */
     brick_rising_volume();
     triptych *t = new_context();
     assert_int_equal(triptych_open(t, "low.trip", NULL), TRIPTYCH_OK);
@@ -1330,9 +1330,9 @@ static void the_device_names_the_kernels_in_use(void **state)
     open_data(t, TRIPTYCH_RENDERER_CPU);
     snprintf(defaults, sizeof defaults, "%s", draw(t, rgba).device);
     for (int i = 0; i < 4; i++) {
-        s.all.kernel = i == 1   ? TRIPTYCH_KERNEL_CUBIC
-                       : i == 2 ? TRIPTYCH_KERNEL_GAUSSIAN
-                                : TRIPTYCH_KERNEL_LINEAR;
+        s.all.interpolation = i == 1   ? TRIPTYCH_INTERPOLATION_CUBIC
+                              : i == 2 ? TRIPTYCH_INTERPOLATION_GAUSSIAN
+                                       : TRIPTYCH_INTERPOLATION_LINEAR;
         s.all.classify = i == 3 ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
         assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
         assert_string_equal(draw(t, rgba).device,

@@ -126,10 +126,12 @@ static void check_same(const scene *a, const scene *b, unsigned threads,
             break;
     }
     unsetenv("TRIPTYCH_ISA");
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         trip_camera_params small = views[i];
         small.width = small.height = PIXELS / 2;
-        settings.kernel = i ? TRIP_KERNEL_GAUSSIAN : TRIP_KERNEL_CUBIC;
+        settings.kernel = i == 0   ? TRIP_KERNEL_CUBIC
+                          : i == 1 ? TRIP_KERNEL_GAUSSIAN
+                                   : TRIP_KERNEL_NEAREST;
         check_view(a, b, threads, reader, &small, &settings);
     }
 }
@@ -198,7 +200,7 @@ static void check_memories(trip_kernel kernel, bool clipped, int pixels, uint64_
 {
     scene s;
     make_waves(&s, 32, 0.4);
-    trip_settings settings = post(3);
+    trip_settings settings = post(kernel == TRIP_KERNEL_NEAREST ? 2 : 3);
     trip_camera_params view = from_outside(&s);
     settings.kernel = kernel;
     if (clipped)
@@ -229,6 +231,7 @@ static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
     check_memories(TRIP_KERNEL_LINEAR, false, PIXELS, TEST_BY_TURNS ? 4000000 : 200000);
     check_memories(TRIP_KERNEL_LINEAR, true, PIXELS, TEST_BY_TURNS ? 4000000 : 1000000);
     check_memories(TRIP_KERNEL_CUBIC, false, 40, TEST_BY_TURNS ? 4000000 : 1000000);
+    check_memories(TRIP_KERNEL_NEAREST, true, 40, TEST_BY_TURNS ? 4000000 : 1000000);
 }
 
 enum { WIDE_I = 640, WIDE_J = 320, WIDE_K = TEST_BY_TURNS ? 6 : 12 };
@@ -302,6 +305,8 @@ static void grids_too_wide_for_the_memory_are_drawn_in_windows(void **state)
     check_windows(NULL, TRIP_KERNEL_LINEAR, 0);
     check_windows(&coordinates, TRIP_KERNEL_LINEAR, 1);
     check_windows(NULL, TRIP_KERNEL_CUBIC, TEST_BY_TURNS ? 2 : 1);
+    check_windows(NULL, TRIP_KERNEL_NEAREST, 0);
+    check_windows(&coordinates, TRIP_KERNEL_NEAREST, 1);
 }
 
 static bool solid(void *user, int i, int j, int k, unsigned *code, double gradient[3])

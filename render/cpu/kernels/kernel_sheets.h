@@ -109,6 +109,13 @@ typedef struct trip_cpu_about {
     int64_t number; /* sheet index of rasters[1] */
 } trip_cpu_about;
 
+/* The two sheets of a segment with the nearest value: the nearer one, and the rasters of the other.
+ */
+typedef struct trip_cpu_pair {
+    const trip_cpu_making *near;
+    const int32_t *other;
+} trip_cpu_pair;
+
 /* Integrals of the transfer function from code 0 to each entry: of extinction, and of extinction
  * times each colour component. They are scaled so that the largest is 2^30. Differences are exact
  * except for the rounding of each integral. Entries are 1, 2 or 4 codes apart, if the function is
@@ -154,7 +161,8 @@ typedef struct trip_cpu_group {
     const uint64_t *needed[TRIP_CPU_SEGMENTS]; /* squares with voxels that rays may read */
     bool leaps;                  /* at a sheet, rays may read gradients outside `needed` */
     const trip_cpu_about *about; /* for each segment; NULL selects the linear kernel */
-    const uint64_t *some;        /* squares visible in any segment */
+    trip_cpu_pair nearest[TRIP_CPU_SEGMENTS]; /* set for the nearest value only */
+    const uint64_t *some;                     /* squares visible in any segment */
     /* If set, only rays with a cell in [lo, hi) at the first sample plane are drawn. Units: voxels
      * of the grid of rasters. */
     bool windowed;
@@ -168,6 +176,11 @@ typedef struct trip_cpu_sheet_view {
     const trip_coordinates *coordinates; /* NULL with even spacing */
     int axis;
     trip_kernel kernel;
+    /* For the nearest value: the table of the transfer function, and the map from stretched codes
+     * to its entries, code = (stretched >> code_shift) + code_first. */
+    const struct trip_tf_entry *table;
+    int code_shift, code_first;
+    float voxel_world;
     int64_t voxels[2]; /* size of the grid along u and v */
     bool ortho, shading, headlight, point_light;
     float early_termination; /* trip_cpu_early_termination() */

@@ -349,9 +349,13 @@ typedef struct trip_cpu_kernels {
      * missing in either raster. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);
+    /* Does the work of sheet_gradients() for outlines (sheet.h, `Nearest value`). */
+    void (*sheet_outlines)(const int16_t *codes, uint64_t squares, const int16_t *left,
+                           const int16_t *above, const int16_t *sheet_before,
+                           const int16_t *sheet_behind, trip_cpu_gradient *gradients);
     /* sheet_pane_closed is for segments in closed form (closed_form.h), sheet_pane_effects for
-     * frames with effects. */
-    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed, *sheet_pane_effects;
+     * frames with effects, sheet_pane_nearest for the nearest value. */
+    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed, *sheet_pane_effects, *sheet_pane_nearest;
 } trip_cpu_kernels;
 
 #endif

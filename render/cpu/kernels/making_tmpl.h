@@ -69,10 +69,10 @@ static void make(const trip_cpu_group *g, const trip_cpu_making *m, bool gradien
 {
     trip_cpu_voxels *raster = raster_of(g, m->rasters, at);
     if (!m->from) {
-        sheet_gradients(slopes_of(g, m->rasters, at), squares, slopes_of(g, m->rasters, at - 1),
-                        slopes_of(g, m->rasters, at - (size_t)g->across),
-                        slopes_of(g, m->before, at), slopes_of(g, m->behind, at),
-                        raster->gradients);
+        (TRIP_CPU_NEAREST ? sheet_outlines : sheet_gradients)(
+            slopes_of(g, m->rasters, at), squares, slopes_of(g, m->rasters, at - 1),
+            slopes_of(g, m->rasters, at - (size_t)g->across), slopes_of(g, m->before, at),
+            slopes_of(g, m->behind, at), raster->gradients);
         repeat_gradients(g, m, at, squares);
         return;
     }
@@ -119,6 +119,15 @@ static void make_sample(const trip_cpu_group *g, bool gradients, unsigned sample
         make_squares(g, m, gradients, at, g->leaps && !m->from ? squares : squares & needed);
 }
 
+/* Makes the outlines of the sheet that a segment with the nearest value reads. */
+static void make_nearest(const trip_cpu_group *g, bool gradients, unsigned segment, size_t at,
+                         uint64_t squares)
+{
+    const trip_cpu_making *m = g->nearest[segment].near;
+    if (gradients && m->rasters[at])
+        make_squares(g, m, true, at, g->leaps ? squares : squares & g->needed[segment][at]);
+}
+
 /* Makes the voxels at both ends of a segment that rays in a box of cells read. The last cells of a
  * raster read its copy of the neighbouring rasters' first voxels. */
 static void make_segment(const trip_cpu_group *g, bool gradients, cell_box box, unsigned segment)
@@ -131,6 +140,10 @@ static void make_segment(const trip_cpu_group *g, bool gradients, cell_box box, 
             const size_t at = (size_t)(v >> log2) * (size_t)g->across + (size_t)(u >> log2);
             const uint64_t squares =
                 squares_from_to(u & last, end_u & last, v & last, end_v & last);
+            if (NEAREST) {
+                make_nearest(g, gradients, segment, at, squares);
+                continue;
+            }
             for (unsigned n = segment; n <= segment + 1; n++)
                 make_sample(g, gradients, n, at, squares, g->needed[segment][at]);
         }

@@ -294,11 +294,17 @@ INLINE vh differences(vh codes, vh below, vh above)
     return vh_select(no_below | no_above, half >> 1, half);
 }
 
-static __attribute__((noinline)) void sheet_gradients(const int16_t *codes, uint64_t squares,
-                                                      const int16_t *left, const int16_t *above,
-                                                      const int16_t *sheet_before,
-                                                      const int16_t *sheet_behind,
-                                                      trip_cpu_gradient *gradients)
+/* Returns the difference of the indicators of a code at the neighbours: 1, 0 or -1. */
+INLINE vh outline(vh codes, vh below, vh above)
+{
+    return (vh)(below == codes) - (vh)(above == codes);
+}
+
+/* Finds gradients, or with `outlines` the gradients of outlines. */
+INLINE void squares_gradients(const int16_t *codes, uint64_t squares, bool outlines,
+                              const int16_t *left, const int16_t *above,
+                              const int16_t *sheet_before, const int16_t *sheet_behind,
+                              trip_cpu_gradient *gradients)
 {
     /* The voxels before the first column and row come from the neighbouring rasters. */
     int16_t first[8];
@@ -323,14 +329,33 @@ static __attribute__((noinline)) void sheet_gradients(const int16_t *codes, uint
                 { vh_load(at + 1), vh_load(at + TRIP_CPU_RASTER_STRIDE),
                   vh_load(sheet_behind + i) },
             };
-            const bool lacks = some_is_missing(&n);
+            const bool lacks = !outlines && some_is_missing(&n);
             vh d[3];
             for (int a = 0; a < 3; a++)
-                d[a] = lacks ? differences(vh_load(at), n.before[a], n.behind[a])
-                             : vh_half_difference(n.behind[a], n.before[a]) >> 1;
+                d[a] = outlines ? outline(vh_load(at), n.before[a], n.behind[a])
+                       : lacks  ? differences(vh_load(at), n.before[a], n.behind[a])
+                                : vh_half_difference(n.behind[a], n.before[a]) >> 1;
             vh_store_3((int16_t *)&gradients[i], d[0], d[1], d[2]);
         }
     }
+}
+
+static __attribute__((noinline)) void sheet_gradients(const int16_t *codes, uint64_t squares,
+                                                      const int16_t *left, const int16_t *above,
+                                                      const int16_t *sheet_before,
+                                                      const int16_t *sheet_behind,
+                                                      trip_cpu_gradient *gradients)
+{
+    squares_gradients(codes, squares, false, left, above, sheet_before, sheet_behind, gradients);
+}
+
+static __attribute__((noinline)) void sheet_outlines(const int16_t *codes, uint64_t squares,
+                                                     const int16_t *left, const int16_t *above,
+                                                     const int16_t *sheet_before,
+                                                     const int16_t *sheet_behind,
+                                                     trip_cpu_gradient *gradients)
+{
+    squares_gradients(codes, squares, true, left, above, sheet_before, sheet_behind, gradients);
 }
 
 INLINE vh mean_or_between(vh a, vh b, int32_t weights)

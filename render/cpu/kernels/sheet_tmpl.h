@@ -73,6 +73,9 @@ INLINE bool is_uneven(const pane_path *path)
     return TRIP_SIMD == TRIP_SIMD_PLAIN && path->coordinates;
 }
 
+/* A kernel of its own draws the nearest value. So the other kernels cost no extra instruction. */
+#define NEAREST TRIP_CPU_NEAREST
+
 /* Only the plain kernels sample with 64 voxels, so that linear sampling costs no extra instruction.
  */
 INLINE bool is_wide(const trip_cpu_group *g)
@@ -524,6 +527,23 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
         (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
 }
 
+/* Finds the raster of segment n for the nearest value: the raster that contains the patch's cells
+ * at both sample planes. It repeats the first column and row of its neighbours, so it also contains
+ * all corners of these cells. */
+static void find_nearest_raster(const trip_cpu_group *g, const pane_path *path, unsigned n,
+                                bool whole, const cell_boxes *boxes, patch_path *area)
+{
+    const int log2 = TRIP_CPU_RASTER_LOG2;
+    const cell_box box = both_boxes(boxes, n, n + 1);
+    const int32_t u = box.lo[0] >> log2, v = box.lo[1] >> log2;
+    area->raster[n] = -1;
+    if (!whole || u != box.hi[0] >> log2 || v != box.hi[1] >> log2 || !is_within(g, u, v))
+        return;
+    area->raster[n] = v * g->across + u;
+    area->within[n] =
+        (path->base[1][n] - (v << log2)) * TRIP_CPU_RASTER_STRIDE + path->base[0][n] - (u << log2);
+}
+
 typedef struct pane_segments {
     uint64_t some;    /* segments with a square that may be visible */
     uint64_t made;    /* segments with all voxels made that rays read */
@@ -564,6 +584,10 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         if (!cells_show(g, n, box))
             continue;
         area->segments |= UINT64_C(1) << n;
+        if (NEAREST) {
+            find_nearest_raster(g, path, n, r.whole, &samples, area);
+            continue;
+        }
         if (placed != n)
             find_raster(g, path, n, r.whole, &samples, area);
         find_raster(g, path, n + 1, r.whole, &samples, area);
@@ -763,6 +787,14 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
 
 /* ---- a segment ---- */
 
+/* The part of a segment that is not clipped. */
+typedef struct remnant {
+    vf from, to; /* positions in the segment, 0 to 1 */
+    vm some;
+} remnant;
+
+#include "cpu/kernels/nearest_tmpl.h"
+
 typedef struct medium {
     vf extinction; /* 0 if the segment is transparent */
     vf rgb[3];
@@ -851,6 +883,18 @@ INLINE medium classified_closed(const trip_cpu_closed_form *f, vm open, const sa
     return s;
 }
 
+/* Looks up the box of a voxel. Lanes that are not open may have any index. */
+INLINE medium classified_nearest(const trip_cpu_sheet_view *view, vm open, const sample *a)
+{
+    const vi zero = { 0 };
+    vi row[4];
+    static_assert(sizeof *view->table == 4 * sizeof(float), "a row of four floats");
+    find_rows((int32_t(*)[4])(uintptr_t)view->table, (vi)v_select(open, (vf)a->index, (vf)zero),
+              row);
+    return (medium){ .extinction = (vf)row[3] * v_set(view->voxel_world),
+                     .rgb = { (vf)row[0], (vf)row[1], (vf)row[2] } };
+}
+
 INLINE vf dot3(const vf a[3], const vf b[3])
 {
     return v_fma(a[0], b[0], v_fma(a[1], b[1], a[2] * b[2]));
@@ -936,18 +980,14 @@ INLINE vf ray_depth(const stamp_rays *l, vf along)
 
 INLINE void find_light(const trip_cpu_sheet_view *view, const trip_cpu_group *g, sample *s)
 {
-    if (!s->lit && is_wide(g))
+    if (!s->lit && NEAREST)
+        find_nearest_gradients(g, s);
+    else if (!s->lit && is_wide(g))
         find_wide_gradients(view, g, s);
     else if (!s->lit)
         find_gradients(g, s);
     s->lit = true;
 }
-
-/* The part of a segment that is not clipped. */
-typedef struct remnant {
-    vf from, to; /* positions in the segment, 0 to 1 */
-    vm some;
-} remnant;
 
 INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
                           const pane_path *path, unsigned n)
@@ -983,14 +1023,14 @@ INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const s
     at[2] = v_set((float)g->samples[n].coordinate) + further;
 }
 
-/* Composites a segment behind the pixels' contents. Returns false if it is visible in none of the
- * pixels. */
+/* Composites a segment behind the pixels' contents. With the nearest value only its part `box`
+ * counts. Returns false if it is visible in none of the pixels. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                               const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
-                              sample *b, vf pixel[CHANNELS])
+                              sample *b, const remnant *box, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
-    open = vm_and(open, TRIP_CPU_CLOSED
+    open = vm_and(open, TRIP_CPU_CLOSED || NEAREST
                             ? l->along
                             : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* leaves out segments that begin behind the eye's plane */
@@ -998,19 +1038,22 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
-    if (view->clips > 0) {
-        remnant r = remnant_of(view, l, path, n);
+    if (NEAREST || view->clips > 0) {
+        remnant r = NEAREST ? *box : remnant_of(view, l, path, n);
         open = vm_and(open, r.some);
-        cut_sample(a, b, r.from, first = &cut[0]);
-        cut_sample(a, b, r.to, last = &cut[1]);
+        if (!NEAREST) {
+            cut_sample(a, b, r.from, first = &cut[0]);
+            cut_sample(a, b, r.to, last = &cut[1]);
+        }
         middle =
             v_set(path->along[n]) + v_set(0.5f * (float)view->direction) * (r.from + r.to) * sheets;
         sheets = sheets * (r.to - r.from);
     }
     if (!vm_any(open))
         return false;
-    medium s = TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
-                               : classified(view->integrals, first, last);
+    medium s = NEAREST           ? classified_nearest(view, open, first)
+               : TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
+                                 : classified(view->integrals, first, last);
     for (int k = 0; k < 3 && view->has_debug_colour; k++)
         s.rgb[k] = v_set(view->debug_colour[k]);
     open = vm_and(open, v_gt(s.extinction, v_set(0)));
@@ -1020,7 +1063,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     light_way of_position;
     const light_way *way = &l->way;
     vf at[3];
-    if (TRIP_CPU_EFFECTS || view->point_light)
+    const bool effects = TRIP_CPU_EFFECTS || (NEAREST && view->effects.some);
+    if (effects || view->point_light)
         positions_at(g, path, l, n, middle - v_set(path->along[n]), at);
     if (view->point_light) {
         find_way(view, at, l->to_eye, &of_position);
@@ -1031,7 +1075,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         find_light(view, g, b);
         lit = surface_between(view, path, l, way, a, b);
     }
-    if (TRIP_CPU_EFFECTS) {
+    if (effects) {
         effects_on(&view->effects, at, &lit, way->light, l->to_eye, s.rgb);
     } else if (view->shading) {
         light_segment(&lit, &s);
@@ -1140,6 +1184,23 @@ INLINE vm in_window(const trip_cpu_group *g, const pane_path *path, const stamp_
     return in;
 }
 
+/* Composites a segment with the nearest value, box by box. */
+INLINE void composite_boxes(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                            const stamp_rays *l, const pane_path *path, const patch_path *area,
+                            unsigned n, vf pixel[CHANNELS])
+{
+    const remnant whole = { v_set(0), v_set(1), l->along };
+    box_walk w =
+        begin_boxes(view, g, path, l, n, view->clips > 0 ? remnant_of(view, l, path, n) : whole);
+    while (vm_any(vm_and(w.part.some, v_gt(pixel[3], v_set(0))))) {
+        remnant box = next_box(path, n, &w);
+        sample s;
+        nearest_at(view, g, path, area, n, &w, &box, &s);
+        if (composite_segment(view, g, l, path, n, &s, &s, &box, pixel))
+            finish_terminated(view, pixel);
+    }
+}
+
 static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
                        const pane_path *path, pane_segments *passed, const patch_path *area,
                        const stamp_rays *l, float *stamp)
@@ -1161,7 +1222,9 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             make_segment(g, view->shading, box_of_segment(&passed->boxes, n), n);
             passed->made |= UINT64_C(1) << n;
         }
-        if (is_wide(g)) {
+        if (NEAREST) {
+            composite_boxes(view, g, l, path, area, n, pixel);
+        } else if (is_wide(g)) {
             if (sampled != n || !in_the_same_cells(g, n, &ends[n % 2]))
                 wide_sample_at(view, g, path, l, n, n, &ends[n % 2]);
             wide_sample_at(view, g, path, l, next, n, &ends[next % 2]);
@@ -1171,7 +1234,8 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
         }
         sampled = next;
-        if (!composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], pixel))
+        if (!NEAREST &&
+            !composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], NULL, pixel))
             continue;
         finish_terminated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))

@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_TABLE_H
 #define TRIP_CPU_TABLE_H
 
-#if TRIP_CPU_CLOSED || TRIP_CPU_EFFECTS
+#if TRIP_CPU_CLOSED || TRIP_CPU_EFFECTS || TRIP_CPU_NEAREST
 #pragma GCC diagnostic ignored "-Wunused-function"
 #endif
 
@@ -21,7 +21,8 @@
 /* TRIP_CPU_TABLE defines the kernel table `name` for the instruction set `isa_name`.
  * - With TRIP_CPU_DEPTH it defines name##_depth, the table for layers with depth.
  * - With TRIP_CPU_CLOSED it defines only the kernel for segments in closed form.
- * - With TRIP_CPU_EFFECTS it defines only the kernels for frames with effects. */
+ * - With TRIP_CPU_EFFECTS it defines only the kernels for frames with effects.
+ * - With TRIP_CPU_NEAREST it defines only the kernel for the nearest value. */
 #if TRIP_CPU_DEPTH
 #define TRIP_CPU_TABLE(name, isa_name) DEFINE(name##_depth, isa_name, NULL)
 #else
@@ -52,6 +53,10 @@
 #define DEFINE(name, isa_name, depth_table)                                                        \
     SHEET_KERNEL(name##_sheet_closed)                                                              \
     static_assert(TRIP_CPU_CLOSED, "it alone is compiled then")
+#elif TRIP_CPU_NEAREST
+#define DEFINE(name, isa_name, depth_table)                                                        \
+    SHEET_KERNEL(name##_sheet_nearest)                                                             \
+    static_assert(TRIP_CPU_NEAREST, "it alone is compiled then")
 #elif TRIP_CPU_EFFECTS
 #define DEFINE(name, isa_name, depth_table)                                                        \
     SHEET_KERNEL(name##_sheet_effects)                                                             \
@@ -59,13 +64,14 @@
     static_assert(TRIP_CPU_EFFECTS, "they alone are compiled then")
 #else
 #define DEFINE(name, isa_name, depth_table)                                                        \
-    extern trip_cpu_sheet_kernel name##_sheet_closed, name##_sheet_effects;                        \
+    extern trip_cpu_sheet_kernel name##_sheet_closed, name##_sheet_effects, name##_sheet_nearest;  \
     extern trip_cpu_project_kernel name##_project_effects;                                         \
-    const trip_cpu_kernels name = KERNELS(isa_name, depth_table, name##_sheet_closed,              \
-                                          name##_sheet_effects, name##_project_effects)
+    const trip_cpu_kernels name =                                                                  \
+        KERNELS(isa_name, depth_table, name##_sheet_closed, name##_sheet_effects,                  \
+                name##_sheet_nearest, name##_project_effects)
 #endif
 
-#define KERNELS(isa_name, depth_table, closed, with_effects, project_with_effects)                 \
+#define KERNELS(isa_name, depth_table, closed, with_effects, nearest, project_with_effects)        \
     {                                                                                              \
         .isa = isa_name, .lanes = V, .channels = CHANNELS, .with_depth = depth_table,              \
         .squares = squares, .stage = stage, .project = project, .pane_clear = pane_clear,          \
@@ -73,9 +79,10 @@
         .pane_merge = pane_merge, .pane_finish = pane_finish, .drawn = drawn,                      \
         .reaching = reaching, .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,      \
         .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
-        .sheet_gradients = sheet_gradients, .sheet_between = sheet_between,                        \
-        .sheet_pane = sheet_pane, .sheet_pane_closed = (closed),                                   \
-        .sheet_pane_effects = (with_effects), .project_effects = (project_with_effects),           \
+        .sheet_gradients = sheet_gradients, .sheet_outlines = sheet_outlines,                      \
+        .sheet_between = sheet_between, .sheet_pane = sheet_pane, .sheet_pane_closed = (closed),   \
+        .sheet_pane_effects = (with_effects), .sheet_pane_nearest = (nearest),                     \
+        .project_effects = (project_with_effects),                                                 \
     }
 
 #endif

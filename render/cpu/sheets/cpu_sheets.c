@@ -77,9 +77,11 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->store.sloped = r->frame->settings->shading ? plan->draw.slope_of_stored : NULL;
     s->store.codes = trip_cpu_codes_of(plan->code_min, plan->code_max);
     s->store.coordinates = &r->frame->data->coordinates;
-    s->sheet_pane = trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
-                    : closed                                        ? r->kernels->sheet_pane_closed
-                                                                    : r->kernels->sheet_pane;
+    s->sheet_pane =
+        r->frame->settings->kernel == TRIP_KERNEL_NEAREST ? r->kernels->sheet_pane_nearest
+        : trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
+        : closed                                          ? r->kernels->sheet_pane_closed
+                                                          : r->kernels->sheet_pane;
     s->function =
         trip_cpu_tfs_take(&s->functions, r->budget, r->frame->table, closed ? &plan->closed : NULL,
                           s->store.codes, r->frame->camera->voxel_world);
@@ -160,7 +162,12 @@ int trip_cpu_sheets_held(const trip_frame *frame)
 /* Returns whether interpolation reads 64 voxels. */
 static bool is_wide(const trip_cpu_sheets *s)
 {
-    return s->of->frame->settings->kernel != TRIP_KERNEL_LINEAR;
+    return trip_kernel_is_wide(s->of->frame->settings->kernel);
+}
+
+static bool is_nearest(const trip_cpu_sheets *s)
+{
+    return s->of->frame->settings->kernel == TRIP_KERNEL_NEAREST;
 }
 
 /* Returns how far rays move along u or v between two sheets, in rasters. The distance of two sheets
@@ -304,7 +311,8 @@ static void find_gradients(trip_cpu_sheets *s, int last, int complete)
         if (!sheet->shaded)
             work[count++] = (trip_cpu_sheet_work){ .sheet = sheet,
                                                    .other = s->way > 0 ? before : after,
-                                                   .third = s->way > 0 ? after : before };
+                                                   .third = s->way > 0 ? after : before,
+                                                   .kernel = s->view.kernel };
     }
     trip_cpu_sheets_find_gradients(s, work, count);
 }
@@ -348,6 +356,16 @@ static trip_cpu_about about_of(const trip_cpu_sheets *s, int i)
     };
 }
 
+/* Returns the sheets of the segment from s->last_index to `index`, between held[i] and held[i + 1].
+ */
+static trip_cpu_pair pair_of(trip_cpu_sheets *s, int i, double index)
+{
+    const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
+    const double middle = 0.5 * (s->last_index + index);
+    const bool first = fabs(middle - (double)from->number) < 0.5;
+    return (trip_cpu_pair){ first ? &from->making : &to->making, (first ? to : from)->rasters };
+}
+
 /* Adds a sample plane at `index` of the axis to the group. Unless it is the group's first sample
  * plane, this ends a segment between held[i] and held[i + 1]. */
 static void add_sample(trip_cpu_sheets *s, const trip_cpu_sheet *at, double index, int i,
@@ -362,8 +380,11 @@ static void add_sample(trip_cpu_sheets *s, const trip_cpu_sheet *at, double inde
         g->needed[g->segments] = from->needed;
         if (is_wide(s))
             s->about[g->segments] = about_of(s, i);
+        if (is_nearest(s))
+            g->nearest[g->segments] = pair_of(s, i, index);
         g->segments++;
     }
+    s->last_index = index;
     g->samples[g->segments] = (trip_cpu_sample){ at->rasters, coordinate,
                                                  trip_cpu_sheets_at_once(s) ? NULL : &at->making };
 }
@@ -375,14 +396,14 @@ typedef struct cutting {
 } cutting;
 
 /* Adds a sample plane between held[i] and held[i + 1], with weight `part` for held[i + 1]. Returns
- * false if the pool is full. Kernels of 64 voxels read the sheets, so they need no rasters for
- * sample planes. */
+ * false if the pool is full. Kernels of 64 voxels and the nearest value read the sheets, so they
+ * need no rasters for sample planes. */
 static bool take_sample(trip_cpu_sheets *s, int i, double part, bool first, cutting *cut)
 {
     const trip_cpu_sheet *from = sheet_of(s, i), *to = sheet_of(s, i + 1);
     trip_cpu_sheet *sample = &s->store.samples[cut->count];
     const double index = (double)from->number + part * (double)s->way;
-    if (is_wide(s)) {
+    if (is_wide(s) || is_nearest(s)) {
         add_sample(s, from, index, i, first);
         return true;
     }

@@ -61,9 +61,10 @@ struct trip_cpu_sheets {
     trip_cpu_store store;
     trip_cpu_tfs functions;
     const trip_cpu_tf *function;       /* the frame's entry of `functions` */
-    trip_cpu_sheet_kernel *sheet_pane; /* chosen by effects and closed form */
+    trip_cpu_sheet_kernel *sheet_pane; /* chosen by effects, closed form and nearest value */
     trip_cpu_group group;
     trip_cpu_about about[TRIP_CPU_SEGMENTS]; /* per segment, for kernels of 64 voxels */
+    double last_index;                       /* of the group's last sample plane */
     trip_cpu_sheet_view view;
     int axis;
     const trip_pass *pass; /* current pass, or NULL */

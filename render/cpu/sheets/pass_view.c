@@ -19,6 +19,17 @@ static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
         out[i] = trip_component(v, (view->axis + 1 + i) % 3);
 }
 
+/* Returns the factor 0.5, explained below, over the length of a fully lit outline. */
+static double outline_unit(const trip_cpu_sheet_view *view, const trip_frame *frame)
+{
+    const trip_coordinates *c = &frame->data->coordinates;
+    trip_affine world = { 0 };
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            world.m[i][k] = view->world[i][k];
+    return 0.5 / (trip_shade_outline_full(&world, c->widest) * trip_cpu_outline_unit(c));
+}
+
 /* Sets the map of gradients from index space to world space: the inverse transpose of view->world.
  * It also converts code differences in the store's unit to lengths relative to full shading. The
  * factor 0.5 is there because the kernels pass the sum of two gradients. */
@@ -31,6 +42,8 @@ static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, tri
     double unit = ldexp(0.5 * range / 65535 / full, sloped ? 0 : -(int)codes.shift) /
                   trip_cpu_gradient_unit(&frame->data->coordinates);
     const double(*m)[3] = (const double(*)[3])view->world;
+    if (view->kernel == TRIP_KERNEL_NEAREST)
+        unit = outline_unit(view, frame);
     double adjugate[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
@@ -116,6 +129,10 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
             trip_coordinates_uneven(&frame->data->coordinates) ? &frame->data->coordinates : NULL,
         .axis = axis,
         .kernel = s->kernel,
+        .table = frame->table,
+        .code_shift = (int)function->codes.shift,
+        .code_first = function->codes.first,
+        .voxel_world = (float)c->voxel_world,
         .voxels = { (int64_t)frame->data->header.dims[(axis + 1) % 3],
                     (int64_t)frame->data->header.dims[(axis + 2) % 3] },
         .ortho = c->ortho,

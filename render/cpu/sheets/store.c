@@ -435,7 +435,7 @@ static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t
     const trip_cpu_tf *f = job->function;
     const trip_cpu_voxels *from = raster_at(s, w->sheet, at), *to = raster_at(s, w->other, at);
     trip_cpu_cells *cells = &w->sheet->cells[at];
-    if (w->kernel != TRIP_KERNEL_LINEAR)
+    if (trip_kernel_is_wide(w->kernel))
         s->kernels->sheet_cells(from, to, squares, TRIP_CPU_CODE_MIN, INT16_MAX, cells);
     else if (f->in_a_row)
         s->kernels->sheet_cells(from, to, squares, f->first_visible, f->last_visible, cells);
@@ -516,8 +516,9 @@ static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size
             bool any = a->min[i] <= a->max[i] && b->min[i] <= b->max[i];
             int16_t min = a->min[i] < b->min[i] ? a->min[i] : b->min[i];
             int16_t max = a->max[i] > b->max[i] ? a->max[i] : b->max[i];
-            if (any && (w->kernel == TRIP_KERNEL_LINEAR ? trip_cpu_tf_shows(job->function, min, max)
-                                                        : shows_about(job, w, at, i)))
+            if (any &&
+                (trip_kernel_is_wide(w->kernel) ? shows_about(job, w, at, i)
+                                                : trip_cpu_tf_shows(job->function, min, max)))
                 visible |= UINT64_C(1) << i;
         }
     memset(edges, 0, sizeof w->sheet->edges[at]);
@@ -584,7 +585,7 @@ static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, si
         .axis = s->axis,
     };
     if (trip_coordinates_uneven(s->coordinates))
-        trip_cpu_uneven_gradients(s->coordinates, &r);
+        trip_cpu_uneven_gradients(s->coordinates, &r, w->kernel == TRIP_KERNEL_NEAREST);
     else
         s->kernels->sheet_gradients(r.codes, UINT64_MAX, r.left, r.above, r.sheet_before,
                                     r.sheet_behind, r.gradients);

@@ -12,6 +12,9 @@
  * gradients are clamped. With even spacing the unit is 0.5. */
 double trip_cpu_gradient_unit(const trip_coordinates *c);
 
+/* Returns the 16-bit value of 1 per unit of position in the gradients of outlines. */
+double trip_cpu_outline_unit(const trip_coordinates *c);
+
 /* A raster and its neighbours, as for the kernel sheet_gradients(). */
 typedef struct trip_cpu_uneven_raster {
     const int16_t *codes, *left, *above, *sheet_before, *sheet_behind;
@@ -20,8 +23,9 @@ typedef struct trip_cpu_uneven_raster {
     int axis;         /* axis of the list */
 } trip_cpu_uneven_raster;
 
-/* Sets the gradients of the raster's present voxels. sheet_gradients() does the same for even
- * spacing. */
-void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r);
+/* Sets the gradients of the raster's present voxels, or of their outlines. sheet_gradients() and
+ * sheet_outlines() do the same for even spacing. */
+void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_raster *r,
+                               bool outlines);
 
 #endif

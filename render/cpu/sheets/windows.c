@@ -218,6 +218,7 @@ static void find_interval(trip_cpu_sheets *s)
             .sheet = &sheets[i],
             .other = up ? before : behind,
             .third = up ? behind : before,
+            .kernel = s->view.kernel,
         };
     }
     trip_cpu_store_prepare(&s->store, work, count);
