@@ -41,7 +41,7 @@ void trip_classification_codes(trip_classification *c, const trip_dataset *data,
     c->code_max = c->held_max;
     if (c->held_min > c->held_max)
         return;
-    if (c->draw) {
+    if (c->draw && kernel != TRIP_KERNEL_NEAREST) {
         c->code_min = trip_draw_code(c->draw, c->held_min);
         c->code_max = trip_draw_code(c->draw, c->held_max);
     }

@@ -15,7 +15,8 @@
 
 /* Zero-initialised, it knows nothing yet. */
 typedef struct trip_classification {
-    /* The draw codes of frames that interpolate; the caller's. NULL stands for the stored codes. */
+    /* The draw codes of frames that interpolate; the caller's. NULL stands for the stored codes,
+     * which frames of the nearest value have. */
     const trip_draw_codes *draw;
     /* The range of interpolated draw codes with the last kernel. It covers all bricks of the data
      * set, not only the frame's, so that a picture does not depend on the size of bricks. */
