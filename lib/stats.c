@@ -49,11 +49,9 @@ static void explain_choices(const triptych *t, FILE *out)
         fprintf(out, "default     pre instead of post: %s\n", t->why_pre);
     explain_parts(t, out);
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
-        fprintf(out,
-                "samples     %d per sheet, by the view: between sheets rays move up to %.2f voxels "
-                "sideways; voxels are up to %.3g %s wide\n",
-                t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.slope,
-                t->samples_per_sheet.voxel_px, t->settings.samples > 1 ? "samples" : "px");
+        fprintf(out, "samples     %d per sheet, by the view: voxels are up to %.3g %s wide\n",
+                t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.voxel_px,
+                t->settings.samples > 1 ? "samples" : "px");
 }
 
 int triptych_explain(triptych *t, char **text)
