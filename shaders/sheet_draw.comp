@@ -59,6 +59,7 @@ struct position {
     vec2 part; // fraction within the cell
     bool there; // all voxels of the cell are present
     float code;
+    vec2 lo, hi; // distances from the grid's sides, negative beyond them
 };
 
 ray ray_of(vec2 p)
@@ -180,12 +181,12 @@ float beyond(int voxel, int base, float rest)
     return (float(base) - positions[voxel].x) + (rest - positions[voxel].y);
 }
 
-// Returns the cell of a position among `count` entries of positions[] starting at `first`, or -1.
-// Sets `rest` to the fraction within the cell.
+// Returns the cell of a position among `count` entries of positions[] starting at `first`. Beyond
+// them it returns the nearest cell. Sets `rest` to the fraction within the cell.
 int find_cell(int first, int count, int base, inout float rest)
 {
     int lo = 0, hi = count - 1;
-    if (hi < 1 || beyond(first, base, rest) < 0.0 || beyond(first + hi, base, rest) > 0.0)
+    if (hi < 1)
         return -1;
     while (hi - lo > 1) {
         int middle = (lo + hi) / 2;
@@ -195,7 +196,7 @@ int find_cell(int first, int count, int base, inout float rest)
             hi = middle;
     }
     float before = beyond(first + lo, base, rest), behind = beyond(first + hi, base, rest);
-    rest = before / (before - behind);
+    rest = clamp(before / (before - behind), 0.0, 1.0);
     return lo;
 }
 #endif
@@ -210,21 +211,35 @@ position position_at(ray r, trip_gl_sheet_end end)
 #endif
     p = clamp(p, -268435456.0, 268435456.0);
 #ifdef UNEVEN
+    at.lo = vec2(beyond(0, end.base_u, p.x), beyond(extent.x, end.base_v, p.y));
+    at.hi = -vec2(beyond(extent.x - 1, end.base_u, p.x), beyond(extent.x + extent.y - 1, end.base_v, p.y));
     at.cell = ivec2(find_cell(0, extent.x, end.base_u, p.x), find_cell(extent.x, extent.y, end.base_v, p.y));
     at.part = p;
 #else
     vec2 whole = floor(p);
     at.cell = ivec2(end.base_u, end.base_v) + ivec2(whole);
     at.part = p - whole;
-    // The last voxels of the grid belong to the last cell.
+    at.lo = vec2(ivec2(end.base_u, end.base_v) - clips.yz) + p;
+    at.hi = vec2(extent.zw - ivec2(end.base_u, end.base_v)) - p;
+    // Beyond a side of the grid, the nearest position in the grid counts. The last voxels of the
+    // grid belong to the last cell.
     for (int i = 0; i < 2; i++)
-        if (at.cell[i] == extent[2 + i] && at.part[i] == 0.0) {
-            at.cell[i]--;
+        if (at.cell[i] >= extent[2 + i]) {
+            at.cell[i] = extent[2 + i] - 1;
             at.part[i] = 1.0;
+        } else if (at.cell[i] < clips[1 + i]) {
+            at.cell[i] = clips[1 + i];
+            at.part[i] = 0.0;
         }
 #endif
     at.there = false;
     at.code = 0.0;
+#ifdef UNEVEN
+    // Voxels that were not read are missing, although the grid goes on.
+    for (int i = 0; i < 2; i++)
+        if ((at.lo[i] < 0.0 && clips[1 + i] != 0) || (at.hi[i] < 0.0 && extent[2 + i] != extent[i] - 1))
+            return at;
+#endif
     if (any(lessThan(at.cell, ivec2(0))) || any(greaterThanEqual(at.cell + 1, extent.xy)))
         return at;
 #ifdef WIDE
@@ -298,9 +313,15 @@ float place_between(int voxel, float part)
 }
 #endif
 
-// Returns the position in the grid, list axes.
+// Returns the position in the grid or beyond its sides, list axes.
 vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
+    if (any(lessThan(at.lo, vec2(0.0))) || any(lessThan(at.hi, vec2(0.0))))
+#ifdef UNEVEN
+        return vec3(end.sheet, place_between(0, 0.0) + at.lo.x, place_between(extent.x, 0.0) + at.lo.y);
+#else
+        return vec3(end.sheet, at.lo);
+#endif
 #ifdef UNEVEN
     return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
 #else
@@ -308,6 +329,18 @@ vec3 voxel_of(position at, trip_gl_sheet_end end)
 #endif
 }
 #endif
+
+// Cuts the fractions of a segment at a side of the grid. `a` and `b` are the distances of both ends
+// from it.
+void cut_at_side(float a, float b, inout float first, inout float last)
+{
+    if (a < 0.0 && b < 0.0)
+        last = -1.0;
+    else if (a < 0.0)
+        first = max(first, a / (a - b));
+    else if (b < 0.0)
+        last = min(last, a / (a - b));
+}
 
 // Composites the segment between two ends behind the pixel's colour, opacity and depth.
 void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a, position b, inout vec4 pixel,
@@ -320,6 +353,10 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a
     if (clips.x > 0) {
         first = clamp((r.from - start) / (end - start), 0.0, 1.0);
         last = clamp((r.to - start) / (end - start), 0.0, 1.0);
+    }
+    for (int i = 0; i < 2; i++) {
+        cut_at_side(a.lo[i], b.lo[i], first, last);
+        cut_at_side(a.hi[i], b.hi[i], first, last);
     }
     if (!(first < last))
         return;
