@@ -56,7 +56,7 @@ static double reach(const trip_outline *o, trip_vec3 along, double scale)
 /* A ray at distance d from the centre of the ball crosses 2 sqrt(R^2 - d^2) of it. Its opacity is
  * TRIP_OUTLINE_OPACITY at d. A voxel at distance r is nearer to the centre on rays that are not
  * across. From all but one of the seven directions it is visible up to a distance between d and
- * 1.07 d: on a diagonal, three of the directions have a sine of 0.943; on an axis, two have 1. */
+ * 1.07 d. On a diagonal, three of the directions have a sine of 0.943; on an axis, two have 1. */
 static void faint_objects_end_where_their_rays_are_too_faint_to_see(void **state)
 {
     (void)state;

@@ -515,7 +515,7 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 
 typedef struct patch_path {
     uint64_t segments; /* segments that may be visible */
-    uint64_t beyond;   /* of these, segments in which rays may be beyond a side of the grid */
+    uint64_t beyond;   /* segments in which rays may be beyond a side of the grid */
     /* For each sample plane: the raster that contains all rays of the patch, as an offset in the
      * pool. It is -1 if several rasters or none contain them. `within` is the position of
      * pane_path.base in this raster. */
