@@ -11,6 +11,12 @@
 
 enum { AXES = 3 };
 
+/* Returns the planes of a list with a file. Computed normals have none. */
+static unsigned stored_planes(const trip_dataset *data, const trip_list *list)
+{
+    return data->computes_normals ? list->planes & ~(1u << TRIP_PLANE_NORMALS) : list->planes;
+}
+
 static bool has_file(const bench_files *files, unsigned list, int plane)
 {
     return files->planes[list] >> plane & 1;
@@ -21,7 +27,7 @@ void bench_files_of_plan(const trip_dataset *data, const trip_plan *plan, bench_
     *out = (bench_files){ 0 };
     for (unsigned i = 0; i < data->list_count; i++)
         if (plan->lists[i].drawn && plan->layers[data->lists[i].axis].pass_count)
-            out->planes[i] = (uint8_t)(plan->planes & data->lists[i].planes);
+            out->planes[i] = (uint8_t)(plan->planes & stored_planes(data, &data->lists[i]));
 }
 
 void bench_files_forget(const session *s, const bench_files *files)

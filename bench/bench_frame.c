@@ -68,7 +68,9 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     if (f->occluder)
         *f->occluder = count ? NULL : f->renderer;
     double start = trip_now_ms();
-    int status = trip_plan_make_next(&plan, f->session->data, camera, &settings, f->session->table,
+    const trip_tf_entry *table =
+        session_table(f->session, trip_settings_interpolates(&settings, false));
+    int status = trip_plan_make_next(&plan, f->session->data, camera, &settings, table,
                                      session_classified(f->session, 0), NULL, f->session->budget);
     if (status)
         return status;
@@ -78,7 +80,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
         .camera = camera,
         .settings = &settings,
         .plan = &plan,
-        .table = f->session->table,
+        .table = table,
         .count = count,
     };
     status = trip_frame_draw(f->renderer, f->reader, &frame, f->rgba, NULL, &cost->stats);

@@ -43,7 +43,9 @@ int bench_sample_make(bench_sample *s)
     if (status)
         return status;
     trip_brick_summary summary;
-    return trip_brick(&(trip_brick_params){ .input = path, .output = s->data }, &summary);
+    return trip_brick(
+        &(trip_brick_params){ .input = path, .output = s->data, .normals = TRIP_NORMALS_STORED },
+        &summary);
 }
 
 /* The width of the field in world units, and its default transfer function. */
@@ -107,6 +109,7 @@ int bench_sample_make_field(bench_sample *s, const char *field, int n, const cha
                                                   .output = s->data,
                                                   .functions = &tf,
                                                   .function_count = 1,
+                                                  .normals = TRIP_NORMALS_STORED,
                                                   .levels_for = TRIP_LEVELS_FOR_BOTH },
                             &summary);
     remove(volume);

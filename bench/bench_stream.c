@@ -92,8 +92,10 @@ static int find_files(stream *t)
     trip_plan plan;
     int status = trip_camera_make(&camera, &t->frame->view, &t->session->data->index_to_world);
     if (!status)
-        status = trip_plan_make(&plan, t->session->data, &camera, &t->frame->settings,
-                                t->session->table, t->session->budget);
+        status = trip_plan_make_next(
+            &plan, t->session->data, &camera, &t->frame->settings,
+            session_table(t->session, trip_settings_interpolates(&t->frame->settings, false)),
+            session_classified(t->session, 0), NULL, t->session->budget);
     if (status)
         return status;
     bench_files_of_plan(t->session->data, &plan, &t->files);

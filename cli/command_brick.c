@@ -171,12 +171,12 @@ static int read_type(const trip_option *row, const char *text, void *base)
 
 static const char *const endians[] = { "little", "big", NULL };
 static const char *const code_bits[] = { "auto", "8", "16", NULL };
-static const char *const normals[] = { "auto", "compact", "full", "none", NULL };
+static const char *const normals[] = { "auto", "compact", "full", "none", "stored", NULL };
 static const char *const halos[] = { "1", "0", NULL };
 
 /* The names are in the order of the library's values. */
 _Static_assert(TRIPTYCH_CODE_BITS_AUTO == 0 && TRIPTYCH_CODE_BITS_16 == 2, "code_bits");
-_Static_assert(TRIPTYCH_NORMALS_AUTO == 0 && TRIPTYCH_NORMALS_NONE == 3, "normals");
+_Static_assert(TRIPTYCH_NORMALS_AUTO == 0 && TRIPTYCH_NORMALS_STORED == 4, "normals");
 _Static_assert(TRIPTYCH_LEVELS_FOR_AUTO == 0 && TRIPTYCH_LEVELS_FOR_BOTH == 3, "levels_for");
 
 #define AT(member) .at = offsetof(options, member)
@@ -251,7 +251,8 @@ static const trip_option rows[] = {
       "auto", .group = DRAW_GROUP_STORED, AT(brick.levels_for), CHOICE(trip_levels_for_names) },
     { "normals", "HOW",
       "Selects how normals are stored, for the shading of splats: compact (3 bytes), full (4 "
-      "bytes), none or auto, which is compact if no colour changes by half of 1/255",
+      "bytes), stored (compact if no colour changes by half of 1/255, else full), none, or auto: "
+      "none if drawing can compute them from values, else stored",
       "auto", .group = DRAW_GROUP_STORED, AT(brick.normals), CHOICE(normals) },
     { "slab-sheets", "N", "Sets the number of sheets per brick", "8", .group = DRAW_GROUP_STORED,
       .type = TRIP_OPTION_INTEGER, AT(brick.slab_sheets), .lo = 1, .hi = 64 },

@@ -9,46 +9,59 @@
 
 #include "anatomy.h"
 #include "budget.h"
+#include "cached_volume.h"
+#include "draw_options.h"
 #include "geometry.h"
 #include "json.h"
 #include "library.h"
 #include "command_line.h"
 #include "report.h"
 #include "text.h"
+#include "volume_info_print.h"
 
 typedef struct options {
     const char *path;
-    bool verify, json;
+    int verify, json;
+    triptych_brick_options volume;
 } options;
 
-static const struct argp_option option_table[] = {
-    { "verify", 'v', NULL, 0, "Reads all bytes and checks them", 0 },
-    { "json", 'j', NULL, 0, "Prints JSON", 0 },
-    { 0 },
-};
+#define AT(member) .at = offsetof(options, member)
 
-static error_t parse_option(int key, char *argument, struct argp_state *state)
+static const trip_option info_rows[] = {
+    { "json", NULL, "Prints JSON", .short_name = 'j', .type = TRIP_OPTION_FLAG, AT(json) },
+    { "verify", NULL, "Reads all bytes and checks them", .short_name = 'v',
+      .type = TRIP_OPTION_FLAG, AT(verify) },
+};
+#undef AT
+
+static const trip_option_table info_table = { info_rows, sizeof info_rows / sizeof *info_rows };
+
+enum { OWN, VOLUME, SETS };
+
+typedef struct parse {
+    options *o;
+    option_set sets[SETS];
+} parse;
+
+static int add_input(void *user, char *path)
 {
-    options *o = state->input;
-    switch (key) {
-    case 'v':
-        o->verify = true;
-        return 0;
-    case 'j':
-        o->json = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        if (o->path)
-            return trip_option_fail(argument, "only one data set is possible at a time");
-        o->path = argument;
-        return 0;
-    case ARGP_KEY_END:
-        return o->path ? 0
-                       : trip_option_fail("NAME.trip",
-                                          "no data set given; use `triptych info NAME.trip`");
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+    options *o = ((parse *)user)->o;
+    if (o->path)
+        return trip_option_fail(path, "only one data set or volume is possible at a time");
+    o->path = path;
+    return 0;
+}
+
+static int check(void *user)
+{
+    const parse *p = user;
+    const options *o = p->o;
+    if (!o->path)
+        return trip_option_fail("NAME.trip",
+                                "no data set or volume given; use `triptych info NAME.trip`");
+    if (o->verify && cached_volume_wanted(o->path))
+        return trip_option_fail("--verify", "applies to data sets only");
+    return p->sets[VOLUME].given ? cached_volume_check_options(o->path) : 0;
 }
 
 /* The data set to print. */
@@ -71,6 +84,12 @@ static const char *space_of(const cJSON *text)
 {
     const char *space = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "space"));
     return trip_anatomy_known(space) ? space : NULL;
+}
+
+/* Returns the source of the orientation, a key of FORMAT.md, or NULL. */
+static const char *orientation_of(const cJSON *text)
+{
+    return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(text, "orientation"));
 }
 
 /* Computes the axis-aligned box in world space that contains the whole grid, including the outer
@@ -173,6 +192,8 @@ static void add_world(cJSON *root, const triptych_info *info, const cJSON *text)
     add_bounds(root, "bounds", bounds);
     kept_bounds(info, bounds);
     add_bounds(root, "kept_bounds", bounds);
+    if (orientation_of(text))
+        cJSON_AddStringToObject(root, "orientation", orientation_of(text));
     if (!space)
         return;
     cJSON_AddStringToObject(root, "space", space);
@@ -200,6 +221,16 @@ static bool is_uneven(const triptych_info *info)
     return false;
 }
 
+/* Returns the number of values outside of the typical range. */
+static double outside(const cJSON *root)
+{
+    const cJSON *histogram = cJSON_GetObjectItemCaseSensitive(root, "histogram");
+    const cJSON *below = cJSON_GetObjectItemCaseSensitive(histogram, "below");
+    const cJSON *above = cJSON_GetObjectItemCaseSensitive(histogram, "above");
+    return (cJSON_IsNumber(below) ? below->valuedouble : 0) +
+           (cJSON_IsNumber(above) ? above->valuedouble : 0);
+}
+
 static cJSON *to_json(const data_set *d, bool verified)
 {
     const triptych_info *info = &d->info;
@@ -219,8 +250,16 @@ static cJSON *to_json(const data_set *d, bool verified)
     add_world(root, info, d->source.root);
     cJSON_AddItemToObject(root, "value_min", number(info->value_min));
     cJSON_AddItemToObject(root, "value_max", number(info->value_max));
+    cJSON_AddItemToObject(root, "typical_min", number(info->typical_min));
+    cJSON_AddItemToObject(root, "typical_max", number(info->typical_max));
+    cJSON_AddItemToObject(root, "outside", number(outside(d->source.root)));
     cJSON_AddItemToObject(root, "code_lo", number(info->code_lo));
     cJSON_AddItemToObject(root, "code_hi", number(info->code_hi));
+    cJSON_AddStringToObject(root, "codes", info->codes);
+    cJSON_AddItemToObject(root, "code_step_min", number(info->code_step_min));
+    cJSON_AddItemToObject(root, "code_step_max", number(info->code_step_max));
+    if (info->ids)
+        cJSON_AddItemToObject(root, "ids", number(info->ids));
     add_normals(root, info);
     cJSON_AddItemToObject(root, "voxels", number((double)info->voxels));
     cJSON_AddItemToObject(root, "kept", number((double)info->kept));
@@ -312,13 +351,34 @@ static void print_anatomy(const triptych_info *info, const char *space)
                trip_anatomy_words(space, direction(info->index_to_world, a), words));
 }
 
+static void print_orientation(const char *orientation)
+{
+    static const struct {
+        const char *name, *words;
+    } sources[] = {
+        { "space", "from the space of the patient in the file" },
+        { "file", "from the directions in the file" },
+        { "axes", "from --axes" },
+        { "program", "from the program that wrote the file" },
+        { "symmetry", "guessed from the mirror symmetry" },
+        { "voxels", "guessed from the long voxels" },
+        { "base", "guessed from the level base" },
+        { "length", "guessed from the longest side" },
+        { "format", "guessed from the format" },
+        { "none", "not in the file; z is up by default" },
+    };
+    for (size_t i = 0; orientation && i < sizeof sources / sizeof *sources; i++)
+        if (!strcmp(orientation, sources[i].name))
+            printf("%-12s %s\n", "orientation", sources[i].words);
+}
+
 /* Prints the top-level strings of the notes that `triptych brick` stored. */
 static void print_notes(const cJSON *root)
 {
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
         if (cJSON_IsString(item) && strlen(item->valuestring) < 1024 &&
             strlen(item->string) < 200 && !strchr(item->valuestring, '\n') &&
-            strcmp(item->string, "space") != 0) {
+            strcmp(item->string, "space") != 0 && strcmp(item->string, "orientation") != 0) {
             trip_text_write(stdout, item->string);
             for (size_t i = strlen(item->string); i < 12; i++)
                 putchar(' ');
@@ -368,6 +428,34 @@ static void print_list(const triptych_info *info, const triptych_list *list)
     putchar('\n');
 }
 
+/* Prints the typical range if some values lie outside. */
+static void print_typical(const data_set *d)
+{
+    const triptych_info *info = &d->info;
+    char lo[32], hi[32];
+    if (info->typical_min == info->value_min && info->typical_max == info->value_max)
+        return;
+    printf("%-12s %s to %s, without %.0f values far outside\n", "typical",
+           shortest(info->typical_min, lo), shortest(info->typical_max, hi),
+           outside(d->source.root));
+}
+
+static void print_codes(const triptych_info *info)
+{
+    char lo[32], hi[32], least[32], most[32];
+    shortest(info->code_lo, lo);
+    shortest(info->code_hi, hi);
+    shortest(info->code_step_min, least);
+    shortest(info->code_step_max, most);
+    if (info->ids)
+        printf("%-12s %u ids, %s to %s, exactly\n", "codes for", info->ids, lo, hi);
+    else if (info->code_step_min < info->code_step_max)
+        printf("%-12s %s to %s, finer where values are dense: %s to %s apart\n", "codes for", lo,
+               hi, least, most);
+    else
+        printf("%-12s %s to %s, %s apart\n", "codes for", lo, hi, least);
+}
+
 static void print_text(const data_set *d)
 {
     const triptych_info *info = &d->info;
@@ -380,8 +468,10 @@ static void print_text(const data_set *d)
     print_world(info);
     if (space_of(d->source.root))
         print_anatomy(info, space_of(d->source.root));
+    print_orientation(orientation_of(d->source.root));
     print_range("values", info->value_min, info->value_max);
-    print_range("codes for", info->code_lo, info->code_hi);
+    print_typical(d);
+    print_codes(info);
     printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);
     printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
            100.0 * (double)info->kept / voxels);
@@ -427,29 +517,44 @@ static int show(const options *o, data_set *d, trip_budget *budget)
     return status;
 }
 
+static int show_data_set(const options *o, data_set *d)
+{
+    trip_budget *budget = NULL;
+    int status = trip_budget_create(&budget, 0);
+    if (status == 0)
+        status = show(o, d, budget);
+    trip_json_free(&d->source);
+    free(d->lists);
+    if (budget)
+        trip_budget_destroy(budget);
+    return status;
+}
+
 int trip_command_info(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse_option,
-        .args_doc = "NAME.trip",
-        .doc = "Prints the contents of a data set: grid, values, sizes and source.",
-    };
     options o = { 0 };
+    parse p = { .o = &o,
+                .sets = { [OWN] = { .table = &info_table, .base = &o },
+                          [VOLUME] = { .table = &volume_options_table, .base = &o.volume } } };
+    const command_line c = {
+        .args_doc = "NAME.trip|VOLUME",
+        .doc = "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
+               "prints the grid, and the series of a DICOM folder.",
+        .sets = p.sets,
+        .set_count = SETS,
+        .argument = add_input,
+        .end = check,
+        .user = &p,
+    };
     data_set d = { 0 };
-    trip_budget *budget = NULL;
-    int status = trip_options_parse(&argp, argc, argv, &o);
+    int status = command_line_parse(&c, argc, argv);
     d.path = o.path;
-    if (status == 0)
-        status = trip_budget_create(&budget, 0);
     if (status == 0)
         status = library_create(&d.t, NULL);
     if (status == 0)
-        status = show(&o, &d, budget);
-    trip_json_free(&d.source);
-    free(d.lists);
+        status = cached_volume_wanted(o.path)
+                     ? volume_info_print(d.t, o.path, &o.volume, o.json != 0)
+                     : show_data_set(&o, &d);
     triptych_destroy(d.t);
-    if (budget)
-        trip_budget_destroy(budget);
     return trip_exit_status(status);
 }

@@ -84,19 +84,19 @@ static int draw(pilot *p)
     return status;
 }
 
-static void pass_warning(void *user, const char *line)
+static void pass_remark(void *user, const char *line)
 {
-    static const char warning[] = "triptych: warning: ";
+    static const char warning[] = "triptych: warning: ", note[] = "triptych: note: ";
     (void)user;
-    if (!strncmp(line, warning, strlen(warning)))
+    if (!strncmp(line, warning, strlen(warning)) || !strncmp(line, note, strlen(note)))
         trip_report_line(line);
 }
 
-/* Only the first frame's context prints warnings; the other frames have the same ones. */
+/* Only the first frame's context prints warnings and notes; the other frames have the same ones. */
 static int draw_frame(pilot *p, int frame)
 {
     const flight *f = p->all->f;
-    triptych_set_messages(p->t, frame ? NULL : pass_warning, NULL);
+    triptych_set_messages(p->t, frame ? NULL : pass_remark, NULL);
     int status = sequence_set_frame(f->sequence, p->t, frame, true);
     if (!status)
         status = draw(p);

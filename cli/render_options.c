@@ -112,9 +112,7 @@ static int check_more(const render_options *o)
                              : cached_volume_wanted(o->more[i]) ? o->more[i]
                                                                 : NULL;
         if (volume)
-            return trip_option_fail(
-                volume,
-                TRIP_ONE_VOLUME "; several data sets are possible (see triptych brick --region)");
+            return trip_option_fail(volume, TRIP_ONE_VOLUME_A_PICTURE);
     }
     if (o->more_count && draw_settings_has_levels(&o->settings))
         return trip_option_fail(

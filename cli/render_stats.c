@@ -378,6 +378,8 @@ int render_stats_explain_cost(const render_options *o, triptych *t, FILE *out)
         fprintf(out, "heat        %s read in %.1f ms; %s of memory\n",
                 trip_format_bytes(frame.heat_bytes_read, bytes), frame.heat_ms,
                 trip_format_bytes(frame.heat_memory_bytes, memory));
+    if (frame.normals_ms > 0)
+        fprintf(out, "normals     computed in %.1f ms\n", frame.normals_ms);
     fprintf(out, "drawn by    %s: %s\n", frame.renderer, frame.device);
     fprintf(out, "ring        %s\n", frame.ring);
     fprintf(out, "time        %.1f ms: waiting for the disk %.1f, drawing %.1f, %s %.1f\n",

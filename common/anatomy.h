@@ -1,7 +1,8 @@
 /* Anatomical directions of the axes of world space. A space is three letters, the ends of the body
- * that x, y and z point to. "LPS" (left, posterior, superior) is the space of DICOM, "RAS" (right,
- * anterior, superior) the space of NIfTI. These two are the only ones, since world space is
- * right-handed and pictures must not be mirrored. "" stands for an unknown space. Pure functions.
+ * that x, y and z point to. "LPS" (left, posterior, superior) is the space of DICOM and of most
+ * NRRD files, "RAS" (right, anterior, superior) the space of NIfTI and of all data sets. These two
+ * are the only ones, since world space is right-handed and pictures must not be mirrored. "" stands
+ * for an unknown space. Pure functions.
  */
 #ifndef TRIP_ANATOMY_H
 #define TRIP_ANATOMY_H

@@ -43,15 +43,16 @@ enum trip_image_task {
     /* Reads a picture from a file. numbers: bytes the helper may use. Reply data: trip_image_size,
      * then float RGBA rows. */
     TRIP_IMAGE_READ,
-    /* Opens a stack of slices. numbers: bytes the helper may use; 1 to accept missing slices. Reply
-     * data: trip_image_stack. */
+    /* Opens a stack of slices. numbers: bytes the helper may use; 1 to accept missing slices; the
+     * number of the DICOM series, or 0; the time; the channel. Reply data: trip_image_stack, then
+     * the positions and the text that it announces. */
     TRIP_IMAGE_OPEN_STACK,
     /* Reads a slice. numbers: k. Reply data: the stored values in this machine's byte order. */
     TRIP_IMAGE_READ_SLICE,
     /* Opens a variable of a netCDF-4 file, so that slices of it can be read. numbers: bytes the
-     * helper may use; length of the variable's name. The name follows the request; length 0 lets
-     * the helper choose a variable. Reply data: trip_image_netcdf, then the coordinates that it
-     * announces. */
+     * helper may use; length of the variable's name; time; channel. The name follows the request;
+     * length 0 lets the helper choose a variable. Reply data: trip_image_netcdf, then the
+     * coordinates that it announces. */
     TRIP_IMAGE_OPEN_NETCDF,
 };
 
@@ -96,7 +97,13 @@ typedef struct trip_image_stack {
     char space[8];         /* anatomical, as in anatomy.h; terminated */
     char modality[24];     /* from DICOM, at most 16 characters; terminated */
     uint64_t helper_bytes; /* part of the allowed memory used until the helper ends */
+    int32_t uneven;        /* 1: dims[2] doubles follow, the positions of the slices, ascending */
+    uint32_t parts_bytes;  /* of the list of series that follows, one a line */
+    char note[512];        /* choices made for the user, or ""; terminated */
 } trip_image_stack;
+
+/* Maximum of trip_image_stack.parts_bytes. */
+#define TRIP_IMAGE_PARTS_MAX ((uint32_t)1 << 20)
 
 typedef struct trip_image_netcdf {
     int64_t dims[3];
@@ -105,7 +112,9 @@ typedef struct trip_image_netcdf {
     double slope, inter;
     char name[64];  /* of the variable; terminated */
     int32_t others; /* 1 if the file holds more volumes */
-    int32_t deeper; /* 1 if the variable has more than three dimensions */
+    int32_t deeper; /* 1 if the variable has more than five dimensions */
+    int64_t times,
+        channels; /* sizes of the first two dimensions before the last three; at least 1 */
     uint64_t
         helper_bytes; /* part of the allowed memory used until the helper ends, besides a slice */
 } trip_image_netcdf;

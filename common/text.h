@@ -9,6 +9,10 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Parses the whole of `text` as a finite decimal number ("1", "-.5", "2.5e-3"). Returns false for
  * anything else: blanks, trailing text, hexadecimal, "nan", "inf", or a value beyond the range of a
  * double. */
@@ -52,5 +56,9 @@ void trip_text_write_word(FILE *f, const char *word);
 /* Returns the Levenshtein distance of two texts in bytes, or SIZE_MAX if one has more than 63
  * bytes. */
 size_t trip_text_distance(const char *a, const char *b);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

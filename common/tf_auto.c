@@ -159,16 +159,34 @@ int trip_tf_even_fog(trip_tf **out, const trip_histogram *h)
     return trip_tf_from_points(out, &point, 1, false, 0);
 }
 
+/* Returns whether the background is bright, so that bins are in descending order. */
+static bool analyse_either_way(analysis *a, const trip_histogram *h)
+{
+    analyse(a, h, false);
+    const bool downwards = a->foreground * 1000 < a->under;
+    if (downwards)
+        analyse(a, h, true);
+    return downwards;
+}
+
+bool trip_tf_find_foreground(const trip_histogram *h, double *edge, double *extreme)
+{
+    analysis a;
+    if (h->value_min == h->value_max)
+        return false;
+    analyse_either_way(&a, h);
+    *edge = upper_edge(&a, a.end);
+    *extreme = a.low + a.range;
+    return a.foreground > 0 && isfinite(a.range);
+}
+
 int trip_tf_from_histogram(trip_tf **out, const trip_histogram *h)
 {
     trip_tf_point points[LEVELS + 2];
     analysis a;
     if (h->value_min == h->value_max)
         return trip_tf_even_fog(out, h);
-    analyse(&a, h, false);
-    bool downwards = a.foreground * 1000 < a.under; /* the background is bright */
-    if (downwards)
-        analyse(&a, h, true);
+    const bool downwards = analyse_either_way(&a, h);
     if (!(a.foreground > 0) || !isfinite(a.range)) {
         points[0] = (trip_tf_point){ h->value_min, colour_at(0.7, solid_opacity) };
         return trip_tf_from_points(out, points, 1, false, 0);

@@ -88,6 +88,7 @@ static int read_map(map_reader *r)
         return status;
     if (is_set(r->map, "UseLogScale"))
         trip_warn(r->where, "UseLogScale is not supported; the map is used on a linear scale");
+    trip_tf_curves_drop_opaque(&r->curves);
     trip_tf_curves_stretch(&r->curves);
     return TRIP_OK;
 }

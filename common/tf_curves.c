@@ -122,6 +122,14 @@ void trip_tf_curves_stretch(trip_tf_curves *c)
     normalise(&c->colours);
 }
 
+void trip_tf_curves_drop_opaque(trip_tf_curves *c)
+{
+    for (size_t i = 0; i < c->opacities.count; i++)
+        if (c->opacities.data[i].part[0] < 1)
+            return;
+    c->opacities.count = 0;
+}
+
 /* A growing list of points. */
 typedef struct samples {
     trip_tf curve;
@@ -289,6 +297,8 @@ int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *whe
     else
         status = trip_tf_from_points(out, merged.curve.points, merged.curve.count, c->normalised,
                                      c->unit_world);
+    if (!status)
+        (*out)->ramp = c->opacities.count == 0;
     free(colour.curve.points);
     free(opacity.curve.points);
     free(merged.curve.points);

@@ -35,8 +35,12 @@ int trip_tf_nodes_add_text(trip_tf_nodes *n, const char *text, int numbers_per_n
 /* Normalises the curves if the colours span 0 to 1 or -1 to 1. ParaView stretches such curves over
  * the data when it loads them. */
 void trip_tf_curves_stretch(trip_tf_curves *c);
+/* Drops opacities that are all 1. Colour maps for surfaces have them; a volume would be a solid
+ * box.
+ */
+void trip_tf_curves_drop_opaque(trip_tf_curves *c);
 /* Builds the transfer function. Without opacities, opacity rises from 0 to 1 over the range of the
- * colours, as in ParaView. */
+ * colours, as in ParaView. trip_tf_adapt() lets it begin above the background. */
 int trip_tf_curves_build(trip_tf **out, const trip_tf_curves *c, const char *where);
 void trip_tf_curves_free(trip_tf_curves *c);
 

@@ -19,15 +19,76 @@ int trip_tf_from_kind(trip_tf **out, trip_tf_kind kind)
 
 bool trip_tf_needs_data(const trip_tf *tf)
 {
-    return tf->normalised || tf->made;
+    return tf->normalised || tf->made || tf->ramp;
 }
+
+bool trip_tf_needs_histogram(const trip_tf *tf)
+{
+    return tf->made;
+}
+
+bool trip_tf_spans_window(const trip_tf *tf)
+{
+    return tf->normalised || tf->ramp;
+}
+
+/* ---- ramps ---- */
+
+/* Returns where `value` lies between the ends of a ramp, 0 to 1. */
+static double share(double value, double from, double to)
+{
+    return fmin(1, fmax(0, (value - from) / (to - from)));
+}
+
+/* Sets opacities that rise from 0 at `from` to 1 at `to`. */
+static int set_ramp(trip_tf *tf, double from, double to)
+{
+    const trip_rgba at_bend = trip_tf_evaluate(tf, from);
+    trip_tf_point *points = realloc(tf->points, (tf->count + 1) * sizeof *points);
+    size_t at = tf->count;
+    if (!points)
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "ramp", "out of memory");
+    tf->points = points;
+    for (; at > 0 && points[at - 1].value > from; at--)
+        points[at] = points[at - 1];
+    points[at] = (trip_tf_point){ from, at_bend };
+    tf->count++;
+    for (size_t i = 0; i < tf->count; i++)
+        points[i].colour.opacity = share(points[i].value, from, to);
+    return TRIP_OK;
+}
+
+/* Starts the ramp of a colour map at the edge of the background, and says so. */
+static int adapt_ramp(trip_tf *tf, const trip_histogram *h, const char *where)
+{
+    const double lo = tf->points[0].value, hi = tf->points[tf->count - 1].value;
+    double edge, extreme, from = lo, to = hi;
+    if (!tf->ramp)
+        return TRIP_OK;
+    tf->ramp = false;
+    if (h && trip_tf_find_foreground(h, &edge, &extreme)) {
+        from = fmax(lo, fmin(hi, edge));
+        to = extreme > edge ? hi : lo;
+        from = from == to ? lo : from; /* all values of the map are background */
+        to = from == to ? hi : to;
+    }
+    const int status = from != to && from != lo ? set_ramp(tf, from, to) : TRIP_OK;
+    if (!status)
+        trip_note(where,
+                  "the transfer function has colours without opacities; its opacity rises from 0 "
+                  "at %.4g to 1 at %.4g, and --window and --level move it",
+                  from, to);
+    return status;
+}
+
+/* ---- data ---- */
 
 int trip_tf_adapt(trip_tf *tf, const trip_tf_data *data, const char *where)
 {
     trip_tf *made;
     if (!tf->made) {
         trip_tf_denormalise(tf, data->value_min, data->value_max);
-        return TRIP_OK;
+        return adapt_ramp(tf, data->histogram, where);
     }
     trip_tf_kind kind = tf->as == TRIP_TF_AUTOMATIC ? data->kind : tf->as;
     if (!data->histogram)
@@ -61,7 +122,7 @@ int trip_tf_window(trip_tf *tf, double width, double level)
         /* Rounding must not put a point before its predecessor. */
         tf->points[i].value = i ? fmax(value, tf->points[i - 1].value) : value;
     }
-    tf->normalised = false;
+    tf->normalised = tf->ramp = false;
     tf->hounsfield = false;
     return TRIP_OK;
 }

@@ -19,8 +19,9 @@ struct trip_tf {
     bool normalised;
     double unit_world; /* 0 means one voxel */
     bool hounsfield;   /* preset in Hounsfield units */
-    bool made;         /* points are still to be made from a histogram */
-    trip_tf_kind as;   /* kind of data to make them for */
+    bool ramp; /* colours without opacities; trip_tf_adapt() starts the ramp above background */
+    bool made; /* points are still to be made from a histogram */
+    trip_tf_kind as; /* kind of data to make them for */
 };
 
 /* Returns why a point is invalid, or NULL. `before` is the previous point, or NULL. */
@@ -43,6 +44,10 @@ int trip_tf_from_kind(trip_tf **out, trip_tf_kind kind);
  * `preset` names one of an array; NULL selects the first. */
 int trip_tf_parse_colormap(trip_tf **out, const char *name, const char *text, size_t bytes,
                            const char *preset);
+
+/* Finds the interval of values beside the background, from the background's edge to the extreme on
+ * its other side. lo > hi if the background is bright. Returns false if all values are alike. */
+bool trip_tf_find_foreground(const trip_histogram *histogram, double *edge, double *extreme);
 
 /* Makes fog for a volume of one value. It transmits about a third of the light behind it. */
 int trip_tf_even_fog(trip_tf **out, const trip_histogram *histogram);

@@ -113,6 +113,8 @@ trip_tf_kind trip_tf_recognise(const trip_tf_origin *o, const trip_histogram *h)
 {
     const char *modality = o->modality ? o->modality : "";
     bool values = h->total > 0 && h->value_min < h->value_max;
+    if (h->id_count)
+        return TRIP_TF_LABELS;
     if (o->sparse)
         return h->value_min >= 0 ? TRIP_TF_FOG : TRIP_TF_SIMULATION;
     if (!values)

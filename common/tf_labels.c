@@ -57,10 +57,57 @@ static size_t add_bin(trip_tf_point *points, size_t count, const trip_histogram 
     return count;
 }
 
+/* Returns 0 or, if all ids are above 0, the first one of the most frequent bin. */
+static double background_id(const trip_histogram *h)
+{
+    const double range = h->value_max - h->value_min;
+    int max = 0;
+    uint32_t i = 0;
+    for (int b = 1; b < BINS; b++)
+        if (h->counts[b] > h->counts[max])
+            max = b;
+    while (h->ids[0] > 0 && i + 1 < h->id_count && h->ids[i] < h->value_min + range * max / BINS)
+        i++;
+    return h->ids[0] > 0 ? h->ids[i] : 0;
+}
+
+/* Returns the end of an id's colour: half a unit away, or half way to the next id if that is
+ * nearer. */
+static double end_of(const trip_histogram *h, uint32_t i, int step)
+{
+    const bool alone = step < 0 ? i == 0 : i + 1 == h->id_count;
+    const double gap = alone ? 1 : fabs(h->ids[step < 0 ? i - 1 : i + 1] - h->ids[i]);
+    return h->ids[i] + step * fmin(0.5, gap / 2);
+}
+
+/* Makes the function from the ids themselves. Each has its colour over one unit or, if there are
+ * too many for two points each, at the id. */
+static int make_from_ids(trip_tf **out, const trip_histogram *h)
+{
+    const bool wide = h->id_count <= TRIP_TF_MAX_POINTS / 2;
+    const double background = background_id(h);
+    trip_tf_point *points = calloc(2 * (size_t)h->id_count, sizeof *points);
+    if (!points)
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, "", "out of memory");
+    size_t count = 0;
+    for (uint32_t i = 0; i < h->id_count; i++) {
+        trip_rgba colour = colour_of(h->ids[i]);
+        colour.opacity = h->ids[i] == background ? 0 : label_opacity;
+        points[count++] = (trip_tf_point){ wide ? end_of(h, i, -1) : h->ids[i], colour };
+        if (wide)
+            points[count++] = (trip_tf_point){ end_of(h, i, 1), colour };
+    }
+    int status = trip_tf_from_points(out, points, count, false, 0);
+    free(points);
+    return status;
+}
+
 int trip_tf_labels_from_histogram(trip_tf **out, const trip_histogram *h)
 {
     double range = h->value_max - h->value_min, background = background_of(h);
     int occurring = 0;
+    if (h->ids && h->id_count > 2)
+        return make_from_ids(out, h);
     for (int i = 0; i < BINS; i++)
         occurring += h->counts[i] > 0;
     const bool counts =

@@ -245,8 +245,10 @@ static int check(xml_reader *r)
     if (!r->found)
         return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, r->name,
                          "holds no volume property and no colour map");
-    if (r->map)
+    if (r->map) {
+        trip_tf_curves_drop_opaque(&r->curves);
         trip_tf_curves_stretch(&r->curves);
+    }
     trip_tf_warn_of_gradient(&r->gradient, r->where);
     return TRIP_OK;
 }

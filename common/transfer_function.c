@@ -221,6 +221,8 @@ char *trip_tf_to_text(const trip_tf *tf)
         return NULL;
     if (tf->made)
         fprintf(f, "# made from the histogram: %s\n", trip_tf_kind_name(tf->as));
+    if (tf->ramp)
+        fputs("# opacity: a ramp that starts above the background\n", f);
     fputs("unit ", f);
     if (tf->unit_world > 0)
         write_number(f, tf->unit_world, '\n');
@@ -247,14 +249,18 @@ double trip_extinction(double opacity)
     return -log1p(-fmin(opacity, TRIP_OPACITY_MAX));
 }
 
+trip_tf_entry trip_tf_entry_at(const trip_tf *tf, double value, double voxel_world)
+{
+    const double unit = tf->unit_world > 0 ? tf->unit_world : voxel_world;
+    assert(!tf->normalised && unit > 0);
+    const trip_rgba c = trip_tf_evaluate(tf, value);
+    return (trip_tf_entry){ (float)c.r, (float)c.g, (float)c.b,
+                            (float)(trip_extinction(c.opacity) / unit) };
+}
+
 void trip_tf_fill_table(const trip_tf *tf, double lo, double hi, double voxel_world,
                         trip_tf_entry table[65536])
 {
-    double unit = tf->unit_world > 0 ? tf->unit_world : voxel_world;
-    assert(!tf->normalised && unit > 0);
-    for (int code = 0; code < 65536; code++) {
-        trip_rgba c = trip_tf_evaluate(tf, lo + (hi - lo) * code / 65535);
-        table[code] = (trip_tf_entry){ (float)c.r, (float)c.g, (float)c.b,
-                                       (float)(trip_extinction(c.opacity) / unit) };
-    }
+    for (int code = 0; code < 65536; code++)
+        table[code] = trip_tf_entry_at(tf, lo + (hi - lo) * code / 65535, voxel_world);
 }

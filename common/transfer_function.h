@@ -31,12 +31,16 @@ typedef struct trip_tf_point {
     trip_rgba colour;
 } trip_tf_point;
 
-/* Counts the finite values of a volume in equal bins over [value_min, value_max]. `total` is the
- * sum. */
+/* Counts the finite values of a volume in equal bins over [value_min, value_max], its typical
+ * range. Values outside are left out. `total` is the sum. */
 typedef struct trip_histogram {
     double value_min, value_max;
     uint64_t counts[1024];
     uint64_t total;
+    /* The distinct values of a volume of ids, ascending. NULL if they are not known. The caller
+     * owns them. */
+    const double *ids;
+    uint32_t id_count; /* 0 if the values are no ids */
 } trip_histogram;
 
 /* Kinds of volumes. Each kind has an automatic transfer function. */
@@ -98,6 +102,10 @@ const char *trip_tf_preset_name(size_t i);
 const char *trip_tf_preset_summary(size_t i);
 const char *trip_tf_preset_basis(size_t i);
 
+/* Whether trip_tf_adapt() fails without a histogram. */
+bool trip_tf_needs_histogram(const trip_tf *tf);
+/* Whether a window replaces the range of trip_tf_adapt(). */
+bool trip_tf_spans_window(const trip_tf *tf);
 /* Whether values are fractions of the data's range. Otherwise they are in data units. */
 bool trip_tf_is_normalised(const trip_tf *tf);
 /* Converts a normalised function to data units in place. Leaves other functions unchanged. */
@@ -164,12 +172,14 @@ int trip_tf_write(const trip_tf *tf, trip_tf_format format, const char *name, ch
  */
 double trip_extinction(double opacity);
 
-/* One entry per code of a data set: r, g, b in [0, 1] and extinction per world unit, as floats.
- * Code c, 0 to 65535, stands for value lo + (hi - lo) * c / 65535. `voxel_world` is the length of
- * one voxel. */
+/* One entry per code: r, g, b in [0, 1] and extinction per world unit, as floats. `voxel_world` is
+ * the length of one voxel. */
 typedef struct trip_tf_entry {
     float r, g, b, extinction;
 } trip_tf_entry;
+/* Returns the entry of a value in data units. */
+trip_tf_entry trip_tf_entry_at(const trip_tf *tf, double value, double voxel_world);
+/* Fills a table for even codes. Code c, 0 to 65535, stands for value lo + (hi - lo) * c / 65535. */
 void trip_tf_fill_table(const trip_tf *tf, double lo, double hi, double voxel_world,
                         trip_tf_entry table[65536]);
 

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstring>
 
 #include <sys/socket.h>
+#include <unistd.h>
+
+#include "report.h"
 
 namespace
 {
@@ -39,7 +43,36 @@ int take_descriptor()
     return fd;
 }
 
+/* The file that is decoded. on_abort() reads it. */
+char decoded[4000];
+volatile std::sig_atomic_t decoded_bytes;
+
+/* Calls only functions that are safe in a signal handler. */
+void on_abort(int)
+{
+    static const char why[] = "is damaged, or of a kind that is not supported: its decoder gave up";
+    const trip_image_reply r = { TRIP_IMAGE_FAILED, TRIP_ERROR, (uint32_t)decoded_bytes,
+                                 sizeof why - 1, 0 };
+    if (decoded_bytes > 0 && send(connection, &r, sizeof r, MSG_NOSIGNAL) == sizeof r &&
+        send(connection, decoded, (size_t)decoded_bytes, MSG_NOSIGNAL) > 0)
+        (void)send(connection, why, sizeof why - 1, MSG_NOSIGNAL);
+    _exit(1);
+}
+
 } // namespace
+
+void trip_connection_decode(const std::string &path)
+{
+    decoded_bytes = 0;
+    const size_t bytes = std::min(path.size(), sizeof decoded);
+    std::memcpy(decoded, path.data(), bytes);
+    decoded_bytes = (std::sig_atomic_t)bytes;
+}
+
+void trip_connection_catch_abort()
+{
+    std::signal(SIGABRT, on_abort);
+}
 
 void trip_connection_receive(void *data, size_t bytes)
 {

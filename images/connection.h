@@ -22,6 +22,13 @@ trip_image_request trip_connection_next(std::string &path, int &fd);
 void trip_connection_reply(trip_image_outcome outcome, int status, std::string where,
                            std::string why, uint64_t data_bytes);
 
+/* Names the file that is decoded, for trip_connection_catch_abort(). "" names none. */
+void trip_connection_decode(const std::string &path);
+
+/* Libraries abort the process at some damaged files. From now on, the other end then learns the
+ * name of the file. */
+void trip_connection_catch_abort();
+
 /* Tells the other end that the helper is working, at most once a second. Call it repeatedly during
  * long tasks. */
 void trip_connection_working();

@@ -2,6 +2,7 @@
  * the connection closes. Every exception of the libraries becomes a reply. */
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -131,12 +132,20 @@ class Session
         if (!budget_ && trip_budget_create(&budget_, (uint64_t)request.numbers[0]) < 0)
             throw std::bad_alloc();
         trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
-        bool allow_gaps = request.numbers[1] != 0;
-        trip_slice_files files = trip_slice_find(path, allow_gaps);
-        stack_ = files.kind == TRIP_IMAGE_DICOM ? trip_dicom_stack(files, budget_, allow_gaps)
-                                                : trip_picture_stack(files, budget_);
-        bool frames = files.kind == TRIP_IMAGE_DICOM && stack_->dims[2] > 1;
-        if (allow_gaps && files.names[0] == path && !frames)
+        const trip_stack_choice choice = { request.numbers[1] != 0, (int)request.numbers[2],
+                                           (int)request.numbers[3], (int)request.numbers[4] };
+        trip_slice_files files = trip_slice_find(path, choice.allow_gaps);
+        const bool dicom = files.kind == TRIP_IMAGE_DICOM;
+        if (!dicom && choice.series)
+            throw trip_slice_error(path,
+                                   std::string("holds ") + trip_image_kind_name(files.kind) +
+                                       "; --series requires DICOM",
+                                   TRIP_USAGE);
+        if (dicom)
+            trip_check_entry(path, "channel", choice.channel, 1);
+        stack_ = dicom ? trip_dicom_stack(path, files, budget_, choice)
+                       : trip_picture_stack(files, budget_, choice);
+        if (choice.allow_gaps && files.names[0] == path && !(dicom && stack_->dims[2] > 1))
             throw trip_slice_error(
                 path, "is one file; --allow-gaps requires a stack of several files", TRIP_USAGE);
         trip_image_stack s = {};
@@ -148,9 +157,15 @@ class Session
         std::memcpy(s.space, stack_->space, sizeof s.space);
         std::memcpy(s.modality, stack_->modality, sizeof s.modality);
         s.oriented = stack_->oriented;
+        s.uneven = !stack_->along.empty();
+        std::snprintf(s.note, sizeof s.note, "%s", stack_->note.c_str());
+        s.parts_bytes = (uint32_t)std::min<size_t>(stack_->parts.size(), TRIP_IMAGE_PARTS_MAX);
         s.helper_bytes = trip_budget_peak_bytes(budget_);
-        reply_data(sizeof s);
+        const size_t along_bytes = stack_->along.size() * sizeof(double);
+        reply_data(sizeof s + along_bytes + s.parts_bytes);
         trip_connection_send(&s, sizeof s);
+        trip_connection_send(stack_->along.data(), along_bytes);
+        trip_connection_send(stack_->parts.data(), s.parts_bytes);
     }
 
     void read_slice(const trip_image_request &request)
@@ -206,6 +221,7 @@ void answer_one(Session &session)
     Descriptor file;
     const trip_image_request request = trip_connection_next(path, file.fd);
     memory_refused = false;
+    trip_connection_decode(path);
     try {
         session.answer(request, path, file.fd);
     } catch (const trip_slice_error &e) {
@@ -241,6 +257,7 @@ int main()
     std::signal(SIGXFSZ, SIG_IGN); /* write() then fails with EFBIG */
     (void)trip_sandbox_enter();    /* continues without a sandbox if the kernel has none */
     set_up_threads();
+    trip_connection_catch_abort();
     std::set_new_handler(on_memory_refused);
     trip_report_redirect(pass_warning, nullptr);
     Session session;

@@ -1,12 +1,17 @@
 #include <algorithm>
-#include <cstdlib>
+#include <fstream>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include <OpenImageIO/imageio.h>
+#include <tiffio.h>
 
+#include "absent_value.h"
 #include "connection.h"
+#include "page_order.h"
 #include "slice_stack.h"
+#include "text.h"
 #include "volume_info.h"
 
 namespace
@@ -43,19 +48,14 @@ std::string message(std::string text)
     return text.empty() ? "cannot be read" : text;
 }
 
-/* Returns the faults among the library's messages. It remarks on tags that it does not know, such
- * as the private tags of microscopes and of GeoTIFF, and such a file is sound. */
-std::string faults(const std::string &messages)
+/* Silences libtiff's remarks on sound files, such as files with private tags. OpenImageIO would
+ * report the last remark as the reason for the end of the pages. It sets libtiff's handlers once,
+ * with its first reader. */
+void silence_remarks()
 {
-    std::string left;
-    for (size_t at = 0; at < messages.size();) {
-        const size_t end = std::min(messages.find('\n', at), messages.size());
-        const std::string line = messages.substr(at, end - at);
-        if (line.find("Unknown field with tag") == std::string::npos && !line.empty())
-            left += line + "\n";
-        at = end + 1;
-    }
-    return left;
+    OIIO::ImageInput::create("tiff");
+    OIIO::geterror();
+    TIFFSetWarningHandler(nullptr);
 }
 
 /* Whether a page of a TIFF is a smaller copy of another page: a thumbnail, or a level of a pyramid.
@@ -86,23 +86,33 @@ trip_scalar scalar_of(const std::string &file, OIIO::TypeDesc type)
 class PictureStack : public trip_slice_stack
 {
   public:
-    PictureStack(const trip_slice_files &files, trip_budget *budget);
+    PictureStack(const trip_slice_files &files, trip_budget *budget,
+                 const trip_stack_choice &choice);
     void read(int64_t k, void *values) override;
 
   private:
     Input open(const std::string &file) const;
     void check_same(const std::string &stage, const OIIO::ImageSpec &spec) const;
-    void count_pages(OIIO::ImageInput &in);
-    void choose_channels(trip_budget *budget);
-    void colour_to_luma(float *values) const;
+    std::vector<int> find_pages(OIIO::ImageInput &in);
+    void order_pages(const OIIO::ImageSpec &first, const std::vector<int> &pages,
+                     const trip_stack_choice &choice);
+    void choose_type(const OIIO::ImageSpec &first, trip_budget *budget);
+    void keep_bits(void *values) const;
+    void convert(void *values) const;
 
     trip_slice_files files_;
     std::unique_ptr<Form> form_;
     trip_scalar stored_ = TRIP_U8;
     Input current_;
     int64_t current_file_ = -1;
-    std::vector<int> pages_;   /* of a single file: the page of each slice */
-    trip_slice_buffer colour_; /* a slice with all channels; only for colour */
+    std::vector<std::string> misfits_; /* of a single file: the fault of each page, or "" */
+    std::vector<int> pages_;           /* of a single file: the page of each slice */
+    bool colour_ = false;              /* the values of a pixel are a colour */
+    int sample_ = 0;                   /* the value of a pixel that is read, unless colour */
+    int bits_ = 0; /* of a value of fewer bits than its type, which the library scales up; or 0 */
+    bool has_absent_ = false;
+    double absent_ = 0;        /* the stored value that means no value */
+    trip_slice_buffer buffer_; /* a slice as stored, with all its values; if it is converted */
 };
 
 Input PictureStack::open(const std::string &file) const
@@ -125,77 +135,149 @@ void PictureStack::check_same(const std::string &stage, const OIIO::ImageSpec &s
                                           form_->text());
 }
 
-/* ImageJ writes stacks beyond 4 GB as one page followed by raw data, which no library reads. */
-void check_imagej(const std::string &file, const OIIO::ImageSpec &spec, int pages)
-{
-    const std::string text = spec.get_string_attribute("ImageDescription");
-    size_t at = text.find("images=");
-    if (text.compare(0, 7, "ImageJ=") != 0 || at == std::string::npos)
-        return;
-    long images = std::strtol(text.c_str() + at + 7, nullptr, 10);
-    if (pages == 1 && images > 1)
-        throw trip_slice_error(file, "holds " + std::to_string(images) +
-                                         " slices in a form private to ImageJ; save it as raw data "
-                                         "or as an image sequence");
-}
-
-/* Counts the pages of a single file, which are the slices of a TIFF. */
-void PictureStack::count_pages(OIIO::ImageInput &in)
+/* Returns the pages of a single file, except reduced ones. Other pages may be unlike the first one
+ * if the description does not count them as slices, so misfits are only kept. */
+std::vector<int> PictureStack::find_pages(OIIO::ImageInput &in)
 {
     const std::string &file = files_.names[0];
-    const OIIO::ImageSpec first = in.spec();
-    int pages = 0;
-    pages_.assign(1, 0);
-    while (in.seek_subimage(++pages, 0)) {
+    std::vector<int> pages = { 0 };
+    int page = 0;
+    misfits_.assign(1, "");
+    while (in.seek_subimage(++page, 0)) {
         if (files_.kind != TRIP_IMAGE_TIFF) {
             trip_warn(file.c_str(), "has several parts; the first one is read");
             break;
         }
         trip_connection_working();
-        if (is_reduced(in.spec()))
-            continue;
-        check_same(file + ": page " + std::to_string(pages + 1), in.spec());
-        pages_.push_back(pages);
+        misfits_.push_back("");
+        if (!is_reduced(in.spec()))
+            pages.push_back(page);
+        try {
+            check_same(file + ": page " + std::to_string(page + 1), in.spec());
+        } catch (const trip_slice_error &e) {
+            misfits_.back() = e.what();
+        }
     }
     /* After the last page the library reports only the file's name, which is no error. */
-    const std::string why = faults(in.geterror());
+    const std::string why = in.geterror();
     if (files_.kind == TRIP_IMAGE_TIFF && !why.empty() && message(why) != file)
-        throw trip_slice_error(file, "after page " + std::to_string(pages) + ": " + message(why));
-    check_imagej(file, first, pages);
+        throw trip_slice_error(file, "after page " + std::to_string(page) + ": " + message(why));
+    return pages;
+}
+
+/* Chooses the pages that are slices of the wanted channel and time. Descriptions of ImageJ count
+ * the pages that are not reduced, descriptions of OME count all. */
+void PictureStack::order_pages(const OIIO::ImageSpec &first, const std::vector<int> &pages,
+                               const trip_stack_choice &choice)
+{
+    const std::string &file = files_.names[0];
+    const bool tiff = files_.kind == TRIP_IMAGE_TIFF;
+    const std::string text = tiff ? first.get_string_attribute("ImageDescription") : "";
+    const bool imagej = text.compare(0, 7, "ImageJ=") == 0;
+    const trip_page_order order = trip_page_order_of(
+        { file,
+          text,
+          (int64_t)(imagej ? pages.size() : misfits_.size()),
+          files_.names.size() > 1,
+          { first.get_float_attribute("XResolution"), first.get_float_attribute("YResolution") },
+          first.get_string_attribute("ResolutionUnit"),
+          colour_ ? 1 : form_->channels,
+          choice.time,
+          choice.channel });
+    note += (note.empty() || order.note.empty() ? "" : "; ") + order.note;
+    sample_ = (int)order.sample;
+    slope = order.slope;
+    inter = order.inter;
+    for (int a = 0; a < 3; a++)
+        index_to_world.m[a][a] = order.spacing[a];
+    if (files_.names.size() > 1)
+        return;
+    pages_ = pages;
+    if (!order.pages.empty()) {
+        pages_.clear();
+        for (int64_t page : order.pages)
+            pages_.push_back(imagej ? pages[(size_t)page] : (int)page);
+    }
+    for (int page : pages_)
+        if (!misfits_[(size_t)page].empty())
+            throw trip_slice_error(file + ": page " + std::to_string(page + 1),
+                                   misfits_[(size_t)page]);
     dims[2] = (int64_t)pages_.size();
 }
 
-void PictureStack::choose_channels(trip_budget *budget)
+/* Returns whether three or four values are a colour. In a TIFF the tag of the interpretation
+ * tells: 0 and 1 are grey. */
+bool is_colour(const OIIO::ImageSpec &spec)
+{
+    const int grey = spec.get_int_attribute("tiff:PhotometricInterpretation", 2);
+    return (spec.nchannels == 3 || spec.nchannels == 4) && grey != 0 && grey != 1;
+}
+
+/* Returns the bits of a value if they are fewer than the type's. The library scales such values up
+ * to the type's range, except colours from a palette. */
+int few_bits(const OIIO::ImageSpec &spec, trip_scalar type)
+{
+    const int bits = spec.get_int_attribute("oiio:BitsPerSample");
+    const bool palette = spec.get_int_attribute("tiff:PhotometricInterpretation") == 3;
+    const bool whole = type < TRIP_F16 && bits > 0 && bits < 8 * (int)trip_scalar_bytes(type);
+    return whole && !palette ? bits : 0;
+}
+
+/* Returns the bits of the values of a grey PNG if they are fewer than 8. The library scales such
+ * values up, too, and does not tell. Depth and kind are at a fixed place. */
+int few_bits_of_png(const std::string &file)
+{
+    char head[26] = "";
+    std::ifstream in(file, std::ios::binary);
+    const bool grey = in.read(head, sizeof head) && head[25] == 0;
+    return grey && head[24] > 0 && head[24] < 8 ? head[24] : 0;
+}
+
+void PictureStack::choose_type(const OIIO::ImageSpec &first, trip_budget *budget)
 {
     const std::string &file = files_.names[0];
     stored_ = type = scalar_of(file, form_->type);
-    if (form_->channels > 4)
-        throw trip_slice_error(file, "has " + std::to_string(form_->channels) +
-                                         " channels; a slice must have one channel, or colour");
-    if (form_->channels == 2)
-        trip_warn(file.c_str(), "has two channels; the first one is read");
-    if (form_->channels < 3)
+    colour_ = is_colour(first);
+    if (files_.kind == TRIP_IMAGE_TIFF) {
+        bits_ = few_bits(first, stored_);
+        has_absent_ = !colour_ && trip_absent_value(file, absent_);
+    }
+    if (files_.kind == TRIP_IMAGE_PNG && stored_ == TRIP_U8)
+        bits_ = few_bits_of_png(file);
+    if (colour_)
+        note = TRIP_VOLUME_COLOUR_NOTE;
+    if (has_absent_) {
+        char number[32];
+        note = std::string("the value ") + trip_text_from_double(absent_, number) +
+               " is absent, as the file says";
+    }
+    if (!colour_ && !has_absent_)
         return;
-    trip_warn(file.c_str(), "is in colour; its Rec. 709 luma is read");
-    type = TRIP_F32;
-    colour_.take(budget, file,
-                 (uint64_t)form_->width * (uint64_t)form_->height * (uint64_t)form_->channels *
-                     trip_scalar_bytes(stored_));
+    type = stored_ == TRIP_F64 && !colour_ ? TRIP_F64 : TRIP_F32;
+    buffer_.take(budget, file,
+                 (uint64_t)form_->width * (uint64_t)form_->height *
+                     (uint64_t)(colour_ ? form_->channels : 1) * trip_scalar_bytes(stored_));
 }
 
-PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget) : files_(files)
+PictureStack::PictureStack(const trip_slice_files &files, trip_budget *budget,
+                           const trip_stack_choice &choice)
+    : files_(files)
 {
+    silence_remarks();
     Input in = open(files.names[0]);
-    form_ = std::make_unique<Form>(in->spec());
+    const OIIO::ImageSpec first = in->spec();
+    std::vector<int> pages;
+    form_ = std::make_unique<Form>(first);
     dims[0] = form_->width;
     dims[1] = form_->height;
     dims[2] = (int64_t)files.names.size();
     if (files.names.size() == 1)
-        count_pages(*in);
+        pages = find_pages(*in);
     else if (files.kind == TRIP_IMAGE_TIFF && in->seek_subimage(1, 0))
         throw trip_slice_error(files.names[0], "holds several slices but is one of several files");
     in->geterror();
-    choose_channels(budget);
+    choose_type(first, budget);
+    order_pages(first, pages, choice);
     for (size_t i = 1; i < files.names.size(); i++) {
         check_same(files.names[i], open(files.names[i])->spec());
         trip_connection_working();
@@ -208,19 +290,53 @@ bool on_progress(void *, float)
     return false; /* continue */
 }
 
-/* Converts to the luma of the stored numbers (Rec. ITU-R BT.709-6, 3.2). Alpha is ignored. */
-void PictureStack::colour_to_luma(float *values) const
+template <typename T> void shift_down(void *values, size_t count, int bits)
 {
-    const int channels = form_->channels;
-    std::vector<float> row((size_t)dims[0] * (size_t)channels);
-    const size_t row_bytes = row.size() * trip_scalar_bytes(stored_);
-    for (int64_t y = 0; y < dims[1]; y++) {
-        const char *from = colour_.data() + (size_t)y * row_bytes;
-        trip_scalar_decode(stored_, false, 1, 0, from, row.size(), row.data());
-        for (int64_t x = 0; x < dims[0]; x++) {
-            const float *p = &row[(size_t)(x * channels)];
-            values[y * dims[0] + x] = (float)(0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]);
-        }
+    T *v = static_cast<T *>(values);
+    for (size_t i = 0; i < count; i++)
+        v[i] = (T)(v[i] >> bits);
+}
+
+/* Restores values of few bits. The library puts them into the upper bits and repeats them below. It
+ * reads values of 24 bits with their first byte as the highest, whatever the machine's order. */
+void PictureStack::keep_bits(void *values) const
+{
+    const size_t count =
+        (size_t)dims[0] * (size_t)dims[1] * (size_t)(colour_ ? form_->channels : 1);
+    const int bytes = (int)trip_scalar_bytes(stored_), down = 8 * bytes - bits_;
+    const bool is_signed = stored_ == TRIP_I8 || stored_ == TRIP_I16 || stored_ == TRIP_I32;
+    if (bits_ == 24 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__) {
+        uint32_t *v = static_cast<uint32_t *>(values);
+        for (size_t i = 0; i < count; i++)
+            v[i] = __builtin_bswap32(v[i] >> 8);
+    }
+    if (bytes == 1)
+        is_signed ? shift_down<int8_t>(values, count, down)
+                  : shift_down<uint8_t>(values, count, down);
+    else if (bytes == 2)
+        is_signed ? shift_down<int16_t>(values, count, down)
+                  : shift_down<uint16_t>(values, count, down);
+    else
+        is_signed ? shift_down<int32_t>(values, count, down)
+                  : shift_down<uint32_t>(values, count, down);
+}
+
+/* Converts the buffer: colours to their luma, without opacity, and absent values to NaN. */
+void PictureStack::convert(void *values) const
+{
+    const size_t count = (size_t)dims[0] * (size_t)dims[1], bytes = trip_scalar_bytes(stored_);
+    float *to = static_cast<float *>(values);
+    if (colour_) {
+        for (size_t i = 0; i < count; i++)
+            to[i] = trip_scalar_luma(stored_, false,
+                                     buffer_.data() + i * (size_t)form_->channels * bytes);
+    } else if (type == TRIP_F64) {
+        double *wide = static_cast<double *>(values);
+        std::copy_n(reinterpret_cast<const double *>(buffer_.data()), count, wide);
+        std::replace(wide, wide + count, absent_, std::numeric_limits<double>::quiet_NaN());
+    } else {
+        trip_scalar_decode(stored_, false, 1, 0, buffer_.data(), count, to);
+        std::replace(to, to + count, (float)absent_, std::numeric_limits<float>::quiet_NaN());
     }
 }
 
@@ -236,19 +352,23 @@ void PictureStack::read(int64_t k, void *values)
         check_same(file, current_->spec());
         current_file_ = index;
     }
-    bool colour = form_->channels > 2;
-    if (!current_->read_image(page, 0, 0, colour ? form_->channels : 1, form_->type,
-                              colour ? (void *)colour_.data() : values, OIIO::AutoStride,
-                              OIIO::AutoStride, OIIO::AutoStride, on_progress))
+    void *to = colour_ || has_absent_ ? (void *)buffer_.data() : values;
+    const int first = colour_ ? 0 : sample_;
+    if (!current_->read_image(page, 0, first, colour_ ? form_->channels : first + 1, form_->type,
+                              to, OIIO::AutoStride, OIIO::AutoStride, OIIO::AutoStride,
+                              on_progress))
         throw trip_slice_error(file, message(current_->geterror()));
-    if (colour)
-        colour_to_luma((float *)values);
+    if (bits_)
+        keep_bits(to);
+    if (colour_ || has_absent_)
+        convert(values);
 }
 
 } // namespace
 
 std::unique_ptr<trip_slice_stack> trip_picture_stack(const trip_slice_files &files,
-                                                     trip_budget *budget)
+                                                     trip_budget *budget,
+                                                     const trip_stack_choice &choice)
 {
-    return std::unique_ptr<trip_slice_stack>(new PictureStack(files, budget));
+    return std::unique_ptr<trip_slice_stack>(new PictureStack(files, budget, choice));
 }

@@ -210,8 +210,6 @@ std::vector<std::string> find_in_folder(const std::string &path)
     std::set<std::string> shapes;
     for (const std::string &name : list_folder(path)) {
         std::string file = path + (path.back() == '/' ? "" : "/") + name;
-        if (name == "DICOMDIR")
-            continue;
         if (is_regular(file) && kind_of_file(file) != TRIP_IMAGE_OTHER) {
             names.push_back(file);
             shapes.insert(trip_name_shape(name));
@@ -250,6 +248,15 @@ std::vector<std::string> find_names(const std::string &path)
 }
 
 } // namespace
+
+bool trip_slice_is_dicom(const std::string &path)
+{
+    try {
+        return is_regular(path) && kind_of_file(path) == TRIP_IMAGE_DICOM;
+    } catch (const trip_slice_error &) {
+        return false;
+    }
+}
 
 trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps)
 {

@@ -35,6 +35,8 @@ struct trip_slice_files {
  * positions instead (dicom_stack.cpp). A file with the name of a slice that is not a picture or
  * cannot be read is an error. */
 trip_slice_files trip_slice_find(const std::string &path, bool allow_gaps);
+/* Returns whether a path is a DICOM file that can be opened. */
+bool trip_slice_is_dicom(const std::string &path);
 
 /* ---- slice_gaps.cpp: missing slices ---- */
 
@@ -48,11 +50,10 @@ std::string trip_name_shape(const std::string &name);
 void trip_check_numbers(const std::string &path, const std::vector<std::string> &names,
                         bool allow_gaps);
 
-/* Checks `positions`, in ascending order, with one entry of `names` each. The median step is the
- * normal one, and a step of about two or more times its length has slices missing. Throws or warns
- * as trip_check_numbers() does. Returns the normal step divided by the mean step if gaps were found
- * and allowed, else 1. */
-double trip_check_positions(const std::vector<double> &positions,
-                            const std::vector<std::string> &names, bool allow_gaps);
+/* Checks `positions`, in ascending order, with one entry of `names` each. Slices are missing where
+ * a step is about two or more times as long as the steps beside it. Several long steps in a row are
+ * no gap, since a scan may change its distance. Throws or warns as trip_check_numbers() does. */
+void trip_check_positions(const std::vector<double> &positions,
+                          const std::vector<std::string> &names, bool allow_gaps);
 
 #endif

@@ -138,26 +138,38 @@ void trip_check_numbers(const std::string &path, const std::vector<std::string> 
         check_one_shape(path, shape.second, allow_gaps);
 }
 
-double trip_check_positions(const std::vector<double> &positions,
-                            const std::vector<std::string> &names, bool allow_gaps)
+/* Returns how many of the steps beside it a step is long, if that is a whole number of at least 2
+ * on all sides, else 0. */
+static long steps_within(const std::vector<double> &steps, size_t i)
+{
+    long whole = 0;
+    for (size_t side : { i - 1, i + 1 }) {
+        if (side >= steps.size())
+            continue;
+        const double times = steps[i] / steps[side], near = std::round(times);
+        if (!(near >= 2 && near < 1e6 && std::fabs(times - near) <= 0.1))
+            return 0;
+        whole = (long)near;
+    }
+    return whole;
+}
+
+void trip_check_positions(const std::vector<double> &positions,
+                          const std::vector<std::string> &names, bool allow_gaps)
 {
     std::vector<double> steps;
     for (size_t i = 1; i < positions.size(); i++)
         steps.push_back(positions[i] - positions[i - 1]);
-    if (steps.size() < 2)
-        return 1;
-    std::vector<double> sorted = steps;
-    std::sort(sorted.begin(), sorted.end());
-    const double typical = sorted[(sorted.size() - 1) / 2];
     for (size_t i = 0; i < steps.size(); i++) {
-        double times = steps[i] / typical, whole = std::round(times);
-        if (!(whole >= 2 && whole < 1e6 && std::fabs(times - whole) <= 0.1))
+        const long whole = steps_within(steps, i);
+        if (!whole)
             continue;
-        report_gap(names[i],
-                   "a slice is missing after it: the next slice, " + names[i + 1] + ", is " +
-                       std::to_string((long)whole) + " steps away",
-                   allow_gaps);
-        return typical * (double)steps.size() / (positions.back() - positions.front());
+        const std::string text = "a slice is missing after it: the next slice, " + names[i + 1] +
+                                 ", is " + std::to_string(whole) + " steps away";
+        if (!allow_gaps)
+            throw trip_slice_error(names[i],
+                                   text + "; --allow-gaps draws the others where they are");
+        trip_warn(names[i].c_str(), "%s; values in between are interpolated", text.c_str());
+        return;
     }
-    return 1;
 }

@@ -19,3 +19,10 @@ void trip_slice_buffer::take(trip_budget *budget, const std::string &file, uint6
     budget_ = budget;
     bytes_ = bytes;
 }
+
+void trip_check_entry(const std::string &file, const char *what, int64_t index, int64_t count)
+{
+    char why[TRIP_ENTRY_WHY_BYTES];
+    if (!trip_entry_exists(why, what, index, count))
+        throw trip_slice_error(file, why, TRIP_USAGE);
+}

@@ -12,23 +12,33 @@
 
 /* ---- light, effects, clipping, background ---- */
 
+/* The words before the numbers of a light. */
+static const char *prefix_of(triptych_light_kind kind)
+{
+    return kind == TRIPTYCH_LIGHT_POINT       ? "point:"
+           : kind == TRIPTYCH_LIGHT_DIRECTION ? "world:"
+                                              : "";
+}
+
 static int read_light(const trip_option *row, const char *text, void *base)
 {
-    static const char point[] = "point:";
-    const size_t length = sizeof point - 1;
+    static const triptych_light_kind kinds[] = { TRIPTYCH_LIGHT_POINT, TRIPTYCH_LIGHT_DIRECTION,
+                                                 TRIPTYCH_LIGHT_VIEW };
     triptych_light *l = &((draw_settings *)base)->light;
-    const bool is_point = !strncmp(text, point, length);
     double v[3];
-    int count;
+    int count, kind = 0;
     (void)row;
     if (!strcmp(text, "head")) {
         l->kind = TRIPTYCH_LIGHT_HEAD;
         return 0;
     }
-    int status = trip_option_numbers("--light", text + (is_point ? length : 0), 3, 3, v, &count);
-    if (!status && !is_point && !(v[0] != 0 || v[1] != 0 || v[2] != 0))
+    while (strncmp(text, prefix_of(kinds[kind]), strlen(prefix_of(kinds[kind]))) != 0)
+        kind++; /* the last prefix is empty */
+    int status =
+        trip_option_numbers("--light", text + strlen(prefix_of(kinds[kind])), 3, 3, v, &count);
+    if (!status && kind > 0 && !(v[0] != 0 || v[1] != 0 || v[2] != 0))
         return trip_option_fail("--light", "the direction is zero");
-    l->kind = is_point ? TRIPTYCH_LIGHT_POINT : TRIPTYCH_LIGHT_DIRECTION;
+    l->kind = kinds[kind];
     for (int i = 0; i < 3 && !status; i++)
         l->toward[i] = v[i];
     return status;
@@ -46,11 +56,7 @@ static void print_numbers(const double *numbers, int count, char *text, size_t b
 static void print_light(const void *base, char *text, size_t bytes)
 {
     const triptych_light *l = &((const draw_settings *)base)->light;
-    const bool is_point = l->kind == TRIPTYCH_LIGHT_POINT;
-    snprintf(text, bytes, "%s",
-             l->kind < TRIPTYCH_LIGHT_DIRECTION ? "head"
-             : is_point                         ? "point:"
-                                                : "");
+    snprintf(text, bytes, "%s", l->kind < TRIPTYCH_LIGHT_DIRECTION ? "head" : prefix_of(l->kind));
     if (l->kind >= TRIPTYCH_LIGHT_DIRECTION)
         print_numbers(l->toward, 3, text, bytes);
 }
@@ -231,14 +237,16 @@ static const trip_option rows[DRAW_OPTIONS] = {
                           .group = DRAW_GROUP_PICTURE, .type = TRIP_OPTION_CUSTOM,
                           AT(has_background), .read = read_background, .print = print_background,
                           .same = same_background },
-    [DRAW_LIGHT] = { "light", "X,Y,Z|point:X,Y,Z|head",
-                     "Sets the direction to the light, the position of the light, or a light at "
-                     "the eye",
-                     "head", .brief = "Sets the light (default: head, at the eye)",
+    [DRAW_LIGHT] = { "light", "LEFT,UP,FRONT|world:X,Y,Z|point:X,Y,Z|head",
+                     "Sets the direction to the light as seen in the picture (1,1,1 is the upper "
+                     "left front), or in the world; the position of the light; or a light at the "
+                     "eye",
+                     "head; with shadows 1,1,1",
+                     .brief = "Sets the light (default: head, at the eye)",
                      .group = DRAW_GROUP_LIGHT, .type = TRIP_OPTION_CUSTOM, AT(light.kind),
                      .read = read_light, .print = print_light, .same = same_light },
     [DRAW_EFFECTS] = { "effects", "auto|none|LIST",
-                       "Switches effects on: shadows (require a --light other than head), "
+                       "Switches effects on: shadows (not with --light head), "
                        "occlusion, emission (requires --emission) and cueing, joined by commas; "
                        "auto chooses by the kind of data",
                        "none", .brief = "Switches on shadows, occlusion, cueing, emission",

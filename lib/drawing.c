@@ -163,18 +163,17 @@ static void choose_settings(triptych *t)
         t->drawn_settings.background[3] = 0;
 }
 
-/* Chooses the levels of the frame by the view of level 0. A frame with distances or with a light
+/* Chooses the levels of the frame by the camera of level 0. A frame with distances or with a light
  * map needs one level: distances belong to one surface, and a light map to one level. */
 static int choose_parts(triptych *t)
 {
     const trip_settings *s = &t->drawn_settings;
     const bool one = t->given.all.count_exactly || s->depth || s->effects.emission ||
                      trip_effects_light(&s->effects);
-    int status = make_camera(t, t->session.data);
+    int status = 0;
     t->parts = (trip_lod_parts){ .count = 1 };
     t->part = 0;
-    if (status || s->classify != TRIP_CLASSIFY_POST ||
-        t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
+    if (s->classify != TRIP_CLASSIFY_POST || t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
         return status;
     status = trip_lod_parts_make(&t->parts, t->session.data, &t->camera, s, one, t->session.budget);
     if (t->parts.count > 1) /* the background is added after the last part */
@@ -183,7 +182,7 @@ static int choose_parts(triptych *t)
 }
 
 /* Selects the level of the next part and makes its camera. A first part at level 0 has the camera
- * of choose_parts(). */
+ * of plan_first(). */
 static int enter_part(triptych *t)
 {
     int status = use_level(t, t->parts.level[t->part]);
@@ -266,18 +265,9 @@ static int plan_field(triptych *t)
         return trip_fail(
             TRIP_USAGE, "render", "field",
             "the sum of the splats needs the values of the data set; do not give a volume");
+    const bool values = trip_settings_interpolates(&t->drawn_settings, true);
     return trip_plan_make_field(&t->plan, s->data, &t->camera, &t->drawn_settings, kinds,
-                                s->budget);
-}
-
-/* Fails for settings of splats that the data set does not support. */
-static int check_splats(const triptych *t)
-{
-    const trip_settings *s = &t->settings;
-    if (s->flatten > 1 && !(t->session.data->header.planes >> TRIP_PLANE_NORMALS & 1))
-        return trip_fail(TRIP_USAGE, "render", t->name,
-                         "has no normals, which flattened kernels need; brick it with normals");
-    return 0;
+                                values ? &s->draw : NULL, s->budget);
 }
 
 /* Computes the common size of fixed footprints. */
@@ -297,12 +287,17 @@ static int choose_sprites(triptych *t)
                      "behind the eye; move the eye");
 }
 
+/* Returns the table of the frame's codes. */
+static const trip_tf_entry *table_of(const triptych *t)
+{
+    const bool integral = t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL;
+    return session_table(&t->session, trip_settings_interpolates(&t->drawn_settings, integral));
+}
+
 static int plan_frame(triptych *t)
 {
     session *s = &t->session;
-    int status = check_splats(t);
-    if (!status)
-        status = choose_sprites(t);
+    int status = choose_sprites(t);
     if (status)
         return status;
     if (t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL)
@@ -310,9 +305,9 @@ static int plan_frame(triptych *t)
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST ||
         !trip_settings_has_levels(&t->drawn_settings)) /* these frames get all the memory */
         trip_mean_tables_release(&s->mean_tables, s->budget);
-    status =
-        trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
-                            s->table, session_classified(s, t->level), &s->mean_tables, s->budget);
+    status = trip_plan_make_next(&t->plan, drawn_session(t).data, &t->camera, &t->drawn_settings,
+                                 table_of(t), session_classified(s, t->level), &s->mean_tables,
+                                 s->budget);
     t->plan.level = t->level;
     return status;
 }
@@ -365,7 +360,9 @@ static int plan_first(triptych *t)
     uint64_t start = trip_now_ns();
     choose_settings(t);
     check_rounding(t);
-    int status = trip_context_choose_effects(t);
+    int status = make_camera(t, t->session.data);
+    if (!status)
+        status = trip_context_choose_effects(t);
     if (!status)
         status = choose_parts(t);
     const double ms = (double)(trip_now_ns() - start) * 1e-6;
@@ -407,9 +404,20 @@ static void warn_of_levels(triptych *t)
               post ? "post" : "pre");
 }
 
+/* Sets the unit of the source's values by the draw codes. */
+static void place_source(triptych *t)
+{
+    const trip_draw_codes *draw = &t->session.draw;
+    const double per_code = trip_draw_value_per_code(draw);
+    if (t->source && draw->of_stored)
+        trip_field_set_unit(t->source,
+                            (trip_field_unit){ draw->lo, per_code > 0 ? 1 / per_code : 0 });
+}
+
 static int start(triptych *t)
 {
     int status = trip_context_begin_light(t);
+    place_source(t);
     if (!status)
         status = make_reader(t, t->plan.planes);
     t->frame = (trip_frame){
@@ -417,7 +425,7 @@ static int start(triptych *t)
         .camera = &t->camera,
         .settings = &t->drawn_settings,
         .plan = &t->plan,
-        .table = t->session.table,
+        .table = table_of(t),
         .field = t->source,
         .light = t->light,
         .emission = t->drawn_settings.effects.emission ? t->heat : NULL,

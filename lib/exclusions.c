@@ -28,8 +28,8 @@ enum {
     DEBUG_VIEW = 1 << 14,
     SHOW_MERGE = 1 << 15,
     COUNTED = 1 << 16,
-    PLAIN = 1 << 17, /* neither shading nor effects */
-    HEADLIGHT = 1 << 18,
+    PLAIN = 1 << 17,     /* neither shading nor effects */
+    HEADLIGHT = 1 << 18, /* asked for */
     SHADOWS = 1 << 19,
     MAY_SHADOW = 1 << 20, /* shadows or automatic effects */
     MAY_CUE = 1 << 21,
@@ -66,8 +66,8 @@ static const struct rule {
     { ROW(LIGHT_CELLS), ALL, 0, MAY_LATTICE,
       "requires --effects shadows, occlusion, emission or auto", IDLE },
     { ROW(EFFECTS), ALL, SHADOWS | HEADLIGHT, 0,
-      "shadows require a light that is not at the eye; give --light X,Y,Z or --light "
-      "point:X,Y,Z",
+      "shadows cannot be seen with --light head; leave out --light or give another light, such as "
+      "--light 1,1,1",
       CONFLICT },
     { ROW(EARLY_TERMINATION), ALL, ASCENDING, 0, "requires --traversal outward", IDLE },
     { ROW(H), ALL, 0, MERGE, "requires --method merge", IDLE },
@@ -152,7 +152,7 @@ static int facts_of_effects(const draw_settings *s)
     const int lattices =
         TRIPTYCH_EFFECT_SHADOWS | TRIPTYCH_EFFECT_OCCLUSION | TRIPTYCH_EFFECT_EMISSION;
     return (s->light.no_shading && !which ? PLAIN : 0) |
-           (s->light.kind < TRIPTYCH_LIGHT_DIRECTION ? HEADLIGHT : 0) |
+           (s->light.kind == TRIPTYCH_LIGHT_HEAD ? HEADLIGHT : 0) |
            (which & TRIPTYCH_EFFECT_SHADOWS ? SHADOWS : 0) |
            (some & TRIPTYCH_EFFECT_SHADOWS ? MAY_SHADOW : 0) |
            (some & TRIPTYCH_EFFECT_CUEING ? MAY_CUE : 0) |
@@ -248,11 +248,11 @@ static triptych_renderer required_renderer(const draw_settings *s)
 static int check_light(const triptych_light *l)
 {
     const double length = hypot(hypot(l->toward[0], l->toward[1]), l->toward[2]);
-    if (l->kind < TRIPTYCH_LIGHT_DEFAULT || l->kind > TRIPTYCH_LIGHT_POINT)
+    if (l->kind < TRIPTYCH_LIGHT_DEFAULT || l->kind > TRIPTYCH_LIGHT_VIEW)
         return trip_option_fail("--light", "unknown kind of light");
     if (l->kind >= TRIPTYCH_LIGHT_DIRECTION && !isfinite(length))
         return trip_option_fail("--light", "the light is too far away or not finite");
-    if (l->kind == TRIPTYCH_LIGHT_DIRECTION && !(length > 0))
+    if (l->kind >= TRIPTYCH_LIGHT_DIRECTION && l->kind != TRIPTYCH_LIGHT_POINT && !(length > 0))
         return trip_option_fail("--light", "the direction to the light is zero");
     return 0;
 }

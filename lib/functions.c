@@ -37,7 +37,7 @@ static int load_for_data_set(triptych *t, const char *function, trip_tf **tf)
     if (!status)
         status =
             function ? trip_tf_load(tf, function) : trip_dataset_metadata_tf(s->text, s->data, tf);
-    return status ? status : trip_dataset_metadata_adapt(s->text, s->data, *tf);
+    return status ? status : trip_dataset_metadata_adapt(s->text, s->data, *tf, t->name);
 }
 
 static int load_for_volume(triptych *t, const triptych_conversion *c, trip_tf **tf)
@@ -57,7 +57,7 @@ static int load_alone(const triptych_conversion *c, const char *name, trip_tf **
     if (!c->function)
         return trip_fail(TRIP_USAGE, "tf", name, "give a transfer function or data");
     int status = trip_tf_load(tf, c->function);
-    if (!status && trip_tf_needs_data(*tf) && !trip_tf_is_normalised(*tf))
+    if (!status && trip_tf_needs_histogram(*tf))
         return trip_fail(TRIP_USAGE, "tf", name,
                          "needs a histogram; use `triptych tf show --tf %s DATA`, where DATA is a "
                          "data set or a volume",

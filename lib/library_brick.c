@@ -13,6 +13,7 @@
 #include "report.h"
 #include "source.h"
 #include "source_field.h"
+#include "volume.h"
 
 /* The volume must be free of faults. */
 static trip_volume_memory memory_of(const triptych_volume *v)
@@ -44,6 +45,10 @@ static trip_volume_params volume_params(const triptych_brick_options *o)
         .raw_offset_bytes = o->raw_offset_bytes,
         .axes = o->axes,
         .allow_gaps = o->allow_gaps,
+        .series = o->series,
+        .channel = o->channel,
+        .time = o->time,
+        .fill = o->fill,
         .max_voxels = o->max_voxels,
     };
     if (o->in_memory)
@@ -135,10 +140,15 @@ static const char *fault_of_volume(const triptych_brick_options *o)
     }
     if (o->axes && !trip_anatomy_axes_valid(o->axes))
         return "the axes must be three letters: one of R and L, one of A and P, one of S and I";
+    trip_fills fills;
+    if (o->fill && !trip_fills_parse(o->fill, &fills))
+        return "the fill value must be a number or \"none\"";
     if (o->raw_type && !triptych_is_raw_type(o->raw_type))
         return "unknown type of raw data";
     if (o->raw_offset_bytes > UINT64_C(1) << 62)
         return "raw data starts too far into the file";
+    if (o->series < 0 || o->channel < 0 || o->time < 0)
+        return "series, channels and times count from 0";
     if (o->level_set < TRIPTYCH_LEVEL_SET_DEFAULT || o->level_set > TRIPTYCH_LEVEL_SET_BAND ||
         o->raw_endian < TRIPTYCH_ENDIAN_NATIVE || o->raw_endian > TRIPTYCH_ENDIAN_BIG)
         return "unknown level set or byte order";
@@ -154,7 +164,7 @@ static const char *fault_of_options(const triptych_brick_options *o)
         return "a brick must have 1 to 64 sheets";
     if (o->code_bits < TRIPTYCH_CODE_BITS_AUTO || o->code_bits > TRIPTYCH_CODE_BITS_16)
         return "codes must have 8 or 16 bits";
-    if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_NONE)
+    if (o->normals < TRIPTYCH_NORMALS_AUTO || o->normals > TRIPTYCH_NORMALS_STORED)
         return "unknown kind of normals";
     if (o->levels_for < TRIPTYCH_LEVELS_FOR_AUTO || o->levels_for > TRIPTYCH_LEVELS_FOR_BOTH)
         return "coarse levels must be for post, pre or both";
@@ -341,6 +351,79 @@ int triptych_list_files(triptych *t, const char *volume, const triptych_brick_op
     const triptych_brick_options defaults = { 0 };
     return trip_context_leave(before,
                               list_files(volume, options ? options : &defaults, found, user));
+}
+
+/* Calls found(user, LINE) for each line of a text, which it cuts into lines. */
+static int each_line(char *text, triptych_text_callback found, void *user)
+{
+    int status = 0;
+    for (char *line = text, *end; line && *line && status >= 0; line = end) {
+        end = strchr(line, '\n');
+        if (end)
+            *end++ = 0;
+        status = found(user, line);
+    }
+    return status < 0 ? status : 0;
+}
+
+static triptych_description description_of(const trip_volume_info *info)
+{
+    triptych_description d = { .format = info->format, .type = trip_scalar_name(info->type) };
+    for (int a = 0; a < 3; a++) {
+        const double step =
+            trip_length(trip_v3(info->index_to_world.m[0][a], info->index_to_world.m[1][a],
+                                info->index_to_world.m[2][a]));
+        const double *x = info->coordinates[a];
+        d.dims[a] = info->dims[a];
+        d.spacing_min[a] = d.spacing_max[a] = step;
+        for (int64_t i = 1; x && i < info->dims[a]; i++) {
+            const double apart = (x[i] - x[i - 1]) * step;
+            d.spacing_min[a] = i == 1 ? apart : fmin(d.spacing_min[a], apart);
+            d.spacing_max[a] = i == 1 ? apart : fmax(d.spacing_max[a], apart);
+        }
+    }
+    memcpy(d.index_to_world, info->index_to_world.m, sizeof d.index_to_world);
+    snprintf(d.space, sizeof d.space, "%s", info->space);
+    snprintf(d.modality, sizeof d.modality, "%s", info->modality);
+    snprintf(d.note, sizeof d.note, "%s", info->note);
+    return d;
+}
+
+static int describe(const char *path, const triptych_brick_options *o, triptych_description *out,
+                    triptych_text_callback series, void *user)
+{
+    const char *fault = fault_of_volume(o);
+    trip_budget *budget = NULL;
+    trip_volume *v = NULL;
+    if (fault)
+        return trip_fail(TRIP_USAGE, "read", path, "%s", fault);
+    const trip_volume_params params = volume_params(o);
+    int status = trip_budget_create(&budget, o->memory_bytes);
+    if (!status)
+        status = trip_volume_open(&v, path, &params, budget);
+    if (!status)
+        *out = description_of(trip_volume_get_info(v));
+    char *parts = !status ? trip_volume_get_info(v)->parts : NULL;
+    if (parts && series && !(parts = strdup(parts)))
+        status = trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    else if (parts && series) {
+        status = each_line(parts, series, user);
+        free(parts);
+    }
+    trip_volume_close(v);
+    if (budget)
+        trip_budget_destroy(budget);
+    return status;
+}
+
+int triptych_describe(triptych *t, const char *volume, const triptych_brick_options *options,
+                      triptych_description *out, triptych_text_callback series, void *user)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_brick_options defaults = { 0 };
+    *out = (triptych_description){ 0 };
+    return trip_context_leave(before,
+                              describe(volume, options ? options : &defaults, out, series, user));
 }
 
 static int use_source(triptych *t, const char *path, const triptych_brick_options *o)

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #include "camera.h"
 #include "library_context.h"
@@ -25,10 +26,30 @@ static void keep_failure(void *user, int status, const char *line)
         t->take(t->take_user, line);
 }
 
+/* Returns whether the line is a note that was passed on before. */
+static bool is_noted(triptych *t, const char *line)
+{
+    static const char prefix[] = "triptych: note: ";
+    bool found = false;
+    if (strncmp(line, prefix, strlen(prefix)) != 0)
+        return false;
+    const uint64_t hash = XXH64(line, strlen(line), 0);
+    pthread_mutex_lock(&t->lock);
+    for (int i = 0; i < TRIP_CONTEXT_NOTES; i++)
+        found = found || t->noted[i] == hash;
+    if (!found) {
+        memmove(t->noted, t->noted + 1, sizeof t->noted - sizeof *t->noted);
+        t->noted[TRIP_CONTEXT_NOTES - 1] = hash;
+    }
+    pthread_mutex_unlock(&t->lock);
+    return found;
+}
+
+/* Passes on each note once. */
 static void pass_line(const char *line, void *user)
 {
     triptych *t = user;
-    if (t->take)
+    if (t->take && !is_noted(t, line))
         t->take(t->take_user, line);
 }
 
@@ -349,12 +370,27 @@ static void describe_spacing(const trip_dataset *d, triptych_info *out)
     }
 }
 
+static void describe_codes(const trip_dataset *d, triptych_info *out)
+{
+    const trip_codes *c = &d->codes;
+    out->codes = trip_codes_even(c) ? "even" : trip_codes_ids(c) ? "ids" : "knots";
+    out->ids = trip_codes_ids(c) ? c->entries : 0;
+    out->code_step_min = out->code_step_max = (c->hi - c->lo) / (TRIP_CODES - 1);
+    for (uint32_t i = 0; i + 1 < c->entries; i++) {
+        const double step = ldexp(c->table[i + 1] - c->table[i], -(int)c->step_log2);
+        out->code_step_min = i > 0 ? fmin(out->code_step_min, step) : step;
+        out->code_step_max = i > 0 ? fmax(out->code_step_max, step) : step;
+    }
+}
+
 static triptych_info info_of(const trip_dataset *d)
 {
     const trip_file_header *h = &d->header;
     triptych_info info = {
         .value_min = h->value_min,
         .value_max = h->value_max,
+        .typical_min = h->typical_min,
+        .typical_max = h->typical_max,
         .code_lo = h->code_lo,
         .code_hi = h->code_hi,
         .voxels = h->voxels,
@@ -366,8 +402,8 @@ static triptych_info info_of(const trip_dataset *d)
         .format_version = h->version,
         .lists = d->list_count,
         .code_bytes = h->code_bytes,
-        .normal_bytes = h->normal_bytes,
-        .gradient_full = h->gradient_full,
+        .normal_bytes = d->computes_normals ? 0 : h->normal_bytes,
+        .gradient_full = d->computes_normals ? 0 : h->gradient_full,
         .tile_voxels = 1u << h->tile_log2,
         .slab_sheets = h->slab_sheets,
         .page_bytes = 1u << h->page_log2,
@@ -378,6 +414,7 @@ static triptych_info info_of(const trip_dataset *d)
         info.gradient_step[a] = h->gradient_step[a];
     }
     memcpy(info.index_to_world, d->index_to_world.m, sizeof info.index_to_world);
+    describe_codes(d, &info);
     describe_kept(d, &info);
     describe_spacing(d, &info);
     return info;

@@ -18,7 +18,7 @@
 #include "sheet_samples.h"
 #include "triptych.h"
 
-enum { TRIP_CONTEXT_MAX_THREADS = 256 };
+enum { TRIP_CONTEXT_MAX_THREADS = 256, TRIP_CONTEXT_NOTES = 8 };
 
 /* Default temperature of the greatest heat. */
 #define TRIP_HOTTEST_KELVIN 2500.0
@@ -33,7 +33,8 @@ typedef struct trip_context_picture {
 struct triptych {
     trip_scope scope;
     pthread_mutex_t lock;
-    char error[4096]; /* guarded by lock */
+    char error[4096];                   /* guarded by lock */
+    uint64_t noted[TRIP_CONTEXT_NOTES]; /* hashes of notes, newest last; guarded by lock */
     triptych_message_callback take;
     void *take_user;
     triptych_progress_callback show;
@@ -66,6 +67,7 @@ struct triptych {
     double bytes_per_ms;               /* measured in bounded frames; 0 if none was drawn */
     bool kernel_warned;                /* warned about the halo for the kernel */
     bool levels_warned;                /* warned about missing levels for the classification */
+    bool light_noted;                  /* noted the light that was chosen for shadows */
     double kelvin[2];                  /* of emission */
     /* Reason for the choice of TRIPTYCH_EFFECT_AUTO; NULL without it. */
     const char *why_effects;

@@ -9,8 +9,10 @@ static bool is_of_surfaces(const triptych *t)
 {
     const trip_tf_entry *table = t->session.table;
     const double voxel = t->camera.voxel_world;
+    const trip_codes *codes = &t->session.data->codes;
+    const int count = trip_codes_ids(codes) ? (int)codes->entries : CODES;
     int shown = 0, opaque = 0;
-    for (int code = 0; code < CODES; code++) {
+    for (int code = 0; code < count && code < CODES; code++) {
         shown += table[code].extinction > 0;
         opaque += (double)table[code].extinction * voxel > 0.69314718055994531; /* opacity 1/2 */
     }
@@ -22,13 +24,13 @@ static int choose(triptych *t)
 {
     const trip_tf_kind kind = trip_dataset_metadata_kind(t->session.text);
     const bool surfaces = kind == TRIP_TF_LABELS && is_of_surfaces(t);
+    const bool head = t->given.light.kind == TRIPTYCH_LIGHT_HEAD;
     switch (kind) {
     case TRIP_TF_FOG:
-        t->why_effects = t->settings.headlight
-                             ? "smoke, clouds or fog would scatter the light, but it comes from "
-                               "the eye; give it a direction or position"
-                             : "smoke, clouds or fog scatter the light";
-        return t->settings.headlight ? 0 : TRIPTYCH_EFFECT_SHADOWS;
+        t->why_effects = head ? "smoke, clouds or fog would scatter the light, but it comes from "
+                                "the eye; give it a direction or position"
+                              : "smoke, clouds or fog scatter the light";
+        return head ? 0 : TRIPTYCH_EFFECT_SHADOWS;
     case TRIP_TF_LABELS:
         t->why_effects =
             surfaces ? "labels are drawn as surfaces" : "transparent labels keep their colours";
@@ -53,6 +55,26 @@ static int check_effects(const triptych *t, int effects)
     return 0;
 }
 
+/* Sets the direction of a light that turns with the view. Chooses such a light for shadows if none
+ * is given. */
+static void choose_light(triptych *t)
+{
+    static const double upper_left_front[3] = { 1, 1, 1 };
+    trip_settings *s = &t->drawn_settings;
+    const triptych_light *light = &t->given.light;
+    const bool chosen = light->kind == TRIPTYCH_LIGHT_DEFAULT && s->effects.shadows;
+    const double *toward = chosen ? upper_left_front : light->toward;
+    if (!chosen && light->kind != TRIPTYCH_LIGHT_VIEW)
+        return;
+    s->headlight = false;
+    s->light_direction =
+        trip_normalize(trip_camera_direction(&t->camera, toward[0], toward[1], toward[2]));
+    if (chosen && !t->light_noted)
+        trip_note(t->name, "the light for the shadows comes from the upper left front of the view; "
+                           "--light chooses another");
+    t->light_noted |= chosen;
+}
+
 int trip_context_choose_effects(triptych *t)
 {
     trip_effects *e = &t->drawn_settings.effects;
@@ -71,6 +93,7 @@ int trip_context_choose_effects(triptych *t)
     e->occlusion = effects & TRIPTYCH_EFFECT_OCCLUSION;
     e->emission = effects & TRIPTYCH_EFFECT_EMISSION;
     e->cueing = effects & TRIPTYCH_EFFECT_CUEING ? t->settings.effects.cueing : 0;
+    choose_light(t);
     return status;
 }
 
@@ -170,7 +193,9 @@ static void explain_lattice(const triptych *t, FILE *out)
     fprintf(out, "light       %d x %d x %d nodes, one in %g voxels: %s\n", grid->nodes[0],
             grid->nodes[1], grid->nodes[2], grid->spacing,
             trip_light_map_is_complete(t->light) ? "kept from the frame before, so nothing is read"
-                                                 : "one more list is read");
+            : trip_light_map_is_gathered(t->light)
+                ? "kept from the frame before, but swept for another light"
+                : "one more list is read");
 }
 
 static void explain_heat(const triptych *t, FILE *out)

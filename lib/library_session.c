@@ -5,10 +5,13 @@
 #include <string.h>
 
 #include "brick_command.h"
+#include "computed_normals.h"
 #include "dataset_join.h"
+#include "dataset_normals.h"
 #include "report.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
+static const size_t maps_bytes = sizeof(trip_draw_maps);
 
 enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MAX };
 
@@ -52,18 +55,25 @@ static void warn_of_culled_values(const session *s, unsigned part, const trip_tf
     free(command);
 }
 
-/* Opacity o becomes 1 - (1 - o)^scale. */
 static void warn_of_lost_peak(const session *s, const trip_tf *tf)
 {
-    const trip_file_header *h = &s->data->header;
+    const trip_draw_codes *d = &s->draw;
+    trip_draw_loss loss;
     trip_tf_point peak;
-    if (trip_tf_lost_peak(tf, h->code_lo, h->code_hi, &peak))
+    if (trip_draw_codes_loss(d, tf, &loss))
+        trip_warn(s->input,
+                  "the transfer function changes from %.9g to %.9g, but post draws only %.2g steps "
+                  "there, since the whole function spans %.9g to %.9g; narrow it, or use "
+                  "--classify pre",
+                  loss.lo, loss.hi, fmax(1, loss.codes), loss.first, loss.last);
+    else if (trip_tf_lost_peak(tf, d->lo, d->hi, &peak))
         trip_warn(s->input,
                   "the transfer function has a peak at %.9g that is narrower than the %.3g between "
                   "two codes, so it is not drawn; make it wider",
-                  peak.value, (h->code_hi - h->code_lo) / 65535);
+                  peak.value, trip_draw_value_per_code(d));
 }
 
+/* Opacity o becomes 1 - (1 - o)^scale. */
 static void scale_extinction(trip_tf_entry *table, double scale)
 {
     if (scale > 0 && scale != 1)
@@ -78,16 +88,31 @@ static int load_function(const session *s, const session_look *look, trip_tf **t
                  : look->tf    ? trip_tf_load(tf, look->tf)
                                : trip_dataset_metadata_tf(s->text, s->data, tf);
     bool window = look->window > 0;
-    if (!status && !(window && trip_tf_is_normalised(*tf))) /* a window replaces the range */
-        status = trip_dataset_metadata_adapt(s->text, s->data, *tf);
+    if (!status && !(window && trip_tf_spans_window(*tf))) /* a window replaces the range */
+        status = trip_dataset_metadata_adapt(s->text, s->data, *tf, s->input);
     return !status && window ? trip_tf_window(*tf, look->window, look->level) : status;
 }
 
-static int take_table(session *s)
+static void release_tables(session *s)
 {
+    trip_budget_release(s->budget, s->table, table_bytes);
+    trip_budget_release(s->budget, s->draw_table, table_bytes);
+    trip_budget_release(s->budget, s->draw_maps, maps_bytes);
+    s->table = s->draw_table = NULL;
+    s->draw_maps = NULL;
+}
+
+static int take_tables(session *s)
+{
+    const bool even = trip_codes_even(&s->data->codes);
     s->table = trip_budget_take(s->budget, table_bytes);
-    if (s->table)
+    if (!even)
+        s->draw_table = trip_budget_take(s->budget, table_bytes);
+    if (!even)
+        s->draw_maps = trip_budget_take(s->budget, maps_bytes);
+    if (s->table && (even || (s->draw_table && s->draw_maps)))
         return 0;
+    release_tables(s);
     return trip_fail(TRIP_ERROR, "render", s->input,
                      "the table of the transfer function does not fit in memory; raise --memory");
 }
@@ -102,6 +127,11 @@ int session_read_text(session *s)
     return status;
 }
 
+const trip_tf_entry *session_table(const session *s, bool interpolates)
+{
+    return interpolates && s->draw_table ? s->draw_table : s->table;
+}
+
 trip_classification *session_classified(const session *s, unsigned level)
 {
     return &s->classified[level];
@@ -114,26 +144,39 @@ void session_keep_tables(session *s)
         trip_mean_tables_release(&s->mean_tables, s->budget);
 }
 
+static void fill_tables(session *s, const trip_tf *tf, double opacity_scale)
+{
+    const double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
+    s->draw = trip_draw_codes_for(tf, &s->data->codes, typical, s->draw_maps);
+    trip_draw_codes_stored_table(&s->draw, tf, voxel_world, s->table);
+    scale_extinction(s->table, opacity_scale);
+    if (!s->draw_table)
+        return;
+    trip_draw_codes_table(&s->draw, tf, voxel_world, s->draw_table);
+    scale_extinction(s->draw_table, opacity_scale);
+}
+
 int session_use_function(session *s, const session_look *look)
 {
     const trip_file_header *h = &s->data->header;
     trip_tf *tf = NULL;
     int status = session_read_text(s);
-    for (int i = 0; i < LEVELS; i++)
+    for (int i = 0; i < LEVELS; i++) {
         trip_classification_forget_table(&s->classified[i]);
+        s->classified[i].draw = &s->draw;
+    }
     trip_mean_tables_release(&s->mean_tables, s->budget);
     if (!status && !s->table)
-        status = take_table(s);
+        status = take_tables(s);
     if (!status)
         status = load_function(s, look, &tf);
     if (!status && !find_missing(s, tf, look)) {
-        trip_tf_check_range(tf, h->value_min, h->value_max, s->input);
+        trip_tf_check_range(tf, h->typical_min, h->typical_max, s->input);
         for (unsigned i = 0; i < s->part_count; i++)
             warn_of_culled_values(s, i, tf, look);
+        fill_tables(s, tf, look->opacity_scale);
         warn_of_lost_peak(s, tf);
-        double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
-        trip_tf_fill_table(tf, h->code_lo, h->code_hi, voxel_world, s->table);
-        scale_extinction(s->table, look->opacity_scale);
     }
     trip_tf_destroy(tf);
     return status;
@@ -154,6 +197,21 @@ static int open_part(session *s, const char *input)
     return status;
 }
 
+/* Sets the data set that is drawn. It has normals, stored or computed. */
+static int use_data(session *s, trip_dataset *data)
+{
+    trip_dataset *with = NULL;
+    int status = 0;
+    if (!(data->header.planes >> TRIP_PLANE_NORMALS & 1))
+        status = trip_dataset_normals_open(&with, data, s->budget);
+    if (status)
+        return status;
+    trip_dataset_normals_close(s->with_normals);
+    s->with_normals = with;
+    s->data = with ? with : data;
+    return 0;
+}
+
 int session_open_data(session *s, const char *input, uint64_t memory_bytes)
 {
     *s = (session){ .input = input };
@@ -163,24 +221,51 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes)
         status = trip_fail(TRIP_ERROR, "open", input, "out of memory");
     if (!status)
         status = open_part(s, input);
-    if (!status)
-        s->data = s->parts[0];
-    return status;
+    return status ? status : use_data(s, s->parts[0]);
+}
+
+/* Fails if the last part is made of another volume than the first one. One
+ * transfer function cannot show both, even if the grids are equal. */
+static int check_source(session *s)
+{
+    const unsigned last = s->part_count - 1;
+    int status = session_read_text(s);
+    if (status)
+        return status;
+    const char *first = trip_dataset_metadata_source(s->texts[0]);
+    const char *other = trip_dataset_metadata_source(s->texts[last]);
+    if (!first || !other || !strcmp(first, other))
+        return 0;
+    return trip_fail(TRIP_ERROR, "open", s->parts[last]->path,
+                     "is made of another volume (%s) than %s (%s); " TRIP_JOIN_ADVICE, other,
+                     s->parts[0]->path, first);
+}
+
+static void drop_last_part(session *s)
+{
+    s->part_count--;
+    trip_dataset_metadata_destroy(s->texts[s->part_count]);
+    trip_dataset_close(s->parts[s->part_count]);
 }
 
 int session_add_data(session *s, const char *input)
 {
-    trip_dataset *joined;
+    trip_dataset *joined = NULL;
     int status = open_part(s, input);
     if (status)
         return status;
     status = trip_dataset_join(&joined, s->parts, s->part_count, s->budget);
+    if (!status)
+        status = check_source(s);
+    if (!status)
+        status = use_data(s, joined);
     if (status) {
-        trip_dataset_close(s->parts[--s->part_count]);
+        trip_dataset_join_close(joined);
+        drop_last_part(s);
         return status;
     }
     trip_dataset_join_close(s->joined);
-    s->data = s->joined = joined;
+    s->joined = joined;
     memset(s->classified, 0, LEVELS * sizeof *s->classified);
     trip_mean_tables_release(&s->mean_tables, s->budget);
     return 0;
@@ -194,10 +279,11 @@ int session_open(session *s, const char *input, const session_look *look, uint64
 
 void session_close(session *s)
 {
-    if (s->table)
-        trip_budget_release(s->budget, s->table, table_bytes);
+    if (s->budget)
+        release_tables(s);
     if (s->budget)
         trip_mean_tables_release(&s->mean_tables, s->budget);
+    trip_dataset_normals_close(s->with_normals);
     trip_dataset_join_close(s->joined);
     for (unsigned i = 0; i < s->part_count; i++) {
         trip_dataset_metadata_destroy(s->texts[i]);
@@ -235,11 +321,19 @@ static unsigned choose_slots(const session_reader *wanted, uint64_t ring_bytes, 
     return fit && !wanted->skip ? MAX_SLOTS : SLOTS;
 }
 
+static bool computes_normals(const session *s, const session_reader *wanted)
+{
+    return s->data->computes_normals && wanted->planes >> TRIP_PLANE_NORMALS & 1;
+}
+
 int session_make_reader(const session *s, trip_reader **out, const session_reader *wanted)
 {
     uint64_t left = trip_budget_left_bytes(s->budget);
+    const bool computes = computes_normals(s, wanted);
+    const uint64_t own = computes ? trip_computed_normals_bytes(s->data) : 0;
+    left -= own < left ? own : left;
     size_t page = (size_t)1 << s->data->header.page_log2;
-    size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS ? 2 : 1;
+    size_t plane_count = wanted->planes & 1u << TRIP_PLANE_NORMALS && !computes ? 2 : 1;
     unsigned slots = choose_slots(wanted, left / 4, plane_count);
     size_t slot = (size_t)(left / 4) / slots / page * page, max = MAX_SLOT_BYTES * plane_count;
     slot = slot < page ? page : slot;
@@ -256,7 +350,8 @@ int session_make_reader(const session *s, trip_reader **out, const session_reade
     };
     if (wanted->renderer)
         params.runner = trip_renderer_runner(wanted->renderer);
-    params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
+    if (!computes) /* runs with computed normals lie in memory of the reader */
+        params.slot_memory = take_slots(s, wanted, params.slots, params.slot_bytes);
     return trip_reader_create(out, s->data, &params, s->budget);
 }
 

@@ -1,5 +1,5 @@
 /* A session has the parts that the frames of a data set share: the budget, the opened data sets and
- * the table of the transfer function. It also makes readers with rings that fit the memory limit.
+ * the tables of the transfer function. It also makes readers with rings that fit the memory limit.
  * One thread. */
 #ifndef TRIP_SESSION_H
 #define TRIP_SESSION_H
@@ -16,11 +16,16 @@ typedef struct session {
     trip_budget *budget;
     trip_dataset **parts; /* opened data sets, in the order of opening */
     unsigned part_count;
-    trip_dataset *joined;            /* all parts as one data set; NULL if there is one part */
-    trip_dataset *data;              /* the data set that is drawn: joined, or parts[0] */
-    trip_dataset_metadata **texts;   /* one per part; NULL until read */
-    trip_dataset_metadata *text;     /* texts[0] */
-    trip_tf_entry *table;            /* 65536 entries; NULL until a transfer function is used */
+    trip_dataset *joined;          /* all parts as one data set; NULL if there is one part */
+    trip_dataset *with_normals;    /* the same with computed normals; NULL if they are stored */
+    trip_dataset *data;            /* the data set that is drawn */
+    trip_dataset_metadata **texts; /* one per part; NULL until read */
+    trip_dataset_metadata *text;   /* texts[0] */
+    /* The tables of the transfer function, 65536 entries each; NULL until one is used. The second
+     * is NULL as long as draw codes are stored codes. */
+    trip_tf_entry *table, *draw_table;
+    trip_draw_maps *draw_maps;       /* of `draw`; NULL if draw codes are stored codes */
+    trip_draw_codes draw;            /* the codes of frames that interpolate */
     trip_classification *classified; /* results of earlier frames, one per level */
     trip_mean_tables mean_tables;    /* of coarse levels; may be kept for the next frame */
 } session;
@@ -46,6 +51,8 @@ int session_read_text(session *s);
 /* Sets the transfer function for later frames. Reads the texts and allocates the table if needed.
  * Warns about visible values that bricking dropped, with the command that bricks again. */
 int session_use_function(session *s, const session_look *look);
+/* Returns the table of frames that interpolate values, or of frames that draw stored voxels. */
+const trip_tf_entry *session_table(const session *s, bool interpolates);
 /* Called between frames. Keeps the tables of coarse levels only if they are a small part of the
  * memory left. */
 void session_keep_tables(session *s);

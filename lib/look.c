@@ -78,7 +78,7 @@ static void set_light(trip_settings *out, const triptych_light *light)
     out->point_light = light->kind == TRIPTYCH_LIGHT_POINT;
     if (out->point_light)
         out->light_position = toward;
-    else if (!out->headlight)
+    else if (!out->headlight) /* the view turns TRIPTYCH_LIGHT_VIEW for each frame */
         out->light_direction = trip_normalize(toward);
 }
 

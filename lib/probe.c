@@ -20,10 +20,10 @@ static void put(double out[3], trip_vec3 v)
 
 static triptych_hit hit_of(const trip_ray_probe *probe, const trip_ray_hit *found)
 {
-    const trip_file_header *h = &probe->data->header;
+    const trip_draw_codes *draw = &probe->draw;
     trip_vec3 position = trip_add(probe->origin, trip_scale(probe->direction, found->z));
     triptych_hit hit = { .opacity = found->opacity,
-                         .value = h->code_lo + (h->code_hi - h->code_lo) * found->code / 65535,
+                         .value = draw->lo + (draw->hi - draw->lo) * found->code / 65535,
                          .depth = found->z * probe->world_per_z,
                          .depth_first = found->first_z * probe->world_per_z };
     for (int a = 0; a < 3; a++)
@@ -74,7 +74,8 @@ int triptych_probe(triptych *t, double x, double y, triptych_hit *out)
         return trip_context_leave(before, status);
     trip_ray_probe probe = { .data = t->session.data,
                              .budget = t->session.budget,
-                             .table = t->session.table,
+                             .table = session_table(&t->session, true),
+                             .draw = t->session.draw,
                              .origin = origin_of(&camera, x, y),
                              .direction = trip_camera_ray(&camera, x, y),
                              .world_per_z = trip_camera_ray_length(&camera, x, y),

@@ -4,13 +4,6 @@
 
 #include "report.h"
 
-static int code_of(const trip_file_header *h, double value)
-{
-    double range = h->code_hi - h->code_lo;
-    double code = range > 0 ? 65535 * (value - h->code_lo) / range : 0;
-    return (int)fmin(65535, fmax(0, code));
-}
-
 double trip_rounding_opacity(const session *s, const trip_settings *settings)
 {
     const trip_file_header *h = &s->data->header;
@@ -19,7 +12,9 @@ double trip_rounding_opacity(const session *s, const trip_settings *settings)
     const double share =
         trip_settings_sum_sheets(settings) ? 1 : 1 / (2 * 3.14159265358979323846 * sigma * sigma);
     double max = 0;
-    for (int code = code_of(h, h->value_min); code <= code_of(h, h->value_max); code++)
+    const trip_codes *codes = &s->data->codes;
+    const int last = (int)trip_codes_code(codes, h->typical_max);
+    for (int code = (int)trip_codes_code(codes, h->typical_min); code <= last; code++)
         max = fmax(max, (double)s->table[code].extinction);
     return -expm1(-max * voxel * share);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "dataset_metadata.h"
 #include "report.h"
 
 enum { EDGE = 64, SLICES = 16 };
@@ -17,11 +18,14 @@ typedef struct reading {
     trip_budget *budget;
 } reading;
 
-static double code_of(const trip_dataset *data, double value)
+/* Returns the code of a value. If codes are uneven, returns the value. */
+static double number_of(const trip_dataset *data, double value)
 {
-    const trip_file_header *h = &data->header;
-    double range = h->code_hi - h->code_lo;
-    return range > 0 ? (value - h->code_lo) / range * 65535 : 0;
+    const trip_codes *c = &data->codes;
+    const double range = c->hi - c->lo;
+    if (!trip_codes_even(c))
+        return value;
+    return range > 0 ? (value - c->lo) / range * 65535 : 0;
 }
 
 static int put_box(reading *r, const int64_t lo[3], const int64_t size[3])
@@ -33,7 +37,7 @@ static int put_box(reading *r, const int64_t lo[3], const int64_t size[3])
             for (int64_t i = lo[0]; i < lo[0] + size[0] && !status; i++, value++) {
                 const int64_t at[3] = { i, j, k };
                 if (isfinite(*value) && !trip_field_at(r->field, i, j, k))
-                    status = trip_field_put(r->field, at, code_of(r->data, *value), NULL);
+                    status = trip_field_put(r->field, at, number_of(r->data, *value), NULL);
             }
     return status;
 }
@@ -110,7 +114,7 @@ static int check_grid(const reading *r, const char *path)
 static int read_volume(reading *r, const char *path)
 {
     const int64_t *dims = trip_volume_get_info(r->volume)->dims;
-    const trip_file_header *h = &r->data->header;
+    const trip_codes *c = &r->data->codes;
     int status = check_grid(r, path);
     if (!status)
         status = trip_field_create(&r->field, dims, r->budget);
@@ -121,7 +125,22 @@ static int read_volume(reading *r, const char *path)
                         r->field,
                         &(trip_field_map){ .index_to_world = r->data->index_to_world,
                                            .coordinates = &r->data->coordinates,
-                                           .value_per_code = (h->code_hi - h->code_lo) / 65535 });
+                                           .value_per_code =
+                                               trip_codes_even(c) ? (c->hi - c->lo) / 65535 : 1 });
+}
+
+/* Makes the volume lack the values that bricking took for fill values. */
+static int use_fills(const reading *r)
+{
+    trip_dataset_metadata *text;
+    trip_fills fills = { 0 };
+    int status = trip_dataset_metadata_parse(&text, r->data);
+    if (status)
+        return status;
+    fills.count = trip_dataset_metadata_fills(text, fills.values, TRIP_FILLS_MAX);
+    trip_dataset_metadata_destroy(text);
+    trip_volume_set_fills(r->volume, &fills);
+    return 0;
 }
 
 int trip_source_field_read(trip_field **out, const trip_dataset *data, const char *path,
@@ -134,10 +153,11 @@ int trip_source_field_read(trip_field **out, const trip_dataset *data, const cha
     if (!r.values)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory; raise --memory");
     int status = trip_volume_open(&r.volume, path, params, budget);
-    if (!status) {
+    if (!status && !params->fill)
+        status = use_fills(&r);
+    if (!status)
         status = read_volume(&r, path);
-        trip_volume_close(r.volume);
-    }
+    trip_volume_close(r.volume);
     trip_budget_release(budget, r.values, values_bytes);
     if (status)
         trip_field_destroy(r.field);

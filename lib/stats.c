@@ -121,6 +121,7 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .ms = s->ms,
         .plan_ms = t->plan_ms,
         .wait_ms = s->read_ms,
+        .normals_ms = (double)s->reader.normals_ns * 1e-6,
         .draw_ms = s->draw_ms,
         .merge_ms = s->merge_ms,
         .splats = s->reader.splats,
@@ -194,6 +195,7 @@ static void add_stats(triptych_frame_stats *to, const triptych_frame_stats *befo
     to->ms += before->ms;
     to->plan_ms += before->plan_ms;
     to->wait_ms += before->wait_ms;
+    to->normals_ms += before->normals_ms;
     to->draw_ms += before->draw_ms;
     to->merge_ms += before->merge_ms;
     to->splats += before->splats;

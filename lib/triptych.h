@@ -24,6 +24,7 @@
  * --kernel-radius.
  *
  * Coordinates: world space has the length units of the volume's file (millimetres, metres, ...).
+ * For a patient, x points to the right, y to anterior and z to superior (RAS), in every format.
  * Index space has voxel (i, j, k) at (i, j, k).
  *
  * Pictures: `height` rows of `width` pixels, the top row first. A pixel is four floats: red, green,
@@ -169,15 +170,23 @@ typedef struct triptych_info {
      */
     double edges[2][3], grid_edges[2][3];
     double value_min, value_max; /* minimum and maximum of the volume */
-    double code_lo, code_hi;     /* values of codes 0 and 65535 (FORMAT.md) */
-    uint64_t voxels;             /* of the volume */
-    uint64_t kept; /* kept voxels, which are visible with a transfer function given to `brick` */
-    uint64_t halo; /* transparent neighbours of kept voxels, stored for interpolation */
+    /* Range of the values without the few that stand far outside. Functions that are made for the
+     * data cover it. */
+    double typical_min, typical_max;
+    double code_lo, code_hi; /* values of codes 0 and 65535 (FORMAT.md) */
+    /* "even": code_step_min apart. "knots": at least code_step_min and at most code_step_max apart.
+     * "ids": a code for each of `ids` values. */
+    const char *codes;
+    double code_step_min, code_step_max;
+    unsigned ids;
+    uint64_t voxels; /* of the volume */
+    uint64_t kept;   /* kept voxels, which are visible with a transfer function given to `brick` */
+    uint64_t halo;   /* transparent neighbours of kept voxels, stored for interpolation */
     uint64_t bytes, index_bytes; /* size on disk of the whole data set and of its index */
     /* Checksum of the index, which contains the checksums of all other bytes. Equal data sets have
      * equal checksums. */
     uint64_t checksum;
-    /* normal_bytes is 0 if the data set has no normals; its splats are then not shaded. */
+    /* normal_bytes is 0 if the data set stores no normals; drawing then computes them. */
     unsigned format_version, lists, code_bytes, normal_bytes;
     /* gradient_step is the unit of 3-byte normals. Shading is full from gradients of gradient_full
      * on. */
@@ -215,9 +224,9 @@ TRIPTYCH_API int triptych_verify(triptych *t);
 enum { TRIPTYCH_HISTOGRAM_BINS = 1024 };
 
 typedef struct triptych_histogram {
-    /* Bins divide the range from lo to hi equally. */
+    /* Bins divide the typical range from lo to hi equally. */
     double lo, hi;
-    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* finite values of the volume, kept or not */
+    uint64_t counts[TRIPTYCH_HISTOGRAM_BINS]; /* finite values in the range, kept or not */
     uint64_t total;
 } triptych_histogram;
 
@@ -457,22 +466,29 @@ typedef struct triptych_lod_settings {
 } triptych_lod_settings;
 
 typedef enum triptych_light_kind {
-    TRIPTYCH_LIGHT_DEFAULT,   /* head */
+    /* Head. With shadows the light comes from the upper left front of the view instead, and a note
+     * says so. */
+    TRIPTYCH_LIGHT_DEFAULT,
     TRIPTYCH_LIGHT_HEAD,      /* at the eye */
-    TRIPTYCH_LIGHT_DIRECTION, /* from the direction `toward` */
+    TRIPTYCH_LIGHT_DIRECTION, /* from the direction `toward` of world space */
     TRIPTYCH_LIGHT_POINT,     /* at the position `toward`; equally bright at any distance */
+    /* From the direction `toward` of the view: left, up, front. { 1, 1, 1 } shines from the upper
+     * left front. The light turns with the camera, so shadows are swept anew in each new view. */
+    TRIPTYCH_LIGHT_VIEW,
 } triptych_light_kind;
 
 typedef struct triptych_light {
     int no_shading; /* if not 0, gradients do not shade the colours; effects still use the light */
     triptych_light_kind kind;
-    double toward[3]; /* world space: direction to the light, not zero, or its position */
+    /* Direction to the light, not zero, or its position. In world space, except for
+     * TRIPTYCH_LIGHT_VIEW. */
+    double toward[3];
 } triptych_light;
 
 /* Effects beyond shading. An effect that is off costs nothing. */
 enum {
-    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with a
-     * light at the eye. */
+    /* Matter between a point and the light attenuates the light, and fog scatters it. Not with
+     * TRIPTYCH_LIGHT_HEAD. */
     TRIPTYCH_EFFECT_SHADOWS = 1,
     TRIPTYCH_EFFECT_OCCLUSION = 2, /* matter around a point attenuates the light from everywhere */
     TRIPTYCH_EFFECT_CUEING = 4,    /* distant matter fades into the background */
@@ -672,6 +688,7 @@ typedef struct triptych_frame_stats {
     /* Parts of `ms`: waiting for the disk, drawing, merging the layers. Merging includes the rays
      * of the integral. */
     double wait_ms, draw_ms, merge_ms;
+    double normals_ms; /* computing normals that the data set does not store (pre) */
     uint64_t splats, bytes_read, reads;     /* over all lists; read from disk */
     uint64_t bytes_cached;                  /* taken from the cache instead of the disk */
     uint64_t runs_occluded, bytes_occluded; /* not read, because they lie behind opaque matter */

@@ -36,11 +36,14 @@ typedef enum triptych_code_bits {
 } triptych_code_bits;
 
 typedef enum triptych_normals {
-    /* Compact if no colour changes by half of 1/255 or more, otherwise full. */
+    /* None, since drawing computes normals from the values. Stored in two cases: the data set lacks
+     * voxels and has no halo, or its coarse levels are for pre alone. */
     TRIPTYCH_NORMALS_AUTO,
     TRIPTYCH_NORMALS_COMPACT, /* 3 bytes */
     TRIPTYCH_NORMALS_FULL,    /* 4 bytes */
     TRIPTYCH_NORMALS_NONE,
+    /* Compact if no colour changes by half of 1/255 or more, otherwise full. */
+    TRIPTYCH_NORMALS_STORED,
 } triptych_normals;
 
 /* The classification for which coarse levels are made. */
@@ -109,6 +112,15 @@ typedef struct triptych_brick_options {
      * and L, one of A and P, one of S and I, such as "PIR". */
     const char *axes;
     int allow_gaps; /* if not 0, a stack of slices may have gaps */
+    /* DICOM: the number of a series, as triptych_describe() lists it; default: the largest. */
+    int series;
+    /* The channel or component, and the time, of a file with several; both count from 0. In DICOM,
+     * slices that share their positions are times. */
+    int channel, time;
+    /* A value that stands for "no value", as text, such as "-9999". Its voxels count as absent.
+     * "none" keeps all values. By default, known fill values that stand far outside of all other
+     * values count as absent, such as 1e20, -9999 or -32768. */
+    const char *fill;
     /* If not 0 and the volume has more voxels, reads only every second, third, ... voxel along each
      * axis, so that at most this many are read. */
     uint64_t max_voxels;
@@ -176,7 +188,7 @@ typedef struct triptych_brick_summary {
     /* Written to temporary files and removed again. */
     uint64_t temporary_bytes;
     int resumed;
-    char note[1024]; /* choices made where the file leaves several, or "" */
+    char note[1536]; /* choices made where the file leaves several, or "" */
     triptych_brick_stage stages[TRIPTYCH_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* limit; maximum used */
 } triptych_brick_summary;
@@ -238,6 +250,28 @@ typedef int (*triptych_file_callback)(void *user, const char *path);
 TRIPTYCH_API int triptych_list_files(triptych *t, const char *volume,
                                      const triptych_brick_options *options,
                                      triptych_file_callback found, void *user);
+
+/* The grid of a volume, as its file gives it. */
+typedef struct triptych_description {
+    const char *format; /* "nrrd", "images", ...; a constant */
+    const char *type;   /* of the stored values, as triptych_brick_options.raw_type; a constant */
+    int64_t dims[3];
+    double index_to_world[3][4];
+    double spacing_min[3], spacing_max[3]; /* distances of neighbouring voxels; equal if even */
+    char space[8];                         /* "RAS" or "" */
+    char modality[24];                     /* of DICOM: "CT", "MR", ..., or "" */
+    char note[1024];                       /* choices made where the file leaves several, or "" */
+} triptych_description;
+
+/* Receives a line of text. A negative result ends the function that calls it. */
+typedef int (*triptych_text_callback)(void *user, const char *text);
+
+/* Describes a volume from its headers. Only the options for reading count; NULL is allowed. For
+ * DICOM, calls `series`, unless it is NULL, with a line for each series: its number, name, modality
+ * and size. */
+TRIPTYCH_API int triptych_describe(triptych *t, const char *volume,
+                                   const triptych_brick_options *options, triptych_description *out,
+                                   triptych_text_callback series, void *user);
 
 /* Returns 1 if `name` is a valid triptych_brick_options.raw_type, otherwise 0. */
 TRIPTYCH_API int triptych_is_raw_type(const char *name);

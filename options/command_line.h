@@ -41,5 +41,10 @@ extern const char *const trip_levels_for_names[];
 #define TRIP_ONE_VOLUME                                                                            \
     "only one volume is possible at a time; give slices by their folder, or by a pattern in "      \
     "quotes, like \"*.tif\""
+/* Message of `render` for a second volume, such as a CT and its segmentation. */
+#define TRIP_ONE_VOLUME_A_PICTURE                                                                  \
+    TRIP_ONE_VOLUME "; draw other volumes in pictures of their own, with the same --eye, --look "  \
+                    "and --up, or show them one after the other with triptych view; several "      \
+                    "regions of one volume can be drawn together (triptych brick --region)"
 
 #endif

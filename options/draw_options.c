@@ -1,6 +1,7 @@
 #include "draw_options.h"
 
 #include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "anatomy.h"
@@ -261,6 +262,16 @@ static int read_axes(const trip_option *row, const char *text, void *base)
                                          : trip_option_fail("--axes", "takes " TRIP_ANATOMY_AXES);
 }
 
+static int read_fill(const trip_option *row, const char *text, void *base)
+{
+    double value;
+    (void)row;
+    ((triptych_brick_options *)base)->fill = text;
+    return !strcmp(text, "none") || (trip_text_to_double(text, &value) && isfinite(value))
+               ? 0
+               : trip_option_fail("--fill", "takes a number or none");
+}
+
 static const char *const level_sets[] = { "filled", "band", NULL };
 
 #define AT(member) .at = offsetof(triptych_brick_options, member)
@@ -273,6 +284,9 @@ static const trip_option volume_rows[] = {
     { "level-set", "HOW", "Selects how an OpenVDB level set becomes a density: filled or band",
       "filled", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_CHOICE, AT(level_set),
       .choices = level_sets, .first = TRIPTYCH_LEVEL_SET_FILLED },
+    { "series", "N", "Selects a series of a DICOM folder by the number in the list of `info`",
+      "the largest", .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(series), .lo = 1,
+      .hi = INT32_MAX },
     { "spacing", "X,Y,Z", "Sets the distance of neighbouring voxels along each axis",
       "the distance in the file, else 1", .group = DRAW_GROUP_VOLUME, AT(spacing),
       CUSTOM(read_spacing) },
@@ -285,8 +299,18 @@ static const trip_option volume_rows[] = {
       "posterior, inferior and right",
       .group = DRAW_GROUP_VOLUME, AT(axes), CUSTOM(read_axes) },
     { "allow-gaps", NULL,
-      "Accepts a stack with missing slices, as if the neighbours of a gap touched",
+      "Accepts a stack with missing slices: the neighbours of a gap touch, but DICOM slices stay "
+      "where they are",
       .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_FLAG, AT(allow_gaps) },
+    { "channel", "N", "Selects the channel or component of a file with several, from 0", "0",
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(channel), .lo = 0,
+      .hi = INT32_MAX },
+    { "time", "N", "Selects the time of a file with several, from 0", "0",
+      .group = DRAW_GROUP_VOLUME, .type = TRIP_OPTION_INTEGER, AT(time), .lo = 0, .hi = INT32_MAX },
+    { "fill", "VALUE|none",
+      "Names the value that stands for \"no value\", or keeps all values with none",
+      "known fill values far outside of all other values: 1e20, -9999, -32768, ...",
+      .group = DRAW_GROUP_VOLUME, AT(fill), CUSTOM(read_fill) },
 };
 #undef AT
 

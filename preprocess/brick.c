@@ -20,6 +20,9 @@
 #include "splats.h"
 #include "orientation.h"
 
+/* Status of a run that found fill values too late. */
+enum { AGAIN = -101 };
+
 /* State of a run. It starts zeroed, so that close_all() can undo any part of it. */
 typedef struct brick {
     const trip_brick_params *params;
@@ -64,13 +67,15 @@ static int scan(brick *b)
     const trip_journal_start *start = trip_journal_get_start(b->temporary.journal);
     double begin = trip_now_seconds();
     int status = 0;
-    if (start)
+    /* The ids are not in the journal. A scan finds the same ones again. */
+    const bool known = start && !start->ids;
+    if (known)
         status = trip_brick_input_set_tally(&b->in, &start->tally);
     else
         status =
             trip_brick_input_scan(&b->in, (trip_scan_params){ .slices = b->plan.slices,
                                                               .read_ahead = b->plan.read_ahead });
-    if (!start)
+    if (!known)
         b->summary->stages[TRIP_BRICK_SCAN].bytes_read = input_bytes(b);
     end_stage(b, TRIP_BRICK_SCAN, begin);
     return status;
@@ -144,7 +149,7 @@ static int reserve(void *user, unsigned thread, unsigned list, size_t bytes, voi
 static int open_splatter(brick *b)
 {
     trip_splat_params p = { .info = b->in.info,
-                            .envelope = &b->in.envelope,
+                            .envelope = trip_brick_envelope(&b->in),
                             .region = &b->in.region,
                             .format = b->format,
                             .quantiser = b->codes.quantiser,
@@ -246,9 +251,11 @@ static int check_tally(brick *b)
         return trip_fail(TRIP_ERROR, "brick", b->params->input, "has no active voxels");
     if (t->finite == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input, "has no finite values");
-    if (t->finite < t->voxels)
-        trip_warn(b->params->input, "%llu values are not finite and count as absent",
-                  (unsigned long long)(t->voxels - t->finite));
+    const uint64_t before = b->in.finite_before > t->finite ? b->in.finite_before : t->finite;
+    if (before < t->voxels)
+        trip_warn(b->params->input, "%llu values are not finite%s and count as absent",
+                  (unsigned long long)(t->voxels - before),
+                  b->in.info->fills.count && !b->in.fills.count ? " or are the fill value" : "");
     if (b->summary->kept == 0)
         return trip_fail(TRIP_ERROR, "brick", b->params->input,
                          "no voxel is visible: the values are from %g to %g, outside of all "
@@ -261,8 +268,18 @@ static int check_tally(brick *b)
     /* With the automatic transfer function as the default, drawing checks the others when it uses
      * them. */
     for (size_t i = 0; i < b->params->function_count && !b->params->automatic; i++)
-        trip_tf_check_range(b->in.functions[i], t->value_min, t->value_max, b->params->input);
+        trip_tf_check_range(b->in.functions[i], t->typical_min, t->typical_max, b->params->input);
     return 0;
+}
+
+/* Without a scan, fill values become known once everything is read. The volume is then read again.
+ */
+static int finish_tally(brick *b)
+{
+    const int found = trip_brick_input_find_fills(&b->in, b->in.tally);
+    if (found == 0)
+        return trip_brick_input_finish_tally(&b->in);
+    return found < 0 ? found : AGAIN;
 }
 
 static int read_volume(brick *b)
@@ -282,8 +299,11 @@ static int read_volume(brick *b)
     if (status < 0)
         return status;
     add_up(b, b->in.tally, &b->summary->kept, &b->summary->halo);
-    trip_tally_histogram(b->in.tally, &b->in.histogram);
-    return check_tally(b);
+    if (!b->in.scanned && b->in.tally->finite > 0)
+        status = finish_tally(b);
+    if (status == 0)
+        trip_brick_input_tell_fills(&b->in);
+    return status == 0 ? check_tally(b) : status;
 }
 
 static void on_merge_progress(void *user, uint64_t splats)
@@ -297,10 +317,10 @@ static int merge_lists(brick *b)
     double begin = trip_now_seconds();
     int status = 0;
     if (!b->format.quantised) {
-        trip_brick_codes_set_range(&b->codes, &b->in, b->in.tally->value_min,
-                                   b->in.tally->value_max);
+        status = trip_brick_codes_set_range(&b->codes, &b->in);
         const trip_writer_codes codes = trip_brick_codes_header(&b->codes);
-        status = trip_writer_set_codes(b->writer, &codes);
+        if (status == 0)
+            status = trip_writer_set_codes(b->writer, &codes);
     }
     if (status == 0)
         status = trip_list_builder_finish(b->builder, &b->codes.quantiser, b->in.workers,
@@ -315,13 +335,13 @@ static void on_levels_progress(void *user, uint64_t done, uint64_t total)
     trip_brick_input_progress(&b->in, "levels", done, total);
 }
 
-/* Returns whether more of the volume's range lies above the envelope than below it. */
+/* Returns whether more of the volume's typical range lies above the envelope than below it. */
 static bool is_hidden_above(const brick *b)
 {
     const trip_envelope *e = &b->in.envelope;
     const trip_tally *t = b->in.tally;
-    return e->count > 0 && t->value_max - (double)e->intervals[e->count - 1].hi >
-                               (double)e->intervals[0].lo - t->value_min;
+    return e->count > 0 && t->typical_max - (double)e->intervals[e->count - 1].hi >
+                               (double)e->intervals[0].lo - t->typical_min;
 }
 
 /* Makes the coarse levels. First releases the memory of level 0, which is no longer needed. */
@@ -338,8 +358,9 @@ static int make_levels(brick *b)
                              .compact = b->codes.normal_bytes == 3 ? &b->codes.compact : NULL,
                              .index_to_world = b->in.info->index_to_world,
                              .levels = b->levels,
-                             .value_min = b->in.tally->value_min,
-                             .value_max = b->in.tally->value_max,
+                             .typical_min = b->in.tally->typical_min,
+                             .typical_max = b->in.tally->typical_max,
+                             .codes = trip_brick_codes_get(&b->codes),
                              .hidden_above = is_hidden_above(b),
                              .folder = b->temporary.partial_path,
                              .writer = b->writer,
@@ -388,7 +409,7 @@ static int check_records(brick *b)
     return 0;
 }
 
-/* Returns whether the orientation must be guessed: neither the file nor its format gives it. With
+/* Returns whether the orientation must be guessed: neither the file nor its program gives it. With
  * uneven spacing, a mirror image of the voxels is not a mirror image of the object, so nothing is
  * guessed. */
 static bool is_up_unknown(const trip_volume_info *info)
@@ -396,19 +417,19 @@ static bool is_up_unknown(const trip_volume_info *info)
     for (int a = 0; a < 3; a++)
         if (info->coordinates[a])
             return false;
-    return !info->oriented && !info->space[0] && strcmp(info->format, "openvdb") &&
-           strcmp(info->format, "nifti");
+    return !info->oriented && !info->space[0] && !info->up[0] && strcmp(info->format, "nifti");
 }
 
 static int find_orientation(brick *b)
 {
-    const trip_quantiser *q = &b->codes.quantiser;
+    const trip_tally *t = b->in.tally;
     trip_occupancy_params p = { .levels = b->levels,
                                 .halo = b->format.halo,
                                 .kinds = b->kinds,
                                 .tile_log2 = b->format.tile_log2,
-                                .scale = trip_mean_scale_make(
-                                    b->in.tally->value_min, b->in.tally->value_max, q->lo, q->hi) };
+                                .codes = trip_brick_codes_get(&b->codes),
+                                .typical_min = t->typical_min,
+                                .typical_max = t->typical_max };
     memcpy(p.dims, b->in.info->dims, sizeof p.dims);
     /* A region may look unlike the whole object. */
     const bool whole = trip_region_is_whole(&b->params->region);
@@ -417,19 +438,31 @@ static int find_orientation(brick *b)
                : 0;
 }
 
+static trip_brick_metadata metadata_of(const brick *b)
+{
+    return (trip_brick_metadata){ .params = b->params,
+                                  .info = b->in.info,
+                                  .envelope = &b->in.envelope,
+                                  .functions = b->in.functions,
+                                  .histogram = &b->in.histogram,
+                                  .tally = b->in.tally,
+                                  .fills = &b->in.info->fills,
+                                  .upright = b->upright };
+}
+
 static int finish_output(brick *b)
 {
     double begin = trip_now_seconds();
-    char *text = trip_brick_metadata_make(&(trip_brick_metadata){ .params = b->params,
-                                                                  .info = b->in.info,
-                                                                  .envelope = &b->in.envelope,
-                                                                  .functions = b->in.functions,
-                                                                  .histogram = &b->in.histogram,
-                                                                  .upright = b->upright });
+    const trip_brick_metadata metadata = metadata_of(b);
+    char *text = trip_brick_metadata_make(&metadata);
     if (!text)
         return TRIP_ERROR;
-    trip_writer_summary s = { b->in.tally->value_min, b->in.tally->value_max, b->in.tally->voxels,
-                              text };
+    trip_writer_summary s = { .value_min = b->in.tally->value_min,
+                              .value_max = b->in.tally->value_max,
+                              .typical_min = b->in.tally->typical_min,
+                              .typical_max = b->in.tally->typical_max,
+                              .voxels = b->in.tally->voxels,
+                              .text = text };
     int status = check_records(b);
     if (status == 0)
         status =
@@ -448,7 +481,8 @@ static void fill_summary(brick *b)
     trip_brick_summary *s = b->summary;
     const double(*m)[4] = b->in.info->index_to_world.m;
     memcpy(s->dims, b->in.info->dims, sizeof s->dims);
-    trip_brick_metadata_note(b->in.info, b->upright, s->note);
+    const trip_brick_metadata metadata = metadata_of(b);
+    trip_brick_metadata_note(&metadata, s->note);
     for (int a = 0; a < 3; a++)
         s->spacing[a] = trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
     s->voxels = b->in.tally->voxels;
@@ -481,6 +515,9 @@ static int prepare(brick *b)
 static int make(brick *b)
 {
     int status = b->params->resume ? trip_folder_check(b->params->output, b->params->replace) : 0;
+    const trip_journal_start *start = trip_journal_get_start(b->temporary.journal);
+    if (status == 0 && start)
+        trip_brick_input_set_fills(&b->in, &start->fills, start->finite_before);
     if (status == 0 && trip_brick_input_needs_scan(&b->in))
         status = scan(b);
     if (status == 0)
@@ -488,8 +525,9 @@ static int make(brick *b)
     if (status < 0)
         return status;
     b->format.quantised = trip_brick_has_narrow_type(&b->in) || b->in.scanned;
-    trip_brick_codes_choose(&b->codes, &b->in);
-    status = plan_memory(b);
+    status = trip_brick_codes_choose(&b->codes, &b->in);
+    if (status == 0)
+        status = plan_memory(b);
     if (status == 0 && !trip_journal_get_start(b->temporary.journal))
         status = trip_estimate_check_disk(&b->in, &b->format, &b->plan);
     if (status == 0)
@@ -527,12 +565,31 @@ static void close_all(brick *b, int status)
     trip_brick_input_close(&b->in);
 }
 
-int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
+/* Runs once. If new fill values were found, adds them to `fills` and returns AGAIN. */
+static int run_once(const trip_brick_params *params, trip_brick_summary *summary, trip_fills *fills,
+                    uint64_t *finite)
 {
     brick b = { .params = params, .summary = summary, .upright = { -1, -1 } };
+    b.in.fills = *fills;
     b.temporary = trip_brick_temporary_none();
     *summary = (trip_brick_summary){ 0 };
+    b.in.finite_before = *finite;
     int status = run(&b);
+    if (status == AGAIN) {
+        *fills = b.in.fills;
+        *finite = b.in.finite_before ? b.in.finite_before : b.in.tally->finite;
+    }
     close_all(&b, status);
+    return status;
+}
+
+int trip_brick(const trip_brick_params *params, trip_brick_summary *summary)
+{
+    trip_fills fills = { 0 };
+    uint64_t finite = 0;
+    int status;
+    do
+        status = run_once(params, summary, &fills, &finite);
+    while (status == AGAIN);
     return status;
 }

@@ -38,7 +38,7 @@ typedef struct trip_brick_summary {
     uint64_t level_bytes;     /* bytes of the coarse levels' lists */
     uint64_t temporary_bytes; /* bytes spilled */
     bool resumed;             /* an interrupted run was resumed */
-    char note[1024];          /* choices that the file left open, or "" */
+    char note[1536];          /* choices that the file left open, or "" */
     trip_brick_cost stages[TRIP_BRICK_STAGES];
     uint64_t memory_bytes, peak_memory_bytes; /* limit and peak of the budget */
 } trip_brick_summary;

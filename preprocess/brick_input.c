@@ -2,6 +2,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "brick_memory.h"
@@ -9,6 +10,8 @@
 #include "format.h"
 #include "normal.h"
 #include "report.h"
+#include "text.h"
+#include "typical.h"
 
 /* Saturates, because the grid of a sparse volume may have more than 2^64 voxels. */
 static uint64_t count_voxels(const int64_t dims[3])
@@ -57,11 +60,19 @@ static int check_levels(const trip_brick_input *in)
                      "leave out --levels");
 }
 
+bool trip_brick_stores_normals(const trip_brick_params *p)
+{
+    const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
+    if (p->normals != TRIP_NORMALS_AUTO)
+        return p->normals != TRIP_NORMALS_NONE;
+    return (p->no_halo && !p->keep_all) || (p->levels >= 0 && kinds.means && !kinds.values);
+}
+
 trip_piece_format trip_brick_format(const trip_brick_params *p)
 {
     return (trip_piece_format){ .tile_log2 =
                                     p->tile_voxels ? (unsigned)__builtin_ctz(p->tile_voxels) : 6,
-                                .normals = p->normals != TRIP_NORMALS_NONE,
+                                .normals = trip_brick_stores_normals(p),
                                 .halo = !p->no_halo };
 }
 
@@ -69,6 +80,40 @@ static unsigned choose_threads(const trip_brick_input *in)
 {
     trip_piece_format format = trip_brick_format(in->params);
     return trip_memory_plan_threads(&format, trip_budget_limit_bytes(in->budget));
+}
+
+/* ---- fill values ---- */
+
+void trip_brick_input_tell_fills(trip_brick_input *in)
+{
+    char text[512], number[32];
+    const uint64_t before = in->finite_before, now = in->tally->finite;
+    if (in->fills.count == 0)
+        return;
+    int used =
+        snprintf(text, sizeof text, "%" PRIu64 " voxels with", before > now ? before - now : 0);
+    for (unsigned i = 0; i < in->fills.count; i++)
+        used += snprintf(text + used, sizeof text - (size_t)used, "%s %s", i ? " or" : "",
+                         trip_text_from_double(in->fills.values[i], number));
+    snprintf(text + used, sizeof text - (size_t)used,
+             ", far outside of all other values, count as absent; --fill none keeps them");
+    trip_volume_add_note(in->volume, text);
+}
+
+void trip_brick_input_set_fills(trip_brick_input *in, const trip_fills *fills,
+                                uint64_t finite_before)
+{
+    in->fills = *fills;
+    in->finite_before = finite_before;
+    if (fills->count)
+        trip_volume_set_fills(in->volume, fills);
+}
+
+int trip_brick_input_find_fills(trip_brick_input *in, const trip_tally *t)
+{
+    return in->params->volume.fill
+               ? 0
+               : trip_typical_find_fills(t, in->info, &in->fills, in->params->input);
 }
 
 static int open_volume(trip_brick_input *in)
@@ -82,6 +127,8 @@ static int open_volume(trip_brick_input *in)
     if (status < 0)
         return status;
     in->info = trip_volume_get_info(in->volume);
+    if (in->fills.count)
+        trip_volume_set_fills(in->volume, &in->fills);
     in->grid_voxels = count_voxels(in->info->dims);
     in->tally = trip_budget_take(in->budget, sizeof *in->tally);
     if (!in->tally)
@@ -142,6 +189,9 @@ int trip_brick_input_open(trip_brick_input *in, const trip_brick_params *params)
 void trip_brick_input_close(trip_brick_input *in)
 {
     trip_envelope_destroy(&in->envelope);
+    trip_envelope_destroy(&in->ranks);
+    if (in->budget)
+        trip_ids_free(&in->ids, in->budget);
     for (size_t i = 0; in->functions && i < in->params->function_count; i++)
         trip_tf_destroy(in->functions[i]);
     free(in->functions);
@@ -211,7 +261,10 @@ bool trip_brick_rounds_codes(const trip_brick_input *in)
 
 double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi)
 {
-    double range = in->scanned ? in->tally->value_max - in->tally->value_min : 0;
+    const trip_tally *t = in->tally;
+    double range = t->has_typical ? t->typical_max - t->typical_min : 0;
+    if (in->ids.count && !in->ids.numbered)
+        range = in->ids.count > 1 ? in->ids.count - 1 : 1;
     double voxel = cbrt(fabs(trip_affine_determinant(&in->info->index_to_world)));
     return TRIP_GRADIENT_FULL * (range > 0 ? range : hi - lo) / voxel;
 }
@@ -219,6 +272,7 @@ double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi
 bool trip_brick_choose_compact(const trip_brick_input *in, double full, double step[3])
 {
     double unit = in->info->type < TRIP_F16 ? fabs(in->info->slope) / 2 : 0;
+    unit = in->ids.count ? 0.5 : unit;
     return trip_compact_normals_choose(&in->info->index_to_world, full, unit, step);
 }
 
@@ -243,9 +297,10 @@ unsigned trip_brick_normal_bytes(const trip_brick_input *in)
     case TRIP_NORMALS_COMPACT:
         return 3;
     case TRIP_NORMALS_AUTO:
+    case TRIP_NORMALS_STORED:
         break;
     }
-    return are_compact_exact(in) ? 3 : 4;
+    return !trip_brick_stores_normals(in->params) ? 0 : are_compact_exact(in) ? 3 : 4;
 }
 
 /* Normals of 8- and 16-bit types are made before all values are known, others after that. */
@@ -261,10 +316,23 @@ static bool is_envelope_automatic(const trip_brick_params *p)
     return p->automatic || (!p->keep_all && p->function_count == 0 && p->range_count == 0);
 }
 
+/* Values that are not integers of 32 or 64 bits can be ids too, if there is a scan. */
+static bool needs_scan_for_ids(const trip_brick_input *in)
+{
+    const trip_scalar type = in->info->type;
+    return type >= TRIP_U32 && type <= TRIP_I64 && trip_brick_input_may_have_ids(in);
+}
+
+bool trip_brick_input_may_have_ids(const trip_brick_input *in)
+{
+    return !in->info->sparse && !trip_brick_has_narrow_type(in) && in->info->type != TRIP_F16 &&
+           in->params->code_bits != TRIP_CODE_BITS_8;
+}
+
 bool trip_brick_input_needs_scan(const trip_brick_input *in)
 {
     bool needed = is_envelope_automatic(in->params) || depend_normals_on_range(in) ||
-                  trip_brick_rounds_codes(in);
+                  trip_brick_rounds_codes(in) || needs_scan_for_ids(in);
     for (size_t i = 0; i < in->params->function_count; i++)
         needed = needed || trip_tf_needs_data(in->functions[i]);
     return needed;
@@ -282,6 +350,13 @@ void trip_brick_input_progress(const trip_brick_input *in, const char *stage, ui
         in->params->progress(in->params->progress_user, stage, done, total);
 }
 
+/* Lets the histogram know the ids. */
+static void add_ids(trip_brick_input *in)
+{
+    in->histogram.ids = in->ids.values;
+    in->histogram.id_count = in->ids.count;
+}
+
 static int on_scan_progress(void *user, uint64_t voxels)
 {
     const trip_brick_input *in = user;
@@ -289,26 +364,130 @@ static int on_scan_progress(void *user, uint64_t voxels)
     return 0;
 }
 
+int trip_brick_input_finish_tally(trip_brick_input *in)
+{
+    trip_tally *t = in->tally;
+    int status = 0;
+    trip_histogram *h = &in->histogram;
+    /* Labels have no outliers: a rare one may lie far from the others. */
+    if (!t->has_typical) {
+        trip_typical_set_whole(t);
+        trip_tally_histogram(t, h);
+        add_ids(in);
+        if (trip_brick_kind(in->info, h) != TRIP_TF_LABELS)
+            status = trip_typical_set(t, in->params->input);
+    }
+    trip_tally_histogram(t, h);
+    add_ids(in);
+    return status;
+}
+
 int trip_brick_input_set_tally(trip_brick_input *in, const trip_tally *known)
 {
-    int status = 0;
     if (known != in->tally)
         *in->tally = *known;
     in->scanned = true;
-    trip_tally_histogram(in->tally, &in->histogram);
-    const trip_tf_data data = { in->tally->value_min, in->tally->value_max, &in->histogram,
+    int status = trip_brick_input_finish_tally(in);
+    const trip_tf_data data = { in->tally->typical_min, in->tally->typical_max, &in->histogram,
                                 trip_brick_kind(in->info, &in->histogram) };
     for (size_t i = 0; i < in->params->function_count && status == 0; i++)
         status = trip_tf_adapt(in->functions[i], &data, in->params->input);
     return status;
 }
 
+static int scan_again(trip_brick_input *in, const trip_scan_params *scan, trip_id_set *ids)
+{
+    trip_scan_params p = *scan;
+    p.progress = on_scan_progress;
+    p.user = in;
+    p.ids = trip_brick_input_may_have_ids(in) ? ids : NULL;
+    if (ids)
+        trip_id_set_free(ids, in->budget);
+    return trip_scan_volume(in->tally, in->volume, in->params->input, in->workers, &p, in->budget);
+}
+
+/* Scans the volume until no undeclared fill value is left. */
+static int scan_without_fills(trip_brick_input *in, const trip_scan_params *scan, trip_id_set *ids)
+{
+    int status = scan_again(in, scan, ids), found = 0;
+    while (status == 0 && (found = trip_brick_input_find_fills(in, in->tally)) > 0) {
+        in->finite_before = in->finite_before ? in->finite_before : in->tally->finite;
+        trip_volume_set_fills(in->volume, &in->fills);
+        status = scan_again(in, scan, ids);
+    }
+    return status ? status : found;
+}
+
+/* Scans once more if some values stand far outside. The bins then are as fine as without them. */
+static int scan_typical(trip_brick_input *in, const trip_scan_params *scan)
+{
+    trip_tally *t = in->tally;
+    const double lo = t->value_min, hi = t->value_max;
+    const uint64_t finite = t->finite;
+    trip_scan_params p = *scan;
+    int status = trip_brick_input_finish_tally(in);
+    if (status < 0 || !(t->typical_min < t->typical_max) ||
+        (t->typical_min == lo && t->typical_max == hi))
+        return status;
+    p.clip_min = t->typical_min;
+    p.clip_max = t->typical_max;
+    status = scan_again(in, &p, NULL);
+    t->has_typical = 1;
+    t->typical_min = t->value_min;
+    t->typical_max = t->value_max;
+    t->value_min = lo;
+    t->value_max = hi;
+    t->finite = finite;
+    return status;
+}
+
+/* Returns whether even codes or floats would merge the distinct integers of the volume, and these
+ * are labels by intent. */
+static bool are_ids(const trip_brick_input *in, const trip_id_set *s)
+{
+    const trip_tally *t = in->tally;
+    const double unit = in->info->type < TRIP_F16 ? fabs(in->info->slope) : 1;
+    const double step = 1.5 * (t->value_max - t->value_min) / 65535;
+    const bool merged =
+        step >= unit / 2 || fmax(fabs(t->value_min), fabs(t->value_max)) >= 0x1p24 * unit;
+    return !s->other && merged && (s->many || s->count > 0) && trip_id_set_coherent(s);
+}
+
+static int read_as_ids(trip_brick_input *in, const trip_id_set *s, const trip_scan_params *scan)
+{
+    int status = trip_ids_make(&in->ids, s, in->info, in->params->input, in->budget);
+    if (status < 0)
+        return status;
+    trip_volume_set_ids(in->volume, &in->ids);
+    in->memory_bytes = trip_budget_left_bytes(in->budget);
+    if (!in->ids.numbered) {
+        in->tally->value_min = in->ids.values[0];
+        in->tally->value_max = in->ids.values[in->ids.count - 1];
+        return 0;
+    }
+    char text[200];
+    snprintf(
+        text, sizeof text,
+        "more than %d ids: each is stored as a number from 1 to %d made from it, which sets its "
+        "colour",
+        TRIP_IDS_MAX, TRIP_IDS_NUMBERS - 1);
+    trip_volume_add_note(in->volume, text);
+    return scan_again(in, scan, NULL);
+}
+
 int trip_brick_input_scan(trip_brick_input *in, trip_scan_params scan)
 {
-    scan.progress = on_scan_progress;
-    scan.user = in;
-    int status =
-        trip_scan_volume(in->tally, in->volume, in->params->input, in->workers, &scan, in->budget);
+    trip_id_set set = { 0 };
+    int status = scan_without_fills(in, &scan, &set);
+    if (status == 0 && set.starved)
+        status = trip_fail(TRIP_ERROR, "brick", in->params->input,
+                           "its distinct values need more memory than --memory allows: raise "
+                           "--memory");
+    if (status == 0 && are_ids(in, &set))
+        status = read_as_ids(in, &set, &scan);
+    trip_id_set_free(&set, in->budget);
+    if (status == 0)
+        status = scan_typical(in, &scan);
     return status == 0 ? trip_brick_input_set_tally(in, in->tally) : status;
 }
 
@@ -324,6 +503,37 @@ static int add_automatic(trip_brick_input *in)
     return status;
 }
 
+static bool keeps_id(const trip_brick_input *in, const trip_tf *automatic, double id)
+{
+    const trip_brick_params *p = in->params;
+    bool keeps = p->keep_all || (automatic && trip_tf_evaluate(automatic, id).opacity > 0);
+    for (size_t i = 0; i < p->range_count; i++)
+        keeps |= p->ranges[i].lo <= id && id <= p->ranges[i].hi;
+    for (size_t i = 0; i < p->function_count; i++)
+        keeps |= trip_tf_evaluate(in->functions[i], id).opacity > 0;
+    return keeps;
+}
+
+/* Makes the envelope of the ranks of the kept ids. */
+static int make_ranks(trip_brick_input *in)
+{
+    trip_tf *automatic = NULL;
+    int status = 0;
+    if (is_envelope_automatic(in->params))
+        status = trip_tf_make_automatic(&automatic, trip_brick_kind(in->info, &in->histogram),
+                                        &in->histogram);
+    for (uint32_t i = 0, past; i < in->ids.count && status == 0; i = past) {
+        past = i + 1;
+        if (!keeps_id(in, automatic, in->ids.values[i]))
+            continue;
+        while (past < in->ids.count && keeps_id(in, automatic, in->ids.values[past]))
+            past++;
+        status = trip_envelope_add_range(&in->ranks, i, past - 1);
+    }
+    trip_tf_destroy(automatic);
+    return status;
+}
+
 int trip_brick_input_make_envelope(trip_brick_input *in)
 {
     const trip_brick_params *p = in->params;
@@ -334,5 +544,7 @@ int trip_brick_input_make_envelope(trip_brick_input *in)
         status = trip_envelope_add_range(&in->envelope, p->ranges[i].lo, p->ranges[i].hi);
     for (size_t i = 0; i < p->function_count && status == 0; i++)
         status = trip_envelope_add_tf(&in->envelope, in->functions[i]);
+    if (in->ids.count && !in->ids.numbered && status == 0)
+        status = make_ranks(in);
     return status;
 }

@@ -23,7 +23,13 @@ typedef struct trip_brick_input {
     bool scanned;          /* the volume was scanned, and the tally is complete */
     trip_tally *tally;
     trip_histogram histogram;
-    trip_envelope envelope;
+    trip_envelope envelope; /* of values */
+    trip_envelope ranks;    /* the same of ranks, for a volume of ids */
+    trip_ids ids;
+    /* Fill values that nobody declared, and the number of finite values with them. May be set
+     * before opening. */
+    trip_fills fills;
+    uint64_t finite_before;
 } trip_brick_input;
 
 trip_coordinates trip_brick_coordinates(const trip_brick_input *in);
@@ -46,6 +52,24 @@ unsigned trip_brick_code_bytes(const trip_brick_input *in);
 bool trip_brick_rounds_codes(const trip_brick_input *in);
 /* Returns the bytes of a normal, or 0 without normals. Call it after the scan, if there is one. */
 unsigned trip_brick_normal_bytes(const trip_brick_input *in);
+/* Whether the data set stores normals. */
+bool trip_brick_stores_normals(const trip_brick_params *p);
+/* Returns the envelope of the numbers that decoding gives: values, or ranks of ids. */
+static inline const trip_envelope *trip_brick_envelope(const trip_brick_input *in)
+{
+    return in->ids.count && !in->ids.numbered ? &in->ranks : &in->envelope;
+}
+/* Looks for fill values that nobody declared, in the tally of the whole volume. Returns the number
+ * of new ones, or a negative status. If there are some, the volume must be read again. */
+int trip_brick_input_find_fills(trip_brick_input *in, const trip_tally *t);
+void trip_brick_input_set_fills(trip_brick_input *in, const trip_fills *fills,
+                                uint64_t finite_before);
+/* Adds a note about fill values that nobody declared. The tally must be complete. */
+void trip_brick_input_tell_fills(trip_brick_input *in);
+/* Returns whether distinct integers may be merged by floats or even codes. */
+bool trip_brick_input_may_have_ids(const trip_brick_input *in);
+/* Finds the typical range of the input's tally, and makes the histogram. */
+int trip_brick_input_finish_tally(trip_brick_input *in);
 /* Returns the gradient magnitude of full shading, for the range [lo, hi] of the values or, if
  * unknown, of the codes. */
 double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi);
@@ -53,8 +77,9 @@ double trip_brick_gradient_full(const trip_brick_input *in, double lo, double hi
 bool trip_brick_choose_compact(const trip_brick_input *in, double full, double step[3]);
 /* Returns the values of the lowest and highest code for types of 8 or 16 bits. */
 void trip_brick_type_range(const trip_volume_info *info, double *lo, double *hi);
-/* Returns whether the volume must be scanned first: the envelope is automatic, a transfer function
- * depends on the values, or normals depend on their range. */
+/* Returns whether the volume must be scanned first. It must if the envelope is automatic, a
+ * transfer function depends on the values, normals depend on their range, or integers may be ids.
+ */
 bool trip_brick_input_needs_scan(const trip_brick_input *in);
 /* Returns whether the range of codes is known before pieces are made, from the type or the scan. */
 bool trip_brick_will_be_quantised(const trip_brick_input *in);

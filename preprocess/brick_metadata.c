@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +14,7 @@
 #include "json.h"
 #include "report.h"
 #include "text.h"
+
 
 /* Prints numbers in their shortest exact form, because cJSON's form differs between versions. */
 static cJSON *number(double value)
@@ -45,11 +47,22 @@ static void add_envelope(cJSON *root, const trip_brick_metadata *t)
     }
 }
 
-static void add_histogram(cJSON *root, const trip_histogram *h)
+static void add_fills(cJSON *root, const trip_fills *fills)
+{
+    cJSON *values = fills->count ? cJSON_AddArrayToObject(root, "fills") : NULL;
+    for (unsigned i = 0; i < fills->count; i++)
+        cJSON_AddItemToArray(values, number(fills->values[i]));
+}
+
+static void add_histogram(cJSON *root, const trip_histogram *h, const trip_tally *t)
 {
     cJSON *histogram = cJSON_AddObjectToObject(root, "histogram");
     add_number(histogram, "value_min", h->value_min);
     add_number(histogram, "value_max", h->value_max);
+    if (t->below)
+        add_number(histogram, "below", (double)t->below);
+    if (t->above)
+        add_number(histogram, "above", (double)t->above);
     cJSON *counts = cJSON_AddArrayToObject(histogram, "counts");
     for (size_t i = 0; i < sizeof h->counts / sizeof *h->counts; i++)
         cJSON_AddItemToArray(counts, number((double)h->counts[i]));
@@ -158,6 +171,14 @@ static void add_volume_options(cJSON *options, const trip_volume_params *v)
         add_option(options, "--coordinates=%s", v->coordinates);
     if (v->allow_gaps)
         add_option(options, "--allow-gaps");
+    if (v->series)
+        add_option(options, "--series=%d", v->series);
+    if (v->channel)
+        add_option(options, "--channel=%d", v->channel);
+    if (v->time)
+        add_option(options, "--time=%d", v->time);
+    if (v->fill)
+        add_option(options, "--fill=%s", v->fill);
 }
 
 static void add_region(cJSON *options, const trip_region *r)
@@ -182,7 +203,7 @@ static void add_source_options(cJSON *root, const trip_brick_params *p)
     static const char *const code_bits[] = { NULL, "8", "16" };
     if (p->code_bits)
         add_option(options, "--code-bits=%s", code_bits[p->code_bits]);
-    static const char *const normals[] = { NULL, "compact", "full", "none" };
+    static const char *const normals[] = { NULL, "compact", "full", "none", "stored" };
     if (p->normals)
         add_option(options, "--normals=%s", normals[p->normals]);
     if (p->no_halo)
@@ -204,40 +225,119 @@ static const char *base_name(const char *path)
     return slash && slash[1] ? slash + 1 : path;
 }
 
-/* Writes the orientation that drawing (render/dataset_metadata.c) derives, if it is not the
- * default. */
-static void print_guess(const trip_volume_info *info, trip_orientation u,
-                        char guess[TRIP_BRICK_NOTE_BYTES / 2])
+/* ---- orientation ---- */
+
+/* How the world direction that is up was found. */
+typedef struct orientation {
+    const char *from;       /* value of the key "orientation" */
+    const char *up, *front; /* world directions */
+    const char *why;        /* reason of a guess that needs a note; otherwise NULL */
+    bool stored;            /* drawing needs the key "up" */
+} orientation;
+
+/* Returns the length of the grid along an axis in world units. */
+static double length_along(const trip_volume_info *info, int a)
 {
-    guess[0] = 0;
-    if (u.mirror == 2)
-        snprintf(
-            guess, TRIP_BRICK_NOTE_BYTES / 2,
-            "its file does not say what is up: being mirror-symmetric across z, its slices are "
-            "taken for views from the side, with up at -y and the front at -x; --up, --view "
-            "and --axes say otherwise");
-    else if (u.footing >= 0 && u.footing != TRIP_ORIENTATION_BASE_LOW_Z &&
-             !trip_anatomy_is_scan_from_above(&info->index_to_world))
-        snprintf(guess, TRIP_BRICK_NOTE_BYTES / 2,
-                 "its file does not say what is up: being level at %s alone, it is taken to stand "
-                 "there, with up at %s; --up, --view and --axes say otherwise",
-                 trip_orientation_base_name(u.footing), trip_orientation_base_name(u.footing ^ 1));
+    const double(*m)[4] = info->index_to_world.m;
+    return (double)info->dims[a] * trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
 }
 
-void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
-                              char note[TRIP_BRICK_NOTE_BYTES])
+/* Some programs that write OpenVDB have y up, others z. Smoke rises, so a grid that is much longer
+ * along one of the two stands on end. */
+static orientation orient_vdb(const trip_volume_info *info, trip_orientation u)
 {
-    char guess[TRIP_BRICK_NOTE_BYTES / 2];
-    print_guess(info, upright, guess);
-    snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s%s", info->note,
-             guess[0] && info->note[0] ? "; " : "", guess);
+    static const double much = 1.5;
+    const double y = length_along(info, 1), z = length_along(info, 2);
+    const bool y_base = u.footing == TRIP_ORIENTATION_BASE_LOW_Y;
+    orientation o = { .up = "+y", .stored = true };
+    if (info->up[0]) {
+        o.from = "program";
+        o.up = info->up;
+    } else if (y_base || u.footing == TRIP_ORIENTATION_BASE_LOW_Z) {
+        o.from = "base";
+        o.up = y_base ? "+y" : "+z";
+        o.why = "being level at one end alone, it is taken to stand there";
+    } else if (z > much * y || y > much * z) {
+        o.from = "length";
+        o.up = z > y ? "+z" : "+y";
+        o.why = "being much longer along one of y and z, it is taken to stand on end";
+    } else {
+        o.from = "format";
+        o.why = "OpenVDB is taken to be as in most programs";
+    }
+    return o;
+}
+
+/* Finds the orientation of a volume without one in its file. */
+static orientation guess(const trip_volume_info *info, trip_orientation u)
+{
+    if (!strcmp(info->format, "openvdb"))
+        return orient_vdb(info, u);
+    if (!strcmp(info->format, "nifti"))
+        return (orientation){ "format", "+z", "+y", "NIfTI is taken to be in its usual space",
+                              false };
+    if (u.mirror == 2)
+        return (orientation){ "symmetry", "-y", "-x",
+                              "being mirror-symmetric across z, its slices are taken for views "
+                              "from the side",
+                              false };
+    if (trip_anatomy_is_scan_from_above(&info->index_to_world))
+        return (orientation){ "voxels", "-z", "-y",
+                              "its voxels being longer along one axis, its slices are taken to run "
+                              "from the top of a head down",
+                              false };
+    if (u.footing >= 0 && u.footing != TRIP_ORIENTATION_BASE_LOW_Z)
+        return (orientation){ "base", trip_orientation_base_name(u.footing ^ 1), NULL,
+                              "being level at the other end alone, it is taken to stand there",
+                              false };
+    return (orientation){ u.footing >= 0 ? "base" : "none", "+z", NULL, NULL, false };
+}
+
+/* Matches trip_dataset_metadata_orient() in render/dataset_metadata.c. */
+static orientation orientation_of(const trip_brick_metadata *t)
+{
+    const trip_volume_info *info = t->info;
+    if (t->params->volume.axes)
+        return (orientation){ .from = "axes" };
+    if (info->space[0] || info->oriented)
+        return (orientation){ .from = info->space[0] ? "space" : "file" };
+    return guess(info, t->upright);
+}
+
+void trip_brick_metadata_note(const trip_brick_metadata *t, char note[TRIP_BRICK_NOTE_BYTES])
+{
+    const trip_volume_info *info = t->info;
+    const orientation o = orientation_of(t);
+    const size_t length = (size_t)snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s", info->note,
+                                           o.why && info->note[0] ? "; " : "");
+    if (o.why)
+        snprintf(note + length, TRIP_BRICK_NOTE_BYTES - length,
+                 "its file does not say what is up: %s, with up at %s%s%s; --up, --view and --axes "
+                 "say otherwise",
+                 o.why, o.up, o.front ? " and the front at " : "", o.front ? o.front : "");
+}
+
+static void add_orientation(cJSON *root, const trip_brick_metadata *t)
+{
+    static const char *const axes[] = { "x", "y", "z" };
+    const orientation o = orientation_of(t);
+    cJSON_AddStringToObject(root, "orientation", o.from);
+    if (t->info->space[0])
+        cJSON_AddStringToObject(root, "space", t->info->space);
+    if (t->info->oriented)
+        cJSON_AddTrueToObject(root, "oriented");
+    if (o.stored)
+        cJSON_AddStringToObject(root, "up", o.up);
+    if (t->upright.mirror >= 0)
+        cJSON_AddStringToObject(root, "mirror", axes[t->upright.mirror]);
+    if (t->upright.footing >= 0)
+        cJSON_AddStringToObject(root, "footing", trip_orientation_base_name(t->upright.footing));
 }
 
 char *trip_brick_metadata_make(const trip_brick_metadata *t)
 {
-    static const char *const axes[] = { "x", "y", "z" };
     char note[TRIP_BRICK_NOTE_BYTES];
-    trip_brick_metadata_note(t->info, t->upright, note);
+    trip_brick_metadata_note(t, note);
     cJSON *root = cJSON_CreateObject();
     if (strcmp(t->info->format, "memory") != 0)
         cJSON_AddStringToObject(root, "source", base_name(t->params->input));
@@ -247,14 +347,7 @@ char *trip_brick_metadata_make(const trip_brick_metadata *t)
         cJSON_AddStringToObject(root, "grid", t->info->name);
     if (note[0])
         cJSON_AddStringToObject(root, "note", note);
-    if (t->info->space[0])
-        cJSON_AddStringToObject(root, "space", t->info->space);
-    if (t->info->oriented)
-        cJSON_AddTrueToObject(root, "oriented");
-    if (t->upright.mirror >= 0)
-        cJSON_AddStringToObject(root, "mirror", axes[t->upright.mirror]);
-    if (t->upright.footing >= 0)
-        cJSON_AddStringToObject(root, "footing", trip_orientation_base_name(t->upright.footing));
+    add_orientation(root, t);
     cJSON_AddStringToObject(root, "type", trip_scalar_name(t->info->type));
     cJSON_AddStringToObject(root, "function_kind",
                             trip_tf_kind_name(trip_brick_kind(t->info, t->histogram)));
@@ -264,7 +357,8 @@ char *trip_brick_metadata_make(const trip_brick_metadata *t)
     add_envelope(root, t);
     add_functions(root, t);
     int status = add_default_function(root, t);
-    add_histogram(root, t->histogram);
+    add_fills(root, t->fills);
+    add_histogram(root, t->histogram, t->tally);
     char *text = status == 0 ? trip_json_print(root, false) : NULL;
     cJSON_Delete(root);
     if (status == 0 && !text)

@@ -7,6 +7,7 @@
 #include "brick_params.h"
 #include "envelope.h"
 #include "orientation.h"
+#include "scan.h"
 
 typedef struct trip_brick_metadata {
     const trip_brick_params *params;
@@ -14,6 +15,8 @@ typedef struct trip_brick_metadata {
     const trip_envelope *envelope;
     trip_tf *const *functions; /* params->function_count transfer functions, in data units */
     const trip_histogram *histogram;
+    const trip_tally *tally;
+    const trip_fills *fills;  /* given or found */
     trip_orientation upright; /* none if the file or its format gives the orientation */
 } trip_brick_metadata;
 
@@ -23,9 +26,8 @@ trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram 
 
 /* Writes the note for the user: the reader's choices, and the orientation guessed from the shape.
  * "" if there is none. */
-enum { TRIP_BRICK_NOTE_BYTES = 1024 };
-void trip_brick_metadata_note(const trip_volume_info *info, trip_orientation upright,
-                              char note[TRIP_BRICK_NOTE_BYTES]);
+enum { TRIP_BRICK_NOTE_BYTES = 1536 };
+void trip_brick_metadata_note(const trip_brick_metadata *t, char note[TRIP_BRICK_NOTE_BYTES]);
 
 /* Returns the metadata, for free(), or NULL after a reported failure. */
 char *trip_brick_metadata_make(const trip_brick_metadata *t);

@@ -16,10 +16,13 @@ typedef enum trip_brick_code_bits {
 } trip_brick_code_bits;
 
 typedef enum trip_brick_normals {
-    TRIP_NORMALS_AUTO,    /* compact if that keeps gradients below full shading exactly */
+    /* None, as drawing computes normals from values. Stored where it cannot: voxels are dropped
+     * without a halo, or coarse levels hold means without values. */
+    TRIP_NORMALS_AUTO,
     TRIP_NORMALS_COMPACT, /* 3 bytes, see normal.h */
     TRIP_NORMALS_FULL,    /* 4 bytes */
     TRIP_NORMALS_NONE,
+    TRIP_NORMALS_STORED, /* compact if that keeps gradients below full shading exactly, else full */
 } trip_brick_normals;
 
 /* The classification that coarse levels serve: post interpolates values, pre draws splats. */

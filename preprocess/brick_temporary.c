@@ -95,6 +95,9 @@ int trip_brick_temporary_begin(trip_brick_temporary *t, const trip_brick_input *
     start->identity = t->identity;
     start->scanned = in->scanned;
     start->tally = *in->tally;
+    start->fills = in->fills;
+    start->finite_before = in->finite_before;
+    start->ids = in->ids.count > 0;
     int status = trip_journal_write_start(t->journal, start);
     free(start);
     return status;

@@ -98,7 +98,7 @@ static int estimate_kept(trip_brick_input *in, const trip_memory_plan *plan, dou
     const trip_scan_params scan = { .slices = slices_of(plan),
                                     .read_ahead = plan->read_ahead,
                                     .stride = stride_of(in, plan),
-                                    .envelope = &in->envelope,
+                                    .envelope = trip_brick_envelope(in),
                                     .progress = on_progress,
                                     .user = &s,
                                     .skip_seconds = &skipping };

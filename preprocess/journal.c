@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -105,7 +106,14 @@ static int check_start(const trip_journal *j, const trip_journal_start *s)
             "--resume");
     if (s->scanned != p->scanned)
         return fail_false(j, "its kind");
-    if (!s->scanned)
+    bool sound = s->fills.count <= TRIP_FILLS_MAX && s->finite_before <= p->voxels;
+    for (uint64_t i = 0; i < s->fills.count && sound; i++)
+        sound = isfinite(s->fills.values[i]);
+    if (!sound)
+        return fail_false(j, "its list of fill values");
+    if (s->ids > 1)
+        return fail_false(j, "its kind");
+    if (!s->scanned || s->ids) /* a resumed run scans ids again */
         return 0;
     if (!trip_tally_check(&s->tally) || s->tally.finite == 0 || s->tally.voxels > p->voxels ||
         (p->slice_voxels && s->tally.voxels != p->voxels))

@@ -15,6 +15,9 @@ typedef struct trip_journal_start {
     uint64_t identity; /* hash of the input and all parameters that determine the output */
     uint64_t scanned;  /* 1 if a scan filled `tally`; 0 if `tally` is zero */
     trip_tally tally;
+    trip_fills fills; /* undeclared fill values, and the number of finite values with them */
+    uint64_t finite_before;
+    uint64_t ids; /* 1 if the values are ids (ids.h) */
 } trip_journal_start;
 
 /* A checkpoint: all pieces of the first part of the volume are on disk, in sequences or in the

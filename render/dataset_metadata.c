@@ -133,13 +133,18 @@ bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histog
     return out->total > 0;
 }
 
-int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf)
+int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf,
+                                const char *where)
 {
     trip_histogram histogram;
     bool given = trip_tf_needs_data(tf) && trip_dataset_metadata_histogram(t, &histogram);
-    const trip_tf_data data = { d->header.value_min, d->header.value_max, given ? &histogram : NULL,
-                                trip_dataset_metadata_kind(t) };
-    return trip_tf_adapt(tf, &data, t->path);
+    const trip_tf_data data = { d->header.typical_min, d->header.typical_max,
+                                given ? &histogram : NULL, trip_dataset_metadata_kind(t) };
+    if (given && trip_codes_ids(&d->codes)) {
+        histogram.ids = d->codes.table;
+        histogram.id_count = d->codes.entries;
+    }
+    return trip_tf_adapt(tf, &data, where);
 }
 
 const char *trip_dataset_metadata_source(const trip_dataset_metadata *t)
@@ -162,10 +167,10 @@ int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset 
     if (text)
         return trip_tf_parse(out, t->path, text, strlen(text));
     const trip_file_header *h = &d->header;
-    const bool range = h->value_max > h->value_min;
+    const bool range = h->typical_max > h->typical_min;
     const trip_tf_point ramp[2] = {
-        { range ? h->value_min : h->code_lo, { 0.2, 0.2, 0.2, 0.001 } },
-        { range ? h->value_max : h->code_hi, { 1, 1, 1, 0.05 } },
+        { range ? h->typical_min : h->code_lo, { 0.2, 0.2, 0.2, 0.001 } },
+        { range ? h->typical_max : h->code_hi, { 1, 1, 1, 0.05 } },
     };
     return trip_tf_from_points(out, ramp, 2, false, 0);
 }
@@ -234,6 +239,18 @@ static trip_vec3 direction_at(const trip_dataset_metadata *t, const char *key)
         return trip_v3(0, 0, 0);
     double sign = text[0] == '-' ? -1 : 1;
     return trip_v3(text[1] == 'x' ? sign : 0, text[1] == 'y' ? sign : 0, text[1] == 'z' ? sign : 0);
+}
+
+size_t trip_dataset_metadata_fills(const trip_dataset_metadata *t, double *values, size_t max)
+{
+    const cJSON *fills = cJSON_GetObjectItemCaseSensitive(t->root, "fills"), *item;
+    size_t count = 0;
+    cJSON_ArrayForEach(item, fills)
+    {
+        if (count < max && isfinite(number_of(item)))
+            values[count++] = number_of(item);
+    }
+    return count;
 }
 
 /* If the object is mirror-symmetric across z, its slices are views from the side. They usually run

@@ -3,7 +3,8 @@
  * thread at a time. The keys are:
  *
  *   "format"             "openvdb", "nrrd", ...: the format of the volume
- *   "space"              "LPS" or "RAS": the anatomical directions of world space (anatomy.h)
+ *   "space"              "RAS", in older data sets also "LPS": the anatomical directions of world
+ *                        space (anatomy.h)
  *   "oriented"           true if the file gave the directions of its axes: nothing is guessed
  *   "mirror"             "x", "y" or "z": the only axis of the grid across which the kept voxels
  *                        are mirror-symmetric; for volumes without orientation
@@ -18,8 +19,10 @@
  *   "front"              "+x" ... "-z": the world direction that the object faces
  *   "transfer_function"  the default transfer function as `.tf` text in data units
  *   "envelope"           [[lo, hi], ...]: the kept values, closed intervals
- *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: all finite values,
- *                        kept or not, in at most 65536 equal bins over [a, b] */
+ *   "histogram"          { "value_min": a, "value_max": b, "counts": [...] }: finite values in [a,
+ *                        b], kept or not, in at most 65536 equal bins
+ *   "fills"              [value, ...]: values that were taken for "no value", given to
+ *                        `brick` or found by it */
 #ifndef TRIP_DATASET_METADATA_H
 #define TRIP_DATASET_METADATA_H
 
@@ -41,8 +44,10 @@ const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, 
 /* Returns the kind of the volume, or TRIP_TF_SIMULATION if the text has none. */
 trip_tf_kind trip_dataset_metadata_kind(const trip_dataset_metadata *t);
 
-/* Converts a transfer function that is relative to the data or its histogram to data units. */
-int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf);
+/* Converts a transfer function that is relative to the data or its histogram to data units. `where`
+ * names the data in messages. */
+int trip_dataset_metadata_adapt(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf *tf,
+                                const char *where);
 
 /* Loads the stored transfer function, or else a faint grey ramp over the values. */
 int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset *d, trip_tf **out);
@@ -61,5 +66,8 @@ double trip_dataset_metadata_culled(const trip_dataset_metadata *t, const trip_t
  * the default of a view. */
 void trip_dataset_metadata_orient(const trip_dataset_metadata *t, const trip_dataset *d,
                                   trip_vec3 *up, trip_vec3 *front);
+
+/* Writes the values of "fills", at most `max`, and returns their number. */
+size_t trip_dataset_metadata_fills(const trip_dataset_metadata *t, double *values, size_t max);
 
 #endif

@@ -207,6 +207,12 @@ static inline bool trip_settings_has_one_list(const trip_settings *s)
     return s->method == TRIP_METHOD_AXIS || s->method == TRIP_METHOD_IMAGE;
 }
 
+/* Whether a frame interpolates values between voxels, so that it needs draw codes. */
+static inline bool trip_settings_interpolates(const trip_settings *s, bool integral)
+{
+    return integral ? s->field == TRIP_FIELD_VALUES : s->classify == TRIP_CLASSIFY_POST;
+}
+
 /* Whether coarse levels may be drawn. */
 static inline bool trip_settings_has_levels(const trip_settings *s)
 {

@@ -12,7 +12,7 @@
 #   --libraries  installs nothing; prints the libraries that the program and its tests link with
 set -eu
 
-libraries="libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libdcmtk-dev libepoxy-dev libegl-dev libglfw3-dev
+libraries="libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libtiff-dev libgdcm-dev libepoxy-dev libegl-dev libglfw3-dev
  libimgui-dev libmicrohttpd-dev libjpeg62-turbo-dev libpng-dev
  liburing-dev libseccomp-dev libnetcdf-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
 build="cmake ninja-build gcc g++ pkg-config libgl1-mesa-dri libegl1 libgbm1 $libraries"

@@ -226,25 +226,31 @@ static bool choose(const char *text, const char *const *names, int *out)
     return false;
 }
 
-/* Parses "head" or "AZIMUTH,ELEVATION,DISTANCE" of trip_light_control. */
+/* Parses "head", "turns", "fixed", "AZIMUTH,ELEVATION" or "AZIMUTH,ELEVATION,DISTANCE" of
+ * trip_light_control. A light without distance turns with the view. */
 static bool set_light(trip_document *d, const char *value)
 {
     char copy[64], *rest = copy;
-    double numbers[3];
+    double numbers[3] = { 0, 0, TRIP_LIGHT_FARTHEST };
+    const bool turns = !strcmp(value, "turns");
+    int count = 0;
     if (!strcmp(value, "head")) {
         trip_light_set_head(&d->settings, true);
         return true;
     }
     if (!d->opened || strlen(value) >= sizeof copy)
         return false;
-    snprintf(copy, sizeof copy, "%s", value);
-    for (int i = 0; i < 3; i++) {
-        const char *number = strsep(&rest, ",");
-        if (!number || !trip_text_to_double(number, &numbers[i]))
-            return false;
+    if (d->has_navigation && (turns || !strcmp(value, "fixed"))) {
+        trip_light_set_turns(&d->settings, &d->info, &d->navigation, turns);
+        return true;
     }
-    const trip_light_control c = { numbers[0], numbers[1], numbers[2] };
-    if (rest || !(fabs(c.round) <= 360 && fabs(c.up) <= 90 && c.distance >= TRIP_LIGHT_NEAREST))
+    snprintf(copy, sizeof copy, "%s", value);
+    for (; count < 3 && rest; count++)
+        if (!trip_text_to_double(strsep(&rest, ","), &numbers[count]))
+            return false;
+    const trip_light_control c = { count == 2, numbers[0], numbers[1], numbers[2] };
+    if (count < 2 || rest ||
+        !(fabs(c.round) <= 360 && fabs(c.up) <= 90 && c.distance >= TRIP_LIGHT_NEAREST))
         return false;
     trip_light_control_set(&d->settings, &d->info, &c);
     return true;
@@ -433,6 +439,7 @@ static void add_light(cJSON *root, const trip_document *d)
     const trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     cJSON *light = cJSON_AddObjectToObject(root, "light");
     cJSON_AddBoolToObject(light, "head", trip_light_is_head(&d->settings));
+    cJSON_AddBoolToObject(light, "turns", c.turns);
     cJSON_AddNumberToObject(light, "round", c.round);
     cJSON_AddNumberToObject(light, "up", c.up);
     cJSON_AddNumberToObject(light, "distance", c.distance);

@@ -25,9 +25,10 @@ bool trip_session_do(trip_session *s, const char *text, size_t bytes);
  * Returns false for unknown names. */
 bool trip_session_set_function(trip_session *s, const char *name);
 
-/* Sets a setting by its name on the page: classify, method, h, shading, light (head, or
- * "AZIMUTH,ELEVATION,DISTANCE" of trip_light_control), opacity, show, or an effect's name in
- * light.h. Returns false, and changes nothing, for an unknown name or an invalid value. */
+/* Sets a setting by its name on the page: classify, method, h, shading, opacity, show, or an
+ * effect's name in light.h. A light is "head", "turns", "fixed", "AZIMUTH,ELEVATION" or
+ * "AZIMUTH,ELEVATION,DISTANCE" of light.h. Returns false, and changes nothing, for an unknown name
+ * or an invalid value. */
 bool trip_session_set(trip_session *s, const char *name, const char *value);
 /* Returns the names of the built-in transfer functions as JSON, for free(), or NULL if memory is
  * exhausted. */

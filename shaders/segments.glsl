@@ -2,9 +2,13 @@
 // In: two codes and the sums of the transfer function. Out: colour and extinction.
 // Mirrors trip_segment_of() in render/classification/segments.c. All terms of a sum have the same sign, and
 // differences of the integrals between whole codes are exact. With CLOSED it mirrors
-// render/classification/closed_form.h.
+// render/classification/closed_form.h. With EXACT the codes may lie beyond the ends of the function,
+// where it is constant.
 #include "shared.h"
 
+#ifdef EXACT
+#define segment_between segment_within
+#endif
 #ifdef CLOSED
 
 layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_closed_form
@@ -14,7 +18,7 @@ layout(std430, binding = TRIP_GL_SUMS) readonly buffer trip_gl_closed_form
 
 float position_of(float code)
 {
-#ifdef WIDE
+#if defined(WIDE) || defined(EXACT)
     code = clamp(code, 0.0, 65535.0);
 #endif
     return code * form.x.x + form.x.y;
@@ -83,4 +87,27 @@ vec4 segment_between(float a, float b, float unit)
     return colour_of(sum / (to - from));
 }
 
+#endif
+
+#ifdef EXACT
+#undef segment_between
+
+vec4 weighed(vec4 colour, float weight)
+{
+    float k = colour.a * weight;
+    return k > 0.0 ? vec4(colour.rgb * k, k) : vec4(0.0);
+}
+
+vec4 segment_between(float a, float b, float unit)
+{
+    float low = min(a, b), high = max(a, b);
+    if ((low >= 0.0 && high <= 65535.0) || low == high)
+        return segment_within(a, b, unit);
+    float from = clamp(low, 0.0, 65535.0), to = clamp(high, 0.0, 65535.0), share = 1.0 / (high - low);
+    float below = max(0.0, min(high, 0.0) - low), above = max(0.0, high - max(low, 65535.0));
+    vec4 sum = weighed(segment_within(from, to, unit), (to - from) * share) +
+               weighed(segment_within(0.0, 0.0, unit), below * share) +
+               weighed(segment_within(65535.0, 65535.0, unit), above * share);
+    return vec4(sum.rgb / max(sum.a, 1e-30), sum.a);
+}
 #endif

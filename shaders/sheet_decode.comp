@@ -1,7 +1,9 @@
 // Decodes the squares of a block into a sheet. Each work group decodes one square, each invocation
 // one voxel.
-// In: squares and their codes, bytes as in the files. Out: codes of the voxels present.
-// Mirrors trip_block_voxels() in stream/block.c.
+// In: squares and their codes, bytes as in the files; with EXACT, the exact draw code of each stored
+// code. Out: draw codes of the voxels present.
+// Mirrors trip_block_voxels() in stream/block.c. With EXACT it also mirrors trip_draw_code_exact()
+// in render/classification/draw_codes.c.
 #include "shared.h"
 
 layout(local_size_x = 64) in;
@@ -9,6 +11,10 @@ layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint v
 layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_sheet_square squares[]; };
 layout(r32f, binding = TRIP_GL_IMAGE) writeonly uniform image2D sheet;
 layout(location = TRIP_GL_SHEET) uniform uvec2 form; // first square, step of codes
+
+#ifdef EXACT
+layout(std430, binding = TRIP_GL_DRAW_CODES) readonly buffer trip_gl_draw_codes { float draw_codes[]; };
+#endif
 
 #include "code.glsl"
 
@@ -28,5 +34,9 @@ void main()
     uint before = uint(bitCount(word & (bit - 1u))) + (n < 32u ? 0u : uint(bitCount(square.mask_low)));
     uint code = code_at(square.codes, square.min_width, before) * form.y;
     uvec2 position = uvec2(square.corner, square.corner >> 16) + uvec2(even_bits(n), even_bits(n >> 1));
+#ifdef EXACT
+    imageStore(sheet, ivec2(position & 0xffffu), vec4(draw_codes[code]));
+#else
     imageStore(sheet, ivec2(position & 0xffffu), vec4(code));
+#endif
 }

@@ -8,6 +8,7 @@
 #include "shade.glsl"
 #include "opacity.glsl"
 #include "weight.glsl"
+#include "no_code.glsl"
 
 layout(local_size_x = TRIP_GL_SQUARE_GROUP, local_size_y = TRIP_GL_SQUARE_GROUP) in;
 
@@ -155,7 +156,7 @@ tap tap_of(position at, trip_gl_sheet_end end, vec4 weights[3], int n)
     t.at = ivec3(voxel, layer);
     t.weight = weights[0][i.x] * weights[1][i.y] * weights[2][i.z];
     bool there = layer >= 0 && all(greaterThanEqual(voxel, ivec2(0))) && all(lessThan(voxel, extent.xy));
-    if (!there || texelFetch(codes, t.at, 0).r < 0.0)
+    if (!there || texelFetch(codes, t.at, 0).r < NO_CODE)
         t.at = ivec3(at.cell + ivec2(greaterThan(i.xy, ivec2(1))), i.z > 1 ? end.behind : end.before);
     return t;
 }
@@ -244,7 +245,7 @@ position position_at(ray r, trip_gl_sheet_end end)
         return at;
 #ifdef WIDE
     vec4 before = corners_at(at.cell, end.before), behind = corners_at(at.cell, end.behind);
-    at.there = all(greaterThanEqual(min(before, behind), vec4(0.0)));
+    at.there = all(greaterThanEqual(min(before, behind), vec4(NO_CODE)));
     if (at.there)
         at.code = wide_code(at, end, before.x);
 #else
@@ -253,7 +254,7 @@ position position_at(ray r, trip_gl_sheet_end end)
     vec4 before = corners_at(at.cell, end.part < 1.0 ? end.before : end.behind), behind = before;
     if (end.part > 0.0 && end.part < 1.0)
         behind = corners_at(at.cell, end.behind);
-    at.there = all(greaterThanEqual(min(before, behind), vec4(0.0)));
+    at.there = all(greaterThanEqual(min(before, behind), vec4(NO_CODE)));
     vec4 weights = corner_weights(at.part);
     at.code = before.x + mix(dot(weights, before - before.x), dot(weights, behind - before.x), end.part);
 #endif

@@ -3,6 +3,7 @@
 // list, u and v; with UNEVEN, codes per unit of position.
 // Mirrors difference() in render/reference/reference_sheets.c.
 #include "shared.h"
+#include "no_code.glsl"
 
 layout(local_size_x = TRIP_GL_SQUARE_GROUP, local_size_y = TRIP_GL_SQUARE_GROUP) in;
 layout(binding = TRIP_GL_SHEET_CODES) uniform sampler2DArray codes;
@@ -19,11 +20,16 @@ layout(std430, binding = TRIP_GL_POSITIONS) readonly buffer trip_gl_positions
 };
 #endif
 
-// Returns the code, or a negative number if there is no voxel.
+#ifdef EXACT
+// Gradients are stored times this number.
+layout(location = TRIP_GL_SHEET_SCALE) uniform float scale;
+#endif
+
+// Returns the code, or a number below NO_CODE if there is no voxel.
 float code_at(ivec2 position, int layer)
 {
     if (layer < 0 || any(lessThan(position, ivec2(0))) || any(greaterThanEqual(position, size.xy)))
-        return -1.0;
+        return TRIP_GL_MISSING;
     return texelFetch(codes, ivec3(position, layer), 0).r;
 }
 
@@ -42,16 +48,16 @@ vec2 voxels_apart(int first, int i, int count)
 
 float difference(float before, float here, float after, vec2 apart)
 {
-    if (before >= 0.0 && after >= 0.0)
+    if (before >= NO_CODE && after >= NO_CODE)
         return (after - before) / (apart.x + apart.y);
-    return after >= 0.0 ? (after - here) / apart.y : before >= 0.0 ? (here - before) / apart.x : 0.0;
+    return after >= NO_CODE ? (after - here) / apart.y : before >= NO_CODE ? (here - before) / apart.x : 0.0;
 }
 
 void main()
 {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, size.z), u = ivec2(1, 0), v = ivec2(0, 1);
     float here = code_at(p, layers.x);
-    if (here < 0.0)
+    if (here < NO_CODE)
         return;
 #ifndef UNEVEN
     const vec2 sheets_apart = vec2(1.0);
@@ -61,5 +67,9 @@ void main()
                   difference(code_at(p - u, layers.x), here, code_at(p + u, layers.x), u_apart),
                   difference(code_at(p - v, layers.x), here, code_at(p + v, layers.x), v_apart));
     // The range of 16-bit floats.
+#ifdef EXACT
+    g *= scale;
+    g *= min(1.0, 65504.0 / max(max(abs(g.x), abs(g.y)), max(abs(g.z), 1.0)));
+#endif
     imageStore(gradients, p, vec4(clamp(g, -65504.0, 65504.0), 0.0));
 }

@@ -154,6 +154,12 @@ static void set_coordinates(trip_dataset *d)
         voxels);
 }
 
+static void set_codes(trip_dataset *d)
+{
+    const uint64_t offset = d->header.code_table_offset;
+    d->codes = trip_codes_of(&d->header, offset ? table(d, offset) : NULL);
+}
+
 static int set_lists(trip_dataset *d)
 {
     const trip_file_list *files = table(d, d->header.lists_offset);
@@ -164,6 +170,7 @@ static int set_lists(trip_dataset *d)
                          count);
     memcpy(d->index_to_world.m, d->header.index_to_world, sizeof d->index_to_world.m);
     set_coordinates(d);
+    set_codes(d);
     for (; d->list_count < count; d->list_count++) {
         trip_list *l = &d->lists[d->list_count];
         l->index = d->list_count;

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 
 #include "budget.h"
+#include "codes.h"
 #include "coordinates.h"
 #include "format.h"
 #include "geometry.h"
@@ -43,6 +44,9 @@ typedef struct trip_dataset {
     /* For level 0. With uneven spacing it maps positions to world space. */
     trip_affine index_to_world;
     trip_coordinates coordinates;
+    trip_codes codes; /* of voxels, halo and values */
+    /* The normals of the header and the lists are on no disk (dataset_normals.h). */
+    bool computes_normals;
     trip_list *lists; /* from the budget */
     unsigned list_count;
     char *text;     /* JSON, null-terminated */

@@ -1,6 +1,7 @@
 #include "dataset_check.h"
 
 #include "block.h"
+#include "codes.h"
 #include "coordinates.h"
 #include "geometry.h"
 #include "kind.h"
@@ -85,6 +86,13 @@ static int check_grid(const trip_file_header *h, const char *where)
         return FAIL_FIELD(code_lo, "the range of codes is invalid");
     if (!isfinite(h->value_min) || !isfinite(h->value_max) || h->value_min > h->value_max)
         return FAIL_FIELD(value_min, "the range of values is invalid");
+    if (!(h->typical_min >= h->value_min && h->typical_min <= h->typical_max &&
+          h->typical_max <= h->value_max))
+        return FAIL_FIELD(typical_min, "the typical range leaves the range of values");
+    if (!h->code_table_offset && (h->code_table_entries || h->code_table_step_log2))
+        return FAIL_FIELD(code_table_entries, "entries of a table of codes that is absent");
+    if (h->code_table_offset && h->code_bytes != 2)
+        return FAIL_FIELD(code_bytes, "codes with a table must have 2 bytes");
     if (!is_length(h->gradient_full))
         return FAIL_FIELD(gradient_full, "the length of gradients is invalid");
     for (int a = 0; a < 3; a++)
@@ -444,6 +452,19 @@ static int check_coordinates(const unsigned char *index, const trip_file_header 
     return TRIP_OK;
 }
 
+/* Checks the table of codes. code_lo and code_hi must be the values of the first and last code. */
+static int check_codes(const unsigned char *index, const trip_file_header *h, const char *where)
+{
+    const double *table = (const void *)(index + h->code_table_offset);
+    const char *fault = trip_codes_fault(table, h->code_table_entries, h->code_table_step_log2);
+    if (fault)
+        return fail_at(where, h->code_table_offset, fault);
+    const trip_codes codes = trip_codes_of(h, table);
+    if (codes.lo != h->code_lo || codes.hi != h->code_hi)
+        return FAIL_FIELD(code_lo, "the range of codes differs from their table");
+    return TRIP_OK;
+}
+
 static int check_positions(const unsigned char *index, const trip_file_header *h, const char *where,
                            sections *s)
 {
@@ -454,6 +475,9 @@ static int check_positions(const unsigned char *index, const trip_file_header *h
     if (h->coordinates_offset &&
         !add_section(s, h, h->coordinates_offset, h->dims[0] + h->dims[1] + h->dims[2], 8, 8))
         return FAIL_FIELD(coordinates_offset, "the coordinates lie outside the file");
+    if (h->code_table_offset &&
+        !add_section(s, h, h->code_table_offset, h->code_table_entries, 8, 8))
+        return FAIL_FIELD(code_table_offset, "the table of codes lies outside the file");
     const trip_file_list *lists = (const void *)(index + h->lists_offset);
     int status = check_text(index, h, where);
     for (uint32_t i = 0; i < h->list_count && status == TRIP_OK; i++)
@@ -462,6 +486,8 @@ static int check_positions(const unsigned char *index, const trip_file_header *h
         status = check_set(h, lists, where);
     if (status == TRIP_OK && h->coordinates_offset)
         status = check_coordinates(index, h, lists, where);
+    if (status == TRIP_OK && h->code_table_offset)
+        status = check_codes(index, h, where);
     return status == TRIP_OK ? check_overlap(s, where) : status;
 }
 

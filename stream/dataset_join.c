@@ -23,10 +23,11 @@ static const char *find_difference(const trip_dataset *first, const trip_dataset
         memcmp(a->index_to_world, b->index_to_world, sizeof a->index_to_world) != 0 ||
         !has_same_coordinates(first, d))
         return "has a different grid";
-    if (a->code_lo != b->code_lo || a->code_hi != b->code_hi || a->code_bytes != b->code_bytes)
+    if (!trip_codes_equal(&first->codes, &d->codes) || a->code_bytes != b->code_bytes)
         return "has a different scale of values";
-    if (a->normal_bytes != b->normal_bytes || a->gradient_full != b->gradient_full ||
-        memcmp(a->gradient_step, b->gradient_step, sizeof a->gradient_step) != 0)
+    const bool stored = a->normal_bytes && b->normal_bytes;
+    if (stored && (a->normal_bytes != b->normal_bytes || a->gradient_full != b->gradient_full ||
+                   memcmp(a->gradient_step, b->gradient_step, sizeof a->gradient_step) != 0))
         return "has different normals";
     if (a->tile_log2 != b->tile_log2 || a->slab_sheets != b->slab_sheets ||
         a->page_log2 != b->page_log2)
@@ -111,9 +112,7 @@ static int check(trip_dataset *const *parts, unsigned count)
     for (unsigned p = 1; p < count; p++) {
         const char *why = find_difference(parts[0], parts[p]);
         if (why)
-            return trip_fail(TRIP_ERROR, "open", parts[p]->path,
-                             "%s than %s; data sets drawn together must be regions of one volume, "
-                             "bricked alike (triptych brick --region)",
+            return trip_fail(TRIP_ERROR, "open", parts[p]->path, "%s than %s; " TRIP_JOIN_ADVICE,
                              why, parts[0]->path);
     }
     if (count_lists(parts, count) > TRIP_LISTS_MAX)
@@ -152,6 +151,21 @@ static void add_header(trip_dataset *d, const trip_dataset *part)
     d->bytes += part->bytes;
 }
 
+/* Hides the normals of all parts, unless each part stores normals. */
+static void hide_normals(trip_dataset *d, trip_dataset *const *parts, unsigned count)
+{
+    bool all = true;
+    for (unsigned p = 0; p < count; p++)
+        all = all && parts[p]->header.normal_bytes > 0;
+    if (all)
+        return;
+    d->header.planes &= ~(1u << TRIP_PLANE_NORMALS);
+    d->header.normal_bytes = 0;
+    d->header.gradient_full = 0;
+    for (unsigned i = 0; i < d->list_count; i++)
+        d->lists[i].planes &= ~(1u << TRIP_PLANE_NORMALS);
+}
+
 int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned count,
                       trip_budget *budget)
 {
@@ -173,6 +187,7 @@ int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned c
         if (p > 0)
             add_header(d, parts[p]);
     }
+    hide_normals(d, parts, count);
     *out = d;
     return TRIP_OK;
 }

@@ -7,6 +7,12 @@
 
 #include "dataset.h"
 
+/* The advice of messages about data sets that cannot be joined. */
+#define TRIP_JOIN_ADVICE                                                                           \
+    "only regions of one volume, bricked alike, are drawn together (triptych brick --region); "    \
+    "draw "                                                                                        \
+    "other data sets in pictures of their own, with the same --eye, --look and --up"
+
 /* Joins the parts. Reports a failure, with the name of the part at fault, in these cases:
  * - grids, codes, normals or tiles differ
  * - there are more than TRIP_LISTS_MAX lists

@@ -1,4 +1,4 @@
-/* The bytes of a data set on disk, `NAME.trip/`, format version 5. FORMAT.md describes them for
+/* The bytes of a data set on disk, `NAME.trip/`, format version 6. FORMAT.md describes them for
  * people. Fixed width, little-endian, no pointers. Reserved bits are zero; other values are
  * refused.
  *
@@ -29,7 +29,7 @@
 #include <stdint.h>
 
 #define TRIP_MAGIC "TRIPTYCH"
-#define TRIP_FORMAT_VERSION 5
+#define TRIP_FORMAT_VERSION 6
 #define TRIP_HEADER_BYTES 1024
 #define TRIP_LISTS_MAX 4096
 #define TRIP_TEXT_BYTES_MAX (UINT64_C(1) << 24)
@@ -79,7 +79,13 @@ typedef struct trip_file_header {
     /* Positions of voxels along i, j and k (coordinates.h), as dims[0] + dims[1] + dims[2] doubles.
      * 0 means even spacing. */
     uint64_t coordinates_offset;
-    uint8_t reserved[TRIP_HEADER_BYTES - 328];
+    /* Values of codes (codes.h), as code_table_entries doubles. 0 means even codes. */
+    uint64_t code_table_offset;
+    uint32_t code_table_entries, code_table_step_log2;
+    /* Range of the values without the few that stand far outside. Functions made for the data
+     * cover it. It lies in value_min to value_max. */
+    double typical_min, typical_max;
+    uint8_t reserved[TRIP_HEADER_BYTES - 360];
 } trip_file_header;
 
 typedef struct trip_file_list {
@@ -129,6 +135,7 @@ static_assert(offsetof(trip_file_header, dims) == 48, "header layout");
 static_assert(offsetof(trip_file_header, voxels) == 240, "header layout");
 static_assert(offsetof(trip_file_header, text_bytes) == 312, "header layout");
 static_assert(offsetof(trip_file_header, coordinates_offset) == 320, "header layout");
+static_assert(offsetof(trip_file_header, reserved) == 360, "header layout");
 static_assert(sizeof(trip_file_list) == 320, "list size");
 static_assert(offsetof(trip_file_list, records) == 152, "list layout");
 static_assert(sizeof(trip_file_slab) == 32, "slab size");

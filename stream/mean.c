@@ -7,12 +7,15 @@ enum { COVERS = 8, DEPTHS = 8, VALUES = 1024 };
 static const double covers[COVERS] = { 1.0 / 64, 1.0 / 32, 1.0 / 16, 1.0 / 8,
                                        1.0 / 4,  1.0 / 2,  3.0 / 4,  1 };
 
-trip_mean_scale trip_mean_scale_make(double value_min, double value_max, double code_lo,
-                                     double code_hi)
+trip_mean_scale trip_mean_scale_make(double value_min, double value_max, const trip_codes *codes)
 {
-    const double per_value = code_hi > code_lo ? 65535 / (code_hi - code_lo) : 0;
-    const double lo = fmin(65535, fmax(0, (value_min - code_lo) * per_value));
-    const double hi = fmin(65535, fmax(lo, (value_max - code_lo) * per_value));
+    const double per_value = codes->hi > codes->lo ? 65535 / (codes->hi - codes->lo) : 0;
+    double lo = fmin(65535, fmax(0, (value_min - codes->lo) * per_value));
+    double hi = fmin(65535, fmax(lo, (value_max - codes->lo) * per_value));
+    if (!trip_codes_even(codes)) {
+        lo = trip_codes_code(codes, value_min);
+        hi = trip_codes_code(codes, value_max);
+    }
     return (trip_mean_scale){ lo, hi - lo };
 }
 

@@ -2,8 +2,8 @@
  * voxels of level 0, some of which were kept. For any transfer function, its opacity along an axis
  * depends on three numbers, which are stored in a 16-bit code:
  *
- *   bits 6-15  m, the mean of the kept values: m / 1023 of the way from the volume's minimum to its
- *              maximum
+ *   bits 6-15  m, the mean of the kept values: m / 1023 of the way from the code of the typical
+ *              minimum to the code of the typical maximum
  *   bits 3-5   d, the mean depth: in the columns along the list's axis that hold kept voxels, the
  *              fraction that is kept, (d + 1) / 8
  *   bits 0-2   c, the cover: the fraction of columns that hold kept voxels, 1/64, 1/32, 1/16, 1/8,
@@ -18,6 +18,8 @@
 #ifndef TRIP_MEAN_H
 #define TRIP_MEAN_H
 
+#include "codes.h"
+
 enum { TRIP_MEAN_AXIS_BITS = 6, TRIP_MEAN_SHARES = 1 << TRIP_MEAN_AXIS_BITS };
 
 /* The minimum of the volume as a 16-bit code of level 0, and the difference to the maximum. Codes
@@ -27,9 +29,7 @@ typedef struct trip_mean_scale {
     double lo, width;
 } trip_mean_scale;
 
-/* `code_lo` and `code_hi` are the values of codes 0 and 65535. */
-trip_mean_scale trip_mean_scale_make(double value_min, double value_max, double code_lo,
-                                     double code_hi);
+trip_mean_scale trip_mean_scale_make(double value_min, double value_max, const trip_codes *codes);
 
 /* Packs the nearest code. `value` is a code of level 0. Cover and depth are above 0 and at most 1.
  */

@@ -2,6 +2,8 @@
  * 1]^2. The two coordinates in the square are quantised. */
 #include "normal.h"
 
+#include "clones.h"
+
 enum { COORDINATE_MAX = 4095, PART_BITS = 10, PART_MAX = 511, LENGTH_MAX = 127 };
 enum { STEPS_MAX = 127, P_MAX = 4095, Q_MAX = 2047, COMPACT_STRONG = 1 << 23 };
 static const uint32_t STRONG = UINT32_C(1) << 31, CENTRE = UINT32_C(1) << 30;
@@ -90,6 +92,78 @@ uint32_t trip_normal_pack(const double gradient[3], double full)
     pack_octahedral(gradient, COORDINATE_MAX, c);
     double n = (sqrt(length) - 1) * 32 + 0.5;
     return STRONG | c[0] | c[1] << 12 | (n < LENGTH_MAX ? (uint32_t)n : LENGTH_MAX) << 24;
+}
+
+/* Returns the squared distance from a part to the nearest multiple of 1, plus `centre`. */
+static inline float round_part(float part, float centre, int32_t *whole)
+{
+    const float steps = part - centre;
+    *whole = (int32_t)(steps + copysignf(0.5f, steps));
+    return (steps - (float)*whole) * (steps - (float)*whole);
+}
+
+static inline float within(float x, float lo, float hi)
+{
+    x = x > lo ? x : lo;
+    return x < hi ? x : hi;
+}
+
+/* Selects without a branch, which would keep the loop out of vectors. */
+static inline uint32_t selected(bool first, uint32_t a, uint32_t b)
+{
+    const uint32_t mask = -(uint32_t)first;
+    return (a & mask) | (b & ~mask);
+}
+
+static inline uint32_t pack_whole(int32_t x, int32_t y, int32_t z)
+{
+    const uint32_t mask = (1u << PART_BITS) - 1;
+    return ((uint32_t)x & mask) | ((uint32_t)y & mask) << PART_BITS |
+           ((uint32_t)z & mask) << 2 * PART_BITS;
+}
+
+/* Packs the nearest point of the lattice with an offset. Sets its squared distance. */
+static inline uint32_t pack_weak(float x, float y, float z, float centre, float *squared)
+{
+    int32_t n[3];
+    *squared =
+        round_part(x, centre, &n[0]) + round_part(y, centre, &n[1]) + round_part(z, centre, &n[2]);
+    return pack_whole(n[0], n[1], n[2]);
+}
+
+static inline uint32_t pack_strong(float x, float y, float z, float length)
+{
+    const float sum = fabsf(x) + fabsf(y) + fabsf(z), scale = 1 / (sum > 0 ? sum : 1);
+    const float p = x * scale, q = y * scale;
+    const float a = z < 0 ? copysignf(1 - fabsf(q), p) : p;
+    const float b = z < 0 ? copysignf(1 - fabsf(p), q) : q;
+    const int32_t first = (int32_t)(within(a * 0.5f + 0.5f, 0, 1) * COORDINATE_MAX + 0.5f);
+    const int32_t second = (int32_t)(within(b * 0.5f + 0.5f, 0, 1) * COORDINATE_MAX + 0.5f);
+    const int32_t n = (int32_t)within((sqrtf(length) - 1) * 32 + 0.5f, 0, LENGTH_MAX);
+    return STRONG | (uint32_t)first | (uint32_t)second << 12 | (uint32_t)n << 24;
+}
+
+TRIP_ALSO_V3
+void trip_normals_pack_64(const float x[64], const float y[64], const float z[64],
+                          uint32_t normals[64])
+{
+    float length[64], scale[64], corner[64], centre[64];
+    uint32_t strong[64], at_centre[64];
+    for (int i = 0; i < 64; i++)
+        length[i] = sqrtf(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+    for (int i = 0; i < 64; i++)
+        strong[i] = pack_strong(x[i], y[i], z[i], length[i]);
+    for (int i = 0; i < 64; i++)
+        scale[i] = length[i] < 1 ? PART_MAX : 0; /* parts of other gradients might overflow */
+    for (int i = 0; i < 64; i++)
+        normals[i] = pack_weak(scale[i] * x[i], scale[i] * y[i], scale[i] * z[i], 0, &corner[i]);
+    for (int i = 0; i < 64; i++)
+        at_centre[i] =
+            CENTRE | pack_weak(scale[i] * x[i], scale[i] * y[i], scale[i] * z[i], 0.5f, &centre[i]);
+    for (int i = 0; i < 64; i++) {
+        const uint32_t weak = selected(corner[i] <= centre[i], normals[i], at_centre[i]);
+        normals[i] = selected(length[i] < 1, weak, strong[i]);
+    }
 }
 
 void trip_normal_unpack(uint32_t normal, double full, double gradient[3])

@@ -38,6 +38,10 @@
 uint32_t trip_normal_pack(const double gradient[3], double full);
 void trip_normal_unpack(uint32_t normal, double full, double gradient[3]);
 
+/* Packs 64 gradients, given in units of `full`, in single precision. */
+void trip_normals_pack_64(const float x[64], const float y[64], const float z[64],
+                          uint32_t normals[64]);
+
 /* Packs a direction alone, as octahedral coordinates of 16 bits each. */
 uint32_t trip_direction_pack(const double gradient[3]);
 /* Unpacks to a vector of length 1. */

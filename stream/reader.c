@@ -43,6 +43,8 @@ static void set_defaults(trip_reader *r)
     trip_reader_params *p = &r->params;
     size_t page = (size_t)1 << r->data->header.page_log2;
     p->planes |= 1u << TRIP_PLANE_VOXELS;
+    if (r->data->computes_normals)
+        p->planes &= ~(1u << TRIP_PLANE_NORMALS);
     p->slots = p->slots ? p->slots : DEFAULT_SLOTS;
     if (!p->slot_memory && p->slot_bytes <= SLOT_BYTES_MAX)
         p->slot_bytes = trip_reader_slot_bytes(r->data, p->planes, p->slot_bytes);
@@ -252,6 +254,11 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
         status = create_engine(r);
     if (status == TRIP_OK && r->params.engine == TRIP_ENGINE_NULL)
         status = load_lists(r);
+    if (status == TRIP_OK && d->computes_normals && params->planes >> TRIP_PLANE_NORMALS & 1)
+        status = trip_computed_normals_create(
+            &r->normals, d,
+            &(trip_computed_normals_params){ params->runner, params->skip, params->skip_user },
+            budget);
     if (status < 0) {
         trip_reader_destroy(r);
         return status;
@@ -262,7 +269,7 @@ int trip_reader_create(trip_reader **out, const trip_dataset *d, const trip_read
 
 unsigned trip_reader_slots(const trip_reader *r)
 {
-    return r->params.slots;
+    return r->computing ? 1 : r->params.slots;
 }
 
 bool trip_reader_in_place(const trip_reader *r)
@@ -279,6 +286,10 @@ trip_reader_stats trip_reader_get_stats(const trip_reader *r)
 {
     trip_reader_stats stats = r->stats;
     stats.runs_skipped = r->planner.runs_skipped;
+    if (r->computing) {
+        stats.runs_skipped += trip_computed_normals_skipped(r->normals);
+        stats.normals_ns = trip_computed_normals_ns(r->normals);
+    }
     stats.bytes_skipped = r->planner.bytes_skipped;
     return stats;
 }
@@ -301,6 +312,7 @@ void trip_reader_destroy(trip_reader *r)
         trip_reader_drain(r);
         r->ops->destroy(r->engine);
     }
+    trip_computed_normals_destroy(r->normals);
     release_sources(r);
     trip_cache_destroy(r->cache);
     release_memory(r);

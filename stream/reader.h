@@ -5,8 +5,7 @@
 #ifndef TRIP_READER_H
 #define TRIP_READER_H
 
-#include "block.h"
-#include "selection.h"
+#include "batch.h"
 #include "task_runner.h"
 
 #define TRIP_READER_PASSES_MAX 8
@@ -23,8 +22,10 @@ typedef enum trip_engine {
 /* Zero selects the default. */
 typedef struct trip_reader_params {
     trip_engine engine;
-    unsigned planes; /* one bit per trip_plane; voxels always */
-    unsigned slots;  /* length of the ring, at least 2; default 8 */
+    /* One bit per trip_plane; voxels always. Normals that the data set does not store are computed,
+     * in passes with trip_pass.around. */
+    unsigned planes;
+    unsigned slots; /* length of the ring, at least 2; default 8 */
     /* Size of a slot for all planes, from trip_reader_slot_bytes(). Slots hold whole runs. */
     size_t slot_bytes;
     /* Gaps up to this size are read through. At least a page; default 32 KiB. */
@@ -39,7 +40,7 @@ typedef struct trip_reader_params {
     void *const *slot_memory;
     /* Called right before the bytes of a run are requested, on the thread that calls begin and
      * next. Returning true leaves the run out, since it has no effect, such as when opaque pixels
-     * occlude it. */
+     * occlude it. Runs of selections with `ahead` also have an effect on the runs beside them. */
     bool (*skip)(void *user, const trip_selection *s, const trip_run *run);
     void *skip_user;
     /* Runs the checks of blocks. The thread that calls next calls the runner. */
@@ -51,44 +52,14 @@ typedef struct trip_reader_params {
     void *fault_user;
 } trip_reader_params;
 
-/* Runs ready to draw, in draw order. The block of run i, already checked, is at
- * planes[TRIP_PLANE_VOXELS] + runs[i].at[TRIP_PLANE_VOXELS]. Its normals are found in the same way.
- */
-typedef struct trip_batch {
-    const trip_pass *pass;
-    /* NULL for planes that are not read, and if only runs are wanted. */
-    const unsigned char *planes[TRIP_PLANES];
-    size_t plane_bytes[TRIP_PLANES]; /* including gaps */
-    uint64_t splats;                 /* records of all runs */
-    const trip_run *runs;
-    size_t run_count;
-    void *slot;
-} trip_batch;
-
-/* Returns the list of a run in a batch. */
-static inline const trip_list *trip_batch_list(const trip_batch *b, const trip_run *run)
-{
-    return b->pass->selections[run->selection].list;
-}
-
-/* Returns the block of a run. The batch must have its planes. */
-static inline trip_block trip_block_of(const trip_batch *b, const trip_run *run)
-{
-    const trip_selection *s = &b->pass->selections[run->selection];
-    const trip_block_form form = trip_block_form_of(&s->data->header, s->list->kind);
-    bool normals = b->planes[TRIP_PLANE_NORMALS] && s->list->planes >> TRIP_PLANE_NORMALS & 1;
-    return trip_block_make(
-        &form, run->count, run->words, b->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS],
-        normals ? b->planes[TRIP_PLANE_NORMALS] + run->at[TRIP_PLANE_NORMALS] : NULL);
-}
-
 typedef struct trip_reader_stats {
     uint64_t bytes_read, reads; /* from disk, for slots handed out */
     uint64_t bytes_cached;      /* from the cache instead */
     uint64_t splats;            /* handed out */
     uint64_t runs_skipped,
-        bytes_skipped; /* by the skip callback; includes gaps that are read through */
-    uint64_t wait_ns;  /* time spent waiting for the disk */
+        bytes_skipped;   /* by the skip callback; includes gaps that are read through */
+    uint64_t wait_ns;    /* time spent waiting for the disk */
+    uint64_t normals_ns; /* time spent computing normals */
 } trip_reader_stats;
 
 /* Whether the engine can read into memory that does not belong to the process, such as a driver's
@@ -125,7 +96,8 @@ int trip_reader_next(trip_reader *r, trip_batch *batch);
  * the timeout; UINT64_MAX sets none. Returns false after the timeout or an interruption. */
 bool trip_reader_await(trip_reader *r, uint64_t timeout_ns);
 void trip_reader_release(trip_reader *r, trip_batch *batch);
-/* Returns the length of the ring. */
+/* Returns the length of the ring, or 1 if normals are computed: then one batch is handed out at a
+ * time. */
 unsigned trip_reader_slots(const trip_reader *r);
 /* Whether the slots are the caller's memory. */
 bool trip_reader_in_place(const trip_reader *r);

@@ -246,7 +246,8 @@ static struct timespec time_after(uint64_t timeout_ns)
                               .tv_nsec = (long)(end % 1000000000u) };
 }
 
-bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
+/* Waits for the next slot, at most for the timeout. */
+static bool await_slot(trip_reader *r, uint64_t timeout_ns)
 {
     const uint64_t begin = trip_now_ns();
     while (!r->failed) {
@@ -287,8 +288,27 @@ void trip_reader_set_runs_only(trip_reader *r, bool runs_only)
     r->runs_only = runs_only;
 }
 
+static void release_slot(trip_batch *batch)
+{
+    trip_slot *s = batch->slot;
+    assert(s->state == TRIP_SLOT_DRAWING);
+    s->state = TRIP_SLOT_FREE;
+    batch->slot = NULL;
+}
+
+/* Releases the slot that the computation of normals uses. */
+static void release_read(trip_reader *r)
+{
+    if (r->read.slot)
+        release_slot(&r->read);
+}
+
 int trip_reader_begin(trip_reader *r, const trip_pass *pass)
 {
+    if (r->normals)
+        trip_computed_normals_begin(r->normals);
+    release_read(r);
+    r->computing = false;
     give_up_slots(r);
     for (unsigned i = 0; i < r->params.slots; i++)
         assert(r->slots[i].state != TRIP_SLOT_DRAWING);
@@ -320,6 +340,11 @@ int trip_reader_then(trip_reader *r, const trip_pass *pass)
         return trip_fail(TRIP_ERROR, "read", r->data->path,
                          "%u selections in a pass, more than the data set has lists",
                          pass->selection_count);
+    r->computing = r->normals && pass->around && !r->runs_only;
+    if (r->computing) {
+        r->drawn_passes[r->pass_count] = pass;
+        pass = pass->around;
+    }
     r->passes[r->pass_count++] = pass;
     if (r->pass == r->pass_count - 1)
         enter_pass(r);
@@ -454,12 +479,12 @@ static void fill_batch(trip_reader *r, trip_slot *s, trip_batch *batch)
         batch->planes[plane] = plane_memory(r, s, plane);
         batch->plane_bytes[plane] = batch->planes[plane] ? s->extent.plane_bytes[plane] : 0;
     }
-    r->stats.splats += s->extent.records;
 }
 
-int trip_reader_next(trip_reader *r, trip_batch *batch)
+/* Takes the next slot as a batch. Returns as trip_reader_next(). */
+static int next_slot(trip_reader *r, trip_batch *batch)
 {
-    const bool answered = trip_reader_await(r, UINT64_MAX);
+    const bool answered = await_slot(r, UINT64_MAX);
     if (r->failed)
         return r->failed;
     if (!answered)
@@ -480,11 +505,82 @@ int trip_reader_next(trip_reader *r, trip_batch *batch)
     return r->failed ? r->failed : 1;
 }
 
+/* ---- computed normals ---- */
+
+/* Returns the pass that is drawn, by the pass that is read for it. */
+static const trip_pass *drawn_pass(const trip_reader *r, const trip_pass *around)
+{
+    for (unsigned i = 0; i < r->pass_count; i++)
+        if (r->passes[i] == around)
+            return r->drawn_passes[i];
+    return NULL;
+}
+
+/* Passes the next slot, or the end, on to the computation. */
+static void read_values(trip_reader *r)
+{
+    const int status = next_slot(r, &r->read);
+    if (status > 0)
+        trip_computed_normals_add(r->normals, &r->read, drawn_pass(r, r->read.pass));
+    else if (status == 0)
+        trip_computed_normals_end(r->normals);
+}
+
+/* Reads and computes until a batch is ready, or all runs were handed out. Works on at least one
+ * slot, then until the timeout. */
+static bool await_normals(trip_reader *r, uint64_t timeout_ns)
+{
+    const uint64_t begin = trip_now_ns();
+    uint64_t passed = 0;
+    if (trip_computed_normals_is_held(r->normals))
+        return false;
+    do {
+        if (r->failed || trip_computed_normals_work(r->normals) != TRIP_NORMALS_WANT)
+            return true;
+        release_read(r);
+        if (!await_slot(r, timeout_ns - passed))
+            return false;
+        read_values(r);
+        passed = trip_now_ns() - begin;
+    } while (passed < timeout_ns);
+    return false;
+}
+
+static int next_with_normals(trip_reader *r, trip_batch *batch)
+{
+    const bool answered = await_normals(r, UINT64_MAX);
+    if (r->failed)
+        return r->failed;
+    if (!answered && trip_computed_normals_is_held(r->normals))
+        return trip_fail(TRIP_ERROR, "read", r->data->path,
+                         "normals are computed one batch at a time; release the batch first");
+    if (!answered)
+        return trip_fail(TRIP_INTERRUPTED, "read", r->data->path, "interrupted");
+    if (trip_computed_normals_work(r->normals) == TRIP_NORMALS_OVER)
+        return 0;
+    trip_computed_normals_take(r->normals, batch);
+    return 1;
+}
+
+/* ---- batches ---- */
+
+bool trip_reader_await(trip_reader *r, uint64_t timeout_ns)
+{
+    return r->computing ? await_normals(r, timeout_ns) : await_slot(r, timeout_ns);
+}
+
+int trip_reader_next(trip_reader *r, trip_batch *batch)
+{
+    const int status = r->computing ? next_with_normals(r, batch) : next_slot(r, batch);
+    if (status > 0)
+        r->stats.splats += batch->splats;
+    return status;
+}
+
 void trip_reader_release(trip_reader *r, trip_batch *batch)
 {
-    trip_slot *s = batch->slot;
-    (void)r;
-    assert(s->state == TRIP_SLOT_DRAWING);
-    s->state = TRIP_SLOT_FREE;
-    batch->slot = NULL;
+    if (r->computing)
+        trip_computed_normals_release(r->normals);
+    else
+        release_slot(batch);
 }

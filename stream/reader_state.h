@@ -5,6 +5,7 @@
 #include <pthread.h>
 
 #include "border.h"
+#include "computed_normals.h"
 #include "engine.h"
 #include "extent.h"
 #include "reader.h"
@@ -56,6 +57,11 @@ struct trip_reader {
     int failed;                /* status that ended the passes */
     bool runs_only;
     bool in_memory; /* batches lie in the cache; nothing is requested, and slots hold only runs */
+    /* Computes the normals of the data set; NULL if they are stored, or not wanted. */
+    trip_computed_normals *normals;
+    bool computing;  /* the passes of this frame take their runs from `normals` */
+    trip_batch read; /* the batch that `normals` uses; its slot is NULL if there is none */
+    const trip_pass *drawn_passes[TRIP_READER_PASSES_MAX]; /* passes[i] is around drawn_passes[i] */
     trip_reader_stats stats;
     uint64_t *list_bytes; /* stats.bytes_read by list */
     trip_slot *slots;

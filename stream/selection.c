@@ -168,8 +168,10 @@ bool trip_run_next(trip_run_iterator *it, trip_run *run)
 static void advance(trip_pass_cursor *c)
 {
     c->has_run = trip_run_next(&c->it, &c->run);
+    const trip_selection *s = c->it.selection;
+    const int64_t ahead = s->descending ? -s->ahead : s->ahead;
     if (c->has_run)
-        c->coordinate = trip_list_sheet_coordinate(c->it.selection->list, c->run.sheet);
+        c->coordinate = trip_list_sheet_coordinate(s->list, c->run.sheet - ahead);
 }
 
 trip_pass_iterator trip_pass_begin(const trip_pass *pass, trip_pass_cursor *cursors)

@@ -14,6 +14,7 @@ typedef struct trip_selection {
     const trip_list *list;
     bool descending;                 /* draw order is the exact reverse of file order */
     int64_t sheet_first, sheet_last; /* inclusive range of sheets that the pass covers */
+    int ahead;                       /* sheets that the pass is ahead of their list coordinates */
     uint64_t *bricks;                /* one bit per brick of the list */
 } trip_selection;
 
@@ -24,11 +25,14 @@ typedef struct trip_pass {
     const trip_selection *selections;
     unsigned selection_count;
     bool descending;
+    /* If normals are computed: the runs to read for them. It includes all runs of this pass and the
+     * runs beside them, one sheet ahead. NULL in all other passes. */
+    const struct trip_pass *around;
 } trip_pass;
 
 static inline trip_pass trip_pass_of(const trip_selection *s)
 {
-    return (trip_pass){ s, 1, s->descending };
+    return (trip_pass){ .selections = s, .selection_count = 1, .descending = s->descending };
 }
 
 /* The records of a brick in one sheet: [first, first + count) of the list, with tile origin (u, v).

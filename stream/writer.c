@@ -31,6 +31,10 @@ static void set_defaults(trip_writer_params *p)
 
 static int check_codes(const trip_writer_codes *c, const char *path)
 {
+    const char *fault =
+        c->table ? trip_codes_fault(c->table, c->table_entries, c->table_step_log2) : NULL;
+    if (fault)
+        return trip_fail(TRIP_ERROR, "write", path, "%s", fault);
     if (!isfinite(c->code_lo) || !isfinite(c->code_hi) || c->code_lo > c->code_hi)
         return trip_fail(TRIP_ERROR, "write", path, "invalid value range %g to %g", c->code_lo,
                          c->code_hi);
@@ -160,8 +164,13 @@ static int check_params(const trip_writer_params *p, const char *path)
 
 static void set_header_codes(trip_file_header *h, const trip_writer_codes *c)
 {
-    h->code_lo = c->code_lo;
-    h->code_hi = c->code_hi;
+    const trip_codes codes =
+        c->table ? trip_codes_from_table(c->table, c->table_entries, c->table_step_log2)
+                 : (trip_codes){ .lo = c->code_lo, .hi = c->code_hi };
+    h->code_lo = codes.lo;
+    h->code_hi = codes.hi;
+    h->code_table_entries = codes.entries;
+    h->code_table_step_log2 = codes.step_log2;
     memcpy(h->gradient_step, c->gradient_step, sizeof h->gradient_step);
     h->gradient_full = c->gradient_full;
 }
@@ -424,8 +433,12 @@ int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t t
 
 int trip_writer_set_codes(trip_writer *w, const trip_writer_codes *codes)
 {
+    const int status = check_codes(codes, w->folder.path);
+    if (status < 0)
+        return status;
+    w->params.codes = *codes;
     set_header_codes(&w->header, codes);
-    return check_codes(codes, w->folder.path);
+    return TRIP_OK;
 }
 
 static double grid_voxels(const trip_writer *w)
@@ -469,6 +482,11 @@ static int check_text(const trip_writer *w, const char *text)
     return TRIP_OK;
 }
 
+static bool has_typical_range(const trip_writer_summary *s)
+{
+    return s->typical_min != 0 || s->typical_max != 0;
+}
+
 static int check_summary(const trip_writer *w, const trip_writer_summary *s)
 {
     uint64_t kept = records_of(w, 0, TRIP_KIND_VOXELS);
@@ -479,6 +497,11 @@ static int check_summary(const trip_writer *w, const trip_writer_summary *s)
     if (!isfinite(s->value_min) || !isfinite(s->value_max) || s->value_min > s->value_max)
         return trip_fail(TRIP_ERROR, "write", w->folder.path, "invalid value range %g to %g",
                          s->value_min, s->value_max);
+    if (has_typical_range(s) &&
+        !(s->typical_min >= s->value_min && s->typical_min <= s->typical_max &&
+          s->typical_max <= s->value_max))
+        return trip_fail(TRIP_ERROR, "write", w->folder.path, "invalid typical range %g to %g",
+                         s->typical_min, s->typical_max);
     /* In a sparse volume, neighbours of kept voxels may not exist, but they are in the grid. */
     if (s->voxels < kept || (double)s->voxels > grid_voxels(w) ||
         (double)halo > grid_voxels(w) - (double)kept)
@@ -585,11 +608,25 @@ static int append_coordinates(trip_writer *w, trip_output *index)
     return status;
 }
 
+static int append_codes(trip_writer *w, trip_output *index)
+{
+    const trip_writer_codes *c = &w->params.codes;
+    if (!c->table)
+        return TRIP_OK;
+    int status = trip_output_align(index, 8);
+    w->header.code_table_offset = index->bytes;
+    return status == TRIP_OK
+               ? trip_output_append(index, c->table, c->table_entries * sizeof *c->table)
+               : status;
+}
+
 static int append_tables(trip_writer *w, trip_output *index, const char *text)
 {
     int status = append_lists(w, index);
     if (status == TRIP_OK)
         status = append_coordinates(w, index);
+    if (status == TRIP_OK)
+        status = append_codes(w, index);
     w->header.text_offset = index->bytes;
     w->header.text_bytes = strlen(text);
     if (status == TRIP_OK)
@@ -669,6 +706,9 @@ int trip_writer_finish(trip_writer *w, const trip_writer_summary *summary)
         status = check_text(w, text);
     w->header.value_min = summary->value_min;
     w->header.value_max = summary->value_max;
+    const bool typical = has_typical_range(summary);
+    w->header.typical_min = typical ? summary->typical_min : summary->value_min;
+    w->header.typical_max = typical ? summary->typical_max : summary->value_max;
     w->header.voxels = summary->voxels;
     w->header.kept = records_of(w, 0, TRIP_KIND_VOXELS);
     w->header.halo = records_of(w, 0, TRIP_KIND_HALO);

@@ -9,6 +9,7 @@
 
 #include "block.h"
 #include "budget.h"
+#include "codes.h"
 #include "coordinates.h"
 #include "format.h"
 #include "geometry.h"
@@ -28,6 +29,11 @@ typedef struct trip_writer_list {
 /* The scale of codes and of normals. The form of normals depends on normal_bytes. */
 typedef struct trip_writer_codes {
     double code_lo, code_hi;
+    /* Values of codes, as in trip_codes, which must exist until the end. NULL means even codes.
+     * With a table, code_lo and code_hi follow from it. */
+    const double *table;
+    uint32_t table_entries;
+    unsigned table_step_log2;
     double gradient_step[3], gradient_full;
 } trip_writer_codes;
 
@@ -69,6 +75,7 @@ int trip_writer_set_codes(trip_writer *w, const trip_writer_codes *codes);
 /* Values known only at the end. */
 typedef struct trip_writer_summary {
     double value_min, value_max;
+    double typical_min, typical_max; /* if both are 0: the whole range */
     uint64_t voxels;
     const char *text; /* JSON */
 } trip_writer_summary;

@@ -27,13 +27,33 @@ static bool is_point(const draw_settings *s)
     return s->light.kind == TRIPTYCH_LIGHT_POINT;
 }
 
-trip_light_control trip_light_control_of(const draw_settings *s, const triptych_info *info)
+/* Orders the components of a direction as x, y and z of the world: front, left, up. */
+static void reorder(const double toward[3], double way[3])
 {
-    double way[3];
+    way[0] = toward[2];
+    way[1] = toward[0];
+    way[2] = toward[1];
+}
+
+/* Returns the direction to the light. */
+static void way_of(const draw_settings *s, const triptych_info *info, double way[3])
+{
     for (int i = 0; i < 3; i++)
         way[i] = s->light.toward[i] - (is_point(s) ? middle(info, i) : 0);
+}
+
+trip_light_control trip_light_control_of(const draw_settings *s, const triptych_info *info)
+{
+    static const double upper_left_front[3] = { 1, 1, 1 };
+    const bool chosen = s->light.kind < TRIPTYCH_LIGHT_DIRECTION;
+    const bool turns = chosen || s->light.kind == TRIPTYCH_LIGHT_VIEW;
+    double way[3];
+    way_of(s, info, way);
+    if (turns)
+        reorder(chosen ? upper_left_front : s->light.toward, way);
     const double length = hypot(hypot(way[0], way[1]), way[2]), unit = half_diagonal(info);
     return (trip_light_control){
+        .turns = turns,
         .round = atan2(way[1], way[0]) / DEGREE,
         .up = length > 0 ? asin(way[2] / length) / DEGREE : 90,
         .distance = is_point(s) && unit > 0 ? length / unit : TRIP_LIGHT_FARTHEST,
@@ -46,17 +66,61 @@ void trip_light_control_set(draw_settings *s, const triptych_info *info,
     const double round = control->round * DEGREE, up = control->up * DEGREE;
     const double way[3] = { cos(up) * cos(round), cos(up) * sin(round), sin(up) };
     const double distance = control->distance * half_diagonal(info);
-    s->light.kind =
-        control->distance < TRIP_LIGHT_FARTHEST ? TRIPTYCH_LIGHT_POINT : TRIPTYCH_LIGHT_DIRECTION;
+    s->light.kind = control->turns                            ? TRIPTYCH_LIGHT_VIEW
+                    : control->distance < TRIP_LIGHT_FARTHEST ? TRIPTYCH_LIGHT_POINT
+                                                              : TRIPTYCH_LIGHT_DIRECTION;
+    if (control->turns) {
+        s->light.toward[0] = way[1];
+        s->light.toward[1] = way[2];
+        s->light.toward[2] = way[0];
+        return;
+    }
     for (int i = 0; i < 3; i++)
         s->light.toward[i] = is_point(s) ? middle(info, i) + distance * way[i] : way[i];
 }
 
+static bool is_zero(const double v[3])
+{
+    return !(hypot(hypot(v[0], v[1]), v[2]) > 0);
+}
+
 void trip_light_set_head(draw_settings *s, bool head)
 {
-    const double *toward = s->light.toward;
-    s->light.kind = head ? TRIPTYCH_LIGHT_HEAD : TRIPTYCH_LIGHT_DIRECTION;
-    if (!head && !(hypot(hypot(toward[0], toward[1]), toward[2]) > 0))
+    triptych_light *l = &s->light;
+    if (l->kind == TRIPTYCH_LIGHT_DIRECTION || l->kind == TRIPTYCH_LIGHT_POINT)
+        memset(l->toward, 0, sizeof l->toward); /* it is no direction of the view */
+    l->kind = head ? TRIPTYCH_LIGHT_HEAD : TRIPTYCH_LIGHT_VIEW;
+    for (int i = 0, none = is_zero(l->toward); i < 3 && !head && none; i++)
+        l->toward[i] = 1;
+}
+
+/* Returns the view's axes in the world: left, up, front. */
+static void axes_of(const trip_navigation *n, double axes[3][3])
+{
+    const trip_navigation_axes a = trip_navigation_get_axes(n);
+    for (int i = 0; i < 3; i++) {
+        axes[0][i] = -a.right[i];
+        axes[1][i] = a.up[i];
+        axes[2][i] = -a.forward[i];
+    }
+}
+
+void trip_light_set_turns(draw_settings *s, const triptych_info *info, const trip_navigation *n,
+                          bool turns)
+{
+    double axes[3][3], way[3], toward[3] = { 0 };
+    if (s->light.kind == TRIPTYCH_LIGHT_DEFAULT)
+        trip_light_set_head(s, false);
+    if (trip_light_is_head(s) || turns == (s->light.kind == TRIPTYCH_LIGHT_VIEW))
+        return;
+    axes_of(n, axes);
+    way_of(s, info, way);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            toward[i] += turns ? axes[i][k] * way[k] : axes[k][i] * way[k];
+    s->light.kind = turns ? TRIPTYCH_LIGHT_VIEW : TRIPTYCH_LIGHT_DIRECTION;
+    memcpy(s->light.toward, toward, sizeof toward);
+    if (is_zero(toward)) /* a light at the centre */
         s->light.toward[2] = 1;
 }
 
@@ -90,7 +154,7 @@ const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS] = {
 const char *trip_effect_lacks(const trip_effect_switch *effect, const draw_settings *s,
                               const char *heat)
 {
-    if (effect->bit == TRIPTYCH_EFFECT_SHADOWS && trip_light_is_head(s))
+    if (effect->bit == TRIPTYCH_EFFECT_SHADOWS && s->light.kind == TRIPTYCH_LIGHT_HEAD)
         return "the light is the headlight";
     return effect->bit == TRIPTYCH_EFFECT_EMISSION && !heat ? "no heat data set (--emission)"
                                                             : NULL;
@@ -100,6 +164,8 @@ bool trip_effect_turn(const trip_effect_switch *effect, bool on, draw_settings *
 {
     if (on && trip_effect_lacks(effect, s, heat))
         return false;
+    if (on && effect->bit == TRIPTYCH_EFFECT_SHADOWS && trip_light_is_head(s))
+        trip_light_set_head(s, false);
     s->effects.which = on ? s->effects.which | effect->bit : s->effects.which & ~effect->bit;
     return true;
 }

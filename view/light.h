@@ -7,6 +7,7 @@
 #include <stddef.h>
 
 #include "draw_settings.h"
+#include "navigation.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -17,9 +18,13 @@ extern "C" {
 #define TRIP_LIGHT_NEAREST 0.02
 #define TRIP_LIGHT_FARTHEST 10.0
 
-/* Position of the light, relative to the centre of the data. */
+/* Place of the light in degrees and half diagonals. A light that turns with the view is far away.
+ * Its azimuth counts from the front to the left, its elevation to the top of the picture. Other
+ * lights lie around the centre of the data. Their azimuth counts from the x axis towards y, their
+ * elevation towards z. */
 typedef struct trip_light_control {
-    double round, up; /* azimuth from the x axis towards y, elevation towards z; degrees */
+    bool turns; /* with the view */
+    double round, up;
     double distance;
 } trip_light_control;
 
@@ -28,11 +33,18 @@ trip_light_control trip_light_control_of(const draw_settings *s, const triptych_
 void trip_light_control_set(draw_settings *s, const triptych_info *info,
                             const trip_light_control *control);
 
-/* Puts the light at the eye, or takes it from there to its last direction or position. */
+/* Puts the light at the eye, or takes it from there to its last direction that turned with the
+ * view. The first one is the upper left front. */
 void trip_light_set_head(draw_settings *s, bool head);
+/* Lets the light turn with the view, or fixes it in the world. The picture of the view `n` stays
+ * the same, except for a light that leaves its position. */
+void trip_light_set_turns(draw_settings *s, const triptych_info *info, const trip_navigation *n,
+                          bool turns);
+/* Returns whether the light is at the eye. The default is another light with shadows. */
 static inline bool trip_light_is_head(const draw_settings *s)
 {
-    return s->light.kind < TRIPTYCH_LIGHT_DIRECTION;
+    return s->light.kind == TRIPTYCH_LIGHT_HEAD || (s->light.kind == TRIPTYCH_LIGHT_DEFAULT &&
+                                                    !(s->effects.which & TRIPTYCH_EFFECT_SHADOWS));
 }
 /* Writes the names of the active effects into `text`, cut to `bytes`; "" without effects. */
 void trip_effects_say(const draw_settings *s, const char *heat, char *text, size_t bytes);
@@ -62,7 +74,8 @@ extern const trip_effect_number trip_effect_numbers[TRIP_EFFECT_NUMBERS];
  * set or NULL. */
 const char *trip_effect_lacks(const trip_effect_switch *effect, const draw_settings *s,
                               const char *heat);
-/* Switches an effect. Returns false, and changes nothing, if it cannot run. */
+/* Switches an effect. Returns false, and changes nothing, if it cannot run. Shadows take the
+ * default light from the eye to the upper left front of the view. */
 bool trip_effect_turn(const trip_effect_switch *effect, bool on, draw_settings *s,
                       const char *heat);
 /* Returns whether the number's control belongs below this effect's switch. Each number belongs to

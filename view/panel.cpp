@@ -332,8 +332,8 @@ void draw_editor(trip_panel *p, trip_document *d)
     Canvas c;
     c.lo = ImGui::GetCursorScreenPos();
     c.hi = ImVec2(c.lo.x + ImGui::GetContentRegionAvail().x, c.lo.y + height);
-    c.value_lo = d->info.value_min;
-    c.value_hi = d->info.value_max > d->info.value_min ? d->info.value_max : d->info.value_min + 1;
+    c.value_lo = d->info.typical_min;
+    c.value_hi = d->info.typical_max > c.value_lo ? d->info.typical_max : c.value_lo + 1;
     ImGui::InvisibleButton("Function editor", ImVec2(c.hi.x - c.lo.x, height),
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
     mark(p, "Function editor", false);
@@ -453,15 +453,20 @@ void draw_function(trip_panel *p, trip_viewer *v, trip_document *d)
 
 bool draw_light_position(trip_panel *p, trip_document *d)
 {
+    bool turns = trip_light_control_of(&d->settings, &d->info).turns;
+    const bool switched = check(p, "Light turns with the view", &turns);
+    if (switched)
+        trip_light_set_turns(&d->settings, &d->info, &d->navigation, turns);
     trip_light_control c = trip_light_control_of(&d->settings, &d->info);
     const bool far = c.distance >= TRIP_LIGHT_FARTHEST;
     bool changed = slide(p, "Light azimuth", &c.round, -180, 180, "%.0f°");
     changed |= slide(p, "Light elevation", &c.up, -89, 89, "%.0f°");
-    changed |= slide(p, "Light distance", &c.distance, TRIP_LIGHT_NEAREST, TRIP_LIGHT_FARTHEST,
-                     far ? "far away" : "%.2f", ImGuiSliderFlags_Logarithmic);
+    if (!turns)
+        changed |= slide(p, "Light distance", &c.distance, TRIP_LIGHT_NEAREST, TRIP_LIGHT_FARTHEST,
+                         far ? "far away" : "%.2f", ImGuiSliderFlags_Logarithmic);
     if (changed)
         trip_light_control_set(&d->settings, &d->info, &c);
-    return changed;
+    return changed || switched;
 }
 
 bool draw_effect_numbers(trip_panel *p, draw_settings *s, const trip_effect_switch &below)
@@ -506,10 +511,7 @@ bool draw_light(trip_panel *p, trip_document *d)
 {
     draw_settings *s = &d->settings;
     bool changed = false, shading = !s->light.no_shading, head = trip_light_is_head(s);
-    if (d->info.normal_bytes || s->all.classify != TRIPTYCH_CLASSIFY_PRE)
-        changed |= check(p, "Shading", &shading);
-    else
-        ImGui::TextDisabled("The data set has no normals: splats cannot be shaded.");
+    changed |= check(p, "Shading", &shading);
     s->light.no_shading = !shading;
     if (check(p, "Light from the eye", &head)) { // also lights effects
         trip_light_set_head(s, head);

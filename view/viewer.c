@@ -206,7 +206,7 @@ draw_settings trip_viewer_settings(const trip_document *d)
     draw_settings s = d->settings;
     if (!d->clips)
         s.clip = (triptych_clip){ 0 };
-    if (trip_light_is_head(&s)) /* its shadows are invisible */
+    if (s.light.kind == TRIPTYCH_LIGHT_HEAD) /* its shadows are invisible */
         s.effects.which &= ~TRIPTYCH_EFFECT_SHADOWS;
     if (!trip_viewer_heat(d)) {
         s.effects.which &= ~TRIPTYCH_EFFECT_EMISSION;

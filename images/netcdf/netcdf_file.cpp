@@ -110,11 +110,11 @@ struct trip_netcdf_file::variable {
 };
 
 trip_netcdf_file::trip_netcdf_file(const std::string &path, const std::string &name,
-                                   uint64_t memory_bytes)
+                                   const trip_netcdf_entry &entry, uint64_t memory_bytes)
 {
     check(nc_open(path.c_str(), NC_NOWRITE, &file_));
     try {
-        open_variable(name, memory_bytes);
+        open_variable(name, entry, memory_bytes);
     } catch (...) {
         nc_close(file_);
         throw;
@@ -233,7 +233,8 @@ void trip_netcdf_file::keep_chunks(uint64_t memory_bytes)
     about.helper_bytes += (uint64_t)(all + one) + positions * sizeof(void *);
 }
 
-void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_bytes)
+void trip_netcdf_file::open_variable(const std::string &name, const trip_netcdf_entry &entry,
+                                     uint64_t memory_bytes)
 {
     variable found;
     find(file_, "", name, found);
@@ -260,7 +261,17 @@ void trip_netcdf_file::open_variable(const std::string &name, uint64_t memory_by
         position(a, dimensions[(size_t)(count_ - 1 - a)]);
     std::strncpy(about.name, found.name.c_str(), sizeof about.name - 1);
     about.others = found.volumes > 1;
-    about.deeper = count_ > 3;
+    about.deeper = count_ > 5;
+    first_.assign((size_t)count_, 0);
+    about.times = about.channels = 1;
+    if (count_ > 3) {
+        about.times = (int64_t)length_of(group_, dimensions[0]);
+        first_[0] = (size_t)entry.time;
+    }
+    if (count_ > 4) {
+        about.channels = (int64_t)length_of(group_, dimensions[1]);
+        first_[1] = (size_t)entry.channel;
+    }
     keep_chunks(memory_bytes);
 }
 
@@ -272,7 +283,7 @@ size_t trip_netcdf_file::slice_bytes() const
 
 void trip_netcdf_file::read(int64_t k, void *values)
 {
-    std::vector<size_t> start((size_t)count_, 0), count((size_t)count_, 1);
+    std::vector<size_t> start = first_, count((size_t)count_, 1);
     const size_t in_slice = (size_t)about.dims[0] * (size_t)about.dims[1];
     start[(size_t)count_ - 3] = (size_t)k;
     count[(size_t)count_ - 2] = (size_t)about.dims[1];

@@ -1,6 +1,6 @@
 /* Reads a variable of a netCDF-4 file with libnetcdf. It must have at least three dimensions; the
- * last three are k, j and i. It reads the first index of any other dimension. Throws
- * trip_netcdf_error. One thread. */
+ * last three are k, j and i. The first of the other dimensions is time, the second has channels,
+ * and all others are read at their first index. Throws trip_netcdf_error. One thread. */
 #ifndef TRIP_NETCDF_FILE_H
 #define TRIP_NETCDF_FILE_H
 
@@ -17,12 +17,18 @@ class trip_netcdf_error : public std::runtime_error
     using std::runtime_error::runtime_error;
 };
 
+/* The index in the first and in the second dimension before the last three. */
+struct trip_netcdf_entry {
+    int64_t time, channel;
+};
+
 class trip_netcdf_file
 {
   public:
     /* Opens the variable `name` ("GROUP/NAME" in a group). An empty name selects the variable with
      * the most values. Caches use part of `memory_bytes`. */
-    trip_netcdf_file(const std::string &path, const std::string &name, uint64_t memory_bytes);
+    trip_netcdf_file(const std::string &path, const std::string &name,
+                     const trip_netcdf_entry &entry, uint64_t memory_bytes);
     ~trip_netcdf_file();
     trip_netcdf_file(const trip_netcdf_file &) = delete;
     trip_netcdf_file &operator=(const trip_netcdf_file &) = delete;
@@ -37,13 +43,15 @@ class trip_netcdf_file
 
   private:
     struct variable;
-    void open_variable(const std::string &name, uint64_t memory_bytes);
+    void open_variable(const std::string &name, const trip_netcdf_entry &entry,
+                       uint64_t memory_bytes);
     void find(int group, const std::string &prefix, const std::string &name, variable &found);
     void set_type(int type);
     void position(int axis, int dimension);
     void keep_chunks(uint64_t memory_bytes);
 
     int file_ = -1;
+    std::vector<size_t> first_; /* index in each dimension */
     int group_ = -1, variable_ = -1, count_ = 0;
     int stored_ = 0; /* trip_scalar */
     bool decoded_ = false;

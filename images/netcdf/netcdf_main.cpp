@@ -38,7 +38,9 @@ class Session
         trip_connection_receive(&name[0], name.size());
         trip_sandbox_limit_memory((uint64_t)request.numbers[0]);
         file_.reset();
-        file_ = std::make_unique<trip_netcdf_file>(path, name, (uint64_t)request.numbers[0]);
+        file_ = std::make_unique<trip_netcdf_file>(
+            path, name, trip_netcdf_entry{ request.numbers[2], request.numbers[3] },
+            (uint64_t)request.numbers[0]);
         const size_t placed = file_->coordinates.size() * sizeof(double);
         slice_.resize(file_->slice_bytes());
         trip_connection_reply(TRIP_IMAGE_DONE, 0, "", "", sizeof file_->about + placed);

@@ -40,9 +40,33 @@ static inline uint16_t trip_coarse_turned(uint16_t code, bool round)
     return round ? (uint16_t)(UINT16_MAX - code) : code;
 }
 
+/* A sum for codes with a table. It has no mean of codes. */
+typedef union trip_coarse_uneven {
+    double values; /* knots: sum of values times shares */
+    struct {       /* ids: the candidate for the majority */
+        uint32_t votes, id;
+    };
+} trip_coarse_uneven;
+
+/* Adds a share of an id. The candidate left at the end has the majority, if any id has. */
+static inline void trip_coarse_vote(trip_coarse_uneven *s, uint32_t share, uint16_t id)
+{
+    if (s->id == id) {
+        s->votes += share;
+    } else if (share > s->votes) {
+        s->votes = share - s->votes;
+        s->id = id;
+    } else {
+        s->votes -= share;
+    }
+}
+
 /* Sums over the voxels of one coarse voxel. Zero-initialise it. */
 typedef struct trip_coarse_value_sum {
-    uint64_t value;
+    union {
+        uint64_t value; /* sum of codes times known shares */
+        trip_coarse_uneven uneven;
+    };
     uint32_t known;
     uint16_t below; /* UINT16_MAX minus `around` of dropped voxels; 0 if there are none */
     bool kept;
@@ -54,15 +78,22 @@ static inline void trip_coarse_value_add_around(trip_coarse_value_sum *s, uint16
     s->below = below > s->below ? below : s->below;
 }
 
+/* Adds a voxel of the level below, apart from its value. */
+static inline void trip_coarse_value_add_share(trip_coarse_value_sum *s,
+                                               const trip_coarse_value *value, bool round)
+{
+    const bool kept = value->around != TRIP_COARSE_NONE_KEPT;
+    s->known += value->known;
+    s->kept |= kept;
+    trip_coarse_value_add_around(s, kept ? value->around : trip_coarse_turned(value->value, round));
+}
+
 /* Adds a voxel of the level below. */
 static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value,
                                          bool round)
 {
-    const bool kept = value->around != TRIP_COARSE_NONE_KEPT;
-    s->known += value->known;
     s->value += (uint64_t)value->known * value->value;
-    s->kept |= kept;
-    trip_coarse_value_add_around(s, kept ? value->around : trip_coarse_turned(value->value, round));
+    trip_coarse_value_add_share(s, value, round);
 }
 
 /* Adds several level 0 voxels at once by the sum of their codes. */
@@ -74,11 +105,13 @@ static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_
     s->kept |= kept;
 }
 
-/* Computes all members but `u` and `v`. The sum must not be empty. */
+/* Computes all members but `u` and `v`. The sum must not be empty. With a table of
+ * codes, the caller sets `value` instead. */
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out);
 
 /* Sums for the means of one coarse voxel. Call trip_coarse_mean_clear() before adding voxels. */
 typedef struct trip_coarse_mean_sum {
+    trip_coarse_uneven uneven;
     float kept, mean;
     float gradient[3], steep; /* sum of gradients times their lengths; sum of the lengths */
     uint8_t open[3][4];       /* by axis and column: share without kept voxels, in 1 / 255 */
@@ -95,7 +128,7 @@ void trip_coarse_mean_add(trip_coarse_mean_sum *s, const trip_coarse_mean *mean,
 void trip_coarse_mean_add_whole(trip_coarse_mean_sum *s, uint16_t code, unsigned odd,
                                 const double gradient[3]);
 
-/* Computes the mean, without the normal. */
+/* Computes the mean, without the normal. With a table of codes, the caller sets `mean` instead. */
 void trip_coarse_mean_get(const trip_coarse_mean_sum *s, trip_coarse_mean *out);
 
 /* Returns the mean gradient of the kept voxels, weighted by length. */

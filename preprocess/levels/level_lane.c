@@ -60,6 +60,28 @@ static uint32_t normal_of(const trip_level_work *w, const double gradient[3])
     return trip_compact_normal_pack(w->compact, index);
 }
 
+static bool has_table(const trip_level_work *w)
+{
+    return w->value_of || w->quantiser.ids;
+}
+
+/* Adds a share of a code that has a place in a table. */
+static void add_uneven(const trip_level_work *w, trip_coarse_uneven *to, uint32_t share,
+                       uint16_t code)
+{
+    if (w->quantiser.ids)
+        trip_coarse_vote(to, share, code);
+    else
+        to->values += (double)share * w->value_of[code];
+}
+
+/* Returns the code of a sum of shares. */
+static uint16_t code_of_sum(const trip_level_work *w, const trip_coarse_uneven *sum, double shares)
+{
+    return w->quantiser.ids ? (uint16_t)sum->id
+                            : (uint16_t)trip_knots_code(w->quantiser.knots, sum->values / shares);
+}
+
 /* Clears the sums of a voxel before its first contribution. */
 static void touch(trip_level_lane *l, size_t at)
 {
@@ -135,8 +157,13 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
         const uint32_t count = counts >> bit & 15;
         const size_t at = first + ((size_t)cells[n][1] << w->edge_log2) + cells[n][0];
         touch(l, at);
-        trip_coarse_value_add_whole(&l->value_sums[at], count, sums[before + count] - sums[before],
-                                    square->kept);
+        if (has_table(w))
+            trip_coarse_value_add_whole(&l->value_sums[at], count, 0, square->kept);
+        else
+            trip_coarse_value_add_whole(&l->value_sums[at], count,
+                                        sums[before + count] - sums[before], square->kept);
+        for (uint32_t i = before; i < before + count && has_table(w); i++)
+            add_uneven(w, &l->value_sums[at].uneven, TRIP_COARSE_ALL, codes[i]);
         if (!square->kept)
             trip_coarse_value_add_around(&l->value_sums[at], around[n]);
         before += count;
@@ -157,6 +184,9 @@ static void add_means(trip_level_lane *l, const trip_level_work *w, const trip_l
             gradient_of(w, normals[i], gradient);
         trip_coarse_mean_add_whole(&l->mean_sums[p.at], (uint16_t)trip_voxel_code(voxels[i]), p.odd,
                                    run->normals ? gradient : NULL);
+        if (has_table(w))
+            add_uneven(w, &l->mean_sums[p.at].uneven, TRIP_COARSE_ALL,
+                       (uint16_t)trip_voxel_code(voxels[i]));
     }
 }
 
@@ -207,13 +237,21 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         const trip_coarse_value *value = &l->values_below[i];
         const position p = position_of(w, square, value->u, value->v);
         touch(l, p.at);
-        trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
+        if (has_table(w)) {
+            trip_coarse_value_add_share(&l->value_sums[p.at], value, w->hidden_above);
+            add_uneven(w, &l->value_sums[p.at].uneven, value->known, value->value);
+        } else {
+            trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
+        }
         if (!l->means_below || !l->means_below[i].kept)
             continue;
         if (w->format.normals)
             gradient_of(w, l->means_below[i].normal, gradient);
         trip_coarse_mean_add(&l->mean_sums[p.at], &l->means_below[i], p.odd,
                              w->format.normals ? gradient : NULL);
+        if (has_table(w))
+            add_uneven(w, &l->mean_sums[p.at].uneven, l->means_below[i].kept,
+                       l->means_below[i].mean);
     }
     return status;
 }
@@ -228,7 +266,10 @@ static void take_mean(const trip_level_lane *l, const trip_level_work *w, size_t
                       trip_coarse_mean *mean)
 {
     double gradient[3];
-    trip_coarse_mean_get(&l->mean_sums[at], mean);
+    const trip_coarse_mean_sum *sum = &l->mean_sums[at];
+    trip_coarse_mean_get(sum, mean);
+    if (has_table(w) && mean->kept)
+        mean->mean = code_of_sum(w, &sum->uneven, (double)sum->kept);
     trip_coarse_mean_gradient(&l->mean_sums[at], gradient);
     if (mean->kept && w->format.normals)
         mean->normal = normal_of(w, gradient);
@@ -244,6 +285,9 @@ TRIP_ALSO_V3 uint32_t trip_level_lane_take(trip_level_lane *l, const trip_level_
             l->values[n].u = (uint8_t)(at & (edge - 1));
             l->values[n].v = (uint8_t)(at >> w->edge_log2);
             trip_coarse_value_get(&l->value_sums[at], &l->values[n]);
+            if (has_table(w))
+                l->values[n].value =
+                    code_of_sum(w, &l->value_sums[at].uneven, l->value_sums[at].known);
             if (l->means)
                 take_mean(l, w, at, &l->means[n]);
             n++;

@@ -16,6 +16,7 @@ typedef struct trip_level_work {
     bool means, values;       /* the kinds of lists */
     bool hidden_above;        /* as in trip_levels_params */
     trip_quantiser quantiser;
+    const double *value_of;              /* value of each code; NULL if codes are even or ids */
     const trip_compact_normals *compact; /* NULL means 4 bytes */
     trip_affine index_to_world;
     trip_mean_scale scale;

@@ -464,6 +464,8 @@ static int open_sharpen(making *m)
     int status = own ? create_file(m, &m->with_halo, 27 * records_below(m), false) : 0;
     trip_sharpen_open(&m->sharpen, own ? &m->with_halo : m->file, m->params->kinds.means && !own,
                       m->params->hidden_above, m->work.edge_log2, m->budget);
+    m->sharpen.value_of = m->work.value_of;
+    m->sharpen.quantiser = &m->work.quantiser;
     return status;
 }
 
@@ -499,7 +501,8 @@ static int make(making *m, const trip_output *below, trip_output *file)
     return status == 0 ? make_level(m) : status;
 }
 
-static void begin(making *m, const trip_levels_params *params, unsigned level, trip_budget *budget)
+static void begin(making *m, const trip_levels_params *params, unsigned level,
+                  const double *value_of, trip_budget *budget)
 {
     *m =
         (making){ .params = params,
@@ -518,8 +521,8 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     w->quantiser = params->quantiser;
     w->compact = params->compact;
     w->index_to_world = params->index_to_world;
-    w->scale = trip_mean_scale_make(params->value_min, params->value_max, params->quantiser.lo,
-                                    params->quantiser.hi);
+    w->scale = trip_mean_scale_make(params->typical_min, params->typical_max, &params->codes);
+    w->value_of = value_of;
     w->edge_log2 = (unsigned)__builtin_ctzll((unsigned long long)trip_splat_box_edge(&w->format));
     w->lists = level == 1;
     trip_splat_box_tables_fill(&w->tables, &w->format);
@@ -528,16 +531,29 @@ static void begin(making *m, const trip_levels_params *params, unsigned level, t
     pthread_cond_init(&m->turned, NULL);
 }
 
+/* Makes a table with the value of each code, for codes that follow the values. */
+static int make_values_of_codes(const trip_levels_params *params, double **out, trip_budget *budget)
+{
+    double *value_of = *out = NULL;
+    if (!params->quantiser.knots)
+        return 0;
+    value_of = *out = trip_budget_take(budget, TRIP_CODES * sizeof *value_of);
+    for (int code = 0; code < TRIP_CODES && value_of; code++)
+        value_of[code] = trip_codes_value(&params->codes, code);
+    return value_of ? 0 : trip_level_fail_memory();
+}
+
 int trip_levels_make(const trip_levels_params *params, trip_budget *budget)
 {
     trip_output files[2] = { { .fd = -1 }, { .fd = -1 } };
     making *m = trip_budget_take(budget, sizeof *m);
     uint64_t sheets = 0, before = 0;
-    int status = m ? 0 : trip_level_fail_memory();
+    double *value_of = NULL;
+    int status = m ? make_values_of_codes(params, &value_of, budget) : trip_level_fail_memory();
     for (unsigned level = 1; level <= params->levels; level++)
         sheets += (uint64_t)((params->dims[2] - 1) >> level) + 1;
     for (unsigned level = 1; level <= params->levels && status == 0; level++) {
-        begin(m, params, level, budget);
+        begin(m, params, level, value_of, budget);
         m->sheets_before = before;
         m->sheets = sheets;
         status = make(m, &files[(level - 1) % 2], &files[level % 2]);
@@ -547,6 +563,8 @@ int trip_levels_make(const trip_levels_params *params, trip_budget *budget)
     }
     trip_output_close(&files[0]);
     trip_output_close(&files[1]);
+    if (value_of)
+        trip_budget_release(budget, value_of, TRIP_CODES * sizeof *value_of);
     if (m)
         trip_budget_release(budget, m, sizeof *m);
     return status;

@@ -7,6 +7,7 @@
 #define TRIP_LEVELS_H
 
 #include "brick_params.h"
+#include "codes.h"
 #include "list_builder.h"
 #include "normal.h"
 
@@ -27,11 +28,12 @@ typedef struct trip_levels_params {
     int64_t dims[3];                     /* voxels of level 0 along each axis */
     trip_affine index_to_world;
     unsigned levels;
-    double value_min, value_max; /* range of the volume's values */
-    bool hidden_above;           /* dropped values lie mostly above the kept ones */
-    const char *folder;          /* folder for temporary files */
-    trip_writer *writer;         /* has the lists of trip_levels_lists() */
-    trip_spill *spill;           /* its sequences are retired, because they are no longer needed */
+    double typical_min, typical_max; /* typical range of the volume's values */
+    trip_codes codes;                /* the same codes as the quantiser's */
+    bool hidden_above;               /* dropped values lie mostly above the kept ones */
+    const char *folder;              /* folder for temporary files */
+    trip_writer *writer;             /* has the lists of trip_levels_lists() */
+    trip_spill *spill; /* its sequences are retired, because they are no longer needed */
     trip_workers *workers;
     /* Called from time to time with the number of finished sheets. May be NULL. */
     void (*progress)(void *user, uint64_t done, uint64_t total);

@@ -26,6 +26,7 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
     l->values = trip_level_carve(memory, &at, plane * sizeof *l->values);
     l->beside = trip_level_carve(memory, &at, plane * sizeof *l->beside);
     l->sums = trip_level_carve(memory, &at, plane * sizeof *l->sums);
+    l->value_sums = trip_level_carve(memory, &at, plane * sizeof *l->value_sums);
     l->squares = trip_level_carve(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
         uint16_t *known = trip_level_carve(memory, &at, plane * sizeof *known);
@@ -85,6 +86,16 @@ static void add_differences(int32_t *restrict sums, const uint16_t *here, const 
         sums[i] += (here[i] & known[i]) - (others[i] & known[i]);
 }
 
+/* Adds differences of values, for knots. */
+static void add_value_differences(double *restrict sums, const double *value_of,
+                                  const uint16_t *here, const uint16_t *others,
+                                  const uint16_t *here_known, const uint16_t *known, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (known[i] && here_known[i])
+            sums[i] += value_of[here[i]] - value_of[others[i]];
+}
+
 /* Adds differences for a part of the current square: `count` rows from `row` on and `width` columns
  * from `column` on. The neighbours are `shift` entries further in the other square. */
 static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
@@ -94,8 +105,13 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
     const trip_sharpen_square *here = &l->squares[0];
     for (size_t v = row; v < row + count; v++) {
         const size_t at = (v << s->edge_log2) + column;
-        add_differences(l->sums + at, here->values + at, other->values + at + shift,
-                        other->known + at + shift, width);
+        if (s->value_of)
+            add_value_differences(l->value_sums + at, s->value_of, here->values + at,
+                                  other->values + at + shift, here->known + at,
+                                  other->known + at + shift, width);
+        else
+            add_differences(l->sums + at, here->values + at, other->values + at + shift,
+                            other->known + at + shift, width);
     }
 }
 
@@ -144,8 +160,19 @@ static uint16_t sharpened(uint16_t value, int32_t sum)
 
 /* Returns the sharpened value of a voxel. A voxel that covers no known value is invisible, and only
  * moves away from visible values. */
-static uint16_t sharpened_value(const trip_sharpen *s, const trip_coarse_value *voxel, int32_t sum)
+static uint16_t sharpened_value(const trip_sharpen *s, const trip_sharpen_lane *l,
+                                const trip_coarse_value *voxel)
 {
+    const size_t at = ((size_t)voxel->v << s->edge_log2) + voxel->u;
+    if (s->value_of) {
+        const double by = l->value_sums[at];
+        const bool nearer = s->round ? by < 0 : by > 0;
+        return voxel->known == 0 && nearer
+                   ? voxel->value
+                   : (uint16_t)trip_quantise(s->quantiser,
+                                             s->value_of[voxel->value] + by / TRIP_SHARPEN_PART);
+    }
+    const int32_t sum = l->sums[at];
     const bool towards = s->round ? sum < 0 : sum > 0;
     return voxel->known == 0 && towards ? voxel->value : sharpened(voxel->value, sum);
 }
@@ -155,14 +182,14 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
 {
     const trip_level_position *position = &of->square;
     int status = read_square(s, position, l->values, &l->squares[0]);
+    if (s->quantiser && s->quantiser->ids)
+        return status;
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
+    memset(l->value_sums, 0, sizeof *l->value_sums << 2 * s->edge_log2);
     if (status == 0)
         status = add_around(s, l, of->beside);
-    for (uint32_t i = 0; i < position->count && status == 0; i++) {
-        trip_coarse_value *voxel = &l->values[i];
-        const int32_t sum = l->sums[((size_t)voxel->v << s->edge_log2) + voxel->u];
-        voxel->value = sharpened_value(s, voxel, sum);
-    }
+    for (uint32_t i = 0; i < position->count && status == 0; i++)
+        l->values[i].value = sharpened_value(s, l, &l->values[i]);
     return status;
 }
 

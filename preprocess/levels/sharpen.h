@@ -1,6 +1,7 @@
-/* Computes the values of a coarse level that its lists store. Linear interpolation of means is
- * smoother than the original values. Over the cube of a voxel the difference is an eighth of the
- * second differences along each axis. Each value is therefore moved the other way:
+/* Computes the values of a coarse level that its lists store. Ids stay as they are. Otherwise,
+ * linear interpolation of means is smoother than the original values. Over the cube of a voxel the
+ * difference is an eighth of the second differences along each axis. Each value is therefore moved
+ * the other way:
  *
  *   value + the sum over the six neighbours of (value - neighbour) / TRIP_SHARPEN_PART
  *
@@ -44,7 +45,10 @@ typedef struct trip_sharpen_column {
 /* Working memory of one thread. */
 typedef struct trip_sharpen_lane {
     trip_coarse_value *values, *beside;
-    int32_t *sums; /* for each voxel of a square, the sum of its differences to its neighbours */
+    /* For each voxel of a square, the sum of its differences to its neighbours: in codes, or in
+     * values for knots. */
+    int32_t *sums;
+    double *value_sums;
     trip_sharpen_square *squares; /* the current square, then some recently used ones */
 } trip_sharpen_lane;
 
@@ -52,6 +56,8 @@ typedef struct trip_sharpen {
     const trip_output *file;
     unsigned edge_log2;
     bool round; /* codes in `around` are reversed, as dropped values lie above kept ones */
+    const trip_quantiser *quantiser; /* NULL means even codes */
+    const double *value_of;          /* value of each code, for knots */
     trip_level_positions positions;
     uint64_t sheet; /* first sheet of the current columns; UINT64_MAX if there are none yet */
     size_t next[TRIP_SHARPEN_SHEETS]; /* next square in each of the sheets */

@@ -20,6 +20,7 @@
 
 #include "budget.h"
 #include "format.h"
+#include "knots.h"
 
 /* Lists 0 to 2 hold kept voxels along X, Y and Z. Lists 3 to 5 hold their halo. */
 enum { TRIP_HALO_LISTS = 3, TRIP_MAX_LISTS = 6 };
@@ -36,12 +37,15 @@ enum {
     TRIP_TILE_MORTON_BITS = 40, /* a sheet has up to 2^20 by 2^20 tiles */
 };
 
-/* The scale of codes, value(c) = lo + (hi - lo) * c / 65535, and of the magnitudes of normals. */
+/* The scale of codes, value(c) = lo + (hi - lo) * c / 65535 or knots, and of the magnitudes of
+ * normals. */
 typedef struct trip_quantiser {
     double lo, hi;
-    double gradient_full; /* `full` of 4-byte normals (normal.h) */
-    double gradient_unit; /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
-    bool bytes;           /* use only the codes that 8 bits can express (format.h) */
+    double gradient_full;    /* `full` of 4-byte normals (normal.h) */
+    double gradient_unit;    /* trip_gradient_unit() of magnitudes kept as floats; 0 stands for 1 */
+    bool bytes;              /* use only the codes that 8 bits can express (format.h) */
+    const trip_knots *knots; /* NULL means even codes */
+    bool ids;                /* codes are ranks or numbers of ids (ids.h), which have no mean */
 } trip_quantiser;
 
 /* Sets the values of codes 0 and 65535 from the values of the first and the last 8-bit code. */
@@ -55,6 +59,8 @@ static inline void trip_quantiser_set_bytes(trip_quantiser *q, double first, dou
 /* Returns the nearest code. NaN gives the minimum code. */
 static inline uint32_t trip_quantise(const trip_quantiser *q, double value)
 {
+    if (q->knots)
+        return trip_knots_code(q->knots, value);
     const uint32_t step = q->bytes ? TRIP_CODE_STEP : 1, min = q->bytes ? TRIP_CODE_FIRST : 0,
                    max = q->bytes ? TRIP_CODE_FIRST + 255 : 65535;
     double code = (value - q->lo) * (65535 / step / (q->hi - q->lo)) + 0.5;

@@ -15,8 +15,9 @@ enum {
 typedef struct summing {
     const trip_occupancy_params *params;
     unsigned level;
-    int shift[3]; /* a voxel of the level lies in bin index >> shift */
-    int dims[3];  /* bins along each axis */
+    trip_mean_scale scale; /* of the codes of means */
+    int shift[3];          /* a voxel of the level lies in bin index >> shift */
+    int dims[3];           /* bins along each axis */
     uint64_t weights[TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE];
 } summing;
 
@@ -48,18 +49,31 @@ static unsigned list_of(const summing *s)
            ALONG_Z;
 }
 
-/* Returns the distance of the value from the volume's minimum, scaled to WHOLE_VOXEL. For a mean,
- * multiplies the distance by the kept share of the voxel. */
+/* Returns the distance of a value from the minimum, scaled to WHOLE_VOXEL. Ids count by their rank,
+ * and even codes by the code. */
+static double distance_of(const summing *s, double code)
+{
+    const trip_codes *codes = &s->params->codes;
+    double lo = s->scale.lo, width = s->scale.width;
+    if (codes->table && !trip_codes_ids(codes)) {
+        lo = s->params->typical_min;
+        width = s->params->typical_max - lo;
+        code = trip_codes_value(codes, code);
+    }
+    return fmin(1, fmax(0, width > 0 ? (code - lo) / width : 1)) * WHOLE_VOXEL;
+}
+
+/* Returns the weight of a code. Multiplies the distance of a mean by the kept share of the voxel.
+ */
 static uint64_t weight_of(const summing *s, unsigned code)
 {
-    const trip_mean_scale *scale = &s->params->scale;
-    if (!has_means(s)) {
-        double part = scale->width > 0 ? ((double)code - scale->lo) / scale->width : 1;
-        return (uint64_t)(fmin(1, fmax(0, part)) * WHOLE_VOXEL + 0.5);
-    }
+    if (!has_means(s))
+        return (uint64_t)(distance_of(s, code) + 0.5);
     unsigned shares = code % TRIP_MEAN_SHARES;
     double kept = trip_mean_cover(shares) * trip_mean_depth(shares);
-    unsigned mean = scale->width > 0 ? code >> TRIP_MEAN_AXIS_BITS : WHOLE_VOXEL;
+    unsigned mean = s->scale.width > 0 ? code >> TRIP_MEAN_AXIS_BITS : WHOLE_VOXEL;
+    if (s->params->codes.table)
+        return (uint64_t)(distance_of(s, trip_mean_value(&s->scale, code)) * kept + 0.5);
     return (uint64_t)(mean * kept + 0.5);
 }
 
@@ -128,6 +142,7 @@ int trip_occupancy_read(trip_occupancy *o, trip_writer *w, const trip_occupancy_
         return trip_fail(TRIP_ERROR, "brick", "orientation",
                          "guessing it takes 3 MiB of memory: raise --memory");
     *s = (summing){ .params = params };
+    s->scale = trip_mean_scale_make(params->typical_min, params->typical_max, &params->codes);
     choose_level(s);
     trip_list_buffer *buffer;
     int status = trip_list_buffer_create(&buffer, w, budget);

@@ -9,7 +9,7 @@
 enum { TRIP_OCCUPANCY_EDGE = 64 }; /* maximum number of bins along each axis */
 
 /* The weight of each bin of a coarse grid, i fastest. A weight sums the kept values above the
- * volume's minimum. Weights are scaled so that the greatest is 65535. */
+ * minimum of the typical range. Weights are scaled so that the greatest is 65535. */
 typedef struct trip_occupancy {
     int dims[3]; /* 1 to TRIP_OCCUPANCY_EDGE */
     uint16_t weights[TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE * TRIP_OCCUPANCY_EDGE];
@@ -31,8 +31,9 @@ typedef struct trip_occupancy_params {
     unsigned levels; /* number of coarse levels written */
     bool halo;       /* level 0 has lists of halo voxels */
     trip_level_kinds kinds;
-    unsigned tile_log2;    /* tiles have an edge of 1 << tile_log2 voxels */
-    trip_mean_scale scale; /* of the codes of means */
+    unsigned tile_log2; /* tiles have an edge of 1 << tile_log2 voxels */
+    trip_codes codes;
+    double typical_min, typical_max; /* typical range of the volume's values */
 } trip_occupancy_params;
 
 /* Fills `o` from one Z list of the data set. All lists must be complete.

@@ -34,7 +34,7 @@ int trip_orientation_symmetry_axis(const double scores[3]);
  * Statues on plinths, teapots and clouds with flat bases have one level side and uneven other
  * sides. */
 
-enum { TRIP_ORIENTATION_BASE_LOW_Z = 4 };
+enum { TRIP_ORIENTATION_BASE_LOW_Y = 2, TRIP_ORIENTATION_BASE_LOW_Z = 4 };
 
 /* Returns how level a side is. Sides are numbered -x, +x, -y, +y, -z, +z. Counts the rows of bins
  * that cross the object along the side's axis. Returns the fraction of the rows that reach into the

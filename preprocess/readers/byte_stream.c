@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -19,6 +18,8 @@
 #define PIECE_BYTES ((size_t)1 << 20)
 /* Minimum size of plain data that several threads read. */
 #define LARGE_BYTES ((uint64_t)4 << 20)
+/* Size of the buffer for values that are text. */
+#define TEXT_BYTES ((size_t)64 << 10)
 /* Maximum bytes to read or decompress between checks for an interruption. The decompressors count
  * in 32 bits. */
 #define STEP_BYTES ((size_t)4 << 20)
@@ -35,46 +36,50 @@ struct trip_byte_stream {
     unsigned char *piece; /* buffer of compressed bytes; piece_used of piece_bytes are consumed */
     size_t piece_used, piece_bytes;
     bool ended; /* the compressed stream is complete */
-    bool codec_ready;
+    bool codec_ready, quiet;
+    char *text; /* buffer of a text; text_used of text_bytes are decoded */
+    size_t text_used, text_bytes;
+    trip_text_decoder decoder;
     union {
         z_stream zlib;
         bz_stream bzip2;
     } codec;
 };
 
-/* Returns the number of bytes read, at most `bytes`. */
-static size_t read_head(const char *path, unsigned char *head, size_t bytes)
+trip_byte_encoding trip_byte_encoding_of_head(const unsigned char *head, size_t bytes)
 {
-    FILE *file = fopen(path, "rbe");
-    const size_t got = file ? fread(head, 1, bytes, file) : 0;
-    if (file)
-        fclose(file);
-    return got;
-}
-
-/* Some programs name a NIfTI file .nii.gz and do not compress it. Its header starts with its own
- * length, in either byte order. */
-static bool is_plain_nifti(const unsigned char *head, size_t bytes)
-{
-    static const unsigned char lengths[4][4] = {
-        { 0x5c, 1, 0, 0 }, { 0, 0, 1, 0x5c }, { 0x1c, 2, 0, 0 }, { 0, 0, 2, 0x1c }
-    };
-    for (int i = 0; i < 4 && bytes >= 348; i++)
-        if (!memcmp(head, lengths[i], 4))
-            return true;
-    return false;
+    /* The first block of a bzip2 file, or its end. */
+    static const unsigned char block[] = { 0x31, 0x41, 0x59, 0x26, 0x53, 0x59 };
+    static const unsigned char end[] = { 0x17, 0x72, 0x45, 0x38, 0x50, 0x90 };
+    if (bytes >= 2 && head[0] == 0x1f && head[1] == 0x8b && (bytes == 2 || head[2] == 8))
+        return TRIP_BYTES_ZLIB;
+    if (bytes >= 10 && memcmp(head, "BZh", 3) == 0 && head[3] >= '1' && head[3] <= '9' &&
+        (memcmp(head + 4, block, 6) == 0 || memcmp(head + 4, end, 6) == 0))
+        return TRIP_BYTES_BZIP2;
+    return TRIP_BYTES_PLAIN;
 }
 
 trip_byte_encoding trip_byte_encoding_of(const char *path)
 {
-    const char *dot = strrchr(path, '.');
-    const bool gz = dot && strcasecmp(dot, ".gz") == 0, bz2 = dot && strcasecmp(dot, ".bz2") == 0;
-    unsigned char head[348];
-    if (!gz && !bz2)
-        return TRIP_BYTES_PLAIN;
-    if (is_plain_nifti(head, read_head(path, head, sizeof head)))
-        return TRIP_BYTES_PLAIN;
-    return gz ? TRIP_BYTES_ZLIB : TRIP_BYTES_BZIP2;
+    unsigned char head[10];
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    const ssize_t got = fd >= 0 ? pread(fd, head, sizeof head, 0) : 0;
+    if (fd >= 0)
+        close(fd);
+    return trip_byte_encoding_of_head(head, got > 0 ? (size_t)got : 0);
+}
+
+const char *trip_byte_encoding_name(trip_byte_encoding encoding)
+{
+    return encoding == TRIP_BYTES_ZLIB ? "gzip" : encoding == TRIP_BYTES_BZIP2 ? "bzip2" : "";
+}
+
+int trip_byte_stream_refuse_twice(const char *path, trip_byte_encoding whole)
+{
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "is compressed with %s and holds values that are compressed again: unpack it "
+                     "first, with `%s -dc FILE >NAME`",
+                     trip_byte_encoding_name(whole), trip_byte_encoding_name(whole));
 }
 
 static int open_regular(const char *path, int *fd_out, uint64_t *bytes_out)
@@ -170,6 +175,8 @@ static int fill_piece(trip_byte_stream *s)
 static int corrupt(const trip_byte_stream *s)
 {
     const char *kind = s->source.encoding == TRIP_BYTES_ZLIB ? "zlib" : "bzip2";
+    if (s->quiet)
+        return TRIP_ERROR;
     return trip_fail(TRIP_ERROR, "read", s->path,
                      "%s data is corrupt near byte %" PRIu64 " of the file", kind,
                      s->position - (s->piece_bytes - s->piece_used));
@@ -275,11 +282,81 @@ static void warn_left_over(trip_byte_stream *s, const char *count_text)
     s->source.warned = true;
 }
 
+static int read_plain(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
+{
+    if (!s->pieces || !trip_file_pieces_read(s->pieces, s->position, to, bytes))
+        return read_file(s, to, bytes, got_out);
+    s->position += bytes;
+    *got_out = bytes;
+    return 0;
+}
+
+/* Reads the bytes of the file, decompressed, fewer than `bytes` only at their end. */
+static int fetch(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
+{
+    return s->source.encoding == TRIP_BYTES_PLAIN ? read_plain(s, to, bytes, got_out)
+                                                  : decompress(s, to, bytes, got_out);
+}
+
+static int not_a_value(const trip_byte_stream *s)
+{
+    return trip_fail(
+        TRIP_ERROR, "read", s->path, "\"%.40s\" is not a value of the type %s", s->decoder.word,
+        s->source.text == TRIP_TEXT_HEX ? "hex" : trip_scalar_name(s->source.text_type));
+}
+
+/* Decodes up to `bytes` bytes of values, fewer only at the end of the text. */
+static int decode_text(trip_byte_stream *s, char *to, size_t bytes, size_t *got_out)
+{
+    bool ended = false;
+    size_t done = 0;
+    while (done < bytes) {
+        size_t used, made;
+        if (!trip_text_decode(&s->decoder, s->text + s->text_used, s->text_bytes - s->text_used,
+                              &used, to + done, bytes - done, &made))
+            return not_a_value(s);
+        s->text_used += used;
+        done += made;
+        if (done == bytes || ended)
+            break;
+        if (s->text_used < s->text_bytes)
+            continue;
+        s->text_used = 0;
+        int status = fetch(s, s->text, TEXT_BYTES, &s->text_bytes);
+        if (status < 0)
+            return status;
+        if (s->text_bytes == 0) { /* a line end ends the last number */
+            s->text[s->text_bytes++] = '\n';
+            ended = true;
+        }
+    }
+    *got_out = done;
+    return 0;
+}
+
+/* Reads to the end of a text and warns if it holds more than separators. */
+static int finish_text(trip_byte_stream *s)
+{
+    for (;;) {
+        for (size_t i = s->text_used; i < s->text_bytes; i++)
+            if (!strchr(" \t\r\n\v\f,", s->text[i]) || !s->text[i]) {
+                warn_left_over(s, "more text is");
+                return 0;
+            }
+        s->text_used = 0;
+        int status = fetch(s, s->text, TEXT_BYTES, &s->text_bytes);
+        if (status < 0 || s->text_bytes == 0)
+            return status;
+    }
+}
+
 /* Reads to the end of a compressed stream, which verifies its checksum. */
 static int finish(trip_byte_stream *s)
 {
     unsigned char extra;
     size_t got;
+    if (s->source.text)
+        return finish_text(s);
     int status = s->ended ? 0 : decompress(s, &extra, 1, &got);
     if (status < 0)
         return status;
@@ -290,47 +367,27 @@ static int finish(trip_byte_stream *s)
     return 0;
 }
 
-static int read_compressed(trip_byte_stream *s, unsigned char *to, size_t bytes)
-{
-    size_t got;
-    int status = decompress(s, to, bytes, &got);
-    if (status < 0)
-        return status;
-    if (got < bytes)
-        return too_short(s, s->done + got);
-    return 0;
-}
-
-static int read_plain(trip_byte_stream *s, void *to, size_t bytes, size_t *got_out)
-{
-    if (!s->pieces || !trip_file_pieces_read(s->pieces, s->position, to, bytes))
-        return read_file(s, to, bytes, got_out);
-    s->position += bytes;
-    *got_out = bytes;
-    return 0;
-}
-
 int trip_byte_stream_read(trip_byte_stream *s, void *to, size_t bytes)
 {
-    size_t got = bytes;
-    int status = s->source.encoding == TRIP_BYTES_PLAIN ? read_plain(s, to, bytes, &got)
-                                                        : read_compressed(s, to, bytes);
+    size_t got = 0;
+    int status = s->source.text ? decode_text(s, to, bytes, &got) : fetch(s, to, bytes, &got);
     if (status < 0)
         return status;
     if (got < bytes)
         return too_short(s, s->done + got);
     s->done += bytes;
-    bool last = s->done == s->source.size_bytes;
-    return last && s->source.encoding != TRIP_BYTES_PLAIN ? finish(s) : 0;
+    const bool plain = s->source.encoding == TRIP_BYTES_PLAIN && !s->source.text;
+    return s->done == s->source.size_bytes && !plain ? finish(s) : 0;
 }
 
-static int skip_decompressed(trip_byte_stream *s, uint64_t bytes)
+/* Skips bytes by reading them, decompressed and, if `text`, decoded. */
+static int skip_decoded(trip_byte_stream *s, uint64_t bytes, bool text)
 {
-    unsigned char waste[4096];
+    char waste[4096];
     uint64_t left = bytes;
     while (left > 0) {
         size_t n = left < sizeof waste ? (size_t)left : sizeof waste, got;
-        int status = decompress(s, waste, n, &got);
+        int status = text ? decode_text(s, waste, n, &got) : fetch(s, waste, n, &got);
         if (status < 0)
             return status;
         if (got < n)
@@ -344,10 +401,10 @@ static int skip_decompressed(trip_byte_stream *s, uint64_t bytes)
 int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes)
 {
     int status = 0;
-    if (s->source.encoding == TRIP_BYTES_PLAIN)
+    if (s->source.encoding == TRIP_BYTES_PLAIN && !s->source.text)
         s->position += bytes;
     else
-        status = skip_decompressed(s, bytes);
+        status = skip_decoded(s, bytes, s->source.text != TRIP_TEXT_NONE);
     s->done += bytes;
     return status;
 }
@@ -358,12 +415,22 @@ int trip_byte_stream_rewind(trip_byte_stream *s)
     s->done = 0;
     s->piece_used = s->piece_bytes = 0;
     s->ended = false;
+    s->text_used = s->text_bytes = 0;
+    s->decoder = (trip_text_decoder){ .form = s->source.text, .type = s->source.text_type };
     if (s->source.encoding == TRIP_BYTES_PLAIN) {
         s->position += s->source.skip_bytes;
         return 0;
     }
     int status = codec_begin(s);
-    return status < 0 ? status : skip_decompressed(s, s->source.skip_bytes);
+    return status < 0 ? status : skip_decoded(s, s->source.skip_bytes, false);
+}
+
+static int too_short_text(const trip_byte_stream *s, uint64_t bytes)
+{
+    return trip_fail(TRIP_ERROR, "read", s->path,
+                     "holds %" PRIu64 " characters of values, which are too few for %" PRIu64
+                     " bytes of data; is it truncated?",
+                     bytes, s->source.size_bytes);
 }
 
 /* The length of a plain file is checked before reading. */
@@ -377,6 +444,10 @@ static int check_length(trip_byte_stream *s)
                          "the data offset lies beyond its end, %" PRIu64 " bytes", s->file_bytes);
     if (!plain)
         return 0;
+    if (s->source.text)
+        return s->file_bytes - start < trip_text_min_bytes(&s->decoder, s->source.size_bytes)
+                   ? too_short_text(s, s->file_bytes - start)
+                   : 0;
     if (__builtin_add_overflow(start, s->source.size_bytes, &end) || end > s->file_bytes)
         return too_short(s, s->file_bytes - start);
     if (end < s->file_bytes) {
@@ -392,9 +463,12 @@ static int prepare(trip_byte_stream *s)
     int status = open_regular(s->path, &s->fd, &s->file_bytes);
     if (status < 0)
         return status;
+    s->decoder = (trip_text_decoder){ .form = s->source.text, .type = s->source.text_type };
     status = check_length(s);
     if (status < 0)
         return status;
+    if (s->source.text && !(s->text = malloc(TEXT_BYTES)))
+        return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decode it");
     if (s->source.encoding != TRIP_BYTES_PLAIN && !(s->piece = malloc(PIECE_BYTES)))
         return trip_fail(TRIP_ERROR, "read", s->path, "no memory to decompress it");
     posix_fadvise(s->fd, 0, 0, POSIX_FADV_SEQUENTIAL);
@@ -433,6 +507,23 @@ void trip_byte_stream_close(trip_byte_stream *s)
     if (s->fd >= 0)
         close(s->fd);
     free(s->piece);
+    free(s->text);
     free(s->path);
     free(s);
+}
+
+int trip_byte_stream_head(const char *path, void *to, size_t bytes, bool quiet, size_t *got_out)
+{
+    trip_byte_stream *s;
+    const trip_byte_source source = { .path = path,
+                                      .encoding = trip_byte_encoding_of(path),
+                                      .warned = true };
+    *got_out = 0;
+    int status = trip_byte_stream_open(&s, &source);
+    if (status < 0)
+        return status;
+    s->quiet = quiet;
+    status = fetch(s, to, bytes, got_out);
+    trip_byte_stream_close(s);
+    return quiet && status == TRIP_ERROR ? 0 : status;
 }

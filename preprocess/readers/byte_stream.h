@@ -1,12 +1,14 @@
-/* Reads the bytes of a file in order and decompresses them. All readers of dense formats use it. It
- * holds at most one buffer of the file. An interruption ends reads and skips soon, as a reported
- * failure. One thread at a time. */
+/* Reads the bytes of a file in order, decompresses them, and decodes values that are text. All
+ * readers of dense formats use it. It holds at most two buffers of the file. An interruption ends
+ * reads and skips soon, as a reported failure. One thread at a time. */
 #ifndef TRIP_BYTE_STREAM_H
 #define TRIP_BYTE_STREAM_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include "text_values.h"
 
 typedef enum trip_byte_encoding {
     TRIP_BYTES_PLAIN,
@@ -21,6 +23,8 @@ typedef struct trip_byte_source {
     uint64_t skip_bytes;   /* skipped at the start, after decompression */
     uint64_t size_bytes;   /* bytes of data after skip_bytes */
     bool warned;           /* suppresses the warning about bytes after the data */
+    trip_text_form text;   /* if the values are text, size_bytes counts the decoded bytes */
+    trip_scalar text_type; /* of a text of numbers */
 } trip_byte_source;
 
 typedef struct trip_byte_stream trip_byte_stream;
@@ -44,8 +48,20 @@ int trip_byte_stream_skip(trip_byte_stream *s, uint64_t bytes);
 /* Returns the length of a regular file. Any other file is a reported failure. */
 int trip_file_size(const char *path, uint64_t *bytes_out);
 
-/* Returns the encoding from the name's extension: ".gz", ".bz2", else plain. A file that starts
- * like an uncompressed NIfTI file is plain. */
+/* Detects the encoding from the first bytes of a file. The second function reads them; a file that
+ * cannot be read counts as plain. */
+trip_byte_encoding trip_byte_encoding_of_head(const unsigned char *head, size_t bytes);
 trip_byte_encoding trip_byte_encoding_of(const char *path);
+/* Returns "gzip" or "bzip2", or "" for plain files. */
+const char *trip_byte_encoding_name(trip_byte_encoding encoding);
+
+/* Reports that a compressed file holds compressed values. Returns TRIP_ERROR.
+ */
+int trip_byte_stream_refuse_twice(const char *path, trip_byte_encoding whole);
+
+/* Reads the first bytes of a regular file, decompressed if its content is compressed. *got_out is
+ * less than `bytes` only at the end of the data. `quiet` reports no damaged compressed data, which
+ * then end where the damage begins. */
+int trip_byte_stream_head(const char *path, void *to, size_t bytes, bool quiet, size_t *got_out);
 
 #endif

@@ -6,11 +6,31 @@
 #include "byte_stream.h"
 #include "volume_reader.h"
 
-/* Opens `count` sources. Each holds an equal part of the volume that *info describes by dims and
- * type. Sets their size_bytes. `swap` means that the files have the other byte order. *state is for
- * the calls below. */
+/* The other axes of files that hold more than one value per voxel, or more than one volume. An axis
+ * of each place may have any number of entries, of which the volume takes one. */
+typedef enum trip_dense_place {
+    TRIP_DENSE_IN_VOXEL,      /* faster than i, such as the components of a vector */
+    TRIP_DENSE_BETWEEN_I_J,   /* slower than i, faster than j */
+    TRIP_DENSE_BETWEEN_J_K,   /* slower than j, faster than k */
+    TRIP_DENSE_AFTER_VOLUMES, /* slower than k, such as time */
+    TRIP_DENSE_PLACES
+} trip_dense_place;
+
+typedef struct trip_dense_layout {
+    int64_t count[TRIP_DENSE_PLACES]; /* entries; at least 1 */
+    int64_t index[TRIP_DENSE_PLACES]; /* the entry that is taken */
+    /* The entries in a voxel are red, green and blue, possibly with more after them, in the type
+     * `stored`. The volume gets their luma, of type float. */
+    bool luma;
+    trip_scalar stored;
+} trip_dense_layout;
+
+/* Opens `count` sources. Each holds an equal part of the values. These are the volume that *info
+ * describes by dims and type, unless `layout` (may be NULL) tells of more. Sets the sources'
+ * size_bytes. `swap` means that the files have the other byte order. *state is for the calls below.
+ */
 int trip_dense_open(void **state, const trip_byte_source *sources, int64_t count,
-                    const trip_volume_info *info, bool swap);
+                    const trip_volume_info *info, const trip_dense_layout *layout, bool swap);
 
 void trip_dense_close(void *state);
 int trip_dense_rewind(void *state);

@@ -116,9 +116,8 @@ static int parse_data_file(trip_nrrd_parser *p, trip_nrrd_header *h, bool ends)
 static int check_sizes(const trip_nrrd_parser *p, const trip_nrrd_header *h)
 {
     int64_t values = 1;
-    for (int a = 0; a < 3; a++)
-        if (__builtin_mul_overflow(values, h->dims[a], &values))
-            return trip_nrrd_fail(p, p->lines[TRIP_NRRD_SIZES], "the sizes are impossibly large");
+    for (int axis = 0; axis < h->axes; axis++)
+        values *= h->sizes[axis];
     if (h->file_count > 1 && values % (int64_t)h->file_count != 0)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DATA_FILE],
                               "%" PRId64 " values cannot be divided equally among %zu data files",

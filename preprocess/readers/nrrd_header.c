@@ -169,8 +169,7 @@ static int split_lines(trip_nrrd_parser *p, bool ends)
     return 0;
 }
 
-/* Fails if a field is missing. */
-static int require(const trip_nrrd_parser *p, trip_nrrd_field f, const char *name)
+int trip_nrrd_require(const trip_nrrd_parser *p, trip_nrrd_field f, const char *name)
 {
     if (p->values[f])
         return 0;
@@ -189,7 +188,7 @@ bool trip_nrrd_parse_integer(char **text, int64_t *value)
     return true;
 }
 
-static bool parse_lone_integer(char *text, int64_t *value)
+bool trip_nrrd_parse_lone_integer(char *text, int64_t *value)
 {
     return trip_nrrd_parse_integer(&text, value) && !*text;
 }
@@ -202,105 +201,39 @@ char *trip_nrrd_next_word(char **text)
     return word;
 }
 
-/* Axes of other kinds carry no position in space and cannot be axes of the volume. */
-static bool is_spatial_kind(const char *kind)
-{
-    static const char *const spatial[] = { "domain", "space", "time", "list",
-                                           "scalar", "stub",  "none", "???" };
-    for (size_t i = 0; i < sizeof spatial / sizeof spatial[0]; i++)
-        if (strcasecmp(kind, spatial[i]) == 0)
-            return true;
-    return false;
-}
-
-static int check_kinds(const trip_nrrd_parser *p)
-{
-    char *text = p->values[TRIP_NRRD_KINDS];
-    if (!text)
-        return 0;
-    for (int axis = 0; axis < p->axes; axis++) {
-        const char *kind = trip_nrrd_next_word(&text);
-        bool kept = axis == p->kept[0] || axis == p->kept[1] || axis == p->kept[2];
-        if (kept && *kind && !is_spatial_kind(kind))
-            return trip_nrrd_fail(p, p->lines[TRIP_NRRD_KINDS],
-                                  "axis %d is of kind \"%.40s\": only scalar volumes can be read",
-                                  axis, kind);
-    }
-    return 0;
-}
-
-/* Chooses the three axes of the volume. Drops axes of size 1, first from the slowest axis on, then
- * from the fastest. */
-static int choose_axes(trip_nrrd_parser *p, const int64_t sizes[TRIP_NRRD_AXES_MAX])
-{
-    int first = 0, last = p->axes;
-    while (last - first > 3 && sizes[last - 1] == 1)
-        last--;
-    while (last - first > 3 && sizes[first] == 1)
-        first++;
-    if (last - first != 3)
-        return trip_nrrd_fail(
-            p, p->lines[TRIP_NRRD_SIZES],
-            "the data have %d axes: only scalar volumes of three axes can be read", p->axes);
-    for (int a = 0; a < 3; a++)
-        p->kept[a] = first + a;
-    return 0;
-}
-
-static int parse_sizes(trip_nrrd_parser *p, trip_nrrd_header *h)
-{
-    int64_t axes, sizes[TRIP_NRRD_AXES_MAX];
-    int status = require(p, TRIP_NRRD_DIMENSION, "dimension");
-    if (status < 0 || (status = require(p, TRIP_NRRD_SIZES, "sizes")) < 0)
-        return status;
-    if (!parse_lone_integer(p->values[TRIP_NRRD_DIMENSION], &axes) || axes < 1 ||
-        axes > TRIP_NRRD_AXES_MAX)
-        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_DIMENSION],
-                              "\"dimension\" must be a number from 1 to %d", TRIP_NRRD_AXES_MAX);
-    p->axes = (int)axes;
-    char *text = p->values[TRIP_NRRD_SIZES];
-    for (int a = 0; a < p->axes; a++)
-        if (!trip_nrrd_parse_integer(&text, &sizes[a]) || sizes[a] < 1)
-            return trip_nrrd_fail(p, p->lines[TRIP_NRRD_SIZES],
-                                  "\"sizes\" must be %d numbers of at least 1", p->axes);
-    if (*trip_nrrd_trim(text))
-        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_SIZES], "\"sizes\" has more than %d numbers",
-                              p->axes);
-    if ((status = choose_axes(p, sizes)) < 0)
-        return status;
-    for (int a = 0; a < 3; a++)
-        h->dims[a] = sizes[p->kept[a]];
-    return check_kinds(p);
-}
-
 static int parse_encoding(const trip_nrrd_parser *p, trip_nrrd_header *h)
 {
     static const struct {
         const char *name;
         trip_byte_encoding encoding;
-    } known[] = { { "raw", TRIP_BYTES_PLAIN },
-                  { "gzip", TRIP_BYTES_ZLIB },
-                  { "gz", TRIP_BYTES_ZLIB },
-                  { "bzip2", TRIP_BYTES_BZIP2 },
-                  { "bz2", TRIP_BYTES_BZIP2 } };
-    int status = require(p, TRIP_NRRD_ENCODING, "encoding");
+        trip_text_form text;
+    } known[] = { { "raw", TRIP_BYTES_PLAIN, TRIP_TEXT_NONE },
+                  { "gzip", TRIP_BYTES_ZLIB, TRIP_TEXT_NONE },
+                  { "gz", TRIP_BYTES_ZLIB, TRIP_TEXT_NONE },
+                  { "bzip2", TRIP_BYTES_BZIP2, TRIP_TEXT_NONE },
+                  { "bz2", TRIP_BYTES_BZIP2, TRIP_TEXT_NONE },
+                  { "ascii", TRIP_BYTES_PLAIN, TRIP_TEXT_NUMBERS },
+                  { "text", TRIP_BYTES_PLAIN, TRIP_TEXT_NUMBERS },
+                  { "txt", TRIP_BYTES_PLAIN, TRIP_TEXT_NUMBERS },
+                  { "hex", TRIP_BYTES_PLAIN, TRIP_TEXT_HEX } };
+    int status = trip_nrrd_require(p, TRIP_NRRD_ENCODING, "encoding");
     if (status < 0)
         return status;
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcasecmp(p->values[TRIP_NRRD_ENCODING], known[i].name) == 0) {
             h->encoding = known[i].encoding;
+            h->text = known[i].text;
             return 0;
         }
     return trip_nrrd_fail(
         p, p->lines[TRIP_NRRD_ENCODING],
-        "encoding \"%.40s\" cannot be read; raw, gzip and bzip2 can: convert it, for "
-        "example with \"unu save -e gzip\"",
+        "encoding \"%.40s\" is unknown; raw, ascii, hex, gzip and bzip2 can be read",
         p->values[TRIP_NRRD_ENCODING]);
 }
 
 static int parse_type(const trip_nrrd_parser *p, trip_nrrd_header *h)
 {
-    int status = require(p, TRIP_NRRD_TYPE, "type");
+    int status = trip_nrrd_require(p, TRIP_NRRD_TYPE, "type");
     if (status < 0)
         return status;
     int type = trip_scalar_from_name(p->values[TRIP_NRRD_TYPE]);
@@ -308,9 +241,20 @@ static int parse_type(const trip_nrrd_parser *p, trip_nrrd_header *h)
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_TYPE], "type \"%.40s\" is not a scalar type",
                               p->values[TRIP_NRRD_TYPE]);
     h->type = (trip_scalar)type;
-    if (trip_scalar_bytes(h->type) == 1)
+    return 0;
+}
+
+static int parse_endian(const trip_nrrd_parser *p, trip_nrrd_header *h)
+{
+    if (h->type == TRIP_F16 && h->text == TRIP_TEXT_NUMBERS)
+        return trip_nrrd_fail(p, p->lines[TRIP_NRRD_TYPE],
+                              "values of the type half cannot be numbers in a text");
+    if (trip_scalar_bytes(h->type) == 1 || h->text == TRIP_TEXT_NUMBERS) {
+        h->big_endian = trip_machine_is_big_endian();
         return 0;
-    if ((status = require(p, TRIP_NRRD_ENDIAN, "endian")) < 0)
+    }
+    int status = trip_nrrd_require(p, TRIP_NRRD_ENDIAN, "endian");
+    if (status < 0)
         return status;
     h->big_endian = strcasecmp(p->values[TRIP_NRRD_ENDIAN], "big") == 0;
     if (!h->big_endian && strcasecmp(p->values[TRIP_NRRD_ENDIAN], "little") != 0)
@@ -322,16 +266,19 @@ static int parse_type(const trip_nrrd_parser *p, trip_nrrd_header *h)
 static int parse_skips(const trip_nrrd_parser *p, trip_nrrd_header *h)
 {
     if (p->values[TRIP_NRRD_LINE_SKIP] &&
-        (!parse_lone_integer(p->values[TRIP_NRRD_LINE_SKIP], &h->line_skip) || h->line_skip < 0))
+        (!trip_nrrd_parse_lone_integer(p->values[TRIP_NRRD_LINE_SKIP], &h->line_skip) ||
+         h->line_skip < 0))
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_LINE_SKIP],
                               "\"line skip\" must be a number of at least 0");
     if (p->values[TRIP_NRRD_BYTE_SKIP] &&
-        (!parse_lone_integer(p->values[TRIP_NRRD_BYTE_SKIP], &h->byte_skip) || h->byte_skip < -1))
+        (!trip_nrrd_parse_lone_integer(p->values[TRIP_NRRD_BYTE_SKIP], &h->byte_skip) ||
+         h->byte_skip < -1))
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_BYTE_SKIP],
                               "\"byte skip\" must be a number of at least -1");
-    if (h->byte_skip < 0 && h->encoding != TRIP_BYTES_PLAIN)
+    if (h->byte_skip < 0 && (h->encoding != TRIP_BYTES_PLAIN || h->text))
         return trip_nrrd_fail(p, p->lines[TRIP_NRRD_BYTE_SKIP],
-                              "\"byte skip: -1\" cannot be used with compressed data");
+                              "\"byte skip: -1\" cannot be used with %s data",
+                              h->text ? "text" : "compressed");
     return 0;
 }
 
@@ -341,9 +288,10 @@ static int parse(trip_nrrd_parser *p, trip_nrrd_header *h, bool ends)
     const char *magic = trip_nrrd_next_line(p);
     if (!magic || strncmp(magic, "NRRD000", 7) != 0 || magic[7] < '1' || magic[7] > '5' || magic[8])
         return trip_nrrd_fail(p, 0, "is not an NRRD file of version 1 to 5");
-    if ((status = split_lines(p, ends)) < 0 || (status = parse_sizes(p, h)) < 0 ||
+    if ((status = split_lines(p, ends)) < 0 || (status = trip_nrrd_parse_axes(p, h)) < 0 ||
         (status = parse_type(p, h)) < 0 || (status = parse_encoding(p, h)) < 0 ||
-        (status = parse_skips(p, h)) < 0 || (status = trip_nrrd_parse_geometry(p, h)) < 0)
+        (status = parse_endian(p, h)) < 0 || (status = parse_skips(p, h)) < 0 ||
+        (status = trip_nrrd_parse_geometry(p, h)) < 0)
         return status;
     return trip_nrrd_parse_files(p, h, ends);
 }

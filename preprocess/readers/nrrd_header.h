@@ -9,12 +9,21 @@
 #include <stdint.h>
 
 #include "byte_stream.h"
+#include "dense_file.h"
 #include "volume_info.h"
 
 #define TRIP_NRRD_HEADER_BYTES_MAX ((size_t)1 << 20)
 
+enum { TRIP_NRRD_AXES_MAX = 16 };
+
 typedef struct trip_nrrd_header {
-    int64_t dims[3]; /* the three kept axes; other axes have size 1 and are dropped */
+    int64_t dims[3];                   /* the three kept axes */
+    int64_t sizes[TRIP_NRRD_AXES_MAX]; /* of all axes; their product fits in an int64_t */
+    int axes;
+    int kept[3];      /* the axes that are i, j and k of the volume, in ascending order */
+    int channel_axis; /* the axis from which --channel selects, or -1 */
+    int time_axis;    /* the axis from which --time selects, or -1 */
+    bool colour;      /* the values are red, green, blue and possibly opacity of each voxel */
     trip_affine index_to_world;
     char space[8];          /* anatomical, as in anatomy.h; "" if the header names no such space */
     double *coordinates[3]; /* of the samples in world space; NULL if even */
@@ -22,6 +31,7 @@ typedef struct trip_nrrd_header {
     trip_scalar type;
     bool big_endian; /* meaningless for types of one byte */
     trip_byte_encoding encoding;
+    trip_text_form text;
     int64_t line_skip, byte_skip; /* byte_skip -1: the data are at the end of the file */
     char **files;                 /* data files as the header names them, in order */
     size_t file_count;            /* 0 if the data follow the header */
@@ -34,16 +44,18 @@ typedef struct trip_nrrd_header {
 int trip_nrrd_header_parse(trip_nrrd_header *h, const char *path, char *text, size_t bytes,
                            bool ends);
 void trip_nrrd_header_free(trip_nrrd_header *h);
+/* Sets the layout of the values for a channel and a time within the axes' sizes. */
+void trip_nrrd_header_layout(const trip_nrrd_header *h, int64_t channel, int64_t time,
+                             trip_dense_layout *out);
 
 /* ---- for the parser's own files ----
  *
  * - nrrd_header.c splits the text into fields.
+ * - nrrd_axes.c chooses the axes of the volume.
  * - nrrd_geometry.c makes the map to world space.
  * - nrrd_files.c makes the names of the data files.
  *
  * Functions report failures with file and line. */
-
-enum { TRIP_NRRD_AXES_MAX = 16 };
 
 typedef enum trip_nrrd_field {
     TRIP_NRRD_DIMENSION,
@@ -93,9 +105,16 @@ char *trip_nrrd_next_line(trip_nrrd_parser *p);
 char *trip_nrrd_trim(char *text);
 /* Cuts off the next word and returns it. */
 char *trip_nrrd_next_word(char **text);
+/* Fails if a field is missing. `name` is its name. */
+int trip_nrrd_require(const trip_nrrd_parser *p, trip_nrrd_field f, const char *name);
 /* Parses an integer, which a blank or the end of the text must follow. Returns false if there is
  * none. */
 bool trip_nrrd_parse_integer(char **text, int64_t *value);
+/* Parses an integer that fills the whole text. Returns false if there is none. */
+bool trip_nrrd_parse_lone_integer(char *text, int64_t *value);
+
+/* Fills sizes, axes, kept, channel_axis, time_axis, colour and dims. */
+int trip_nrrd_parse_axes(trip_nrrd_parser *p, trip_nrrd_header *h);
 
 /* Fills index_to_world, space and oriented. dims must be set. */
 int trip_nrrd_parse_geometry(const trip_nrrd_parser *p, trip_nrrd_header *h);

@@ -14,6 +14,7 @@
 #include "anatomy.h"
 #include "helper_slices.h"
 #include "report.h"
+#include "volume_coordinates.h"
 #include "volume_reader.h"
 
 static bool probe(const char *path, const unsigned char *head, size_t bytes,
@@ -21,19 +22,6 @@ static bool probe(const char *path, const unsigned char *head, size_t bytes,
 {
     (void)path, (void)params;
     return bytes == 0 || trip_image_kind_of(head, bytes) != TRIP_IMAGE_OTHER;
-}
-
-static int open_stack(trip_helper_slices *s, bool allow_gaps, trip_image_stack *stack)
-{
-    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), allow_gaps };
-    int status = trip_image_helper_start(&s->helper, "read");
-    if (status == 0)
-        status = trip_image_helper_request(s->helper, TRIP_IMAGE_OPEN_STACK, s->path, numbers, -1);
-    if (status == 0)
-        status = trip_image_helper_expect(s->helper, sizeof *stack);
-    if (status == 0)
-        status = trip_image_helper_receive(s->helper, stack, sizeof *stack);
-    return status;
 }
 
 /* Returns whether the text is a code string as the DICOM standard defines it. */
@@ -58,9 +46,81 @@ static const char *fault_of(const trip_image_stack *stack)
     if (!memchr(stack->space, '\0', sizeof stack->space) || (stack->oriented & ~1) ||
         (stack->space[0] && !trip_anatomy_known(stack->space)))
         return "an unknown space";
+    if (!memchr(stack->note, '\0', sizeof stack->note) || (stack->uneven & ~1))
+        return "an invalid note";
     if (!is_modality(stack->modality, sizeof stack->modality))
         return "an invalid modality";
     return finite ? NULL : "a map that is not finite";
+}
+
+/* Receives the description of the stack. */
+static int open_stack(trip_helper_slices *s, const trip_volume_params *params,
+                      trip_image_stack *stack)
+{
+    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), params->allow_gaps,
+                                 params->series, params->time, params->channel };
+    uint64_t bytes = 0, expected = 0;
+    int status = trip_image_helper_start(&s->helper, "read");
+    if (status == 0)
+        status = trip_image_helper_request(s->helper, TRIP_IMAGE_OPEN_STACK, s->path, numbers, -1);
+    if (status == 0)
+        status = trip_image_helper_outcome(s->helper, &bytes);
+    if (status < 0)
+        return status;
+    if (bytes < sizeof *stack)
+        return trip_image_helper_distrust(s->helper, "data of the wrong size");
+    status = trip_image_helper_receive(s->helper, stack, sizeof *stack);
+    const char *fault = status == 0 ? fault_of(stack) : NULL;
+    if (!fault && status == 0 &&
+        (__builtin_mul_overflow((uint64_t)stack->dims[2], stack->uneven ? sizeof(double) : 0,
+                                &expected) ||
+         stack->parts_bytes > TRIP_IMAGE_PARTS_MAX || bytes - sizeof *stack < expected ||
+         bytes - sizeof *stack - expected != stack->parts_bytes))
+        fault = "data of the wrong size";
+    return fault ? trip_image_helper_distrust(s->helper, fault) : status;
+}
+
+/* Receives the positions of slices at uneven distances. */
+static int take_positions(trip_helper_slices *s, trip_volume_info *info)
+{
+    int status = trip_volume_check_axes(s->path, info);
+    if (status < 0)
+        return status;
+    const size_t bytes = (size_t)info->dims[2] * sizeof(double);
+    double *positions = trip_budget_take(s->budget, bytes);
+    if (!positions)
+        return trip_fail(TRIP_ERROR, "read", s->path,
+                         "its positions do not fit in memory: raise --memory");
+    status = trip_image_helper_receive(s->helper, positions, bytes);
+    if (status == 0)
+        status = trip_volume_set_positions(info, 2, positions, s->path);
+    trip_budget_release(s->budget, positions, bytes);
+    return status;
+}
+
+/* Receives the list of series. */
+static int take_parts(trip_helper_slices *s, uint32_t bytes, trip_volume_info *info)
+{
+    if (!(info->parts = calloc(1, (size_t)bytes + 1)))
+        return trip_fail(TRIP_ERROR, "read", s->path, "out of memory");
+    return trip_image_helper_receive(s->helper, info->parts, bytes);
+}
+
+static void describe(const trip_image_stack *stack, trip_volume_info *info)
+{
+    memcpy(info->dims, stack->dims, sizeof info->dims);
+    memcpy(info->index_to_world.m, stack->index_to_world, sizeof info->index_to_world.m);
+    memcpy(info->space, stack->space, sizeof info->space);
+    memcpy(info->modality, stack->modality, sizeof info->modality);
+    snprintf(info->note, sizeof info->note, "%s", stack->note);
+    info->oriented = stack->oriented != 0;
+    info->type = (trip_scalar)stack->type;
+    info->slope = stack->slope;
+    info->inter = stack->inter;
+    info->sparse = false;
+    info->background = 0;
+    info->format = "images";
+    info->name[0] = 0;
 }
 
 static int open_images(const char *path, const trip_volume_params *params, trip_budget *budget,
@@ -70,10 +130,13 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
     if (!s)
         return TRIP_ERROR;
     trip_image_stack stack = { 0 };
-    int status = open_stack(s, params->allow_gaps, &stack);
-    const char *fault = status == 0 ? fault_of(&stack) : NULL;
-    if (fault)
-        status = trip_image_helper_distrust(s->helper, fault);
+    int status = open_stack(s, params, &stack);
+    if (status == 0)
+        describe(&stack, info);
+    if (status == 0 && stack.uneven)
+        status = take_positions(s, info);
+    if (status == 0 && stack.parts_bytes)
+        status = take_parts(s, stack.parts_bytes, info);
     if (status == 0)
         status =
             trip_helper_slices_reserve(s, stack.dims, (trip_scalar)stack.type, stack.helper_bytes);
@@ -81,18 +144,6 @@ static int open_images(const char *path, const trip_volume_params *params, trip_
         trip_helper_slices_close(s);
         return status;
     }
-    memcpy(info->dims, stack.dims, sizeof info->dims);
-    memcpy(info->index_to_world.m, stack.index_to_world, sizeof info->index_to_world.m);
-    memcpy(info->space, stack.space, sizeof info->space);
-    memcpy(info->modality, stack.modality, sizeof info->modality);
-    info->oriented = stack.oriented != 0;
-    info->type = (trip_scalar)stack.type;
-    info->slope = stack.slope;
-    info->inter = stack.inter;
-    info->sparse = false;
-    info->background = 0;
-    info->format = "images";
-    info->name[0] = 0;
     *out = s;
     return 0;
 }

@@ -1,7 +1,7 @@
 /* Reads netCDF files in the classic formats (CDF-1, CDF-2 and CDF-5); read_netcdf4.c reads
  * netCDF-4.
- * - A volume is a variable with at least three dimensions. The last three are k, j and i. All
- *   earlier dimensions use index 0.
+ * - A volume is a variable with at least three dimensions. The last three are k, j and i. The first
+ *   of the earlier dimensions is time, the next has channels, and all others use index 0.
  * - A variable with the name of a dimension gives the coordinates along this dimension.
  * - Values equal to a fill value or missing value become NaN.
  * - Integers are unsigned if the attribute _Unsigned is "true". CDF-1 and CDF-2 have no unsigned
@@ -463,15 +463,44 @@ static void describe(const header *h, const variable *v, trip_volume_info *info)
     unsigned others = 0;
     for (uint64_t i = 0; i < h->variable_count; i++)
         others += &h->variables[i] != v && volume_of(h, &h->variables[i]) > 0;
-    if (others || v->dims > 3)
+    if (others || v->dims > 5)
         snprintf(info->note, sizeof info->note, "variable \"%.*s\"%s%s", length, v->name.at,
                  others ? ", one of several (--grid NAME selects another)" : "",
-                 v->dims > 3 ? ", at the first index of its other dimensions" : "");
+                 v->dims > 5 ? ", at the first index of its other dimensions" : "");
 }
 
-static int lay_out(const header *h, const variable *v, trip_volume_info *info, netcdf *n)
+/* Chooses the time and the channel from the first dimensions before the last three. *record gets
+ * the index of the record. *volume gets the number of volumes before the chosen one in its record.
+ */
+static int choose_entries(const header *h, const variable *v, const trip_volume_params *params,
+                          trip_volume_info *info, uint64_t *record, uint64_t *volume)
 {
-    uint64_t bytes = bytes_of(v), end;
+    static const char *const names[] = { "time", "channel" };
+    const int wanted[] = { params->time, params->channel };
+    uint64_t step = 1;
+    int status = 0;
+    *record = *volume = 0;
+    for (unsigned i = v->dims > 3 ? v->dims - 3 : 0; i-- > 0;) {
+        const uint64_t size = size_of(h, v->dim[i]), index = i < 2 ? (uint64_t)wanted[i] : 0;
+        if (i == 0 && has_records(h, v))
+            *record = index;
+        else
+            *volume += index * step;
+        if (__builtin_mul_overflow(step, size, &step) || size > INT64_MAX)
+            return trip_fail(TRIP_ERROR, "read", h->path, "has impossibly many volumes");
+    }
+    for (unsigned i = 0; i < 2 && status == 0; i++) {
+        const int64_t size = v->dims > 3 + i ? (int64_t)size_of(h, v->dim[i]) : 1;
+        status = trip_volume_check_entry(h->path, names[i], wanted[i], size);
+        trip_entry_note(info->note, sizeof info->note, names[i], wanted[i], size, "");
+    }
+    return status;
+}
+
+static int lay_out(const header *h, const variable *v, const trip_volume_params *params,
+                   trip_volume_info *info, netcdf *n)
+{
+    uint64_t bytes = bytes_of(v), end, record, volume, volume_bytes;
     for (int a = 0; a < 3; a++) {
         uint64_t size = size_of(h, v->dim[v->dims - 1 - (unsigned)a]);
         info->dims[a] = size > INT64_MAX ? 0 : (int64_t)size;
@@ -480,14 +509,20 @@ static int lay_out(const header *h, const variable *v, trip_volume_info *info, n
     info->slope = v->slope;
     info->inter = v->inter;
     int status = trip_volume_check_dims(h->path, info);
+    if (!status)
+        status = choose_entries(h, v, params, info, &record, &volume);
     if (status)
         return status;
-    n->begin = v->begin;
     n->values = (uint64_t)info->dims[0] * (uint64_t)info->dims[1];
     n->stride = has_records(h, v) && v->dims == 3 ? h->record_bytes : n->values * bytes;
+    volume_bytes = n->values * (uint64_t)info->dims[2] * bytes;
     if (__builtin_mul_overflow(n->stride, (uint64_t)info->dims[2] - 1, &end) ||
         __builtin_add_overflow(end, n->values * bytes, &end) ||
-        __builtin_add_overflow(end, v->begin, &end) || end > h->file_bytes)
+        __builtin_mul_overflow(record, h->record_bytes, &record) ||
+        __builtin_mul_overflow(volume, volume_bytes, &volume) ||
+        __builtin_add_overflow(v->begin, record, &n->begin) ||
+        __builtin_add_overflow(n->begin, volume, &n->begin) ||
+        __builtin_add_overflow(end, n->begin, &end) || end > h->file_bytes)
         return trip_fail(TRIP_ERROR, "read", h->path,
                          "ends early, at byte %" PRIu64 ", within its variable", h->file_bytes);
     n->decoded = !isnan(v->missing[0]) || !isnan(v->missing[1]);
@@ -514,11 +549,11 @@ static int open_variable(netcdf *n, const trip_volume_params *params, trip_volum
     if (!status)
         status = choose_variable(&h, params->grid, &v);
     if (!status)
-        status = lay_out(&h, v, info, n);
+        describe(&h, v, info);
+    if (!status)
+        status = lay_out(&h, v, params, info, n);
     for (int a = 0; a < 3 && !status; a++)
         status = place_axis(&h, n->fd, v->dim[v->dims - 1 - (unsigned)a], a, info);
-    if (!status)
-        describe(&h, v, info);
     free_header(&h);
     return status;
 }

@@ -40,6 +40,8 @@ static const char *fault_of(const trip_image_netcdf *v)
         return "slices without a size";
     if (!is_name(v->name, sizeof v->name))
         return "a variable without a name";
+    if (v->times < 1 || v->channels < 1)
+        return "no times or channels";
     if ((v->placed & ~7) || (v->others & ~1) || (v->deeper & ~1))
         return "coordinates of an unknown axis";
     return isfinite(v->slope) && isfinite(v->inter) ? NULL : "values that are not finite";
@@ -56,11 +58,13 @@ static bool coordinate_bytes(const trip_image_netcdf *v, uint64_t *out)
 }
 
 /* Receives the description of the variable. `left` gets the number of bytes that follow it. */
-static int open_variable(trip_helper_slices *s, const char *name, trip_image_netcdf *v,
-                         uint64_t *left)
+static int open_variable(trip_helper_slices *s, const trip_volume_params *params,
+                         trip_image_netcdf *v, uint64_t *left)
 {
+    const char *name = params->grid;
     const size_t length = name ? strlen(name) : 0;
-    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), (int64_t)length };
+    const int64_t numbers[5] = { (int64_t)trip_budget_left_bytes(s->budget), (int64_t)length,
+                                 params->time, params->channel };
     uint64_t bytes = 0, expected = 0;
     int status = trip_image_helper_start_netcdf(&s->helper, "read");
     if (status == 0)
@@ -114,7 +118,7 @@ static int open_file(trip_helper_slices *s, const trip_volume_params *params,
 {
     trip_image_netcdf v;
     uint64_t left;
-    int status = open_variable(s, params->grid, &v, &left);
+    int status = open_variable(s, params, &v, &left);
     if (status < 0)
         return status;
     memcpy(info->dims, v.dims, sizeof info->dims);
@@ -129,6 +133,12 @@ static int open_file(trip_helper_slices *s, const trip_volume_params *params,
         status = trip_helper_slices_reserve(s, v.dims, info->type, v.helper_bytes);
     if (status == 0)
         describe(&v, info);
+    if (status == 0)
+        status = trip_volume_check_entry(s->path, "time", params->time, v.times);
+    if (status == 0)
+        status = trip_volume_check_entry(s->path, "channel", params->channel, v.channels);
+    trip_entry_note(info->note, sizeof info->note, "time", params->time, v.times, "");
+    trip_entry_note(info->note, sizeof info->note, "channel", params->channel, v.channels, "");
     return status;
 }
 

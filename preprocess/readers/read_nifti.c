@@ -57,14 +57,19 @@ static bool nifti_probe(const char *path, const unsigned char *head, size_t byte
 }
 
 /* Returns the other path of a pair: exchanges ".hdr" and ".img" and keeps ".gz". Keeps the case of
- * each letter, or uses lower case if no such file exists. The caller frees the path. */
+ * each letter. If no such file exists, tries lower case, and with or without ".gz". The caller
+ * frees the path. */
 static char *partner(const char *path, const char *from, const char *to)
 {
-    char *copy = strdup(path);
-    if (!copy || !ends_in(path, from))
+    size_t length = strlen(path);
+    char *copy = malloc(length + sizeof ".gz");
+    if (!copy)
+        return NULL;
+    memcpy(copy, path, length + 1);
+    if (!ends_in(path, from))
         return copy;
-    size_t length = strlen(copy);
-    if (strcasecmp(copy + length - 3, ".gz") == 0)
+    const bool compressed = strcasecmp(copy + length - 3, ".gz") == 0;
+    if (compressed)
         length -= 3;
     char *suffix = copy + length - strlen(to);
     for (size_t i = 0; to[i]; i++) {
@@ -73,6 +78,11 @@ static char *partner(const char *path, const char *from, const char *to)
     }
     if (access(copy, F_OK) != 0)
         memcpy(suffix, to, strlen(to));
+    if (access(copy, F_OK) == 0)
+        return copy;
+    snprintf(copy + length, sizeof ".gz", "%s", compressed ? "" : ".gz");
+    if (access(copy, F_OK) != 0)
+        snprintf(copy + length, sizeof ".gz", "%s", compressed ? ".gz" : "");
     return copy;
 }
 
@@ -168,63 +178,63 @@ static int read_header(const char *path, header *h)
                                                                         : read_version_1(path, h);
 }
 
-static int set_dims(const char *path, const nifti_2_header *n, trip_volume_info *info)
+/* Sets the sizes and chooses the volume: axis 4 is time, axis 5 has the components of a value. */
+static int set_dims(const char *path, const nifti_2_header *n, const trip_volume_params *params,
+                    trip_volume_info *info, trip_dense_layout *layout)
 {
+    int64_t sizes[8] = { 0, 1, 1, 1, 1, 1, 1, 1 }, volumes = 1;
     if (n->dim[0] < 1 || n->dim[0] > 7)
         return trip_fail(TRIP_ERROR, "read", path, "has %" PRId64 " axes; NIfTI allows 1 to 7",
                          n->dim[0]);
     for (int i = 1; i <= n->dim[0]; i++) {
         if (n->dim[i] < 1)
             return trip_fail(TRIP_ERROR, "read", path, "axis %d has size %" PRId64, i, n->dim[i]);
-        if (i <= 3)
-            info->dims[i - 1] = n->dim[i];
-        else if (n->dim[i] > 1)
-            trip_warn(path, "axis %d has %" PRId64 " entries; only the first is read", i,
-                      n->dim[i]);
+        sizes[i] = n->dim[i];
     }
-    for (int i = (int)n->dim[0]; i < 3; i++)
-        info->dims[i] = 1;
-    return 0;
+    for (int i = 4; i <= 7; i++)
+        if (__builtin_mul_overflow(volumes, sizes[i], &volumes))
+            return trip_fail(TRIP_ERROR, "read", path, "has impossibly many volumes");
+    int status = trip_volume_check_entry(path, "time", params->time, sizes[4]);
+    if (status == 0)
+        status = trip_volume_check_entry(path, "channel", params->channel, sizes[5]);
+    memcpy(info->dims, sizes + 1, sizeof info->dims);
+    layout->count[TRIP_DENSE_AFTER_VOLUMES] = volumes;
+    layout->index[TRIP_DENSE_AFTER_VOLUMES] = params->time + params->channel * sizes[4];
+    trip_entry_note(info->note, sizeof info->note, "time", params->time, sizes[4], "");
+    trip_entry_note(info->note, sizeof info->note, "channel", params->channel, sizes[5], "");
+    for (int i = 6; i <= 7 && status == 0; i++)
+        if (sizes[i] > 1)
+            trip_warn(path, "axis %d has %" PRId64 " entries; only the first is read", i, sizes[i]);
+    return status;
 }
 
-static int set_type(const char *path, const nifti_2_header *n, trip_volume_info *info)
+static int set_type(const char *path, const nifti_2_header *n, trip_volume_info *info,
+                    trip_dense_layout *layout)
 {
-    switch (n->datatype) {
-    case DT_UINT8:
-        info->type = TRIP_U8;
+    static const struct {
+        int datatype;
+        trip_scalar type;
+        int64_t colours; /* entries in a voxel; 1 if it is no colour */
+    } known[] = {
+        { DT_UINT8, TRIP_U8, 1 },    { DT_INT8, TRIP_I8, 1 },    { DT_UINT16, TRIP_U16, 1 },
+        { DT_INT16, TRIP_I16, 1 },   { DT_UINT32, TRIP_U32, 1 }, { DT_INT32, TRIP_I32, 1 },
+        { DT_UINT64, TRIP_U64, 1 },  { DT_INT64, TRIP_I64, 1 },  { DT_FLOAT32, TRIP_F32, 1 },
+        { DT_FLOAT64, TRIP_F64, 1 }, { DT_RGB24, TRIP_U8, 3 },   { DT_RGBA32, TRIP_U8, 4 },
+    };
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        if (n->datatype != known[i].datatype)
+            continue;
+        layout->luma = known[i].colours > 1;
+        layout->stored = known[i].type;
+        layout->count[TRIP_DENSE_IN_VOXEL] = known[i].colours;
+        info->type = layout->luma ? TRIP_F32 : known[i].type;
+        if (layout->luma)
+            trip_append_note(info->note, sizeof info->note, TRIP_VOLUME_COLOUR_NOTE);
         return 0;
-    case DT_INT8:
-        info->type = TRIP_I8;
-        return 0;
-    case DT_UINT16:
-        info->type = TRIP_U16;
-        return 0;
-    case DT_INT16:
-        info->type = TRIP_I16;
-        return 0;
-    case DT_UINT32:
-        info->type = TRIP_U32;
-        return 0;
-    case DT_INT32:
-        info->type = TRIP_I32;
-        return 0;
-    case DT_UINT64:
-        info->type = TRIP_U64;
-        return 0;
-    case DT_INT64:
-        info->type = TRIP_I64;
-        return 0;
-    case DT_FLOAT32:
-        info->type = TRIP_F32;
-        return 0;
-    case DT_FLOAT64:
-        info->type = TRIP_F64;
-        return 0;
-    default:
-        return trip_fail(TRIP_ERROR, "read", path,
-                         "cannot read datatype %d (%s): convert it to integers, float or double",
-                         n->datatype, nifti_datatype_string(n->datatype));
     }
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "cannot read datatype %d (%s): convert it to integers, float or double",
+                     n->datatype, nifti_datatype_string(n->datatype));
 }
 
 static trip_affine from_sform(const nifti_2_header *n)
@@ -286,23 +296,21 @@ static void set_scaling(const nifti_2_header *n, trip_volume_info *info)
 }
 
 static int open_values(const char *path, const header *h, const trip_volume_info *info,
-                       void **state)
+                       const trip_dense_layout *layout, void **state)
 {
-    int64_t min = h->own_file ? 0 : h->n.magic[2] == '2' ? 544 : 352;
-    if (h->n.vox_offset < min)
-        return trip_fail(TRIP_ERROR, "read", path,
-                         "vox_offset is invalid: the values would start inside the header");
-    int64_t beyond = 1;
-    for (int i = 4; i <= h->n.dim[0]; i++)
-        beyond = h->n.dim[i] > 1 ? 2 : beyond;
     char *data_path = h->own_file ? partner(path, ".hdr", ".img") : strdup(path);
     if (!data_path)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory");
+    /* A file that says it is the header of a pair may hold the values, whatever its name. */
+    const bool own_file = strcmp(path, data_path) != 0;
+    const int64_t min = own_file ? 0 : h->n.magic[2] == '2' ? 544 : 352;
     trip_byte_source source = { .path = data_path,
                                 .encoding = trip_byte_encoding_of(data_path),
-                                .skip_bytes = (uint64_t)h->n.vox_offset,
-                                .warned = beyond > 1 };
-    int status = trip_dense_open(state, &source, 1, info, h->swapped);
+                                .skip_bytes = (uint64_t)h->n.vox_offset };
+    int status = h->n.vox_offset >= min
+                     ? trip_dense_open(state, &source, 1, info, layout, h->swapped)
+                     : trip_fail(TRIP_ERROR, "read", path,
+                                 "vox_offset is invalid: the values would start inside the header");
     free(data_path);
     return status;
 }
@@ -310,20 +318,23 @@ static int open_values(const char *path, const header *h, const trip_volume_info
 static int nifti_open(const char *path, const trip_volume_params *params, trip_budget *budget,
                       trip_volume_info *info, void **state)
 {
-    (void)params;
     (void)budget;
     header h = { 0 };
+    trip_dense_layout layout = { .count = { 1, 1, 1, 1 } };
     char *header_path = partner(path, ".img", ".hdr");
     if (!header_path)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory");
     nifti_set_debug_level(0); /* disables libnifti's own messages */
     int status = read_header(header_path, &h);
-    if (status == 0 && (status = set_dims(header_path, &h.n, info)) == 0)
-        status = set_type(header_path, &h.n, info);
+    if (status == 0)
+        status = set_dims(header_path, &h.n, params, info, &layout);
+    if (status == 0)
+        status = set_type(header_path, &h.n, info, &layout);
     if (status == 0) {
         set_map(header_path, &h.n, info);
-        set_scaling(&h.n, info);
-        status = open_values(header_path, &h, info, state);
+        if (!layout.luma)
+            set_scaling(&h.n, info);
+        status = open_values(header_path, &h, info, &layout, state);
     }
     free(header_path);
     return status;
@@ -347,6 +358,7 @@ const trip_volume_reader trip_read_nifti = {
     .probe = nifti_probe,
     .list = nifti_list,
     .open = nifti_open,
+    .decompresses = true,
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,
     .read_slices = trip_dense_read_slices,

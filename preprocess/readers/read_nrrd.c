@@ -1,5 +1,5 @@
-/* Reads NRRD files with attached (.nrrd) and detached (.nhdr) headers, raw, gzip or bzip2, with one
- * data file or many. */
+/* Reads NRRD files with attached (.nrrd) and detached (.nhdr) headers, in all encodings of the
+ * format, with one data file or many. A file with header and values may be compressed. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,19 +23,11 @@ static bool nrrd_probe(const char *path, const unsigned char *head, size_t bytes
 static int read_header(const char *path, trip_nrrd_header *h)
 {
     char *text = malloc(TRIP_NRRD_HEADER_BYTES_MAX + 1);
-    FILE *file = fopen(path, "rbe");
-    int status = 0;
-    if (!text)
-        status = trip_fail(TRIP_ERROR, "read", path, "out of memory for its header");
-    else if (!file)
-        status = trip_fail_errno("read", path, "cannot open");
-    size_t bytes = status == 0 ? fread(text, 1, TRIP_NRRD_HEADER_BYTES_MAX, file) : 0;
-    if (status == 0 && ferror(file))
-        status = trip_fail_errno("read", path, "cannot read");
+    size_t bytes = 0;
+    int status = text ? trip_byte_stream_head(path, text, TRIP_NRRD_HEADER_BYTES_MAX, false, &bytes)
+                      : trip_fail(TRIP_ERROR, "read", path, "out of memory for its header");
     if (status == 0)
         status = trip_nrrd_header_parse(h, path, text, bytes, bytes < TRIP_NRRD_HEADER_BYTES_MAX);
-    if (file)
-        fclose(file);
     free(text);
     return status;
 }
@@ -103,29 +95,61 @@ static int locate(trip_byte_source *source, const trip_nrrd_header *h, uint64_t 
     return status; /* opening reports a file that is too short */
 }
 
-static int open_sources(const char *path, const trip_nrrd_header *h, const trip_volume_info *info,
+/* Finds the values in a compressed file. They follow its header after decompression. */
+static int locate_compressed(trip_byte_source *source, const trip_nrrd_header *h,
+                             trip_byte_encoding whole)
+{
+    if (h->encoding != TRIP_BYTES_PLAIN)
+        return trip_byte_stream_refuse_twice(source->path, whole);
+    if (h->line_skip || h->byte_skip < 0)
+        return trip_fail(TRIP_ERROR, "read", source->path,
+                         "skips lines and is compressed with %s: unpack it first, with "
+                         "`%s -dc FILE >NAME`",
+                         trip_byte_encoding_name(whole), trip_byte_encoding_name(whole));
+    source->encoding = whole;
+    source->offset_bytes = 0;
+    if (__builtin_add_overflow(h->header_bytes, (uint64_t)h->byte_skip, &source->skip_bytes))
+        return trip_fail(TRIP_ERROR, "read", source->path, "\"byte skip\" is impossibly large");
+    return 0;
+}
+
+/* Returns the bytes of all values in each of the `count` files. */
+static uint64_t part_bytes_of(const trip_nrrd_header *h, size_t count)
+{
+    uint64_t bytes = trip_scalar_bytes(h->type);
+    for (int axis = 0; axis < h->axes; axis++)
+        bytes *= (uint64_t)h->sizes[axis];
+    return bytes / count;
+}
+
+static int open_sources(const char *path, const trip_nrrd_header *h,
+                        const trip_volume_params *params, const trip_volume_info *info,
                         trip_byte_source *sources, void **state)
 {
     size_t count = h->file_count ? h->file_count : 1;
-    uint64_t part_bytes = (uint64_t)info->dims[0] * (uint64_t)info->dims[1] *
-                          (uint64_t)info->dims[2] * trip_scalar_bytes(info->type) / count;
+    trip_dense_layout layout;
+    const trip_byte_encoding whole = h->file_count ? TRIP_BYTES_PLAIN : trip_byte_encoding_of(path);
     for (size_t i = 0; i < count; i++) {
         char *name = h->file_count ? join(path, h->files[i]) : strdup(path);
         if (!name)
             return trip_fail(TRIP_ERROR, "read", path, "out of memory for its data files");
         sources[i] = (trip_byte_source){ .path = name,
                                          .encoding = h->encoding,
+                                         .text = h->text,
+                                         .text_type = h->type,
                                          .offset_bytes = h->file_count ? 0 : h->header_bytes };
-        int status = locate(&sources[i], h, part_bytes);
+        int status = whole == TRIP_BYTES_PLAIN ? locate(&sources[i], h, part_bytes_of(h, count))
+                                               : locate_compressed(&sources[i], h, whole);
         if (status < 0)
             return status;
     }
-    return trip_dense_open(state, sources, (int64_t)count, info,
+    trip_nrrd_header_layout(h, params->channel, params->time, &layout);
+    return trip_dense_open(state, sources, (int64_t)count, info, &layout,
                            h->big_endian != trip_machine_is_big_endian());
 }
 
-static int open_data(const char *path, const trip_nrrd_header *h, const trip_volume_info *info,
-                     void **state)
+static int open_data(const char *path, const trip_nrrd_header *h, const trip_volume_params *params,
+                     const trip_volume_info *info, void **state)
 {
     size_t count = h->file_count ? h->file_count : 1;
     int status = trip_volume_check_dims(path, info);
@@ -134,17 +158,35 @@ static int open_data(const char *path, const trip_nrrd_header *h, const trip_vol
     trip_byte_source *sources = calloc(count, sizeof *sources);
     if (!sources)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory for its data files");
-    status = open_sources(path, h, info, sources, state);
+    status = open_sources(path, h, params, info, sources, state);
     for (size_t i = 0; i < count; i++)
         free((char *)(uintptr_t)sources[i].path);
     free(sources);
     return status;
 }
 
+/* Checks --channel and --time, and notes the chosen entries. */
+static int choose_entries(const char *path, const trip_nrrd_header *h,
+                          const trip_volume_params *params, trip_volume_info *info)
+{
+    const int64_t channels = h->channel_axis >= 0 && !h->colour ? h->sizes[h->channel_axis] : 1;
+    const int64_t times = h->time_axis >= 0 ? h->sizes[h->time_axis] : 1;
+    int status = trip_volume_check_entry(path, "channel", params->channel, channels);
+    if (status == 0)
+        status = trip_volume_check_entry(path, "time", params->time, times);
+    if (h->colour)
+        trip_append_note(info->note, sizeof info->note, TRIP_VOLUME_COLOUR_NOTE);
+    char axis[32];
+    snprintf(axis, sizeof axis, " (axis %d)", h->channel_axis);
+    trip_entry_note(info->note, sizeof info->note, "channel", params->channel, channels, axis);
+    snprintf(axis, sizeof axis, " (axis %d)", h->time_axis);
+    trip_entry_note(info->note, sizeof info->note, "time", params->time, times, axis);
+    return status;
+}
+
 static int nrrd_open(const char *path, const trip_volume_params *params, trip_budget *budget,
                      trip_volume_info *info, void **state)
 {
-    (void)params;
     (void)budget;
     trip_nrrd_header h = { 0 };
     int status = read_header(path, &h);
@@ -154,8 +196,10 @@ static int nrrd_open(const char *path, const trip_volume_params *params, trip_bu
     info->index_to_world = h.index_to_world;
     info->oriented = h.oriented;
     memcpy(info->space, h.space, sizeof info->space);
-    info->type = h.type;
-    status = open_data(path, &h, info, state);
+    info->type = h.colour ? TRIP_F32 : h.type;
+    status = choose_entries(path, &h, params, info);
+    if (status == 0)
+        status = open_data(path, &h, params, info, state);
     for (int a = 0; a < 3 && status == 0; a++)
         if (h.coordinates[a])
             status = trip_volume_set_coordinates(info, a, h.coordinates[a], path);
@@ -184,6 +228,7 @@ const trip_volume_reader trip_read_nrrd = {
     .probe = nrrd_probe,
     .list = nrrd_list,
     .open = nrrd_open,
+    .decompresses = true,
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,
     .read_slices = trip_dense_read_slices,

@@ -16,9 +16,9 @@
 /* Returns the length of the path without ".gz" or ".bz2". */
 static size_t uncompressed_length(const char *path)
 {
-    size_t length = strlen(path);
-    return trip_byte_encoding_of(path) == TRIP_BYTES_PLAIN ? length
-                                                           : (size_t)(strrchr(path, '.') - path);
+    const char *dot = strrchr(path, '.');
+    const bool packed = dot && (strcasecmp(dot, ".gz") == 0 || strcasecmp(dot, ".bz2") == 0);
+    return packed ? (size_t)(dot - path) : strlen(path);
 }
 
 static bool is_raw_name(const char *path)
@@ -101,6 +101,32 @@ static int find_layout(const char *path, const trip_volume_params *params, trip_
     return 0;
 }
 
+/* The content tells whether a file is compressed. Values can look like the start of a compressed
+ * file by chance. A file of the exact length of the values is therefore plain, unless its name
+ * ends in .gz or .bz2. A file with such a name may be plain if it has that length. */
+static int find_encoding(const char *path, const trip_volume_params *params,
+                         const trip_volume_info *info, trip_byte_encoding *out)
+{
+    uint64_t bytes = 0;
+    const bool named = uncompressed_length(path) < strlen(path);
+    int status = trip_volume_check_dims(path, info);
+    if (status == 0)
+        status = trip_file_size(path, &bytes);
+    if (status < 0)
+        return status;
+    const uint64_t expected =
+        params->raw_offset_bytes + trip_scalar_bytes(info->type) * (uint64_t)info->dims[0] *
+                                       (uint64_t)info->dims[1] * (uint64_t)info->dims[2];
+    *out = trip_byte_encoding_of(path);
+    if (!named && bytes == expected)
+        *out = TRIP_BYTES_PLAIN;
+    if (named && *out == TRIP_BYTES_PLAIN && bytes != expected)
+        return trip_fail(TRIP_ERROR, "read", path,
+                         "its name says that it is compressed, but its content is neither gzip nor "
+                         "bzip2 data; the file may be damaged");
+    return 0;
+}
+
 static int raw_open(const char *path, const trip_volume_params *params, trip_budget *budget,
                     trip_volume_info *info, void **state)
 {
@@ -109,12 +135,15 @@ static int raw_open(const char *path, const trip_volume_params *params, trip_bud
     if (status < 0)
         return status;
     int native = trip_machine_is_big_endian() ? 2 : 1;
-    trip_byte_source source = { .path = path, .encoding = trip_byte_encoding_of(path) };
+    trip_byte_source source = { .path = path };
+    status = find_encoding(path, params, info, &source.encoding);
+    if (status < 0)
+        return status;
     if (source.encoding == TRIP_BYTES_PLAIN)
         source.offset_bytes = params->raw_offset_bytes;
     else
         source.skip_bytes = params->raw_offset_bytes;
-    return trip_dense_open(state, &source, 1, info,
+    return trip_dense_open(state, &source, 1, info, NULL,
                            params->raw_endian && params->raw_endian != native);
 }
 
@@ -122,6 +151,7 @@ const trip_volume_reader trip_read_raw = {
     .format = "raw",
     .probe = raw_probe,
     .open = raw_open,
+    .decompresses = true,
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,
     .read_slices = trip_dense_read_slices,

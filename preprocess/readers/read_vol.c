@@ -110,19 +110,35 @@ static int read_header(const char *path, FILE *file, vol_header *h)
     return trip_fail_line("read", path, LINES_MAX, "the header does not end with a line \".\"");
 }
 
+static int open_header(const char *path, vol_header *h)
+{
+    enum { ROOM = LINE_BYTES * LINES_MAX + REPEATED_BYTES };
+    char *text = malloc(ROOM);
+    size_t bytes = 0;
+    int status = text ? trip_byte_stream_head(path, text, ROOM, false, &bytes)
+                      : trip_fail(TRIP_ERROR, "read", path, "out of memory for its header");
+    FILE *file = status == 0 && bytes > 0 ? fmemopen(text, bytes, "rb") : NULL;
+    if (status == 0)
+        status = file ? read_header(path, file, h)
+                      : trip_fail(TRIP_ERROR, "read", path, "the file ends within the header");
+    if (file)
+        fclose(file);
+    free(text);
+    return status;
+}
+
 static int vol_open(const char *path, const trip_volume_params *params, trip_budget *budget,
                     trip_volume_info *info, void **state)
 {
     (void)params;
     (void)budget;
-    FILE *file = fopen(path, "rbe");
-    if (!file)
-        return trip_fail_errno("read", path, "cannot open");
     vol_header h;
-    int status = read_header(path, file, &h);
-    fclose(file);
+    const trip_byte_encoding whole = trip_byte_encoding_of(path);
+    int status = open_header(path, &h);
     if (status < 0)
         return status;
+    if (h.version == 3 && whole != TRIP_BYTES_PLAIN)
+        return trip_byte_stream_refuse_twice(path, whole);
     if (h.version != 2 && h.version != 3)
         return trip_fail(TRIP_ERROR, "read", path,
                          ".vol version %" PRId64 " is unknown; only versions 2 and 3 can be read",
@@ -130,15 +146,19 @@ static int vol_open(const char *path, const trip_volume_params *params, trip_bud
     memcpy(info->dims, h.dims, sizeof info->dims);
     info->type = TRIP_U8;
     trip_byte_source source = { .path = path,
-                                .encoding = h.version == 3 ? TRIP_BYTES_ZLIB : TRIP_BYTES_PLAIN,
-                                .offset_bytes = h.bytes };
-    return trip_dense_open(state, &source, 1, info, false);
+                                .encoding = h.version == 3 ? TRIP_BYTES_ZLIB : whole };
+    if (whole == TRIP_BYTES_PLAIN)
+        source.offset_bytes = h.bytes;
+    else
+        source.skip_bytes = h.bytes;
+    return trip_dense_open(state, &source, 1, info, NULL, false);
 }
 
 const trip_volume_reader trip_read_vol = {
     .format = "vol",
     .probe = vol_probe,
     .open = vol_open,
+    .decompresses = true,
     .close = trip_dense_close,
     .rewind = trip_dense_rewind,
     .read_slices = trip_dense_read_slices,

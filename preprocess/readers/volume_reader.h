@@ -26,6 +26,7 @@ typedef struct trip_volume_reader {
      * returns a negative status. */
     int (*open)(const char *path, const trip_volume_params *params, trip_budget *budget,
                 trip_volume_info *info, void **state);
+    bool decompresses; /* reads compressed files */
     void (*close)(void *state);
     int (*rewind)(void *state);
 

@@ -448,8 +448,7 @@ static void tally_box(const work *k)
             const int64_t voxel[3] = { box->lo[0], box->lo[1] + y, box->lo[2] + z };
             size_t at = entry_of(k, voxel), count = (size_t)box->size[0];
             const uint8_t *active = k->s->params.info->sparse ? k->w->active + at : NULL;
-            trip_tally_range(&k->w->tally, k->w->decoded + at, active, count);
-            trip_tally_count(&k->w->tally, k->w->decoded + at, active, count);
+            trip_tally_row(&k->w->tally, k->w->decoded + at, active, count, voxel);
         }
 }
 

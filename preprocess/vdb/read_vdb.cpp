@@ -203,6 +203,18 @@ void fill_info(const State &state, const trip_vdb_entry &entry,
     snprintf(info->name, sizeof info->name, "%s", entry.name.c_str());
 }
 
+/* OpenVDB itself has no up direction, so the program that wrote the file decides. */
+const char *up_of(const std::string &creator)
+{
+    static const struct {
+        const char *creator, *up;
+    } customs[] = { { "Houdini", "+y" }, { "Maya", "+y" }, { "Blender", "+z" } };
+    for (const auto &custom : customs)
+        if (creator.find(custom.creator) != std::string::npos)
+            return custom.up;
+    return "";
+}
+
 int open_vdb(const char *path, const trip_volume_params *params, trip_budget *budget,
              trip_volume_info *info, void **out)
 {
@@ -221,6 +233,8 @@ int open_vdb(const char *path, const trip_volume_params *params, trip_budget *bu
         seek_tree(is, contents, entry, head);
         state->grid = trip_vdb_load(state->fd, is, contents, head, entry, conversion, budget);
         fill_info(*state, entry, *transform, info);
+        snprintf(info->up, sizeof info->up, "%s",
+                 up_of(head.creator.empty() ? contents.creator : head.creator));
         write_note(contents, entry, conversion, *params, info);
         *out = state.release();
         return 0;
@@ -278,6 +292,7 @@ extern "C" const trip_volume_reader trip_vdb_reader = {
     .probe = nullptr,
     .list = nullptr,
     .open = open_vdb,
+    .decompresses = false,
     .close = close_vdb,
     .rewind = rewind_vdb,
     .read_slices = nullptr,

@@ -34,9 +34,17 @@ template <typename Item> void read_metadata(trip_vdb_stream &is, const Item &ite
     }
 }
 
-void skip_metadata(trip_vdb_stream &is)
+/* Reads the value of an item of metadata if it is a short string. Otherwise returns "" and reads
+ * nothing. */
+std::string read_text(trip_vdb_stream &is, const std::string &type, uint32_t bytes)
 {
-    read_metadata(is, [](const std::string &, const std::string &, uint32_t) {});
+    std::string text;
+    if (type != "string" || bytes > name_limit)
+        return text;
+    text.resize(bytes);
+    if (bytes > 0)
+        is.read(&text[0], bytes);
+    return text;
 }
 
 /* Parses "Tree_float_5_4_3" or "Tree_float_5_4_3_HalfFloat". */
@@ -208,7 +216,10 @@ trip_vdb_contents trip_vdb_read_contents(const trip_vdb_fd &fd)
         contents.compression =
             is.get_value<char>() ? openvdb::io::COMPRESS_ZIP : openvdb::io::COMPRESS_NONE;
     is.skip(36); /* the file's UUID as text */
-    skip_metadata(is);
+    read_metadata(is, [&](const std::string &name, const std::string &type, uint32_t bytes) {
+        if (name == "creator")
+            contents.creator = read_text(is, type, bytes);
+    });
     read_entries(is, fd.size(), contents);
     return contents;
 }
@@ -216,7 +227,7 @@ trip_vdb_contents trip_vdb_read_contents(const trip_vdb_fd &fd)
 trip_vdb_head trip_vdb_read_head(trip_vdb_stream &is, const trip_vdb_contents &contents,
                                  const trip_vdb_entry &entry)
 {
-    trip_vdb_head head = { contents.compression, "" };
+    trip_vdb_head head = { contents.compression, "", "" };
     is.seekg(entry.offset);
     if (contents.version >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION)
         head.compression = is.get_value<uint32_t>();
@@ -226,11 +237,10 @@ trip_vdb_head trip_vdb_read_head(trip_vdb_stream &is, const trip_vdb_contents &c
         throw trip_vdb_error("is corrupt, or compressed in an unknown way: flags " +
                              std::to_string(head.compression));
     read_metadata(is, [&](const std::string &name, const std::string &type, uint32_t bytes) {
-        if (name != "class" || type != "string" || bytes > name_limit)
-            return;
-        head.grid_class.resize(bytes);
-        if (bytes > 0)
-            is.read(&head.grid_class[0], bytes);
+        if (name == "class")
+            head.grid_class = read_text(is, type, bytes);
+        else if (name == "creator")
+            head.creator = read_text(is, type, bytes);
     });
     return head;
 }

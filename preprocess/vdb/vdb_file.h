@@ -119,6 +119,7 @@ struct trip_vdb_contents {
     uint32_t compression; /* for formats before 222; later, each grid has its own */
     bool has_offsets; /* false for a file written as a stream, in which only the first grid can be
                          found */
+    std::string creator; /* program that wrote the file; empty if unknown */
     std::vector<trip_vdb_entry> grids;
 };
 
@@ -128,6 +129,7 @@ trip_vdb_contents trip_vdb_read_contents(const trip_vdb_fd &fd);
 struct trip_vdb_head {
     uint32_t compression;
     std::string grid_class; /* "level set", "fog volume", ...; empty if unknown */
+    std::string creator;    /* program that made the grid; empty if unknown */
 };
 /* Reads the head of a grid and leaves the stream at the transform. */
 trip_vdb_head trip_vdb_read_head(trip_vdb_stream &is, const trip_vdb_contents &contents,

@@ -13,16 +13,20 @@
 
 /* Raise this with every change that makes the same input and parameters give other bytes: in a
  * reader, in triptych-images or in the bricker. */
-enum { BRICKER_VERSION = 20 };
+enum { BRICKER_VERSION = 24 };
 
 static void write_volume_params(FILE *f, const trip_volume_params *v)
 {
     fprintf(f, "%s %d %s %d %" PRIu64 " %d\n", v->grid ? v->grid : "", (int)v->level_set,
             v->raw_type ? v->raw_type : "", v->raw_endian, v->raw_offset_bytes, v->allow_gaps);
+    if (v->series || v->channel || v->time)
+        fprintf(f, "series %d channel %d time %d\n", v->series, v->channel, v->time);
     if (v->axes)
         fprintf(f, "axes %s\n", v->axes);
     if (v->max_voxels)
         fprintf(f, "at most %" PRIu64 "\n", v->max_voxels);
+    if (v->fill)
+        fprintf(f, "fill %s\n", v->fill);
     if (v->coordinates)
         fprintf(f, "%s\n", v->coordinates);
     for (int a = 0; a < 3; a++)

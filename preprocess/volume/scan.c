@@ -2,6 +2,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "report.h"
@@ -200,12 +201,23 @@ void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active,
     add_one_by_one(t, values + i, active ? active + i : NULL, count - i);
 }
 
+void trip_tally_row(trip_tally *t, const float *values, const uint8_t *active, size_t count,
+                    const int64_t at[3])
+{
+    trip_tally_range(t, values, active, count);
+    trip_tally_count(t, values, active, count);
+    trip_value_sample_add_row(&t->sample, values, active, count, at);
+}
+
 void trip_tally_add(trip_tally *t, const trip_tally *other)
 {
     t->voxels += other->voxels;
     t->finite += other->finite;
     t->kept += other->kept;
     t->borders += other->borders;
+    t->below += other->below;
+    t->above += other->above;
+    trip_value_sample_add(&t->sample, &other->sample);
     t->value_min = fmin(t->value_min, other->value_min);
     t->value_max = fmax(t->value_max, other->value_max);
     if (other->counted == 0)
@@ -232,12 +244,14 @@ static bool check_range(double lo, double hi)
 static bool check_bins(const trip_tally *t)
 {
     const int64_t max = INT64_C(1) << 26; /* see last_bit() */
+    const double lo = t->has_typical ? t->typical_min : t->value_min;
+    const double hi = t->has_typical ? t->typical_max : t->value_max;
     uint64_t sum = 0;
-    if (!check_range(t->value_min, t->value_max) || t->exponent < -149 || t->first < -max ||
-        t->first > max || t->exponent > exponent_for(t->value_min, t->value_max))
+    if (!check_range(lo, hi) || t->exponent < -149 || t->first < -max || t->first > max ||
+        t->exponent > exponent_for(lo, hi))
         return false;
-    double first = floor(ldexp(t->value_min, -t->exponent));
-    double last = floor(ldexp(t->value_max, -t->exponent));
+    double first = floor(ldexp(lo, -t->exponent));
+    double last = floor(ldexp(hi, -t->exponent));
     for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
         double bin = (double)(t->first + b);
         if (t->counts[b] > 0 && (bin < first || bin > last))
@@ -248,31 +262,72 @@ static bool check_bins(const trip_tally *t)
     return sum == t->counted;
 }
 
+static bool has_range(const trip_tally *t)
+{
+    return check_range(t->value_min, t->value_max) &&
+           (!t->has_typical || (check_range(t->typical_min, t->typical_max) &&
+                                t->typical_min >= t->value_min && t->typical_max <= t->value_max));
+}
+
 bool trip_tally_check(const trip_tally *t)
 {
     if (t->finite > t->voxels || t->counted > t->finite || t->kept > t->voxels ||
-        t->borders > 2 * t->voxels)
+        t->borders > 2 * t->voxels || t->has_typical > 1 || t->below > t->finite ||
+        t->above > t->finite - t->below || t->counted > t->finite - t->below - t->above)
         return false;
     if (t->finite == 0)
-        return t->value_min == INFINITY && t->value_max == -INFINITY;
-    return t->counted > 0 ? check_bins(t) : check_range(t->value_min, t->value_max);
+        return t->value_min == INFINITY && t->value_max == -INFINITY && !t->has_typical &&
+               t->sample.count == 0 && trip_value_sample_check(&t->sample, 0, 0, 0);
+    return has_range(t) &&
+           trip_value_sample_check(&t->sample, t->finite, t->value_min, t->value_max) &&
+           (t->counted == 0 || check_bins(t));
+}
+
+enum { BINS = sizeof((trip_histogram *)0)->counts / sizeof *((trip_histogram *)0)->counts };
+
+static int to_bin(const trip_histogram *h, double value)
+{
+    const double range = h->value_max - h->value_min;
+    const int to = range > 0 ? (int)((value - h->value_min) / range * BINS) : 0;
+    return to < BINS ? to : BINS - 1;
+}
+
+/* Fills the histogram from the sample, because the fine bins also cover values far outside. The
+ * sum of all counts is `inside`. */
+static void count_sample(const trip_tally *t, uint64_t inside, trip_histogram *h)
+{
+    uint64_t counts[BINS] = { 0 }, all = 0, before = 0, given = 0;
+    for (uint32_t i = 0; i < t->sample.count; i++)
+        if (t->sample.values[i] >= h->value_min && t->sample.values[i] <= h->value_max) {
+            counts[to_bin(h, t->sample.values[i])]++;
+            all++;
+        }
+    for (int b = 0; b < BINS && all > 0; b++) {
+        before += counts[b];
+        const uint64_t to = (uint64_t)((double)inside * ((double)before / (double)all) + 0.5);
+        h->counts[b] = to - given;
+        given = to;
+    }
+    h->total = given;
 }
 
 void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram)
 {
-    const int bins = sizeof histogram->counts / sizeof *histogram->counts;
-    double range = t->value_max - t->value_min;
+    const bool typical = t->has_typical;
     memset(histogram, 0, sizeof *histogram);
-    histogram->value_min = t->value_min;
-    histogram->value_max = t->value_max;
+    histogram->value_min = typical ? t->typical_min : t->value_min;
+    histogram->value_max = typical ? t->typical_max : t->value_max;
+    if (typical && t->counted + t->below + t->above > t->finite) {
+        count_sample(t, t->finite - t->below - t->above, histogram);
+        return;
+    }
     histogram->total = t->counted;
     for (int64_t b = 0; b < TRIP_TALLY_BINS; b++) {
         if (t->counts[b] == 0)
             continue;
         /* A fine bin counts at its lower edge, which is exact for integers of up to 14 bits. */
-        double value = fmax(ldexp((double)(t->first + b), t->exponent), t->value_min);
-        int to = range > 0 ? (int)((value - t->value_min) / range * bins) : 0;
-        histogram->counts[to < bins ? to : bins - 1] += t->counts[b];
+        double value = fmax(ldexp((double)(t->first + b), t->exponent), histogram->value_min);
+        histogram->counts[to_bin(histogram, value)] += t->counts[b];
     }
 }
 
@@ -282,6 +337,8 @@ typedef struct scan {
     float *values;       /* SCAN_VOXELS for each thread */
     uint8_t *active;
     const trip_scan_params *params;
+    trip_id_set *sets; /* one for each thread, or NULL */
+    trip_budget *budget;
 } scan;
 
 static void count_kept(trip_tally *t, const trip_envelope *e, const float *values,
@@ -299,6 +356,63 @@ static void count_kept(trip_tally *t, const trip_envelope *e, const float *value
         t->borders += (uint64_t)keep[0] + keep[count - 1];
 }
 
+/* Replaces the values outside of the clipping range by NaN, and counts them. */
+static void clip_row(const scan *s, trip_tally *t, float *values, const uint8_t *active,
+                     size_t count)
+{
+    const float lo = (float)s->params->clip_min, hi = (float)s->params->clip_max;
+    for (size_t i = 0; i < count; i++) {
+        const bool exists = isfinite(values[i]) && (!active || active[i]);
+        t->below += exists && values[i] < lo;
+        t->above += exists && values[i] > hi;
+        if (!(values[i] >= lo && values[i] <= hi))
+            values[i] = NAN;
+    }
+}
+
+/* Adds the keys of a row of a dense volume to the set of ids. */
+static int add_ids(const scan *s, unsigned thread, const trip_box *box, const int64_t at[3],
+                   const float *values)
+{
+    const trip_scalar type = trip_volume_get_info(box->volume)->type;
+    trip_id_set *set = &s->sets[thread];
+    uint64_t keys[SCAN_EDGE];
+    bool integers = true;
+    if (set->other)
+        return 0;
+    if (type < TRIP_F16)
+        trip_portion_keys(box->volume, box->portion, at, box->size[0], keys);
+    size_t n = 0;
+    for (int64_t i = 0; i < box->size[0] && integers; i++)
+        if (isfinite(values[i]))
+            keys[n++] = type < TRIP_F16 ? keys[i] : trip_id_key((double)values[i], &integers);
+    set->other = !integers;
+    if (integers)
+        trip_id_set_add_row(
+            set, keys, n, type == TRIP_U32 || type == TRIP_U64 ? 0 : UINT64_C(1) << 63, s->budget);
+    return 0;
+}
+
+static void scan_row(scan *s, unsigned thread, const trip_box *box, size_t row, float *values,
+                     const uint8_t *active)
+{
+    const trip_scan_params *p = s->params;
+    trip_tally *t = &s->tallies[thread];
+    const int64_t y = (int64_t)row % box->size[1], z = (int64_t)row / box->size[1];
+    const int64_t at[3] = { box->lo[0], box->lo[1] + y, box->lo[2] + z };
+    const size_t count = (size_t)box->size[0];
+    if (s->sets)
+        add_ids(s, thread, box, at, values);
+    if (p->clip_min < p->clip_max)
+        clip_row(s, t, values, active, count);
+    if (!p->envelope) {
+        trip_tally_row(t, values, active, count, at);
+        return;
+    }
+    trip_tally_range(t, values, active, count);
+    count_kept(t, p->envelope, values, active, count);
+}
+
 static int scan_box(void *user, unsigned thread, const trip_box *box)
 {
     scan *s = user;
@@ -308,14 +422,8 @@ static int scan_box(void *user, unsigned thread, const trip_box *box)
     if (status < 0)
         return status;
     size_t row = (size_t)box->size[0], rows = (size_t)(box->size[1] * box->size[2]);
-    for (size_t r = 0; r < rows; r++) {
-        const uint8_t *row_active = active ? active + r * row : NULL;
-        trip_tally_range(&s->tallies[thread], values + r * row, row_active, row);
-        if (s->params->envelope)
-            count_kept(&s->tallies[thread], s->params->envelope, values + r * row, row_active, row);
-        else
-            trip_tally_count(&s->tallies[thread], values + r * row, row_active, row);
-    }
+    for (size_t r = 0; r < rows; r++)
+        scan_row(s, thread, box, r, values + r * row, active ? active + r * row : NULL);
     return 0;
 }
 
@@ -354,6 +462,10 @@ static int walk_once(scan *s, trip_tally *out, trip_volume *volume, trip_workers
     int status = trip_walk(volume, workers, &walk);
     for (unsigned i = 0; i < threads; i++)
         trip_tally_add(out, &s->tallies[i]);
+    for (unsigned i = 0; i < threads && s->sets; i++) {
+        trip_id_set_add(s->params->ids, &s->sets[i], s->budget);
+        trip_id_set_free(&s->sets[i], s->budget);
+    }
     return status == 0 ? trip_volume_rewind(volume) : status;
 }
 
@@ -370,20 +482,23 @@ int trip_scan_volume(trip_tally *out, trip_volume *volume, const char *path, tri
                      const trip_scan_params *params, trip_budget *budget)
 {
     size_t threads = trip_workers_count(workers);
-    scan s = { .sparse = trip_volume_get_info(volume)->sparse, .params = params };
+    scan s = { .sparse = trip_volume_get_info(volume)->sparse, .params = params, .budget = budget };
+    const bool ids = params->ids && !s.sparse;
     size_t tallies = threads * sizeof *s.tallies, values = threads * SCAN_VOXELS * sizeof *s.values;
     size_t active = s.sparse ? threads * SCAN_VOXELS : 0;
     int status;
     s.tallies = trip_budget_take(budget, tallies);
     s.values = trip_budget_take(budget, values);
     s.active = active ? trip_budget_take(budget, active) : NULL;
-    if (s.tallies && s.values && (s.active || !active))
+    s.sets = ids ? calloc(threads, sizeof *s.sets) : NULL;
+    if (s.tallies && s.values && (s.active || !active) && (s.sets || !ids))
         status = scan_with(&s, out, volume, path, workers);
     else
         status = trip_fail(TRIP_ERROR, "brick", path,
                            "%zu threads need more memory than --memory allows: raise --memory or "
                            "lower --threads",
                            threads);
+    free(s.sets);
     trip_budget_release(budget, s.tallies, tallies);
     trip_budget_release(budget, s.values, values);
     if (active)

@@ -6,7 +6,9 @@
 #define TRIP_SCAN_H
 
 #include "envelope.h"
+#include "ids.h"
 #include "transfer_function.h"
+#include "value_sample.h"
 #include "walk.h"
 
 enum { TRIP_TALLY_BINS = 16384 };
@@ -25,6 +27,12 @@ typedef struct trip_tally {
     int exponent;
     int64_t first;
     uint64_t counts[TRIP_TALLY_BINS];
+    /* Range of the values without the few that stand far outside (typical.h), and the numbers of
+     * values outside. Not set before trip_typical_set(). */
+    uint64_t has_typical; /* 1 if set */
+    double typical_min, typical_max;
+    uint64_t below, above;
+    trip_value_sample sample;
 } trip_tally;
 
 void trip_tally_clear(trip_tally *t);
@@ -34,10 +42,14 @@ void trip_tally_range(trip_tally *t, const float *values, const uint8_t *active,
 /* Counts the row's finite values in the fine bins. Call trip_tally_range() for the same row first.
  */
 void trip_tally_count(trip_tally *t, const float *values, const uint8_t *active, size_t count);
+/* Does both, and adds the row to the sample. The row starts at voxel `at`. */
+void trip_tally_row(trip_tally *t, const float *values, const uint8_t *active, size_t count,
+                    const int64_t at[3]);
 void trip_tally_add(trip_tally *t, const trip_tally *other);
 /* Returns whether a tally from a file is consistent and therefore safe to use. */
 bool trip_tally_check(const trip_tally *t);
-/* Computes the histogram with 1024 bins over the range. */
+/* Computes the histogram with 1024 bins over the typical range or, before it is known, over the
+ * range. It leaves out the values outside. */
 void trip_tally_histogram(const trip_tally *t, trip_histogram *histogram);
 
 /* Zero selects the default of a field. */
@@ -46,6 +58,10 @@ typedef struct trip_scan_params {
     bool read_ahead; /* as in trip_walk_params */
     uint64_t stride; /* reads the first of every `stride` batches; by default all batches */
     const trip_envelope *envelope; /* counts the kept voxels instead of filling bins */
+    /* If clip_min < clip_max, only values from clip_min to clip_max are put into the bins and the
+     * sample. The others are counted. */
+    double clip_min, clip_max;
+    trip_id_set *ids; /* collects the distinct values of dense volumes; may be NULL */
     /* Gets the number of voxels so far. A status other than 0 ends the scan, which returns the
      * status. */
     int (*progress)(void *user, uint64_t voxels);

@@ -10,7 +10,6 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "byte_stream.h"
 #include "report.h"
 #include "volume_coordinates.h"
 #include "volume_reader.h"
@@ -135,14 +134,12 @@ int trip_source_digest_state(const trip_source *s, const char *text, trip_digest
 }
 
 /* Adds a name as far as readers use it. Names of raw files give size and type, and names in stacks
- * give the order. Other names matter only for the encoding. */
+ * give the order. */
 static void add_name(XXH3_state_t *hash, const trip_source *s, const trip_source_file *f)
 {
     bool matters = !strcmp(s->format, "raw") || !strcmp(s->format, "images");
     const char *name = matters ? base_name(f->path) : "";
-    const int encoding = (int)trip_byte_encoding_of(f->path);
     XXH3_128bits_update(hash, name, strlen(name) + 1);
-    XXH3_128bits_update(hash, &encoding, sizeof encoding);
     XXH3_128bits_update(hash, &f->bytes, sizeof f->bytes);
 }
 

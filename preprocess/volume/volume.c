@@ -11,6 +11,8 @@
 #include <unistd.h>
 
 #include "anatomy.h"
+#include "byte_stream.h"
+#include "dense_file.h"
 #include "report.h"
 #include "sampled.h"
 #include "volume_coordinates.h"
@@ -20,10 +22,11 @@
 /* The default size of a portion. */
 #define PORTION_BYTES ((int64_t)16 << 20)
 
-/* In the order of probing: formats with a magic number first. */
+/* In the order of probing. NIfTI files are also known by their names, and raw data by names alone.
+ */
 static const trip_volume_reader *const readers[] = {
-    &trip_read_vdb,     &trip_read_nrrd, &trip_read_nifti,  &trip_read_netcdf,
-    &trip_read_netcdf4, &trip_read_vol,  &trip_read_images, &trip_read_raw,
+    &trip_read_vdb, &trip_read_nrrd,   &trip_read_netcdf, &trip_read_netcdf4,
+    &trip_read_vol, &trip_read_images, &trip_read_nifti,  &trip_read_raw,
 };
 
 /* The stored slices [first, first + count) of a portion, including one neighbour on each side. */
@@ -39,6 +42,9 @@ struct trip_volume {
     trip_volume_info info;
     trip_budget *budget;
     char *path;
+
+    const trip_ids *ids; /* decoding gives ranks of ids; NULL means values */
+    bool exact_fills;    /* the user gave the fill value, so that not the nearest float counts */
 
     /* All further fields are for slice readers. */
     size_t slice_bytes;
@@ -78,6 +84,21 @@ static int check_options(const char *path, const char *format, const trip_volume
     if (strcmp(format, "images") != 0 && p->allow_gaps)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s; --allow-gaps requires a stack of slices", format);
+    if (strcmp(format, "images") != 0 && p->series)
+        return trip_fail(TRIP_USAGE, "read", path, "its format is %s; --series requires DICOM",
+                         format);
+    static const char *const several[] = { "nrrd", "nifti", "netcdf", "images" };
+    bool may_have_several = false;
+    for (size_t i = 0; i < sizeof several / sizeof *several; i++)
+        may_have_several |= strcmp(format, several[i]) == 0;
+    if (!may_have_several && (p->channel || p->time))
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "its format is %s; --channel and --time require NRRD, NIfTI, netCDF or "
+                         "a stack of slices",
+                         format);
+    trip_fills fills;
+    if (p->fill && !trip_fills_parse(p->fill, &fills))
+        return trip_fail(TRIP_USAGE, "read", path, "--fill takes a number or none");
     for (int a = 0; a < 3; a++)
         if (!isfinite(p->spacing[a]) || p->spacing[a] < 0 ||
             (p->spacing[a] == 0) != (p->spacing[0] == 0))
@@ -87,10 +108,13 @@ static int check_options(const char *path, const char *format, const trip_volume
     return 0;
 }
 
-/* Reads the first bytes of a regular file. A folder or a pattern has none. */
-static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
+/* Reads the first bytes of a regular file, decompressed. A folder or a pattern has none. *encoding
+ * gets the compression of the file. */
+static int read_head(const char *path, unsigned char *head, size_t *bytes_out,
+                     trip_byte_encoding *encoding)
 {
     *bytes_out = 0;
+    *encoding = TRIP_BYTES_PLAIN;
     struct stat st;
     if (stat(path, &st) != 0) {
         if (errno == ENOENT && strpbrk(path, "%*?["))
@@ -110,7 +134,42 @@ static int read_head(const char *path, unsigned char *head, size_t *bytes_out)
     int status = n < 0 ? trip_fail_errno("read", path, "cannot read") : 0;
     close(fd);
     *bytes_out = n < 0 ? 0 : (size_t)n;
+    *encoding = trip_byte_encoding_of_head(head, *bytes_out);
+    if (status < 0 || *encoding == TRIP_BYTES_PLAIN)
+        return status;
+    unsigned char inner[HEAD_BYTES];
+    size_t inner_bytes = 0;
+    status = trip_byte_stream_head(path, inner, HEAD_BYTES, true, &inner_bytes);
+    if (inner_bytes > 0) {
+        memcpy(head, inner, inner_bytes);
+        *bytes_out = inner_bytes;
+    }
     return status;
+}
+
+/* Reports that the format cannot be read in order. */
+static int refuse_compressed(const char *path, const char *format, trip_byte_encoding encoding)
+{
+    const char *program = trip_byte_encoding_name(encoding);
+    return trip_fail(TRIP_ERROR, "read", path,
+                     "is compressed with %s, and its format (%s) can only be read unpacked: unpack "
+                     "it first, with `%s -dc FILE >NAME`",
+                     program, format, program);
+}
+
+/* Reports that no reader knows the file, or that its compressed data are damaged. */
+static int refuse_unknown(const char *path, trip_byte_encoding encoding)
+{
+    unsigned char head[HEAD_BYTES];
+    size_t bytes;
+    int status = encoding == TRIP_BYTES_PLAIN
+                     ? 0
+                     : trip_byte_stream_head(path, head, sizeof head, false, &bytes);
+    return status < 0 ? status
+                      : trip_fail(TRIP_ERROR, "read", path,
+                                  "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); "
+                                  "describe raw data with `triptych brick FILE --size X,Y,Z "
+                                  "--type uint8`");
 }
 
 int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
@@ -122,19 +181,19 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
         *out = &trip_read_memory;
         return check_options(path, trip_read_memory.format, params);
     }
-    int status = read_head(path, head, &bytes);
+    trip_byte_encoding encoding;
+    int status = read_head(path, head, &bytes, &encoding);
     if (status < 0)
         return status;
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
         if (!readers[i]->probe(path, head, bytes, params))
             continue;
         *out = readers[i];
+        if (encoding != TRIP_BYTES_PLAIN && !readers[i]->decompresses)
+            return refuse_compressed(path, readers[i]->format, encoding);
         return check_options(path, readers[i]->format, params);
     }
-    return trip_fail(TRIP_ERROR, "read", path,
-                     "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe "
-                     "raw data with `triptych brick FILE --size X,Y,Z "
-                     "--type uint8`");
+    return refuse_unknown(path, encoding);
 }
 
 /* Returns the length of an index axis in world space, or 0 if the axis has no direction. */
@@ -186,6 +245,17 @@ static bool is_upright(const trip_affine *m)
     return true;
 }
 
+/* Turns a patient's world space into the one of all data sets, RAS: half a turn about z. */
+static void turn_to_ras(trip_volume_info *info)
+{
+    if (strcmp(info->space, "LPS") != 0)
+        return;
+    for (int row = 0; row < 2; row++)
+        for (int column = 0; column < 4; column++) /* without a negative zero */
+            info->index_to_world.m[row][column] = 0 - info->index_to_world.m[row][column];
+    snprintf(info->space, sizeof info->space, "RAS");
+}
+
 /* Turns world space into the patient's, as if the file gave the orientation. */
 static int set_axes(trip_volume *v, const char *axes)
 {
@@ -200,8 +270,7 @@ static int set_axes(trip_volume *v, const char *axes)
     if (!is_upright(&info->index_to_world))
         return trip_fail(TRIP_USAGE, "read", v->path,
                          "gives the directions of its axes; --axes requires a file without them");
-    snprintf(info->space, sizeof info->space, "%s",
-             strcmp(info->format, "nifti") == 0 ? "RAS" : "LPS");
+    snprintf(info->space, sizeof info->space, "RAS");
     info->oriented = true;
     for (int a = 0; a < 3; a++) {
         trip_vec3 to = trip_anatomy_direction(info->space, axes[a]);
@@ -254,6 +323,7 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
     v->info = (trip_volume_info){ .index_to_world = trip_affine_identity(),
                                   .slope = 1,
                                   .format = v->reader->format };
+    v->exact_fills = params->fill && trip_fills_parse(params->fill, &v->info.fills);
     status = v->reader->open(v->path, params, v->budget, &v->info, &v->state);
     if (status < 0)
         return status;
@@ -261,6 +331,7 @@ static int open_with_reader(trip_volume *v, const trip_volume_params *params)
         override_spacing(&v->info.index_to_world, params->spacing);
     if (params->coordinates && !(status = trip_volume_check_dims(v->path, &v->info)))
         status = trip_volume_read_coordinates(&v->info, params->coordinates, v->path);
+    turn_to_ras(&v->info);
     if (!status && params->axes)
         status = set_axes(v, params->axes);
     if (!status)
@@ -298,6 +369,24 @@ int trip_volume_open(trip_volume **out, const char *path, const trip_volume_para
 const trip_volume_info *trip_volume_get_info(const trip_volume *v)
 {
     return &v->info;
+}
+
+void trip_volume_set_fills(trip_volume *v, const trip_fills *fills)
+{
+    v->info.fills = *fills;
+    v->exact_fills = false;
+}
+
+void trip_volume_set_ids(trip_volume *v, const trip_ids *ids)
+{
+    v->ids = ids;
+}
+
+void trip_volume_add_note(trip_volume *v, const char *note)
+{
+    char *to = v->info.note;
+    const size_t used = strlen(to);
+    snprintf(to + used, sizeof v->info.note - used, "%s%s", used ? "; " : "", note);
 }
 
 static void slices_free(trip_volume *v, stored_slices *s)
@@ -366,6 +455,7 @@ void trip_volume_close(trip_volume *v)
     if (v->state)
         v->reader->close(v->state);
     trip_volume_free_coordinates(&v->info);
+    free(v->info.parts);
     free(v->path);
     free(v);
 }
@@ -460,18 +550,108 @@ static int64_t clamp(int64_t v, int64_t lo, int64_t hi)
     return v < lo ? lo : v > hi ? hi : v;
 }
 
+static uint64_t key_of(trip_scalar type, bool swap, const unsigned char *stored)
+{
+    const unsigned bytes = trip_scalar_bytes(type);
+    const bool is_signed =
+        type == TRIP_I8 || type == TRIP_I16 || type == TRIP_I32 || type == TRIP_I64;
+    uint64_t key = 0;
+    for (unsigned i = 0; i < bytes; i++) {
+        const bool first_is_low = trip_machine_is_big_endian() == swap;
+        key |= (uint64_t)stored[first_is_low ? i : bytes - 1 - i] << 8 * i;
+    }
+    if (is_signed && bytes < 8 && key >> (8 * bytes - 1))
+        key |= UINT64_MAX << 8 * bytes;
+    return is_signed ? key ^ UINT64_C(1) << 63 : key;
+}
+
+static void keys_of(const trip_volume *v, const unsigned char *stored, size_t count, uint64_t *keys)
+{
+    const unsigned bytes = trip_scalar_bytes(v->info.type);
+    for (size_t i = 0; i < count; i++)
+        keys[i] = key_of(v->info.type, v->swap, stored + i * bytes);
+}
+
+/* Replaces values by ranks. */
+static void rank_values(const trip_volume *v, const unsigned char *stored, size_t count,
+                        float *values)
+{
+    enum { SOME = 64 };
+    uint64_t keys[SOME];
+    float ranks[SOME];
+    for (size_t i = 0, n; i < count; i += n) {
+        n = count - i < SOME ? count - i : SOME;
+        if (v->info.type < TRIP_F16)
+            keys_of(v, stored + i * trip_scalar_bytes(v->info.type), n, keys);
+        for (size_t k = 0; k < n && v->info.type >= TRIP_F16; k++) {
+            bool integer = true;
+            keys[k] = trip_id_key((double)values[i + k], &integer);
+        }
+        trip_ids_ranks(v->ids, keys, n, ranks);
+        for (size_t k = 0; k < n; k++)
+            values[i + k] = isnan(values[i + k]) ? NAN : ranks[k];
+    }
+}
+
+static void drop_fills(const trip_fills *fills, float *values, size_t count)
+{
+    for (unsigned f = 0; f < fills->count; f++) {
+        const float fill = (float)fills->values[f];
+        for (size_t i = 0; i < count; i++)
+            values[i] = values[i] == fill ? NAN : values[i];
+    }
+}
+
+/* Integers of 32 bits and more share a float with their neighbours. */
+static void drop_exact_fills(const trip_volume *v, const unsigned char *stored, size_t count,
+                             float *values)
+{
+    const trip_volume_info *info = &v->info;
+    const unsigned bytes = trip_scalar_bytes(info->type);
+    const bool is_unsigned = info->type == TRIP_U32 || info->type == TRIP_U64;
+    for (unsigned f = 0; f < info->fills.count; f++) {
+        const double fill = info->fills.values[f];
+        for (size_t i = 0; i < count; i++) {
+            if (values[i] != (float)fill)
+                continue;
+            const uint64_t key = key_of(info->type, v->swap, stored + i * bytes);
+            const double number =
+                is_unsigned ? (double)key : (double)(int64_t)(key ^ UINT64_C(1) << 63);
+            if (info->slope * number + info->inter == fill)
+                values[i] = NAN;
+        }
+    }
+}
+
+static bool is_wide_integer(trip_scalar type)
+{
+    return type >= TRIP_U32 && type <= TRIP_I64;
+}
+
+/* Decodes stored values next to each other. */
+static void decode_values(const trip_volume *v, const unsigned char *stored, size_t count,
+                          float *values)
+{
+    const trip_volume_info *info = &v->info;
+    trip_scalar_decode(info->type, v->swap, info->slope, info->inter, stored, count, values);
+    if (v->exact_fills && is_wide_integer(info->type))
+        drop_exact_fills(v, stored, count, values);
+    else
+        drop_fills(&info->fills, values, count);
+    if (v->ids)
+        rank_values(v, stored, count, values);
+}
+
 /* Decodes values [lo, lo + count) of a stored row of `width` values. Repeats the end values beyond
  * the ends. */
 static void decode_row(const trip_volume *v, const unsigned char *row, int64_t width, int64_t lo,
                        int64_t count, float *values)
 {
-    const trip_volume_info *info = &v->info;
     int64_t begin = clamp(lo, 0, width - 1), end = clamp(lo + count, begin + 1, width);
     int64_t before = clamp(begin - lo, 0, count - 1);
     int64_t inside = clamp(end - begin, 1, count - before);
-    trip_scalar_decode(info->type, v->swap, info->slope, info->inter,
-                       row + (size_t)begin * trip_scalar_bytes(info->type), (size_t)inside,
-                       values + before);
+    decode_values(v, row + (size_t)begin * trip_scalar_bytes(v->info.type), (size_t)inside,
+                  values + before);
     for (int64_t i = 0; i < before; i++)
         values[i] = values[before];
     for (int64_t i = before + inside; i < count; i++)
@@ -509,10 +689,24 @@ int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion
         if (lo[a] < portion->origin[a] - 1 || size[a] < 1 ||
             lo[a] + size[a] > portion->origin[a] + portion->size[a] + 1)
             return trip_fail(TRIP_ERROR, "read", v->path, "voxels outside the portion");
-    if (!v->reader->read_slices)
-        return v->reader->decode(v->state, portion, lo, size, values, active);
-    decode_slices(v, portion->data, lo, size, values, active);
-    return 0;
+    if (v->reader->read_slices) {
+        decode_slices(v, portion->data, lo, size, values, active);
+        return 0;
+    }
+    int status = v->reader->decode(v->state, portion, lo, size, values, active);
+    if (status == 0)
+        drop_fills(&v->info.fills, values, (size_t)(size[0] * size[1] * size[2]));
+    return status;
+}
+
+void trip_portion_keys(const trip_volume *v, const trip_volume_portion *portion,
+                       const int64_t at[3], int64_t count, uint64_t *keys)
+{
+    const stored_slices *s = portion->data;
+    const size_t row_bytes = v->slice_bytes / (size_t)v->info.dims[1];
+    const unsigned char *row =
+        s->slices + (size_t)(at[2] - s->first) * v->slice_bytes + (size_t)at[1] * row_bytes;
+    keys_of(v, row + (size_t)at[0] * trip_scalar_bytes(v->info.type), (size_t)count, keys);
 }
 
 void trip_portion_release(trip_volume *v, trip_volume_portion *portion)

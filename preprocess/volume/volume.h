@@ -9,6 +9,7 @@
 #define TRIP_VOLUME_H
 
 #include "budget.h"
+#include "ids.h"
 #include "volume_info.h"
 
 #ifdef __cplusplus
@@ -23,6 +24,13 @@ int trip_volume_open(trip_volume **out, const char *path, const trip_volume_para
                      trip_budget *budget);
 const trip_volume_info *trip_volume_get_info(const trip_volume *v);
 void trip_volume_close(trip_volume *v);
+/* Sets the fill values. Decoding turns them into NaN. */
+void trip_volume_set_fills(trip_volume *v, const trip_fills *fills);
+/* Adds to the note for the user. */
+void trip_volume_add_note(trip_volume *v, const char *note);
+/* From now on, decoding gives ranks instead of values, and NaN for other values. The ids must exist
+ * until the volume is closed. Dense volumes only. */
+void trip_volume_set_ids(trip_volume *v, const trip_ids *ids);
 
 /* Starts again at the first portion. All portions must have been released. */
 int trip_volume_rewind(trip_volume *v);
@@ -41,6 +49,10 @@ int64_t trip_volume_skip(trip_volume *v, int64_t slices);
  * active; values repeat the border voxel (dense) or are the background (sparse). */
 int trip_portion_decode(const trip_volume *v, const trip_volume_portion *portion,
                         const int64_t lo[3], const int64_t size[3], float *values, uint8_t *active);
+/* Gets the keys (ids.h) of `count` voxels from voxel `at` on along i. Only for integers in a dense
+ * volume, inside the portion. */
+void trip_portion_keys(const trip_volume *v, const trip_volume_portion *portion,
+                       const int64_t at[3], int64_t count, uint64_t *keys);
 /* Releases a portion. The volume keeps the memory of one released portion for the next, until it is
  * rewound or closed. */
 void trip_portion_release(trip_volume *v, trip_volume_portion *portion);

@@ -49,25 +49,21 @@ static const char *fault_of_values(const double *values, int64_t count)
     return NULL;
 }
 
-int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *values,
-                                const char *path)
+int trip_volume_set_positions(trip_volume_info *info, int axis, const double *positions,
+                              const char *path)
 {
     const int64_t count = info->dims[axis];
-    const char *fault = fault_of_values(values, count);
-    double *column = info->index_to_world.m[axis], *table = NULL;
-    if (!fault && !lies_along_axis(&info->index_to_world, axis))
-        fault = "the axis of the volume is not parallel to the axis of world space";
+    const char *fault = fault_of_values(positions, count);
     if (fault)
         return fail_axis(path, axis, fault);
-    column[3] = values[0];
-    if (count == 1)
+    if (count <= 1)
         return 0;
-    column[axis] = (values[count - 1] - values[0]) / (double)(count - 1);
-    table = calloc((size_t)count, sizeof *table);
+    const double mean = (positions[count - 1] - positions[0]) / (double)(count - 1);
+    double *table = calloc((size_t)count, sizeof *table);
     if (!table)
         return trip_fail(TRIP_ERROR, "read", path, "out of memory");
     for (int64_t i = 1; i < count; i++)
-        table[i] = (values[i] - values[0]) / column[axis];
+        table[i] = (positions[i] - positions[0]) / mean;
     table[count - 1] = (double)(count - 1);
     free(info->coordinates[axis]);
     info->coordinates[axis] = NULL;
@@ -77,6 +73,22 @@ int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *
     else
         info->coordinates[axis] = table;
     return fault ? fail_axis(path, axis, fault) : 0;
+}
+
+int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *values,
+                                const char *path)
+{
+    const int64_t count = info->dims[axis];
+    const char *fault = fault_of_values(values, count);
+    double *column = info->index_to_world.m[axis];
+    if (!fault && !lies_along_axis(&info->index_to_world, axis))
+        fault = "the axis of the volume is not parallel to the axis of world space";
+    if (fault)
+        return fail_axis(path, axis, fault);
+    column[3] = values[0];
+    if (count > 1)
+        column[axis] = (values[count - 1] - values[0]) / (double)(count - 1);
+    return trip_volume_set_positions(info, axis, values, path);
 }
 
 /* Splits the option into three names at its commas. Returns false unless there are three. */

@@ -20,6 +20,11 @@ extern "C" {
 int trip_volume_set_coordinates(trip_volume_info *info, int axis, const double *values,
                                 const char *path);
 
+/* Sets the table of an axis from positions along its column of the map, which holds the mean step.
+ */
+int trip_volume_set_positions(trip_volume_info *info, int axis, const double *positions,
+                              const char *path);
+
 /* Reads text files, one for each axis, named as in `--coordinates X.txt,Y.txt,Z.txt`. Blanks,
  * commas or line ends separate the numbers. An axis without a file keeps its spacing. */
 int trip_volume_read_coordinates(trip_volume_info *info, const char *files, const char *path);

@@ -1,10 +1,12 @@
 #include "volume_info.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
 #include "report.h"
+#include "text.h"
 
 static const struct {
     unsigned bytes;
@@ -209,6 +211,13 @@ void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter,
     decoders[type](stored, count, swap, slope, inter, values);
 }
 
+float trip_scalar_luma(trip_scalar type, bool swap, const void *stored)
+{
+    float c[3];
+    trip_scalar_decode(type, swap, 1, 0, stored, 3, c);
+    return (float)(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
+}
+
 int trip_volume_check_dims(const char *path, const trip_volume_info *info)
 {
     int64_t bytes = trip_scalar_bytes(info->type);
@@ -231,4 +240,54 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info)
                              "has more than %" PRId64 " voxels along an axis",
                              TRIP_VOLUME_AXIS_MAX);
     return 0;
+}
+
+bool trip_entry_exists(char why[TRIP_ENTRY_WHY_BYTES], const char *what, int64_t index,
+                       int64_t count)
+{
+    if (index >= 0 && index < count)
+        return true;
+    if (count == 1)
+        snprintf(why, TRIP_ENTRY_WHY_BYTES, "has one %s; --%s %" PRId64 " does not exist", what,
+                 what, index);
+    else
+        snprintf(why, TRIP_ENTRY_WHY_BYTES,
+                 "has %" PRId64 " %ss, from 0 to %" PRId64 "; --%s %" PRId64 " does not exist",
+                 count, what, count - 1, what, index);
+    return false;
+}
+
+int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count)
+{
+    char why[TRIP_ENTRY_WHY_BYTES];
+    return trip_entry_exists(why, what, index, count)
+               ? 0
+               : trip_fail(TRIP_USAGE, "read", path, "%s", why);
+}
+
+void trip_append_note(char *note, size_t room, const char *text)
+{
+    const size_t used = strlen(note);
+    if (*text)
+        snprintf(note + used, room - used, "%s%s", used ? "; " : "", text);
+}
+
+void trip_entry_note(char *note, size_t room, const char *what, int64_t index, int64_t count,
+                     const char *detail)
+{
+    char text[256] = "";
+    if (count > 1)
+        snprintf(text, sizeof text,
+                 "%s %" PRId64 " of %" PRId64 "%s is read (--%s N reads another, from 0)", what,
+                 index, count, detail, what);
+    trip_append_note(note, room, text);
+}
+
+bool trip_fills_parse(const char *text, trip_fills *fills)
+{
+    *fills = (trip_fills){ 0 };
+    if (!strcmp(text, "none"))
+        return true;
+    fills->count = 1;
+    return trip_text_to_double(text, &fills->values[0]) && isfinite(fills->values[0]);
 }

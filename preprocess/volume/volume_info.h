@@ -48,6 +48,21 @@ const char *trip_scalar_name(trip_scalar type);
 void trip_scalar_decode(trip_scalar type, bool swap, double slope, double inter, const void *stored,
                         size_t count, float *values);
 
+/* Returns the luma (Rec. ITU-R BT.709-6, 3.2) of red, green and blue, which follow each other at
+ * `stored`. */
+float trip_scalar_luma(trip_scalar type, bool swap, const void *stored);
+
+/* Values that stand for "no value" in a volume. Their voxels count as absent. */
+enum { TRIP_FILLS_MAX = 8 };
+typedef struct trip_fills {
+    uint64_t count;
+    double values[TRIP_FILLS_MAX];
+} trip_fills;
+
+/* Parses the value of --fill. Sets *fills to the value, or to none for "none". Returns false for
+ * other texts. */
+bool trip_fills_parse(const char *text, trip_fills *fills);
+
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
 #define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
 
@@ -61,11 +76,15 @@ typedef struct trip_volume_info {
     bool sparse;         /* only active voxels exist; all others hold `background` */
     double background;
     const char *format; /* "nrrd", "openvdb", ... */
-    char space[8]; /* orientation of world space in the patient, as in anatomy.h; "" if unknown */
+    char space[8]; /* orientation of world space in the patient: "RAS", or "" if unknown. Readers
+                      may set "LPS"; opening a volume turns it into "RAS". */
     bool oriented; /* the file gives the directions of its axes in world space */
+    char up[3];    /* "+y" or "+z", which is up in the program that wrote the file; "" if unknown */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     char name[128];    /* grid name, if the format has one */
-    char note[512];    /* tells the user which grid or variable was chosen by default, or "" */
+    char note[1024];   /* tells the user the choices made by default, or "" */
+    char *parts;       /* the series of a DICOM folder, one a line, or NULL. The volume owns it. */
+    trip_fills fills;  /* decoded as NaN */
 } trip_volume_info;
 
 /* Reports and returns a negative status unless each of dims is at least 1 and the size in bytes
@@ -74,6 +93,22 @@ typedef struct trip_volume_info {
 int trip_volume_check_dims(const char *path, const trip_volume_info *info);
 /* Reports and returns a negative status if an axis has more than TRIP_VOLUME_AXIS_MAX voxels. */
 int trip_volume_check_axes(const char *path, const trip_volume_info *info);
+
+#define TRIP_VOLUME_COLOUR_NOTE "the values are colours; their luma (Rec. 709) is read"
+
+/* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
+ * Returns false and fills `why` if `index` is none of them. The second function reports this and
+ * returns a negative status. */
+#define TRIP_ENTRY_WHY_BYTES 128
+bool trip_entry_exists(char why[TRIP_ENTRY_WHY_BYTES], const char *what, int64_t index,
+                       int64_t count);
+int trip_volume_check_entry(const char *path, const char *what, int index, int64_t count);
+/* Appends to a note of `room` bytes that one of `count` entries is read, if there are several.
+ * `detail` may be "". */
+void trip_entry_note(char *note, size_t room, const char *what, int64_t index, int64_t count,
+                     const char *detail);
+/* Appends a text to a note of `room` bytes. */
+void trip_append_note(char *note, size_t room, const char *text);
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
@@ -115,6 +150,11 @@ typedef struct trip_volume_params {
     int raw_endian;            /* 0 native, 1 little, 2 big */
     uint64_t raw_offset_bytes; /* --offset */
     bool allow_gaps;           /* accept stacks with missing slices */
+    int series;                /* --series, for DICOM: its number; 0 chooses the largest */
+    int channel, time;         /* --channel, --time: of files with several, from 0 */
+    /* --fill: a value that counts as absent, or "none". By default, known values far outside of
+     * everything else count as absent (typical.h). */
+    const char *fill;
     uint64_t
         max_voxels; /* for larger volumes, reads every second, third, ... voxel along each axis */
 } trip_volume_params;

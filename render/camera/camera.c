@@ -184,3 +184,12 @@ trip_camera_params trip_camera_turn(const trip_camera_params *view, trip_vec3 ax
     p.up = trip_turned(view->up, axis, angle);
     return p;
 }
+
+trip_vec3 trip_camera_direction(const trip_camera *c, double left, double up, double front)
+{
+    basis b;
+    if (make_basis(&c->params, &b) < 0) /* not for the view of a camera */
+        return trip_v3(0, 0, 0);
+    return trip_add(trip_scale(b.right, -left),
+                    trip_add(trip_scale(b.up, up), trip_scale(b.forward, -front)));
+}

@@ -60,6 +60,10 @@ int trip_camera_make(trip_camera *c, const trip_camera_params *params,
  * the axis. */
 trip_camera_params trip_camera_turn(const trip_camera_params *view, trip_vec3 axis, double degrees);
 
+/* Returns a direction of the view as a world vector. The components count to the left and to the
+ * top of the picture, and to the front: from the object to the eye. */
+trip_vec3 trip_camera_direction(const trip_camera *c, double left, double up, double front);
+
 /* Returns the direction of the ray at a pixel position: index space, not normalised. */
 static inline trip_vec3 trip_camera_ray(const trip_camera *c, double x, double y)
 {

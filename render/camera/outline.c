@@ -86,7 +86,7 @@ static void fill_extinctions(summing *s)
 {
     const trip_file_header *h = &s->params->data->header;
     const trip_mean_scale scale =
-        trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
+        trip_mean_scale_make(h->typical_min, h->typical_max, &s->params->data->codes);
     const double length = trip_length(column(&s->list->index_to_world, AXIS));
     double extinctions[TRIP_MEAN_SHARES];
     for (unsigned code = 0; code < CODES; code += TRIP_MEAN_SHARES) {

@@ -171,22 +171,32 @@ static int read_kind(samples *s, trip_kind kind)
     return status;
 }
 
-/* Computes the code where the ray meets a sheet. Returns false if the nearest voxel is missing. */
+/* Computes the draw code where the ray meets a sheet. Returns false if the nearest voxel is
+ * missing.
+ */
 static bool code_at(const samples *s, int64_t sheet, double *code)
 {
-    const uint32_t *c = s->codes + 4 * (sheet - s->first);
+    const uint32_t *stored = s->codes + 4 * (sheet - s->first);
+    double c[4] = { 0 };
     double u = across(s, (double)sheet, 0), v = across(s, (double)sheet, 1);
     u -= floor(u);
     v -= floor(v);
-    uint32_t nearest = c[(u >= 0.5) + 2 * (v >= 0.5)];
-    *code = nearest;
-    if (c[0] != NOTHING && c[1] != NOTHING && c[2] != NOTHING && c[3] != NOTHING)
+    const int nearest = (u >= 0.5) + 2 * (v >= 0.5);
+    bool all = true;
+    for (int n = 0; n < 4; n++) {
+        all = all && stored[n] != NOTHING;
+        if (stored[n] != NOTHING)
+            c[n] = trip_draw_code_exact(&s->probe->draw, stored[n]);
+    }
+    *code = c[nearest];
+    if (all)
         *code = (1 - v) * ((1 - u) * c[0] + u * c[1]) + v * ((1 - u) * c[2] + u * c[3]);
-    return nearest != NOTHING;
+    return stored[nearest] != NOTHING;
 }
 
 static double extinction(const trip_tf_entry *table, double code)
 {
+    code = fmin(65535, fmax(0, code));
     unsigned lower = (unsigned)code;
     unsigned upper = lower < 65535 ? lower + 1 : lower;
     double t = code - lower;

@@ -9,6 +9,7 @@
 #define TRIP_RAY_PROBE_H
 
 #include "clip.h"
+#include "draw_codes.h"
 #include "reader.h"
 #include "transfer_function.h"
 
@@ -16,7 +17,8 @@ typedef struct trip_ray_probe {
     const trip_dataset *data;
     trip_reader *reader; /* reads voxels; no pass may be running */
     trip_budget *budget;
-    const trip_tf_entry *table; /* filled for the data set */
+    const trip_tf_entry *table; /* of draw codes */
+    trip_draw_codes draw;       /* zero if draw codes are stored codes */
     /* The ray is origin + z * direction, z >= 0, in index space. With uneven spacing the
      * coordinates are positions (coordinates.h). A piece with a z length of 1 is world_per_z world
      * units long. */
@@ -30,7 +32,7 @@ typedef struct trip_ray_hit {
     double opacity;
     double first_z; /* where the first visible piece begins */
     double z;       /* where half of the opacity lies in front */
-    double code;    /* of the value at z, 0 to 65535 */
+    double code;    /* exact draw code of the value at z */
 } trip_ray_hit;
 
 /* Returns 0 or a reported failure. */

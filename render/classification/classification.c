@@ -24,23 +24,28 @@ static void find_held(trip_classification *c, const trip_dataset *data)
     }
     c->held_min = min;
     c->held_max = max;
-    c->has_codes = true;
+    c->has_held = true;
 }
 
 void trip_classification_codes(trip_classification *c, const trip_dataset *data, trip_kernel kernel)
 {
     double bounds[2];
-    if (!c->has_codes)
+    if (!c->has_held)
         find_held(c, data);
-    else if (c->kernel == kernel)
+    else if (c->has_codes && c->kernel == kernel)
         return;
     c->kernel = kernel;
+    c->has_codes = true;
     c->has_form = false;
     c->code_min = c->held_min;
     c->code_max = c->held_max;
     if (c->held_min > c->held_max)
         return;
-    trip_field_code_bounds(kernel, c->held_min, c->held_max, bounds);
+    if (c->draw) {
+        c->code_min = trip_draw_code(c->draw, c->held_min);
+        c->code_max = trip_draw_code(c->draw, c->held_max);
+    }
+    trip_field_code_bounds(kernel, c->code_min, c->code_max, bounds);
     c->code_min = (unsigned)fmax(0, floor(bounds[0]));
     c->code_max = (unsigned)fmin(UINT16_MAX, ceil(bounds[1]));
 }
@@ -68,15 +73,16 @@ void trip_classification_form(trip_classification *c, const trip_dataset *data, 
 
 const trip_code_set *trip_classification_shown(trip_classification *c, const trip_tf_entry *table)
 {
-    if (!c->has_shown)
+    if (!c->has_shown || c->shown_by != table)
         trip_code_set_make(&c->shown, table, FLT_TRUE_MIN);
+    c->shown_by = table;
     c->has_shown = true;
     return &c->shown;
 }
 
 void trip_classification_forget_table(trip_classification *c)
 {
-    c->has_form = c->has_shown = false;
+    c->has_codes = c->has_form = c->has_shown = false;
 }
 
 enum { ENTRIES = 65536 };
@@ -88,7 +94,7 @@ static void fill(trip_tf_entry *to, const trip_dataset *data, const trip_tf_entr
 {
     const trip_file_header *h = &data->header;
     const trip_mean_scale scale =
-        trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
+        trip_mean_scale_make(h->typical_min, h->typical_max, &data->codes);
     double extinctions[TRIP_MEAN_SHARES] = { 0 };
     float of_mean = 0;
     for (unsigned code = 0; code < ENTRIES; code += TRIP_MEAN_SHARES) {

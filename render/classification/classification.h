@@ -9,20 +9,25 @@
 #include "closed_form.h"
 #include "code_set.h"
 #include "dataset.h"
+#include "draw_codes.h"
 #include "settings.h"
 #include "transfer_function.h"
 
 /* Zero-initialised, it knows nothing yet. */
 typedef struct trip_classification {
-    /* The range of interpolated codes with the last kernel. It covers all bricks of the data set,
-     * not only the frame's, so that a picture does not depend on the size of bricks. */
+    /* The draw codes of frames that interpolate; the caller's. NULL stands for the stored codes. */
+    const trip_draw_codes *draw;
+    /* The range of interpolated draw codes with the last kernel. It covers all bricks of the data
+     * set, not only the frame's, so that a picture does not depend on the size of bricks. */
     unsigned code_min, code_max; /* code_min > code_max if there are none */
     trip_closed_form_fault not_closed;
     trip_closed_form closed; /* valid if not_closed is TRIP_CLOSED_FORM_FOUND */
-    trip_code_set shown;     /* codes with extinction */
-    /* Whether the range of codes, the closed form and the visible codes are known. */
-    bool has_codes, has_form, has_shown;
-    unsigned held_min, held_max; /* range of codes in the data set */
+    trip_code_set shown;     /* codes with extinction in the table `shown_by` */
+    const trip_tf_entry *shown_by;
+    /* Whether the stored codes, the range of codes, the closed form and the visible codes are
+     * known. */
+    bool has_held, has_codes, has_form, has_shown;
+    unsigned held_min, held_max; /* range of stored codes in the data set */
     trip_kernel kernel;
 } trip_classification;
 
@@ -34,7 +39,7 @@ void trip_classification_form(trip_classification *c, const trip_dataset *data, 
                               const trip_tf_entry *table);
 /* Returns the codes visible in `table`, and finds them unless known. */
 const trip_code_set *trip_classification_shown(trip_classification *c, const trip_tf_entry *table);
-/* Forgets the transfer function. Call it after the table has changed. */
+/* Forgets the transfer function. Call it after the table or the draw codes have changed. */
 void trip_classification_forget_table(trip_classification *c);
 
 /* ---- tables of coarse levels ----

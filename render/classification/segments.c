@@ -1,6 +1,7 @@
 #include "segments.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 enum { CODES = TRIP_SEGMENT_CODES };
 
@@ -97,10 +98,35 @@ static trip_segment_sums means_over(const trip_segments *s, double a, double b)
     return sums;
 }
 
+/* Adds the end of the table for the part of [a, b] that lies beyond it. */
+static void add_beyond(trip_segment_sums *sums, const trip_tf_entry *end, double part)
+{
+    const sample at = { end->extinction,
+                        { (double)end->extinction * end->r, (double)end->extinction * end->g,
+                          (double)end->extinction * end->b } };
+    sums->k += part * at.k;
+    for (int c = 0; c < 3; c++)
+        sums->kq[c] += part * at.kq[c];
+}
+
+/* Returns the means over [a, b], a < b, of which a part lies beyond the ends of the table. */
+static trip_segment_sums means_beyond(const trip_segments *s, double a, double b)
+{
+    const double from = clamp(a), to = clamp(b), unit = 1 / (b - a);
+    const trip_segment_sums within = means_over(s, from, to);
+    trip_segment_sums sums = { 0 };
+    add_sums(&sums, &within, (to - from) * unit);
+    add_beyond(&sums, &s->table[0], fmax(0, fmin(b, 0) - a) * unit);
+    add_beyond(&sums, &s->table[CODES - 1], fmax(0, b - fmax(a, CODES - 1)) * unit);
+    return sums;
+}
+
 trip_segment trip_segment_of(const trip_segments *s, double a, double b)
 {
-    double from = clamp(a), to = clamp(b);
-    trip_segment_sums means = means_over(s, fmin(from, to), fmax(from, to));
+    const double from = fmin(a, b), to = fmax(a, b);
+    const bool within = from == to || (from >= 0 && to <= CODES - 1);
+    trip_segment_sums means =
+        within ? means_over(s, clamp(from), clamp(to)) : means_beyond(s, from, to);
     trip_segment segment = { .extinction = means.k };
     for (int c = 0; c < 3 && means.k > 0; c++)
         segment.rgb[c] = means.kq[c] / means.k;

@@ -38,7 +38,8 @@ static inline double trip_segment_product(double a0, double a1, double b0, doubl
 /* `table` has TRIP_SEGMENT_CODES entries and must outlive `s`. */
 void trip_segments_make(trip_segments *s, const trip_tf_entry *table);
 
-/* The codes lie in [0, 65535], in any order, and need not be whole. */
+/* The codes may have any order and need not be whole. Below code 0 and above code 65535 the
+ * function is constant. */
 trip_segment trip_segment_of(const trip_segments *s, double a, double b);
 
 #endif

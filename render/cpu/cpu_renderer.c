@@ -353,6 +353,19 @@ static const trip_renderer_ops cpu_ops = {
     .stats = stats,
 };
 
+/* Returns the view of a list's level along its axis. Lists that are read for normals alone have no
+ * view of their own. */
+static const trip_cpu_view *view_of_level(const trip_cpu *r, const trip_list *list)
+{
+    const trip_list *lists = r->frame->data->lists;
+    unsigned i = list->index;
+    if (!r->frame->plan->lists[i].drawn)
+        for (i = 0; lists[i].axis != list->axis || lists[i].level != list->level ||
+                    !r->frame->plan->lists[i].drawn;)
+            i++;
+    return &r->views[i];
+}
+
 bool trip_cpu_occluded(void *renderer, const trip_selection *selection, const trip_run *run)
 {
     trip_cpu *r = renderer;
@@ -360,9 +373,11 @@ bool trip_cpu_occluded(void *renderer, const trip_selection *selection, const tr
         trip_plan_way(r->frame->plan, r->view.axis, selection->descending) != r->view.way ||
         !r->view.front_to_back || r->view.coordinates)
         return false;
-    const trip_cpu_view *view = &r->views[selection->list->index];
-    trip_cpu_box box =
-        trip_cpu_brick_box(view, run->brick, selection->sheet_first, selection->sheet_last);
+    const trip_cpu_view *view = view_of_level(r, selection->list);
+    trip_cpu_box box = trip_cpu_brick_box(r->frame->data, selection->list, run->brick,
+                                          selection->sheet_first, selection->sheet_last);
+    for (int i = 0; i < 3 && selection->ahead; i++)
+        box.half[i]++; /* the normals of voxels beside the brick depend on it */
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
 

@@ -34,7 +34,8 @@ void trip_cpu_cull(const trip_cpu_culling *c, trip_cpu_part *part)
     const trip_run *run = part->run;
     if (!c->view->front_to_back || c->view->coordinates)
         return;
-    trip_cpu_box box = trip_cpu_brick_box(c->view, run->brick, run->sheet, run->sheet);
+    trip_cpu_box box =
+        trip_cpu_brick_box(c->view->of->data, c->view->list, run->brick, run->sheet, run->sheet);
     trip_cpu_occlusion occlusion = trip_cpu_box_occlusion(c->view, c->mask, &box);
     if (occlusion == TRIP_CPU_OCCLUDED) {
         part->voxels = 0;

@@ -183,11 +183,9 @@ trip_cpu_occlusion trip_cpu_region_make(const trip_cpu_view *view, int u, int v,
     return TRIP_CPU_VISIBLE;
 }
 
-trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
-                                int64_t last_sheet)
+trip_cpu_box trip_cpu_brick_box(const trip_dataset *data, const trip_list *list, uint64_t brick,
+                                int64_t first_sheet, int64_t last_sheet)
 {
-    const trip_dataset *data = view->of->data;
-    const trip_list *list = view->list;
     trip_brick_box b =
         trip_brick_box_of(&data->header, trip_brick_slab(list, brick), &list->bricks[brick]);
     b.lo[2] = fmax(b.lo[2], (double)first_sheet);

@@ -66,9 +66,9 @@ typedef struct trip_cpu_region {
 trip_cpu_occlusion trip_cpu_region_make(const trip_cpu_view *view, int u, int v, int64_t sheet,
                                         trip_cpu_region *region);
 
-/* Returns the box of a brick of the view's list, cut to the sheets from first_sheet to last_sheet,
+/* Returns the box of a brick of a list, cut to the sheets from first_sheet to last_sheet,
  * inclusive. */
-trip_cpu_box trip_cpu_brick_box(const trip_cpu_view *view, uint64_t brick, int64_t first_sheet,
-                                int64_t last_sheet);
+trip_cpu_box trip_cpu_brick_box(const trip_dataset *data, const trip_list *list, uint64_t brick,
+                                int64_t first_sheet, int64_t last_sheet);
 
 #endif

@@ -18,6 +18,7 @@ struct trip_field {
                             voxels */
     trip_field_cube **chunks;
     size_t chunk_room, count;
+    trip_field_unit unit;
 };
 
 static size_t chunks_of(size_t cubes)
@@ -39,6 +40,7 @@ int trip_field_create(trip_field **out, const int64_t dims[3], trip_budget *budg
     if (!f)
         return fail_memory("the volume");
     f->budget = budget;
+    f->unit.scale = 1;
     f->positions = 1;
     bool fits = true;
     for (int a = 0; a < 3; a++) {
@@ -72,6 +74,16 @@ void trip_field_destroy(trip_field *f)
     trip_budget_release(budget, f->chunks, f->chunk_room * sizeof(trip_field_cube *));
     trip_budget_release(budget, f->directory, f->positions * sizeof *f->directory);
     trip_budget_release(budget, f, sizeof *f);
+}
+
+void trip_field_set_unit(trip_field *f, trip_field_unit unit)
+{
+    f->unit = unit;
+}
+
+trip_field_unit trip_field_get_unit(const trip_field *f)
+{
+    return f->unit;
 }
 
 const int64_t *trip_field_dims(const trip_field *f)
@@ -167,6 +179,12 @@ static double apart(const trip_field_map *map, int axis, int64_t before, int64_t
            trip_coordinates_at(map->coordinates, axis, before);
 }
 
+/* Returns a number of which values are multiples: a draw code, or the value of a stored code. */
+static double even(const trip_field_map *map, double code)
+{
+    return map->stored ? trip_codes_value(map->stored, code) : code;
+}
+
 /* Returns the derivative along an axis, in codes per index or per unit of position. */
 static double difference(const trip_field *f, const trip_field_map *map, const int64_t at[3],
                          double here, int axis)
@@ -176,7 +194,7 @@ static double difference(const trip_field *f, const trip_field_map *map, const i
     before[axis]--;
     const trip_field_voxel *a = trip_field_at(f, after[0], after[1], after[2]);
     const trip_field_voxel *b = trip_field_at(f, before[0], before[1], before[2]);
-    double rise = (a ? (double)a->code : here) - (b ? (double)b->code : here);
+    double rise = even(map, a ? (double)a->code : here) - even(map, b ? (double)b->code : here);
     if (!a && !b)
         return 0;
     return rise / apart(map, axis, b ? before[axis] : at[axis], a ? after[axis] : at[axis]);
@@ -247,7 +265,7 @@ void trip_field_code_bounds(trip_kernel kernel, double min, double max, double b
     bounds[1] = max + beyond;
 }
 
-static void set_bounds(trip_kernel kernel, trip_field_cell *cell)
+static void set_bounds(trip_kernel kernel, trip_field_cell *cell, trip_field_unit unit)
 {
     float lo = INFINITY, hi = -INFINITY;
     double bounds[2];
@@ -256,7 +274,8 @@ static void set_bounds(trip_kernel kernel, trip_field_cell *cell)
         lo = code < lo ? code : lo;
         hi = code > hi ? code : hi;
     }
-    trip_field_code_bounds(kernel, lo, hi, bounds);
+    cell->unit = unit;
+    trip_field_code_bounds(kernel, trip_field_code(unit, lo), trip_field_code(unit, hi), bounds);
     cell->min = bounds[0];
     cell->max = bounds[1];
 }
@@ -331,6 +350,6 @@ bool trip_field_take_cell(const trip_field *f, trip_kernel kernel, const int64_t
         memcpy(out->voxels, corners, sizeof corners);
     else
         take_surroundings(f, at, corners, out->voxels);
-    set_bounds(kernel, out);
+    set_bounds(kernel, out, f->unit);
     return true;
 }

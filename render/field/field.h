@@ -3,9 +3,10 @@
  * of threads. Voxels lie in cubes of 8 x 8 x 8. Cubes without voxels take no memory; the others
  * take 16 bytes per voxel.
  *
- * Values are codes of the data set, 0 to 65535, but may be fractional. They are interpolated in
- * cells: cell (i, j, k) is the cube from voxel (i, j, k) to (i + 1, j + 1, k + 1). A cell is empty
- * unless all eight corners are present.
+ * Values are draw codes (draw_codes.h), which may be fractional and lie outside of [0, 65535]. A
+ * field can also hold the values themselves, and convert them when a cell is loaded. They are
+ * interpolated in cells: cell (i, j, k) is the cube from voxel (i, j, k) to (i + 1, j + 1, k + 1).
+ * A cell is empty unless all eight corners are present.
  * - linear weights the eight corners.
  * - cubic weights the 4 x 4 x 4 voxels around the cell with Catmull-Rom splines. The splines pass
  *   through the values and have central differences as derivatives.
@@ -20,6 +21,7 @@
 #include <stdint.h>
 
 #include "budget.h"
+#include "codes.h"
 #include "coordinates.h"
 #include "geometry.h"
 #include "settings.h"
@@ -27,15 +29,15 @@
 enum { TRIP_FIELD_EDGE = 8 };
 
 typedef struct trip_field_voxel {
-    float code;        /* NaN if the voxel is missing */
+    float code;        /* or value; NaN if the voxel is missing */
     float gradient[3]; /* world space, value units per world unit */
 } trip_field_voxel;
 
 /* A cube with some voxels. */
 typedef struct trip_field_cube {
     int64_t at[3];  /* index of its first voxel */
-    float own[2];   /* minimum and maximum code of its voxels */
-    float range[2]; /* range of codes that its cells are interpolated from */
+    float own[2];   /* minimum and maximum code or value of its voxels */
+    float range[2]; /* range of codes or values that its cells are interpolated from */
     trip_field_voxel voxels[TRIP_FIELD_EDGE * TRIP_FIELD_EDGE * TRIP_FIELD_EDGE];
 } trip_field_cube;
 
@@ -49,11 +51,27 @@ void trip_field_destroy(trip_field *f);
  * memory is exhausted. */
 int trip_field_put(trip_field *f, const int64_t at[3], double code, const double gradient[3]);
 
+/* The conversion of a field's numbers to draw codes: code = (number - origin) * scale. */
+typedef struct trip_field_unit {
+    double origin, scale; /* 0 and 1 for a field of codes */
+} trip_field_unit;
+
+/* Makes the numbers of a field values. `unit` converts them to draw codes. No thread may use the
+ * field meanwhile. */
+void trip_field_set_unit(trip_field *f, trip_field_unit unit);
+trip_field_unit trip_field_get_unit(const trip_field *f);
+
+static inline double trip_field_code(trip_field_unit unit, double number)
+{
+    return (number - unit.origin) * unit.scale;
+}
+
 /* Parameters of computed gradients. */
 typedef struct trip_field_map {
     trip_affine index_to_world;
     const trip_coordinates *coordinates; /* NULL for even spacing */
-    double value_per_code;
+    double value_per_code;               /* 1 for a field of values */
+    const trip_codes *stored; /* not NULL: the field has whole stored codes, which may be uneven */
     bool signless; /* given gradients have an arbitrary sign; they are turned towards increasing
                       values */
 } trip_field_map;
@@ -77,7 +95,8 @@ typedef struct trip_field_cell {
     int64_t at[3];
     int edge; /* 2 or 4 */
     const trip_field_voxel *voxels[64];
-    double min, max; /* range of codes in the cell */
+    trip_field_unit unit;
+    double min, max; /* range of draw codes in the cell */
 } trip_field_cell;
 
 /* Widens [min, max] to the range of interpolated values. */

@@ -1,9 +1,10 @@
 #include "field_fill.h"
 
-void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data, trip_field *field,
-                           unsigned planes)
+void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data,
+                           const trip_draw_codes *draw, trip_field *field, unsigned planes)
 {
     f->field = field;
+    f->draw = *draw;
     f->has_normals = planes >> TRIP_PLANE_NORMALS & 1;
     f->header = &data->header;
     f->compact = trip_compact_normals_make(&data->index_to_world, f->header->gradient_full,
@@ -34,8 +35,8 @@ int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_
         at[(axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(f->voxels[n]);
         if (normals)
             unpack_gradient(f, f->normals[n], gradient);
-        status =
-            trip_field_put(f->field, at, trip_voxel_code(f->voxels[n]), normals ? gradient : NULL);
+        const double code = trip_draw_code_exact(&f->draw, trip_voxel_code(f->voxels[n]));
+        status = trip_field_put(f->field, at, code, normals ? gradient : NULL);
     }
     return status;
 }

@@ -196,10 +196,10 @@ static double world_length(const trip_camera *c, int axis)
     return trip_length(trip_v3(m[0][axis], m[1][axis], m[2][axis]));
 }
 
-static void set_means(trip_gl_frame_double *out, const trip_file_header *h, double length)
+static void set_means(trip_gl_frame_double *out, const trip_dataset *d, double length)
 {
     const trip_mean_scale scale =
-        trip_mean_scale_make(h->value_min, h->value_max, h->code_lo, h->code_hi);
+        trip_mean_scale_make(d->header.typical_min, d->header.typical_max, &d->codes);
     out->means = (trip_gl_double4){ { length, scale.lo, scale.width } };
 }
 
@@ -212,7 +212,7 @@ void trip_gl_frame_make(trip_gl_frame_double *out, const trip_frame *frame, cons
     const trip_block_form form = trip_block_form_of(&frame->data->header, list->kind);
     out->edge.v[1] = trip_block_step(&form);
     if (trip_kind_of(list->kind)->axis_bits > 0)
-        set_means(out, &frame->data->header, world_length(&planned->camera, list->axis));
+        set_means(out, frame->data, world_length(&planned->camera, list->axis));
     out->to_grid = in_list_axes(trip_v3(scale[0], scale[1], scale[2]), list->axis,
                                 trip_list_grid_growth(&planned->grid));
 }

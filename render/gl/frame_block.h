@@ -34,7 +34,8 @@ enum trip_gl_effect {
     TRIP_GL_EMISSION = 524288,
     TRIP_GL_PLACED = TRIP_GL_CUED | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
     TRIP_GL_CLOSED = 1048576,
-    TRIP_GL_EFFECT_SETS = 2097152,
+    TRIP_GL_EXACT = 2097152, /* post: sheets hold exact draw codes (draw_codes.h) */
+    TRIP_GL_EFFECT_SETS = 4194304,
 };
 
 /* Returns x minus x rounded to float. The variable is volatile because GCC 12 replaces

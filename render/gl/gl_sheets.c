@@ -29,7 +29,8 @@ static unsigned effects_of(const trip_frame *frame)
            (s->shading && s->headlight ? TRIP_GL_HEADLIGHT : 0) | (s->depth ? TRIP_GL_DEPTH : 0) |
            trip_gl_frame_placed(s) |
            (trip_coordinates_uneven(&frame->data->coordinates) ? TRIP_GL_UNEVEN : 0) |
-           (frame->plan->not_closed ? 0 : TRIP_GL_CLOSED);
+           (frame->plan->not_closed ? 0 : TRIP_GL_CLOSED) |
+           (frame->plan->draw.of_stored ? TRIP_GL_EXACT : 0);
 }
 
 static void forget(trip_gl_sheets *s)
@@ -56,7 +57,7 @@ int trip_gl_sheets_begin_frame(trip_gl_sheets *s, const trip_frame *frame)
     }
     return trip_gl_sheet_tf_set(&s->function, frame->table,
                                 frame->plan->not_closed ? NULL : &frame->plan->closed,
-                                frame->camera->voxel_world);
+                                &frame->plan->draw, frame->camera->voxel_world);
 }
 
 void trip_gl_sheets_release(trip_gl_sheets *s)
@@ -218,16 +219,20 @@ static void begin_sheet(trip_gl_sheets *s, int64_t number)
         taken |= 1u << s->held[i].layer;
     int layer = __builtin_ctz(~taken);
     s->held[s->count++] = (trip_gl_sheet){ .number = number, .layer = layer, .min = UINT16_MAX };
-    trip_gl_sheet_textures_clear(&s->textures, layer, (int)s->size[0], (int)s->size[1]);
+    trip_gl_sheet_textures_clear(&s->textures, layer, (int)s->size[0], (int)s->size[1],
+                                 s->effects & TRIP_GL_EXACT ? (float)TRIP_GL_MISSING_EXACT
+                                                            : (float)TRIP_GL_MISSING_WHOLE);
 }
 
-/* Widens the code range of the last sheet by the range of the run's brick. */
+/* Widens the range of draw codes of the last sheet by the range of the run's brick. */
 static void widen_range(trip_gl_sheets *s, const trip_batch *batch, const trip_run *run)
 {
     const trip_file_brick *brick = &trip_batch_list(batch, run)->bricks[run->brick];
+    const trip_code_range range =
+        trip_draw_codes_range(&s->frame->plan->draw, brick->code_min, brick->code_max);
     trip_gl_sheet *sheet = &s->held[s->count - 1];
-    sheet->min = brick->code_min < sheet->min ? brick->code_min : sheet->min;
-    sheet->max = brick->code_max > sheet->max ? brick->code_max : sheet->max;
+    sheet->min = range.min < sheet->min ? range.min : sheet->min;
+    sheet->max = range.max > sheet->max ? range.max : sheet->max;
 }
 
 static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
@@ -244,6 +249,8 @@ static int decode_squares(trip_gl_sheets *s, uint32_t first, uint32_t count)
                       (GLsizeiptr)(slot->bytes - s->batch.codes_offset));
     glBindImageTexture(TRIP_GL_IMAGE, s->textures.codes, 0, GL_FALSE, s->held[s->count - 1].layer,
                        GL_WRITE_ONLY, GL_R32F);
+    if (s->effects & TRIP_GL_EXACT)
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_DRAW_CODES, s->function.draw_codes);
     glUniform2ui(TRIP_GL_SHEET, first, trip_block_step(&form));
     glDispatchCompute(count, 1, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
@@ -327,6 +334,8 @@ static int make_gradients(trip_gl_sheets *s, int i)
                 s->way > 0 ? after : before);
     if (s->effects & TRIP_GL_UNEVEN)
         bind_positions(s, sheet->number);
+    if (s->effects & TRIP_GL_EXACT)
+        glUniform1f(TRIP_GL_SHEET_SCALE, (float)s->view.gradient_scale);
     const int width = (int)s->size[0], height = (int)s->size[1];
     const int rows = PART_VOXELS / width < 1 ? 1 : PART_VOXELS / width;
     for (int y = 0; y < height && !status; y += rows) {

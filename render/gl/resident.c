@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "dataset_normals.h"
 #include "gl/shared.h"
 #include "renderer.h"
 #include "report.h"
@@ -125,6 +126,9 @@ struct trip_gl_loading {
     trip_reader *reader;
     trip_selection selection;
     trip_pass pass;
+    /* If normals are computed: the lists with values along the axis of the base list. */
+    trip_pass around;
+    trip_selection *around_selections; /* room for all lists */
     trip_batch batch;
     bool in_batch;
     size_t next_run;
@@ -308,16 +312,56 @@ static int make_room(trip_gl_loading *l)
                      "lists");
 }
 
+static void drop_around(trip_gl_loading *l)
+{
+    const size_t room = l->to->list_count * sizeof *l->around_selections;
+    for (unsigned i = 0; i < l->around.selection_count; i++)
+        trip_selection_destroy(&l->around_selections[i], l->to->budget);
+    trip_budget_release(l->to->budget, l->around_selections, l->around_selections ? room : 0);
+    l->around_selections = NULL;
+    l->around = (trip_pass){ 0 };
+}
+
+/* Adds the lists with the values from which the normals of the base list are computed. */
+static int add_around(trip_gl_loading *l, const trip_list *list)
+{
+    const trip_dataset *data = l->to->data;
+    int status = TRIP_OK;
+    if (list != base_of(l) || !data->computes_normals || !(l->to->planes >> TRIP_PLANE_NORMALS & 1))
+        return TRIP_OK;
+    l->around_selections =
+        trip_budget_take(l->to->budget, l->to->list_count * sizeof *l->around_selections);
+    if (!l->around_selections)
+        return no_memory(l->to);
+    l->around.selections = l->around_selections;
+    for (unsigned i = 0; i < data->list_count && !status; i++) {
+        const trip_list *of = &data->lists[i];
+        trip_selection *s = &l->around_selections[l->around.selection_count];
+        if (of->axis != list->axis || of->level != list->level ||
+            !trip_dataset_has_gradients_of(data, of))
+            continue;
+        status = trip_selection_create_whole(s, data, of, false, l->to->budget);
+        s->ahead = 1;
+        l->around.selection_count += status == TRIP_OK;
+    }
+    l->pass.around = &l->around;
+    return status;
+}
+
 static int begin_list(trip_gl_loading *l, const trip_list *list)
 {
     int status = list == base_of(l) ? make_room(l) : TRIP_OK;
     trip_selection_destroy(&l->selection, l->to->budget);
+    drop_around(l);
     if (!status)
         status =
             trip_selection_create_whole(&l->selection, l->to->data, list, false, l->to->budget);
     if (status)
         return status;
     l->pass = trip_pass_of(&l->selection);
+    status = add_around(l, list);
+    if (status)
+        return status;
     l->list = list;
     l->filled = 0;
     return trip_reader_begin(l->reader, &l->pass);
@@ -402,6 +446,7 @@ static void close_loading(trip_gl_loading *l)
         trip_reader_release(l->reader, &l->batch);
     trip_reader_destroy(l->reader);
     trip_selection_destroy(&l->selection, l->to->budget);
+    drop_around(l);
     l->reader = NULL;
     l->in_batch = false;
     l->list = NULL;

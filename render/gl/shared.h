@@ -25,6 +25,7 @@
 /* Reused by `post`, which draws no splats. */
 #define TRIP_GL_SUMS 7
 #define TRIP_GL_POSITIONS 5
+#define TRIP_GL_DRAW_CODES 4
 /* Reused for splats of grids with uneven spacing; indexed lists use the second number. */
 #define TRIP_GL_VOXEL_POSITIONS 7
 #define TRIP_GL_VOXEL_POSITIONS_INDEXED 0
@@ -50,6 +51,10 @@
 #define TRIP_GL_SHEET 0
 #define TRIP_GL_SHEET_SIZE 1
 #define TRIP_GL_SHEET_APART 2
+#define TRIP_GL_SHEET_SCALE 3
+/* Codes of missing voxels in a sheet, for whole codes and for exact draw codes. */
+#define TRIP_GL_MISSING_WHOLE -1.0
+#define TRIP_GL_MISSING_EXACT -3e38
 /* Directions of rays, as in trip_way. */
 #define TRIP_GL_WAY_ANY 0
 #define TRIP_GL_WAY_UP 1

@@ -54,13 +54,22 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
     v->slope[1] = usable ? w : 0;
 }
 
+/* The length of a stored gradient of full shading, if codes are exact. */
+#define STORED_FULL 64.0
+
 /* Maps differences of codes (list axes) to world space. The map is the inverse transpose of
  * index_to_world. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
-    const trip_file_header *h = &frame->data->header;
-    double full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
-    double unit = (h->code_hi - h->code_lo) / 65535 / full;
+    double full = trip_shade_gradient_full(&frame->data->header, frame->camera->voxel_world,
+                                           frame->plan->level);
+    double unit = trip_draw_value_per_code(&frame->plan->draw) / full;
+    v->gradient_scale = 1;
+    if (frame->plan->draw
+            .of_stored) { /* exact draw codes may exceed the range of stored gradients */
+        v->gradient_scale = STORED_FULL * unit / frame->camera->voxel_world;
+        unit = frame->camera->voxel_world / STORED_FULL;
+    }
     trip_gl_float4 *columns[3] = { &v->constants.gradient_0, &v->constants.gradient_1,
                                    &v->constants.gradient_2 };
     trip_affine to_index;

@@ -11,6 +11,7 @@ typedef struct trip_gl_sheet_view {
     int64_t first_u, first_v; /* origin of the ends' integer coordinates (shared.h) */
     double eye[3];            /* along the list, u and v: start of the reference ray */
     double slope[2];          /* movement of the reference ray along u and v for each sheet */
+    double gradient_scale;    /* factor of stored gradients; 1 unless codes are exact */
     trip_gl_sheet_pass constants;
 } trip_gl_sheet_view;
 

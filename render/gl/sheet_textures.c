@@ -83,8 +83,9 @@ int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t
     return status ? status : make(t, width, height, min, gradients);
 }
 
-void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height)
+void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height,
+                                  float missing)
 {
-    static const GLfloat none = -1;
+    const GLfloat none = missing;
     glClearTexSubImage(t->codes, 0, 0, 0, layer, width, height, 1, GL_RED, GL_FLOAT, &none);
 }

@@ -14,7 +14,7 @@ enum { TRIP_GL_SHEETS_MAX = 10 };
 
 typedef struct trip_gl_sheet_textures {
     trip_budget *budget;
-    GLuint codes;     /* r32f: codes; negative where a voxel is missing */
+    GLuint codes;     /* r32f: codes; TRIP_GL_MISSING_... where a voxel is missing */
     GLuint gradients; /* rgba16f; 0 without shading */
     int width, height, layers;
     uint64_t bytes; /* charged to the budget */
@@ -23,9 +23,9 @@ typedef struct trip_gl_sheet_textures {
 /* Ensures a capacity of at least `min` sheets of width x height voxels. */
 int trip_gl_sheet_textures_fit(trip_gl_sheet_textures *t, int64_t width, int64_t height,
                                unsigned min, bool gradients);
-/* Marks the first width x height voxels of a layer as missing. */
-void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width,
-                                  int height);
+/* Writes the code of missing voxels to the first width x height voxels of a layer. */
+void trip_gl_sheet_textures_clear(const trip_gl_sheet_textures *t, int layer, int width, int height,
+                                  float missing);
 void trip_gl_sheet_textures_release(trip_gl_sheet_textures *t);
 
 #endif

@@ -6,7 +6,11 @@
 #include "report.h"
 #include "segments.h"
 
-enum { CODES = 65536, SUMS_BYTES = CODES * sizeof(struct trip_gl_sum) };
+enum {
+    CODES = 65536,
+    SUMS_BYTES = CODES * sizeof(struct trip_gl_sum),
+    DRAW_CODES_BYTES = CODES * sizeof(float)
+};
 
 /* Approximate maximum of the sums. Sums are integers, so their differences are exact. */
 #define GREATEST 0x1p62
@@ -131,10 +135,31 @@ static void set_closed(trip_gl_sheet_tf *f, const trip_closed_form *form, double
     glNamedBufferSubData(f->closed, 0, sizeof c, &c);
 }
 
+static int set_draw_codes(trip_gl_sheet_tf *f, const trip_draw_codes *draw)
+{
+    if (!f->draw_codes) {
+        if (!trip_budget_charge(f->budget, DRAW_CODES_BYTES))
+            return no_memory();
+        glCreateBuffers(1, &f->draw_codes);
+        glNamedBufferStorage(f->draw_codes, DRAW_CODES_BYTES, NULL, GL_DYNAMIC_STORAGE_BIT);
+    }
+    float *codes = trip_budget_take(f->budget, DRAW_CODES_BYTES);
+    if (!codes)
+        return no_memory();
+    for (unsigned code = 0; code < CODES; code++)
+        codes[code] = (float)trip_draw_code_exact(draw, code);
+    glNamedBufferSubData(f->draw_codes, 0, DRAW_CODES_BYTES, codes);
+    trip_budget_release(f->budget, codes, DRAW_CODES_BYTES);
+    return TRIP_OK;
+}
+
 int trip_gl_sheet_tf_set(trip_gl_sheet_tf *f, const trip_tf_entry *table,
-                         const trip_closed_form *closed, double voxel_world)
+                         const trip_closed_form *closed, const trip_draw_codes *draw,
+                         double voxel_world)
 {
     int status = take_next_visible(f);
+    if (!status && draw->of_stored)
+        status = set_draw_codes(f, draw);
     if (!status && !closed)
         status = set_sums(f, table, voxel_world);
     if (status)
@@ -150,6 +175,10 @@ void trip_gl_sheet_tf_release(trip_gl_sheet_tf *f)
     if (f->sums) {
         glDeleteBuffers(1, &f->sums);
         trip_budget_discharge(f->budget, SUMS_BYTES);
+    }
+    if (f->draw_codes) {
+        glDeleteBuffers(1, &f->draw_codes);
+        trip_budget_discharge(f->budget, DRAW_CODES_BYTES);
     }
     if (f->closed)
         glDeleteBuffers(1, &f->closed);

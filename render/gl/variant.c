@@ -25,13 +25,14 @@ static const struct {
                              true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
-    [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", 0, false },
-    [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp", TRIP_GL_UNEVEN, false },
+    [TRIP_GL_PASS_SHEET_DECODE] = { NULL, NULL, "sheet_decode.comp", TRIP_GL_EXACT, false },
+    [TRIP_GL_PASS_SHEET_GRADIENT] = { NULL, NULL, "sheet_gradient.comp",
+                                      TRIP_GL_UNEVEN | TRIP_GL_EXACT, false },
     [TRIP_GL_PASS_SHEET_DRAW] = { NULL, NULL, "sheet_draw.comp",
                                   TRIP_GL_PARALLEL | TRIP_GL_SHADED | TRIP_GL_HEADLIGHT |
                                       TRIP_GL_DEPTH | TRIP_GL_WIDE | TRIP_GL_CUED | TRIP_GL_UNEVEN |
-                                      TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION |
-                                      TRIP_GL_CLOSED,
+                                      TRIP_GL_EXACT | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION |
+                                      TRIP_GL_EMISSION | TRIP_GL_CLOSED,
                                   false },
 };
 
@@ -51,7 +52,7 @@ static void write_effects(FILE *out, unsigned effects)
         { TRIP_GL_FIXED, "FIXED" },         { TRIP_GL_CUED, "CUED" },
         { TRIP_GL_UNEVEN, "UNEVEN" },       { TRIP_GL_SHADOWS, "SHADOWS" },
         { TRIP_GL_OCCLUSION, "OCCLUSION" }, { TRIP_GL_EMISSION, "EMISSION" },
-        { TRIP_GL_CLOSED, "CLOSED" },
+        { TRIP_GL_CLOSED, "CLOSED" },       { TRIP_GL_EXACT, "EXACT" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -94,16 +95,17 @@ static int build(const trip_gl_variant *variant, GLuint *program)
                                           });
 }
 
-static_assert(TRIP_GL_EFFECT_SETS == 1 << 21, "effects are 21 bits of a key");
-static uint32_t key_of(const trip_gl_variant *v)
+static_assert(TRIP_GL_EFFECT_SETS <= 1 << 24, "effects are 24 bits of a key");
+static uint64_t key_of(const trip_gl_variant *v)
 {
-    return (uint32_t)v->pass | (uint32_t)v->method << 4 | v->effects << 8 | v->layers << 29;
+    return (uint64_t)v->pass | (uint64_t)v->method << 4 | (uint64_t)v->effects << 8 |
+           (uint64_t)v->layers << 32;
 }
 
 int trip_gl_variants_get(trip_gl_variants *v, trip_gl_variant variant, GLuint *program)
 {
     variant.effects &= passes[variant.pass].effects;
-    uint32_t key = key_of(&variant);
+    uint64_t key = key_of(&variant);
     for (size_t i = 0; i < v->count; i++) {
         if (v->built[i].key == key) {
             *program = v->built[i].program;

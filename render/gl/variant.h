@@ -28,7 +28,7 @@ typedef struct trip_gl_variant {
 } trip_gl_variant;
 
 typedef struct trip_gl_built {
-    uint32_t key;
+    uint64_t key;
     GLuint program;
 } trip_gl_built;
 

@@ -44,8 +44,8 @@ static inline void add_product(coefficients sum, double (*p)[FOUR], int terms, c
 }
 
 /* Weights voxels along x, the sums along y, and those sums along z. */
-static inline void weigh(const trip_field_voxel *const *voxels, int edge, double w[3][4][4],
-                         coefficients out)
+static inline void weigh(const trip_field_voxel *const *voxels, trip_field_unit unit, int edge,
+                         double w[3][4][4], coefficients out)
 {
     memset(out, 0, sizeof(coefficients));
     for (int z = 0; z < edge; z++) {
@@ -54,8 +54,8 @@ static inline void weigh(const trip_field_voxel *const *voxels, int edge, double
             coefficients row = { 0 };
             for (int x = 0; x < edge; x++, voxels++) {
                 const trip_field_voxel *v = *voxels;
-                double at[1][FOUR] = { { v->code, v->gradient[0], v->gradient[1],
-                                         v->gradient[2] } };
+                double at[1][FOUR] = { { trip_field_code(unit, v->code), v->gradient[0],
+                                         v->gradient[1], v->gradient[2] } };
                 add_product(row, at, 1, w[0][x], edge);
             }
             add_product(plane, row, edge, w[1][y], edge);
@@ -82,9 +82,9 @@ trip_cell_line trip_cell_along(const trip_field_cell *cell, const trip_coordinat
         (cell->edge == 2 ? linear_weights : cubic_weights)(start, rise, w[a]);
     }
     if (cell->edge == 2)
-        weigh(cell->voxels, 2, w, l.all);
+        weigh(cell->voxels, cell->unit, 2, w, l.all);
     else
-        weigh(cell->voxels, 4, w, l.all);
+        weigh(cell->voxels, cell->unit, 4, w, l.all);
     l.code.degree = 3 * (cell->edge - 1);
     for (int i = 0; i <= l.code.degree; i++)
         l.code.c[i] = l.all[i][0];

@@ -25,6 +25,7 @@ typedef struct integral {
     const trip_dataset *field_data;
     unsigned planes; /* that the field was filled from */
     bool has_halo, complete;
+    trip_draw_codes draw; /* of the field */
     uint64_t put;
 
     const trip_frame *frame;
@@ -78,7 +79,10 @@ static int begin_field(integral *r)
     const trip_dataset *data = r->frame->data;
     bool halo = !is_of_splats(r);
     unsigned planes = r->frame->plan->planes;
-    bool same = r->field_data == data && r->has_halo == halo && r->planes == planes;
+    const trip_draw_codes *draw = &r->frame->plan->draw;
+    bool same = r->field_data == data && r->has_halo == halo && r->planes == planes &&
+                r->draw.lo == draw->lo && r->draw.hi == draw->hi &&
+                !r->draw.of_stored == !draw->of_stored;
     if (r->frame->field || (r->complete && same))
         return 0;
     drop_field(r);
@@ -87,9 +91,10 @@ static int begin_field(integral *r)
     r->field_data = data;
     r->has_halo = halo;
     r->planes = planes;
+    r->draw = *draw;
     int status = trip_field_create(&r->field, dims, r->budget);
     if (!status)
-        trip_field_fill_begin(&r->fill, data, r->field, planes);
+        trip_field_fill_begin(&r->fill, data, draw, r->field, planes);
     return status;
 }
 
@@ -163,11 +168,14 @@ static int complete_field(integral *r)
     const trip_file_header *header = &r->frame->data->header;
     if (r->complete || r->put < trip_plan_splats(r->frame->plan))
         return 0;
+    const bool by_table = !r->draw.of_stored && !trip_codes_even(&r->draw.stored);
     int status = trip_field_finish(
-        r->field, &(trip_field_map){ .index_to_world = r->frame->data->index_to_world,
-                                     .coordinates = &r->frame->data->coordinates,
-                                     .value_per_code = (header->code_hi - header->code_lo) / 65535,
-                                     .signless = header->normal_bytes == 3 });
+        r->field,
+        &(trip_field_map){ .index_to_world = r->frame->data->index_to_world,
+                           .coordinates = &r->frame->data->coordinates,
+                           .value_per_code = by_table ? 1 : trip_draw_value_per_code(&r->draw),
+                           .stored = by_table ? &r->draw.stored : NULL,
+                           .signless = header->normal_bytes == 3 });
     r->complete = status == 0;
     return status;
 }

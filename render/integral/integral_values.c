@@ -107,7 +107,9 @@ static bool visit_cube(void *user, const int64_t at[3], double from, double to)
     double bounds[2];
     if (!cube)
         return true;
-    trip_field_code_bounds(in->settings->kernel, cube->range[0], cube->range[1], bounds);
+    const trip_field_unit unit = trip_field_get_unit(in->field);
+    trip_field_code_bounds(in->settings->kernel, trip_field_code(unit, cube->range[0]),
+                           trip_field_code(unit, cube->range[1]), bounds);
     if (!trip_classes_visible(in->classes, bounds[0], bounds[1]))
         return true;
     trip_ray_boxes cells = { .edge = 1, .coordinates = in->coordinates };

@@ -46,7 +46,9 @@ static bool is_drawn(const trip_lod *lod, const trip_list *list)
 static void weigh_levels(limiting *l, const trip_camera *camera, const trip_settings *settings)
 {
     const bool splats = l->lod->kind == TRIP_KIND_MEANS;
-    const double normals = settings->shading && splats ? l->data->header.normal_bytes : 0;
+    const double normals = settings->shading && splats && !l->data->computes_normals
+                               ? l->data->header.normal_bytes
+                               : 0;
     const double kept = (double)l->data->header.kept;
     const double lists = kept > 0 ? lists_read(camera, settings) / kept : 0;
     for (unsigned i = 0; i < l->data->list_count; i++) {

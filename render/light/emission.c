@@ -24,15 +24,15 @@ static void set_table(trip_emission *e)
 {
     const trip_file_header *h = &e->data->header;
     for (int code = 0; code < CODES; code++) {
-        const double value = h->code_lo + (h->code_hi - h->code_lo) * code / (CODES - 1);
+        const double value = trip_codes_value(&e->data->codes, code);
         e->table[code] =
-            (trip_tf_entry){ .extinction = (float)fmin(1, fmax(0, value / h->value_max)) };
+            (trip_tf_entry){ .extinction = (float)fmin(1, fmax(0, value / h->typical_max)) };
     }
 }
 
 static int check(const trip_dataset *data, const char *path)
 {
-    if (!(data->header.value_max > 0))
+    if (!(data->header.typical_max > 0))
         return trip_fail(TRIP_USAGE, "render", path,
                          "holds no value above 0; choose a data set of temperatures");
     return 0;

@@ -582,6 +582,11 @@ void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns)
         trip_reader_await(m->reader, timeout_ns);
 }
 
+bool trip_light_map_is_gathered(const trip_light_map *m)
+{
+    return m->stage > AVERAGE;
+}
+
 bool trip_light_map_is_complete(const trip_light_map *m)
 {
     return m->stage == COMPLETE;

@@ -44,6 +44,8 @@ int trip_light_map_step(trip_light_map *m, const trip_task_runner *runner);
 /* Waits for ready work, at most for the timeout. */
 void trip_light_map_await(trip_light_map *m, uint64_t timeout_ns);
 bool trip_light_map_is_complete(const trip_light_map *m);
+/* Whether the mean extinctions are complete, so that nothing is read. */
+bool trip_light_map_is_gathered(const trip_light_map *m);
 /* Returns the time of completion. It is unique among the lattices of a process, and so identifies
  * copies. */
 uint64_t trip_light_map_made_ns(const trip_light_map *m);

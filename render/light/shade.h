@@ -29,12 +29,13 @@
 #define TRIP_FACING 4.0
 
 /* Returns |gradient| in value per world unit at which shading is full. It is the same at every
- * level. `voxel_world` is the voxel size of `level` in world units. */
+ * level. `voxel_world` is the voxel size of `level` in world units. A table of codes tells that few
+ * values lie far from the others; these do not count. */
 static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world,
                                               unsigned level)
 {
     double range =
-        h->value_max > h->value_min ? h->value_max - h->value_min : h->code_hi - h->code_lo;
+        h->typical_max > h->typical_min ? h->typical_max - h->typical_min : h->code_hi - h->code_lo;
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 

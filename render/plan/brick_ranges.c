@@ -42,11 +42,13 @@ static void find_tiles(trip_brick_ranges *r)
     r->down = hi[1] - lo[1] + 3;
 }
 
-void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data, int axis,
-                              trip_kernel kernel, trip_budget *budget)
+void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data,
+                              const trip_draw_codes *draw, int axis, trip_kernel kernel,
+                              trip_budget *budget)
 {
     int sheets = (int)data->header.slab_sheets;
     *r = (trip_brick_ranges){ .data = data,
+                              .draw = draw,
                               .axis = axis,
                               .kernel = kernel,
                               .reach = (trip_sheet_reach(kernel) + sheets - 1) / sheets,
@@ -93,7 +95,7 @@ static void fill_from(trip_brick_ranges *r, int layer, const trip_list *list, in
     for (uint64_t k = s->first_brick; k < s->first_brick + s->brick_count; k++) {
         const trip_file_brick *b = &list->bricks[k];
         trip_code_range *tile = tile_at(r, layer, b->tile_u, b->tile_v);
-        *tile = both(*tile, (trip_code_range){ b->code_min, b->code_max });
+        *tile = both(*tile, trip_draw_codes_range(r->draw, b->code_min, b->code_max));
     }
 }
 

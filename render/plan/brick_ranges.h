@@ -1,10 +1,11 @@
-/* The range of codes in all cells that a brick's voxels touch (sheet.h). It covers the brick and
- * its neighbours, in all lists of voxels and halo along an axis. The plan owns it. */
+/* The range of draw codes in all cells that a brick's voxels touch (sheet.h). It covers the brick
+ * and its neighbours, in all lists of voxels and halo along an axis. The plan owns it. */
 #ifndef TRIP_BRICK_RANGES_H
 #define TRIP_BRICK_RANGES_H
 
 #include "code_set.h"
 #include "dataset.h"
+#include "draw_codes.h"
 #include "sheet.h"
 
 /* Maximum number of slabs that the voxels around a brick lie in. It is reached with slabs of one
@@ -14,6 +15,7 @@ enum { TRIP_BRICK_RANGES_SLABS = 2 * TRIP_SHEET_REACH_MAX + 1 };
 /* The tiles of a few consecutive slabs. */
 typedef struct trip_brick_ranges {
     const trip_dataset *data;
+    const trip_draw_codes *draw;
     int axis;
     trip_kernel kernel;
     int64_t first_u, first_v, across, down;          /* tiles with bricks, plus one on every side */
@@ -26,8 +28,9 @@ typedef struct trip_brick_ranges {
 
 /* Prepares the ranges of the level 0 lists along an axis. If memory is too short or tiles are too
  * far apart, every range covers all codes. */
-void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data, int axis,
-                              trip_kernel kernel, trip_budget *budget);
+void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data,
+                              const trip_draw_codes *draw, int axis, trip_kernel kernel,
+                              trip_budget *budget);
 void trip_brick_ranges_destroy(trip_brick_ranges *r);
 
 /* Returns the range of a brick and its neighbours. Fast if called slab after slab. */

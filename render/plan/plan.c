@@ -200,7 +200,7 @@ static void count_runs(const selecting *of, uint64_t index, int64_t slab_sheet)
         const uint64_t passes = passes_of(of, slab_sheet + s);
         of->planned->splats_selected += passes * runs[s].records;
         bytes[TRIP_PLANE_VOXELS] += passes * 8 * runs[s].words;
-        if (of->list->planes >> TRIP_PLANE_NORMALS & 1)
+        if (of->list->planes >> TRIP_PLANE_NORMALS & 1 && !of->p->data->computes_normals)
             bytes[TRIP_PLANE_NORMALS] += passes * runs[s].records * h->normal_bytes;
     }
 }
@@ -360,7 +360,7 @@ static int plan_layer(planning *p, int axis)
 static int plan_sheets(planning *p, int axis)
 {
     trip_brick_ranges about;
-    trip_brick_ranges_create(&about, p->data, axis, p->settings->kernel, p->budget);
+    trip_brick_ranges_create(&about, p->data, &p->plan->draw, axis, p->settings->kernel, p->budget);
     p->about = &about;
     int status = plan_layer(p, axis);
     p->about = NULL;
@@ -412,6 +412,12 @@ int trip_plan_check_coordinates(const trip_dataset *data, const trip_settings *s
     return why ? trip_fail(TRIP_USAGE, "render", data->path, "has uneven spacing: %s", why) : 0;
 }
 
+/* Returns the draw codes of a frame that interpolates values. */
+static trip_draw_codes draw_codes_of(const trip_dataset *data, const trip_draw_codes *draw)
+{
+    return draw ? *draw : trip_draw_codes_as_stored(&data->codes);
+}
+
 /* Decides whether classification has a closed form or looks up its integrals. */
 static void plan_classification(const planning *p)
 {
@@ -435,6 +441,21 @@ static void place_whole_clip(trip_plan *plan, const trip_dataset *data, const tr
     trip_clip_simplify(&plan->clip, data->header.dims);
 }
 
+/* Adds the passes to read around the passes, if normals are computed. */
+static int add_around(trip_plan *plan, const trip_dataset *data, trip_budget *budget)
+{
+    if (!data->computes_normals || !(plan->planes >> TRIP_PLANE_NORMALS & 1))
+        return 0;
+    int status = trip_plan_around_create(&plan->around, plan->list_count, budget);
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 0; i < plan->layers[axis].pass_count && !status; i++) {
+            trip_plan_pass *pass = &plan->layers[axis].passes[i];
+            status = trip_plan_around_add(&plan->around, &pass->pass, &pass->around, budget);
+            pass->pass.around = &pass->around;
+        }
+    return status;
+}
+
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget)
 {
@@ -455,9 +476,11 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
                    .tables = tables ? tables : &plan->own_tables,
                    .budget = budget,
                    .classified = classified };
+    const bool post = settings->classify == TRIP_CLASSIFY_POST;
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
-                         .planes = planes_of(data, settings) };
+                         .planes = planes_of(data, settings),
+                         .draw = draw_codes_of(data, post ? classified->draw : NULL) };
     place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
     if (!status)
@@ -481,6 +504,8 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
     }
     if (!status && settings->classify == TRIP_CLASSIFY_POST)
         plan_classification(&p);
+    if (!status)
+        status = add_around(plan, data, budget);
     if (status)
         trip_plan_release(plan, budget);
     return status;
@@ -534,7 +559,8 @@ static unsigned planes_gathered(const trip_dataset *data, const trip_settings *s
 }
 
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, unsigned kinds, trip_budget *budget)
+                         const trip_settings *settings, unsigned kinds, const trip_draw_codes *draw,
+                         trip_budget *budget)
 {
     const planning p = {
         .plan = plan, .data = data, .camera = camera, .settings = settings, .budget = budget
@@ -542,6 +568,7 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
     *plan = (trip_plan){ .axis_of_view = trip_weight_axis_of_view(camera),
                          .coordinates = &data->coordinates,
                          .gathers = true,
+                         .draw = draw_codes_of(data, draw),
                          .planes = planes_gathered(data, settings) };
     place_whole_clip(plan, data, camera, settings);
     int status = trip_light_check(settings, &data->index_to_world);
@@ -551,6 +578,8 @@ int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_c
         status = take_lists(plan, data->list_count, budget);
     if (!status)
         status = gather_lists(&p, kinds);
+    if (!status)
+        status = add_around(plan, data, budget);
     if (status)
         trip_plan_release(plan, budget);
     return status;
@@ -561,6 +590,7 @@ void trip_plan_release(trip_plan *plan, trip_budget *budget)
     size_t count = plan->list_count;
     for (unsigned i = 0; i < plan->selection_count; i++)
         trip_selection_destroy(&plan->selections[i], budget);
+    trip_plan_around_release(&plan->around, budget);
     trip_mean_tables_release(&plan->own_tables, budget);
     trip_lod_release(&plan->lod, budget);
     trip_budget_release(budget, plan->selections, 2 * count * sizeof *plan->selections);
@@ -582,10 +612,7 @@ static void explain_footprints(const trip_settings *s, FILE *out)
         fprintf(out, "low-pass    uniform: footprints are scaled until no axis is shorter than the "
                      "filter's\n");
     if (s->flatten > 1)
-        fprintf(out,
-                "flattening  runs: kernels are up to %g times flatter along gradients; normal "
-                "planes are "
-                "read\n",
+        fprintf(out, "flattening  runs: kernels are up to %g times flatter along gradients\n",
                 s->flatten);
 }
 
@@ -606,6 +633,14 @@ static void explain_kernel(const trip_dataset *data, const trip_settings *s, FIL
                 : "");
 }
 
+static void explain_codes(const trip_plan *plan, FILE *out)
+{
+    const trip_draw_codes *d = &plan->draw;
+    if (d->of_stored)
+        fprintf(out, "codes       uneven, drawn as even codes of the values from %.9g to %.9g\n",
+                d->lo, d->hi);
+}
+
 static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *out)
 {
     if (plan->gathers) {
@@ -623,6 +658,7 @@ static void explain_method(const trip_plan *plan, const trip_settings *s, FILE *
             out,
             "classify    post: values are interpolated at %d sample%s per sheet, then classified\n",
             s->samples_per_sheet, s->samples_per_sheet == 1 ? "" : "s");
+    explain_codes(plan, out);
     if (trip_settings_sum_sheets(s))
         fprintf(
             out,
@@ -880,7 +916,7 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
 {
     const char *light = s->headlight     ? "from the eye"
                         : s->point_light ? "from the given position"
-                                         : "from the given direction";
+                                         : "from a direction";
     char bytes[32];
     const bool of_values = trip_plan_is_of_values(plan, s);
     if (s->show == TRIP_SHOW_MERGE)
@@ -892,12 +928,31 @@ static void explain_shading(const trip_plan *plan, const trip_dataset *data, con
     else if (!s->shading && s->flatten > 1)
         fprintf(out, "shading     does not run: switched off\n");
     else if (plan->planes & 1u << TRIP_PLANE_NORMALS)
-        fprintf(out, "shading     runs, lit %s: normal planes are read\n", light);
+        fprintf(out, "shading     runs, lit %s\n", light);
     else if (!(data->header.planes & 1u << TRIP_PLANE_NORMALS))
         fprintf(out, "shading     does not run: the data set has no normals\n");
     else
         fprintf(out, "shading     does not run: switched off; normal planes are not read, %s\n",
                 trip_format_bytes(trip_plan_bytes_left_out(plan, data), bytes));
+}
+
+/* Prints where the gradients of splats come from. */
+static void explain_normals(const trip_plan *plan, const trip_dataset *data, FILE *out)
+{
+    char bytes[32];
+    uint64_t sum = 0;
+    if (!(plan->planes & 1u << TRIP_PLANE_NORMALS))
+        return;
+    for (unsigned i = 0; i < plan->list_count; i++)
+        sum += plan->lists[i].bytes_selected[TRIP_PLANE_NORMALS];
+    if (data->computes_normals)
+        fprintf(out,
+                "gradients   are differences of the values, computed while reading: %s more are "
+                "read for them\n",
+                trip_format_bytes(plan->around.bytes, bytes));
+    else
+        fprintf(out, "gradients   are the stored normals: normal planes are read, %s\n",
+                trip_format_bytes(sum, bytes));
 }
 
 void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
@@ -920,6 +975,8 @@ void trip_plan_explain(const trip_plan *plan, const trip_dataset *data,
     for (int axis = 0; axis < 3; axis++)
         used += plan->layers[axis].pass_count > 0;
     explain_shading(plan, data, settings, out);
+    if (!trip_plan_is_of_values(plan, settings) && settings->show != TRIP_SHOW_MERGE)
+        explain_normals(plan, data, out);
     if (plan->gathers)
         return;
     if (used > 1)

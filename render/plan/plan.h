@@ -9,6 +9,7 @@
 #include "classification.h"
 #include "list_grid.h"
 #include "lod.h"
+#include "plan_around.h"
 #include "selection.h"
 #include "settings.h"
 #include "transfer_function.h"
@@ -37,6 +38,7 @@ typedef struct trip_plan_list {
  * `ascending` traversal one pass covers all sheets. */
 typedef struct trip_plan_pass {
     trip_pass pass;
+    trip_pass around;   /* pass.around, if normals are computed */
     bool front_to_back; /* false only in `ascending` traversal, if the view looks down the axis */
 } trip_plan_pass;
 
@@ -59,6 +61,8 @@ typedef struct trip_plan {
     trip_clip clip; /* the part of the grid that is drawn; index space */
     const trip_coordinates *coordinates; /* of the data set's grid */
     unsigned planes;                     /* the planes to read, a bit per trip_plane */
+    /* The codes that the frame interpolates. Splats have the stored codes. */
+    trip_draw_codes draw;
     /* Post only: see classification.h. Frames with effects have no closed form. */
     unsigned code_min, code_max;
     trip_closed_form_fault not_closed;
@@ -69,25 +73,29 @@ typedef struct trip_plan {
     trip_mean_tables own_tables; /* of coarse levels, if the caller keeps none */
     trip_selection *selections;  /* of all passes; room for two per list */
     unsigned selection_count;
+    trip_plan_around around; /* of passes with computed normals */
 } trip_plan;
 
 /* Makes the plan of a frame. `camera` must be made with the index_to_world map of level 0.
- * `table` must be filled for `data`: bricks with transparent codes alone are left out. Fails
+ * `table` must be filled for the codes of `data`: bricks with transparent codes alone are left
+ * out. Fails
  * (reported) for settings that exclude one another, for light too far away, and if memory is
  * exhausted. */
 int trip_plan_make(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                    const trip_settings *settings, const trip_tf_entry *table, trip_budget *budget);
 /* Makes the plan of a later frame of the same data set. It uses and updates the results of
  * earlier frames in `classified` and `tables`. `tables` must outlive the plan; NULL selects
- * tables of the plan's own. */
+ * tables of the plan's own. In `post`, `table` belongs to the draw codes of `classified`. */
 int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
                         const trip_settings *settings, const trip_tf_entry *table,
                         trip_classification *classified, trip_mean_tables *tables,
                         trip_budget *budget);
 /* Makes the plan for the integral renderer: one pass over the whole Z list of level 0, for any
- * view and transfer function. `kinds` has a bit for each trip_kind to read; 0 reads nothing. */
+ * view and transfer function. `kinds` has a bit for each trip_kind to read; 0 reads nothing. `draw`
+ * has the draw codes; NULL stands for the stored codes. */
 int trip_plan_make_field(trip_plan *plan, const trip_dataset *data, const trip_camera *camera,
-                         const trip_settings *settings, unsigned kinds, trip_budget *budget);
+                         const trip_settings *settings, unsigned kinds, const trip_draw_codes *draw,
+                         trip_budget *budget);
 void trip_plan_release(trip_plan *plan, trip_budget *budget);
 
 /* Fails (reported) for grids that are one voxel thick: they have no cells to interpolate in. The

@@ -141,11 +141,14 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
 static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
                            const trip_file_slab *slab)
 {
-    if (trip_code_set_has_some(cull->shown, brick->code_min, brick->code_max))
+    trip_code_range range = { brick->code_min, brick->code_max };
+    if (cull->about)
+        range = trip_draw_codes_range(cull->about->draw, range.min, range.max);
+    if (trip_code_set_has_some(cull->shown, range.min, range.max))
         return false;
     if (!cull->about)
         return true;
-    trip_code_range range = trip_brick_ranges_about(cull->about, slab->slab, brick);
+    range = trip_brick_ranges_about(cull->about, slab->slab, brick);
     return !trip_code_set_has_some(cull->shown, range.min, range.max);
 }
 

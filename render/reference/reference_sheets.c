@@ -39,7 +39,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     trip_affine_invert(&data->index_to_world, &s->to_index); /* invertible: checked on opening */
     s->coordinates = &data->coordinates;
     s->early_termination = trip_settings_early_termination(frame->settings);
-    s->value_per_code = (h->code_hi - h->code_lo) / 65535;
+    s->value_per_code = trip_draw_value_per_code(&frame->plan->draw);
     s->gradient_full = trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
     if (status) {
@@ -47,7 +47,7 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
         *out = NULL;
         return status;
     }
-    trip_field_fill_begin(&s->fill, data, s->field, 1u << TRIP_PLANE_VOXELS);
+    trip_field_fill_begin(&s->fill, data, &frame->plan->draw, s->field, 1u << TRIP_PLANE_VOXELS);
     trip_segments_make(&s->segments, frame->table);
     s->effects = trip_effects_view_make(frame->settings, frame->camera, h->dims);
     trip_light_map_view(frame->light, &s->effects);
@@ -88,7 +88,8 @@ static double difference(const trip_reference_sheets *s, const int64_t at[3], in
                         : 0;
 }
 
-/* Sets the gradient of a voxel. The field's single precision holds differences of codes exactly. */
+/* Sets the gradient of a voxel. The field's single precision holds differences of whole codes
+ * exactly. */
 static int set_gradient(const trip_reference_sheets *s, const int64_t at[3])
 {
     trip_field *field = s->field;

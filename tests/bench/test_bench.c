@@ -22,7 +22,8 @@ static int enter(void **state)
     FILE *f = fopen("block.raw", "wb");
     if (!f || fwrite(values, 1, sizeof values, f) != sizeof values || fclose(f) != 0)
         return -1;
-    program_call(&r, "brick block.raw --size 20,18,16 --type uint8 --keep-all -o block.trip -q");
+    program_call(&r, "brick block.raw --size 20,18,16 --type uint8 --keep-all --normals stored -o "
+                     "block.trip -q");
     return r.exit_status;
 }
 

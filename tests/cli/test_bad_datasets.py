@@ -23,7 +23,8 @@ class BadDatasets(program.ProgramTest):
         for name in "a", "b":
             assert (
                 program.call(
-                    "brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=100:255"
+                    "brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=100:255",
+                    "--normals=stored"
                 ).returncode
                 == 0
             )

@@ -403,7 +403,7 @@ class BadVolumes(program.ProgramTest):
         self.assertRegex(run.stderr, r"^triptych: note: ball.vdb: [^\n]*--level-set band[^\n]*\n$")
         for how in "filled", "band":
             run = self.works("brick", "ball.vdb", "-o", f"{how}.trip", "--level-set", how)
-            self.assertEqual(run.stderr, "")
+            self.assertNotIn("level set", run.stderr)
         kept = [self.info(f"{how}.trip")["kept"] for how in ("default", "filled", "band")]
         self.assertEqual(kept[0], kept[1])
         self.assertNotEqual(kept[0], kept[2])
@@ -412,7 +412,7 @@ class BadVolumes(program.ProgramTest):
 
     def test_a_note_names_the_chosen_grid_and_the_others(self):
         run = self.works("brick", os.path.join(program.DATASETS, "densityAndHeat.vdb"), "-o", "chosen.trip")
-        self.assertRegex(run.stderr, r'^triptych: note: [^\n]*"density" is used[^\n]*: heat\n$')
+        self.assertRegex(run.stderr, r'^triptych: note: [^\n]*"density" is used[^\n]*: heat; [^\n]*\n$')
         self.assertEqual(self.info("chosen.trip")["source"]["grid"], "density")
         program.shutil.rmtree("chosen.trip")
         self.fails(

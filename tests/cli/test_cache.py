@@ -554,7 +554,8 @@ class Cache(program.ProgramTest):
             run = self.works("render", vdb, "-o", "one.png", *SIZE)
             self.assertEqual(b"bricked" in run.stdout, bricked)
             self.assertRegex(run.stderr, r'\Atriptych: note: [^\n]*"density" is used[^\n]*\n\Z')
-        self.assertEqual(self.works("render", vdb, "-o", "a.png", *SIZE, "--grid=heat").stderr, "")
+        run = self.works("render", vdb, "-o", "a.png", *SIZE, "--grid=heat")
+        self.assertNotIn("is used", run.stderr)
 
     def test_an_impossible_output_is_reported_before_reading(self):
         program.write_nrrd("ball.nrrd", program.ball((20, 24, 28)))
@@ -580,7 +581,8 @@ class Cache(program.ProgramTest):
     def test_options_of_volumes_are_refused_for_data_sets(self):
         program.write_nrrd("v.nrrd", program.noise((12, 12, 12)))
         self.brick("v.nrrd", "v.trip")
-        for option in ("--allow-gaps",), ("--grid", "a"), ("--level-set", "band"), ("--spacing", "1,1,1"), ("--axes", "PIR"):
+        for option in (("--allow-gaps",), ("--grid", "a"), ("--level-set", "band"), ("--spacing", "1,1,1"),
+                       ("--axes", "PIR"), ("--channel", "0"), ("--series", "1"), ("--time", "1")):
             self.fails(2, "render", "v.trip", "-o", "x.png", *option, says="is a data set")
         self.fails(2, "render", "v.nrrd", "-o", "x.png", "--grid", "a", says="--level-set requires OpenVDB, --grid OpenVDB or netCDF")
 

@@ -138,8 +138,13 @@ class Formats(program.ProgramTest):
             lambda path, image: program.write_dicom(path, image, int(path[-8:-4])),
             "dcm",
         )
-        program.write_nrrd("words.nrrd", self.values.astype("u2"))
-        self.assertTrue(numpy.array_equal(self.draw("dicoms"), self.draw("words.nrrd")))
+        geometry = "space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)"
+        program.write_nrrd("words.nrrd", self.values.astype("u2"), geometry=geometry)
+        view = look_from((-75, 60, 50))  # in RAS, x and y are negated
+        view[view.index("20,18,14")], view[view.index("0.1,0.2,1")] = "-20,-18,14", "-0.1,-0.2,1"
+        picture = self.draw("dicoms", view=view)
+        self.assertTrue(numpy.array_equal(picture, self.draw("words.nrrd", view=view)))
+        self.assertLess(abs(picture - self.plain).mean(), 0.01)  # it is the same view of the data
 
     def test_wider_types_look_like_raw(self):
         for kind in "f4", "f8", "i4", "u4":

@@ -34,7 +34,9 @@ static void write_dataset(const char *path, const char *text)
         0);
     for (int axis = 0; axis < 3; axis++)
         assert_int_equal(trip_writer_append(w, (unsigned)axis, 0, 0, 0, &voxel, NULL, 1), 0);
-    assert_int_equal(trip_writer_finish(w, &(trip_writer_summary){ 0, 1, 64, text }), 0);
+    assert_int_equal(
+        trip_writer_finish(w, &(trip_writer_summary){ .value_max = 1, .voxels = 64, .text = text }),
+        0);
     trip_budget_destroy(budget);
 }
 

@@ -110,10 +110,11 @@ def write_data_set(folder):
     checksums = struct.pack(f"<{len(pages)}Q", *pages)
     end = 1024 + len(body)
     header = bytearray(struct.pack(
-        "<8s2I4Q3Q12d4dQ3dd3Q8I4Q", b"TRIPTYCH", 5, 1024, 0, end + len(checksums), end,
+        "<8s2I4Q3Q12d4dQ3dd3Q8I4Q", b"TRIPTYCH", 6, 1024, 0, end + len(checksums), end,
         xxh64(checksums), *DIMS, *IDENTITY, -258, 513, 0, 255, 0, 0, 0, 0, 0, VOXELS, VOXELS, 0,
         6, EDGE, 16, 1, 1, 0, 3, 0, 1024, at, 2, 0))
     header += bytes(1024 - len(header))
+    struct.pack_into("<2d", header, 344, 0, 255)  # the typical range
     struct.pack_into("<Q", header, 16, xxh64(bytes(header)))
     program.write(os.path.join(folder, "index.trip"), bytes(header) + body + checksums)
 

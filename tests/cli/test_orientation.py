@@ -4,6 +4,7 @@ picture. Left, right, front and head are where radiologists expect them.
 The phantom is a function of the position in the patient, in millimetres to the left, the back and
 the head. It has a body, a nose in front, a marker at the left and a marker at the head. It has no
 symmetry."""
+import itertools
 import os
 import shutil
 
@@ -164,6 +165,14 @@ class Orientation(program.ProgramTest):
         self.assertLess(difference.max(), most, about)
         self.assertLess(difference.mean(), mean, about)
 
+    def check_box(self, info, affine, values, about):
+        """Checks the world box of the grid: the patient's, with x to the right and y to the front.
+        """
+        ends = [(-0.5, n - 0.5) for n in values.shape[::-1]]
+        corners = numpy.array([[*p, 1] for p in itertools.product(*ends)]) @ (TO_RAS @ affine)[:3].T
+        box = [corners.min(axis=0), corners.max(axis=0)]
+        numpy.testing.assert_allclose(info["bounds"], box, atol=1e-4, err_msg=about)
+
     def check_default_view(self, about):
         """Checks the default view, which is a little from the patient's left. Radiologists expect
         the patient's left on the right and lowest, the head at the top, and the nose on the
@@ -203,8 +212,8 @@ class Orientation(program.ProgramTest):
         self.assertLess(alpha.max(), 0.02, about)
 
     def sources(self, affine, values, scanner):
-        """Yields the name of the world space, its axes in the patient, and the file."""
-        lps, ras = numpy.eye(3), TO_RAS[:3, :3]
+        """Yields the axes of world space in the patient, and the file."""
+        ras = TO_RAS[:3, :3]
         for space, change in (
             ("left-posterior-superior", numpy.eye(4)),
             ("RAS", TO_RAS),
@@ -212,26 +221,27 @@ class Orientation(program.ProgramTest):
         ):
             geometry = nrrd_geometry(space, change @ affine)
             program.write_nrrd("a.nrrd", values, geometry=geometry)
-            is_lps = space.startswith("left-post")
-            yield "LPS" if is_lps else "RAS", lps if is_lps else ras, "a.nrrd"
+            yield ras, "a.nrrd"
         program.write_nifti("a.nii", values, TO_RAS @ affine)
-        yield "RAS", ras, "a.nii"
+        yield ras, "a.nii"
         if scanner:
             write_series(f"{scanner}", affine, values)
-            yield "LPS", lps, scanner
+            yield ras, scanner
         if scanner == "gantry-tilt":
             write_frames("frames.dcm", affine, values)
-            yield "LPS", lps, "frames.dcm"
+            yield ras, "frames.dcm"
 
     def check_acquisition(self, name, scanner, first):
         """Checks every format of an acquisition, also against the picture `first` of another
         acquisition. Returns a picture of this acquisition."""
         affine, values = acquisition(*ACQUISITIONS[name][:3])
         camera, own = Camera(), None
-        for space, to_patient, source in self.sources(affine, values, scanner):
-            about = f"{name}, {source}, {space}"
+        for to_patient, source in self.sources(affine, values, scanner):
+            about = f"{name}, {source}"
             info = self.brick(source)
-            self.assertEqual((info["space"], info["axes"]), (space, ACQUISITIONS[name][3]), about)
+            self.assertEqual((info["space"], info["axes"]), ("RAS", ACQUISITIONS[name][3]), about)
+            self.assertEqual(info["orientation"], "space", about)
+            self.check_box(info, affine, values, about)
             picture = self.picture("a.trip", *camera.options(to_patient))
             if own is None:
                 own = picture
@@ -278,7 +288,7 @@ class Orientation(program.ProgramTest):
         corner, _ = acquisition(*steps)
         affine, values = acquisition(*steps, place=-corner[:3, 3])
         self.assertTrue(numpy.array_equal(affine, numpy.diag([2, 2, 5, 1])))
-        for _, _, source in self.sources(affine, values, "thick"):
+        for _, source in self.sources(affine, values, "thick"):
             self.brick(source)
             self.check_default_view(source)
 
@@ -346,6 +356,7 @@ class Orientation(program.ProgramTest):
         self.assertNotIn("space", info["source"])
         text = self.works("info", "a.trip").stdout.decode()
         self.assertIn("mirror-symmetric across z", text)
+        self.assertIn("orientation  guessed from the mirror symmetry\n", text)
         for end in "left", "right", "anterior", "superior":
             self.assertNotIn(f"to {end}", text)
         self.alike(self.picture("a.trip", "--size=96x96"), expected, "wedge", most=0.01, mean=5e-4)
@@ -356,6 +367,27 @@ class Orientation(program.ProgramTest):
         self.assertIn("--up, --view and --axes say otherwise", run.stderr)
         run = self.works("render", "said.nrrd", "-o", "b.png", "--size=32x32", "--tf", "all.tf")
         self.assertNotIn("symmetric", run.stderr)
+
+    def test_the_program_that_wrote_an_openvdb_file_decides_what_is_up(self):
+        """The smoke in densityAndHeat.vdb, whose file names no program, rises along z: it was looked
+        at. The cloud is by Houdini, where y is up."""
+        sources = {}
+        for name in "densityAndHeat", "wdas_cloud_sixteenth":
+            path = os.path.join(program.DATASETS, f"{name}.vdb")
+            run = self.works("brick", path, "-o", "a.trip", "--force")
+            source = self.info("a.trip")["source"]
+            sources[name] = source["orientation"], source["up"], "--axes" in run.stderr
+            program.write("fog.tf", b"values normalised\n0 1 1 1 0\n1 1 1 1 1\n")
+            view = "--size=64x64", "--view=front", "--tf=fog.tf"
+            up = "--up=0,0,1" if source["up"] == "+z" else "--up=0,1,0"
+            self.assertTrue(numpy.array_equal(self.picture("a.trip", *view),
+                                              self.picture("a.trip", *view, up)))
+        self.assertEqual(sources["densityAndHeat"], ("length", "+z", True))
+        self.assertEqual(sources["wdas_cloud_sixteenth"], ("program", "+y", False))
+        path = os.path.join(program.DATASETS, "densityAndHeat.vdb")
+        self.assertNotIn("what is up", self.works("brick", path, "-o", "a.trip", "--force",
+                                                  "--axes", "RAS").stderr)
+        self.assertEqual(self.info("a.trip")["orientation"], "axes")
 
     def bright_from_middle(self, name):
         """Returns the offset in pixels from the centre of tests/regress/NAME to the centre of its
@@ -376,15 +408,16 @@ class Orientation(program.ProgramTest):
         self.assertGreater(across, 8)
 
     def test_a_missing_frame_is_refused_unless_allowed(self):
-        """The file has frames at 0, 2, 4, 8, 10 and 12. With the gap allowed, their spacing is 2
-        and not 2.4."""
+        """The file has frames at 0, 2, 4, 8, 10 and 12. With the gap allowed, they stay there."""
         values = program.noise((6, 8, 8)).astype("u2")
         places = [(0, 0, z) for z in (0, 2, 4, 8, 10, 12)]
         program.write_dicom("gap.dcm", values, 0, (1, 1, 2), places[0], frames=places)
         self.fails(1, "brick", "gap.dcm", "-o", "g.trip", "-q", says="frame 3: a slice is missing")
         run = self.works("brick", "gap.dcm", "-o", "g.trip", "-q", "--force", "--allow-gaps")
         self.assertIn("frame 3: a slice is missing", run.stderr)
-        self.assertAlmostEqual(self.info("g.trip")["spacing"][2], 2)
+        info = self.info("g.trip")
+        self.assertAlmostEqual(info["spacing_min"][2], 2)
+        self.assertAlmostEqual(info["spacing_max"][2], 4)
         even = [(0, 0, 2 * z) for z in range(6)]
         program.write_dicom("even.dcm", values, 0, (1, 1, 2), even[0], frames=even)
         self.assertEqual(
@@ -414,7 +447,8 @@ class Orientation(program.ProgramTest):
         program.write_nrrd("a.nrrd", values, geometry=nrrd_geometry("LPS", affine))
         self.brick("a.nrrd")
         words = self.works("info", "a.trip").stdout.decode()
-        self.assertIn("space        LPS: x to left, y to posterior, z to superior\n", words)
+        self.assertIn("space        RAS: x to right, y to anterior, z to superior\n", words)
+        self.assertIn("orientation  from the space of the patient in the file\n", words)
         self.assertIn("i points to  left\n", words)
         self.assertIn("j points to  posterior, 20 degrees to superior\n", words)
         self.assertIn("k points to  superior\n", words)

@@ -132,19 +132,39 @@ class Parts(program.ProgramTest):
         program.write_nrrd("float.nrrd", self.volume.astype("f4") * 2)
         self.make("moved.trip", volume="moved.nrrd")
         self.make("float.trip", volume="float.nrrd")
-        self.make("flat.trip", "--normals", "none")
+        self.make("lit.trip", "--normals", "full", "--region", "21:,:,:")
+        self.make("compact.trip", "--normals", "compact", "--region", ":21,:,:")
         self.make("tiles.trip", "--tile", 32)
         for other, why in (
             ("moved.trip", "a different grid"),
             ("float.trip", "a different scale of values"),
-            ("flat.trip", "different normals"),
             ("tiles.trip", "different tiles"),
         ):
             says = f"open: {other}: "
             run = self.leaves_nothing(1, "render", self.halves[0], other, "-o", "x.png", says=says)
             self.assertIn(why, run.stderr)
+        run = self.leaves_nothing(1, "render", "compact.trip", "lit.trip", "-o", "x.png",
+                                  says="open: lit.trip: ")
+        self.assertIn("different normals", run.stderr)
+        self.works("render", self.halves[0], "lit.trip", "-o", "x.png", *SIZE)
         self.leaves_nothing(2, "render", self.halves[0], "v.nrrd", "-o", "x.png", says="v.nrrd: ")
         self.leaves_nothing(2, "render", *self.halves, "--error", 1, "-o", "x.png", says="--error")
+
+    def test_two_volumes_on_one_grid_are_refused_with_a_way_out(self):
+        """A scan and its segmentation. The values of both have the same codes, and no voxel is kept
+        in both, so only their sources tell them apart."""
+        for name, at, value in ("scan", 2, 200), ("labels", 40, 2):
+            values = numpy.zeros((64, 64, 64), "u1")
+            values[at : at + 9, at : at + 9, at : at + 9] = value
+            values[-1, -1, -1] = 255
+            program.write_nrrd(f"{name}.nrrd", values)
+            self.works("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=1:254")
+        run = self.leaves_nothing(1, "render", "scan.trip", "labels.trip", "-o", "x.png",
+                                  says="labels.trip: is made of another volume (labels.nrrd)")
+        self.assertIn("the same --eye, --look and --up", run.stderr)
+        run = self.leaves_nothing(2, "render", "scan.nrrd", "labels.nrrd", "-o", "x.png",
+                                  says="only one volume")
+        self.assertIn("the same --eye, --look and --up", run.stderr)
 
     def test_regions_that_overlap_are_refused_for_every_classification(self):
         self.make("low.trip", "--region", ":22,:,:")

@@ -1,5 +1,7 @@
 """Tests of fixed faults, with the small files of tests/regress or files made here."""
 import bz2
+import gzip
+import json
 import os
 import signal
 import struct
@@ -49,14 +51,47 @@ class Regress(program.ProgramTest):
             for page in range(24):
                 pages.seek(page)
                 values.append(numpy.array(pages).astype(kind))
-            program.write("pages.raw", numpy.stack(values).tobytes())
+            volume = numpy.stack(values)
+            if name == "unknown-tags":
+                volume = numpy.where(volume == -9999, numpy.nan, volume).astype("<f4")
+            program.write("pages.raw", volume.tobytes())
             self.brick("pages.raw", "raw.trip", "--size=40,32,24", "--keep-all",
-                       f"--type={'int16' if kind == '<i2' else 'uint16'}")
+                       f"--type={'float' if kind == '<i2' else 'uint16'}")
             self.brick(os.path.join(REGRESS, f"{name}.tif"), "tiff.trip", "--keep-all")
             drawn, expected = (self.picture(f"{d}.trip", *VIEW, "--tf=grey", "--up=0,0,1", "--view=left")
                                for d in ("tiff", "raw"))
             self.assertGreater(expected.std(), 0.01)
             self.assertTrue((drawn == expected).all(), name)
+
+    def values(self, source, *options):
+        """Returns the summary of a data set of all values."""
+        run = self.works("brick", source, "-o", "all.trip", "--force", "--keep-all", "--json", *options)
+        self.note = run.stderr
+        return json.loads(run.stdout)
+
+    def test_channels_of_an_ome_tiff_are_volumes(self):
+        """Both channels were read as one stack of 48 slices, 1 apart."""
+        source = os.path.join(REGRESS, "two-channels.ome.tif")
+        for channel, most in (0, 1000), (1, 500):
+            s = self.values(source, f"--channel={channel}")
+            self.assertEqual((s["dims"], s["spacing"], s["value_max"]), ([40, 32, 24], [0.5, 0.5, 1], most))
+            self.assertIn(f"channel {channel} of 2", self.note)
+        self.fails(2, "brick", source, "-o", "no.trip", "--channel=2", says="has 2 channels")
+        self.fails(2, "brick", source, "-o", "no.trip", "--time=1", says="has one time")
+
+    def test_the_absent_value_of_a_tiff_is_absent(self):
+        """The value -9999 of the first three planes counted as a value."""
+        s = self.values(os.path.join(REGRESS, "unknown-tags.tif"))
+        self.assertEqual((s["dims"], s["value_min"], s["not_finite"]), ([40, 32, 24], 0, 3 * 40 * 32))
+
+    def test_text_in_a_compressed_file_is_read(self):
+        """Values as text, and any file that was compressed as a whole, were refused."""
+        grid = program.noise((4, 5, 6), "<i2")
+        text = " ".join(map(str, grid.ravel())) + "\n"
+        head = "NRRD0005\ntype: short\ndimension: 4\nsizes: 1 6 5 4\nencoding: ascii\n\n"
+        program.write("text.bin", gzip.compress((head + text).encode()))
+        s = self.values("text.bin")
+        self.assertEqual((s["dims"], s["value_min"], s["value_max"]), ([6, 5, 4], grid.min(), grid.max()))
 
     def test_a_nifti_file_named_gz_need_not_be_compressed(self):
         header = bytearray(352)

@@ -120,6 +120,29 @@ class Tf(program.ProgramTest):
             self.fails(1, "tf", "show", name)
         self.leaves_nothing(1, "tf", "convert", "grey", "no/such/folder/a.tf")
 
+    def test_colour_maps_without_opacities_leave_the_background_empty(self):
+        """The map for surfaces would be a solid box: the tooth's surroundings are a quarter of its
+        range. The corners of the box stay background."""
+        colours = '"RGBPoints": [0, 0.2, 0.3, 0.8, 0.5, 0.9, 0.9, 0.9, 1, 0.7, 0, 0.1]'
+        point = '<Point x="%d" o="1" r="1" g="%d" b="0"/>'
+        program.write("plain.json", ("[{%s}]" % colours).encode())
+        program.write("opaque.json", ('[{%s, "Points": [0, 1, 0.5, 0, 1, 1, 0.5, 0]}]' % colours).encode())
+        program.write("map.xml", f'<ColorMap space="RGB">{point % (0, 0)}{point % (1, 1)}</ColorMap>'.encode())
+        tooth = os.path.join(program.DATASETS, "tooth.nhdr")
+        for name in "plain.json", "opaque.json", "map.xml":
+            run = self.works("render", tooth, "-o", "a.exr", "--size=96x96", "--view=front", "--ortho", "fit",
+                             "--tf", name, "--background=none")
+            self.assertEqual(run.stderr.count("has colours without opacities"), 1, run.stderr)
+            alpha = program.read_exr("a.exr")[..., 3]
+            corners = [alpha[y, x] for y in (2, -3) for x in (2, -3)]
+            self.assertEqual(max(corners), 0, name)
+            self.assertGreater(alpha[48, 48], 0.99)
+            shown = (alpha > 0.5).mean()
+            self.assertLess(shown, 0.6)
+            self.assertGreater(shown, 0.2)
+        run = self.works("render", tooth, "-o", "a.exr", "--tf", "plain.json", "--window=800", "--level=900")
+        self.assertNotIn("without opacities", run.stderr)
+
 
 if __name__ == "__main__":
     program.main()

@@ -11,7 +11,7 @@ class Scale(program.ProgramTest):
     def records(self, spacing, factor, *options):
         """Bricks the scaled volume. Returns the contents of its plane files."""
         program.write_nrrd("a.nrrd", VOLUME * numpy.float32(factor), spacing=(spacing,) * 3)
-        self.brick("a.nrrd", "a.trip", *options)
+        self.brick("a.nrrd", "a.trip", "--normals=stored", *options)
         contents = []
         for name in FILES:
             with open(f"a.trip/{name}", "rb") as f:

@@ -111,6 +111,20 @@ static void colour_maps_of_older_paraview_versions_are_normalised(void **state)
     trip_tf_destroy(tf);
 }
 
+/* All their points have o="1". */
+static void colour_maps_for_surfaces_get_a_ramp(void **state)
+{
+    (void)state;
+    trip_tf *tf = from_xml("<ColorMap name=\"a\" space=\"RGB\">"
+                           "<Point x=\"0\" o=\"1\" r=\"0\" g=\"0\" b=\"0\"/>"
+                           "<Point x=\"1\" o=\"1\" r=\"1\" g=\"0.5\" b=\"0\"/></ColorMap>",
+                           NULL);
+    trip_tf_denormalise(tf, 100, 200);
+    assert_rgba(trip_tf_evaluate(tf, 100), 0, 0, 0, 0);
+    assert_rgba(trip_tf_evaluate(tf, 150), 0.5, 0.25, 0, 0.5);
+    trip_tf_destroy(tf);
+}
+
 static void opacity_by_gradient_gives_a_warning(void **state)
 {
     (void)state;
@@ -170,6 +184,7 @@ int main(void)
         cmocka_unit_test(properties_of_vtk_have_points_as_elements),
         cmocka_unit_test(grey_transfer_functions_are_read),
         cmocka_unit_test(colour_maps_of_older_paraview_versions_are_normalised),
+        cmocka_unit_test(colour_maps_for_surfaces_get_a_ramp),
         cmocka_unit_test(opacity_by_gradient_gives_a_warning),
         cmocka_unit_test(every_report_names_the_fault),
         cmocka_unit_test(entities_are_never_expanded),

@@ -282,13 +282,18 @@ static void bad_volumes_are_refused(void **state)
                      says[n]);
     }
     const triptych_brick_options refused[] = {
-        { .in_memory = &good, .resume = 1 },
-        { .in_memory = &good, .raw_type = "uint8" },
-        { .in_memory = &good, .allow_gaps = 1 },
-        { .in_memory = &good, .grid = "density" },
+        { .in_memory = &good, .resume = 1 },     { .in_memory = &good, .raw_type = "uint8" },
+        { .in_memory = &good, .allow_gaps = 1 }, { .in_memory = &good, .grid = "density" },
+        { .in_memory = &good, .channel = 1 },    { .in_memory = &good, .time = 1 },
+        { .in_memory = &good, .time = -1 },
     };
-    static const char *const why[] = { "cannot be resumed", "its format is memory; --size",
-                                       "--allow-gaps", "--grid" };
+    static const char *const why[] = { "cannot be resumed",
+                                       "its format is memory; --size",
+                                       "--allow-gaps",
+                                       "--grid",
+                                       "--channel and --time require",
+                                       "--channel and --time require",
+                                       "times count from 0" };
     for (size_t n = 0; n < sizeof refused / sizeof *refused; n++)
         assert_fails(t, triptych_brick(t, "bad", "failed.trip", &refused[n], NULL), TRIPTYCH_USAGE,
                      why[n]);

@@ -56,6 +56,29 @@ static void options_set_the_members_of_their_names(void **state)
     assert_int_equal(s.all.traversal, TRIPTYCH_TRAVERSAL_ASCENDING);
 }
 
+static draw_settings read_light(const char *options)
+{
+    draw_settings s = { .has_background = 0 };
+    assert_int_equal(draw_settings_read_text(&s, options), 0);
+    char *text = draw_settings_text(&s);
+    assert_string_equal(text, options);
+    free(text);
+    return s;
+}
+
+static void the_words_before_a_light_select_its_kind(void **state)
+{
+    (void)state;
+    const draw_settings view = read_light(" --light -1,2,3"),
+                        world = read_light(" --light world:-1,2,3"),
+                        point = read_light(" --light point:-1,2,3");
+    assert_int_equal(view.light.kind, TRIPTYCH_LIGHT_VIEW);
+    assert_int_equal(world.light.kind, TRIPTYCH_LIGHT_DIRECTION);
+    assert_int_equal(point.light.kind, TRIPTYCH_LIGHT_POINT);
+    assert_true(view.light.toward[0] == -1 && world.light.toward[2] == 3);
+    assert_false(draw_settings_same(&view, &world));
+}
+
 static void the_longest_values_are_printed_completely(void **state)
 {
     (void)state;
@@ -141,6 +164,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_row_reads_and_prints_the_same_option),
         cmocka_unit_test(options_set_the_members_of_their_names),
+        cmocka_unit_test(the_words_before_a_light_select_its_kind),
         cmocka_unit_test(the_longest_values_are_printed_completely),
         cmocka_unit_test(a_difference_in_any_row_is_seen),
         cmocka_unit_test(public_settings_point_to_every_group),

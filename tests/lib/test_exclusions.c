@@ -38,7 +38,8 @@ static void the_message_names_the_option_and_the_reason(void **state)
     (void)state;
     const triptych_renderer any = TRIPTYCH_RENDERER_AUTO, integral = TRIPTYCH_RENDERER_INTEGRAL;
     assert_refused("--light 1,0,0 --no-shading", any, "--light: does not apply with --no-shading");
-    assert_refused("--effects shadows", any, "shadows require a light that is not at the eye");
+    assert_refused("--effects shadows --light head", any,
+                   "shadows cannot be seen with --light head");
     assert_refused("--h 0.5 --method clip", any, "--h: requires --method merge");
     assert_refused("--tolerance 0.01", any, "--tolerance: requires --renderer integral");
     assert_refused("--lod 2", integral, "--lod: does not apply to --renderer integral");

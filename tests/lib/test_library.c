@@ -31,6 +31,7 @@ static int brick(void **state)
     const triptych_brick_options options = { .functions = &grey,
                                              .function_count = 1,
                                              .automatic = 1,
+                                             .normals = TRIPTYCH_NORMALS_STORED,
                                              .levels = -1,
                                              .replace = 1,
                                              .memory_bytes = 64 << 20,
@@ -1080,6 +1081,90 @@ static draw_settings with_effects(int effects)
     return s;
 }
 
+/* Returns the greatest difference of two pictures. */
+static double difference(const float *a, const float *b)
+{
+    double max = 0;
+    for (size_t i = 0; i < FLOATS; i++)
+        max = fmax(max, fabs((double)a[i] - (double)b[i]));
+    return max;
+}
+
+/* The library draws a light of the view as the same light given in the world. The world direction
+ * is computed here, from the camera. */
+static void a_light_of_the_view_turns_with_the_camera(void **state)
+{
+    (void)state;
+    static float view[FLOATS], world[FLOATS], before[FLOATS];
+    const triptych_renderer renderers[] = { TRIPTYCH_RENDERER_CPU, TRIPTYCH_RENDERER_REFERENCE };
+    for (int n = 0; n < 4; n++) {
+        draw_settings s = with_effects(n / 2 ? TRIPTYCH_EFFECT_SHADOWS : 0);
+        triptych *t = new_context();
+        open_data(t, renderers[n % 2]);
+        for (double degrees = 0; degrees < 250; degrees += 80) {
+            triptych_camera c;
+            double axes[3][3], length[2] = { 0, 0 };
+            const double light[3] = { 2, 1, 0.5 };
+            assert_int_equal(triptych_turn(t, degrees), TRIPTYCH_OK);
+            assert_int_equal(triptych_get_camera(t, &c), TRIPTYCH_OK);
+            for (int i = 0; i < 3; i++)
+                axes[2][i] = c.eye[i] - c.look[i];
+            for (int i = 0; i < 3; i++) { /* front x up is left */
+                const int j = (i + 1) % 3, k = (i + 2) % 3;
+                axes[0][i] = axes[2][j] * c.up[k] - axes[2][k] * c.up[j];
+            }
+            for (int i = 0; i < 3; i++) {
+                length[0] += axes[0][i] * axes[0][i];
+                length[1] += axes[2][i] * axes[2][i];
+            }
+            for (int i = 0; i < 3; i++) {
+                axes[0][i] /= sqrt(length[0]);
+                axes[2][i] /= sqrt(length[1]);
+            }
+            s.light.kind = TRIPTYCH_LIGHT_DIRECTION;
+            for (int i = 0; i < 3; i++) { /* left x front is up */
+                const int j = (i + 1) % 3, k = (i + 2) % 3;
+                axes[1][i] = axes[0][j] * axes[2][k] - axes[0][k] * axes[2][j];
+            }
+            for (int i = 0; i < 3; i++)
+                s.light.toward[i] =
+                    light[0] * axes[0][i] + light[1] * axes[1][i] + light[2] * axes[2][i];
+            assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
+            draw(t, world);
+            s.light.kind = TRIPTYCH_LIGHT_VIEW;
+            memcpy(s.light.toward, light, sizeof light);
+            assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
+            draw(t, view);
+            assert_true(difference(view, world) < 1e-5);
+            assert_true(degrees == 0 || difference(view, before) > 1e-3);
+            memcpy(before, view, sizeof before);
+        }
+        triptych_destroy(t);
+    }
+}
+
+static void shadows_without_a_light_get_one_and_read_nothing_for_another_view(void **state)
+{
+    (void)state;
+    static float own[FLOATS], chosen[FLOATS];
+    draw_settings none = with_effects(TRIPTYCH_EFFECT_SHADOWS), given = none, head = none;
+    none.light = (triptych_light){ 0 };
+    given.light = (triptych_light){ .kind = TRIPTYCH_LIGHT_VIEW, .toward = { 1, 1, 1 } };
+    head.light = (triptych_light){ .kind = TRIPTYCH_LIGHT_HEAD };
+    triptych *t = new_context();
+    open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(draw_settings_use(t, &none), TRIPTYCH_OK);
+    assert_int_equal(draw(t, chosen).effects, TRIPTYCH_EFFECT_SHADOWS);
+    assert_int_equal(draw_settings_use(t, &given), TRIPTYCH_OK);
+    assert_int_equal(draw(t, own).light_bytes_read, 0);
+    assert_true(are_same(own, chosen));
+    assert_int_equal(triptych_turn(t, 50), TRIPTYCH_OK);
+    assert_int_equal(draw(t, own).light_bytes_read, 0);
+    assert_int_equal(draw_settings_use(t, &head), TRIPTYCH_OK);
+    assert_int_equal(triptych_draw(t, own), TRIPTYCH_USAGE);
+    triptych_destroy(t);
+}
+
 static void effects_cost_nothing_when_off_and_are_kept_between_views(void **state)
 {
     (void)state;
@@ -1278,7 +1363,7 @@ static void measured_volumes_have_effects_only_on_request(void **state)
     s.effects.which = TRIPTYCH_EFFECT_SHADOWS;
     s.light.kind = TRIPTYCH_LIGHT_HEAD;
     assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
-    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "shadows require a light");
+    assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "shadows cannot be seen with --light head");
     s.effects.which = TRIPTYCH_EFFECT_EMISSION;
     assert_int_equal(draw_settings_use(t, &s), TRIPTYCH_OK);
     assert_fails(t, triptych_begin(t), TRIPTYCH_USAGE, "needs a data set of heat");
@@ -1316,6 +1401,8 @@ int main(void)
         cmocka_unit_test(settings_for_splats_select_pre),
         cmocka_unit_test(samples_are_averaged_as_in_a_larger_picture),
         cmocka_unit_test(two_levels_are_blended),
+        cmocka_unit_test(a_light_of_the_view_turns_with_the_camera),
+        cmocka_unit_test(shadows_without_a_light_get_one_and_read_nothing_for_another_view),
         cmocka_unit_test(effects_cost_nothing_when_off_and_are_kept_between_views),
         cmocka_unit_test(heat_is_read_once_if_emission_runs),
         cmocka_unit_test(the_closed_form_depends_on_the_current_settings),

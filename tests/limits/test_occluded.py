@@ -26,8 +26,10 @@ class Hidden(limits.Test):
         if n <= 256:  # a close view, because edges and the ring are most of the reads of a small volume
             view += ["--fov", 60, "--look", f"{n / 2},{n / 2},{n / 2}", "--eye",
                      f"{n / 2},{-n / 3},{n / 2}"]
+        lit = self.brick(volume, "lit.trip", "--keep-all", "--tf", self.tf, "--normals", "stored")
         # `post` draws several sheets at once, so that it has read more before pixels are opaque.
-        for classify, most in ("pre", 0.5), ("post", 0.65):
+        # Computed normals also read the bricks beside the visible ones.
+        for classify, data, most in ("pre", lit, 0.5), ("pre", data, 0.7), ("post", data, 0.65):
             look = [*view, "--classify", classify]
             drawn, wanted = self.stats(data, *look, "--occluded", "draw", size="512x512")
             skipped, picture = self.stats(data, *look, "--occluded", "skip", size="512x512")
@@ -99,7 +101,7 @@ class Hidden(limits.Test):
 
     def test_normals_are_read_only_for_shading(self):
         volume = self.generate("lobes.nrrd", "marschner-lobb", 64)
-        data = self.brick(volume, "lobes.trip", "--keep-all")
+        data = self.brick(volume, "lobes.trip", "--keep-all", "--normals", "stored")
         pre = "--classify", "pre"
         shaded = self.stats(data, "--occluded", "draw", *pre)[0]
         plain = self.stats(data, "--no-shading", "--occluded", "draw", *pre)[0]
@@ -124,7 +126,7 @@ class Hidden(limits.Test):
 
     def test_cached_bricks_are_not_read_again_in_a_sequence(self):
         data = self.brick(self.generate("turned.nrrd", "marschner-lobb", 144), "turned.trip",
-                          "--keep-all")
+                          "--keep-all", "--normals", "stored")
         for classify in "pre", "post":
             frames = {}
             for memory in "24M", "1G":

@@ -93,6 +93,8 @@ typedef struct test_lists {
     uint64_t splats[TEST_LISTS];
     uint64_t out_of_order; /* splats not in order of sheet and Morton code */
     char *text;
+    double *table; /* copy of the table of codes */
+    trip_codes scale;
 } test_lists;
 
 static inline void test_read_run(const trip_dataset *d, unsigned number, const trip_run *run,
@@ -142,6 +144,10 @@ static inline void test_read_lists(const char *name, test_lists *l)
     assert_int_equal(trip_dataset_open(&d, test_path(name), budget), 0);
     assert_int_equal(trip_dataset_verify(d, budget), 0);
     *l = (test_lists){ .header = d->header, .text = strdup(d->text) };
+    l->table = malloc((d->codes.entries + 1) * sizeof *l->table);
+    if (d->codes.entries)
+        memcpy(l->table, d->codes.table, d->codes.entries * sizeof *l->table);
+    l->scale = trip_codes_of(&d->header, d->codes.table ? l->table : NULL);
     l->voxels = (size_t)(d->header.dims[0] * d->header.dims[1] * d->header.dims[2]);
     while (l->lists < d->list_count && d->lists[l->lists].level == 0)
         l->lists++;
@@ -174,6 +180,7 @@ static inline void test_free_lists(test_lists *l)
         free(l->normals[i]);
     }
     free(l->text);
+    free(l->table);
 }
 
 /* Checks that the lists are valid and in order, and that all three lists of a kind have the same

@@ -97,16 +97,28 @@ static inline void append_png_chunk(bytes *b, const char *name, const void *data
     append_word(b, crc32(0, b->data + start, (unsigned)(b->count - start)), 4, true);
 }
 
+/* Appends a PNG of rows that start with the number of their filter. */
+static inline void append_png_file(bytes *b, unsigned width, unsigned height, unsigned bits,
+                                   unsigned colour_type, const bytes *rows)
+{
+    bytes header = { .count = 0 }, packed = { .count = 0 };
+    append_word(&header, width, 4, true);
+    append_word(&header, height, 4, true);
+    unsigned char rest[5] = { (unsigned char)bits, (unsigned char)colour_type };
+    append(&header, rest, 5);
+    append_zlib(&packed, rows);
+    append(b, "\x89PNG\r\n\x1a\n", 8);
+    append_png_chunk(b, "IHDR", header.data, header.count);
+    append_png_chunk(b, "IDAT", packed.data, packed.count);
+    append_png_chunk(b, "IEND", "", 0);
+}
+
 /* Appends slice k with `channels` channels. Colour channels repeat the value, and the last of 2 or
  * 4 channels is an alpha of one half. */
 static inline void append_png(bytes *b, trip_scalar type, int k, int channels)
 {
     static const unsigned char colour_type[] = { 0, 0, 4, 2, 6 };
-    bytes header = { .count = 0 }, raw = { .count = 0 }, packed = { .count = 0 };
-    append_word(&header, NX, 4, true);
-    append_word(&header, NY, 4, true);
-    unsigned char rest[5] = { (unsigned char)(8 * trip_scalar_bytes(type)), colour_type[channels] };
-    append(&header, rest, 5);
+    bytes raw = { .count = 0 };
     for (int j = 0; j < NY; j++) {
         append_word(&raw, 0, 1, true);
         for (int i = 0; i < NX; i++)
@@ -114,11 +126,7 @@ static inline void append_png(bytes *b, trip_scalar type, int k, int channels)
                 append_value(&raw, type,
                              c % 2 == 1 && c == channels - 1 ? 128 : sample(type, i, j, k), true);
     }
-    append_zlib(&packed, &raw);
-    append(b, "\x89PNG\r\n\x1a\n", 8);
-    append_png_chunk(b, "IHDR", header.data, header.count);
-    append_png_chunk(b, "IDAT", packed.data, packed.count);
-    append_png_chunk(b, "IEND", "", 0);
+    append_png_file(b, NX, NY, 8 * trip_scalar_bytes(type), colour_type[channels], &raw);
 }
 
 static inline void append_exr_attribute(bytes *b, const char *name, const char *type,

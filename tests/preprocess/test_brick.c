@@ -34,6 +34,25 @@ static void make_floats(void)
     test_write("v.raw", floats, sizeof floats);
 }
 
+/* A slice of fill values that nobody declared, and one value far outside. */
+static void make_strange_floats(void)
+{
+    make_floats();
+    for (int i = 0; i < NX * NY; i++)
+        floats[i] = 1e20f;
+    floats[N / 2] = 1e6f;
+    test_write("v.raw", floats, sizeof floats);
+}
+
+/* Blocks of 8 ids, some of which share a float. */
+static void make_ids(void)
+{
+    static uint32_t ids[N];
+    for (int i = 0; i < N; i++)
+        ids[i] = i % NX / 8 ? 4000000000u + (uint32_t)(i % NX / 8 % 3 + i / NX % NY / 8 % 3) : 0;
+    test_write("v.raw", ids, sizeof ids);
+}
+
 static trip_brick_params params_for(const char *type, const char *output)
 {
     static char input_path[128], output_path[128];
@@ -42,6 +61,7 @@ static trip_brick_params params_for(const char *type, const char *output)
     return (trip_brick_params){ .input = input_path,
                                 .output = output_path,
                                 .volume = { .raw_dims = { NX, NY, NZ }, .raw_type = type },
+                                .normals = TRIP_NORMALS_STORED,
                                 .memory_bytes = (uint64_t)1 << 28,
                                 .threads = 2 };
 }
@@ -179,11 +199,15 @@ static void check_codes_of_floats(trip_brick_code_bits bits, unsigned code_bytes
     assert_true(fabs(l.header.code_hi - (hi + room * range_of_values)) < 1e-9 * all);
     assert_true(l.header.value_min == lo && l.header.value_max == hi);
     for (int i = 0; i < N; i++) {
-        double value = lo - room * range_of_values + all * l.codes[0][i] / 65535;
         assert_int_equal(l.codes[0][i] >= 0, floats[i] >= -1 && floats[i] <= 20);
         if (l.codes[0][i] >= 0) {
             assert_int_equal(l.codes[0][i] % (65535 / steps), 0);
-            assert_true(fabs(value - floats[i]) <= 0.5001 * all / steps);
+            const int code = l.codes[0][i], step = 65535 / steps;
+            const double value = trip_codes_value(&l.scale, code);
+            const double above = trip_codes_value(&l.scale, code + step) - value;
+            const double below = value - trip_codes_value(&l.scale, code - step);
+            assert_true(fabs(value - floats[i]) <= 0.5001 * fmax(above, below));
+            assert_true(fmax(above, below) <= 8 * all / steps);
         }
     }
     test_free_lists(&l);
@@ -497,7 +521,7 @@ static void normals_have_the_chosen_number_of_bytes(void **state)
         bool ranges;
         unsigned bytes;
     } ways[] = {
-        { TRIP_NORMALS_AUTO, false, 4 },    { TRIP_NORMALS_AUTO, true, 4 },
+        { TRIP_NORMALS_STORED, false, 4 },  { TRIP_NORMALS_STORED, true, 4 },
         { TRIP_NORMALS_COMPACT, true, 3 },  { TRIP_NORMALS_FULL, false, 4 },
         { TRIP_NORMALS_COMPACT, false, 3 }, { TRIP_NORMALS_NONE, true, 0 },
     };
@@ -531,7 +555,7 @@ static void check_ways(const trip_brick_params *base)
         trip_brick_params p = *base;
         p.threads = (unsigned[]){ 1, 1, 4, 3, 2 }[way];
         p.slices = (int64_t[]){ 0, 1, 5, 23, 64 }[way];
-        p.memory_bytes = (uint64_t[]){ 0, 28 << 20, 48 << 20, 64 << 20, 256 << 20 }[way];
+        p.memory_bytes = (uint64_t[]){ 0, 29 << 20, 48 << 20, 64 << 20, 256 << 20 }[way];
         brick_to(p, "b.trip");
         test_same_dataset("a.trip", "b.trip");
     }
@@ -551,6 +575,13 @@ static void memory_threads_and_slabs_do_not_change_the_result(void **state)
     p.keep_all = true;
     check_ways(&p);
     p = params_for("float", "a.trip");
+    check_ways(&p);
+    make_strange_floats();
+    check_ways(&p);
+    p.keep_all = true;
+    check_ways(&p);
+    make_ids();
+    p = params_for("uint32", "a.trip");
     check_ways(&p);
 }
 
@@ -732,16 +763,20 @@ static void killed_runs_resume_and_give_the_same_bytes(void **state)
 {
     (void)state;
     bool resumed = false;
-    for (int kind = 0; kind < 3; kind++) {
-        trip_brick_params p = params_for(kind < 2 ? "uint8" : "float", "a.trip");
-        if (kind < 2)
-            make_bytes();
-        else
-            make_floats();
-        p.keep_all = kind > 0;
+    static const struct {
+        const char *type;
+        void (*make)(void);
+        bool keep_all;
+    } kinds[] = { { "uint8", make_bytes, false },         { "uint8", make_bytes, true },
+                  { "float", make_floats, true },         { "float", make_strange_floats, false },
+                  { "float", make_strange_floats, true }, { "uint32", make_ids, false } };
+    for (size_t kind = 0; kind < sizeof kinds / sizeof *kinds; kind++) {
+        trip_brick_params p = params_for(kinds[kind].type, "a.trip");
+        kinds[kind].make();
+        p.keep_all = kinds[kind].keep_all;
         p.threads = 1;
         p.slices = 4;
-        p.memory_bytes = 28 << 20;
+        p.memory_bytes = 29 << 20;
         brick_to(p, "a.trip");
         check_resumed(&p, &resumed);
     }
@@ -830,6 +865,7 @@ static void the_summary_tells_the_requested_levels(void **state)
     trip_brick_summary s;
     make_bytes();
     p.replace = true;
+    p.normals = TRIP_NORMALS_AUTO;
     for (size_t i = 0; i < sizeof asked / sizeof *asked; i++) {
         test_lists l;
         p.levels = asked[i].levels;

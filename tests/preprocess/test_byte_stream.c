@@ -236,8 +236,115 @@ static void unexpected_content_is_refused(void **state)
     (void)state;
     bytes b = plain();
     const char *path = write_file("plain", &b);
-    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_ZLIB, 0, 0, COUNT, false }, "zlib data");
-    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_BZIP2, 0, 0, COUNT, false }, "bzip2 data");
+    assert_fails(&(trip_byte_source){ .path = path,
+                                      .encoding = TRIP_BYTES_ZLIB,
+                                      .offset_bytes = 0,
+                                      .skip_bytes = 0,
+                                      .size_bytes = COUNT },
+                 "zlib data");
+    assert_fails(&(trip_byte_source){ .path = path,
+                                      .encoding = TRIP_BYTES_BZIP2,
+                                      .offset_bytes = 0,
+                                      .skip_bytes = 0,
+                                      .size_bytes = COUNT },
+                 "bzip2 data");
+}
+
+static void texts_deliver_their_values_in_any_pieces(void **state)
+{
+    (void)state;
+    static const char numbers[] = "0,1 , -2\t\n32767\r\n-32768 +7 300,,5 -6";
+    static const int16_t values[] = { 0, 1, -2, 32767, -32768, 7, 300, 5, -6 };
+    static const char digits[] = "00 01fe\nFf ff7F00 80";
+    static const unsigned char decoded[] = { 0, 1, 0xfe, 0xff, 0xff, 0x7f, 0, 0x80 };
+    for (int hex = 0; hex < 2; hex++)
+        for (int e = TRIP_BYTES_PLAIN; e <= TRIP_BYTES_BZIP2; e++)
+            for (size_t step = 1; step < sizeof values + 2; step++) {
+                bytes b = { .count = 0 };
+                unsigned char got[sizeof values];
+                const size_t count = hex ? sizeof decoded : sizeof values;
+                trip_byte_stream *s;
+                append_text(&b, "3 lines\n");
+                append_text(&b, hex ? digits : numbers);
+                const trip_byte_source source = { .path = write_encoded("text", e, &b),
+                                                  .encoding = (trip_byte_encoding)e,
+                                                  .skip_bytes = 8,
+                                                  .size_bytes = count,
+                                                  .text = hex ? TRIP_TEXT_HEX : TRIP_TEXT_NUMBERS,
+                                                  .text_type = TRIP_I16 };
+                catch_reports();
+                assert_int_equal(trip_byte_stream_open(&s, &source), 0);
+                for (int round = 0; round < 2; round++) {
+                    for (size_t done = 0, n; done < count; done += n) {
+                        n = count - done < step ? count - done : step;
+                        assert_int_equal(done == 4 ? trip_byte_stream_skip(s, n)
+                                                   : trip_byte_stream_read(s, got + done, n),
+                                         0);
+                        if (done == 4)
+                            memcpy(got + 4, (hex ? decoded : (const unsigned char *)values) + 4, n);
+                    }
+                    assert_memory_equal(got, hex ? decoded : (const unsigned char *)values, count);
+                    assert_int_equal(trip_byte_stream_rewind(s), 0);
+                }
+                trip_byte_stream_close(s);
+                trip_report_redirect(NULL, NULL);
+                assert_int_equal(reports, 0);
+            }
+}
+
+static void texts_that_are_no_values_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        trip_scalar type;
+        const char *says;
+    } wrong[] = {
+        { "1 32768 2", TRIP_I16, "\"32768\" is not a value of the type int16" },
+        { "1 -32769 2", TRIP_I16, "\"-32769\" is not a value" },
+        { "1 -1 2", TRIP_U16, "\"-1\" is not a value of the type uint16" },
+        { "1 2.5 2", TRIP_I16, "\"2.5\" is not a value" },
+        { "1 2x 2", TRIP_I16, "\"2x\" is not a value" },
+        { "1 99999999999999999999 2", TRIP_U16, "is not a value" },
+        { "1", TRIP_I16, "too few" },
+        { "1                     ", TRIP_I16, "holds 2 bytes of data, but 4 are expected" },
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+        assert_fails(
+            &(trip_byte_source){ .path = write_bytes("w", wrong[i].text, strlen(wrong[i].text)),
+                                 .size_bytes = 4,
+                                 .text = TRIP_TEXT_NUMBERS,
+                                 .text_type = wrong[i].type },
+            wrong[i].says);
+    assert_fails(&(trip_byte_source){ .path = write_bytes("w", "00 0g 11", 8),
+                                      .size_bytes = 3,
+                                      .text = TRIP_TEXT_HEX },
+                 "\"g\" is not a value of the type hex");
+    char longest[200];
+    memset(longest, '1', sizeof longest);
+    assert_fails(&(trip_byte_source){ .path = write_bytes("w", longest, sizeof longest),
+                                      .size_bytes = 4,
+                                      .text = TRIP_TEXT_NUMBERS,
+                                      .text_type = TRIP_F32 },
+                 "is not a value");
+}
+
+static void the_content_tells_the_encoding(void **state)
+{
+    (void)state;
+    bytes b = plain();
+    for (int e = TRIP_BYTES_PLAIN; e <= TRIP_BYTES_BZIP2; e++)
+        for (int named = 0; named < 3; named++) {
+            static const char *const names[] = { "n", "n.gz", "n.bz2" };
+            unsigned char head[100];
+            size_t got;
+            const char *path = write_encoded(names[named], (trip_byte_encoding)e, &b);
+            assert_int_equal(trip_byte_encoding_of(path), e);
+            assert_int_equal(trip_byte_stream_head(path, head, sizeof head, false, &got), 0);
+            assert_int_equal(got, sizeof head);
+            assert_memory_equal(head, b.data, sizeof head);
+        }
+    assert_int_equal(trip_byte_encoding_of(path_of("missing.gz")), TRIP_BYTES_PLAIN);
 }
 
 static void leftover_bytes_cause_one_warning(void **state)
@@ -264,11 +371,24 @@ static void impossible_offsets_and_sizes_are_refused(void **state)
     (void)state;
     bytes b = plain();
     const char *path = write_file("offsets", &b);
-    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, COUNT + 1, 0, 1, false },
+    assert_fails(&(trip_byte_source){ .path = path,
+                                      .encoding = TRIP_BYTES_PLAIN,
+                                      .offset_bytes = COUNT + 1,
+                                      .skip_bytes = 0,
+                                      .size_bytes = 1 },
                  "beyond its end");
-    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, UINT64_MAX, UINT64_MAX, 1, false },
+    assert_fails(&(trip_byte_source){ .path = path,
+                                      .encoding = TRIP_BYTES_PLAIN,
+                                      .offset_bytes = UINT64_MAX,
+                                      .skip_bytes = UINT64_MAX,
+                                      .size_bytes = 1 },
                  "beyond its end");
-    assert_fails(&(trip_byte_source){ path, TRIP_BYTES_PLAIN, COUNT, 0, 1, false }, "are expected");
+    assert_fails(&(trip_byte_source){ .path = path,
+                                      .encoding = TRIP_BYTES_PLAIN,
+                                      .offset_bytes = COUNT,
+                                      .skip_bytes = 0,
+                                      .size_bytes = 1 },
+                 "are expected");
     trip_byte_stream *s;
     catch_reports();
     assert_int_equal(trip_byte_stream_open(&s, &(trip_byte_source){ .path = path,
@@ -328,6 +448,9 @@ int main(void)
         cmocka_unit_test(a_file_truncated_anywhere_is_refused),
         cmocka_unit_test(corrupt_data_is_found_by_the_checksum),
         cmocka_unit_test(unexpected_content_is_refused),
+        cmocka_unit_test(texts_deliver_their_values_in_any_pieces),
+        cmocka_unit_test(texts_that_are_no_values_are_refused),
+        cmocka_unit_test(the_content_tells_the_encoding),
         cmocka_unit_test(leftover_bytes_cause_one_warning),
         cmocka_unit_test(impossible_offsets_and_sizes_are_refused),
         cmocka_unit_test(folders_and_missing_files_are_refused),

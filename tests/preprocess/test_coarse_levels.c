@@ -58,6 +58,8 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
     strcpy(path, test_path(output));
     p.input = input;
     p.output = path;
+    if (!p.normals)
+        p.normals = TRIP_NORMALS_STORED;
     if (!p.levels_for && !p.no_halo)
         p.levels_for = TRIP_LEVELS_FOR_BOTH;
     if (p.range_count == 0) {
@@ -248,8 +250,8 @@ static uint64_t visit(const trip_dataset *d, const trip_list *list,
 static void check_record(const trip_dataset *d, const trip_list *list, const int64_t at[3],
                          unsigned code, void *user)
 {
-    const trip_mean_scale scale = trip_mean_scale_make(d->header.value_min, d->header.value_max,
-                                                       d->header.code_lo, d->header.code_hi);
+    const trip_mean_scale scale =
+        trip_mean_scale_make(d->header.value_min, d->header.value_max, &d->codes);
     const cube c = sum_cube(at, list->level, list->axis);
     const base *b = base_at(at[0], at[1], at[2], list->level);
     (void)user;

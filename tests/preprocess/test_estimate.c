@@ -33,6 +33,7 @@ static void a_sample_estimates_the_voxels_kept_and_bytes_written(void **state)
     trip_brick_summary s;
     p.ranges = &(trip_value_range){ 128, 191 }; /* a quarter of the voxels */
     p.range_count = 1;
+    p.normals = TRIP_NORMALS_STORED;
     assert_int_equal(trip_brick_estimate_make(&p, &e), 0);
     assert_int_equal(e.voxels, N);
     assert_true(e.kept > N / 4 * 0.8 && e.kept < N / 4 * 1.2);

@@ -47,6 +47,7 @@ static trip_brick_params params(void)
                                 .memory_bytes = 28 << 20,
                                 .threads = 1,
                                 .slices = 2,
+                                .normals = TRIP_NORMALS_STORED,
                                 .keep_all = true };
 }
 

@@ -169,7 +169,9 @@ static int run(const char *name, const run_params *p, uint64_t *spilled)
         damage_spill();
     status = trip_list_builder_finish(b.builder, &q, b.workers, NULL, NULL);
     *spilled = trip_spill_bytes(b.spill);
-    trip_writer_summary summary = { 0, 1, (uint64_t)NX * NY * NZ, "{}" };
+    trip_writer_summary summary = { .value_max = 1,
+                                    .voxels = (uint64_t)NX * NY * NZ,
+                                    .text = "{}" };
     if (status == 0) {
         assert_int_equal(trip_writer_finish(b.writer, &summary), 0);
         b.writer = NULL;

@@ -331,7 +331,7 @@ static void records_of_several_variables_are_padded(void **state)
 }
 
 /* The record dimension is time. Each of two records has a volume and one number. */
-static void the_first_of_several_times_is_read(void **state)
+static void one_of_several_times_is_read(void **state)
 {
     (void)state;
     static const char *const names[] = { "time", "z", "lat", "x" };
@@ -362,7 +362,17 @@ static void the_first_of_several_times_is_read(void **state)
             begin_values(&f, 1);
         put(&f.b, 1, 4);
     }
-    assert_holds_sample(write_file("times.nc", &f.b), NULL, TRIP_I16);
+    const char *path = write_file("times.nc", &f.b);
+    float values[VOXELS];
+    trip_volume_info info;
+    assert_holds_sample(path, NULL, TRIP_I16);
+    assert_int_equal(
+        read_volume(path, &(trip_volume_params){ .time = 1 }, 2, values, VOXELS, &info), 0);
+    assert_non_null(strstr(info.note, "time 1 of 2"));
+    for (int v = 0; v < VOXELS; v++)
+        assert_true(values[v] == 7);
+    assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .time = 2 }, "has 2 times");
+    assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .channel = 1 }, "has one channel");
 }
 
 /* netCDF's default fill value, 0x7cf00000 as a float. */
@@ -487,7 +497,7 @@ int main(void)
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_have_no_value),
         cmocka_unit_test(a_scale_that_loses_the_values_is_refused),
         cmocka_unit_test(records_of_several_variables_are_padded),
-        cmocka_unit_test(the_first_of_several_times_is_read),
+        cmocka_unit_test(one_of_several_times_is_read),
         cmocka_unit_test(floats_never_written_have_no_value),
         cmocka_unit_test(errors_give_the_byte_where_the_header_is_invalid),
         cmocka_unit_test(the_unsigned_attribute_applies),

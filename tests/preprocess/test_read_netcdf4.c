@@ -19,7 +19,8 @@ typedef struct contents {
     int endian;       /* NC_ENDIAN_... */
     bool chunks;      /* compressed chunks of 3 x 3 x 3 */
     bool records;     /* z is unlimited */
-    bool deeper;      /* a dimension of size 2 comes first; its first index holds the sample */
+    bool deeper;      /* a dimension of size 2 comes first */
+    size_t time;      /* its index that holds the sample */
     bool inside;      /* t is in the group "g" */
     bool coordinates; /* x and z have coordinates */
     bool scaled;      /* t has scale 2 and offset 3 */
@@ -84,7 +85,7 @@ static const char *write_contents(const char *name, const contents *c)
                          0);
     put_no_sign(group, variable, c->no_sign);
     for (size_t v = 0; v < VOXELS; v++) {
-        const size_t at[4] = { 0, v / NX / NY, v / NX % NY, v % NX };
+        const size_t at[4] = { c->time, v / NX / NY, v / NX % NY, v % NX };
         const int value = sample(scalar_of[c->type], (int)at[3], (int)at[2], (int)at[1]);
         assert_int_equal(nc_put_var1_int(group, variable, at + first, &value), 0);
     }
@@ -109,6 +110,21 @@ static void every_type_holds_the_sample(void **state)
             const trip_scalar held = type == NC_DOUBLE ? TRIP_F32 : scalar_of[type];
             assert_holds_sample(write_contents("a.nc", &c), NULL, held);
         }
+}
+
+static void a_time_is_chosen(void **state)
+{
+    (void)state;
+    const contents c = { .type = NC_SHORT, .deeper = true, .time = 1 };
+    const char *path = write_contents("t.nc", &c);
+    float values[VOXELS];
+    trip_volume_info info;
+    assert_holds_sample(path, &(trip_volume_params){ .time = 1 }, TRIP_I16);
+    assert_int_equal(read_volume(path, NULL, 2, values, VOXELS, &info), 0);
+    assert_non_null(strstr(info.note, "time 0 of 2"));
+    assert_true(values[0] != (float)sample(TRIP_I16, 0, 0, 0));
+    assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .time = 2 }, "has 2 times");
+    assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .channel = 1 }, "has one channel");
 }
 
 static void coordinates_become_positions(void **state)
@@ -216,6 +232,8 @@ static void make_answer(int number)
     *v = (trip_image_netcdf){ .dims = { NX, NY, NZ },
                               .type = TRIP_I16,
                               .placed = 1,
+                              .times = 1,
+                              .channels = 1,
                               .slope = 1,
                               .name = "t",
                               .helper_bytes = 1000 };
@@ -330,6 +348,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_type_holds_the_sample),
+        cmocka_unit_test(a_time_is_chosen),
         cmocka_unit_test(coordinates_become_positions),
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_have_no_value),
         cmocka_unit_test(the_unsigned_attribute_applies),

@@ -308,8 +308,10 @@ static void spacings_and_directions_become_the_map(void **state)
                                 "space: left-posterior-superior\n"
                                 "space directions: (1,0.25,0) ( 0 , 2 , 0.5 )  (-0.5,0,3)\n"
                                 "space origin: (-10, 20, 1e1)\n"));
-    assert_map(&a,
-               (const double[3][4]){ { 1, 0, -0.5, -10 }, { 0.25, 2, 0, 20 }, { 0, 0.5, 3, 10 } });
+    assert_map(&a, (const double[3][4]){ /* in RAS, x and y are negated */
+                                         { -1, 0, 0.5, 10 },
+                                         { -0.25, -2, 0, -20 },
+                                         { 0, 0.5, 3, 10 } });
     a = map_of(write_with_lines("extent.nrrd", "axis mins: 1 -3 nan\naxis maxs: 11 3 nan\n"
                                                "centers: cell node cell\n"));
     assert_map(&a, (const double[3][4]){ { 2, 0, 0, 2 }, { 0, 2, 0, -3 }, { 0, 0, 1, 0 } });
@@ -335,23 +337,206 @@ static void axes_of_size_one_are_dropped(void **state)
     assert_map(&a, (const double[3][4]){ { 4, 0, 0, 0 }, { 0, 5, 0, 0 }, { 0, 0, 6, 0 } });
 }
 
-static void vectors_and_other_non_scalar_data_are_refused(void **state)
+static void data_without_three_axes_in_space_are_refused(void **state)
 {
     (void)state;
-    assert_refused(write_with_header("rgb.nrrd",
-                                     "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 5 4 7\n"
-                                     "encoding: raw\nkinds: RGB-color domain domain domain\n\n"),
-                   "only scalar volumes");
     assert_refused(write_with_lines("vector.nrrd", "kinds: 3-vector domain domain\n"),
                    "axis 0 is of kind \"3-vector\"");
     assert_refused(write_with_lines("none.nrrd", "space directions: none (1,0,0) (0,1,0)\n"),
                    "axis 0 has no direction");
     assert_refused(write_with_header("flat.nrrd", "NRRD0004\ntype: uint8\ndimension: 2\n"
                                                   "sizes: 5 4\nencoding: raw\n\n"),
-                   "three axes");
+                   "a volume has three");
     assert_refused(write_with_header("block.nrrd", "NRRD0004\ntype: block\nblock size: 3\n"
                                                    "dimension: 3\nsizes: 5 4 7\nencoding: raw\n\n"),
                    "line 2: type \"block\"");
+    assert_refused(write_with_header("six.nrrd", "NRRD0004\ntype: uint16\ndimension: 6\n"
+                                                 "sizes: 2 2 2 5 4 7\nendian: little\n"
+                                                 "encoding: raw\nkinds: vector list time domain "
+                                                 "domain domain\n\n"),
+                   "axes 0 and 1 both have several entries");
+}
+
+static void values_may_be_text(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "ascii", "text", "txt", "hex" };
+    for (int t = 0; t < TRIP_SCALARS; t++)
+        for (int n = 0; n < 8 && nrrd_types[t]; n++) {
+            const bool detached = n % 2, hex = n >= 6, big = n == 7;
+            char number[32];
+            bytes b = { .count = 0 }, values = { .count = 0 }, text = { .count = 0 };
+            append_header(&b, (trip_scalar)t, big, names[n / 2],
+                          detached ? "data file: values.txt\n" : "\n");
+            append_volume(&values, (trip_scalar)t, big);
+            for (size_t i = 0; i < (hex ? values.count : VOXELS); i++) {
+                const int v =
+                    sample((trip_scalar)t, (int)i % NX, (int)i / NX % NY, (int)i / NX / NY);
+                snprintf(number, sizeof number, hex ? "%02x%s" : "%d%s", hex ? values.data[i] : v,
+                         i % 7 == 6 ? "\n"
+                         : hex      ? ""
+                                    : " ");
+                append_text(&text, number);
+            }
+            if (detached)
+                write_file("values.txt", &text);
+            else
+                append(&b, text.data, text.count);
+            assert_holds_sample(write_file(detached ? "text.nhdr" : "text.nrrd", &b), NULL,
+                                (trip_scalar)t);
+        }
+}
+
+static void endian_is_not_needed_for_numbers_in_a_text(void **state)
+{
+    (void)state;
+    float values[8];
+    static const char text[] = "NRRD0004\ntype: float\ndimension: 3\nsizes: 2 2 2\n"
+                               "encoding: ascii\n\n1 2.5 -3e2 nan inf -inf .5 1e-3\n";
+    assert_int_equal(
+        read_volume(write_bytes("float.nrrd", text, sizeof text - 1), NULL, 1, values, 8, NULL), 0);
+    assert_true(values[0] == 1 && values[1] == 2.5 && values[2] == -300 && isnan(values[3]));
+    assert_true(isinf(values[4]) && isinf(values[5]) && values[5] < 0);
+    assert_true(values[6] == 0.5F && values[7] == 1e-3F);
+}
+
+/* Axes beside the three axes of the volume. */
+typedef struct more_axes {
+    const char *sizes, *kinds;
+    int place[2]; /* of the channel and the time: the number of axes of the volume before them; -1
+                   */
+} more_axes;
+
+/* Appends every voxel of every channel and time. The sample is in channel 1 of 3 and time 2 of 4.
+ * All other values are 99. */
+static void append_entries(bytes *b, const more_axes *m)
+{
+    enum { C = 3, T = 4 };
+    const int dims[3] = { NX, NY, NZ };
+    int size[5], role[5], axes = 0; /* role: axis of the volume, 3 for channels, 4 for times */
+    for (int before = 0; before <= 3; before++) {
+        for (int r = 0; r < 2; r++)
+            if (m->place[r] == before) {
+                role[axes] = 3 + r;
+                size[axes++] = r ? T : C;
+            }
+        if (before < 3) {
+            role[axes] = before;
+            size[axes++] = dims[before];
+        }
+    }
+    int at[5] = { 0 }, total = 1;
+    for (int a = 0; a < axes; a++)
+        total *= size[a];
+    for (int n = 0; n < total; n++) {
+        int of_role[5] = { 0, 0, 0, 1, 2 };
+        for (int a = 0, rest = n; a < axes; rest /= size[a++])
+            of_role[role[a]] = at[a] = rest % size[a];
+        const bool wanted = of_role[3] == 1 && of_role[4] == 2;
+        append_value(b, TRIP_I16,
+                     wanted ? sample(TRIP_I16, of_role[0], of_role[1], of_role[2]) : 99, false);
+    }
+}
+
+static void an_entry_of_further_axes_is_read(void **state)
+{
+    (void)state;
+    static const more_axes some[] = {
+        { "3 5 4 7", "vector domain domain domain", { 0, -1 } },
+        { "5 3 4 7", "domain covariant-vector domain domain", { 1, -1 } },
+        { "5 4 3 7", "space space list space", { 2, -1 } },
+        { "5 4 7 3", "domain domain domain list", { 3, -1 } },
+        { "5 4 7 4", "domain domain domain time", { -1, 3 } },
+        { "4 5 4 7", "time domain domain domain", { -1, 0 } },
+        { "3 5 4 7 4", "3-vector domain domain domain time", { 0, 3 } },
+        { "3 4 5 4 7", "list time domain domain domain", { 0, 0 } },
+        { "5 3 4 4 7", "domain list domain time domain", { 1, 2 } },
+        { "5 4 7 3 4", "domain domain domain RGB-color time", { 3, 3 } },
+        { "5 4 7 3", NULL, { 3, -1 } },
+        { "1 5 4 7 3", "vector domain domain domain list", { 3, -1 } },
+    };
+    for (size_t n = 0; n < sizeof some / sizeof *some; n++) {
+        const more_axes *m = &some[n];
+        const bool channels = m->place[0] >= 0, times = m->place[1] >= 0;
+        const trip_volume_params params = { .channel = channels, .time = times ? 2 : 0 };
+        char header[512], note[128];
+        bytes b = { .count = 0 };
+        snprintf(header, sizeof header,
+                 "NRRD0004\ntype: int16\ndimension: %d\nsizes: %s\nendian: little\n"
+                 "encoding: raw\n%s%s\n\n",
+                 (int)(strlen(m->sizes) + 1) / 2, m->sizes, m->kinds ? "kinds: " : "# no kinds",
+                 m->kinds ? m->kinds : "");
+        append_text(&b, header);
+        append_entries(&b, m);
+        const char *path = write_file("more.nrrd", &b);
+        float values[VOXELS];
+        trip_volume_info info;
+        assert_holds_sample(path, &params, TRIP_I16);
+        assert_int_equal(read_volume(path, &params, 3, values, VOXELS, &info), 0);
+        if (channels)
+            assert_non_null(strstr(info.note, "channel 1 of 3 (axis"));
+        if (times)
+            assert_non_null(strstr(info.note, "time 2 of 4 (axis"));
+        assert_int_equal(read_volume(path, NULL, 3, values, VOXELS, &info), 0);
+        assert_true(values[0] == 99 && values[VOXELS - 1] == 99);
+        snprintf(note, sizeof note, "has %s", channels ? "3 channels, from 0 to 2" : "one channel");
+        assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .channel = 3 }, note);
+        snprintf(note, sizeof note, "has %s", times ? "4 times, from 0 to 3" : "one time");
+        assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .time = 4 }, note);
+        b.count--;
+        assert_refused(write_file("more.nrrd", &b), "is it truncated?");
+    }
+}
+
+static void an_entry_may_lie_in_another_data_file(void **state)
+{
+    (void)state;
+    bytes b = { .count = 0 };
+    append_header(&b, TRIP_U16, false, "raw",
+                  "data file: entry-%d.raw 0 2 1\nkinds: domain domain domain list\n");
+    memcpy(strstr((char *)b.data, "dimension: 3"), "dimension: 4", 12);
+    char *sizes = strstr((char *)b.data, "5 4 7\n");
+    memmove(sizes + 7, sizes + 5, b.count - (size_t)(sizes + 5 - (char *)b.data));
+    memcpy(sizes, "5 4 7 3", 7);
+    b.count += 2;
+    const char *path = write_file("entries.nhdr", &b);
+    for (int n = 0; n < 3; n++) {
+        char name[32];
+        bytes values = { .count = 0 };
+        for (int v = 0; v < VOXELS && n != 1; v++)
+            append_value(&values, TRIP_U16, n, false);
+        if (n == 1)
+            append_volume(&values, TRIP_U16, false);
+        snprintf(name, sizeof name, "entry-%d.raw", n);
+        write_file(name, &values);
+    }
+    assert_holds_sample(path, &(trip_volume_params){ .channel = 1 }, TRIP_U16);
+}
+
+static void colours_become_their_luma(void **state)
+{
+    (void)state;
+    for (int colours = 3; colours <= 4; colours++) {
+        char header[256];
+        bytes b = { .count = 0 };
+        float values[VOXELS];
+        trip_volume_info info;
+        snprintf(header, sizeof header,
+                 "NRRD0004\ntype: uint16\ndimension: 4\nsizes: %d 5 4 7\nendian: big\n"
+                 "encoding: raw\nkinds: %s domain domain domain\n\n",
+                 colours, colours == 3 ? "RGB-color" : "RGBA-color");
+        append_text(&b, header);
+        for (int v = 0; v < VOXELS; v++)
+            for (int c = 0; c < colours; c++)
+                append_value(&b, TRIP_U16, 300 * c + v, true);
+        const char *path = write_file("colour.nrrd", &b);
+        assert_int_equal(read_volume(path, NULL, 2, values, VOXELS, &info), 0);
+        assert_int_equal(info.type, TRIP_F32);
+        assert_non_null(strstr(info.note, "luma"));
+        for (int v = 0; v < VOXELS; v++) /* 0.7152 * 300 + 0.0722 * 600 */
+            assert_true(fabs(values[v] - (v + 257.88)) < 1e-3);
+        assert_refused_as(TRIP_USAGE, path, &(trip_volume_params){ .channel = 1 }, "one channel");
+    }
 }
 
 static void a_locale_with_decimal_commas_changes_nothing(void **state)
@@ -444,11 +629,12 @@ static void wrong_headers_are_refused(void **state)
         { "NRRD0004\ndimension: 3\nsizes: 5 4 0\n\n", "line 3: \"sizes\"" },
         { "NRRD0004\ndimension: 3\nsizes: 5 4 7\n\n", "no \"type\"" },
         { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: string\n\n", "line 4: type \"string\"" },
-        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: short\n\n", "no \"endian\"" },
-        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: short\nendian: middle\n\n", "line 5" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: short\nencoding: raw\n\n", "no \"endian\"" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: short\nendian: middle\nencoding: raw\n\n",
+          "line 5" },
         { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\n\n", "no \"encoding\"" },
-        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: ascii\n\n",
-          "line 5: encoding \"ascii\" cannot be read" },
+        { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: base64\n\n",
+          "line 5: encoding \"base64\" is unknown" },
         { "NRRD0004\ndimension: 3\nsizes: 5 4 7\ntype: uchar\nencoding: gzip\nbyte skip: -1\n\n",
           "cannot be used with compressed data" },
         { "NRRD0004\ndimension: 3\nsizes: 9999999999 9999999999 9999999999\ntype: uchar\n"
@@ -548,7 +734,7 @@ static void the_space_gives_the_orientation(void **state)
     static const char *const lines[][5] = {
         { "RAS", "space: right-anterior-superior\n", "space: RAS\n",
           "space: rightanteriorsuperior\n", "space: Right Anterior Superior\n" },
-        { "LPS", "space: left-posterior-superior\n", "space: lps\n",
+        { "RAS", "space: left-posterior-superior\n", "space: lps\n",
           "space: left posterior superior\n", "space: LEFTPOSTERIORSUPERIOR\n" },
         { "", "space: scanner-xyz\n", "space: 3D-right-handed\n", "space: 3d right handed\n",
           "space: 3Drighthanded\n" },
@@ -627,9 +813,11 @@ static void vectors_with_time_give_their_spatial_part(void **state)
                  "space origin: (10,20,30,40)\n\n",
                  names[i]);
         trip_volume_info info = info_of(write_with_header("time.nrrd", text));
-        assert_string_equal(info.space, i < 2 ? "RAS" : "LPS");
-        assert_map(&info.index_to_world,
-                   (const double[3][4]){ { 1, 0, 0, 10 }, { 0, 2, 0, 20 }, { 0, 0, 3, 30 } });
+        const double sign = i < 2 ? 1 : -1; /* LPS has x and y negated */
+        assert_string_equal(info.space, "RAS");
+        assert_map(&info.index_to_world, (const double[3][4]){ { sign * 1, 0, 0, sign * 10 },
+                                                               { 0, sign * 2, 0, sign * 20 },
+                                                               { 0, 0, 3, 30 } });
     }
     assert_refused(write_with_lines("time.nrrd",
                                     "space: RAST\n"
@@ -714,7 +902,12 @@ int main(void)
         cmocka_unit_test(axis_coordinates_are_a_key_and_value),
         cmocka_unit_test(the_measurement_frame_changes_nothing),
         cmocka_unit_test(axes_of_size_one_are_dropped),
-        cmocka_unit_test(vectors_and_other_non_scalar_data_are_refused),
+        cmocka_unit_test(data_without_three_axes_in_space_are_refused),
+        cmocka_unit_test(values_may_be_text),
+        cmocka_unit_test(endian_is_not_needed_for_numbers_in_a_text),
+        cmocka_unit_test(an_entry_of_further_axes_is_read),
+        cmocka_unit_test(an_entry_may_lie_in_another_data_file),
+        cmocka_unit_test(colours_become_their_luma),
         cmocka_unit_test(a_locale_with_decimal_commas_changes_nothing),
         cmocka_unit_test(wrong_fields_are_refused_with_line_number),
         cmocka_unit_test(wrong_headers_are_refused),

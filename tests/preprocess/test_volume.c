@@ -287,8 +287,8 @@ static void axes_orient_files_without_orientation(void **state)
     const trip_volume_params p = { .axes = "SLP" };
     assert_int_equal(read_volume(write_file("up.nrrd", &up), &p, 2, values, VOXELS, &info), 0);
     assert_map(&info.index_to_world,
-               (const double[3][4]){ { 0, 2, 0, 20 }, { 0, 0, 3, 30 }, { 1, 0, 0, 10 } });
-    assert_string_equal(info.space, "LPS");
+               (const double[3][4]){ { 0, -2, 0, -20 }, { 0, 0, -3, -30 }, { 1, 0, 0, 10 } });
+    assert_string_equal(info.space, "RAS");
     append_text(&down, head);
     append_text(&down, "spacings: 1 -2 3\n\n");
     append_volume(&down, TRIP_U8, false);
@@ -315,6 +315,86 @@ static void options_of_another_format_are_wrong_usage(void **state)
         trip_volume_params p = { .spacing = { spacings[i][0], spacings[i][1], spacings[i][2] } };
         assert_refused_as(TRIP_USAGE, nrrd, &p, "--spacing");
     }
+}
+
+/* Files of formats that are read in order. */
+static void compressed_files_are_read_whatever_their_names(void **state)
+{
+    (void)state;
+    static const char *const names[] = { "x.nrrd.gz", "x.bz2", "x.nii", "x.vol" };
+    for (int format = 0; format < 4; format++)
+        for (int name = 0; name < 4; name++)
+            for (int bz2 = 0; bz2 < 2; bz2++) {
+                bytes b = { .count = 0 }, packed = { .count = 0 };
+                unsigned char head[352] = { 92, 1, [40] = 3, 0, NX, 0, NY, 0, NZ, [70] = 2, 0, 8 };
+                const float one = 1, offset = 352;
+                for (int a = 1; a < 4; a++)
+                    memcpy(head + 76 + 4 * a, &one, 4);
+                memcpy(head + 108, &offset, 4);
+                memcpy(head + 344, "n+1", 4);
+                if (format == 0)
+                    append_text(&b, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 7\n"
+                                    "encoding: raw\n\n");
+                else if (format == 1)
+                    append_text(&b, "X: 5\nY: 4\nZ: 7\nVersion: 2\n.\n");
+                else if (format == 2)
+                    append(&b, head, sizeof head);
+                const trip_volume_params raw = { .raw_dims = { NX, NY, NZ } };
+                append_volume(&b, TRIP_U8, false);
+                if (bz2)
+                    append_bzip2(&packed, &b);
+                else
+                    append_gzip(&packed, &b);
+                if (format < 3 || name < 2)
+                    assert_holds_sample(write_file(names[name], &packed), format == 3 ? &raw : NULL,
+                                        TRIP_U8);
+                packed.count -= 9;
+                if (format < 3)
+                    assert_true(survives(write_file(names[name], &packed), NULL));
+            }
+}
+
+static void compressed_files_of_other_formats_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *head, *says;
+    } formats[] = {
+        { "II*\0\10", "its format (images) can only be read unpacked" },
+        { "\x89HDF\r\n\x1a\n", "its format (netcdf) can only be read unpacked" },
+        { "CDF\1", "its format (netcdf) can only be read unpacked" },
+        { " BDV\0\0\0\0", "its format (openvdb) can only be read unpacked" },
+        { "hello", "is of no known format" },
+    };
+    for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
+        bytes b = { .count = 0 }, packed = { .count = 0 };
+        append(&b, formats[i].head, 8);
+        b.count = 400;
+        append_gzip(&packed, &b);
+        assert_refused(write_file("packed.gz", &packed), formats[i].says);
+    }
+    assert_refused(write_bytes("short.gz", "\x1f\x8b\x08", 3), "is of no known format");
+    bytes b = { .count = 0 }, values = { .count = 0 }, packed = { .count = 0 };
+    append_text(&b, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 7\nencoding: gzip\n\n");
+    append_volume(&values, TRIP_U8, false);
+    append_gzip(&b, &values);
+    append_gzip(&packed, &b);
+    assert_refused(write_file("twice.nrrd.gz", &packed), "unpack it first");
+}
+
+/* Values that begin like a gzip file. */
+static void plain_values_may_look_compressed(void **state)
+{
+    (void)state;
+    unsigned char values[8] = { 0x1f, 0x8b, 8, 0, 5, 6, 7, 9 };
+    float got[8];
+    const trip_volume_params params = { .raw_dims = { 2, 2, 2 } };
+    assert_int_equal(read_volume(write_bytes("looks.raw", values, 8), &params, 1, got, 8, NULL), 0);
+    assert_true(got[0] == 0x1f && got[7] == 9);
+    values[0] = 0;
+    assert_int_equal(read_volume(write_bytes("plain.gz", values, 8), &params, 1, got, 8, NULL), 0);
+    assert_refused_as(TRIP_ERROR, write_bytes("plain.gz", values, 7), &params,
+                      "neither gzip nor bzip2");
 }
 
 static void errors_name_the_file_that_cannot_be_opened(void **state)
@@ -378,6 +458,9 @@ int main(void)
         cmocka_unit_test(axes_orient_files_without_orientation),
         cmocka_unit_test(voxels_too_long_or_short_to_draw_are_refused),
         cmocka_unit_test(options_of_another_format_are_wrong_usage),
+        cmocka_unit_test(compressed_files_are_read_whatever_their_names),
+        cmocka_unit_test(compressed_files_of_other_formats_are_refused),
+        cmocka_unit_test(plain_values_may_look_compressed),
         cmocka_unit_test(errors_name_the_file_that_cannot_be_opened),
         cmocka_unit_test(errors_name_a_file_without_permission),
     };

@@ -91,6 +91,13 @@ static void set_params(writing *w, const scene_params *p)
         .codes = { .code_hi = 1 },
     };
     trip_writer_params *params = &w->params;
+    if (p->codes) {
+        params->codes = (trip_writer_codes){ .code_lo = p->codes->lo,
+                                             .code_hi = p->codes->hi,
+                                             .table = p->codes->table,
+                                             .table_entries = p->codes->entries,
+                                             .table_step_log2 = p->codes->step_log2 };
+    }
     bool given = false;
     for (int i = 0; i < 12; i++)
         given |= p->index_to_world.m[i / 4][i % 4] != 0;
@@ -183,7 +190,10 @@ static void write_dataset(const scene *s, const scene_params *p)
         for (int sheet = 0; sheet < w.lists[i].dims[w.lists[i].axis]; sheet++)
             append_sheet(&w, i, sheet);
     trip_writer_summary summary = {
-        .value_max = 1,
+        .value_min = p->codes ? p->codes->lo : 0,
+        .value_max = p->codes ? p->codes->hi : 1,
+        .typical_min = p->typical[0],
+        .typical_max = p->typical[1],
         .voxels = (uint64_t)(p->dims[0] * p->dims[1] * p->dims[2]),
         .text = "{}",
     };
@@ -221,6 +231,27 @@ void scene_colour(scene *s, unsigned first, unsigned last, double r, double g, d
                             (float)(trip_extinction(opacity) / voxel) };
     for (unsigned i = first; i <= last; i++)
         s->table[i] = entry;
+}
+
+void scene_use_function(scene *s, scene_function *f, const trip_tf_point *points, size_t count)
+{
+    const double voxel = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
+    trip_tf *tf;
+    assert_int_equal(trip_tf_from_points(&tf, points, count, false, 0), 0);
+    const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
+    f->draw = trip_draw_codes_for(tf, &s->data->codes, typical, &f->maps);
+    trip_draw_codes_table(&f->draw, tf, voxel, f->table);
+    trip_draw_codes_stored_table(&f->draw, tf, voxel, f->stored_table);
+    trip_tf_destroy(tf);
+    memcpy(s->table, f->table, sizeof f->table);
+    s->draw = &f->draw;
+    s->stored_table = f->stored_table;
+}
+
+/* Returns the table of a frame. */
+static const trip_tf_entry *table_of(const scene *s, bool interpolates)
+{
+    return interpolates || !s->stored_table ? s->table : s->stored_table;
 }
 
 static int create_cpu(trip_renderer **out, trip_budget *budget)
@@ -317,7 +348,11 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     trip_reader_params params = *reader_params;
     scene_picture p = { .width = view->width, .height = view->height };
     assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
-    assert_int_equal(trip_plan_make(&plan, s->data, &camera, settings, s->table, s->budget), 0);
+    const trip_tf_entry *table = table_of(s, trip_settings_interpolates(settings, false));
+    trip_classification classified = { .draw = s->draw };
+    assert_int_equal(
+        trip_plan_make_next(&plan, s->data, &camera, settings, table, &classified, NULL, s->budget),
+        0);
     plan.level = s->level;
     params.planes = plan.planes;
     assert_int_equal(trip_reader_create(&reader, s->data, &params, s->budget), 0);
@@ -326,7 +361,7 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
     const trip_light_source source = { .data = s->data,
                                        .settings = settings,
                                        .clip = &plan.clip,
-                                       .table = s->table,
+                                       .table = table_of(s, false),
                                        .engine = params.engine,
                                        .threads = 1 };
     if (trip_effects_light(&settings->effects)) {
@@ -338,7 +373,7 @@ scene_picture scene_draw_with(const scene *s, const scene_renderer *renderer,
                          .camera = &camera,
                          .settings = settings,
                          .plan = &plan,
-                         .table = s->table,
+                         .table = table,
                          .light = light,
                          .emission = s->emission,
                          .count = true };
@@ -377,10 +412,11 @@ scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
     trip_reader *reader;
     scene_picture p = { .width = view->width, .height = view->height };
     unsigned kinds = settings->field == TRIP_FIELD_SPLATS ? 1 : 3;
+    const bool interpolates = trip_settings_interpolates(settings, true);
     assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
-    assert_int_equal(
-        trip_plan_make_field(&plan, s->data, &camera, settings, how->field ? 0 : kinds, s->budget),
-        0);
+    assert_int_equal(trip_plan_make_field(&plan, s->data, &camera, settings, how->field ? 0 : kinds,
+                                          interpolates ? s->draw : NULL, s->budget),
+                     0);
     assert_int_equal(trip_reader_create(&reader, s->data,
                                         &(trip_reader_params){ .planes = plan.planes }, s->budget),
                      0);
@@ -390,7 +426,7 @@ scene_picture scene_integrate(const scene *s, const trip_camera_params *view,
                          .settings = settings,
                          .plan = &plan,
                          .field = how->field,
-                         .table = s->table,
+                         .table = table_of(s, interpolates),
                          .emission = s->emission,
                          .progress = how->progress,
                          .progress_user = how->progress_user };

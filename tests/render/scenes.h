@@ -38,8 +38,10 @@ typedef struct scene_params {
     bool normals;
     /* 0 selects 2 for codes, and 4 for normals if there are any. */
     unsigned code_bytes, normal_bytes;
-    double gradient_scale; /* factor of the gradients in 4-byte normals; 0 selects 1 */
-    scene_voxel voxel;     /* NULL stores every voxel with code 65535 */
+    const trip_codes *codes; /* NULL: even codes of values from 0 to 1 */
+    double typical[2];       /* typical range; both 0 select the whole range */
+    double gradient_scale;   /* factor of the gradients in 4-byte normals; 0 selects 1 */
+    scene_voxel voxel;       /* NULL stores every voxel with code 65535 */
     void *user;
     const scene_part *parts; /* follow the voxels of level 0; three lists each */
     unsigned part_count;     /* 3 at most */
@@ -51,6 +53,9 @@ typedef struct scene {
     trip_dataset *data;
     unsigned level;       /* the level of `data`, see trip_dataset_level_open() */
     trip_tf_entry *table; /* 65536 entries, initially transparent black */
+    /* Set by scene_use_function(), with the draw table in `table`. */
+    const trip_draw_codes *draw;
+    trip_tf_entry *stored_table; /* NULL: the same as `table` */
     /* Heat to draw, after trip_emission_begin() by the test that owns it. NULL for none. */
     struct trip_emission *emission;
 } scene;
@@ -73,6 +78,16 @@ void scene_destroy(scene *s);
 /* Gives codes [first, last] a colour and an opacity per voxel. */
 void scene_colour(scene *s, unsigned first, unsigned last, double r, double g, double b,
                   double opacity);
+
+/* The codes and tables of a transfer function, as a session has them. */
+typedef struct scene_function {
+    trip_draw_maps maps;
+    trip_draw_codes draw;
+    trip_tf_entry table[TRIP_CODES], stored_table[TRIP_CODES];
+} scene_function;
+
+/* Makes frames draw by a function with these points in data units. `f` must outlive the scene. */
+void scene_use_function(scene *s, scene_function *f, const trip_tf_point *points, size_t count);
 
 /* Creates a renderer. Tests run over all renderers of a table of names. */
 typedef int (*scene_renderer_create)(trip_renderer **out, trip_budget *budget);

@@ -118,6 +118,32 @@ static void a_slab_of_even_heat_radiates_as_much_as_it_absorbs(void **state)
     }
 }
 
+/* Half of the codes lie between 0 and 1500, half between 1500 and 2000. */
+static void heat_of_uneven_codes_is_the_value(void **state)
+{
+    (void)state;
+    static const double table[3] = { 0, 1500, 2000 };
+    const trip_codes codes = trip_codes_from_table(table, 3, 15);
+    const double opacity = 1 - exp(-FOG * (EDGE - 1)), grey = 0.25;
+    for (unsigned quarter = 1; quarter < 4; quarter++) {
+        unsigned code = 16384 * quarter;
+        const double value = quarter < 3 ? 750.0 * quarter : 1750;
+        scene s, hot;
+        double expected[3];
+        create_fog(&s, (float)grey);
+        heat(&s, &hot,
+             &(scene_params){
+                 .dims = { EDGE, EDGE, EDGE }, .codes = &codes, .voxel = even, .user = &code },
+             0);
+        radiance(value / codes.hi, expected);
+        for (int k = 0; k < 3; k++)
+            expected[k] = opacity * (grey + expected[k]);
+        const trip_settings settings = with_emission();
+        assert_middle(&s, &settings, expected, 2e-5, 2e-5);
+        destroy(&s, &hot);
+    }
+}
+
 /* Heat rises along z from 0 to its maximum. */
 static bool rising(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -282,6 +308,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slab_of_even_heat_radiates_as_much_as_it_absorbs),
+        cmocka_unit_test(heat_of_uneven_codes_is_the_value),
         cmocka_unit_test(heat_lies_at_the_positions_of_its_own_grid),
         cmocka_unit_test(beyond_its_grid_heat_falls_to_nothing_over_a_voxel),
         cmocka_unit_test(the_error_falls_as_the_lattice_becomes_finer),

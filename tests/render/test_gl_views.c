@@ -28,6 +28,7 @@ static void open_volume(scene *s, const char *name, trip_brick_levels_for levels
     assert_int_equal(trip_brick(&(trip_brick_params){ .input = input,
                                                       .output = s->path,
                                                       .levels_for = levels_for,
+                                                      .normals = TRIP_NORMALS_STORED,
                                                       .memory_bytes = UINT64_C(1) << 30 },
                                 &summary),
                      0);

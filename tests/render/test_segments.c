@@ -185,6 +185,44 @@ static void one_code_has_the_transfer_function_between_entries(void **state)
     assert_true(s.extinction == 0);
 }
 
+/* Returns the integral of extinction of the ramp, and of extinction times red, from code 0. */
+static double whole_k(double code)
+{
+    return code * code / 2 / 1024;
+}
+
+static double whole_kr(double code)
+{
+    return code * code * code / 3 / 1024 / 65536;
+}
+
+static void the_function_is_constant_beyond_its_ends(void **state)
+{
+    (void)state;
+    make(ramp);
+    const double last_k = LAST / 1024.0, last_kr = last_k * LAST / 65536;
+    const double ends[][2] = { { -1000, 1000 },  { -3e6, 60000.5 },    { -1e15, 1e15 },
+                               { 65000, 66535 }, { 65534.5, 7e8 },     { 65535, 65536 },
+                               { 70000, 80000 }, { 65536.5, 65536.5 }, { -0.5, 65535.5 } };
+    for (int i = 0; i < 9; i++) {
+        const double a = ends[i][0], b = ends[i][1], length = b - a;
+        const double from = fmin(LAST, fmax(0, a)), to = fmin(LAST, fmax(0, b));
+        const double above = length > 0 ? fmax(0, b - fmax(a, LAST)) / length : 1;
+        double k = above * last_k, kr = above * last_kr;
+        if (to > from) {
+            k += (whole_k(to) - whole_k(from)) / length;
+            kr += (whole_kr(to) - whole_kr(from)) / length;
+        }
+        const trip_segment s = trip_segment_of(&segments, a, b),
+                           t = trip_segment_of(&segments, b, a);
+        assert_close(s.extinction / k, 1, 1e-9);
+        assert_close(s.rgb[0] / (kr / k), 1, 1e-9);
+        assert_true(s.extinction == t.extinction && s.rgb[0] == t.rgb[0]);
+    }
+    const trip_segment s = trip_segment_of(&segments, -200, -100);
+    assert_true(s.extinction == 0 && s.rgb[0] == 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -195,6 +233,7 @@ int main(void)
         cmocka_unit_test(a_rough_function_equals_the_sum_of_many_small_steps),
         cmocka_unit_test(products_of_linear_functions_are_integrated_exactly),
         cmocka_unit_test(one_code_has_the_transfer_function_between_entries),
+        cmocka_unit_test(the_function_is_constant_beyond_its_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -172,9 +172,9 @@ class Serve(program.ProgramTest):
         for name, value in (
             ("classify", "x"), ("shading", "2"), ("h", "1"), ("h", "nan"),
             ("early-termination", "0.11"), ("early-termination", "-2"), ("early-termination", "x"),
-            ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,2"),
+            ("opacity", "0"), ("opacity", "1e9"), ("light", "1"), ("light", "1,91"),
             ("light", "nan,0,9"), ("light", "0,91,9"), ("light", "0,0,0"), ("light", "1,2,3,4"),
-            ("light", "," * 500), ("samples", "65"), ("depth", "1"), ("count", "1"), ("", ""), ("shadows", "1"), ("emission", "1"),
+            ("light", "," * 500), ("light", "turn"), ("samples", "65"), ("depth", "1"), ("count", "1"), ("", ""), ("emission", "1"),
             ("cueing", "2"), ("occlusion", ""), ("auto", "yes"), ("fading", "0"), ("fading", "1.1"),
             ("anisotropy", "nan"), ("anisotropy", "-1"), ("coldest", "-1"), ("hottest", "1e9"),
             ("light-cells", "7"), ("light-cells", "1025"), ("light-cells", "8.5"),
@@ -196,6 +196,28 @@ class Serve(program.ProgramTest):
             self.assert_rendered(picture, camera)
             self.assertTrue((picture != before).any(), value)
             before = picture
+
+    def test_a_light_that_turns_keeps_its_direction_when_it_is_fixed(self):
+        self.do("resize 60 50")
+        before, number, camera = self.whole_picture()
+        self.assertEqual(self.ask("/set", "POST", name="light", value="60,20")[0], 204)
+        turning, number, camera = self.whole_picture(number)
+        self.assertIn("--light 0.8", camera)  # left is sin 60 cos 20 = 0.81
+        self.assert_rendered(turning, camera)
+        self.assertTrue((turning != before).any())
+        self.assertEqual(self.ask("/set", "POST", name="light", value="fixed")[0], 204)
+        for _ in range(200):
+            camera = self.status()["camera"]
+            if "--light world:" in camera:
+                break
+            time.sleep(0.05)
+        self.assertIn("--light world:", camera)
+        self.assertFalse(self.status()["light"]["turns"])
+        self.assertEqual(self.ask("/set", "POST", name="light", value="turns")[0], 204)
+        now = self.status()["light"]
+        self.assertTrue(now["turns"])
+        self.assertAlmostEqual(now["round"], 60, 9)
+        self.assertAlmostEqual(now["up"], 20, 9)
 
     def test_effects_can_be_switched_and_equal_render(self):
         self.tearDown()

@@ -65,14 +65,15 @@ def read_header(index):
         "Q:checksums_checksum 3Q:dims 12d:index_to_world d:code_lo d:code_hi d:value_min "
         "d:value_max Q:reserved_scale 3d:gradient_step d:gradient_full Q:voxels Q:kept Q:halo "
         "I:tile_log2 I:slab_sheets I:page_log2 I:planes I:code_bytes I:normal_bytes I:list_count "
-        "I:reserved Q:lists_offset Q:text_offset Q:text_bytes Q:coordinates_offset",
+        "I:reserved Q:lists_offset Q:text_offset Q:text_bytes Q:coordinates_offset "
+        "Q:code_table_offset I:code_table_entries I:code_table_step_log2 d:typical_min d:typical_max",
         index,
         0,
     )
-    if at != 328 or header["version"] != 5 or header["header_bytes"] != 1024:
+    if at != 360 or header["version"] != 6 or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
-    if header["reserved"] or header["reserved_scale"] or any(index[328:1024]):
-        fail("index.trip", 328, "reserved bytes")
+    if header["reserved"] or header["reserved_scale"] or any(index[360:1024]):
+        fail("index.trip", 360, "reserved bytes")
     if header["index_bytes"] != len(index):
         fail("index.trip", 24, "length of the file")
     if xxh64(index[:16] + bytes(8) + index[24:1024]) != header["header_checksum"]:

@@ -51,7 +51,7 @@ static int sum_list(const trip_dataset *d, trip_reader *r, int axis, uint64_t *s
         trip_selection_create(&s, d, &d->lists[axis], false, 0, INT32_MAX, shared.budget), 0);
     for (uint64_t i = 0; i < d->lists[axis].brick_count; i++)
         trip_selection_add(&s, i);
-    int status = trip_reader_begin(r, &(trip_pass){ &s, 1, false });
+    int status = trip_reader_begin(r, &(trip_pass){ &s, 1, false, NULL });
     while (status == 0 && (status = trip_reader_next(r, &b)) == 1) {
         for (size_t i = 0; i < b.run_count; i++) {
             fixture_decode_run(&b, &b.runs[i], voxels, normals);
@@ -284,9 +284,10 @@ static void an_invalid_header_with_valid_checksum_is_refused(void **state)
     REFUSE(c.header->version = 2, "format version 2 is no longer supported");
     REFUSE(c.header->version = 3, "format version 3 is no longer supported");
     REFUSE(c.header->version = 4, "format version 4 is no longer supported");
-    REFUSE(c.header->version = 6, "format version 6");
+    REFUSE(c.header->version = 5, "format version 5 is no longer supported");
+    REFUSE(c.header->version = 7, "format version 7");
     REFUSE(c.header->header_bytes = 512, "header size");
-    REFUSE(c.header->reserved[690] = 1, "reserved");
+    REFUSE(c.header->reserved[660] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");
     REFUSE(c.header->reserved1 = 1, "reserved");
     REFUSE(c.header->coordinates_offset = 3, "the coordinates lie outside");

@@ -196,7 +196,7 @@ static void alternating_lists_have_separate_pieces(void **state)
     start(&t, false, 1 << 20, 1);
     select_all(&t, 0);
     select_all(&t, 1);
-    t.pass = (trip_pass){ t.s, 2, false };
+    t.pass = (trip_pass){ t.s, 2, false, NULL };
     begin(&t);
     assert_true(trip_planner_fill(&t.planner, &t.extent));
     assert_int_equal(t.extent.range_count, 2);

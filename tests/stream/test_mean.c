@@ -57,7 +57,8 @@ static void values_are_the_nearest_of_1024_steps(void **state)
 static void steps_cover_the_range_of_values(void **state)
 {
     (void)state;
-    const trip_mean_scale scale = trip_mean_scale_make(100, 1400, 0, 65535);
+    const trip_mean_scale scale =
+        trip_mean_scale_make(100, 1400, &(trip_codes){ .lo = 0, .hi = 65535 });
     assert_true(scale.lo == 100 && scale.width == 1300);
     for (unsigned value = 100; value <= 1400; value++) {
         unsigned back = trip_mean_value(&scale, trip_mean_pack(&scale, value, 1, 1));
@@ -66,9 +67,9 @@ static void steps_cover_the_range_of_values(void **state)
             assert_int_equal(back, value);
     }
     /* Values beyond the range of codes get the nearest code. */
-    const trip_mean_scale cut = trip_mean_scale_make(-10, 20, 0, 10);
+    const trip_mean_scale cut = trip_mean_scale_make(-10, 20, &(trip_codes){ .lo = 0, .hi = 10 });
     assert_true(cut.lo == 0 && cut.width == 65535);
-    const trip_mean_scale one = trip_mean_scale_make(5, 5, 0, 10);
+    const trip_mean_scale one = trip_mean_scale_make(5, 5, &(trip_codes){ .lo = 0, .hi = 10 });
     assert_int_equal(trip_mean_value(&one, trip_mean_pack(&one, 32768, 1, 1)), 32768);
 }
 

@@ -284,7 +284,7 @@ static void the_reader_reads_into_memory_of_the_caller(void **state)
     check_random_passes(&f, d, &params, 2, 4);
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 1, true);
-    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
     while (trip_reader_next(r, &batch) == 1) {
         bool own = false;
         for (int i = 0; i < 3; i++)
@@ -356,7 +356,7 @@ static void a_data_set_in_memory_is_returned_in_place(void **state)
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     assert_int_equal(calls, 0);
     select_all(&s, d, 1, false);
-    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
     unsigned first = calls;
     assert_int_equal(trip_reader_next(r, &next), 1);
@@ -368,7 +368,7 @@ static void a_data_set_in_memory_is_returned_in_place(void **state)
     const unsigned char *voxels = batch.planes[0];
     trip_reader_release(r, &next);
     trip_reader_release(r, &batch);
-    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batch), 1);
     assert_ptr_equal(batch.planes[0], voxels);
     assert_int_equal(trip_reader_get_stats(r).bytes_read, 0);
@@ -451,7 +451,7 @@ static void runs_only_passes_read_nothing(void **state)
     select_all(&s, d, 1, true);
     trip_run_iterator it = trip_run_begin(&s);
     trip_reader_set_runs_only(r, true);
-    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
     while (trip_reader_next(r, &batch) == 1) {
         assert_null(batch.planes[0]);
         assert_null(batch.planes[1]);
@@ -1021,7 +1021,7 @@ static void an_abandoned_pass_leaves_the_reader_ready(void **state)
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 0, false);
     for (int i = 0; i < 5; i++) {
-        assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+        assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
         for (int k = 0; k < i; k++) {
             assert_int_equal(trip_reader_next(r, &batch), 1);
             trip_reader_release(r, &batch);
@@ -1029,7 +1029,7 @@ static void an_abandoned_pass_leaves_the_reader_ready(void **state)
     }
     assert_int_equal(read_pass(r, &s, 0, out, &n), 0);
     assert_int_equal(n, f.count);
-    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
     trip_selection_destroy(&s, f.budget);
     trip_reader_destroy(r); /* reads still run */
     free(out);
@@ -1274,7 +1274,7 @@ static void holding_every_slot_is_an_error(void **state)
     trip_reader_params params = { .slot_bytes = 4096, .slots = 2 };
     assert_int_equal(trip_reader_create(&r, d, &params, f.budget), TRIP_OK);
     select_all(&s, d, 0, false);
-    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending }), TRIP_OK);
+    assert_int_equal(trip_reader_begin(r, &(trip_pass){ &s, 1, s.descending, NULL }), TRIP_OK);
     assert_int_equal(trip_reader_next(r, &batches[0]), 1);
     assert_int_equal(trip_reader_next(r, &batches[1]), 1);
     fixture_catch_reports();

@@ -66,7 +66,7 @@ static size_t runs_of(two_levels *t, bool descending, trip_run *runs)
     trip_pass_cursor cursors[2];
     size_t n = 0;
     select_both(t, descending);
-    const trip_pass pass = { t->s, 2, descending };
+    const trip_pass pass = { t->s, 2, descending, NULL };
     trip_pass_iterator it = trip_pass_begin(&pass, cursors);
     while (n < RUNS_MAX && trip_pass_next(&it, &runs[n]))
         n++;
@@ -164,7 +164,7 @@ static void check_reader(two_levels *t, const trip_reader_params *params, bool d
     int status;
     assert_int_equal(trip_reader_create(&r, &t->both, params, t->f[0].budget), TRIP_OK);
     select_both(t, descending);
-    const trip_pass pass = { t->s, 2, descending };
+    const trip_pass pass = { t->s, 2, descending, NULL };
     assert_int_equal(trip_reader_begin(r, &pass), TRIP_OK);
     while ((status = trip_reader_next(r, &b)) == 1) {
         check_batch(t, &b, taken);
@@ -206,7 +206,7 @@ static void more_selections_than_lists_are_refused(void **state)
     make(&t, 0.5);
     select_both(&t, false);
     const trip_selection three[3] = { t.s[0], t.s[1], t.s[0] };
-    const trip_pass pass = { three, 3, false };
+    const trip_pass pass = { three, 3, false, NULL };
     assert_int_equal(trip_reader_create(&r, &t.both, &(trip_reader_params){ 0 }, t.f[0].budget), 0);
     fixture_catch_reports();
     assert_int_equal(trip_reader_begin(r, &pass), TRIP_ERROR);

@@ -14,7 +14,7 @@ static void a_light_is_placed_around_the_centre_of_the_data(void **state)
 {
     (void)state;
     draw_settings s = { 0 };
-    trip_light_control_set(&s, &box, &(trip_light_control){ 90, 30, 2 });
+    trip_light_control_set(&s, &box, &(trip_light_control){ false, 90, 30, 2 });
     assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_POINT);
     const double position[3] = { 1, 2 + 12 * sqrt(0.75), 9 };
     for (int i = 0; i < 3; i++)
@@ -25,7 +25,7 @@ static void at_the_maximum_distance_a_light_is_a_direction(void **state)
 {
     (void)state;
     draw_settings s = { 0 };
-    trip_light_control_set(&s, &box, &(trip_light_control){ 180, 0, TRIP_LIGHT_FARTHEST });
+    trip_light_control_set(&s, &box, &(trip_light_control){ false, 180, 0, TRIP_LIGHT_FARTHEST });
     assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_DIRECTION);
     const double way[3] = { -1, 0, 0 };
     for (int i = 0; i < 3; i++)
@@ -36,13 +36,15 @@ static void at_the_maximum_distance_a_light_is_a_direction(void **state)
 static void the_controls_show_the_numbers_that_were_set(void **state)
 {
     (void)state;
-    const double distances[] = { TRIP_LIGHT_NEAREST, 0.3, 1, 9.9, TRIP_LIGHT_FARTHEST };
-    for (int i = 0; i < 5; i++)
+    const double distances[] = { TRIP_LIGHT_NEAREST, 0.3, 1, 9.9, TRIP_LIGHT_FARTHEST,
+                                 TRIP_LIGHT_FARTHEST };
+    for (int i = 0; i < 6; i++)
         for (double round = -170; round < 180; round += 35) {
-            const trip_light_control set = { round, round / 2, distances[i] };
+            const trip_light_control set = { i == 5, round, round / 2, distances[i] };
             draw_settings s = { 0 };
             trip_light_control_set(&s, &box, &set);
             const trip_light_control shown = trip_light_control_of(&s, &box);
+            assert_int_equal(shown.turns, set.turns);
             assert_close(shown.round, set.round, 1e-9);
             assert_close(shown.up, set.up, 1e-9);
             assert_close(shown.distance, set.distance, 1e-9);
@@ -61,19 +63,62 @@ static void a_light_at_the_centre_has_finite_numbers(void **state)
     assert_true(isfinite(c.round) && isfinite(c.up) && c.distance == 0);
 }
 
-static void the_light_leaves_the_eye_to_its_last_place(void **state)
+static void the_light_leaves_the_eye_to_its_last_direction_of_the_view(void **state)
 {
     (void)state;
     draw_settings s = { .light = { .kind = TRIPTYCH_LIGHT_HEAD } };
     assert_true(trip_light_is_head(&s));
     trip_light_set_head(&s, false);
     assert_false(trip_light_is_head(&s));
-    assert_true(s.light.toward[2] == 1); /* a direction that is not zero */
+    assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_VIEW);
+    for (int i = 0; i < 3; i++)
+        assert_true(s.light.toward[i] == 1); /* the upper left front */
     s.light.toward[0] = 3;
     trip_light_set_head(&s, true);
     assert_true(trip_light_is_head(&s));
     trip_light_set_head(&s, false);
     assert_true(s.light.toward[0] == 3);
+    s.light.kind = TRIPTYCH_LIGHT_POINT; /* a position is no direction of the view */
+    trip_light_set_head(&s, true);
+    trip_light_set_head(&s, false);
+    assert_true(s.light.toward[0] == 1);
+}
+
+/* Left is 0 degrees down from the azimuth of 90, the top is at the elevation of 90. */
+static void controls_of_a_light_that_turns_count_from_the_front_to_the_left(void **state)
+{
+    (void)state;
+    const double at[][5] = { { 0, 0, 0, 0, 1 },
+                             { 90, 0, 1, 0, 0 },
+                             { -90, 0, -1, 0, 0 },
+                             { 180, 0, 0, 0, -1 },
+                             { 30, 90, 0, 1, 0 } };
+    for (int i = 0; i < 5; i++) {
+        draw_settings s = { 0 };
+        trip_light_control_set(
+            &s, &box, &(trip_light_control){ true, at[i][0], at[i][1], TRIP_LIGHT_FARTHEST });
+        assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_VIEW);
+        for (int k = 0; k < 3; k++)
+            assert_close(s.light.toward[k], at[i][2 + k], 1e-12);
+    }
+}
+
+/* The camera looks along +y with z up, so left is -x and the front is -y. */
+static void a_light_keeps_its_direction_when_it_is_fixed_or_turns(void **state)
+{
+    (void)state;
+    const triptych_camera camera = { .eye = { 5, -20, 3 }, .look = { 5, 9, 3 }, .up = { 0, 0, 1 } };
+    const trip_navigation n = trip_navigation_from_camera(&camera, NULL);
+    draw_settings s = { .light = { .kind = TRIPTYCH_LIGHT_VIEW, .toward = { 1, 2, 3 } } };
+    const double world[3] = { -1, -3, 2 };
+    trip_light_set_turns(&s, &box, &n, false);
+    assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_DIRECTION);
+    for (int i = 0; i < 3; i++)
+        assert_close(s.light.toward[i], world[i], 1e-12);
+    trip_light_set_turns(&s, &box, &n, true);
+    assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_VIEW);
+    for (int i = 0; i < 3; i++)
+        assert_close(s.light.toward[i], i + 1, 1e-12);
 }
 
 static void assert_words(const draw_settings *s, const char *heat, const char *words)
@@ -106,6 +151,19 @@ static const trip_effect_switch *switch_of(int bit)
     return &trip_effect_switches[i];
 }
 
+static void shadows_take_the_default_light_from_the_eye(void **state)
+{
+    (void)state;
+    const trip_effect_switch *shadows = switch_of(TRIPTYCH_EFFECT_SHADOWS);
+    draw_settings s = { 0 };
+    assert_null(trip_effect_lacks(shadows, &s, NULL));
+    assert_true(trip_effect_turn(shadows, true, &s, NULL));
+    assert_int_equal(s.light.kind, TRIPTYCH_LIGHT_VIEW);
+    s.light.kind = TRIPTYCH_LIGHT_DEFAULT; /* as from the command line */
+    assert_false(trip_light_is_head(&s));
+    assert_true(trip_light_control_of(&s, &box).turns);
+}
+
 static void every_effect_has_its_own_switch(void **state)
 {
     (void)state;
@@ -128,7 +186,7 @@ static void every_effect_has_its_own_switch(void **state)
 static void effects_without_light_or_heat_cannot_be_turned_on(void **state)
 {
     (void)state;
-    draw_settings s = { 0 };
+    draw_settings s = { .light = { .kind = TRIPTYCH_LIGHT_HEAD } };
     assert_non_null(
         strstr(trip_effect_lacks(switch_of(TRIPTYCH_EFFECT_SHADOWS), &s, "h"), "headlight"));
     assert_false(trip_effect_turn(switch_of(TRIPTYCH_EFFECT_SHADOWS), true, &s, "h"));
@@ -222,7 +280,10 @@ int main(void)
         cmocka_unit_test(at_the_maximum_distance_a_light_is_a_direction),
         cmocka_unit_test(the_controls_show_the_numbers_that_were_set),
         cmocka_unit_test(a_light_at_the_centre_has_finite_numbers),
-        cmocka_unit_test(the_light_leaves_the_eye_to_its_last_place),
+        cmocka_unit_test(the_light_leaves_the_eye_to_its_last_direction_of_the_view),
+        cmocka_unit_test(controls_of_a_light_that_turns_count_from_the_front_to_the_left),
+        cmocka_unit_test(a_light_keeps_its_direction_when_it_is_fixed_or_turns),
+        cmocka_unit_test(shadows_take_the_default_light_from_the_eye),
         cmocka_unit_test(active_effects_are_named_in_words),
         cmocka_unit_test(every_effect_has_its_own_switch),
         cmocka_unit_test(effects_without_light_or_heat_cannot_be_turned_on),

@@ -225,7 +225,7 @@ class View(program.ProgramTest):
                     "click 0.3 Function editor", "click 0.5 Undo", "click 0.5 Redo",
                     "click 0.4 Opacity", "click 0.5 Shading", "click 0.5 Shading",
                     "click 0.5 Light from the eye\nclick 0.2 Light azimuth", "click 0.9 Light elevation",
-                    "click 0.4 Light distance",
+                    "click 0.5 Light turns with the view\nclick 0.4 Light distance",
                     "click 0.5 Classification\nclick 0.5 Pre (splats)",
                     "click 0.5 Variants of the papers\nclick 0.5 Kernel radius", "click 0.5 Compositing\nclick 0.5 Per sheet",
                     "click 0.2 Blend start (h)",

@@ -294,11 +294,11 @@ INLINE vh differences(vh codes, vh below, vh above)
     return vh_select(no_below | no_above, half >> 1, half);
 }
 
-static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares,
-                                                      const trip_cpu_voxels *left,
-                                                      const trip_cpu_voxels *above,
-                                                      const trip_cpu_voxels *sheet_before,
-                                                      const trip_cpu_voxels *sheet_behind)
+static __attribute__((noinline)) void sheet_gradients(const int16_t *codes, uint64_t squares,
+                                                      const int16_t *left, const int16_t *above,
+                                                      const int16_t *sheet_before,
+                                                      const int16_t *sheet_behind,
+                                                      trip_cpu_gradient *gradients)
 {
     /* The voxels before the first column and row come from the neighbouring rasters. */
     int16_t first[8];
@@ -307,28 +307,28 @@ static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, u
         int u = square % TRIP_CPU_SQUARES_ACROSS * 8, v0 = square / TRIP_CPU_SQUARES_ACROSS * 8;
         for (int v = v0; v < v0 + 8; v++) {
             int i = v * TRIP_CPU_RASTER_STRIDE + u;
-            const int16_t *at = raster->codes + i;
+            const int16_t *at = codes + i;
             const int16_t *to_left = at - 1, *before = at - TRIP_CPU_RASTER_STRIDE;
             if (all_are_missing(vh_load(at)))
                 continue;
             if (v == 0)
-                before = above->codes + 63 * TRIP_CPU_RASTER_STRIDE + u;
+                before = above + 63 * TRIP_CPU_RASTER_STRIDE + u;
             if (u == 0) {
-                first[0] = left->codes[v * TRIP_CPU_RASTER_STRIDE + 63];
+                first[0] = left[v * TRIP_CPU_RASTER_STRIDE + 63];
                 memcpy(first + 1, at, 7 * sizeof *first);
                 to_left = first;
             }
             const neighbours n = {
-                { vh_load(to_left), vh_load(before), vh_load(sheet_before->codes + i) },
+                { vh_load(to_left), vh_load(before), vh_load(sheet_before + i) },
                 { vh_load(at + 1), vh_load(at + TRIP_CPU_RASTER_STRIDE),
-                  vh_load(sheet_behind->codes + i) },
+                  vh_load(sheet_behind + i) },
             };
             const bool lacks = some_is_missing(&n);
             vh d[3];
             for (int a = 0; a < 3; a++)
                 d[a] = lacks ? differences(vh_load(at), n.before[a], n.behind[a])
                              : vh_half_difference(n.behind[a], n.before[a]) >> 1;
-            vh_store_3((int16_t *)&raster->gradients[i], d[0], d[1], d[2]);
+            vh_store_3((int16_t *)&gradients[i], d[0], d[1], d[2]);
         }
     }
 }

@@ -73,6 +73,8 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->run_count = s->taken_count = 0;
     const trip_plan *plan = r->frame->plan;
     const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
+    s->store.drawn = plan->draw.of_stored;
+    s->store.sloped = r->frame->settings->shading ? plan->draw.slope_of_stored : NULL;
     s->store.codes = trip_cpu_codes_of(plan->code_min, plan->code_max);
     s->store.coordinates = &r->frame->data->coordinates;
     s->sheet_pane = trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
@@ -138,7 +140,7 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const tr
     const uint64_t min = need->rasters + s->sample_rasters;
     const uint64_t max = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SAMPLES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
-    while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * min) > room)
+    while (sheets > fewest && trip_cpu_store_bytes(&s->store, all, sheets, 2 * min) > room)
         sheets--;
     s->max = (int)(sheets > fewest + 2 ? sheets - 4 : fewest - 2);
     return trip_cpu_store_fit(&s->store, all, sheets, min, max, room);
@@ -186,8 +188,8 @@ static int find_min(const trip_cpu_sheets *s, uint64_t *bytes)
         status = trip_cpu_need_find(&need, layer, rasters_in(&all), held_sheets, s->store.budget);
         if (status)
             break;
-        uint64_t min = trip_cpu_windows_min_bytes(&all, reach_of(frame), &need, held_sheets,
-                                                  frame->settings->samples_per_sheet);
+        uint64_t min = trip_cpu_windows_min_bytes(&s->store, &all, reach_of(frame), &need,
+                                                  held_sheets, frame->settings->samples_per_sheet);
         *bytes = min > *bytes ? min : *bytes;
     }
     return status;
@@ -491,6 +493,7 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     const unsigned segments = (unsigned)s->of->frame->settings->samples_per_sheet;
     const trip_cpu_group given = s->group;
     s->group = (trip_cpu_group){ .pool = store->voxels,
+                                 .slopes = store->slopes,
                                  .first_u = store->first_u * TRIP_CPU_RASTER,
                                  .first_v = store->first_v * TRIP_CPU_RASTER,
                                  .across = store->across,
@@ -658,7 +661,8 @@ static bool is_occluded(const trip_cpu_sheets *s, const trip_run *run)
     const trip_cpu_view *view = &r->views[trip_batch_list(s->batch, run)->index];
     if (view->coordinates)
         return false;
-    trip_cpu_box box = trip_cpu_brick_box(view, run->brick, run->sheet, run->sheet);
+    trip_cpu_box box =
+        trip_cpu_brick_box(view->of->data, view->list, run->brick, run->sheet, run->sheet);
     return trip_cpu_box_occlusion(view, &r->mask, &box) == TRIP_CPU_OCCLUDED;
 }
 

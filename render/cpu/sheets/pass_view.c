@@ -24,9 +24,11 @@ static void by_list(const trip_cpu_sheet_view *view, trip_vec3 v, double out[3])
  * factor 0.5 is there because the kernels pass the sum of two gradients. */
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, trip_cpu_codes codes)
 {
-    const trip_file_header *h = &frame->data->header;
-    double full = trip_shade_gradient_full(h, 1, frame->plan->level);
-    double unit = ldexp(0.5 * (h->code_hi - h->code_lo) / 65535 / full, -(int)codes.shift) /
+    const trip_draw_codes *draw = &frame->plan->draw;
+    double full = trip_shade_gradient_full(&frame->data->header, 1, frame->plan->level);
+    const bool sloped = draw->slope_of_stored != NULL;
+    const double range = sloped ? draw->slope_hi - draw->slope_lo : draw->hi - draw->lo;
+    double unit = ldexp(0.5 * range / 65535 / full, sloped ? 0 : -(int)codes.shift) /
                   trip_cpu_gradient_unit(&frame->data->coordinates);
     const double(*m)[3] = (const double(*)[3])view->world;
     double adjugate[3][3];

@@ -1,0 +1,105 @@
+/* The codes that a frame interpolates. Interpolation needs even codes: the mean of two codes must
+ * stand for the mean of their values. If the codes of a data set are even, draw codes are the
+ * stored codes. Otherwise a map converts each stored code to a draw code. The draw codes then cover
+ * the values between which the transfer function changes, and a margin around them.
+ *
+ * Beyond the range of draw codes the function is constant. The CPU renderer has codes of 16 bits,
+ * so it counts values there as the nearest end. A surface moves only in cells that have values
+ * beyond the range. If a cell has values beyond both ends, its surface lies in the middle. The
+ * range therefore covers all typical values, unless the function changes within a small part of
+ * them. The reference, the integral and gl use exact codes beyond the range.
+ *
+ * Plain values and pure functions. */
+#ifndef TRIP_DRAW_CODES_H
+#define TRIP_DRAW_CODES_H
+
+#include "code_set.h"
+#include "codes.h"
+#include "transfer_function.h"
+
+/* The number of draw codes between the two nearest points of the function, and the maximum number
+ * in the whole part in which it changes. The fewer codes the part has, the more widths of it lie
+ * within the range. Draw codes are never finer than the stored codes of the part. */
+#define TRIP_DRAW_PART_MIN 64.0
+#define TRIP_DRAW_PART_MAX 1024.0
+
+/* How many times coarser draw codes are if the range would lack a part of the typical values. */
+#define TRIP_DRAW_COARSER 2.0
+
+/* The number of draw codes in the part if typical values lie beyond one of its ends only. Surfaces
+ * then move by less than a hundredth of a voxel, and thin matter at the other end needs fine codes.
+ */
+#define TRIP_DRAW_PART_FINE 512.0
+
+/* How many times wider than the range of slope codes the range of draw codes may be and replace it.
+ */
+#define TRIP_DRAW_SLOPES 16.0
+
+typedef struct trip_draw_codes {
+    double lo, hi; /* values of draw codes 0 and 65535 */
+    /* The draw code of each of 65536 stored codes. NULL means that draw codes are stored codes. */
+    const uint16_t *of_stored;
+    /* Slope codes are even. The gradients of the CPU renderer are differences of slope codes. Slope
+     * codes 0 and 65535 stand for the values slope_lo and slope_hi. They cover the typical values
+     * and as much again on either side, while draw codes may cover few values. The map is NULL if
+     * draw codes cover this range too. */
+    double slope_lo, slope_hi;
+    const uint16_t *slope_of_stored;
+    trip_codes stored; /* the codes of the data set */
+} trip_draw_codes;
+
+/* Returns draw codes that are the stored codes: for even codes, and for frames that do not
+ * interpolate. */
+trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored);
+/* The maps of draw codes and slope codes. */
+typedef struct trip_draw_maps {
+    uint16_t draw[TRIP_CODES], slope[TRIP_CODES];
+} trip_draw_maps;
+
+/* Chooses the ranges for a function in data units and fills `maps`, which must outlive the result.
+ * If the codes are even, returns trip_draw_codes_as_stored() and leaves `maps` alone. `typical` has
+ * the typical range of the data set (format.h). */
+trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
+                                    const double typical[2], trip_draw_maps *maps);
+
+static inline unsigned trip_draw_code(const trip_draw_codes *d, unsigned stored)
+{
+    return d->of_stored ? d->of_stored[stored] : stored;
+}
+
+/* Returns the draw codes of the stored codes from `min` to `max`. */
+static inline trip_code_range trip_draw_codes_range(const trip_draw_codes *d, unsigned min,
+                                                    unsigned max)
+{
+    return (trip_code_range){ (uint16_t)trip_draw_code(d, min), (uint16_t)trip_draw_code(d, max) };
+}
+
+/* Returns the code of a stored code before rounding and clamping. It may lie far outside of [0,
+ * 65535]. */
+double trip_draw_code_exact(const trip_draw_codes *d, unsigned stored);
+
+static inline double trip_draw_value_per_code(const trip_draw_codes *d)
+{
+    return (d->hi - d->lo) / (TRIP_CODES - 1);
+}
+
+/* Fills the table of a function: entry c belongs to the value of stored code c, or of draw code c.
+ * `voxel_world` is the length of one voxel. The two tables are equal if draw codes are stored
+ * codes. */
+void trip_draw_codes_stored_table(const trip_draw_codes *d, const trip_tf *tf, double voxel_world,
+                                  trip_tf_entry table[TRIP_CODES]);
+void trip_draw_codes_table(const trip_draw_codes *d, const trip_tf *tf, double voxel_world,
+                           trip_tf_entry table[TRIP_CODES]);
+
+/* A part of a function that draw codes are too coarse for. */
+typedef struct trip_draw_loss {
+    double lo, hi;      /* the values between which the function changes */
+    double codes;       /* number of draw codes between them */
+    double first, last; /* the values between which the whole function changes */
+} trip_draw_loss;
+
+/* Finds a part between two neighbouring points with a visible change, fewer than 16 draw codes, and
+ * at least 4 times as many stored codes. Returns false if there is none. */
+bool trip_draw_codes_loss(const trip_draw_codes *d, const trip_tf *tf, trip_draw_loss *out);
+
+#endif
