@@ -62,8 +62,7 @@ static int draw_planned(const bench_frame *f, const trip_camera *camera, bool co
     trip_settings settings = f->settings;
     if (!settings.samples_per_sheet)
         settings.samples_per_sheet =
-            trip_sheet_samples_of_view(camera, &settings, f->session->data->header.dims)
-                .samples_per_sheet;
+            trip_sheet_samples_of_view(camera, f->session->data->header.dims).samples_per_sheet;
     if (settings.footprint == TRIP_FOOTPRINT_FIXED)
         settings.sprite_px = sprite_px(f->session->data, camera, &settings);
     if (f->occluder)

@@ -337,7 +337,7 @@ static const trip_option rows[DRAW_OPTIONS] = {
     [DRAW_SAMPLES_PER_SHEET] = { "samples-per-sheet", "N|auto",
                                  "Sets the samples per sheet of post; more come closer to the "
                                  "integral",
-                                 "auto, 1 to 6", .alias = "slices", .group = DRAW_GROUP_ACCURACY,
+                                 "auto, 2 to 6", .alias = "slices", .group = DRAW_GROUP_ACCURACY,
                                  .measured = true, .type = TRIP_OPTION_AUTO, AT(sheet.samples),
                                  .lo = 1, .hi = 16 },
     [DRAW_DEPTH] = { "depth", "FILE",

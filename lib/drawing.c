@@ -223,7 +223,7 @@ static int enter_part(triptych *t)
     if (status)
         return status;
     t->samples_per_sheet =
-        trip_sheet_samples_of_view(&t->camera, &t->settings, drawn_session(t).data->header.dims);
+        trip_sheet_samples_of_view(&t->camera, drawn_session(t).data->header.dims);
     t->drawn_settings.samples_per_sheet = t->settings.samples_per_sheet
                                               ? t->settings.samples_per_sheet
                                               : t->samples_per_sheet.samples_per_sheet;

@@ -55,11 +55,9 @@ static void explain_choices(const triptych *t, FILE *out)
         fputs("samples     one per voxel that a ray meets, as always with the nearest value\n",
               out);
     else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
-        fprintf(out,
-                "samples     %d per sheet, by the view: between sheets rays move up to %.2f voxels "
-                "sideways; voxels are up to %.3g %s wide\n",
-                t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.slope,
-                t->samples_per_sheet.voxel_px, t->settings.samples > 1 ? "samples" : "px");
+        fprintf(out, "samples     %d per sheet, by the view: voxels are up to %.3g %s wide\n",
+                t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.voxel_px,
+                t->settings.samples > 1 ? "samples" : "px");
 }
 
 int triptych_explain(triptych *t, char **text)

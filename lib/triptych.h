@@ -438,7 +438,7 @@ typedef struct triptych_splat_settings {
 /* Settings of sheets of interpolated values (post). */
 typedef struct triptych_sheet_settings {
     /* Samples per sheet, 1 to 16. More samples come closer to the integral. By default the view
-     * selects 1 to 6, unless the quality selects a number. -1 always lets the view select. */
+     * selects 2 to 6, unless the quality selects a number. -1 always lets the view select. */
     int samples;
 } triptych_sheet_settings;
 

@@ -23,9 +23,16 @@
  * settings.samples_per_sheet. In perspective the eye's own coordinate is one more. The planes cut a
  * layer's ray into segments. Each end of a segment is a sample (c, g) of the field at a plane. A
  * segment lies in the cell layer between two sheets. It is empty if one end lies in an empty cell
- * of the layer, or beyond the grid. Linear samples at a sheet (n / S is whole) are interpolated
- * from the four voxels around them there, and need no others. Rays begin at the eye, or at its
- * plane in parallel views. Everything behind is left out.
+ * of the layer. Linear samples at a sheet (n / S is whole) are interpolated from the four voxels
+ * around them there, and need no others. Rays begin at the eye, or at its plane in parallel views.
+ * Everything behind is left out.
+ *
+ * Sides
+ * -----
+ * A ray may enter or leave the grid through a side, between two planes. Its segment is cut there,
+ * as at a clipping plane: the code is linear between both ends. The end beyond the grid takes the
+ * sample at the nearest position of its plane in the grid. The error of the code at the side is in
+ * proportion to the segment's length, so the error of the picture falls with the square of S.
  *
  * Segments
  * --------

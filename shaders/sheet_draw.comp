@@ -66,6 +66,7 @@ struct position {
     vec2 rest;
     ivec3 voxel;
 #endif
+    vec2 lo, hi; // distances from the grid's sides, negative beyond them
 };
 
 ray ray_of(vec2 p)
@@ -187,12 +188,12 @@ float beyond(int voxel, int base, float rest)
     return (float(base) - positions[voxel].x) + (rest - positions[voxel].y);
 }
 
-// Returns the cell of a position among `count` entries of positions[] starting at `first`, or -1.
-// Sets `rest` to the fraction within the cell.
+// Returns the cell of a position among `count` entries of positions[] starting at `first`. Beyond
+// them it returns the nearest cell. Sets `rest` to the fraction within the cell.
 int find_cell(int first, int count, int base, inout float rest)
 {
     int lo = 0, hi = count - 1;
-    if (hi < 1 || beyond(first, base, rest) < 0.0 || beyond(first + hi, base, rest) > 0.0)
+    if (hi < 1)
         return -1;
     while (hi - lo > 1) {
         int middle = (lo + hi) / 2;
@@ -202,7 +203,7 @@ int find_cell(int first, int count, int base, inout float rest)
             hi = middle;
     }
     float before = beyond(first + lo, base, rest), behind = beyond(first + hi, base, rest);
-    rest = before / (before - behind);
+    rest = clamp(before / (before - behind), 0.0, 1.0);
     return lo;
 }
 #endif
@@ -211,17 +212,25 @@ int find_cell(int first, int count, int base, inout float rest)
 void place(ivec2 base, vec2 p, inout position at)
 {
 #ifdef UNEVEN
+    at.lo = vec2(beyond(0, base.x, p.x), beyond(extent.x, base.y, p.y));
+    at.hi = -vec2(beyond(extent.x - 1, base.x, p.x), beyond(extent.x + extent.y - 1, base.y, p.y));
     at.cell = ivec2(find_cell(0, extent.x, base.x, p.x), find_cell(extent.x, extent.y, base.y, p.y));
     at.part = p;
 #else
     vec2 whole = floor(p);
     at.cell = base + ivec2(whole);
     at.part = p - whole;
-    // The last voxels of the grid belong to the last cell.
+    at.lo = vec2(base - clips.yz) + p;
+    at.hi = vec2(extent.zw - base) - p;
+    // Beyond a side of the grid, the nearest position in the grid counts. The last voxels of the
+    // grid belong to the last cell.
     for (int i = 0; i < 2; i++)
-        if (at.cell[i] == extent[2 + i] && at.part[i] == 0.0) {
-            at.cell[i]--;
+        if (at.cell[i] >= extent[2 + i]) {
+            at.cell[i] = extent[2 + i] - 1;
             at.part[i] = 1.0;
+        } else if (at.cell[i] < clips[1 + i]) {
+            at.cell[i] = clips[1 + i];
+            at.part[i] = 0.0;
         }
 #endif
     at.there = false;
@@ -247,6 +256,12 @@ position position_at(ray r, trip_gl_sheet_end end)
     at.base = ivec2(end.base_u, end.base_v);
     at.rest = p;
     return at;
+#endif
+#ifdef UNEVEN
+    // Voxels that were not read are missing, although the grid goes on.
+    for (int i = 0; i < 2; i++)
+        if ((at.lo[i] < 0.0 && clips[1 + i] != 0) || (at.hi[i] < 0.0 && extent[2 + i] != extent[i] - 1))
+            return at;
 #endif
     if (!is_within(at.cell))
         return at;
@@ -387,20 +402,40 @@ float place_between(int voxel, float part)
 }
 #endif
 
-// Returns the position in the grid, list axes.
+// Returns the position in the grid or beyond its sides, list axes.
 vec3 voxel_of(position at, trip_gl_sheet_end end)
 {
 #if defined(NEAREST) && defined(UNEVEN)
     return vec3(end.sheet, vec2(at.base) + at.rest);
 #elif defined(NEAREST)
     return vec3(end.sheet, vec2(at.base - clips.yz) + at.rest);
-#elif defined(UNEVEN)
+#else
+    if (any(lessThan(at.lo, vec2(0.0))) || any(lessThan(at.hi, vec2(0.0))))
+#ifdef UNEVEN
+        return vec3(end.sheet, place_between(0, 0.0) + at.lo.x, place_between(extent.x, 0.0) + at.lo.y);
+#else
+        return vec3(end.sheet, at.lo);
+#endif
+#ifdef UNEVEN
     return vec3(end.sheet, place_between(at.cell.x, at.part.x), place_between(extent.x + at.cell.y, at.part.y));
 #else
     return vec3(end.sheet, vec2(at.cell - clips.yz) + at.part);
 #endif
+#endif
 }
 #endif
+
+// Cuts the fractions of a segment at a side of the grid. `a` and `b` are the distances of both ends
+// from it.
+void cut_at_side(float a, float b, inout float first, inout float last)
+{
+    if (a < 0.0 && b < 0.0)
+        last = -1.0;
+    else if (a < 0.0)
+        first = max(first, a / (a - b));
+    else if (b < 0.0)
+        last = min(last, a / (a - b));
+}
 
 // Composites the part of a segment from fraction `first` to `last` behind the pixel's colour,
 // opacity and depth.
@@ -495,6 +530,10 @@ void add_segment(ray r, trip_gl_sheet_end from, trip_gl_sheet_end to, position a
 #ifdef NEAREST
     add_boxes(r, from, to, a, b, part, pixel, pixel_depth);
 #else
+    for (int i = 0; i < 2; i++) {
+        cut_at_side(a.lo[i], b.lo[i], part.x, part.y);
+        cut_at_side(a.hi[i], b.hi[i], part.x, part.y);
+    }
     add_part(r, from, to, a, b, part.x, part.y, pixel, pixel_depth);
 #endif
 }

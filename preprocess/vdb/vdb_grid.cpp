@@ -31,7 +31,7 @@ class Converter
     Converter(const trip_vdb_conversion &c, double background)
         : mode_(c.mode),
           scale_(1 / (c.mode == TRIP_LEVEL_SET_BAND ? background
-                                                    : std::min(4 * c.voxel_world, 2 * background)))
+                                                    : std::min(6 * c.voxel_world, 2 * background)))
     {
     }
     Sample operator()(double stored, bool active) const
@@ -39,7 +39,8 @@ class Converter
         if (mode_ == TRIP_LEVEL_SET_BAND)
             return { (float)std::max(0.0, 1 - std::fabs(stored) * scale_), active };
         if (mode_ == TRIP_LEVEL_SET_FILLED) {
-            float inside = (float)std::min(1.0, std::max(0.0, 0.5 - stored * scale_));
+            double t = std::min(1.0, std::max(0.0, 0.5 - stored * scale_));
+            float inside = (float)(t * t * (3 - 2 * t));
             return { inside, inside > 0 };
         }
         return { (float)stored, active };

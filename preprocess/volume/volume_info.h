@@ -117,9 +117,9 @@ void trip_append_note(char *note, size_t room, const char *text);
 
 typedef enum trip_level_set_mode {
     TRIP_LEVEL_SET_UNSET = 0, /* filled, if the grid is a level set */
-    /* Density 1 inside and 0 outside, with a ramp about the surface. The ramp is 4 voxels wide if
-     * the band is. Central differences, which light uses, are then exact within a voxel of the
-     * surface. */
+    /* Density 1 inside and 0 outside, with the ramp t^2 (3 - 2 t) about the surface. The ramp is 6
+     * voxels wide, or as wide as the band. It has no kinks. Central differences, which light uses,
+     * would show a kink as rings. */
     TRIP_LEVEL_SET_FILLED,
     TRIP_LEVEL_SET_BAND, /* density max(0, 1 - |distance| / half band width) */
 } trip_level_set_mode;

@@ -367,16 +367,11 @@ static int frame(const finding *f, trip_camera_params *out)
     return 0;
 }
 
-/* Frames the visible part. The view of the box shows which voxels are visible. A turntable has no
- * outline, since turning shows other sides. */
+/* Frames the visible part. A turntable has no outline, since one framing serves all its pictures.
+ */
 static int frame_visible(finding *f, trip_visible *visible, trip_camera_params *out)
 {
-    int status = 0;
-    if (visible && !f->s->turntable) {
-        status = frame(f, out);
-        if (!status)
-            status = trip_visible_outline(visible, f->lo, f->hi, out);
-    }
+    int status = visible && !f->s->turntable ? trip_visible_outline(visible) : 0;
     f->visible = visible;
     return status ? status : frame(f, out);
 }

@@ -1,51 +1,55 @@
 #include "outline.h"
 
-#include <float.h>
+#include <assert.h>
+#include <string.h>
 
 #include "mean.h"
 #include "report.h"
 
 enum {
-    AXIS = 2,         /* the list to read; all lists of a level hold the same voxels */
-    MAX_VOXELS = 128, /* maximum along each side of the level */
-    PIXELS = 128,     /* pixels along the longer side */
+    AXIS = 2,   /* the list to read; all lists of a level hold the same voxels */
+    EDGE = 128, /* maximum number of voxels along each side of the level */
+    DIRECTIONS = 7,
+    HIDDEN_MAX = 1, /* number of directions from which a visible voxel may be hidden */
     CODES = 65536,
+    ENOUGH = 1 << 20, /* optical depth of a ray that is opaque enough */
 };
 
-#define UNIT 4294967296.0   /* unit of optical depth */
-#define MAX_OF_A_VOXEL 16.0 /* limit per voxel, so that sums stay within 64 bits */
+/* Steps along the list's indices: the axes, then the diagonals. */
+static const int directions[DIRECTIONS][3] = {
+    { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 }, { 1, 1, 1 }, { 1, 1, -1 }, { 1, -1, 1 }, { 1, -1, -1 },
+};
 
-typedef struct pixel {
-    uint64_t depth; /* optical depth, in 1 / UNIT */
-    float nearest, farthest;
-} pixel;
-
-/* An affine function of the list's indices. */
-typedef struct form {
-    double i, j, k, constant;
-} form;
+/* The visible voxels of a row along i; first > last if there are none. */
+typedef struct row {
+    int16_t first, last;
+} row;
 
 struct trip_outline {
     trip_budget *budget;
-    const trip_affine *map;            /* of level 0 */
-    trip_vec3 middle;                  /* centre of the box, in level 0's index space */
-    trip_vec3 eye, right, up, forward; /* world directions; eye relative to the middle */
-    bool parallel;
-    double origin[2], pixel; /* of the picture: tangents, or lengths in parallel views */
-    int size[2];
+    trip_affine map; /* from the list's indices to world space */
+    /* List coordinate of index 0, and step between indices, in indices of level 0. */
+    double first, step;
     uint64_t splats;
-    pixel pixels[PIXELS + 1][PIXELS + 1]; /* [y][x] */
+    row rows[EDGE][EDGE]; /* [k][j] */
 };
 
-/* State of summing a list. */
+/* The optical depths along the lines of a direction. All lines of a direction have their own place
+ * in a square of 2 EDGE x 2 EDGE. */
+typedef struct lines {
+    uint32_t depths[2 * EDGE][2 * EDGE];
+} lines;
+
+/* State of summing the voxels. */
 typedef struct summing {
     trip_outline *outline;
     const trip_outline_params *params;
     const trip_list *list;
-    form x, y, z;
-    double width[2]; /* size of a voxel along right and up */
+    double lengths[DIRECTIONS]; /* of a step, in units of the depth that is enough */
     uint32_t voxels[TRIP_RUN_RECORDS_MAX];
-    double mass[CODES]; /* by code: opacity times area of a voxel */
+    float extinctions[CODES];                /* by code */
+    uint64_t counted[EDGE][EDGE][EDGE / 64]; /* [k][j]: voxels with enough extinction, a bit each */
+    lines lines[DIRECTIONS];
 } summing;
 
 /* Returns the finest level that is small enough. It depends only on the grid, because data sets
@@ -56,7 +60,7 @@ static const trip_list *coarse_list(const trip_dataset *data)
     if (trip_coordinates_uneven(&data->coordinates))
         return NULL;
     for (int a = 0; a < 3; a++)
-        while ((data->header.dims[a] - 1) >> level >= MAX_VOXELS)
+        while ((data->header.dims[a] - 1) >> level >= EDGE)
             level++;
     const trip_list *values =
         trip_dataset_find(data, AXIS, level, level ? TRIP_KIND_VALUES : TRIP_KIND_VOXELS);
@@ -68,156 +72,66 @@ static trip_vec3 column(const trip_affine *m, int axis)
     return trip_v3(m->m[0][axis], m->m[1][axis], m->m[2][axis]);
 }
 
-static void set_view(trip_outline *o, const trip_outline_params *p)
+/* Returns the place of a voxel's line. A line meets plane 0 of an axis along which it steps, at
+ * coordinates that may be up to EDGE beyond the grid. */
+static uint32_t *line_of(lines *of, const int d[3], int i, int j, int k)
 {
-    const trip_camera_params *view = p->view;
-    o->budget = p->budget;
-    o->map = &p->data->index_to_world;
-    o->middle = trip_v3(0.5 * p->lo[0] + 0.5 * p->hi[0], 0.5 * p->lo[1] + 0.5 * p->hi[1],
-                        0.5 * p->lo[2] + 0.5 * p->hi[2]);
-    o->eye = trip_sub(view->eye, trip_affine_point(o->map, o->middle));
-    o->forward = trip_normalize(trip_sub(view->look, view->eye));
-    o->right = trip_normalize(trip_cross(o->forward, view->up));
-    o->up = trip_cross(o->right, o->forward);
-    o->parallel = view->ortho_height > 0;
+    if (d[0])
+        return &of->depths[k - d[2] * i + (d[2] > 0 ? EDGE : 0)]
+                          [j - d[1] * i + (d[1] > 0 ? EDGE : 0)];
+    return d[1] ? &of->depths[k][i] : &of->depths[j][i];
 }
 
-/* Returns the picture position of a point relative to the eye. */
-static void project(const trip_outline *o, trip_vec3 p, double at[2])
+static void fill_extinctions(summing *s)
 {
-    double scale = o->parallel ? 1 : 1 / trip_dot(o->forward, p);
-    at[0] = trip_dot(o->right, p) * scale;
-    at[1] = trip_dot(o->up, p) * scale;
-}
-
-/* Sizes the picture for the box plus one voxel of the list around it. */
-static void set_picture(trip_outline *o, const trip_outline_params *p, double voxel)
-{
-    double lo[2] = { INFINITY, INFINITY }, hi[2] = { -INFINITY, -INFINITY };
-    for (int corner = 0; corner < 8; corner++) {
-        double c[3], at[2];
-        for (int a = 0; a < 3; a++)
-            c[a] = corner >> a & 1 ? p->hi[a] + voxel : p->lo[a] - voxel;
-        trip_vec3 from_middle = trip_sub(trip_v3(c[0], c[1], c[2]), o->middle);
-        project(o, trip_sub(trip_affine_vector(o->map, from_middle), o->eye), at);
-        for (int a = 0; a < 2; a++) {
-            lo[a] = fmin(lo[a], at[a]);
-            hi[a] = fmax(hi[a], at[a]);
-        }
-    }
-    o->pixel = fmax(hi[0] - lo[0], hi[1] - lo[1]) / PIXELS;
-    for (int a = 0; a < 2; a++) {
-        o->origin[a] = lo[a];
-        o->size[a] = (int)fmin(PIXELS, ceil((hi[a] - lo[a]) / o->pixel));
-    }
-}
-
-/* Returns the coordinate along a world direction, relative to the eye, as a function of the list's
- * indices. */
-static form make_form(const summing *s, trip_vec3 axis)
-{
-    const trip_affine *m = &s->list->index_to_world;
-    const trip_outline *o = s->outline;
-    double first = s->list->sheet_first, step = s->list->sheet_step;
-    form f = { trip_dot(axis, column(m, 0)), trip_dot(axis, column(m, 1)),
-               trip_dot(axis, column(m, 2)), -trip_dot(axis, o->eye) };
-    f.constant -= f.i * (o->middle.x - first) / step + f.j * (o->middle.y - first) / step +
-                  f.k * (o->middle.z - first) / step;
-    return f;
-}
-
-static double size_of(const form *f)
-{
-    return sqrt(f->i * f->i + f->j * f->j + f->k * f->k);
-}
-
-static void fill_masses(summing *s)
-{
-    const trip_affine *m = &s->list->index_to_world;
     const trip_file_header *h = &s->params->data->header;
     const trip_mean_scale scale =
         trip_mean_scale_make(h->typical_min, h->typical_max, &s->params->data->codes);
-    const double length = trip_length(column(m, AXIS));
-    const double area = fabs(trip_affine_determinant(m)) / length;
+    const double length = trip_length(column(&s->list->index_to_world, AXIS));
     double extinctions[TRIP_MEAN_SHARES];
     for (unsigned code = 0; code < CODES; code += TRIP_MEAN_SHARES) {
         const double of_mean = (double)s->params->table[trip_mean_value(&scale, code)].extinction;
         if (s->list->kind == TRIP_KIND_MEANS)
             trip_mean_extinctions(of_mean, length, extinctions);
-        for (unsigned i = 0; i < TRIP_MEAN_SHARES; i++) {
-            if (s->list->kind != TRIP_KIND_MEANS)
-                extinctions[i] = (double)s->params->table[code + i].extinction;
-            s->mass[code + i] = extinctions[i] > 0 ? -expm1(-extinctions[i] * length) * area : 0;
-        }
+        for (unsigned i = 0; i < TRIP_MEAN_SHARES; i++)
+            s->extinctions[code + i] = s->list->kind == TRIP_KIND_MEANS
+                                           ? (float)extinctions[i]
+                                           : s->params->table[code + i].extinction;
     }
 }
 
-static bool some_has_mass(const summing *s, const trip_file_brick *b)
+static bool some_counts(const summing *s, const trip_file_brick *b)
 {
     for (unsigned code = b->code_min; code <= b->code_max; code++)
-        if (s->mass[code] > 0)
+        if (s->extinctions[code] > 0)
             return true;
     return false;
 }
 
-/* Returns the share of the pixel at `at` that [lo, hi] covers. */
-static inline double part_in(int at, double lo, double hi)
+static void add_voxel(summing *s, int i, int j, int k, double extinction)
 {
-    const double past = hi < at + 1 ? hi : at + 1, from = lo > at ? lo : at;
-    return (past - from) / (hi - lo);
-}
-
-static inline void add_to(pixel *p, double optical, float z)
-{
-    p->depth += (uint64_t)((optical < MAX_OF_A_VOXEL ? optical : MAX_OF_A_VOXEL) * UNIT);
-    p->nearest = z < p->nearest ? z : p->nearest;
-    p->farthest = z > p->farthest ? z : p->farthest;
-}
-
-/* Draws a voxel as a rectangle of its size. */
-static void add_voxel(summing *s, double x, double y, double z, double mass)
-{
-    trip_outline *o = s->outline;
-    const double scale = (o->parallel ? 1 : 1 / z) / o->pixel;
-    const double at[2] = { x, y };
-    double lo[2], hi[2], columns[PIXELS];
-    int first[2], last[2];
-    if (!o->parallel && !(z > 0))
+    if ((unsigned)i >= EDGE || (unsigned)j >= EDGE || (unsigned)k >= EDGE)
         return;
-    for (int a = 0; a < 2; a++) {
-        double middle = at[a] * scale - o->origin[a] / o->pixel;
-        double half = 0.5 * s->width[a] * scale;
-        half = half > 1e-6 ? half : 1e-6;
-        lo[a] = middle - half;
-        hi[a] = middle + half;
-        first[a] = lo[a] > 0 ? lo[a] < PIXELS ? (int)lo[a] : PIXELS : 0;
-        last[a] = hi[a] < 0 ? -1 : hi[a] < o->size[a] - 1 ? (int)hi[a] : o->size[a] - 1;
-    }
-    mass *= scale * scale;
-    for (int u = first[0]; u <= last[0]; u++)
-        columns[u] = part_in(u, lo[0], hi[0]);
-    for (int v = first[1]; v <= last[1]; v++) {
-        double row = mass * part_in(v, lo[1], hi[1]);
-        for (int u = first[0]; u <= last[0]; u++)
-            add_to(&o->pixels[v][u], row * columns[u], (float)z);
+    if (extinction >= s->params->min_extinction)
+        s->counted[k][j][i / 64] |= UINT64_C(1) << i % 64;
+    for (int n = 0; n < DIRECTIONS; n++) {
+        const double depth = extinction * s->lengths[n];
+        *line_of(&s->lines[n], directions[n], i, j, k) +=
+            depth < ENOUGH ? (uint32_t)depth : (uint32_t)ENOUGH;
     }
 }
 
 static void add_run(summing *s, const trip_batch *batch, const trip_run *run)
 {
     const trip_block block = trip_block_of(batch, run);
-    const double k = run->sheet;
     trip_block_voxels(&block, 0, run->count, s->voxels);
     s->outline->splats += run->count;
     for (uint32_t n = 0; n < run->count; n++) {
-        double mass = s->mass[trip_voxel_code(s->voxels[n])];
-        if (!(mass > 0))
-            continue;
-        double i = run->u + (double)trip_voxel_u(s->voxels[n]);
-        double j = run->v + (double)trip_voxel_v(s->voxels[n]);
-        add_voxel(s, s->x.i * i + s->x.j * j + (s->x.k * k + s->x.constant),
-                  s->y.i * i + s->y.j * j + (s->y.k * k + s->y.constant),
-                  s->z.i * i + s->z.j * j + (s->z.k * k + s->z.constant), mass);
+        const double extinction = (double)s->extinctions[trip_voxel_code(s->voxels[n])];
+        if (extinction > 0)
+            add_voxel(s, (int)(run->u + (int64_t)trip_voxel_u(s->voxels[n])),
+                      (int)(run->v + (int64_t)trip_voxel_v(s->voxels[n])), (int)run->sheet,
+                      extinction);
     }
 }
 
@@ -247,7 +161,7 @@ static int sum_list(summing *s)
     if (status)
         return status;
     for (uint64_t b = 0; b < s->list->brick_count; b++)
-        if (some_has_mass(s, &s->list->bricks[b]))
+        if (some_counts(s, &s->list->bricks[b]))
             trip_selection_add(&selection, b);
     status = read_selected(s, &selection);
     trip_selection_destroy(&selection, p->budget);
@@ -267,58 +181,81 @@ static int sum(summing *s)
     return status;
 }
 
-static bool shows(const pixel *p)
+static bool is_visible(summing *s, int i, int j, int k)
 {
-    return (double)p->depth >= -log1p(-TRIP_OUTLINE_OPACITY) * UNIT;
+    int hidden = 0;
+    if (!(s->counted[k][j][i / 64] >> i % 64 & 1))
+        return false;
+    for (int n = 0; n < DIRECTIONS && hidden <= HIDDEN_MAX; n++)
+        hidden += *line_of(&s->lines[n], directions[n], i, j, k) < ENOUGH;
+    return hidden <= HIDDEN_MAX;
 }
 
-static bool some_shows(const trip_outline *o)
+/* Sets the visible voxels of a row: only the ends are needed. */
+static row row_of(summing *s, int j, int k)
 {
-    for (int v = 0; v < o->size[1]; v++)
-        for (int u = 0; u < o->size[0]; u++)
-            if (shows(&o->pixels[v][u]))
-                return true;
-    return false;
+    row r = { 0, EDGE - 1 };
+    while (r.first < EDGE && !is_visible(s, r.first, j, k))
+        r.first++;
+    while (r.last > r.first && !is_visible(s, r.last, j, k))
+        r.last--;
+    return r;
 }
 
-static int make(trip_outline *o, summing *s, const trip_outline_params *p, const trip_list *list)
+static bool find_rows(summing *s)
 {
+    bool some = false;
+    for (int k = 0; k < EDGE; k++)
+        for (int j = 0; j < EDGE; j++) {
+            const row r = s->outline->rows[k][j] = row_of(s, j, k);
+            some |= r.first <= r.last;
+        }
+    return some;
+}
+
+static void start(summing *s, trip_outline *o, const trip_outline_params *p, const trip_list *list)
+{
+    const double enough = -log1p(-TRIP_OUTLINE_OPACITY);
+    memset(s->counted, 0, sizeof s->counted);
+    memset(s->lines, 0, sizeof s->lines);
     s->outline = o;
     s->params = p;
     s->list = list;
+    o->budget = p->budget;
     o->splats = 0;
-    for (int v = 0; v <= PIXELS; v++)
-        for (int u = 0; u <= PIXELS; u++)
-            o->pixels[v][u] = (pixel){ 0, FLT_MAX, -FLT_MAX };
-    set_view(o, p);
-    set_picture(o, p, list->sheet_step);
-    s->x = make_form(s, o->right);
-    s->y = make_form(s, o->up);
-    s->z = make_form(s, o->forward);
-    s->width[0] = size_of(&s->x);
-    s->width[1] = size_of(&s->y);
-    fill_masses(s);
-    return sum(s);
+    o->map = list->index_to_world;
+    o->first = list->sheet_first;
+    o->step = list->sheet_step;
+    for (int n = 0; n < DIRECTIONS; n++) {
+        const int *d = directions[n];
+        s->lengths[n] =
+            trip_length(trip_affine_vector(&o->map, trip_v3(d[0], d[1], d[2]))) * ENOUGH / enough;
+    }
+    fill_extinctions(s);
 }
 
 int trip_outline_make(trip_outline **out, const trip_outline_params *params)
 {
     const trip_list *list = coarse_list(params->data);
     int status = 0;
+    bool some = false;
     *out = NULL;
     if (!list)
         return 0;
     trip_outline *o = trip_budget_take(params->budget, sizeof *o);
     summing *s = trip_budget_take(params->budget, sizeof *s);
-    if (o && s)
-        status = make(o, s, params, list);
-    else
+    if (o && s) {
+        start(s, o, params, list);
+        status = sum(s);
+        some = !status && find_rows(s);
+    } else {
         status = trip_fail(TRIP_ERROR, "render", "view",
                            "the outline of the visible part does not fit the memory given; raise "
                            "--memory");
+    }
     if (s)
         trip_budget_release(params->budget, s, sizeof *s);
-    if (o && (status || !some_shows(o)))
+    if (o && !some)
         trip_budget_release(params->budget, o, sizeof *o);
     else
         *out = o;
@@ -331,34 +268,29 @@ void trip_outline_destroy(trip_outline *o)
         trip_budget_release(o->budget, o, sizeof *o);
 }
 
-/* Returns the centre of a pixel at a depth, relative to the centre of the box. */
-static trip_vec3 point_at(const trip_outline *o, int u, int v, double z)
+/* Returns the maximum of a linear function over the visible voxels' centres, in list indices. */
+static double farthest(const trip_outline *o, trip_vec3 n)
 {
-    double across = o->parallel ? 1 : z;
-    trip_vec3 x = trip_scale(o->right, across * (o->origin[0] + o->pixel * (u + 0.5)));
-    trip_vec3 y = trip_scale(o->up, across * (o->origin[1] + o->pixel * (v + 0.5)));
-    return trip_add(o->eye, trip_add(trip_scale(o->forward, z), trip_add(x, y)));
+    double max = -INFINITY;
+    for (int k = 0; k < EDGE; k++)
+        for (int j = 0; j < EDGE; j++) {
+            const row *r = &o->rows[k][j];
+            if (r->first <= r->last)
+                max = fmax(max, n.x * (n.x > 0 ? r->last : r->first) + n.y * j + n.z * k);
+        }
+    return max;
 }
 
 void trip_outline_reach(const trip_outline *o, const trip_reach_origin *origin,
                         const trip_reach *wanted, int count, double *values)
 {
-    trip_vec3 from = trip_affine_vector(o->map, trip_sub(origin->index, o->middle));
-    for (int n = 0; n < count; n++)
-        values[n] = -INFINITY;
-    for (int i = 0; i < 2 * o->size[0] * o->size[1]; i++) {
-        int u = i / 2 % o->size[0], v = i / 2 / o->size[0];
-        const pixel *at = &o->pixels[v][u];
-        if (!shows(at))
-            continue;
-        trip_vec3 p = point_at(o, u, v, (double)(i % 2 ? at->nearest : at->farthest));
-        p = trip_sub(p, from);
-        for (int n = 0; n < count; n++) {
-            double around = wanted[n].around;
-            if (around > 0)
-                around *= trip_length(trip_cross(origin->axis, p));
-            values[n] = fmax(values[n], trip_dot(wanted[n].along, p) + around);
-        }
+    const trip_vec3 from =
+        trip_v3((origin->index.x - o->first) / o->step, (origin->index.y - o->first) / o->step,
+                (origin->index.z - o->first) / o->step);
+    for (int i = 0; i < count; i++) {
+        assert(!(wanted[i].around > 0));
+        const trip_vec3 n = trip_affine_transpose_vector(&o->map, wanted[i].along);
+        values[i] = farthest(o, n) - trip_dot(n, from);
     }
 }
 

@@ -1,9 +1,12 @@
-/* Finds the visible extent of an object: a small picture of opacity only, summed from a coarse
- * level, or from the finest level of small data sets. Optical depths are added as integers, so that
- * the result is the same for any tiles, slots and threads. One thread at a time.
+/* Finds the visible extent of an object: the visible voxels of a coarse level, or of the finest
+ * level of small data sets. The result is one set of voxels for all directions of view, so a view
+ * that fits it changes as little as its direction. One thread at a time.
  *
- * A pixel is visible if its opacity is at least TRIP_OUTLINE_OPACITY. Parts narrower than a pixel
- * may be missing: visible.h finds single visible voxels. */
+ * A coarse voxel is visible if, in all but one of seven directions, a ray through it has an opacity
+ * of at least TRIP_OUTLINE_OPACITY. The directions are the axes and diagonals of the grid. The rays
+ * sum the voxels of one line as integers, so that the result is the same for any tiles, slots and
+ * threads. Details narrower than a coarse voxel may be missing: visible.h finds single visible
+ * voxels. */
 #ifndef TRIP_OUTLINE_H
 #define TRIP_OUTLINE_H
 
@@ -34,17 +37,16 @@ typedef struct trip_outline_params {
     const trip_dataset *data;
     trip_reader *reader; /* reads voxels; no pass in progress */
     trip_budget *budget;
-    const trip_tf_entry *table;     /* filled for the data set */
-    double lo[3], hi[3];            /* index-space box to examine */
-    const trip_camera_params *view; /* from outside the box; size and angle are ignored */
+    const trip_tf_entry *table; /* filled for the data set */
+    double min_extinction;      /* fainter voxels do not count */
 } trip_outline_params;
 
 /* Finds the outline. *out is NULL if nothing is visible or no level is small enough. */
 int trip_outline_make(trip_outline **out, const trip_outline_params *params);
 void trip_outline_destroy(trip_outline *o);
 
-/* Sets values[i] to the maximum of wanted[i], for i < count <= TRIP_REACHES_MAX: over the visible
- * pixels, from the nearest to the farthest visible depth of each pixel. */
+/* Sets values[i] to the maximum of wanted[i], for i < count <= TRIP_REACHES_MAX, over the centres
+ * of the visible voxels. `around` must be 0. */
 void trip_outline_reach(const trip_outline *o, const trip_reach_origin *origin,
                         const trip_reach *wanted, int count, double *values);
 

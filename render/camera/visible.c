@@ -396,17 +396,14 @@ static double with_kernel(const trip_visible *v, const form *f, double value)
     return value + v->kernel_radius * f->per_voxel;
 }
 
-int trip_visible_outline(trip_visible *v, const double lo[3], const double hi[3],
-                         const trip_camera_params *view)
+int trip_visible_outline(trip_visible *v)
 {
     int status = trip_outline_make(&v->outline, &(trip_outline_params){
                                                     .data = v->data,
                                                     .reader = v->reader,
                                                     .budget = v->budget,
                                                     .table = v->table,
-                                                    .lo = { lo[0], lo[1], lo[2] },
-                                                    .hi = { hi[0], hi[1], hi[2] },
-                                                    .view = view,
+                                                    .min_extinction = min_extinction(v, false),
                                                 });
     if (!v->outline)
         return status;

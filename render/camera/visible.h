@@ -54,14 +54,12 @@ bool trip_visible_skip(void *user, const trip_selection *selection, const trip_r
 /* Computes the bounds of the visible voxels in index space, without kernels. */
 int trip_visible_bounds(trip_visible *v, double lo[3], double hi[3]);
 
-/* Makes the outline of the box [lo, hi] in a view from outside. There is no outline if nothing is
- * visible in it, or if no level is small enough. */
-int trip_visible_outline(trip_visible *v, const double lo[3], const double hi[3],
-                         const trip_camera_params *view);
+/* Makes the outline. There is none if nothing is visible in it, or if no level is small enough. */
+int trip_visible_outline(trip_visible *v);
 
 /* Sets values[i] to the maximum of wanted[i] over the visible part with its kernels, for i < count
- * <= TRIP_REACHES_MAX. If no voxel is visible together with others, it uses the bounds of all
- * voxels. */
+ * <= TRIP_REACHES_MAX. With an outline, `around` must be 0. If no voxel is visible together with
+ * others, it uses the bounds of all voxels. */
 int trip_visible_reach(trip_visible *v, const trip_reach_origin *origin, const trip_reach *wanted,
                        int count, double *values);
 

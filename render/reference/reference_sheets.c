@@ -132,7 +132,7 @@ typedef struct passage {
     int axis;
     trip_vec3 origin, direction;
     double world_per_t;
-    double from, to; /* part of the ray inside the clipping planes, in t */
+    double from, to; /* part of the ray inside the clipping planes and the grid's sides, in t */
     double layer[TRIP_CHANNELS_MAX];
 } passage;
 
@@ -210,20 +210,23 @@ static double reached_at(const passage *p, double coordinate)
 }
 
 /* Computes the sample at a coordinate, where the ray is at t. The coordinate lies at the sheet
- * `cells` or between it and the next. Returns false in empty cells and beyond the grid. */
+ * `cells` or between it and the next. Beyond a side of the grid, the position is the nearest one in
+ * the grid. Returns false in empty cells. */
 static bool find_position(const passage *p, double coordinate, double t, int64_t cells,
                           position *at)
 {
     const int64_t *dims = trip_field_dims(p->s->field);
-    trip_vec3 point = index_at(p, point_at(p, t));
+    const trip_vec3 point = index_at(p, point_at(p, t));
+    double x[3];
     int64_t cell[3];
     for (int a = 0; a < 3; a++) {
-        double x = trip_component(point, a), last = (double)dims[a] - 1;
-        if (a != p->axis && !(x >= 0 && x <= last))
-            return false;
-        cell[a] = a == p->axis ? cells : (int64_t)fmin(floor(x), last - 1);
+        const double last = (double)dims[a] - 1;
+        x[a] = trip_component(point, a);
+        if (a != p->axis)
+            x[a] = fmin(fmax(x[a], 0), last);
+        cell[a] = a == p->axis ? cells : (int64_t)fmin(floor(x[a]), last - 1);
     }
-    return interpolate(p, cell, point, coordinate, at);
+    return interpolate(p, cell, trip_v3(x[0], x[1], x[2]), coordinate, at);
 }
 
 static trip_vec3 gradient_at(const position *at)
@@ -309,26 +312,10 @@ static double next_face(const passage *p, int axis, double t)
     return at > t ? at : (trip_coordinates_position(c, axis, face + step) - o) / d;
 }
 
-/* Cuts a part of the ray at the sides of the grid along u and v. */
-static void cut_at_sides(const passage *p, double *from, double *to)
-{
-    const trip_coordinates *c = p->s->coordinates;
-    for (int a = 0; a < 3; a++) {
-        const double o = trip_component(p->origin, a), d = trip_component(p->direction, a);
-        const double last =
-            trip_coordinates_position(c, a, (double)trip_field_dims(p->s->field)[a] - 1);
-        if (a == p->axis || d == 0)
-            continue;
-        *from = fmax(*from, ((d > 0 ? 0 : last) - o) / d);
-        *to = fmin(*to, ((d > 0 ? last : 0) - o) / d);
-    }
-}
-
 /* Adds a segment with the nearest value, box by box. */
 static bool add_boxes(passage *p, double middle, int64_t cells, double from, double to)
 {
     position ends[2];
-    cut_at_sides(p, &from, &to);
     while (from < to) {
         double next = to;
         for (int a = 0; a < 3; a++)
@@ -358,6 +345,25 @@ static bool add_segment(passage *p, double first, double last, int64_t cells)
         !find_position(p, last, t1, cells, &ends[1]))
         return true;
     return add_part(p, ends, code_at(ends, t0, t1, from), code_at(ends, t0, t1, to), from, to);
+}
+
+/* Cuts the ray at the sides of the grid. */
+static void cut_at_sides(passage *p)
+{
+    const trip_coordinates *c = p->s->coordinates;
+    for (int a = 0; a < 3; a++) {
+        const double o = trip_component(p->origin, a), d = trip_component(p->direction, a);
+        const double lo = trip_coordinates_at(c, a, 0) - o;
+        const double hi = trip_coordinates_at(c, a, trip_field_dims(p->s->field)[a] - 1) - o;
+        if (a == p->axis)
+            continue;
+        if (d == 0 && (lo > 0 || hi < 0))
+            p->to = -INFINITY;
+        if (d != 0) {
+            p->from = fmax(p->from, fmin(lo / d, hi / d));
+            p->to = fmin(p->to, fmax(lo / d, hi / d));
+        }
+    }
 }
 
 /* Adds all segments in front of the eye. They lie between coordinates n / samples_per_sheet, and
@@ -399,7 +405,9 @@ void trip_reference_sheets_layer(const trip_reference_sheets *s, int axis, int x
     if (c->ortho)
         p.origin =
             trip_add(c->eye, trip_add(trip_scale(c->rx, x + 0.5), trip_scale(c->ry, y + 0.5)));
-    if (trip_clip_ray(&s->frame->plan->clip, p.origin, p.direction, &p.from, &p.to))
+    if (trip_clip_ray(&s->frame->plan->clip, p.origin, p.direction, &p.from, &p.to)) {
+        cut_at_sides(&p);
         add_segments(&p);
+    }
     memcpy(layer, p.layer, sizeof p.layer);
 }

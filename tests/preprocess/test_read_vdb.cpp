@@ -1,12 +1,14 @@
 #include "volume_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <random>
 #include <string>
 #include <thread>
@@ -482,9 +484,9 @@ void a_level_set_is_filled_by_default_with_a_note(void **)
     assert_string_equal(filled.info.note, "");
 }
 
-/* The density is 1 inside and 0 outside, with a ramp four voxels wide between. The file has no
- * active voxels in the interior. The sum of densities is the mean volume of balls of radius 20 - 2
- * to 20 + 2. */
+/* The density is 1 inside and 0 outside, with a smooth ramp six voxels wide between. The file has
+ * no active voxels in the interior. The sum of densities is the mean volume of balls of radius
+ * 20 - 3 to 20 + 3, weighted by the slope of the ramp. The variance of the radius is then 9 / 5. */
 void a_filled_level_set_is_a_ball(void **)
 {
     openvdb::FloatGrid::Ptr grid = sphere();
@@ -498,7 +500,8 @@ void a_filled_level_set_is_a_ball(void **)
     Coord first = first_of(*grid);
     check_voxels(v, first, [&](const Coord &at, float &value, bool &active) {
         double d = (double)grid->tree().getValue(at) / grid->voxelSize()[0];
-        value = (float)std::min(1.0, std::max(0.0, 0.5 - d / 4));
+        double t = std::min(1.0, std::max(0.0, 0.5 - d / 6));
+        value = (float)(t * t * (3 - 2 * t));
         active = value > 0;
     });
     for (const trip_volume_portion &portion : v.portions()) {
@@ -509,8 +512,49 @@ void a_filled_level_set_is_a_ball(void **)
         for (float value : values)
             sum += value;
     }
-    const double mean_cube = 20.0 * 20 * 20 + 20 * 2 * 2; /* mean of r^3 for r from 18 to 22 */
+    const double mean_cube = 20.0 * 20 * 20 + 3 * 20 * 9 / 5.0;
     assert_true(std::fabs(sum / (4 / 3.0 * M_PI * mean_cube) - 1) < 0.001);
+}
+
+/* Light follows the gradient, and rings show where its size or direction jumps. Away from the
+ * centre, the gradient of a ball points to the centre. Central differences of a function of the
+ * distance have the derivative to the third order. */
+void a_filled_level_set_has_smooth_gradients(void **)
+{
+    openvdb::FloatGrid::Ptr grid = sphere();
+    File file({ grid });
+    trip_volume_params params = {};
+    params.level_set = TRIP_LEVEL_SET_FILLED;
+    Volume v(file, params);
+    std::map<std::array<int, 3>, double> density;
+    check_voxels(v, first_of(*grid), [&](const Coord &at, float &value, bool &active) {
+        double t = std::min(
+            1.0, std::max(0.0, 0.5 - (double)grid->tree().getValue(at) / grid->voxelSize()[0] / 6));
+        value = (float)(t * t * (3 - 2 * t));
+        active = value > 0;
+        density[{ at.x(), at.y(), at.z() }] = (double)value;
+    });
+    const auto at = [&](int x, int y, int z) {
+        auto found = density.find({ x, y, z });
+        return found == density.end() ? 0.0 : found->second;
+    };
+    double angle = 0, size = 0;
+    for (const auto &[p, value] : density) {
+        const auto [x, y, z] = p;
+        const double dx = x - 3.3; /* the centre is at 3.3, 0, 0 */
+        const double r = std::sqrt(dx * dx + y * y + z * z), t = 0.5 - (r - 20) / 6;
+        const double g[3] = { (at(x + 1, y, z) - at(x - 1, y, z)) / 2,
+                              (at(x, y + 1, z) - at(x, y - 1, z)) / 2,
+                              (at(x, y, z + 1) - at(x, y, z - 1)) / 2 };
+        const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+        if (value < 0.02 || value > 0.98)
+            continue;
+        const double along = -(g[0] * dx + g[1] * y + g[2] * z) / r;
+        angle = std::max(angle, std::acos(std::min(1.0, along / length)));
+        size = std::max(size, std::fabs(along - t * (1 - t)) / 0.25);
+    }
+    assert_true(angle < 2 * M_PI / 180);
+    assert_true(size < 0.08);
 }
 
 /* The density is 1 at the surface and falls to 0 at the edges of the band, 3 voxels away on each
@@ -706,6 +750,7 @@ int main()
         cmocka_unit_test(level_set_options_need_level_sets),
         cmocka_unit_test(a_level_set_is_filled_by_default_with_a_note),
         cmocka_unit_test(a_filled_level_set_is_a_ball),
+        cmocka_unit_test(a_filled_level_set_has_smooth_gradients),
         cmocka_unit_test(a_band_is_one_at_the_surface),
         cmocka_unit_test(grids_that_cannot_be_drawn_are_refused),
         cmocka_unit_test(insufficient_memory_is_refused_first),

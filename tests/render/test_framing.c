@@ -135,6 +135,69 @@ static void a_sphere_has_the_distance_of_its_tangent_cone(void **state)
     scene_destroy(&s);
 }
 
+/* An ellipsoid of faint noise with some dense voxels around it. */
+static bool cloud(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)gradient;
+    const double x = (i - 31.5) / 28, y = (j - 23.5) / 20, z = (k - 15.5) / 13;
+    const uint32_t noise = scene_hash(i, j, k);
+    const bool dense = noise % 4096 == 7;
+    *code = dense ? 65535 : 1000 + noise / 4096 % 3000;
+    return dense || x * x + y * y + z * z < 1;
+}
+
+/* Checks the changes between neighbouring views. A body within R of its centre reaches at most
+ * R dt farther or less far after a turn by dt. So half the height or width changes by at most
+ * R sqrt(1 + t^2) dt for a half angle with tangent t. The point looked at moves by at most three
+ * times as much.
+ * There are `steps` views, `azimuth` and `elevation` degrees apart. */
+static void assert_changes_gradually(trip_view_settings s, trip_view_object o, double radius,
+                                     int steps, double azimuth, double elevation)
+{
+    const double half = s.ortho_fit ? 0 : 0.9 * tan(15 * DEGREE);
+    const double wide = s.ortho_fit ? 0.9 : half;
+    const double most = radius * sqrt(1 + half * half) * hypot(azimuth, elevation) * DEGREE;
+    double last_size = 0;
+    trip_vec3 last_look = { 0 };
+    for (int n = 0; n < steps; n++) {
+        const trip_camera_params p = frame(&s, o);
+        const double size = s.ortho_fit ? p.ortho_height / 2 : trip_length(trip_sub(p.look, p.eye));
+        if (n > 0) {
+            assert_true(fabs(size - last_size) <= most / wide * 1.001);
+            assert_true(trip_length(trip_sub(p.look, last_look)) <= 3 * most);
+        }
+        last_size = size;
+        last_look = p.look;
+        s.azimuth_degrees += azimuth;
+        s.elevation_degrees += elevation;
+    }
+}
+
+static void the_framing_changes_no_faster_than_the_direction(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        scene s;
+        scene_create(&s, &(scene_params){ .dims = { 64, 48, 32 }, .voxel = cloud });
+        scene_colour(&s, 65535, 65535, 1, 1, 1, 0.5);
+        scene_colour(&s, 1000, 3999, 1, 1, 1, i ? 0.002 : 0.02);
+        trip_visible v = { .data = s.data, .budget = s.budget, .table = s.table };
+        const trip_view_object o = { .index_to_world = trip_affine_identity(), .visible = &v };
+        trip_view_settings settings = { .width = 200, .height = 200, .elevation_degrees = 10 };
+        const double radius = sqrt(32 * 32 + 24 * 24 + 16 * 16);
+        assert_int_equal(
+            trip_reader_create(&v.reader, s.data, &(trip_reader_params){ 0 }, s.budget), 0);
+        for (int parallel = 0; parallel < 2; parallel++) {
+            settings.ortho_fit = parallel;
+            assert_changes_gradually(settings, o, radius, 72, 2.5, 0);
+            assert_changes_gradually(settings, o, radius, 60, 0.02, 0);
+            assert_changes_gradually(settings, o, radius, 60, -0.02, 0.05);
+        }
+        trip_reader_destroy(v.reader);
+        scene_destroy(&s);
+    }
+}
+
 static void without_memory_to_search_there_is_no_view(void **state)
 {
     (void)state;
@@ -367,6 +430,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_is_centred_and_fills_the_picture_up_to_the_margins),
         cmocka_unit_test(a_sphere_has_the_distance_of_its_tangent_cone),
+        cmocka_unit_test(the_framing_changes_no_faster_than_the_direction),
         cmocka_unit_test(without_memory_to_search_there_is_no_view),
         cmocka_unit_test(a_parallel_view_keeps_a_given_height_and_centres_its_object),
         cmocka_unit_test(a_turning_object_stays_in_the_picture_and_touches_its_margins),

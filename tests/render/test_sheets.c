@@ -67,6 +67,45 @@ static void a_slab_has_the_opacity_of_the_path_through_it(void **state)
     }
 }
 
+/* Rays enter and leave a cube of one value through all its faces. Each ray loses light along its
+ * whole length in the cube, whatever the kernel and the distance of the samples. */
+static void a_cube_has_the_opacity_of_the_path_through_its_sides(void **state)
+{
+    (void)state;
+    enum { PX = 14 };
+    const trip_vec3 directions[] = { { 1, 0.3, -0.2 }, { -0.5, 0.8, 0.6 }, { 0.7, -0.75, 1 } };
+    const trip_kernel kernels[] = { TRIP_KERNEL_LINEAR, TRIP_KERNEL_CUBIC };
+    for (int i = 0; i < 24; i++) {
+        scene s;
+        int through_sides = 0;
+        scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE - 3, EDGE + 60 },
+                                          .index_to_world =
+                                              i / 12 ? scene_sheared : trip_affine_identity() });
+        fill_table(&s, 1, 0.5, 0.25, 0.06);
+        trip_camera_params view = view_along(&s, directions[i % 3], 40, PX);
+        view.ortho_height = i / 3 % 2 ? 60 : 0;
+        trip_settings settings = scene_post(1 + i % 4);
+        settings.kernel = kernels[i / 6 % 2];
+        scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
+        while (scene_take_turn(&turn)) {
+            for (int n = 0; n < PX * PX; n++) {
+                trip_vec3 o, ray;
+                double from, to, alpha = 0;
+                scene_ray(&s, &view, n % PX, n / PX, &o, &ray);
+                if (scene_ray_in_grid(&s, o, ray, &from, &to)) {
+                    alpha = 1 - exp(-0.06F * (to - from) * scene_ray_stretch(&s, ray));
+                    through_sides++;
+                }
+                const float *c = scene_pixel(&turn.picture, n % PX, n / PX);
+                assert_close(c[3], alpha, 2e-5 + turn.renderer->tolerance);
+                assert_close(c[1], alpha / 2, 2e-5 + turn.renderer->tolerance);
+            }
+        }
+        assert_true(through_sides > 20);
+        scene_destroy(&s);
+    }
+}
+
 enum { RISE = 3000 }; /* codes per voxel */
 
 /* Codes rise along the axis *user. */
@@ -649,6 +688,16 @@ static void mirrored_turned_and_moved_volumes_look_the_same(void **state)
     }
 }
 
+/* Waves that the sides of the grid cut off. */
+static bool waves(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)lround(20000 + 9000 * sin(0.45 * i + 0.3 * j) * cos(0.4 * k) +
+                             6000 * sin(0.5 * j - 0.2 * k));
+    return true;
+}
+
 /* Three lumps. Values at the border are 0. */
 static bool blobs(void *user, int i, int j, int k, unsigned *code, double gradient[3])
 {
@@ -664,14 +713,14 @@ static bool blobs(void *user, int i, int j, int k, unsigned *code, double gradie
     return true;
 }
 
-static void put_blobs(trip_field **field, const scene *s)
+static void put_voxels(trip_field **field, const scene *s, scene_voxel voxel)
 {
     const int edge = (int)s->data->header.dims[0];
     assert_int_equal(trip_field_create(field, (int64_t[3]){ edge, edge, edge }, s->budget), 0);
     for (int n = 0; n < edge * edge * edge; n++) {
         const int at[3] = { n % edge, n / edge % edge, n / edge / edge };
         unsigned code;
-        blobs(NULL, at[0], at[1], at[2], &code, NULL);
+        voxel(NULL, at[0], at[1], at[2], &code, NULL);
         assert_int_equal(trip_field_put(*field, (int64_t[3]){ at[0], at[1], at[2] }, code, NULL),
                          0);
     }
@@ -682,12 +731,13 @@ static void put_blobs(trip_field **field, const scene *s)
 
 /* Compares 1, 4 and 16 samples per sheet with the integral of the same field with the same light.
  * The volume is translucent, so that no pixel terminates early. */
-static void compare_with_integral(trip_kernel kernel, bool lit, bool parallel, trip_vec3 direction)
+static void compare_with_integral(scene_voxel voxel, trip_kernel kernel, bool lit, bool parallel,
+                                  trip_vec3 direction)
 {
     trip_field *field;
     scene s;
-    scene_create(&s, &(scene_params){ .dims = { 28, 28, 28 }, .normals = true, .voxel = blobs });
-    put_blobs(&field, &s);
+    scene_create(&s, &(scene_params){ .dims = { 28, 28, 28 }, .normals = true, .voxel = voxel });
+    put_voxels(&field, &s, voxel);
     for (int code = 0; code < 65536; code++)
         s.table[code] = (trip_tf_entry){ (float)code / 65535, 0.5F, 1 - (float)code / 65535,
                                          0.25F * (float)fmax(0, code - 10000) / 30000 };
@@ -723,17 +773,26 @@ static void the_error_falls_with_the_square_of_the_samples_per_sheet(void **stat
 {
     (void)state;
     const trip_kernel linear = TRIP_KERNEL_LINEAR;
-    compare_with_integral(linear, false, false, trip_v3(1, 0.2, -0.3));
-    compare_with_integral(linear, false, true, trip_v3(-1, 0.9, 0.8));
-    compare_with_integral(linear, true, false, trip_v3(0.3, 1, -0.9));
-    compare_with_integral(linear, true, true, trip_v3(0.2, 0.1, -1));
+    compare_with_integral(blobs, linear, false, false, trip_v3(1, 0.2, -0.3));
+    compare_with_integral(blobs, linear, false, true, trip_v3(-1, 0.9, 0.8));
+    compare_with_integral(blobs, linear, true, false, trip_v3(0.3, 1, -0.9));
+    compare_with_integral(blobs, linear, true, true, trip_v3(0.2, 0.1, -1));
+}
+
+static void values_at_the_sides_converge_to_the_integral(void **state)
+{
+    (void)state;
+    const trip_kernel linear = TRIP_KERNEL_LINEAR;
+    compare_with_integral(waves, linear, false, false, trip_v3(1, 0.2, -0.3));
+    compare_with_integral(waves, linear, true, true, trip_v3(-1, 0.9, 0.8));
+    compare_with_integral(waves, TRIP_KERNEL_CUBIC, false, false, trip_v3(0.3, 1, -0.9));
 }
 
 static void the_cubic_kernel_gives_the_cubic_integral(void **state)
 {
     (void)state;
-    compare_with_integral(TRIP_KERNEL_CUBIC, false, true, trip_v3(-1, 0.9, 0.8));
-    compare_with_integral(TRIP_KERNEL_CUBIC, true, false, trip_v3(0.3, 1, -0.9));
+    compare_with_integral(blobs, TRIP_KERNEL_CUBIC, false, true, trip_v3(-1, 0.9, 0.8));
+    compare_with_integral(blobs, TRIP_KERNEL_CUBIC, true, false, trip_v3(0.3, 1, -0.9));
 }
 
 /* Random values, one per sheet along an axis. */
@@ -1092,6 +1151,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slab_has_the_opacity_of_the_path_through_it),
+        cmocka_unit_test(a_cube_has_the_opacity_of_the_path_through_its_sides),
         cmocka_unit_test(a_narrow_peak_counts_fully_at_any_samples_per_sheet),
         cmocka_unit_test(values_fall_to_the_halo_and_end_without_it),
         cmocka_unit_test(a_cell_without_a_corner_is_empty),
@@ -1107,6 +1167,7 @@ int main(void)
         cmocka_unit_test(depth_is_the_mean_visible_distance),
         cmocka_unit_test(mirrored_turned_and_moved_volumes_look_the_same),
         cmocka_unit_test(the_error_falls_with_the_square_of_the_samples_per_sheet),
+        cmocka_unit_test(values_at_the_sides_converge_to_the_integral),
         cmocka_unit_test(the_cubic_kernel_gives_the_cubic_integral),
         cmocka_unit_test(samples_between_sheets_have_the_values_of_the_kernel),
         cmocka_unit_test(voxels_beyond_the_halo_repeat_their_neighbours),

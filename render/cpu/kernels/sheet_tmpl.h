@@ -64,7 +64,9 @@ typedef struct pane_path {
      * grid's first voxel. */
     const trip_coordinates *coordinates;
     int axes[2];
-    int32_t corner[2]; /* voxel at the corner of the grid of rasters */
+    int32_t corner[2];   /* voxel at the corner of the grid of rasters */
+    int32_t cells[2][2]; /* first and last cell of the grid along u and v, from this corner */
+    double sides[2][2];  /* the sides of the grid, in the units of `base` */
 } pane_path;
 
 /* Only the plain kernels draw uneven grids, so that even grids cost no extra instruction. */
@@ -219,6 +221,21 @@ static void find_clip(const trip_cpu_sheet_view *view, int x, int y, pane_path *
     }
 }
 
+static void find_sides(const trip_cpu_sheet_view *view, const trip_cpu_group *g, pane_path *path)
+{
+    const int64_t origin[2] = { g->first_u, g->first_v };
+    for (int a = 0; a < 2; a++) {
+        const int64_t ends[2] = { -origin[a], view->voxels[a] - 1 - origin[a] };
+        for (int i = 0; i < 2; i++) {
+            path->cells[a][i] = (int32_t)(ends[i] - i);
+            path->sides[a][i] = (double)ends[i];
+            if (is_uneven(path))
+                path->sides[a][i] = trip_coordinates_at(path->coordinates, path->axes[a],
+                                                        i ? view->voxels[a] - 1 : 0);
+        }
+    }
+}
+
 static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, int x, int y,
                       pane_path *path)
 {
@@ -252,6 +269,7 @@ static void find_path(const trip_cpu_sheet_view *view, const trip_cpu_group *g, 
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
             path->gradient[k][i] = view->gradient[k][i] * (1.0f / (1 << WEIGHT_LOG2));
+    find_sides(view, g, path);
     find_forms(view, x, y, path);
     find_clip(view, x, y, path);
 }
@@ -500,6 +518,7 @@ INLINE bool cells_show(const trip_cpu_group *g, unsigned segment, cell_box box)
 
 typedef struct patch_path {
     uint64_t segments; /* segments that may be visible */
+    uint64_t beyond;   /* segments in which rays may be beyond a side of the grid */
     /* For each sample plane: the raster that contains all rays of the patch, as an offset in the
      * pool. It is -1 if several rasters or none contain them. `within` is the position of
      * pane_path.base in this raster. */
@@ -555,6 +574,7 @@ static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group 
 {
     const ray_bounds r = bounds_of_beam(view, path, x, y, TRIP_CPU_PANE);
     cell_boxes samples;
+    const int32_t size[2] = { g->across * TRIP_CPU_RASTER, g->down * TRIP_CPU_RASTER };
     out->some = 0;
     out->made = g->samples[0].making ? 0 : UINT64_MAX;
     find_boxes(g, path, &r, 0, g->segments, &samples);
@@ -564,6 +584,22 @@ static void find_segments(const trip_cpu_sheet_view *view, const trip_cpu_group 
     for (unsigned n = 0; n < g->segments; n++)
         if (some_square_of(g, g->visible[n], box_of_segment(&out->boxes, n)))
             out->some |= UINT64_C(1) << n;
+    for (unsigned n = 0; n < g->segments; n += V) /* rays beyond a side read cells at it */
+        for (int a = 0; a < 2; a++) {
+            const int32_t first = greater_of(path->cells[a][0], 0);
+            const int32_t last = lesser_of(path->cells[a][1], size[a] - 1);
+            vi_store(out->boxes.lo[a] + n, vi_within(vi_load(out->boxes.lo[a] + n), first, last));
+            vi_store(out->boxes.hi[a] + n, vi_within(vi_load(out->boxes.hi[a] + n), first, last));
+        }
+}
+
+/* Returns whether rays may be beyond a side of the grid. */
+INLINE bool is_beyond(const pane_path *path, cell_box box)
+{
+    bool beyond = false;
+    for (int a = 0; a < 2; a++)
+        beyond |= box.lo[a] < path->cells[a][0] || box.hi[a] > path->cells[a][1];
+    return beyond;
 }
 
 /* Finds the segments of a patch among the pane's `segments`, which must not be empty. */
@@ -577,7 +613,7 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     const unsigned last = 63 - (unsigned)__builtin_clzll(segments);
     find_boxes(g, path, &r, first, last + 1, &samples);
     find_segment_boxes(first, last, &samples, &boxes);
-    area->segments = 0;
+    area->segments = area->beyond = 0;
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments);
         const cell_box box = box_of_segment(&boxes, n);
@@ -592,6 +628,10 @@ static void find_patch(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             find_raster(g, path, n, r.whole, &samples, area);
         find_raster(g, path, n + 1, r.whole, &samples, area);
         placed = n + 1;
+        if (is_beyond(path, box)) {
+            area->beyond |= UINT64_C(1) << n;
+            area->raster[n] = area->raster[n + 1] = -1;
+        }
     }
 }
 
@@ -670,6 +710,20 @@ INLINE corners cells_at(const pane_path *path, const stamp_rays *l, unsigned n)
     return is_uneven(path) ? uneven_corners(path, n, c, (int32_t[2]){ 0 }) : c;
 }
 
+/* Moves cells beyond a side of the grid to the nearest position in the grid. */
+INLINE void move_inside(const pane_path *path, unsigned n, corners *c)
+{
+    for (int a = 0; a < 2; a++) {
+        const int32_t base = path->base[a][n];
+        const vi whole = vi_within(c->whole[a] - (path->cells[a][0] - base), 0,
+                                   path->cells[a][1] - path->cells[a][0]) +
+                         (path->cells[a][0] - base);
+        c->part[a] = c->part[a] + v_from_int(c->whole[a] - whole);
+        c->part[a] = v_min(v_max(c->part[a], v_set(0)), v_set(0x1.fffffep-1f));
+        c->whole[a] = whole;
+    }
+}
+
 /* The cells of the rays in the grid of rasters, for kernels of 64 voxels. The positions in a cell
  * are `part` along u and v, and `between` along the sheets. */
 typedef struct wide_position {
@@ -741,9 +795,10 @@ INLINE vi raster_starts(const trip_cpu_group *g, const int32_t *rasters, const v
 }
 
 /* Returns the offsets of the first corners' codes in the pool, in 16-bit numbers, and sets
- * gradient_at. With uneven spacing it also sets the weights. */
+ * gradient_at. With uneven spacing it also sets the weights. If `beyond`, rays may be beyond a side
+ * of the grid. */
 INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
-                         unsigned n, const corners *c, sample *s)
+                         unsigned n, bool beyond, const corners *c, sample *s)
 {
     if (area->raster[n] >= 0) {
         vi in = c->whole[1] * TRIP_CPU_RASTER_STRIDE + c->whole[0] + area->within[n];
@@ -753,6 +808,8 @@ INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const p
     vi whole[2];
     if (is_uneven(path)) {
         corners uneven = uneven_corners(path, n, *c, s->near);
+        if (beyond)
+            move_inside(path, n, &uneven);
         set_weights(uneven.part, s);
         find_cells(g, path, n, &uneven, whole);
     } else {
@@ -775,11 +832,14 @@ INLINE vi index_of(const trip_cpu_integrals *in, vi code)
 #include "cpu/kernels/corners_tmpl.h"
 
 INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, const pane_path *path,
-                      const patch_path *area, const stamp_rays *l, unsigned n, sample *s)
+                      const patch_path *area, const stamp_rays *l, unsigned n, bool beyond,
+                      sample *s)
 {
     corners c = corners_at(path, l, n);
+    if (beyond && !is_uneven(path))
+        move_inside(path, n, &c);
     set_weights(c.part, s);
-    find_codes(g, in, find_positions(g, path, area, n, &c, s), s);
+    find_codes(g, in, find_positions(g, path, area, n, beyond, &c, s), s);
     s->lit = s->summed = false;
 }
 
@@ -999,12 +1059,47 @@ INLINE remnant remnant_of(const trip_cpu_sheet_view *view, const stamp_rays *l,
     return (remnant){ first, last, v_gt(last, first) };
 }
 
+/* Cuts the rest of segment n at the sides of the grid. */
+static remnant within_sides(const pane_path *path, const stamp_rays *l, unsigned n, remnant r)
+{
+    const vf zero = v_set(0), one = v_set(1);
+    for (int a = 0; a < 2; a++) {
+        const int32_t base = path->base[a][n];
+        const vf at =
+            v_fma(l->slope[a], v_set(path->along[n]), v_set(path->first[a][n]) + l->shift[a]);
+        const vf end = v_fma(l->slope[a], v_set(path->along[n + 1]),
+                             v_set(path->first[a][n + 1]) + l->shift[a]);
+        const vf way = (end - at) + v_set((float)(path->base[a][n + 1] - base));
+        const vf lo = v_set((float)(path->sides[a][0] - base));
+        const vf hi = v_set((float)(path->sides[a][1] - base));
+        const vm moves = v_gt(v_abs(way), v_set(1e-12f));
+        const vf inverse = one / v_select(moves, way, one);
+        const vf one_side = (lo - at) * inverse, other = (hi - at) * inverse;
+        const vf inside = v_select(v_ge(at, lo), v_select(v_ge(hi, at), one, zero), zero);
+        r.from = v_select(moves, v_max(r.from, v_min(one_side, other)), r.from);
+        r.to = v_select(moves, v_min(r.to, v_max(one_side, other)), r.to * inside);
+    }
+    r.some = vm_and(r.some, v_gt(r.to, r.from));
+    r.from = v_min(r.from, one); /* rays beside the grid still look up a code */
+    r.to = v_max(r.to, zero);
+    return r;
+}
+
 /* Computes the sample at a position between a (0) and b (1), with linear codes. */
 INLINE void cut_sample(const sample *a, const sample *b, vf share, sample *out)
 {
     vf code = v_fma(share, v_from_int(b->index - a->index), v_from_int(a->index));
     out->index = v_truncate(code + v_set(0.5f));
     out->summed = false;
+}
+
+/* Cuts a segment at the sides of the grid. Rays that are inside at both ends keep them exactly. */
+static void cut_ends(const sample *a, const sample *b, const remnant *r, sample out[2])
+{
+    cut_sample(a, b, r->from, &out[0]);
+    cut_sample(a, b, r->to, &out[1]);
+    out[0].index = (vi)v_select(v_gt(r->from, v_set(0)), (vf)out[0].index, (vf)a->index);
+    out[1].index = (vi)v_select(v_gt(v_set(1), r->to), (vf)out[1].index, (vf)b->index);
 }
 
 /* Computes the rays' positions `further` sheets beyond sample plane n, in the list's voxels. With
@@ -1023,11 +1118,12 @@ INLINE void positions_at(const trip_cpu_group *g, const pane_path *path, const s
     at[2] = v_set((float)g->samples[n].coordinate) + further;
 }
 
-/* Composites a segment behind the pixels' contents. With the nearest value only its part `box`
- * counts. Returns false if it is visible in none of the pixels. */
+/* Composites a segment behind the pixels' contents. If `beyond`, rays may be beyond a side of the
+ * grid. With the nearest value only the part `box` of the segment counts. Returns false if the
+ * segment is visible in none of the pixels. */
 INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                              const stamp_rays *l, const pane_path *path, unsigned n, sample *a,
-                              sample *b, const remnant *box, vf pixel[CHANNELS])
+                              const stamp_rays *l, const pane_path *path, unsigned n, bool beyond,
+                              sample *a, sample *b, const remnant *box, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
     open = vm_and(open, TRIP_CPU_CLOSED || NEAREST
@@ -1038,15 +1134,31 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     vf sheets = v_set(path->sheets[n]);
     vf middle = v_set(0.5f * (path->along[n] + path->along[n + 1]));
     sample cut[2], *first = a, *last = b;
-    if (NEAREST || view->clips > 0) {
-        remnant r = NEAREST ? *box : remnant_of(view, l, path, n);
+    if (NEAREST) {
+        const remnant r = *box;
         open = vm_and(open, r.some);
-        if (!NEAREST) {
-            cut_sample(a, b, r.from, first = &cut[0]);
-            cut_sample(a, b, r.to, last = &cut[1]);
-        }
         middle =
             v_set(path->along[n]) + v_set(0.5f * (float)view->direction) * (r.from + r.to) * sheets;
+        sheets = sheets * (r.to - r.from);
+    } else if (view->clips > 0 || beyond) {
+        remnant r = { v_set(0), v_set(1), open };
+        if (view->clips > 0)
+            r = remnant_of(view, l, path, n);
+        if (beyond)
+            r = within_sides(path, l, n, r);
+        open = vm_and(open, r.some);
+        first = &cut[0];
+        last = &cut[1];
+        if (view->clips > 0) {
+            cut_sample(a, b, r.from, first);
+            cut_sample(a, b, r.to, last);
+        } else {
+            cut_ends(a, b, &r, cut);
+        }
+        const vm whole = vm_and(v_ge(v_set(0), r.from), v_ge(r.to, v_set(1)));
+        const vf centre =
+            v_set(path->along[n]) + v_set(0.5f * (float)view->direction) * (r.from + r.to) * sheets;
+        middle = view->clips > 0 ? centre : v_select(whole, middle, centre);
         sheets = sheets * (r.to - r.from);
     }
     if (!vm_any(open))
@@ -1196,7 +1308,7 @@ INLINE void composite_boxes(const trip_cpu_sheet_view *view, const trip_cpu_grou
         remnant box = next_box(path, n, &w);
         sample s;
         nearest_at(view, g, path, area, n, &w, &box, &s);
-        if (composite_segment(view, g, l, path, n, &s, &s, &box, pixel))
+        if (composite_segment(view, g, l, path, n, false, &s, &s, &box, pixel))
             finish_terminated(view, pixel);
     }
 }
@@ -1218,6 +1330,7 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
         ends[i].wide = &positions[i];
     for (; segments; segments &= segments - 1) {
         unsigned n = (unsigned)__builtin_ctzll(segments), next = n + 1;
+        const bool beyond = area->beyond >> n & 1;
         if (!(passed->made >> n & 1)) {
             make_segment(g, view->shading, box_of_segment(&passed->boxes, n), n);
             passed->made |= UINT64_C(1) << n;
@@ -1230,12 +1343,12 @@ static void draw_stamp(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
             wide_sample_at(view, g, path, l, next, n, &ends[next % 2]);
         } else {
             if (sampled != n)
-                sample_at(g, view->integrals, path, area, l, n, &ends[n % 2]);
-            sample_at(g, view->integrals, path, area, l, next, &ends[next % 2]);
+                sample_at(g, view->integrals, path, area, l, n, beyond, &ends[n % 2]);
+            sample_at(g, view->integrals, path, area, l, next, beyond, &ends[next % 2]);
         }
         sampled = next;
-        if (!NEAREST &&
-            !composite_segment(view, g, l, path, n, &ends[n % 2], &ends[next % 2], NULL, pixel))
+        if (!NEAREST && !composite_segment(view, g, l, path, n, beyond, &ends[n % 2],
+                                           &ends[next % 2], NULL, pixel))
             continue;
         finish_terminated(view, pixel);
         if (!vm_any(v_gt(pixel[3], v_set(0))))

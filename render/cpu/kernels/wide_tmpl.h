@@ -92,26 +92,20 @@ static double interpolated_code(const trip_cpu_sheet_view *view, const wide_posi
     return (double)corner + (double)sum;
 }
 
-/* Computes the positions of the rays at sample plane n, in cells of a segment. A ray at the last
- * voxels of the grid counts as inside the last cell. */
-INLINE void find_wide_positions(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
-                                const pane_path *path, const stamp_rays *l, unsigned n,
-                                unsigned segment, wide_position *p)
+/* Computes the positions of the rays at sample plane n, in cells of a segment. Rays
+ * beyond a side of the grid count as inside the last cell. */
+INLINE void find_wide_positions(const trip_cpu_group *g, const pane_path *path, const stamp_rays *l,
+                                unsigned n, unsigned segment, wide_position *p)
 {
-    const corners c = corners_at(path, l, n);
-    const int64_t origin[2] = { g->first_u, g->first_v };
+    corners c = corners_at(path, l, n);
     vi whole[2];
+    move_inside(path, n, &c);
     find_cells(g, path, n, &c, whole);
     p->about = &g->about[segment];
     p->between = (float)(g->samples[n].coordinate - (double)p->about->number);
     for (int a = 0; a < 2; a++) {
         vi_store(p->cell[a], whole[a]);
         v_store(p->part[a], c.part[a]);
-        for (int i = 0; i < V; i++)
-            if (p->cell[a][i] + origin[a] == view->voxels[a] - 1 && p->part[a][i] == 0) {
-                p->cell[a][i]--;
-                p->part[a][i] = 1;
-            }
     }
 }
 
@@ -121,7 +115,7 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
                            sample *s)
 {
     vi code = { 0 }, lack = { 0 };
-    find_wide_positions(view, g, path, l, n, segment, s->wide);
+    find_wide_positions(g, path, l, n, segment, s->wide);
     for (int i = 0; i < V; i++) {
         tap taps[64];
         lack[i] = !take_taps(view, g, s->wide, i, taps);
