@@ -340,6 +340,8 @@ void cut_at_sides(position a, position b, inout vec2 part)
         float x = ((way > 0.0 ? lo : hi) - from) / way, y = ((way > 0.0 ? hi : lo) - from) / way;
         if (way != 0.0)
             part = vec2(max(part.x, x), min(part.y, y));
+        else if (from < lo || from > hi)
+            part.y = -1.0;
     }
 }
 #endif

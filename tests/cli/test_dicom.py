@@ -330,8 +330,8 @@ class Dicom(program.ProgramTest):
 
     def test_options_for_series_need_dicom(self):
         program.write_nrrd("a.nrrd", self.values)
-        self.fails(2, "info", "a.nrrd", "--series=1", says="require DICOM")
-        self.fails(2, "brick", "a.nrrd", "-o", "a.trip", "-q", "--series=2", says="require DICOM")
+        self.fails(2, "info", "a.nrrd", "--series=1", says="requires DICOM")
+        self.fails(2, "brick", "a.nrrd", "-o", "a.trip", "-q", "--series=2", says="requires DICOM")
         self.brick("a.nrrd", "a.trip")
         for command in "info", "view", "serve":
             self.fails(2, command, "a.trip", "--series=1", says="is a data set")

@@ -185,7 +185,8 @@ class Measured(program.ProgramTest):
         program.write_nifti("cube.nii", program.noise((128, 128, 128)))
         with open("solid.tf", "w") as f:
             f.write("# value r g b opacity\n0 0.3 0.5 0.9 0.9\n255 1 0.8 0.4 0.999\n")
-        cls.brick(cls(), "cube.nii", "cube.trip", "--keep-all", "--tf", "solid.tf")
+        cls.brick(cls(), "cube.nii", "cube.trip", "--keep-all", "--tf", "solid.tf",
+                  "--normals=stored")
 
     def render(self, *arguments):
         """Returns the output, the counts of the summary line without the time, and the bytes of the

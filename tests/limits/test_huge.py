@@ -33,10 +33,9 @@ class Huge(limits.Test):
             self.assertPromise(r, memory)
             e = json.loads(r.out)
             self.assertEqual((e["voxels"], e["kept"]), (voxels, voxels))
-            # Each of three lists has a code of 1 byte and a normal of 3 bytes per voxel, and a bit
-            # in the mask of a full square. Coarse levels have a seventh of the voxels, with values
-            # only.
-            fine, coarse = 3 * (1 + 3 + 1 / 8), 3 * (1 + 1 / 8) / 7
+            # Each of three lists has a code of 1 byte per voxel, and a bit in the mask of a full
+            # square. Coarse levels have a seventh of the voxels.
+            fine, coarse = 3 * (1 + 1 / 8), 3 * (1 + 1 / 8) / 7
             self.assertGreaterEqual(e["bytes"], (fine + coarse) * voxels)
             self.assertLess(e["bytes"], 1.06 * (fine + coarse) * voxels)
             self.assertGreater(e["temporary_bytes"], e["bytes"] / 2)
