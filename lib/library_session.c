@@ -9,6 +9,7 @@
 #include "dataset_join.h"
 #include "dataset_normals.h"
 #include "report.h"
+#include "shade.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
 static const size_t maps_bytes = sizeof(trip_draw_maps);
@@ -149,6 +150,7 @@ static void fill_tables(session *s, const trip_tf *tf, double opacity_scale)
     const double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
     const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
     s->draw = trip_draw_codes_for(tf, &s->data->codes, typical, s->draw_maps);
+    s->shading_range = TRIP_SHADING_WIDTHS * trip_draw_codes_changing(tf);
     trip_draw_codes_stored_table(&s->draw, tf, voxel_world, s->table);
     scale_extinction(s->table, opacity_scale);
     if (!s->draw_table)

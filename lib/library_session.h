@@ -26,6 +26,7 @@ typedef struct session {
     trip_tf_entry *table, *draw_table;
     trip_draw_maps *draw_maps;       /* of `draw`; NULL if draw codes are stored codes */
     trip_draw_codes draw;            /* the codes of frames that interpolate */
+    double shading_range;            /* of the transfer function, as in trip_settings */
     trip_classification *classified; /* results of earlier frames, one per level */
     trip_mean_tables mean_tables;    /* of coarse levels; may be kept for the next frame */
 } session;

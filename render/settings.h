@@ -129,6 +129,7 @@ typedef struct trip_settings {
     bool triangles;            /* bounding quads of two triangles instead of point sprites */
     bool depth;                /* also computes distances (layer.h); rgba32f only */
     bool shading;              /* diffuse and specular light */
+    double shading_range;      /* full shading counts at most this range of values; 0: no limit */
     bool headlight;            /* light from the eye */
     bool point_light;          /* light from light_position, equally bright at any distance */
     trip_vec3 light_direction; /* if neither: world space, towards the light, unit length */

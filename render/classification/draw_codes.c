@@ -56,6 +56,12 @@ static part changing_part(const trip_tf *tf)
     return p;
 }
 
+double trip_draw_codes_changing(const trip_tf *tf)
+{
+    const part p = changing_part(tf);
+    return p.of.hi - p.of.lo;
+}
+
 /* ---- the range of draw codes ---- */
 
 /* Returns the distance between the codes of the data set about a value. */

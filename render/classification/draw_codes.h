@@ -83,6 +83,9 @@ static inline double trip_draw_value_per_code(const trip_draw_codes *d)
     return (d->hi - d->lo) / (TRIP_CODES - 1);
 }
 
+/* Returns the width of the smallest interval outside of which the function is constant. */
+double trip_draw_codes_changing(const trip_tf *tf);
+
 /* Fills the table of a function: entry c belongs to the value of stored code c, or of draw code c.
  * `voxel_world` is the length of one voxel. The two tables are equal if draw codes are stored
  * codes. */

@@ -144,7 +144,8 @@ static void make_view(trip_cpu_view *view, const trip_frame *frame, const trip_c
                       int axis, unsigned code_bytes, bool front_to_back)
 {
     const trip_file_header *header = &frame->data->header;
-    const double full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
+    const double full =
+        trip_shade_gradient_full(header, frame->settings, frame->camera->voxel_world, 0);
     const double eye[3] = { camera->eye.x, camera->eye.y, camera->eye.z };
     const trip_vec3 light = trip_light_position(frame->settings, &camera->index_to_world);
     *view = (trip_cpu_view){

@@ -126,7 +126,7 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const tr
         *columns[i] =
             as_it_is(trip_scale(trip_v3(m[0][a], m[1][a], m[2][a]), 1 / c->voxel_world), 0);
     }
-    double full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
+    double full = trip_shade_gradient_full(header, frame->settings, frame->camera->voxel_world, 0);
     f->light = as_it_is(frame->settings->light_direction, 0);
     if (frame->settings->point_light)
         f->light = in_list_axes(
@@ -138,7 +138,7 @@ static void set_world(trip_gl_frame_double *f, const trip_frame *frame, const tr
 static void set_compact_normals(trip_gl_frame_double *f, const trip_frame *frame)
 {
     const trip_file_header *h = &frame->data->header;
-    double full = trip_shade_gradient_full(h, frame->camera->voxel_world, 0);
+    double full = trip_shade_gradient_full(h, frame->settings, frame->camera->voxel_world, 0);
     trip_gl_double4 *columns[3] = { &f->compact_0, &f->compact_1, &f->compact_2 };
     if (h->normal_bytes != 3)
         return;

@@ -61,8 +61,8 @@ static void choose_slope(trip_gl_sheet_view *v, const rays *r, double way)
  * space, relative to full shading. The map is the inverse transpose of index_to_world. */
 static void set_gradient(trip_gl_sheet_view *v, const trip_frame *frame)
 {
-    double full = trip_shade_gradient_full(&frame->data->header, frame->camera->voxel_world,
-                                           frame->plan->level);
+    double full = trip_shade_gradient_full(&frame->data->header, frame->settings,
+                                           frame->camera->voxel_world, frame->plan->level);
     double unit = trip_draw_value_per_code(&frame->plan->draw) / full;
     v->gradient_scale = 1;
     if (frame->settings->kernel == TRIP_KERNEL_NEAREST)

@@ -136,7 +136,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         .nearest = nearest,
         .gradient_full = nearest ? trip_shade_outline_full(&frame->camera->index_to_world,
                                                            frame->data->coordinates.widest)
-                                 : trip_shade_gradient_full(header, frame->camera->voxel_world, 0),
+                                 : trip_shade_gradient_full(header, frame->settings,
+                                                            frame->camera->voxel_world, 0),
         .effects = trip_effects_view_make(frame->settings, frame->camera, header->dims),
     };
     trip_affine_invert(&frame->camera->index_to_world, &r->in.to_index); /* checked on opening */

@@ -31,14 +31,20 @@
 #define TRIP_SHININESS 24.0
 #define TRIP_FACING 4.0
 
+/* The shading range is at most this many widths of the values in which the transfer function
+ * changes. Values far outside of a narrow window then do not weaken its shading. */
+#define TRIP_SHADING_WIDTHS 2.5
+
 /* Returns |gradient| in value per world unit at which shading is full. It is the same at every
- * level. `voxel_world` is the voxel size of `level` in world units. A table of codes tells that few
- * values lie far from the others; these do not count. */
-static inline double trip_shade_gradient_full(const trip_file_header *h, double voxel_world,
-                                              unsigned level)
+ * level. `voxel_world` is the voxel size of `level` in world units. The few values that lie far
+ * from the others do not count, nor values far from those that the function shows. */
+static inline double trip_shade_gradient_full(const trip_file_header *h, const trip_settings *s,
+                                              double voxel_world, unsigned level)
 {
     double range =
         h->typical_max > h->typical_min ? h->typical_max - h->typical_min : h->code_hi - h->code_lo;
+    if (s->shading_range > 0)
+        range = fmin(range, s->shading_range);
     return TRIP_GRADIENT_FULL * range / voxel_world * ldexp(1, (int)level);
 }
 

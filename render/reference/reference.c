@@ -141,7 +141,8 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     r->frame = frame;
     r->channels = trip_layer_channels(frame->settings);
     r->early_termination = trip_settings_early_termination(frame->settings);
-    r->gradient_full = trip_shade_gradient_full(header, frame->camera->voxel_world, 0);
+    r->gradient_full =
+        trip_shade_gradient_full(header, frame->settings, frame->camera->voxel_world, 0);
     r->compact = trip_compact_normals_make(&frame->data->index_to_world, header->gradient_full,
                                            header->gradient_step);
     r->effects = trip_effects_view_make(frame->settings, frame->camera, header->dims);

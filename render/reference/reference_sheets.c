@@ -43,7 +43,8 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
     s->value_per_code = s->nearest ? 1 : trip_draw_value_per_code(&frame->plan->draw);
     s->gradient_full =
         s->nearest ? trip_shade_outline_full(&data->index_to_world, data->coordinates.widest)
-                   : trip_shade_gradient_full(h, frame->camera->voxel_world, frame->plan->level);
+                   : trip_shade_gradient_full(h, frame->settings, frame->camera->voxel_world,
+                                              frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
     if (status) {
         trip_reference_sheets_destroy(s);

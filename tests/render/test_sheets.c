@@ -469,7 +469,7 @@ static void shading_uses_differences_of_values(void **state)
         const double *row = to_index.m[axis]; /* the world gradient of the index along the axis */
         const double rise = RISE / 65535.0, g[3] = { row[0] * rise, row[1] * rise, row[2] * rise };
         trip_shade(&settings, &camera,
-                   trip_shade_gradient_full(&s.data->header, camera.voxel_world, 0),
+                   trip_shade_gradient_full(&s.data->header, &settings, camera.voxel_world, 0),
                    trip_v3(0, 0, 0), g, rgb);
         max = fmax(max, fabs(rgb[0] - unlit[0]));
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
@@ -889,7 +889,7 @@ static void a_segment_is_lit_by_the_mean_of_both_gradients(void **state)
         const trip_vec3 mean = trip_scale(along, (300 + 1250) / 2.0 / 65535);
         double rgb[3] = { 0.6F, 0.3F, 0.1F };
         assert_int_equal(trip_camera_make(&camera, &view, &s.data->index_to_world), 0);
-        trip_shade(&settings, &camera, trip_shade_gradient_full(&s.data->header, 1, 0),
+        trip_shade(&settings, &camera, trip_shade_gradient_full(&s.data->header, &settings, 1, 0),
                    trip_v3(0, 0, 0), (const double[3]){ mean.x, mean.y, mean.z }, rgb);
         scene_turn turn = scene_turns(scene_renderers_post(), &s, &view, &settings);
         while (scene_take_turn(&turn)) {
