@@ -26,7 +26,8 @@ static void add_numbers(cJSON *root, const char *name, const double *values, int
     cJSON_AddItemToObject(root, name, cJSON_CreateDoubleArray(values, count));
 }
 
-static int print_json(const triptych_description *d, const char *path, cJSON *series)
+static int print_json(const triptych_description *d, const char *path, const char *fill,
+                      cJSON *series)
 {
     cJSON *root = cJSON_CreateObject();
     const double dims[3] = { (double)d->dims[0], (double)d->dims[1], (double)d->dims[2] };
@@ -44,6 +45,8 @@ static int print_json(const triptych_description *d, const char *path, cJSON *se
         cJSON_AddStringToObject(root, "modality", d->modality);
     if (d->note[0])
         cJSON_AddStringToObject(root, "note", d->note);
+    if (fill)
+        cJSON_AddStringToObject(root, "fill", fill);
     cJSON_AddItemReferenceToObject(root, "series", series);
     char *text = trip_json_print(root, true);
     cJSON_Delete(root);
@@ -61,7 +64,8 @@ static void print_line(const char *label, const char *text)
     putchar('\n');
 }
 
-static void print_text(const triptych_description *d, const char *path, const cJSON *series)
+static void print_text(const triptych_description *d, const char *path, const char *fill,
+                       const cJSON *series)
 {
     char words[TRIP_ANATOMY_WORDS];
     print_line("volume", path);
@@ -85,6 +89,8 @@ static void print_text(const triptych_description *d, const char *path, const cJ
                trip_anatomy_words(d->space, direction(d, a), words));
     if (d->modality[0])
         print_line("modality", d->modality);
+    if (fill)
+        print_line("fill", fill);
     const cJSON *line;
     cJSON_ArrayForEach(line, series) print_line("series", line->valuestring);
     if (d->note[0])
@@ -100,9 +106,9 @@ int volume_info_print(triptych *t, const char *path, const triptych_brick_option
         return trip_fail(TRIP_ERROR, "info", path, "out of memory");
     int status = triptych_describe(t, path, options, &d, add_series, series);
     if (status == 0 && json)
-        status = print_json(&d, path, series);
+        status = print_json(&d, path, options->fill, series);
     else if (status == 0)
-        print_text(&d, path, series);
+        print_text(&d, path, options->fill, series);
     cJSON_Delete(series);
     return status;
 }

@@ -145,8 +145,8 @@ INFO = {
     "--verify": None,
     "--json": None,
     **{name: RENDER[name] for name in (
-        "--allow-gaps", "--axes", "--channel", "--coordinates", "--grid", "--level-set", "--series",
-        "--spacing", "--time")},
+        "--allow-gaps", "--axes", "--channel", "--coordinates", "--fill", "--grid", "--level-set",
+        "--series", "--spacing", "--time")},
 }
 
 
