@@ -82,8 +82,24 @@ static uint32_t *line_of(lines *of, const int d[3], int i, int j, int k)
     return d[1] ? &of->depths[k][i] : &of->depths[j][i];
 }
 
+trip_code_range trip_outline_codes(const trip_dataset *data, const trip_tf_entry *table, double min)
+{
+    const trip_file_header *h = &data->header;
+    const double lo = floor(trip_codes_code(&data->codes, h->typical_min));
+    const double hi = ceil(trip_codes_code(&data->codes, h->typical_max));
+    const trip_code_range all = { 0, CODES - 1 }, typical = { (uint16_t)lo, (uint16_t)hi };
+    if (h->typical_min <= h->value_min && h->typical_max >= h->value_max)
+        return all;
+    for (unsigned code = typical.min; code <= typical.max; code++)
+        if ((double)table[code].extinction >= min)
+            return typical;
+    return all;
+}
+
 static void fill_extinctions(summing *s)
 {
+    const trip_code_range codes =
+        trip_outline_codes(s->params->data, s->params->table, s->params->min_extinction);
     const trip_file_header *h = &s->params->data->header;
     const trip_mean_scale scale =
         trip_mean_scale_make(h->typical_min, h->typical_max, &s->params->data->codes);
@@ -94,8 +110,9 @@ static void fill_extinctions(summing *s)
         if (s->list->kind == TRIP_KIND_MEANS)
             trip_mean_extinctions(of_mean, length, extinctions);
         for (unsigned i = 0; i < TRIP_MEAN_SHARES; i++)
-            s->extinctions[code + i] = s->list->kind == TRIP_KIND_MEANS
-                                           ? (float)extinctions[i]
+            s->extinctions[code + i] = s->list->kind == TRIP_KIND_MEANS ? (float)extinctions[i]
+                                       : code + i < codes.min || code + i > codes.max
+                                           ? 0
                                            : s->params->table[code + i].extinction;
     }
 }

@@ -11,6 +11,7 @@
 #define TRIP_OUTLINE_H
 
 #include "camera.h"
+#include "code_set.h"
 #include "reader.h"
 #include "transfer_function.h"
 
@@ -30,6 +31,12 @@ typedef struct trip_reach_origin {
 } trip_reach_origin;
 
 #define TRIP_OUTLINE_OPACITY (8.0 / 255)
+
+/* Returns the codes of voxels that count in the visible extent: codes of typical values (format.h)
+ * or, if none of them has an extinction of at least `min`, all codes. A hot voxel beside an object
+ * does not make the object smaller. */
+trip_code_range trip_outline_codes(const trip_dataset *data, const trip_tf_entry *table,
+                                   double min);
 
 typedef struct trip_outline trip_outline;
 

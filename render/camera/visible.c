@@ -49,11 +49,18 @@ static double min_extinction(const trip_visible *v, bool alone)
     return -log1p(-MIN_OPACITY) / (SHARE_OF_DEPTH * trip_length(trip_affine_vector(m, diagonal)));
 }
 
+/* Sets the codes of the voxels to search for. */
+static void choose_codes(trip_visible *v, double min)
+{
+    trip_code_set_make(&v->codes, v->table, min);
+    trip_code_set_keep(&v->codes, trip_outline_codes(v->data, v->table, min));
+}
+
 void trip_visible_start(trip_visible *v, const double lo[3], const double hi[3])
 {
     memcpy(v->lo, lo, sizeof v->lo);
     memcpy(v->hi, hi, sizeof v->hi);
-    trip_code_set_make(&v->codes, v->table, min_extinction(v, false));
+    choose_codes(v, min_extinction(v, false));
 }
 
 void trip_visible_end(trip_visible *v)
@@ -408,7 +415,7 @@ int trip_visible_outline(trip_visible *v)
     if (!v->outline)
         return status;
     v->splats += trip_outline_splats(v->outline);
-    trip_code_set_make(&v->codes, v->table, min_extinction(v, true));
+    choose_codes(v, min_extinction(v, true));
     return 0;
 }
 

@@ -35,6 +35,23 @@ void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double m
     }
 }
 
+void trip_code_set_keep(trip_code_set *set, trip_code_range range)
+{
+    for (unsigned word = 0; word < 1024; word++) {
+        const unsigned first = word * 64;
+        uint64_t kept = set->codes[word];
+        if (first + 63 < range.min || first > range.max)
+            kept = 0;
+        if (kept && first < range.min)
+            kept &= UINT64_MAX << (range.min - first);
+        if (kept && first + 63 > range.max)
+            kept &= UINT64_MAX >> (first + 63 - range.max);
+        if (!kept)
+            set->some[word / 64] &= ~(UINT64_C(1) << word % 64);
+        set->codes[word] = kept;
+    }
+}
+
 trip_code_range trip_code_set_range(const trip_code_set *set)
 {
     unsigned min = 1, max = 0, count = 0;

@@ -20,6 +20,9 @@ typedef struct trip_code_set {
  */
 void trip_code_set_make(trip_code_set *set, const trip_tf_entry *table, double min);
 
+/* Drops all codes outside of a range. */
+void trip_code_set_keep(trip_code_set *set, trip_code_range range);
+
 /* Returns whether any code from first to last is in the set. */
 bool trip_code_set_has_some(const trip_code_set *set, unsigned first, unsigned last);
 
