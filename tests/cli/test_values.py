@@ -174,6 +174,36 @@ class Fills(program.ProgramTest):
         self.assertNotIn("fills", kept["source"])
         return info
 
+    def test_a_hot_voxel_changes_only_its_own_pixels(self):
+        """In a fixed view, only pixels of the eight cells around the voxel change. The default view
+        moves by less than a tenth of a voxel."""
+        program.write_nifti("ball.nii", ball())
+        program.write_nifti("hot.nii", hot_ball(1e6))
+        view = "--eye=-30,-30,10", "--look=19.5,19.5,19.5", "--up=0,0,1"
+        voxel = 300 / (2 * 42 * numpy.tan(numpy.radians(15)))  # pixels at the centre's distance
+        for renderer in ("cpu", *program.GL):
+            for where in view, ():
+                both = [self.picture(name, "--renderer", renderer, "--size=300x300", *where)
+                        for name in ("ball.nii", "hot.nii")]
+                difference = numpy.abs(both[0] - both[1]).max(axis=-1)
+                self.assertLess(255 * numpy.median(difference), 1.5)
+                changed = numpy.nonzero(difference > (2 if where else 10) / 255)
+                self.assertTrue(len(changed[0]) > 0 or not where)
+                for pixels in changed:
+                    self.assertLess(numpy.ptp(pixels) if len(pixels) else 0, 6 * voxel, (renderer, where))
+
+    def test_a_window_shows_the_same_whatever_lies_outside(self):
+        """Values beyond 30 are far outside of a window from 0 to 10, in every cell."""
+        radius = numpy.linalg.norm(grid(), axis=-1)
+        field = numpy.exp(12 * (1 - radius)).astype("f4")
+        program.write_nifti("all.nii", field)
+        program.write_nifti("to-30.nii", numpy.minimum(field, 30))
+        for renderer in ("cpu", "integral", *program.GL):
+            both = [self.picture(name, "--renderer", renderer, "--size=200x200", "--window=10",
+                                 "--level=5", "--tf=grey", "--no-shading")
+                    for name in ("all.nii", "to-30.nii")]
+            self.assertLess(255 * numpy.abs(both[0] - both[1]).mean(), 0.5, renderer)
+
     def test_values_that_nobody_declared_are_absent(self):
         for fill in (1e20, -1e30, 9.96921e36, -9999, -32768, 3.4028234663852886e38):
             volume = ball()
@@ -272,6 +302,27 @@ class Ids(program.ProgramTest):
         self.assertEqual([p[0] for p in points if p[4] > 0],
                          [v for i in (1, 2, 100000, 100001, 4000000000)
                           for v in (i - 0.5, i + 0.5)])
+
+    def test_each_ball_has_its_own_colour_alone(self):
+        """Opaque balls without light show the colours of their ids and the background only."""
+        volume, _ = self.labels((1, 2, 100000, 100001, 4000000000), "u4")
+        info = self.brick_labels(volume)
+        points = [tuple(map(float, line.split()))
+                  for line in info["source"]["transfer_function"].splitlines()[2:]]
+        with open("solid.tf", "w") as out:
+            out.write("unit 0.0001\n")
+            out.writelines(f"{p[0]} {p[1]} {p[2]} {p[3]} {1 if p[4] > 0 else 0}\n" for p in points)
+        colours = {tuple(round(255 * c) for c in p[1:4]) for p in points if p[4] > 0}
+        for renderer in ("cpu", "integral", *program.GL):
+            pixels = self.picture("v.trip", "--renderer", renderer, "--size=100x100", "--tf=solid.tf",
+                                  "--no-shading").reshape(-1, 4)
+            opaque = pixels[pixels[:, 3] > 0.99]
+            seen = {tuple(int(round(255 * c)) for c in p[:3]) for p in opaque}
+            near = {c for c in colours for p in seen if max(abs(a - b) for a, b in zip(c, p)) <= 2}
+            self.assertEqual(near, colours, renderer)
+            for p in seen:
+                self.assertTrue(any(max(abs(a - b) for a, b in zip(c, p)) <= 2 for c in colours),
+                                (renderer, p))
 
     def test_coarse_levels_have_no_other_ids(self):
         volume, _ = self.labels((1, 2, 100000, 100001, 4000000000), "u4")
