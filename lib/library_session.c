@@ -12,7 +12,7 @@
 #include "shade.h"
 
 static const size_t table_bytes = 65536 * sizeof(trip_tf_entry);
-static const size_t maps_bytes = sizeof(trip_draw_maps);
+static const size_t map_bytes = TRIP_CODES * sizeof(uint16_t);
 
 enum { LEVELS = 1 + TRIP_DATASET_LEVELS_MAX };
 
@@ -98,9 +98,9 @@ static void release_tables(session *s)
 {
     trip_budget_release(s->budget, s->table, table_bytes);
     trip_budget_release(s->budget, s->draw_table, table_bytes);
-    trip_budget_release(s->budget, s->draw_maps, maps_bytes);
+    trip_budget_release(s->budget, s->draw_map, map_bytes);
     s->table = s->draw_table = NULL;
-    s->draw_maps = NULL;
+    s->draw_map = NULL;
 }
 
 static int take_tables(session *s)
@@ -110,8 +110,8 @@ static int take_tables(session *s)
     if (!even)
         s->draw_table = trip_budget_take(s->budget, table_bytes);
     if (!even)
-        s->draw_maps = trip_budget_take(s->budget, maps_bytes);
-    if (s->table && (even || (s->draw_table && s->draw_maps)))
+        s->draw_map = trip_budget_take(s->budget, map_bytes);
+    if (s->table && (even || (s->draw_table && s->draw_map)))
         return 0;
     release_tables(s);
     return trip_fail(TRIP_ERROR, "render", s->input,
@@ -149,7 +149,7 @@ static void fill_tables(session *s, const trip_tf *tf, double opacity_scale)
 {
     const double voxel_world = cbrt(fabs(trip_affine_determinant(&s->data->index_to_world)));
     const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
-    s->draw = trip_draw_codes_for(tf, &s->data->codes, typical, s->draw_maps);
+    s->draw = trip_draw_codes_for(tf, &s->data->codes, typical, s->draw_map);
     s->shading_range = TRIP_SHADING_WIDTHS * trip_draw_codes_changing(tf);
     trip_draw_codes_stored_table(&s->draw, tf, voxel_world, s->table);
     scale_extinction(s->table, opacity_scale);

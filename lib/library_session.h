@@ -24,7 +24,7 @@ typedef struct session {
     /* The tables of the transfer function, 65536 entries each; NULL until one is used. The second
      * is NULL as long as draw codes are stored codes. */
     trip_tf_entry *table, *draw_table;
-    trip_draw_maps *draw_maps;       /* of `draw`; NULL if draw codes are stored codes */
+    uint16_t *draw_map;              /* of `draw`; NULL if draw codes are stored codes */
     trip_draw_codes draw;            /* the codes of frames that interpolate */
     double shading_range;            /* of the transfer function, as in trip_settings */
     trip_classification *classified; /* results of earlier frames, one per level */

@@ -124,38 +124,13 @@ static span choose_range(span data, span typical, span changing, double nearest,
     return widened(changing, widest - width, most);
 }
 
-static void fill_map(const trip_draw_codes *d, uint16_t map[TRIP_CODES])
-{
-    for (unsigned code = 0; code < TRIP_CODES; code++)
-        map[code] = (uint16_t)(fmin(LAST, fmax(0, trip_draw_code_exact(d, code))) + 0.5);
-}
-
-/* Fills the map of slope codes, unless draw codes cover the same range. */
-static void set_slopes(trip_draw_codes *d, span data, const double typical[2],
-                       uint16_t map[TRIP_CODES])
-{
-    const double width = typical[1] - typical[0];
-    if (!(width > 0))
-        return;
-    d->slope_lo = within(data, typical[0] - width);
-    d->slope_hi = within(data, typical[1] + width);
-    const bool fine = d->hi - d->lo <= TRIP_DRAW_SLOPES * (d->slope_hi - d->slope_lo);
-    if (d->lo <= d->slope_lo && d->hi >= d->slope_hi && fine)
-        return;
-    const trip_draw_codes slopes = {
-        .lo = d->slope_lo, .hi = d->slope_hi, .of_stored = map, .stored = d->stored
-    };
-    fill_map(&slopes, map);
-    d->slope_of_stored = map;
-}
-
 trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored)
 {
     return (trip_draw_codes){ .lo = stored->lo, .hi = stored->hi, .stored = *stored };
 }
 
 trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
-                                    const double typical[2], trip_draw_maps *maps)
+                                    const double typical[2], uint16_t map[TRIP_CODES])
 {
     trip_draw_codes d = trip_draw_codes_as_stored(stored);
     const span data = { stored->lo, stored->hi };
@@ -172,9 +147,9 @@ trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
         d.lo = range.lo;
         d.hi = range.hi;
     }
-    d.of_stored = maps->draw;
-    fill_map(&d, maps->draw);
-    set_slopes(&d, data, typical, maps->slope);
+    d.of_stored = map;
+    for (unsigned code = 0; code < TRIP_CODES; code++)
+        map[code] = (uint16_t)(fmin(LAST, fmax(0, trip_draw_code_exact(&d, code))) + 0.5);
     return d;
 }
 

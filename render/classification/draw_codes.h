@@ -31,36 +31,21 @@
  */
 #define TRIP_DRAW_PART_FINE 512.0
 
-/* How many times wider than the range of slope codes the range of draw codes may be and replace it.
- */
-#define TRIP_DRAW_SLOPES 16.0
-
 typedef struct trip_draw_codes {
     double lo, hi; /* values of draw codes 0 and 65535 */
     /* The draw code of each of 65536 stored codes. NULL means that draw codes are stored codes. */
     const uint16_t *of_stored;
-    /* Slope codes are even. The gradients of the CPU renderer are differences of slope codes. Slope
-     * codes 0 and 65535 stand for the values slope_lo and slope_hi. They cover the typical values
-     * and as much again on either side, while draw codes may cover few values. The map is NULL if
-     * draw codes cover this range too. */
-    double slope_lo, slope_hi;
-    const uint16_t *slope_of_stored;
     trip_codes stored; /* the codes of the data set */
 } trip_draw_codes;
 
 /* Returns draw codes that are the stored codes: for even codes, and for frames that do not
  * interpolate. */
 trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored);
-/* The maps of draw codes and slope codes. */
-typedef struct trip_draw_maps {
-    uint16_t draw[TRIP_CODES], slope[TRIP_CODES];
-} trip_draw_maps;
-
-/* Chooses the ranges for a function in data units and fills `maps`, which must outlive the result.
- * If the codes are even, returns trip_draw_codes_as_stored() and leaves `maps` alone. `typical` has
+/* Chooses the range for a function in data units and fills `map`, which must outlive the result.
+ * If the codes are even, returns trip_draw_codes_as_stored() and leaves `map` alone. `typical` has
  * the typical range of the data set (format.h). */
 trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
-                                    const double typical[2], trip_draw_maps *maps);
+                                    const double typical[2], uint16_t map[TRIP_CODES]);
 
 static inline unsigned trip_draw_code(const trip_draw_codes *d, unsigned stored)
 {

@@ -239,7 +239,7 @@ void scene_use_function(scene *s, scene_function *f, const trip_tf_point *points
     trip_tf *tf;
     assert_int_equal(trip_tf_from_points(&tf, points, count, false, 0), 0);
     const double typical[2] = { s->data->header.typical_min, s->data->header.typical_max };
-    f->draw = trip_draw_codes_for(tf, &s->data->codes, typical, &f->maps);
+    f->draw = trip_draw_codes_for(tf, &s->data->codes, typical, f->map);
     trip_draw_codes_table(&f->draw, tf, voxel, f->table);
     trip_draw_codes_stored_table(&f->draw, tf, voxel, f->stored_table);
     trip_tf_destroy(tf);

@@ -81,7 +81,7 @@ void scene_colour(scene *s, unsigned first, unsigned last, double r, double g, d
 
 /* The codes and tables of a transfer function, as a session has them. */
 typedef struct scene_function {
-    trip_draw_maps maps;
+    uint16_t map[TRIP_CODES];
     trip_draw_codes draw;
     trip_tf_entry table[TRIP_CODES], stored_table[TRIP_CODES];
 } scene_function;

@@ -427,8 +427,7 @@ static int difference(int below, int here, int above)
 static void check_gradients(const trip_cpu_kernels *k, uint64_t squares)
 {
     out = rasters[0];
-    k->sheet_gradients(out.codes, squares, rasters[1].codes, rasters[2].codes, rasters[3].codes,
-                       rasters[4].codes, out.gradients);
+    k->sheet_gradients(&out, squares, &rasters[1], &rasters[2], &rasters[3], &rasters[4]);
     assert_memory_equal(out.codes, rasters[0].codes, sizeof out.codes);
     for (int v = 0; v < 64; v++)
         for (int u = 0; u < 64; u++) {

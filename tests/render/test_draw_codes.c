@@ -7,6 +7,7 @@
 #include "cpu_scenes.h"
 #include "dataset_level.h"
 #include "ray_probe.h"
+#include "shade.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -212,12 +213,21 @@ static void end_drawn(drawn *d)
     free(d->f);
 }
 
-static scene_picture draw(drawn *d, const scene_renderer *renderer, const trip_tf_point *points,
-                          size_t count, const trip_settings *settings)
+/* Returns settings with the shading range of a session that has this window. */
+static trip_settings settings_for(const trip_settings *settings, const trip_tf_point points[2])
+{
+    trip_settings s = *settings;
+    s.shading_range = TRIP_SHADING_WIDTHS * (points[1].value - points[0].value);
+    return s;
+}
+
+static scene_picture draw(drawn *d, const scene_renderer *renderer, const trip_tf_point points[2],
+                          const trip_settings *settings)
 {
     const trip_camera_params view = view_of(&d->s);
-    scene_use_function(&d->s, d->f, points, count);
-    return scene_draw(&d->s, renderer, &view, settings);
+    const trip_settings s = settings_for(settings, points);
+    scene_use_function(&d->s, d->f, points, 2);
+    return scene_draw(&d->s, renderer, &view, &s);
 }
 
 /* ---- windows over few values ---- */
@@ -231,11 +241,11 @@ static void compare_windows(field_value of, const trip_settings *settings, bool 
     for (int w = 0; w < WINDOWS; w++) {
         trip_tf_point points[2];
         window_at(v, w / (WINDOWS - 1.0), points);
-        scene_picture truth = draw(&exact, scene_renderers(), points, 2, settings);
+        scene_picture truth = draw(&exact, scene_renderers(), points, settings);
         assert_true(scene_max_opaque(&truth) > 0.2);
         for (const scene_renderer *r = post ? scene_renderers_post() : scene_renderers(); r->name;
              r++) {
-            scene_picture p = draw(&uneven, r, points, 2, settings);
+            scene_picture p = draw(&uneven, r, points, settings);
             const double off = mean_difference(&p, &truth);
             if (!(off <= (strcmp(r->name, "cpu") == 0 && post ? 0.5 : 0.25)))
                 fail_msg("%s: window %g to %g: the picture is %.3f / 255 off", r->name,
@@ -316,9 +326,9 @@ static void compare_with_clipped(field_value of, double before)
         const trip_codes near = { .lo = fmax(whole.lo, points[0].value - 200 * width),
                                   .hi = fmin(whole.hi, points[1].value + 200 * width) };
         drawn clipped = write_drawn(v, &near);
-        scene_picture a = draw(&exact, scene_renderers(), points, 2, &settings);
-        scene_picture b = draw(&clipped, scene_renderers(), points, 2, &settings);
-        scene_picture c = draw(&coarse, scene_renderers(), points, 2, &settings);
+        scene_picture a = draw(&exact, scene_renderers(), points, &settings);
+        scene_picture b = draw(&clipped, scene_renderers(), points, &settings);
+        scene_picture c = draw(&coarse, scene_renderers(), points, &settings);
         assert_true(mean_difference(&a, &b) < 0.1);
         max = fmax(max, mean_difference(&a, &c));
         end_drawn(&clipped);
@@ -491,8 +501,8 @@ static void a_hot_voxel_changes_only_the_pixels_of_its_cells(void **state)
         trip_tf_point points[2];
         window_at(without, w / (WINDOWS - 1.0), points);
         for (const scene_renderer *r = scene_renderers_post(); r->name; r++) {
-            scene_picture p = draw(&a, r, points, 2, &settings);
-            scene_picture q = draw(&b, r, points, 2, &settings);
+            scene_picture p = draw(&a, r, points, &settings);
+            scene_picture q = draw(&b, r, points, &settings);
             for (int i = 0; i < 4 * p.width * p.height; i++) {
                 const int x = i / 4 % p.width, y = i / 4 / p.width;
                 if (!is_reached(&a.s, &view, x, y, trip_v3(20, 12, 15)))
@@ -518,13 +528,14 @@ static void threads_tiles_and_kernels_of_the_cpu_draw_the_same(void **state)
     window_at(v, 0.25, points);
     trip_settings settings = scene_post(3);
     settings.shading = true;
+    settings = settings_for(&settings, points);
     drawn first = write_drawn(v, &v->uneven);
     const trip_camera_params view = view_of(&first.s);
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
         cpu_scenes_threads = 1;
-        scene_picture truth = draw(&first, &cpu_scenes_cpu, points, 2, &settings);
-        assert_non_null(first.f->draw.slope_of_stored);
+        scene_picture truth = draw(&first, &cpu_scenes_cpu, points, &settings);
+        assert_non_null(first.f->draw.of_stored);
         for (unsigned threads = 1; threads < 6; threads += 2) {
             drawn d = { .f = first.f };
             cpu_scenes_threads = threads;
@@ -547,20 +558,21 @@ static void threads_tiles_and_kernels_of_the_cpu_draw_the_same(void **state)
 
 /* The typical range reaches up to `typical_max`. */
 static trip_draw_codes codes_about(const trip_codes *stored, double typical_max,
-                                   const trip_tf_point *points, size_t count, trip_draw_maps *maps)
+                                   const trip_tf_point *points, size_t count,
+                                   uint16_t map[TRIP_CODES])
 {
     trip_tf *tf;
     const double typical[2] = { stored->lo, typical_max };
     assert_int_equal(trip_tf_from_points(&tf, points, count, false, 0), 0);
-    const trip_draw_codes d = trip_draw_codes_for(tf, stored, typical, maps);
+    const trip_draw_codes d = trip_draw_codes_for(tf, stored, typical, map);
     trip_tf_destroy(tf);
     return d;
 }
 
 static trip_draw_codes codes_for(const trip_codes *stored, const trip_tf_point *points,
-                                 size_t count, trip_draw_maps *maps)
+                                 size_t count, uint16_t map[TRIP_CODES])
 {
-    return codes_about(stored, stored->hi, points, count, maps);
+    return codes_about(stored, stored->hi, points, count, map);
 }
 
 static void even_codes_are_drawn_as_stored(void **state)
@@ -570,7 +582,6 @@ static void even_codes_are_drawn_as_stored(void **state)
     const trip_tf_point points[2] = { { 1, { 0, 0, 0, 0 } }, { 1.001, { 1, 1, 1, 1 } } };
     const trip_draw_codes d = codes_for(&even, points, 2, NULL);
     assert_null(d.of_stored);
-    assert_null(d.slope_of_stored);
     assert_true(d.lo == -5 && d.hi == 7);
     assert_int_equal(trip_draw_code(&d, 1234), 1234);
     assert_true(trip_draw_code_exact(&d, 1234) == 1234);
@@ -582,35 +593,31 @@ static const double hockey[3] = { 0, 1, 1000 };
 static void the_range_of_draw_codes_holds_the_function_and_a_wide_margin(void **state)
 {
     (void)state;
-    static trip_draw_maps maps;
+    static uint16_t map[TRIP_CODES];
     const trip_codes stored = trip_codes_from_table(hockey, 3, 15);
     const trip_tf_point narrow[2] = { { 0.5, { 0, 0, 0, 0 } }, { 0.51, { 1, 1, 1, 1 } } };
-    trip_draw_codes d = codes_for(&stored, narrow, 2, &maps);
+    trip_draw_codes d = codes_for(&stored, narrow, 2, map);
     assert_true(d.lo == 0);
     assert_close((0.51 - 0.5) / trip_draw_value_per_code(&d), 32, 0.1);
-    assert_ptr_equal(d.slope_of_stored, maps.slope);
-    assert_true(d.slope_lo == 0 && d.slope_hi == stored.hi);
     for (unsigned code = 1; code < TRIP_CODES; code++)
-        assert_true(maps.draw[code] >= maps.draw[code - 1]);
-    assert_int_equal(maps.draw[0], 0);
-    assert_int_equal(maps.draw[65535], 65535);
+        assert_true(map[code] >= map[code - 1]);
+    assert_int_equal(map[0], 0);
+    assert_int_equal(map[65535], 65535);
     assert_close(trip_draw_code_exact(&d, 65535), 65535 * (trip_codes_value(&stored, 65535) / d.hi),
                  1e-6);
 
     /* If the typical values fit into the range, there are more codes. */
-    d = codes_about(&stored, 1, narrow, 2, &maps);
+    d = codes_about(&stored, 1, narrow, 2, map);
     assert_true(d.lo == 0);
-    assert_close(d.hi, 3, 1e-12);   /* the typical width three times */
-    assert_null(d.slope_of_stored); /* no gradient needs more than these values */
-    d = codes_about(&stored, 9, narrow, 2, &maps);
+    assert_close(d.hi, 3, 1e-12); /* the typical width three times */
+    d = codes_about(&stored, 9, narrow, 2, map);
     assert_close((0.51 - 0.5) / trip_draw_value_per_code(&d), 64, 0.1);
-    assert_true(d.slope_hi == 18);
 
     /* Three points have more codes, but not more than stored codes, 1 / 32768 apart. */
     const trip_tf_point tent[3] = { { 0.5, { 0, 0, 0, 0 } },
                                     { 0.501, { 1, 1, 1, 1 } },
                                     { 0.51, { 0, 0, 0, 0 } } };
-    d = codes_for(&stored, tent, 3, &maps);
+    d = codes_for(&stored, tent, 3, map);
     assert_close(0.001 / trip_draw_value_per_code(&d), 0.001 * 32768 / 2, 0.1);
 
     /* Equal ends of the function do not count. */
@@ -618,36 +625,36 @@ static void the_range_of_draw_codes_holds_the_function_and_a_wide_margin(void **
                                     { 0.5, { 0, 1, 0, 0 } },
                                     { 0.51, { 1, 1, 1, 1 } },
                                     { 1e6, { 1, 1, 1, 1 } } };
-    d = codes_for(&stored, flat, 4, &maps);
+    d = codes_for(&stored, flat, 4, map);
     assert_close(0.01 / trip_draw_value_per_code(&d), 32, 0.1);
 
     /* A function of the whole range needs the whole range. */
     const trip_tf_point wide[2] = { { 0, { 0, 0, 0, 0 } }, { 1000, { 1, 1, 1, 1 } } };
-    d = codes_for(&stored, wide, 2, &maps);
+    d = codes_for(&stored, wide, 2, map);
     assert_true(d.lo == 0 && d.hi == stored.hi);
 
     /* A step takes the distance of the stored codes, 1 / 32768. */
     const trip_tf_point step[2] = { { 0.5, { 0, 0, 0, 0 } }, { 0.5, { 1, 1, 1, 1 } } };
-    d = codes_for(&stored, step, 2, &maps);
+    d = codes_for(&stored, step, 2, map);
     assert_close(trip_draw_value_per_code(&d), 2.0 / 32768, 1e-9);
 
     /* A part of few stored codes has as many draw codes. */
     const double apart = (1000 - 1) / 32768.0;
     const trip_tf_point sparse[2] = { { 500, { 0, 0, 0, 0 } },
                                       { 500 + 9 * apart, { 1, 1, 1, 1 } } };
-    d = codes_for(&stored, sparse, 2, &maps);
+    d = codes_for(&stored, sparse, 2, map);
     assert_true(d.lo == 0 && d.hi == stored.hi); /* 65536 such codes hold all values */
 
     /* No value is where the function changes. */
     const trip_tf_point outside[2] = { { 2000, { 0, 0, 0, 0 } }, { 2001, { 1, 1, 1, 1 } } };
-    d = codes_for(&stored, outside, 2, &maps);
+    d = codes_for(&stored, outside, 2, map);
     assert_true(d.lo == 0 && d.hi == stored.hi);
 }
 
 static void a_part_that_draw_codes_lose_is_reported(void **state)
 {
     (void)state;
-    static trip_draw_maps maps;
+    static uint16_t map[TRIP_CODES];
     const trip_codes stored = trip_codes_from_table(hockey, 3, 15);
     const trip_tf_point points[3] = { { 0.5, { 0, 0, 0, 0 } },
                                       { 0.6, { 1, 0, 0, 0.2 } },
@@ -655,7 +662,7 @@ static void a_part_that_draw_codes_lose_is_reported(void **state)
     for (size_t count = 2; count <= 3; count++) {
         trip_tf *tf;
         trip_draw_loss loss;
-        const trip_draw_codes d = codes_for(&stored, points, count, &maps);
+        const trip_draw_codes d = codes_for(&stored, points, count, map);
         assert_int_equal(trip_tf_from_points(&tf, points, count, false, 0), 0);
         assert_int_equal(trip_draw_codes_loss(&d, tf, &loss), count == 3);
         trip_tf_destroy(tf);

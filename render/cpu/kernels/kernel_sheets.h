@@ -51,9 +51,6 @@ typedef struct trip_cpu_voxels {
     trip_cpu_gradient gradients[TRIP_CPU_RASTER_VOXELS]; /* undefined for missing voxels */
 } trip_cpu_voxels;
 
-/* Other codes of the same voxels (trip_draw_codes.slope_of_stored). */
-typedef int16_t trip_cpu_slopes[TRIP_CPU_RASTER_VOXELS];
-
 /* An index of a code in a pool of rasters must fit 32 bits. */
 #define TRIP_CPU_RASTERS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 
@@ -147,9 +144,6 @@ typedef struct trip_cpu_integrals {
 
 typedef struct trip_cpu_group {
     trip_cpu_voxels *pool;
-    /* The codes that gradients are differences of, for each raster of the pool. NULL selects the
-     * codes in the pool. */
-    const trip_cpu_slopes *slopes;
     int64_t first_u, first_v; /* voxel at the corner of the grid of rasters */
     int32_t across, down;
     unsigned segments;

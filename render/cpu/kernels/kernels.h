@@ -338,21 +338,21 @@ typedef struct trip_cpu_kernels {
      * Cells that lack corners at both sheets are left out, and cells of other squares. */
     void (*sheet_cells)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                         int16_t min, int16_t max, trip_cpu_cells *out);
-    /* Computes the gradients of the squares' voxels that are present in `codes`. The other codes
-     * are of neighbouring rasters: `left` and `above` of the same sheet, `sheet_before` and
-     * `sheet_behind` in index order. */
-    void (*sheet_gradients)(const int16_t *codes, uint64_t squares, const int16_t *left,
-                            const int16_t *above, const int16_t *sheet_before,
-                            const int16_t *sheet_behind, trip_cpu_gradient *gradients);
+    /* Computes the gradients of the squares' voxels that are present. `left` and `above` are the
+     * neighbouring rasters of the same sheet; `sheet_before` and `sheet_behind` follow index order.
+     * Only `raster` needs gradients; the kernel reads the codes of the other rasters. */
+    void (*sheet_gradients)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
+                            const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
+                            const trip_cpu_voxels *sheet_behind);
     /* Interpolates the squares' voxels between two rasters, with gradients if `gradients`.
      * `weights` is w << 16 | 2^14 - w, where w is the weight of `to`. A voxel is missing if it is
      * missing in either raster. */
     void (*sheet_between)(const trip_cpu_voxels *from, const trip_cpu_voxels *to, uint64_t squares,
                           int32_t weights, bool gradients, trip_cpu_voxels *out);
     /* Does the work of sheet_gradients() for outlines (sheet.h, `Nearest value`). */
-    void (*sheet_outlines)(const int16_t *codes, uint64_t squares, const int16_t *left,
-                           const int16_t *above, const int16_t *sheet_before,
-                           const int16_t *sheet_behind, trip_cpu_gradient *gradients);
+    void (*sheet_outlines)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
+                           const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
+                           const trip_cpu_voxels *sheet_behind);
     /* sheet_pane_closed is for segments in closed form (closed_form.h), sheet_pane_effects for
      * frames with effects, sheet_pane_nearest for the nearest value. */
     trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed, *sheet_pane_effects, *sheet_pane_nearest;

@@ -23,13 +23,6 @@ INLINE trip_cpu_voxels *raster_of(const trip_cpu_group *g, const int32_t *raster
     return g->pool + (rasters ? rasters[at] : 0);
 }
 
-/* Returns the codes that gradients are differences of. */
-INLINE const int16_t *slopes_of(const trip_cpu_group *g, const int32_t *rasters, size_t at)
-{
-    const int32_t raster = rasters ? rasters[at] : 0;
-    return g->slopes ? g->slopes[raster] : g->pool[raster].codes;
-}
-
 /* Copies gradients from neighbouring rasters into the extra column and row of a raster:
  * - for squares at the right edge, the first column of the raster to the right;
  * - for squares at the lower edge, the first row of the raster below;
@@ -70,9 +63,9 @@ static void make(const trip_cpu_group *g, const trip_cpu_making *m, bool gradien
     trip_cpu_voxels *raster = raster_of(g, m->rasters, at);
     if (!m->from) {
         (TRIP_CPU_NEAREST ? sheet_outlines : sheet_gradients)(
-            slopes_of(g, m->rasters, at), squares, slopes_of(g, m->rasters, at - 1),
-            slopes_of(g, m->rasters, at - (size_t)g->across), slopes_of(g, m->before, at),
-            slopes_of(g, m->behind, at), raster->gradients);
+            raster, squares, raster_of(g, m->rasters, at - 1),
+            raster_of(g, m->rasters, at - (size_t)g->across), raster_of(g, m->before, at),
+            raster_of(g, m->behind, at));
         repeat_gradients(g, m, at, squares);
         return;
     }

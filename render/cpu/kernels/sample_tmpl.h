@@ -301,10 +301,10 @@ INLINE vh outline(vh codes, vh below, vh above)
 }
 
 /* Finds gradients, or with `outlines` the gradients of outlines. */
-INLINE void squares_gradients(const int16_t *codes, uint64_t squares, bool outlines,
-                              const int16_t *left, const int16_t *above,
-                              const int16_t *sheet_before, const int16_t *sheet_behind,
-                              trip_cpu_gradient *gradients)
+INLINE void squares_gradients(trip_cpu_voxels *raster, uint64_t squares, bool outlines,
+                              const trip_cpu_voxels *left, const trip_cpu_voxels *above,
+                              const trip_cpu_voxels *sheet_before,
+                              const trip_cpu_voxels *sheet_behind)
 {
     /* The voxels before the first column and row come from the neighbouring rasters. */
     int16_t first[8];
@@ -313,21 +313,21 @@ INLINE void squares_gradients(const int16_t *codes, uint64_t squares, bool outli
         int u = square % TRIP_CPU_SQUARES_ACROSS * 8, v0 = square / TRIP_CPU_SQUARES_ACROSS * 8;
         for (int v = v0; v < v0 + 8; v++) {
             int i = v * TRIP_CPU_RASTER_STRIDE + u;
-            const int16_t *at = codes + i;
+            const int16_t *at = raster->codes + i;
             const int16_t *to_left = at - 1, *before = at - TRIP_CPU_RASTER_STRIDE;
             if (all_are_missing(vh_load(at)))
                 continue;
             if (v == 0)
-                before = above + 63 * TRIP_CPU_RASTER_STRIDE + u;
+                before = above->codes + 63 * TRIP_CPU_RASTER_STRIDE + u;
             if (u == 0) {
-                first[0] = left[v * TRIP_CPU_RASTER_STRIDE + 63];
+                first[0] = left->codes[v * TRIP_CPU_RASTER_STRIDE + 63];
                 memcpy(first + 1, at, 7 * sizeof *first);
                 to_left = first;
             }
             const neighbours n = {
-                { vh_load(to_left), vh_load(before), vh_load(sheet_before + i) },
+                { vh_load(to_left), vh_load(before), vh_load(sheet_before->codes + i) },
                 { vh_load(at + 1), vh_load(at + TRIP_CPU_RASTER_STRIDE),
-                  vh_load(sheet_behind + i) },
+                  vh_load(sheet_behind->codes + i) },
             };
             const bool lacks = !outlines && some_is_missing(&n);
             vh d[3];
@@ -335,27 +335,27 @@ INLINE void squares_gradients(const int16_t *codes, uint64_t squares, bool outli
                 d[a] = outlines ? outline(vh_load(at), n.before[a], n.behind[a])
                        : lacks  ? differences(vh_load(at), n.before[a], n.behind[a])
                                 : vh_half_difference(n.behind[a], n.before[a]) >> 1;
-            vh_store_3((int16_t *)&gradients[i], d[0], d[1], d[2]);
+            vh_store_3((int16_t *)&raster->gradients[i], d[0], d[1], d[2]);
         }
     }
 }
 
-static __attribute__((noinline)) void sheet_gradients(const int16_t *codes, uint64_t squares,
-                                                      const int16_t *left, const int16_t *above,
-                                                      const int16_t *sheet_before,
-                                                      const int16_t *sheet_behind,
-                                                      trip_cpu_gradient *gradients)
+static __attribute__((noinline)) void sheet_gradients(trip_cpu_voxels *raster, uint64_t squares,
+                                                      const trip_cpu_voxels *left,
+                                                      const trip_cpu_voxels *above,
+                                                      const trip_cpu_voxels *sheet_before,
+                                                      const trip_cpu_voxels *sheet_behind)
 {
-    squares_gradients(codes, squares, false, left, above, sheet_before, sheet_behind, gradients);
+    squares_gradients(raster, squares, false, left, above, sheet_before, sheet_behind);
 }
 
-static __attribute__((noinline)) void sheet_outlines(const int16_t *codes, uint64_t squares,
-                                                     const int16_t *left, const int16_t *above,
-                                                     const int16_t *sheet_before,
-                                                     const int16_t *sheet_behind,
-                                                     trip_cpu_gradient *gradients)
+static __attribute__((noinline)) void sheet_outlines(trip_cpu_voxels *raster, uint64_t squares,
+                                                     const trip_cpu_voxels *left,
+                                                     const trip_cpu_voxels *above,
+                                                     const trip_cpu_voxels *sheet_before,
+                                                     const trip_cpu_voxels *sheet_behind)
 {
-    squares_gradients(codes, squares, true, left, above, sheet_before, sheet_behind, gradients);
+    squares_gradients(raster, squares, true, left, above, sheet_before, sheet_behind);
 }
 
 INLINE vh mean_or_between(vh a, vh b, int32_t weights)

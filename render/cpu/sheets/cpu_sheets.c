@@ -74,7 +74,6 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     const trip_plan *plan = r->frame->plan;
     const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
     s->store.drawn = plan->draw.of_stored;
-    s->store.sloped = r->frame->settings->shading ? plan->draw.slope_of_stored : NULL;
     s->store.codes = trip_cpu_codes_of(plan->code_min, plan->code_max);
     s->store.coordinates = &r->frame->data->coordinates;
     s->sheet_pane =
@@ -142,7 +141,7 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const tr
     const uint64_t min = need->rasters + s->sample_rasters;
     const uint64_t max = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SAMPLES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
-    while (sheets > fewest && trip_cpu_store_bytes(&s->store, all, sheets, 2 * min) > room)
+    while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * min) > room)
         sheets--;
     s->max = (int)(sheets > fewest + 2 ? sheets - 4 : fewest - 2);
     return trip_cpu_store_fit(&s->store, all, sheets, min, max, room);
@@ -195,8 +194,8 @@ static int find_min(const trip_cpu_sheets *s, uint64_t *bytes)
         status = trip_cpu_need_find(&need, layer, rasters_in(&all), held_sheets, s->store.budget);
         if (status)
             break;
-        uint64_t min = trip_cpu_windows_min_bytes(&s->store, &all, reach_of(frame), &need,
-                                                  held_sheets, frame->settings->samples_per_sheet);
+        uint64_t min = trip_cpu_windows_min_bytes(&all, reach_of(frame), &need, held_sheets,
+                                                  frame->settings->samples_per_sheet);
         *bytes = min > *bytes ? min : *bytes;
     }
     return status;
@@ -514,7 +513,6 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     const unsigned segments = (unsigned)s->of->frame->settings->samples_per_sheet;
     const trip_cpu_group given = s->group;
     s->group = (trip_cpu_group){ .pool = store->voxels,
-                                 .slopes = store->slopes,
                                  .first_u = store->first_u * TRIP_CPU_RASTER,
                                  .first_v = store->first_v * TRIP_CPU_RASTER,
                                  .across = store->across,

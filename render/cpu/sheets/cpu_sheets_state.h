@@ -118,8 +118,8 @@ void trip_cpu_sheets_find_gradients(trip_cpu_sheets *s, const trip_cpu_sheet_wor
 /* trip_cpu_windows_min_bytes() returns the bytes of the smallest windows. trip_cpu_windows_fit()
  * makes room for the largest windows that fit `room` bytes. It returns false if `room` is too
  * small. */
-uint64_t trip_cpu_windows_min_bytes(const trip_cpu_store *s, const trip_cpu_rasters *all,
-                                    int64_t reach, const trip_cpu_need *need, int held_sheets,
+uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
+                                    const trip_cpu_need *need, int held_sheets,
                                     int samples_per_sheet);
 bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room);

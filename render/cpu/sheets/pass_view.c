@@ -36,10 +36,9 @@ static double outline_unit(const trip_cpu_sheet_view *view, const trip_frame *fr
 static void set_gradient(trip_cpu_sheet_view *view, const trip_frame *frame, trip_cpu_codes codes)
 {
     const trip_draw_codes *draw = &frame->plan->draw;
-    double full = trip_shade_gradient_full(&frame->data->header, frame->settings, 1, frame->plan->level);
-    const bool sloped = draw->slope_of_stored != NULL;
-    const double range = sloped ? draw->slope_hi - draw->slope_lo : draw->hi - draw->lo;
-    double unit = ldexp(0.5 * range / 65535 / full, sloped ? 0 : -(int)codes.shift) /
+    double full =
+        trip_shade_gradient_full(&frame->data->header, frame->settings, 1, frame->plan->level);
+    double unit = ldexp(0.5 * trip_draw_value_per_code(draw) / full, -(int)codes.shift) /
                   trip_cpu_gradient_unit(&frame->data->coordinates);
     const double(*m)[3] = (const double(*)[3])view->world;
     if (view->kernel == TRIP_KERNEL_NEAREST)

@@ -9,24 +9,15 @@
 #include "field.h"
 #include "report.h"
 
-static size_t raster_bytes(const trip_cpu_store *s)
-{
-    return sizeof(trip_cpu_voxels) + (s->sloped ? sizeof(trip_cpu_slopes) : 0);
-}
+static const size_t raster_bytes = sizeof(trip_cpu_voxels);
 
 /* ---- memory ---- */
 
-static void clear_codes(int16_t *codes)
-{
-    for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++)
-        codes[i] = TRIP_CPU_CODE_MISSING;
-}
-
 void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster)
 {
-    clear_codes(s->voxels[raster].codes);
-    if (s->slopes)
-        clear_codes(s->slopes[raster]);
+    int16_t *codes = s->voxels[raster].codes;
+    for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++)
+        codes[i] = TRIP_CPU_CODE_MISSING;
 }
 
 static void free_all(trip_cpu_store *s)
@@ -38,11 +29,9 @@ static void free_all(trip_cpu_store *s)
 
 static void release_voxels(trip_cpu_store *s)
 {
-    trip_budget_release(s->budget, s->voxels, s->rasters * sizeof *s->voxels);
-    trip_budget_release(s->budget, s->slopes, s->rasters * sizeof *s->slopes);
+    trip_budget_release(s->budget, s->voxels, s->voxels_bytes);
     trip_budget_release(s->budget, s->free, s->rasters * sizeof *s->free);
     s->voxels = NULL;
-    s->slopes = NULL;
     s->free = NULL;
     s->voxels_bytes = 0;
     s->rasters = 0;
@@ -52,16 +41,14 @@ static void release_voxels(trip_cpu_store *s)
  * `wanted`. Returns false without memory. */
 static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
 {
-    if (s->rasters >= min && s->rasters >= wanted / 2 && !s->slopes == !s->sloped)
+    if (s->rasters >= min && s->rasters >= wanted / 2)
         return true;
     release_voxels(s);
     s->rasters = (uint32_t)wanted;
-    s->voxels_bytes = wanted * raster_bytes(s);
-    s->voxels = trip_budget_take(s->budget, wanted * sizeof *s->voxels);
-    if (s->sloped)
-        s->slopes = trip_budget_take(s->budget, wanted * sizeof *s->slopes);
+    s->voxels_bytes = wanted * raster_bytes;
+    s->voxels = trip_budget_take(s->budget, s->voxels_bytes);
     s->free = trip_budget_take(s->budget, s->rasters * sizeof *s->free);
-    if (!s->voxels || !s->free || (s->sloped && !s->slopes))
+    if (!s->voxels || !s->free)
         release_voxels(s);
     return s->voxels != NULL;
 }
@@ -156,11 +143,10 @@ static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets)
     return lay_out(&of, NULL);
 }
 
-uint64_t trip_cpu_store_bytes(const trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                              uint64_t rasters)
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters)
 {
     uint64_t grids = has_grid(all) ? grid_bytes(all, sheets) : UINT64_MAX / 2;
-    return grids + (rasters + 1) * (raster_bytes(s) + sizeof(int32_t));
+    return grids + (rasters + 1) * (raster_bytes + sizeof(int32_t));
 }
 
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
@@ -172,10 +158,10 @@ bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned
                         uint64_t min, uint64_t max, uint64_t room)
 {
     const uint64_t greatest = TRIP_CPU_RASTERS_MAX - 1;
-    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(s, all, sheets, min) > room)
+    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, min) > room)
         return false;
     max = max < greatest ? max : greatest;
-    uint64_t fit = (room - grid_bytes(all, sheets)) / (raster_bytes(s) + sizeof *s->free) - 1;
+    uint64_t fit = (room - grid_bytes(all, sheets)) / (raster_bytes + sizeof *s->free) - 1;
     s->sheet_room = sheets;
     set_grid(s, all);
     if (s->rasters > fit + 1)
@@ -225,18 +211,18 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
 
 static const uint16_t positions[64] = { PLACES16(0), PLACES16(16), PLACES16(32), PLACES16(48) };
 
-/* Writes the codes of a square's records, mapped by `map` unless it is NULL, stretched and biased.
- * The local arrays cannot alias, so the compiler vectorises the loops. */
-static void square_codes(const uint16_t stored[64], uint32_t count, const uint16_t *map,
-                         trip_cpu_codes stretch, int16_t out[64])
+/* Writes the draw codes of a square's records, stretched and biased. The local arrays cannot alias,
+ * so the compiler vectorises the loops. */
+static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t out[64])
 {
     uint16_t codes[64];
     int16_t biased[64];
-    for (uint32_t i = 0; i < count; i++)
-        codes[i] = stored[i];
-    if (map)
+    const uint32_t count = at->count;
+    const trip_cpu_codes stretch = s->codes;
+    trip_square_codes(at, codes);
+    if (s->drawn)
         for (uint32_t i = 0; i < count; i++)
-            codes[i] = map[codes[i]];
+            codes[i] = s->drawn[codes[i]];
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
@@ -245,31 +231,18 @@ static void square_codes(const uint16_t stored[64], uint32_t count, const uint16
     memcpy(out, biased, sizeof *out * count);
 }
 
-/* Writes codes to the positions of a square's voxels. `to` is the first position. */
-static void put_codes(int16_t *to, uint64_t mask, const int16_t codes[64])
+static void decode_square(const trip_cpu_store *s, int16_t *to, const trip_square *at)
 {
+    int16_t codes[64];
     const int16_t *next = codes;
-    if (mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
+    square_codes(s, at, codes);
+    if (at->mask == UINT64_MAX) { /* each pair of voxels is adjacent in a row */
         for (unsigned i = 0; i < 64; i += 2)
             memcpy(to + positions[i], codes + i, 2 * sizeof *codes);
         return;
     }
-    for (uint64_t rest = mask; rest; rest &= rest - 1)
+    for (uint64_t rest = at->mask; rest; rest &= rest - 1)
         to[positions[__builtin_ctzll(rest)]] = *next++;
-}
-
-/* Decodes a square into a raster. `first` is the position of its first voxel. */
-static void decode_square(const trip_cpu_store *s, int32_t raster, int first, const trip_square *at)
-{
-    uint16_t stored[64];
-    int16_t codes[64];
-    trip_square_codes(at, stored);
-    square_codes(stored, at->count, s->drawn, s->codes, codes);
-    put_codes(s->voxels[raster].codes + first, at->mask, codes);
-    if (!s->slopes)
-        return;
-    square_codes(stored, at->count, s->sloped, (trip_cpu_codes){ 0 }, codes);
-    put_codes(s->slopes[raster] + first, at->mask, codes);
 }
 
 static bool is_within(const trip_cpu_store *s, int64_t u, int64_t v)
@@ -295,7 +268,8 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         const uint64_t bit = UINT64_C(1) << (v / 8 * TRIP_CPU_SQUARES_ACROSS + u / 8);
         if (!sheet->rasters[at] || !(s->open[at] & bit))
             continue;
-        decode_square(s, sheet->rasters[at], v * TRIP_CPU_RASTER_STRIDE + u, square);
+        decode_square(s, s->voxels[sheet->rasters[at]].codes + v * TRIP_CPU_RASTER_STRIDE + u,
+                      square);
         atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
     }
 }
@@ -345,27 +319,18 @@ static trip_cpu_voxels *raster_at(const trip_cpu_store *s, const trip_cpu_sheet 
 
 /* Copies the first column of the raster to the right, the first row of the raster below, and the
  * first voxel of the raster diagonally behind. */
-static void copy_beside(int16_t *to, const int16_t *right, const int16_t *below,
-                        const int16_t *diagonal)
+static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
+    const trip_cpu_store *s = job->store;
+    size_t across = (size_t)s->across;
+    int16_t *to = raster_at(s, w->sheet, at)->codes;
+    const int16_t *right = raster_at(s, w->sheet, at + 1)->codes;
+    const int16_t *below = raster_at(s, w->sheet, at + across)->codes;
     for (int v = 0; v < TRIP_CPU_RASTER; v++)
         to[v * TRIP_CPU_RASTER_STRIDE + TRIP_CPU_RASTER] = right[v * TRIP_CPU_RASTER_STRIDE];
     int16_t *last = to + TRIP_CPU_RASTER * TRIP_CPU_RASTER_STRIDE;
     memcpy(last, below, TRIP_CPU_RASTER * sizeof *last);
-    last[TRIP_CPU_RASTER] = diagonal[0];
-}
-
-static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
-{
-    const trip_cpu_store *s = job->store;
-    const size_t across = (size_t)s->across;
-    const int32_t *rasters = w->sheet->rasters;
-    copy_beside(raster_at(s, w->sheet, at)->codes, raster_at(s, w->sheet, at + 1)->codes,
-                raster_at(s, w->sheet, at + across)->codes,
-                raster_at(s, w->sheet, at + across + 1)->codes);
-    if (s->slopes)
-        copy_beside(s->slopes[rasters[at]], s->slopes[rasters[at + 1]],
-                    s->slopes[rasters[at + across]], s->slopes[rasters[at + across + 1]]);
+    last[TRIP_CPU_RASTER] = raster_at(s, w->sheet, at + across + 1)->codes[0];
 }
 
 static void copy_gradients_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
@@ -563,23 +528,16 @@ void trip_cpu_store_find_visible(trip_cpu_store *s, const trip_cpu_sheet_work *w
     run_work(&(work_job){ .store = s, .work = work, .each = find_needed }, count);
 }
 
-/* Returns the codes that gradients are differences of. */
-static const int16_t *slopes_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
-{
-    return s->slopes ? s->slopes[sheet ? sheet->rasters[at] : 0] : raster_at(s, sheet, at)->codes;
-}
-
 static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_store *s = job->store;
     const size_t across = (size_t)s->across;
     const trip_cpu_uneven_raster r = {
-        .codes = slopes_at(s, w->sheet, at),
-        .left = slopes_at(s, w->sheet, at - 1),
-        .above = slopes_at(s, w->sheet, at - across),
-        .sheet_before = slopes_at(s, w->other, at),
-        .sheet_behind = slopes_at(s, w->third, at),
-        .gradients = raster_at(s, w->sheet, at)->gradients,
+        .raster = raster_at(s, w->sheet, at),
+        .left = raster_at(s, w->sheet, at - 1),
+        .above = raster_at(s, w->sheet, at - across),
+        .sheet_before = raster_at(s, w->other, at),
+        .sheet_behind = raster_at(s, w->third, at),
         .first = { (s->first_u + (int64_t)(at % across)) * TRIP_CPU_RASTER,
                    (s->first_v + (int64_t)(at / across)) * TRIP_CPU_RASTER, w->sheet->number },
         .axis = s->axis,
@@ -587,8 +545,8 @@ static void find_gradients(const work_job *job, const trip_cpu_sheet_work *w, si
     if (trip_coordinates_uneven(s->coordinates))
         trip_cpu_uneven_gradients(s->coordinates, &r, w->kernel == TRIP_KERNEL_NEAREST);
     else
-        s->kernels->sheet_gradients(r.codes, UINT64_MAX, r.left, r.above, r.sheet_before,
-                                    r.sheet_behind, r.gradients);
+        s->kernels->sheet_gradients(r.raster, UINT64_MAX, r.left, r.above, r.sheet_before,
+                                    r.sheet_behind);
 }
 
 void trip_cpu_store_find_gradients(trip_cpu_store *s, const trip_cpu_sheet_work *work,

@@ -57,12 +57,7 @@ typedef struct trip_cpu_store {
     const trip_coordinates *coordinates;
     int axis; /* axis of the layer's lists */
 
-    /* The slope code of each stored code. NULL if gradients are differences of draw codes, or if
-     * the frame needs no gradients. */
-    const uint16_t *sloped;
-
     trip_cpu_voxels *voxels; /* the pool of rasters; raster 0 has only missing voxels */
-    trip_cpu_slopes *slopes; /* of the same rasters; NULL unless `sloped` */
     size_t voxels_bytes;
     int32_t *free; /* numbers of free rasters */
     uint32_t rasters, free_count;
@@ -79,8 +74,7 @@ typedef struct trip_cpu_store {
 } trip_cpu_store;
 
 /* Returns the bytes of `sheets` sheets of a rectangle, with a pool of `rasters` rasters. */
-uint64_t trip_cpu_store_bytes(const trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
-                              uint64_t rasters);
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters);
 /* Returns the bytes that the store holds from the budget. */
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
 /* Makes room for `sheets` sheets of a rectangle and for `min` to `max` rasters, in at most `room`

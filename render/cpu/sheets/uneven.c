@@ -39,11 +39,11 @@ static trip_cpu_gradient gradient_of(const trip_coordinates *c, const trip_cpu_u
 {
     enum { STRIDE = TRIP_CPU_RASTER_STRIDE, LAST = TRIP_CPU_RASTER - 1 };
     const int i = v * STRIDE + u;
-    const int16_t *at = r->codes + i;
+    const int16_t *at = r->raster->codes + i;
     const row rows[3] = {
-        { u ? at[-1] : r->left[i + LAST], *at, at[1] },
-        { v ? at[-STRIDE] : r->above[i + LAST * STRIDE], *at, at[STRIDE] },
-        { r->sheet_before[i], *at, r->sheet_behind[i] },
+        { u ? at[-1] : r->left->codes[i + LAST], *at, at[1] },
+        { v ? at[-STRIDE] : r->above->codes[i + LAST * STRIDE], *at, at[STRIDE] },
+        { r->sheet_before->codes[i], *at, r->sheet_behind->codes[i] },
     };
     const int64_t voxel[3] = { r->first[0] + u, r->first[1] + v, r->first[2] };
     trip_cpu_gradient g;
@@ -62,7 +62,7 @@ void trip_cpu_uneven_gradients(const trip_coordinates *c, const trip_cpu_uneven_
     for (int v = 0; v < TRIP_CPU_RASTER; v++)
         for (int u = 0; u < TRIP_CPU_RASTER; u++) {
             const int at = v * TRIP_CPU_RASTER_STRIDE + u;
-            if (r->codes[at] != TRIP_CPU_CODE_MISSING)
-                r->gradients[at] = gradient_of(c, r, u, v, unit, outlines);
+            if (r->raster->codes[at] != TRIP_CPU_CODE_MISSING)
+                r->raster->gradients[at] = gradient_of(c, r, u, v, unit, outlines);
         }
 }

@@ -17,8 +17,8 @@ double trip_cpu_outline_unit(const trip_coordinates *c);
 
 /* A raster and its neighbours, as for the kernel sheet_gradients(). */
 typedef struct trip_cpu_uneven_raster {
-    const int16_t *codes, *left, *above, *sheet_before, *sheet_behind;
-    trip_cpu_gradient *gradients;
+    trip_cpu_voxels *raster;
+    const trip_cpu_voxels *left, *above, *sheet_before, *sheet_behind;
     int64_t first[3]; /* index of the first voxel: u, v, sheet */
     int axis;         /* axis of the list */
 } trip_cpu_uneven_raster;

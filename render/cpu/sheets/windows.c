@@ -37,12 +37,11 @@ static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_samples)
            (uint64_t)sheets_and_samples;
 }
 
-static uint64_t bytes_of(const trip_cpu_store *s, const trip_cpu_rasters *all,
-                         const int64_t size[2], int64_t reach, int sheets, int samples_per_sheet)
+static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,
+                         int sheets, int samples_per_sheet)
 {
     trip_cpu_rasters b = held_rasters(all, size, reach);
-    return trip_cpu_store_bytes(s, &b, (unsigned)sheets,
-                                rasters_of(&b, sheets + samples_per_sheet));
+    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + samples_per_sheet));
 }
 
 static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
@@ -50,12 +49,11 @@ static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
     return (uint64_t)sheets * sheet_bytes(need);
 }
 
-uint64_t trip_cpu_windows_min_bytes(const trip_cpu_store *s, const trip_cpu_rasters *all,
-                                    int64_t reach, const trip_cpu_need *need, int sheets,
-                                    int samples_per_sheet)
+uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
+                                    const trip_cpu_need *need, int sheets, int samples_per_sheet)
 {
     const int64_t one[2] = { 1, 1 };
-    return kept_bytes(need, sheets) + bytes_of(s, all, one, reach, sheets, samples_per_sheet);
+    return kept_bytes(need, sheets) + bytes_of(all, one, reach, sheets, samples_per_sheet);
 }
 
 static bool take_runs(trip_cpu_windows *w, const trip_cpu_need *need, trip_budget *budget)
@@ -88,7 +86,7 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
     const int samples_per_sheet = s->of->frame->settings->samples_per_sheet;
     const int sheets = trip_cpu_sheets_held(s->of->frame);
     const uint64_t kept = kept_bytes(need, sheets);
-    if (trip_cpu_windows_min_bytes(&s->store, all, reach, need, sheets, samples_per_sheet) > room)
+    if (trip_cpu_windows_min_bytes(all, reach, need, sheets, samples_per_sheet) > room)
         return false;
     w->room = sheets;
     w->about = trip_cpu_sheets_about(s->of->frame);
@@ -97,7 +95,7 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
     w->count = w->from = 0;
     for (int a = 0; a < 2; a++)
         w->size[a] = all->last[a] - all->first[a] + 1;
-    while (bytes_of(&s->store, all, w->size, reach, sheets, samples_per_sheet) > room - kept) {
+    while (bytes_of(all, w->size, reach, sheets, samples_per_sheet) > room - kept) {
         int longer = w->size[0] > w->size[1] ? 0 : 1;
         w->size[longer] = (w->size[longer] + 1) / 2;
     }
