@@ -94,7 +94,8 @@ typedef struct trip_image_stack {
     int32_t oriented; /* the file states the directions of the map */
     double slope, inter;
     double index_to_world[3][4];
-    char space[8];         /* anatomical, as in anatomy.h; terminated */
+    char space[4];         /* anatomical, as in anatomy.h; terminated */
+    char up[4];            /* "+z": up by the custom of the format, or ""; terminated */
     char modality[24];     /* from DICOM, at most 16 characters; terminated */
     uint64_t helper_bytes; /* part of the allowed memory used until the helper ends */
     int32_t uneven;        /* 1: dims[2] doubles follow, the positions of the slices, ascending */

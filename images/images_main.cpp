@@ -155,6 +155,7 @@ class Session
         s.inter = stack_->inter;
         std::memcpy(s.index_to_world, stack_->index_to_world.m, sizeof s.index_to_world);
         std::memcpy(s.space, stack_->space, sizeof s.space);
+        std::memcpy(s.up, stack_->up, sizeof s.up);
         std::memcpy(s.modality, stack_->modality, sizeof s.modality);
         s.oriented = stack_->oriented;
         s.uneven = !stack_->along.empty();

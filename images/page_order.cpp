@@ -197,6 +197,7 @@ void imagej_spacing(const trip_page_source &s, trip_page_order &order)
         if (s.per_unit[a] > 0 && std::isfinite(s.per_unit[a]) &&
             !(tagged && s.unit == "in" && name.empty()))
             order.spacing[a] = 1 / s.per_unit[a];
+    order.measured = !imagej_text(text, "spacing").empty() || order.spacing[0] != 1;
     const double z = std::fabs(imagej_number(text, "spacing", 1));
     order.spacing[2] = z > 0 && std::isfinite(z) ? z : 1;
     const std::string own[2] = { imagej_text(text, "yunit"), imagej_text(text, "zunit") };
@@ -429,6 +430,7 @@ void ome_spacing(const trip_page_source &s, const Ome &ome, trip_page_order &ord
     const double x = ome.spacing[0];
     if (!(x > 0))
         return;
+    order.measured = true;
     for (int a = 0; a < 3; a++)
         order.spacing[a] =
             ome.spacing[a] > 0 ? convert(ome.spacing[a], find_unit(ome.unit[a]), unit) : x;

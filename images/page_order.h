@@ -26,6 +26,7 @@ struct trip_page_order {
     std::vector<int64_t> pages;
     int64_t sample = 0;              /* the value of each pixel that is the channel */
     double spacing[3] = { 1, 1, 1 }; /* in `unit` */
+    bool measured = false;           /* the description gives distances: microscopy */
     double slope = 1, inter = 0;     /* ImageJ's calibration of values */
     std::string note;                /* choices made for the user */
 };

@@ -188,6 +188,8 @@ void PictureStack::order_pages(const OIIO::ImageSpec &first, const std::vector<i
     sample_ = (int)order.sample;
     slope = order.slope;
     inter = order.inter;
+    if (order.measured) /* slices of microscopes are no scan of a head from the top down */
+        std::strcpy(up, "+z");
     for (int a = 0; a < 3; a++)
         index_to_world.m[a][a] = order.spacing[a];
     if (files_.names.size() > 1)

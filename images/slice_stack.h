@@ -43,7 +43,8 @@ class trip_slice_stack
     trip_scalar type = TRIP_U8;
     double slope = 1, inter = 0; /* value = slope * stored + inter */
     trip_affine index_to_world = { { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } } };
-    char space[8] = "";        /* anatomical, as in anatomy.h */
+    char space[4] = "";        /* anatomical, as in anatomy.h */
+    char up[4] = "";           /* "+z": up by the custom of the format */
     char modality[24] = "";    /* from DICOM: "CT", "MR", ... */
     bool oriented = false;     /* the file states the directions of the map */
     std::vector<double> along; /* positions of slices at uneven distances, ascending, else empty */

@@ -196,6 +196,20 @@ static int choose_settings(triptych *t)
     return choose_interpolation(t);
 }
 
+int trip_context_takes_nearest(triptych *t, bool *out)
+{
+    /* The last frame's choices stay, since its statistics name them. */
+    const trip_settings drawn = t->drawn_settings;
+    const char *why_pre = t->why_pre;
+    const bool chosen = t->nearest_chosen;
+    const int status = choose_settings(t);
+    *out = t->drawn_settings.kernel == TRIP_KERNEL_NEAREST && trip_context_draws_values(t);
+    t->drawn_settings = drawn;
+    t->why_pre = why_pre;
+    t->nearest_chosen = chosen;
+    return status;
+}
+
 /* Chooses the levels of the frame by the camera of level 0. A frame with distances or with a light
  * map needs one level: distances belong to one surface, and a light map to one level. */
 static int choose_parts(triptych *t)

@@ -134,6 +134,8 @@ void trip_context_drop_level(triptych *t);
 trip_clip trip_context_clip(const triptych *t);
 /* Also destroys the reader, which may lie in the renderer's memory. */
 void trip_context_drop_renderer(triptych *t);
+/* Tells whether the next frame takes the value of the nearest voxel. No frame may be begun. */
+int trip_context_takes_nearest(triptych *t, bool *out);
 /* Chooses the effects of the planned frame and sets them in drawn_settings. */
 int trip_context_choose_effects(triptych *t);
 /* Prepares the light map and the heat for the planned frame. Destroys them if no effect needs them.

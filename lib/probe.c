@@ -23,7 +23,9 @@ static triptych_hit hit_of(const trip_ray_probe *probe, const trip_ray_hit *foun
     const trip_draw_codes *draw = &probe->draw;
     trip_vec3 position = trip_add(probe->origin, trip_scale(probe->direction, found->z));
     triptych_hit hit = { .opacity = found->opacity,
-                         .value = draw->lo + (draw->hi - draw->lo) * found->code / 65535,
+                         .value = draw->of_stored
+                                      ? draw->lo + (draw->hi - draw->lo) * found->code / 65535
+                                      : trip_codes_value(&draw->stored, found->code),
                          .depth = found->z * probe->world_per_z,
                          .depth_first = found->first_z * probe->world_per_z };
     for (int a = 0; a < 3; a++)
@@ -68,14 +70,19 @@ int triptych_probe(triptych *t, double x, double y, triptych_hit *out)
 {
     trip_scope *before = trip_context_enter_anew(t);
     trip_camera camera;
+    bool nearest = false;
     *out = (triptych_hit){ 0 };
     int status = prepare(t, x, y, &camera);
+    if (!status)
+        status = trip_context_takes_nearest(t, &nearest);
     if (status)
         return trip_context_leave(before, status);
     trip_ray_probe probe = { .data = t->session.data,
                              .budget = t->session.budget,
-                             .table = session_table(&t->session, true),
-                             .draw = t->session.draw,
+                             .table = session_table(&t->session, !nearest),
+                             .draw = nearest ? trip_draw_codes_as_stored(&t->session.data->codes)
+                                             : t->session.draw,
+                             .nearest = nearest,
                              .origin = origin_of(&camera, x, y),
                              .direction = trip_camera_ray(&camera, x, y),
                              .world_per_z = trip_camera_ray_length(&camera, x, y),

@@ -628,7 +628,9 @@ typedef struct triptych_hit {
     double opacity;
     double position[3]; /* world space */
     double index[3];    /* the same position in index space */
-    /* The interpolated value where the ray meets the sheet nearest to the position. */
+    /* The interpolated value where the ray meets the sheet nearest to the position. Without
+     * interpolation (TRIPTYCH_INTERPOLATION_NEAREST), the value of the voxel around the position.
+     */
     double value;
     /* World units from the eye along the ray; in parallel views, from the plane of the eye. */
     double depth;

@@ -15,7 +15,6 @@
 #include "report.h"
 #include "text.h"
 
-
 /* Prints numbers in their shortest exact form, because cJSON's form differs between versions. */
 static cJSON *number(double value)
 {
@@ -275,6 +274,8 @@ static orientation guess(const trip_volume_info *info, trip_orientation u)
 {
     if (!strcmp(info->format, "openvdb"))
         return orient_vdb(info, u);
+    if (info->up[0])
+        return (orientation){ "format", info->up, NULL, NULL, true };
     if (!strcmp(info->format, "nifti"))
         return (orientation){ "format", "+z", "+y", "NIfTI is taken to be in its usual space",
                               false };

@@ -237,6 +237,9 @@ void trip_netcdf_file::open_variable(const std::string &name, const trip_netcdf_
                                      uint64_t memory_bytes)
 {
     variable found;
+    int minc;
+    if (nc_inq_grp_ncid(file_, "minc-2.0", &minc) == NC_NOERR)
+        throw trip_netcdf_error(TRIP_VOLUME_MINC);
     find(file_, "", name, found);
     if (found.number < 0)
         throw trip_netcdf_error(name.empty() ? "has no variable of numbers with three dimensions"

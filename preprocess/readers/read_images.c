@@ -46,6 +46,8 @@ static const char *fault_of(const trip_image_stack *stack)
     if (!memchr(stack->space, '\0', sizeof stack->space) || (stack->oriented & ~1) ||
         (stack->space[0] && !trip_anatomy_known(stack->space)))
         return "an unknown space";
+    if (!memchr(stack->up, '\0', sizeof stack->up) || (stack->up[0] && strcmp(stack->up, "+z")))
+        return "an unknown direction";
     if (!memchr(stack->note, '\0', sizeof stack->note) || (stack->uneven & ~1))
         return "an invalid note";
     if (!is_modality(stack->modality, sizeof stack->modality))
@@ -110,7 +112,8 @@ static void describe(const trip_image_stack *stack, trip_volume_info *info)
 {
     memcpy(info->dims, stack->dims, sizeof info->dims);
     memcpy(info->index_to_world.m, stack->index_to_world, sizeof info->index_to_world.m);
-    memcpy(info->space, stack->space, sizeof info->space);
+    snprintf(info->space, sizeof info->space, "%s", stack->space);
+    snprintf(info->up, sizeof info->up, "%.2s", stack->up);
     memcpy(info->modality, stack->modality, sizeof info->modality);
     snprintf(info->note, sizeof info->note, "%s", stack->note);
     info->oriented = stack->oriented != 0;

@@ -7,6 +7,9 @@
  * - Integers are unsigned if the attribute _Unsigned is "true". CDF-1 and CDF-2 have no unsigned
  *   types.
  *
+ * MINC 1 files are refused: each slice has a scale of its own, in the variables image-min and
+ * image-max.
+ *
  * This reader does not use libnetcdf. For damaged files, nc_open() of version 4.9.0 writes beyond
  * its memory and allocates gigabytes. It also reads truncated files without an error. */
 #include <fcntl.h>
@@ -54,6 +57,7 @@ typedef struct variable {
     unsigned dims;
     uint64_t dim[DIMS_MAX];
     int scalar;       /* trip_scalar; -1 for characters */
+    bool minc;        /* has an attribute of MINC */
     bool is_unsigned; /* overrides the type in the file */
     uint64_t begin;
     double slope, inter, missing[2]; /* NaN if absent */
@@ -177,6 +181,8 @@ static void take_attribute(header *h, variable *v)
         return;
     }
     const unsigned char *values = take_bytes(h, bytes);
+    if (v && (is_named(name, "signtype") || is_named(name, "vartype")))
+        v->minc = true;
     if (v && values && type == TYPE_CHAR && is_named(name, "_Unsigned"))
         v->is_unsigned = is_true(values, bytes);
     if (!v || !values || count == 0 || type == TYPE_CHAR)
@@ -382,6 +388,18 @@ static double volume_of(const header *h, const variable *v)
     return values;
 }
 
+static int refuse_minc(const header *h)
+{
+    bool image = false, marked = false;
+    for (uint64_t i = 0; i < h->variable_count; i++) {
+        const variable *v = &h->variables[i];
+        image |= is_named(v->name, "image");
+        marked |= is_named(v->name, "image-min") || is_named(v->name, "image-max") ||
+                  (is_named(v->name, "image") && v->minc);
+    }
+    return image && marked ? trip_fail(TRIP_ERROR, "read", h->path, "%s", TRIP_VOLUME_MINC) : 0;
+}
+
 /* Chooses the named variable, or else the variable with the most values. */
 static int choose_variable(const header *h, const char *name, const variable **out)
 {
@@ -546,6 +564,8 @@ static int open_variable(netcdf *n, const trip_volume_params *params, trip_volum
     header h = { 0 };
     const variable *v;
     int status = read_header(&h, n->fd, n->path);
+    if (!status)
+        status = refuse_minc(&h);
     if (!status)
         status = choose_variable(&h, params->grid, &v);
     if (!status)

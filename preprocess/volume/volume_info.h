@@ -79,7 +79,8 @@ typedef struct trip_volume_info {
     char space[8]; /* orientation of world space in the patient: "RAS", or "" if unknown. Readers
                       may set "LPS"; opening a volume turns it into "RAS". */
     bool oriented; /* the file gives the directions of its axes in world space */
-    char up[3];    /* "+y" or "+z", which is up in the program that wrote the file; "" if unknown */
+    char up[3];    /* "+y" or "+z", which is up in the program that wrote the file, or by the custom
+                      of image stacks from microscopes; "" if unknown */
     char modality[17]; /* DICOM modality, "CT", "MR", ...; "" if unknown */
     bool labels;       /* the file states that its values are labels */
     bool named_labels; /* its name does */
@@ -100,6 +101,10 @@ int trip_volume_check_dims(const char *path, const trip_volume_info *info);
 int trip_volume_check_axes(const char *path, const trip_volume_info *info);
 
 #define TRIP_VOLUME_COLOUR_NOTE "the values are colours; their luma (Rec. 709) is read"
+
+/* Why MINC files, which are netCDF or HDF5, are refused. */
+#define TRIP_VOLUME_MINC                                                                           \
+    "is a MINC file; the scales of its slices are not read: convert it to NIfTI with `mnc2nii`"
 
 /* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
  * Returns false and fills `why` if `index` is none of them. The second function reports this and

@@ -37,14 +37,20 @@ static double z_of(const samples *s, double sheet)
            trip_component(p->direction, s->axis);
 }
 
-/* Returns the ray's u (`which` is 0) or v (1) at a sheet, in voxels. */
-static double across(const samples *s, double sheet, int which)
+/* Returns the ray's u (`which` is 0) or v (1) at z, in voxels. */
+static double across_at(const samples *s, double z, int which)
 {
     const trip_ray_probe *p = s->probe;
-    int axis = (s->axis + 1 + which) % 3;
+    const int axis = (s->axis + 1 + which) % 3;
     return trip_coordinates_index(positions(s), axis,
                                   trip_component(p->origin, axis) +
-                                      z_of(s, sheet) * trip_component(p->direction, axis));
+                                      z * trip_component(p->direction, axis));
+}
+
+/* Returns u or v at a sheet. */
+static double across(const samples *s, double sheet, int which)
+{
+    return across_at(s, z_of(s, sheet), which);
 }
 
 /* Narrows [from, to] to the part where o + z d lies in [lo, hi]. */
@@ -171,8 +177,8 @@ static int read_kind(samples *s, trip_kind kind)
     return status;
 }
 
-/* Computes the draw code where the ray meets a sheet. Returns false if the nearest voxel is
- * missing.
+/* Computes the draw code where the ray meets a sheet, interpolated. Returns false if the nearest
+ * voxel is missing.
  */
 static bool code_at(const samples *s, int64_t sheet, double *code)
 {
@@ -203,20 +209,69 @@ static double extinction(const trip_tf_entry *table, double code)
     return (1 - t) * (double)table[lower].extinction + t * (double)table[upper].extinction;
 }
 
-/* The piece of the ray that belongs to a sheet. */
+/* With the nearest value, the pieces of a sheet are cut at one face along u and one along v. */
+enum { NEAREST_PIECES = 3 };
+
+static int64_t pieces_of(const samples *s)
+{
+    return s->probe->nearest ? s->count * NEAREST_PIECES : s->count;
+}
+
+/* A piece of the ray that belongs to a sheet. */
 typedef struct piece {
     double from, to, code;
     double depth; /* optical depth */
 } piece;
 
+/* Returns u (`which` is 0) or v (1) of the face between the voxels on either side of the point
+ * where the ray meets a sheet.
+ */
+static double face_at(const samples *s, int64_t sheet, int which)
+{
+    return floor(across(s, (double)sheet, which)) + 0.5;
+}
+
+/* Returns z where the ray meets the face, moved into [from, to]. */
+static double cut_at(const samples *s, int64_t sheet, int which, double from, double to)
+{
+    const trip_ray_probe *p = s->probe;
+    const int axis = (s->axis + 1 + which) % 3;
+    const double d = trip_component(p->direction, axis);
+    const double face = trip_coordinates_position(positions(s), axis, face_at(s, sheet, which));
+    return d == 0 ? from : fmin(to, fmax(from, (face - trip_component(p->origin, axis)) / d));
+}
+
+/* Narrows a sheet's piece to one of its NEAREST_PIECES parts. Returns false if the part is empty or
+ * its voxel missing.
+ */
+static bool narrow_to_box(const samples *s, int64_t sheet, int64_t part, piece *out)
+{
+    const double u = cut_at(s, sheet, 0, out->from, out->to);
+    const double v = cut_at(s, sheet, 1, out->from, out->to);
+    const double ends[NEAREST_PIECES + 1] = { out->from, fmin(u, v), fmax(u, v), out->to };
+    out->from = ends[part];
+    out->to = ends[part + 1];
+    if (!(out->from < out->to))
+        return false;
+    const double middle = 0.5 * (out->from + out->to);
+    const int corner = (across_at(s, middle, 0) >= face_at(s, sheet, 0)) +
+                       2 * (across_at(s, middle, 1) >= face_at(s, sheet, 1));
+    const uint32_t code = s->codes[4 * (sheet - s->first) + corner];
+    out->code = code;
+    return code != NOTHING;
+}
+
 /* Computes the n-th piece, counted from the eye. Returns false if the piece is not visible. */
 static bool piece_at(const samples *s, int64_t n, piece *out)
 {
+    const bool nearest = s->probe->nearest;
+    const int64_t at = nearest ? n / NEAREST_PIECES : n;
     bool ascends = trip_component(s->probe->direction, s->axis) > 0;
-    int64_t sheet = s->first + (ascends ? n : s->count - 1 - n);
+    int64_t sheet = s->first + (ascends ? at : s->count - 1 - at);
     double a = z_of(s, (double)sheet - 0.5), b = z_of(s, (double)sheet + 0.5);
     *out = (piece){ .from = fmax(s->from, fmin(a, b)), .to = fmin(s->to, fmax(a, b)) };
-    if (!(out->from < out->to) || !code_at(s, sheet, &out->code))
+    if (!(out->from < out->to) || !(nearest ? narrow_to_box(s, sheet, n % NEAREST_PIECES, out)
+                                            : code_at(s, sheet, &out->code)))
         return false;
     out->depth =
         extinction(s->probe->table, out->code) * (out->to - out->from) * s->probe->world_per_z;
@@ -228,14 +283,14 @@ static void find_hit(const samples *s, trip_ray_hit *out)
     double whole = 0, sum = 0;
     piece p;
     *out = (trip_ray_hit){ 0 };
-    for (int64_t n = s->count - 1; n >= 0; n--)
+    for (int64_t n = pieces_of(s) - 1; n >= 0; n--)
         if (piece_at(s, n, &p)) {
             whole += p.depth;
             out->first_z = p.from;
         }
     out->opacity = -expm1(-whole);
     double wanted = -log1p(-out->opacity / 2);
-    for (int64_t n = 0; n < s->count && sum < wanted; n++)
+    for (int64_t n = 0; n < pieces_of(s) && sum < wanted; n++)
         if (piece_at(s, n, &p)) {
             out->z = p.from + (p.to - p.from) * fmin(1, (wanted - sum) / p.depth);
             out->code = p.code;

@@ -4,7 +4,10 @@
  * The list along the ray's largest component divides the ray into one piece per sheet. A piece
  * reaches from midway between two sheets to midway between the next two. Its value is the value
  * where the ray meets the sheet, interpolated between the four voxels around that point. If one of
- * the four is missing, the value of the nearest voxel is used. */
+ * the four is missing, the value of the nearest voxel is used.
+ *
+ * With the nearest value, a piece ends also where the ray leaves the box of a voxel (sheet.h). The
+ * voxel's value is used. With uneven spacing, the nearest of the four voxels is used. */
 #ifndef TRIP_RAY_PROBE_H
 #define TRIP_RAY_PROBE_H
 
@@ -19,6 +22,7 @@ typedef struct trip_ray_probe {
     trip_budget *budget;
     const trip_tf_entry *table; /* of draw codes */
     trip_draw_codes draw;       /* zero if draw codes are stored codes */
+    bool nearest;               /* no interpolation; draw codes are then stored codes */
     /* The ray is origin + z * direction, z >= 0, in index space. With uneven spacing the
      * coordinates are positions (coordinates.h). A piece with a z length of 1 is world_per_z world
      * units long. */

@@ -79,6 +79,17 @@ class Regress(program.ProgramTest):
         self.fails(2, "brick", source, "-o", "no.trip", "--channel=2", says="has 2 channels")
         self.fails(2, "brick", source, "-o", "no.trip", "--time=1", says="has one time")
 
+    def test_microscopy_stands_with_z_up(self):
+        """Long voxels counted as a scan of a head from the top down."""
+        source = os.path.join(REGRESS, "two-channels.ome.tif")
+        for spacing in (), ("--spacing=1,1,3",):
+            self.brick(source, "ome.trip", "--force", *spacing)
+            notes = self.info("ome.trip")["source"]
+            self.assertEqual((notes["orientation"], notes["up"]), ("format", "+z"))
+        up, default = (self.picture("ome.trip", *VIEW, *options) for options in (("--up=0,0,1",), ()))
+        self.assertGreater(default.std(), 0.01)
+        self.assertTrue((up == default).all())
+
     def test_the_absent_value_of_a_tiff_is_absent(self):
         """The value -9999 of the first three planes counted as a value."""
         s = self.values(os.path.join(REGRESS, "unknown-tags.tif"))

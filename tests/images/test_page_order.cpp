@@ -96,6 +96,7 @@ void imagej_gives_distances(void **)
     s.per_unit[0] = 4;
     s.per_unit[1] = 2;
     assert_spacing(order_of(s), 0.25, 0.5, 1.5);
+    assert_true(order_of(s).measured);
     assert_non_null(strstr(order_of(s).note.c_str(), "lengths are in um"));
     s.description = "ImageJ=1\nspacing=-2e-3\nunit=\\u00B5m\nzunit=mm\n";
     assert_spacing(order_of(s), 0.25, 0.5, 2);
@@ -103,6 +104,7 @@ void imagej_gives_distances(void **)
     s.unit = "in"; /* a unit without a description of it */
     s.per_unit[0] = s.per_unit[1] = 72;
     assert_spacing(order_of(s), 1, 1, 1);
+    assert_false(order_of(s).measured);
     s.per_unit[0] = s.per_unit[1] = 100;
     assert_spacing(order_of(s), 0.01, 0.01, 1);
     s.per_unit[0] = s.per_unit[1] = 0;

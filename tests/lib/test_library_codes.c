@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "contexts.h"
+#include "triptych_brick.h"
 
 enum { NX = 24, NY = 20, NZ = 28, SIZE = 40, FLOATS = 4 * SIZE * SIZE, KNOTS = 257 };
 
@@ -156,11 +157,96 @@ static void the_probe_returns_a_value_of_the_volume(void **state)
     unlink("window.tf");
 }
 
+/* Ids with gaps. Voxels alternate between the second and the third. */
+static const double ids[] = { 0, 7, 4000000000.0 };
+
+static bool label(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)gradient;
+    *code = 1 + (unsigned)(i + j + k) % 2;
+    return true;
+}
+
+static void the_probe_returns_the_id_of_the_nearest_voxel(void **state)
+{
+    (void)state;
+    const trip_codes codes = trip_codes_from_table(ids, 3, 0);
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { NX, NY, NZ }, .codes = &codes, .voxel = label });
+    triptych *t = open_scene(&s, TRIPTYCH_RENDERER_CPU);
+    triptych_settings settings = { 0 };
+    settings.classify = TRIPTYCH_CLASSIFY_POST;
+    settings.interpolation = TRIPTYCH_INTERPOLATION_NEAREST;
+    assert_int_equal(triptych_set_settings(t, &settings), 0);
+    write_function("ids.tf", 1, 7);
+    assert_int_equal(
+        triptych_set_transfer_function(t, &(triptych_transfer_function){ .name = "ids.tf" }), 0);
+    int found = 0;
+    for (int n = 0; n < 100; n++) {
+        triptych_hit hit;
+        assert_int_equal(
+            triptych_probe(t, SIZE / 3.0 + n % 10 * 1.3, SIZE / 3.0 + n / 10 * 1.3, &hit), 0);
+        if (hit.opacity == 0)
+            continue;
+        const int sum = (int)(floor(hit.index[0] + 0.5) + floor(hit.index[1] + 0.5) +
+                              floor(hit.index[2] + 0.5));
+        assert_true(hit.value == (sum % 2 ? 4000000000.0 : 7));
+        found |= 1 << sum % 2;
+    }
+    assert_int_equal(found, 3);
+    triptych_destroy(t);
+    scene_destroy(&s);
+    unlink("ids.tf");
+}
+
+/* No interpolation is given. The data set has even codes, and the labels 3 and 9 touch: linear
+ * interpolation gives values between them.
+ */
+static void the_probe_returns_a_label_of_labels(void **state)
+{
+    (void)state;
+    enum { SIDE = 16 };
+    static uint16_t values[SIDE * SIDE * SIDE];
+    for (int n = 0; n < SIDE * SIDE * SIDE; n++) {
+        const int i = n % SIDE, j = n / SIDE % SIDE, k = n / SIDE / SIDE;
+        const bool inside = i > 1 && i < 14 && j > 1 && j < 14 && k > 1 && k < 14;
+        values[n] = !inside ? 0 : (i / 2 + j / 2 + k / 2) % 2 ? 3 : 9;
+    }
+    const triptych_volume volume = { .type = "uint16",
+                                     .dims = { SIDE, SIDE, SIDE },
+                                     .data = values };
+    const triptych_brick_options options = { .in_memory = &volume, .replace = 1, .keep_all = 1 };
+    triptych *t = new_context();
+    if (triptych_brick(t, "seg.raw", "seg.trip", &options, NULL) ||
+        triptych_open(t, "seg.trip", &(triptych_resources){ .memory_bytes = 256 << 20 }) ||
+        triptych_set_view(t, &(triptych_view){ .width = SIZE, .height = SIZE }))
+        fail_msg("%s", triptych_error(t));
+    int found = 0;
+    for (int n = 0; n < 100; n++) {
+        triptych_hit hit;
+        if (triptych_probe(t, SIZE / 3.0 + n % 10 * 1.3, SIZE / 3.0 + n / 10 * 1.3, &hit))
+            fail_msg("%s", triptych_error(t));
+        if (hit.opacity == 0)
+            continue;
+        int at[3];
+        for (int a = 0; a < 3; a++)
+            at[a] = (int)floor(hit.index[a] + 0.5);
+        const uint16_t value = values[at[0] + SIDE * (at[1] + SIDE * at[2])];
+        assert_close(hit.value, value, 1e-9);
+        found |= value == 3 ? 1 : value == 9 ? 2 : 0;
+    }
+    assert_int_equal(found, 3);
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r seg.trip"), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_function_has_draw_codes_of_its_own),
         cmocka_unit_test(the_probe_returns_a_value_of_the_volume),
+        cmocka_unit_test(the_probe_returns_the_id_of_the_nearest_voxel),
+        cmocka_unit_test(the_probe_returns_a_label_of_labels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,6 +52,7 @@ typedef struct contents {
     bool coordinates; /* x and z have coordinates */
     bool scaled;      /* t has scale 2 and offset 3 */
     bool lost;        /* the scale is 0 instead of 2 */
+    const char *minc; /* an attribute of "image", which then is the name of t, or a variable */
     bool missing;     /* 5 means a missing value, -7 if unsigned */
     bool is_unsigned; /* t is unsigned, and so is x, which then has one byte */
     int type;         /* type of t: 1 int8, 3 int16, 5 float */
@@ -110,9 +111,22 @@ static void put_header(file *f, const contents *c)
     put_text(f, "title");
     put(&f->b, 2, 4);
     put_text(f, "a test");
-    put_list(f, 11, c->coordinates ? 3 : 1);
-    put_variable(f, "t", volume, 3);
-    put_list(f, 12, (c->scaled ? 2 : 0) + (c->missing ? 1 : 0) + (c->is_unsigned ? 1 : 0));
+    const bool minc_variable = c->minc && !strncmp(c->minc, "image-", 6);
+    put_list(f, 11, 1 + (c->coordinates ? 2 : 0) + (minc_variable ? 1 : 0));
+    if (minc_variable) {
+        put_variable(f, c->minc, &z, 1);
+        put_list(f, 12, 0);
+        end_variable(f, 3, 6, NZ * 8);
+    }
+    put_variable(f, c->minc ? "image" : "t", volume, 3);
+    put_list(f, 12,
+             (c->scaled ? 2 : 0) + (c->missing ? 1 : 0) + (c->is_unsigned ? 1 : 0) +
+                 (c->minc && !minc_variable ? 1 : 0));
+    if (c->minc && !minc_variable) {
+        put_text(f, c->minc);
+        put(&f->b, 2, 4);
+        put_text(f, "signed__");
+    }
     if (c->scaled) {
         put_float_attribute(f, "scale_factor", c->lost ? 0 : 2);
         put_float_attribute(f, "add_offset", 3);
@@ -444,6 +458,20 @@ static void a_variable_is_chosen_by_name(void **state)
                       "is not numeric or has fewer than three dimensions");
 }
 
+/* Each slice of a MINC file has a scale of its own. An "image" without the marks is read. */
+static void minc_is_refused(void **state)
+{
+    (void)state;
+    static const char *const marks[] = { "signtype", "vartype", "image-min", "image-max" };
+    for (int i = 0; i < 4; i++) {
+        const contents c = { .form = 1, .type = 3, .minc = marks[i] };
+        assert_refused(write_contents("m.mnc", &c), "is a MINC file");
+        assert_refused(write_contents("m.mnc", &c), "convert it to NIfTI with `mnc2nii`");
+    }
+    const contents other = { .form = 1, .type = 3, .minc = "units" };
+    assert_holds_sample(write_contents("image.nc", &other), NULL, TRIP_I16);
+}
+
 /* Writes 60,000 variables of one number each. */
 static void a_header_takes_little_memory(void **state)
 {
@@ -502,6 +530,7 @@ int main(void)
         cmocka_unit_test(errors_give_the_byte_where_the_header_is_invalid),
         cmocka_unit_test(the_unsigned_attribute_applies),
         cmocka_unit_test(a_variable_is_chosen_by_name),
+        cmocka_unit_test(minc_is_refused),
         cmocka_unit_test(a_header_takes_little_memory),
         cmocka_unit_test(damaged_files_are_read_or_refused),
     };

@@ -344,6 +344,20 @@ static void chunks_and_slices_too_large_for_memory_are_refused(void **state)
     }
 }
 
+/* MINC 2 is HDF5 with a group of this name. */
+static void minc_is_refused(void **state)
+{
+    (void)state;
+    const contents c = { .type = NC_SHORT };
+    const char *path = write_contents("minc2.mnc", &c);
+    int file, group;
+    assert_int_equal(nc_open(path, NC_WRITE, &file), 0);
+    assert_int_equal(nc_def_grp(file, "minc-2.0", &group), 0);
+    assert_int_equal(nc_close(file), 0);
+    assert_refused(path, "is a MINC file");
+    assert_refused(path, "convert it to NIfTI with `mnc2nii`");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -353,6 +367,7 @@ int main(void)
         cmocka_unit_test(numbers_are_scaled_and_missing_ones_have_no_value),
         cmocka_unit_test(the_unsigned_attribute_applies),
         cmocka_unit_test(a_variable_is_chosen_by_name),
+        cmocka_unit_test(minc_is_refused),
         cmocka_unit_test(truncated_files_are_refused),
         cmocka_unit_test(damaged_files_are_read_or_refused),
         cmocka_unit_test(answers_of_the_helper_are_not_trusted),

@@ -34,9 +34,11 @@ static void make(scene *s, scene_voxel voxel, unsigned tile_voxels, unsigned sla
                                      .voxel = voxel });
 }
 
-static trip_ray_hit find(const scene *s, trip_vec3 origin, trip_vec3 direction, double world_per_z)
+static trip_ray_hit find_by(bool nearest, const scene *s, trip_vec3 origin, trip_vec3 direction,
+                            double world_per_z)
 {
-    trip_ray_probe p = { .data = s->data,
+    trip_ray_probe p = { .nearest = nearest,
+                         .data = s->data,
                          .budget = s->budget,
                          .table = s->table,
                          .origin = origin,
@@ -48,6 +50,11 @@ static trip_ray_hit find(const scene *s, trip_vec3 origin, trip_vec3 direction, 
     assert_int_equal(trip_ray_probe_find(&p, &hit), 0);
     trip_reader_destroy(p.reader);
     return hit;
+}
+
+static trip_ray_hit find(const scene *s, trip_vec3 origin, trip_vec3 direction, double world_per_z)
+{
+    return find_by(false, s, origin, direction, world_per_z);
 }
 
 /* A wall of constant extinction: light is lost exponentially from its face on. */
@@ -162,6 +169,61 @@ static void voxels_lie_at_the_coordinates_of_the_tables(void **state)
     scene_destroy(&s);
 }
 
+/* The box of voxel 20 begins at 19.5 and includes that point. */
+static void the_nearest_voxel_gives_the_value_in_its_box(void **state)
+{
+    (void)state;
+    const double next_below = nextafter(19.5, 0);
+    scene s;
+    make(&s, wall, 16, 4);
+    scene_colour(&s, 0, 65535, 1, 1, 1, 0.1);
+    for (int below = 0; below < 2; below++) {
+        const trip_vec3 eye = trip_v3(below ? next_below : 19.5, 12.3, -5);
+        const double expected = below ? 50000 : 20000;
+        assert_close(find_by(true, &s, eye, trip_v3(0, 0, 1), 1).code, expected, 0);
+        assert_close(find(&s, eye, trip_v3(0, 0, 1), 1).code, 35000, 1);
+    }
+    /* The wall's boxes span x from 9.5 to 19.5, where this ray has z 3.125 and 128.125. */
+    scene_colour(&s, 0, 65535, 0, 0, 0, 0);
+    scene_colour(&s, 50000, 50000, 1, 1, 1, 0.1);
+    const trip_ray_hit hit = find_by(true, &s, trip_v3(9.25, 12.3, -1), trip_v3(0.08, 0, 1), 1);
+    assert_close(hit.first_z, 3.125, 1e-12);
+    /* Obliquely in two directions, from the far end: x is 19.5 at 2.875, within a sheet of z. */
+    const trip_ray_hit back = find_by(true, &s, trip_v3(21.8, 30, NZ), trip_v3(-0.8, -0.3, -1), 1);
+    assert_close(back.first_z, 2.875, 1e-12);
+    assert_close(back.code, 50000, 0);
+    scene_destroy(&s);
+}
+
+/* Neighbours have codes far apart. */
+static bool mixed(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)gradient;
+    *code = ((unsigned)i * 7919 + (unsigned)j * 104729 + (unsigned)k * 1299709) % 60000 + 1;
+    return true;
+}
+
+static void the_nearest_value_belongs_to_the_voxel_at_the_hit(void **state)
+{
+    (void)state;
+    scene s;
+    make(&s, mixed, 32, 4);
+    scene_colour(&s, 0, 65535, 1, 1, 1, 0.2);
+    for (int n = 0; n < 60; n++) {
+        const double angle = n * 0.7;
+        const trip_vec3 d = trip_v3(cos(angle), sin(angle) * cos(n), sin(angle) * sin(n));
+        const trip_vec3 inside = trip_v3(20.3 + 0.37 * n, 10.1 + n % 20, 8.2 + n % 13);
+        const trip_vec3 eye = trip_sub(inside, trip_scale(d, 3 + n % 5));
+        const trip_ray_hit hit = find_by(true, &s, eye, d, 1);
+        const trip_vec3 p = trip_add(eye, trip_scale(d, hit.z));
+        unsigned code = 0;
+        mixed(NULL, (int)floor(p.x + 0.5), (int)floor(p.y + 0.5), (int)floor(p.z + 0.5), &code,
+              NULL);
+        assert_close(hit.code, code, 0);
+    }
+    scene_destroy(&s);
+}
+
 static void rays_hit_nothing_behind_the_eye_or_beside_the_grid(void **state)
 {
     (void)state;
@@ -183,6 +245,8 @@ int main(void)
         cmocka_unit_test(values_are_interpolated_for_any_tile_size),
         cmocka_unit_test(a_lone_voxel_reaches_half_way_to_its_neighbours),
         cmocka_unit_test(voxels_lie_at_the_coordinates_of_the_tables),
+        cmocka_unit_test(the_nearest_voxel_gives_the_value_in_its_box),
+        cmocka_unit_test(the_nearest_value_belongs_to_the_voxel_at_the_hit),
         cmocka_unit_test(rays_hit_nothing_behind_the_eye_or_beside_the_grid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
