@@ -124,6 +124,47 @@ static span choose_range(span data, span typical, span changing, double nearest,
     return widened(changing, widest - width, most);
 }
 
+/* ---- the map ---- */
+
+/* Codes beyond `from` grow like a square root: at a distance x by 2 scale (sqrt(1 + x / scale) -
+ * 1). The growth begins as x. */
+typedef struct tail {
+    double from, scale;
+} tail;
+
+/* Returns a tail that takes the exact code `farthest` to `end`. It begins halfway between the part
+ * in which the function changes and `end`. */
+static tail tail_to(double changing, double end, double farthest)
+{
+    const double from = changing + (end - changing) / 2;
+    const double room = fabs(end - from), reach = fabs(farthest - from);
+    return (tail){ from, room * room / (4 * (reach - room)) };
+}
+
+static double squeezed(const tail *t, double code)
+{
+    const double grown = sqrt(1 + fabs(code - t->from) / t->scale) - 1;
+    return t->from + copysign(2 * t->scale * grown, code - t->from);
+}
+
+/* Fills the map. If values lie beyond the range, the outer half of the codes on that side are a
+ * tail. Gradients of far values then keep their direction. */
+static void fill_map(const trip_draw_codes *d, span changing, uint16_t map[TRIP_CODES])
+{
+    const double first = trip_draw_code_exact(d, 0), last = trip_draw_code_exact(d, LAST);
+    const double per_code = trip_draw_value_per_code(d);
+    const tail below = tail_to((changing.lo - d->lo) / per_code, 0, first);
+    const tail above = tail_to((changing.hi - d->lo) / per_code, LAST, last);
+    for (unsigned stored = 0; stored < TRIP_CODES; stored++) {
+        double code = trip_draw_code_exact(d, stored);
+        if (first < 0 && code < below.from)
+            code = squeezed(&below, code);
+        else if (last > LAST && code > above.from)
+            code = squeezed(&above, code);
+        map[stored] = (uint16_t)(fmin(LAST, fmax(0, code)) + 0.5);
+    }
+}
+
 trip_draw_codes trip_draw_codes_as_stored(const trip_codes *stored)
 {
     return (trip_draw_codes){ .lo = stored->lo, .hi = stored->hi, .stored = *stored };
@@ -148,8 +189,7 @@ trip_draw_codes trip_draw_codes_for(const trip_tf *tf, const trip_codes *stored,
         d.hi = range.hi;
     }
     d.of_stored = map;
-    for (unsigned code = 0; code < TRIP_CODES; code++)
-        map[code] = (uint16_t)(fmin(LAST, fmax(0, trip_draw_code_exact(&d, code))) + 0.5);
+    fill_map(&d, p.of, map);
     return d;
 }
 

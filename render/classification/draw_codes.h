@@ -3,11 +3,12 @@
  * stored codes. Otherwise a map converts each stored code to a draw code. The draw codes then cover
  * the values between which the transfer function changes, and a margin around them.
  *
- * Beyond the range of draw codes the function is constant. The CPU renderer has codes of 16 bits,
- * so it counts values there as the nearest end. A surface moves only in cells that have values
- * beyond the range. If a cell has values beyond both ends, its surface lies in the middle. The
- * range therefore covers all typical values, unless the function changes within a small part of
- * them. The reference, the integral and gl use exact codes beyond the range.
+ * Beyond the range of draw codes the function is constant. The CPU renderer has codes of 16 bits.
+ * So its map squeezes values there, and half of the margin, into the outer half of the margin's
+ * codes. Gradients keep their directions. A surface moves only in cells that have squeezed values.
+ * If a cell has values beyond both ends, its surface lies in the middle. The range therefore covers
+ * all typical values, unless the function changes within a small part of them. The reference, the
+ * integral and gl use exact codes beyond the range.
  *
  * Plain values and pure functions. */
 #ifndef TRIP_DRAW_CODES_H
