@@ -51,9 +51,10 @@ int cached_volume_check_options(const char *input)
 {
     return cached_volume_wanted(input)
                ? 0
-               : trip_fail(TRIP_USAGE, "usage", input,
-                           "is a data set; --grid, --level-set, --spacing, --coordinates, --axes, "
-                           "--series, --time, --channel, --allow-gaps and --fill apply to volumes only");
+               : trip_fail(
+                     TRIP_USAGE, "usage", input,
+                     "is a data set; --grid, --level-set, --spacing, --coordinates, --axes, "
+                     "--series, --time, --channel, --allow-gaps and --fill apply to volumes only");
 }
 
 /* Shows on a terminal that another process is bricking the same volume. */

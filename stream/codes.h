@@ -30,7 +30,7 @@ trip_codes trip_codes_of(const trip_file_header *h, const double *table);
 /* Returns codes with a table. lo and hi follow from the table. */
 trip_codes trip_codes_from_table(const double *table, uint32_t entries, unsigned step_log2);
 
-/* Returns what is wrong with a table, or NULL. Values must be finite and must not descend. The
+/* Returns the fault of a table, or NULL. Values must be finite and must not descend. The
  * first must be less than the last, unless there is one. At most 65,537 entries fit, and the last
  * must not lie behind code 65536. */
 const char *trip_codes_fault(const double *table, uint32_t entries, unsigned step_log2);

@@ -431,7 +431,7 @@ static void find_gradients(const square *const around[AROUND], const distances a
     gradients_of(around, along, NULL, out);
 }
 
-/* The same for codes with a table. */
+/* Finds the gradients of values, for codes with a table. */
 static void find_gradients_of_values(const square *const around[AROUND], const distances along[3],
                                      const float *values, gradients *out)
 {

@@ -1,6 +1,6 @@
 /* The distinct values of a volume of labels. Integers of 32 and 64 bits do not fit in floats, and
- * 16-bit codes over their range merge them. Such a volume is therefore read as ranks. The rank of
- * an id is the number of smaller ids in the volume.
+ * 16-bit codes over their range merge them. The reader therefore reads such a volume as ranks. The
+ * rank of an id is the number of smaller ids in the volume.
  *
  * A key stands for an integer and ascends with it. */
 #ifndef TRIP_IDS_H

@@ -16,8 +16,8 @@ enum { TRIP_SAMPLE_MAX = 32768, TRIP_EXTREMES = 128 };
 typedef struct trip_value_sample {
     uint32_t log2, count;
     uint32_t least_count, greatest_count;
-    float least[TRIP_EXTREMES];    /* a heap; the first is the greatest of them */
-    float greatest[TRIP_EXTREMES]; /* a heap; the first is the least of them */
+    float least[TRIP_EXTREMES];    /* a heap; the first is its maximum */
+    float greatest[TRIP_EXTREMES]; /* a heap; the first is its minimum */
     float values[TRIP_SAMPLE_MAX];
     uint8_t ranks[TRIP_SAMPLE_MAX];
 } trip_value_sample;

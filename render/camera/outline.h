@@ -32,9 +32,9 @@ typedef struct trip_reach_origin {
 
 #define TRIP_OUTLINE_OPACITY (8.0 / 255)
 
-/* Returns the codes of voxels that count in the visible extent: codes of typical values (format.h)
- * or, if none of them has an extinction of at least `min`, all codes. A hot voxel beside an object
- * does not make the object smaller. */
+/* Returns the codes that count in the visible extent. These are the codes of typical values
+ * (format.h). All codes count if no typical value has an extinction of at least `min`. A hot voxel
+ * beside an object does not make the object smaller. */
 trip_code_range trip_outline_codes(const trip_dataset *data, const trip_tf_entry *table,
                                    double min);
 
