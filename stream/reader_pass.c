@@ -502,6 +502,8 @@ static int next_slot(trip_reader *r, trip_batch *batch)
         r->failed = check_blocks(r, batch);
     }
     s->state = r->failed ? TRIP_SLOT_FREE : TRIP_SLOT_DRAWING;
+    if (r->failed)
+        *batch = (trip_batch){ 0 };
     return r->failed ? r->failed : 1;
 }
 

@@ -358,7 +358,8 @@ static void compressed_files_of_other_formats_are_refused(void **state)
 {
     (void)state;
     static const struct {
-        const char *head, *says;
+        char head[9];
+        const char *says;
     } formats[] = {
         { "II*\0\10", "its format (images) can only be read unpacked" },
         { "\x89HDF\r\n\x1a\n", "its format (netcdf) can only be read unpacked" },

@@ -152,9 +152,14 @@ static void nearest_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     s->there = vi_is_0(lacking(g, at) | lacking(g, beside));
     s->gradient_at = near + v_truncate(c.part[0] + v_set(0.5f)) +
                      v_truncate(c.part[1] + v_set(0.5f)) * TRIP_CPU_RASTER_STRIDE;
+    /* Rays without a box may lie outside of the raster. They take its first voxel. */
     vi_store(at, s->gradient_at);
-    for (int i = 0; i < V; i++)
+    for (int i = 0; i < V; i++) {
+        if (at[i] < 0 || at[i] % RASTER_NUMBERS >= TRIP_CPU_RASTER_VOXELS)
+            at[i] = 0;
         codes[i] = ((const int16_t *)g->pool)[at[i]];
+    }
+    s->gradient_at = vi_load(at);
     s->index = ((vi_load(codes) + TRIP_CPU_CODE_BIAS) >> view->code_shift) + view->code_first;
     s->lit = s->summed = false;
 }
