@@ -164,6 +164,18 @@ static void nearest_at(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
     s->lit = s->summed = false;
 }
 
+/* Lets rays that see nothing read the gradient of the missing raster. Another thread may be making
+ * the gradients of their own squares. */
+INLINE void forget_closed(sample *s, vm open)
+{
+    const vf opens = v_select(open, v_set(1), v_set(0));
+    int32_t at[V];
+    vi_store(at, s->gradient_at);
+    for (int i = 0; i < V; i++)
+        at[i] = opens[i] > 0 ? at[i] : 0;
+    s->gradient_at = vi_load(at);
+}
+
 /* The gradients of a raster lie behind its codes. */
 INLINE void find_nearest_gradients(const trip_cpu_group *g, sample *s)
 {

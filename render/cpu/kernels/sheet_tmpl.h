@@ -1183,6 +1183,8 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
         way = &of_position;
     }
     if (view->shading) {
+        if (NEAREST)
+            forget_closed(a, open);
         find_light(view, g, a);
         find_light(view, g, b);
         lit = surface_between(view, path, l, way, a, b);
