@@ -3,8 +3,7 @@
  * thread at a time. The keys are:
  *
  *   "format"             "openvdb", "nrrd", ...: the format of the volume
- *   "space"              "RAS", in older data sets also "LPS": the anatomical directions of world
- *                        space (anatomy.h)
+ *   "space"              "RAS": the anatomical directions of world space (anatomy.h)
  *   "oriented"           true if the file gave the directions of its axes: nothing is guessed
  *   "mirror"             "x", "y" or "z": the only axis of the grid across which the kept voxels
  *                        are mirror-symmetric; for volumes without orientation

@@ -487,9 +487,8 @@ static void describe(const header *h, const variable *v, trip_volume_info *info)
                  v->dims > 5 ? ", at the first index of its other dimensions" : "");
 }
 
-/* Chooses the time and the channel from the first dimensions before the last three. *record gets
- * the index of the record. *volume gets the number of volumes before the chosen one in its record.
- */
+/* Chooses the time and the channel from the first dimensions before the last three. Sets `record`
+ * to the index of the record. Sets `volume` to the number of earlier volumes in the record. */
 static int choose_entries(const header *h, const variable *v, const trip_volume_params *params,
                           trip_volume_info *info, uint64_t *record, uint64_t *volume)
 {
