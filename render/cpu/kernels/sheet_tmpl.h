@@ -547,8 +547,8 @@ static void find_raster(const trip_cpu_group *g, const pane_path *path, unsigned
 }
 
 /* Finds the raster of segment n for the nearest value: the raster that contains the patch's cells
- * at both sample planes. A raster repeats the first column and row of its neighbours. All corners of
- * the cells therefore lie in the raster. */
+ * at both sample planes. A raster repeats the first column and row of its neighbours. All corners
+ * of the cells therefore lie in the raster. */
 static void find_nearest_raster(const trip_cpu_group *g, const pane_path *path, unsigned n,
                                 bool whole, const cell_boxes *boxes, patch_path *area)
 {
