@@ -1,0 +1,39 @@
+# Functions that print progress. Other scripts read this file.
+
+progress_tenth=0
+
+# progress LABEL DONE TOTAL NOTE: replaces the last line on a terminal. Elsewhere prints a line after
+# each tenth of the whole.
+progress() {
+    if [ -t 1 ]; then
+        printf '\r%.79s\033[K' "$1: $2 of $3  $4"
+        return
+    fi
+    tenth=$((10 * $2 / $3))
+    if [ "$tenth" -gt "$progress_tenth" ]; then
+        echo "$1: $2 of $3"
+    fi
+    progress_tenth=$tenth
+}
+
+# Removes the line of progress() from a terminal.
+progress_end() {
+    progress_tenth=0
+    if [ -t 1 ]; then
+        printf '\r\033[K'
+    fi
+}
+
+# duration SECONDS: prints a duration such as `3 min 20 s`.
+duration() {
+    if [ "$1" -ge 60 ]; then
+        echo "$(($1 / 60)) min $(($1 % 60)) s"
+    else
+        echo "$1 s"
+    fi
+}
+
+# free_megabytes FOLDER: prints the room on the folder's disk.
+free_megabytes() {
+    df -Pm "$1" | awk 'NR == 2 { print $4 }'
+}
