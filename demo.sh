@@ -59,7 +59,8 @@ compile() { # TARGET
             case $line in
             "["*/*"] "*)
                 done=${line#"["} total=${line#*/}
-                progress Building "${done%%/*}" "${total%%"]"*}" "${line##*/}"
+                done=${done%%/*} total=${total%%"]"*}
+                progress Building $((100 * done / total)) "$done of $total"
                 ;;
             "demo: failed") failed=1 ;;
             esac

@@ -79,7 +79,7 @@ apt() {
         $as_root env LC_ALL=C DEBIAN_FRONTEND=noninteractive sh -c 'exec apt-get -q -y -o APT::Status-Fd=3 "$@" 3>&1 >&2' \
             apt "$@" 2>>"$log" </dev/null || echo "failed"
     } | {
-        failed=0 last=
+        failed=0
         while IFS=: read -r kind _ percent note; do
             case $kind in
             dlstatus) step=$label ;;
@@ -87,12 +87,10 @@ apt() {
             failed) failed=1; continue ;;
             *) continue ;;
             esac
-            [ "$step" = "$last" ] || progress_tenth=0
-            last=$step
             percent=${percent%%.*}
             case $percent in
             '' | *[!0-9]*) ;;
-            *) progress "$step" "$percent" "100 %" "$note" ;;
+            *) progress "$step" "$percent" "$note" ;;
             esac
         done
         progress_end
@@ -112,13 +110,12 @@ plan=$(apt-get --print-uris -y --no-install-recommends install $missing 2>>"$log
     tail -20 "$log" >&2
     fail "apt-get cannot install:$missing"
 }
-# The three lines of apt-get: 0 upgraded, 85 newly installed...; Need to get 78.1 MB...; After this
-# operation, 298 MB...
-count=$(echo "$plan" | sed -n 's/^\([0-9]*\) upgraded, \([0-9]*\) newly.*/\1 + \2/p')
+# apt-get prints: 0 upgraded, 85 newly installed...; Need to get 78.1 MB...; After this operation, 298 MB...
+count=$(echo "$plan" | awk '/^[0-9]+ upgraded, / { print $1 + $3 }')
 megabytes() { sed -n "s|$1|\\1 \\2|p" | awk '{ print int($1 * ($2 == "GB" ? 1000 : $2 == "MB" ? 1 : 0) + 1) }'; }
 fetched=$(echo "$plan" | megabytes '^Need to get \([0-9.]*\) \([kMG]*B\).*')
 grows=$(echo "$plan" | megabytes '^After this operation, \([0-9.]*\) \([kMG]*B\) of additional.*')
-echo "Packages: $((count)), ${fetched:-0} MB to fetch, ${grows:-0} MB on disk"
+echo "Packages: $count, ${fetched:-0} MB to fetch, ${grows:-0} MB on disk"
 room=$(free_megabytes /usr)
 needed=$((${fetched:-0} + ${grows:-0}))
 [ "$needed" -le "$room" ] || fail "the packages need $needed MB, but the disk of /usr has $room MB free"

@@ -1,24 +1,29 @@
+# shellcheck shell=sh
 # Functions that print progress. Other scripts read this file.
 
+progress_label=
 progress_tenth=0
 
-# progress LABEL DONE TOTAL NOTE: replaces the last line on a terminal. Elsewhere prints a line after
-# each tenth of the whole.
+# progress LABEL PERCENT NOTE: replaces the last line on a terminal. Elsewhere prints a line after each
+# tenth of the whole.
 progress() {
     if [ -t 1 ]; then
-        printf '\r%.79s\033[K' "$1: $2 of $3  $4"
+        printf '\r%.79s\033[K' "$1: $2 %  $3"
         return
     fi
-    tenth=$((10 * $2 / $3))
-    if [ "$tenth" -gt "$progress_tenth" ]; then
-        echo "$1: $2 of $3"
+    if [ "$1" != "$progress_label" ]; then
+        progress_tenth=0
     fi
-    progress_tenth=$tenth
+    if [ $(($2 / 10)) -gt "$progress_tenth" ]; then
+        echo "$1: $2 %  $3"
+    fi
+    progress_label=$1
+    progress_tenth=$(($2 / 10))
 }
 
 # Removes the line of progress() from a terminal.
 progress_end() {
-    progress_tenth=0
+    progress_label=
     if [ -t 1 ]; then
         printf '\r\033[K'
     fi

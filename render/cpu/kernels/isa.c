@@ -5,6 +5,37 @@
 
 #include "report.h"
 
+#if defined(__x86_64__)
+static inline bool has_avx2(void)
+{
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+           __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
+}
+
+#if defined(TRIP_CPU_EMULATED_AVX512)
+static inline bool has_avx512(void)
+{
+    return has_avx2();
+}
+
+static inline bool has_vbmi2(void)
+{
+    return true;
+}
+#else
+static inline bool has_avx512(void)
+{
+    return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+}
+
+static inline bool has_vbmi2(void)
+{
+    return __builtin_cpu_supports("avx512vbmi2");
+}
+#endif
+#endif
+
 /* find_runnable() fills the list once, before main() starts any thread. */
 static const trip_cpu_kernels *runnable[5];
 
@@ -13,23 +44,18 @@ __attribute__((constructor)) static void find_runnable(void)
     int n = 0;
 #if defined(__x86_64__)
     __builtin_cpu_init();
-    bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
-#if !defined(TRIP_CPU_WITHOUT_AVX512)
-#if defined(TRIP_CPU_EMULATED_AVX512)
-    bool avx512 = avx2, vbmi2 = true;
-#else
-    bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-                  __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-    bool vbmi2 = __builtin_cpu_supports("avx512vbmi2");
-#endif
-    if (avx512 && vbmi2)
+#if !defined(TRIP_CPU_WITHOUT_AVX512_VBMI2)
+    if (has_avx512() && has_vbmi2())
         runnable[n++] = &trip_cpu_avx512_vbmi2;
-    if (avx512)
+#endif
+#if !defined(TRIP_CPU_WITHOUT_AVX512)
+    if (has_avx512())
         runnable[n++] = &trip_cpu_avx512;
 #endif
-    if (avx2)
+#if !defined(TRIP_CPU_WITHOUT_AVX2)
+    if (has_avx2())
         runnable[n++] = &trip_cpu_avx2;
+#endif
 #elif defined(__aarch64__)
     runnable[n++] = &trip_cpu_neon;
 #endif
