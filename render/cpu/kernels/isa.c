@@ -5,37 +5,6 @@
 
 #include "report.h"
 
-#if defined(__x86_64__)
-static inline bool has_avx2(void)
-{
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-           __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
-}
-
-#if defined(TRIP_CPU_EMULATED_AVX512)
-static inline bool has_avx512(void)
-{
-    return has_avx2();
-}
-
-static inline bool has_vbmi2(void)
-{
-    return true;
-}
-#else
-static inline bool has_avx512(void)
-{
-    return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-}
-
-static inline bool has_vbmi2(void)
-{
-    return __builtin_cpu_supports("avx512vbmi2");
-}
-#endif
-#endif
-
 /* find_runnable() fills the list once, before main() starts any thread. */
 static const trip_cpu_kernels *runnable[5];
 
@@ -44,16 +13,29 @@ __attribute__((constructor)) static void find_runnable(void)
     int n = 0;
 #if defined(__x86_64__)
     __builtin_cpu_init();
+    struct {
+        bool avx2, avx512, vbmi2;
+    } has;
+    has.avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+               __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
+#if defined(TRIP_CPU_EMULATED_AVX512)
+    has.avx512 = has.avx2, has.vbmi2 = true;
+#else
+    has.avx512 = has.avx2 && __builtin_cpu_supports("avx512f") &&
+                 __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+                 __builtin_cpu_supports("avx512vl");
+    has.vbmi2 = __builtin_cpu_supports("avx512vbmi2");
+#endif
 #if !defined(TRIP_CPU_WITHOUT_AVX512_VBMI2)
-    if (has_avx512() && has_vbmi2())
+    if (has.avx512 && has.vbmi2)
         runnable[n++] = &trip_cpu_avx512_vbmi2;
 #endif
 #if !defined(TRIP_CPU_WITHOUT_AVX512)
-    if (has_avx512())
+    if (has.avx512)
         runnable[n++] = &trip_cpu_avx512;
 #endif
 #if !defined(TRIP_CPU_WITHOUT_AVX2)
-    if (has_avx2())
+    if (has.avx2)
         runnable[n++] = &trip_cpu_avx2;
 #endif
 #elif defined(__aarch64__)
