@@ -50,29 +50,12 @@ compile() { # TARGET
     room=$(free_megabytes .)
     [ -e $build/triptych ] || [ "$room" -ge $need_mb ] ||
         fail "the build needs $need_mb MB, but $(pwd) has $room MB free"
-    echo "Building $1" >>build.log
-    # Ninja prints lines such as: [12/380] Building C object stream/...
-    { NINJA_STATUS='[%f/%t] ' cmake --build --preset release --target "$1" 2>&1 || echo "demo: failed"; } | {
-        failed=0
-        while IFS= read -r line; do
-            echo "$line" >&3
-            case $line in
-            "["*/*"] "*)
-                done=${line#"["} total=${line#*/}
-                done=${done%%/*} total=${total%%"]"*}
-                progress Building $((100 * done / total)) "$done of $total"
-                ;;
-            "demo: failed") failed=1 ;;
-            esac
-        done 3>>build.log
-        progress_end
-        [ $failed = 0 ]
-    } || show_log "building"
+    follow_ninja build.log cmake --build --preset release --target "$1" || show_log "building"
 }
 
 draw() {
     mkdir -p demo
-    $build/triptych render --quiet datasets/tooth.nhdr -o demo/tooth.png || fail "drawing failed"
+    $build/triptych render datasets/tooth.nhdr -o demo/tooth.png || fail "drawing failed"
     picture=$(pwd)/demo/tooth.png
     echo "The picture: $picture"
     echo "Time: $(elapsed)"

@@ -29,6 +29,29 @@ progress_end() {
     fi
 }
 
+# follow_ninja LOG COMMAND...: runs a build with Ninja and prints its progress. The log gets all output.
+# Ninja prints lines such as: [12/380] Building C object stream/...
+follow_ninja() {
+    log=$1
+    shift
+    { NINJA_STATUS='[%f/%t] ' "$@" 2>&1 || echo "follow_ninja: failed"; } | {
+        failed=0
+        while IFS= read -r line; do
+            echo "$line" >&3
+            case $line in
+            "["*/*"] "*)
+                done=${line#"["} total=${line#*/}
+                done=${done%%/*} total=${total%%"]"*}
+                progress Building $((100 * done / total)) "$done of $total"
+                ;;
+            "follow_ninja: failed") failed=1 ;;
+            esac
+        done 3>>"$log"
+        progress_end
+        [ $failed = 0 ]
+    }
+}
+
 # duration SECONDS: prints a duration such as `3 min 20 s`.
 duration() {
     if [ "$1" -ge 60 ]; then
