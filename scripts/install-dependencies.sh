@@ -112,7 +112,7 @@ plan=$(apt-get --print-uris -y --no-install-recommends install $missing 2>>"$log
 }
 # apt-get prints: 0 upgraded, 85 newly installed...; Need to get 78.1 MB...; After this operation, 298 MB...
 count=$(echo "$plan" | awk '/^[0-9]+ upgraded, / { print $1 + $3 }')
-megabytes() { sed -n "s|$1|\\1 \\2|p" | awk '{ print int($1 * ($2 == "GB" ? 1000 : $2 == "MB" ? 1 : 0) + 1) }'; }
+megabytes() { sed -n "s|$1|\\1 \\2|p" | awk '{ print int($1 * ($2 == "GB" ? 1000 : $2 == "MB" ? 1 : 0.001) + 1) }'; }
 fetched=$(echo "$plan" | megabytes '^Need to get \([0-9.]*\) \([kMG]*B\).*')
 grows=$(echo "$plan" | megabytes '^After this operation, \([0-9.]*\) \([kMG]*B\) of additional.*')
 echo "Packages: $count, ${fetched:-0} MB to fetch, ${grows:-0} MB on disk"
