@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import subprocess
+import time
 import unittest
 
 import program
@@ -204,7 +205,7 @@ class Demo(program.ProgramTest):
             [os.path.join(self.clone, "demo.sh")], env=self.environment(), text=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
         while process.poll() is None and not os.path.exists(os.path.join(self.state, "waits")):
-            pass
+            time.sleep(0.02)
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=30)
         self.assertEqual(process.returncode, -signal.SIGINT, err)
