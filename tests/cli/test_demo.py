@@ -23,7 +23,7 @@ STAND_INS = {
 for package; do :; done
 [ ! -e "$STATE/installed/$package" ] || printf 'install ok installed'
 """,
-    "dpkg": "",
+    "dpkg": ': >"$STATE/dpkg$1"',
     "apt-get": """
 kind=install packages=
 for word; do
@@ -212,11 +212,13 @@ class Demo(program.ProgramTest):
         self.assertIn("The picture: ", out)
         self.assertRegex(err, r"demo: stopped; the picture and build/release/triptych stay")
         self.assertNotIn("failed", err)
-        os.remove(os.path.join(self.state, "wait"))
+        for name in "wait", "dpkg--configure":
+            os.remove(os.path.join(self.state, name))
         self.calls()
         run = self.demo()
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertIn("cmake --preset release -DTRIP_SMALL=OFF", self.calls())
+        self.assertTrue(os.path.exists(os.path.join(self.state, "dpkg--configure")))
 
     def test_a_user_without_root_gets_the_picture_or_the_command(self):
         self.put("user", "1000\n")
@@ -256,6 +258,13 @@ class Demo(program.ProgramTest):
         self.assertRegex(run.stderr, r"error: expected a semicolon\n"
                                      r"(follow_ninja: failed\n)?demo: building failed; [^\n]*build.log\n\Z")
         self.assertNotIn("The picture", run.stdout)
+        # The next run draws before it installs the rest, too.
+        os.remove(os.path.join(self.state, "build-fails"))
+        self.calls()
+        run = self.demo()
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn("TRIP_SMALL=ON", self.calls()[0])
+        self.assertLess(run.stdout.index("The picture"), run.stdout.index("Packages: "))
 
     def test_a_full_disk_is_found_before_the_work(self):
         df = "echo 'Filesystem 1048576-blocks Used Available Capacity Mounted on'\necho '/dev/x 9 9 %d 99%% /'\n"
