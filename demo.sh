@@ -9,7 +9,7 @@ cd "$(dirname "$0")"
 
 started=$(date +%s)
 build=build/release
-need_mb=200 # of the build folder
+need_mb=60 # of the build folder
 picture=
 step=0
 

@@ -275,10 +275,10 @@ class Demo(program.ProgramTest):
         self.assertEqual(self.calls(), [])
         self.stand_in("df", df % 5000)
         self.install()
-        self.stand_in("df", df % 100)
+        self.stand_in("df", df % 50)
         run = self.demo()
         self.assertEqual(run.returncode, 1)
-        self.assertRegex(run.stderr, r"\Ademo: the build needs 200 MB, but [^\n]*a clone has 100 MB free\n\Z")
+        self.assertRegex(run.stderr, r"\Ademo: the build needs 60 MB, but [^\n]*a clone has 50 MB free\n\Z")
 
     def test_a_terminal_shows_each_step_of_the_build(self):
         self.install()
