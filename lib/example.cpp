@@ -1,10 +1,10 @@
-// Makes a data set of a volume in memory and draws it, in C++. Build it with
-// c++ example.cpp $(pkg-config --cflags --libs triptych)
-//
-//     example_cpp DATA.trip PICTURE.png
-//
-// The volume is a red body, 16 voxels thick. Prints red, green, blue and opacity of the middle of
-// the picture, and of its upper left corner.
+/* Makes a data set of a volume in memory and draws it, in C++. Build it with
+ * c++ example.cpp $(pkg-config --cflags --libs triptych)
+ *
+ *     example_cpp DATA.trip PICTURE.png
+ *
+ * The volume is a red body, 16 voxels thick. Prints red, green, blue and opacity of the middle of
+ * the picture, and of its upper left corner. */
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -42,7 +42,7 @@ class Volume
         check(triptych_brick(context.get(), "body", data_set, &options, nullptr));
     }
 
-    // Looks along an axis, in parallel. The body covers half of the height.
+    /* Looks along an axis, in parallel. The body covers half of the height. */
     void look(const char *data_set)
     {
         check(triptych_open(context.get(), data_set, nullptr));
@@ -86,7 +86,7 @@ class Volume
     std::unique_ptr<triptych, void (*)(triptych *)> context;
 };
 
-// Values are 200 in the body and 0 around it.
+/* Values are 200 in the body and 0 around it. */
 std::vector<std::uint8_t> body()
 {
     std::vector<std::uint8_t> values;
@@ -103,7 +103,7 @@ void print(const float *pixel)
     std::printf("%.4f %.4f %.4f %.4f\n", pixel[0], pixel[1], pixel[2], pixel[3]);
 }
 
-} // namespace
+} /* namespace */
 
 int main(int argc, char **argv)
 {
