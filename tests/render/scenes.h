@@ -98,6 +98,10 @@ typedef struct scene_renderer {
     double tolerance; /* of a premultiplied component, against the reference */
 } scene_renderer;
 
+/* Tells whether this machine can run gl. Notes in the test if it cannot. Fails if gl cannot be
+ * created although a driver is there, or draws with another driver than TRIP_TEST_DRIVER. */
+bool scene_has_gl(void);
+
 /* Returns every renderer that this machine can run. An entry without a name ends the array. */
 const scene_renderer *scene_renderers(void);
 

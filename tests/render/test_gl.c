@@ -7,7 +7,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "gl/gl_context.h"
 #include "scenes.h"
 #include "splat.h"
 #include "test.h"
@@ -662,17 +661,6 @@ static void shaders_are_the_same_in_a_locale_with_decimal_commas(void **state)
     scene_destroy(&s);
 }
 
-/* Exits with status 77 on a machine without OpenGL 4.5 by EGL, and prints the reason. */
-static bool has_gl(void)
-{
-    trip_gl_context *context;
-    bool has = trip_gl_context_create(&context) == 0;
-    if (has)
-        print_message("%s\n", trip_gl_context_device(context));
-    trip_gl_context_destroy(context);
-    return has;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -694,7 +682,7 @@ int main(void)
         cmocka_unit_test(a_missing_shader_is_reported),
         cmocka_unit_test(shaders_are_the_same_in_a_locale_with_decimal_commas),
     };
-    if (!has_gl())
+    if (!scene_has_gl())
         return 77;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

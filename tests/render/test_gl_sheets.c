@@ -80,14 +80,6 @@ static void compare(const char *label, const scene *s, const trip_camera_params 
     scene_picture_free(&b);
 }
 
-static bool has_gl(void)
-{
-    for (const scene_renderer *r = scene_renderers(); r->name; r++)
-        if (!strcmp(r->name, "gl"))
-            return true;
-    return false;
-}
-
 static void grids_of_any_shape_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -428,7 +420,7 @@ int main(void)
         cmocka_unit_test(frames_cancelled_anywhere_leave_the_next_unchanged),
         cmocka_unit_test(memory_changes_no_bit_and_too_little_is_refused),
     };
-    if (!has_gl())
+    if (!scene_has_gl())
         return 77;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
