@@ -276,7 +276,7 @@ static void check_driver(const char *device)
     const char *wanted = getenv("TRIP_TEST_DRIVER");
     print_message("gl draws with %s\n", device);
     if (wanted && !strstr(device, wanted))
-        fail_msg("gl draws with %s instead of %s", device, wanted);
+        fail_msg("gl draws with %s; install the driver %s (mesa-vulkan-drivers)", device, wanted);
 }
 
 bool scene_has_gl(void)

@@ -58,7 +58,10 @@ static trip_settings post(void)
     return s;
 }
 
-static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b)
+/* Few pixels are off by as much as the bound allows: those with a rounding at early termination, at
+ * the border of the grid or at a change of lists. */
+static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b,
+                          const trip_settings *settings)
 {
     size_t count = 4 * (size_t)a->width * (size_t)a->height;
     double max = scene_difference(a, b), sum = 0;
@@ -66,8 +69,8 @@ static void assert_agrees(const char *label, const scene_picture *a, const scene
         sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
     print_message("%-36s most %.4f mean %.5f of 1/255\n", label, 255 * max,
                   255 * sum / (double)count);
-    assert_true(max <= 1.0 / 255);
-    assert_true(sum / (double)count < 0.05 / 255);
+    assert_true(max <= scene_bound(settings));
+    assert_true(sum / (double)count < 0.005 / 255);
 }
 
 static void compare(const char *label, const scene *s, const trip_camera_params *view,
@@ -75,7 +78,7 @@ static void compare(const char *label, const scene *s, const trip_camera_params 
 {
     scene_picture a = scene_draw(s, &reference, view, settings);
     scene_picture b = scene_draw(s, &gl, view, settings);
-    assert_agrees(label, &a, &b);
+    assert_agrees(label, &a, &b, settings);
     scene_picture_free(&a);
     scene_picture_free(&b);
 }
@@ -230,7 +233,7 @@ static void depths_agree_with_the_reference(void **state)
             seen++;
         }
         assert_true(seen > 500);
-        assert_agrees("with depths", &a, &b);
+        assert_agrees("with depths", &a, &b, &settings);
         scene_picture_free(&a);
         scene_picture_free(&b);
     }
