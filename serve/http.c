@@ -127,7 +127,7 @@ static bool is_own_address(const server *s, const char *address)
     return false;
 }
 
-/* What the headers of a request say about its sender and its body. */
+/* Facts from the headers of a request about its sender and its body. */
 typedef struct head {
     const server *server;
     bool own_host, own_origin, too_long, muddled;

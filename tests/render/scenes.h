@@ -160,7 +160,7 @@ static inline const float *scene_pixel(const scene_picture *p, int x, int y)
 /* Returns the maximum opacity of all pixels. */
 double scene_max_opaque(const scene_picture *p);
 
-/* Returns the most that a picture of gl or cpu may differ from the reference. A rounding may end a
+/* Returns the maximum difference of a picture of gl or cpu from the reference. A rounding may end a
  * pixel one sample or splat earlier or later, which changes less than the transmittance of early
  * termination. Single precision adds the rest. In `post` it also moves the samples: far from the
  * origin their places have fewer bits. */

@@ -158,7 +158,7 @@ static void grids_that_are_not_cubic_agree_with_the_reference(void **state)
         char label[64];
         make_shells(&s, grids[i]);
         double size = cbrt(fabs(trip_affine_determinant(grids[i]))) * 40;
-        trip_camera_params view = scene_view(&s, trip_v3(0.5, 1, 0.7), 1.8 * size, 45, 100);
+        trip_camera_params view = scene_view(&s, trip_v3(0.5, 1, 0.7), 1.8 * size, 45, 60);
         compare(names[i], &s, &view, &settings);
         view.ortho_height = 1.3 * size;
         snprintf(label, sizeof label, "%s, parallel", names[i]);
@@ -342,9 +342,9 @@ static unsigned overlap_at(const trip_splat_frame *f, double x, double y)
     return n;
 }
 
-/* A blend is off by at most a step of the target: a driver may round the colour and the product,
- * half a step each, or cut off the rest. n blends add up to n steps in colour. In alpha they change
- * the transmittance, which adds at most as much again. Merging averages the layers. */
+/* A blend adds an error of at most a step of the target. A driver may round the colour and the
+ * product, half a step each, or cut off the rest. n blends add up to n steps in colour. In alpha
+ * they change the transmittance, which adds at most as much again. Merging averages the layers. */
 static void targets_are_off_by_at_most_two_steps_a_splat(void **state)
 {
     static const char *const names[] = { "rgba32f", "rgba16f", "rgba8" };

@@ -58,8 +58,8 @@ static trip_settings post(void)
     return s;
 }
 
-/* Few pixels are off by as much as the bound allows: those with a rounding at early termination, at
- * the border of the grid or at a change of lists. */
+/* Few pixels come near the bound. There, a rounding decides at early termination, at the border of
+ * the grid or at a change of lists. */
 static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b,
                           const trip_settings *settings)
 {
