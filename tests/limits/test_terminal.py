@@ -92,7 +92,8 @@ class Terminal(limits.Test):
         os.remove(self.picture)
 
     def check_bench(self, table, *more):
-        tiny = self.brick(self.generate("tiny.nrrd", "marschner-lobb", 12), "tiny.trip", "--keep-all")
+        tiny = self.brick(self.generate(f"{table}.nrrd", "marschner-lobb", 12), f"{table}.trip",
+                          "--keep-all")
         arguments = ["bench", table, tiny, "--size", "40x40", "--repeat", 1, *more]
         r = limits.run("triptych", *arguments)
         self.assertEqual((r.status, r.err), (0, ""))  # no progress in a pipe
