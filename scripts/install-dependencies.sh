@@ -17,7 +17,7 @@ libraries="libopenvdb-dev libboost-iostreams-dev libopenimageio-dev libtiff-dev 
  liburing-dev libseccomp-dev libnetcdf-dev libcjson-dev libexpat1-dev libxxhash-dev libnifti-dev zlib1g-dev libbz2-dev"
 build="cmake ninja-build gcc g++ pkg-config libgl1-mesa-dri libegl1 libgbm1 $libraries"
 tests="libcmocka-dev python3 python3-numpy python3-pil python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
- valgrind xauth xvfb chromium ffmpeg locales"
+ valgrind xauth xvfb libxtst6 chromium ffmpeg locales"
 compare="libopenvdb-tools python3-numpy python3-openvdb python3-pil python3-vtk9 xauth xvfb"
 avx512="libsimde-dev"
 arm64="gcc-aarch64-linux-gnu g++-aarch64-linux-gnu mmdebstrap qemu-user-static"
