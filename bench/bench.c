@@ -124,7 +124,8 @@ static int check_plot(const bench_options *o)
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
-    bench_options_choose(o, false); /* until a data set is open */
+    if (!o->input && tables[table].makes_volumes)
+        bench_options_choose(o, false);
     o->progress = measure_progress_start(o->table);
     int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
                                                           : measure_data(o, table, r);

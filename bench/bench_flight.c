@@ -218,6 +218,7 @@ int bench_flight(const session *s, const bench_options *o, bench_report *r)
 {
     flying m = { .options = o, .report = r };
     (void)s;
+    measure_progress_expect(o->progress, 1); /* the picture of the library at rest */
     int status = fly(&m);
     if (!status) {
         describe(&m);

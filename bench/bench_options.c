@@ -209,10 +209,8 @@ static const trip_option_table bench_table = { rows, ROWS };
 #define OF_MODEL                                                                                   \
     (BIT(CLASSIFY) | BIT(COMPOSITING) | BIT(SAMPLES_PER_SHEET) | BIT(EARLY_TERMINATION))
 #define OF_FLIGHT (BIT(SECONDS) | BIT(FPS))
-/* These options change the drawing. */
-#define OF_DRAWING                                                                                 \
-    (OF_MODEL | BIT(NO_SHADING) | BIT(RENDERER) | BIT(SIZE) | BIT(THREADS) | BIT(OCCLUDED) |       \
-     BIT(KERNEL_RADIUS))
+/* These options change the drawing. The renderers, sizes and threads only add rows. */
+#define OF_DRAWING (OF_MODEL | BIT(NO_SHADING) | BIT(OCCLUDED) | BIT(KERNEL_RADIUS))
 #define OF_LEVELS (BIT(FIELD) | BIT(FINEST))
 
 static const struct table {
@@ -400,6 +398,7 @@ static int check(void *user)
     if (!(given(p) & BIT(OCCLUDED)))
         o->draw_occluded = t->draw_occluded;
     o->usual = !(given(p) & OF_DRAWING);
+    o->chosen = given(p) & BIT(RENDERER);
     if (t->refused & BIT(CLASSIFY) || given(p) & (BIT(COMPOSITING) | BIT(KERNEL_RADIUS)))
         o->classify = o->classify ? o->classify : BENCH_CLASSIFY_PRE;
     fill_defaults(o, t);

@@ -27,7 +27,8 @@ typedef struct bench_options {
     double seconds;           /* length of a flight */
     double frames_per_second; /* target of a flight */
     int classify;             /* BENCH_CLASSIFY_... */
-    bool usual; /* no option changes the drawing, so that a table has the default of `render` */
+    bool usual;  /* no option changes the drawing: renderers measures the default too */
+    bool chosen; /* --renderer was given */
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0 selects the default */

@@ -138,7 +138,8 @@ static void add_limits(bench_report *r)
 int bench_orders(bench_scene *scene, const bench_options *o, bench_report *r)
 {
     int status = 0;
-    measure_progress_expect(o->progress, VIEWS * METHODS * (1 + o->repeat));
+    measure_progress_expect(o->progress,
+                            VIEWS * methods_of(scene->frame.renderer) * (1 + o->repeat));
     add_limits(r);
     for (int view = 0; view < VIEWS && !status; view++)
         status = measure_view(&scene->frame, o, r, view);

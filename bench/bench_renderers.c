@@ -65,7 +65,7 @@ static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_re
     own->threads = kind == TRIP_RENDERER_CPU ? threads : 0;
     int status = bench_renderer_create(c->session, &own->renderer, kind, threads, false, why);
     if (!status && own->renderer && own->renderer->software && c->options->in_short &&
-        c->options->usual) {
+        !c->options->chosen) {
         bench_renderer_destroy(own->renderer);
         own->renderer = NULL;
         snprintf(why, sizeof why,

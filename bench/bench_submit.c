@@ -102,6 +102,8 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
         if (forms[i].primitives == FIXED)
             frames[i].settings.footprint = TRIP_FOOTPRINT_FIXED;
         status = warm_up(&frames[i], &counted[i], r, i);
+        if (!frames[i].renderer)
+            measure_progress_expect(o->progress, -o->repeat);
     }
     if (!status)
         status = bench_runs_take(&runs, frames, FORMS, o->repeat);

@@ -150,7 +150,8 @@ void measure_progress_end(measure_progress *p)
     pthread_cond_signal(&p->stop);
     pthread_mutex_unlock(&p->lock);
     pthread_join(p->thread, NULL);
-    print_line(p);
+    if (p->begun == p->expected)
+        print_line(p);
     if (!p->lines)
         fputs("\r\033[K", stderr);
     release(p);

@@ -17,7 +17,7 @@ void measure_progress_expect(measure_progress *p, int steps);
 void measure_progress_step(measure_progress *p, const char *stage);
 /* Renames the current step, for a part of it. */
 void measure_progress_part(measure_progress *p, const char *stage);
-/* Shows the last state of the counter, clears the line and frees *p. */
+/* Shows the counter at its end if all steps began. Clears the line and frees *p. */
 void measure_progress_end(measure_progress *p);
 
 #endif
