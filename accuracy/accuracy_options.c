@@ -86,8 +86,7 @@ static const trip_option rows[] = {
       "selects all",
       ACCURACY_USUAL_SETTINGS, .group = DRAW_GROUP_PICTURE, TEXT, AT(settings) },
     { "source", "VOLUME",
-      "Compares with the integral through this volume, from which the data set was made, and "
-      "measures the error of storing",
+      "Compares with the integral through this volume, from which the data set was made",
       .group = DRAW_GROUP_PICTURE, TEXT, AT(source) },
     { "tf", "NAME|FILE", "Selects the transfer function, a preset or a file",
       "the one in the data set", .group = DRAW_GROUP_PICTURE, TEXT, AT(tf) },

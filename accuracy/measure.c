@@ -699,7 +699,7 @@ static void write_time(double seconds, char text[32])
         snprintf(text, 32, "about %.0f minutes", ceil(seconds / 60));
 }
 
-/* Says what is measured, how long it takes, and what is left out. */
+/* Prints the numbers of settings and views, the time needed, and the usual omissions. */
 static void say_start(const sweep *s, double seconds)
 {
     const accuracy_measured *m = s->m;
