@@ -112,8 +112,8 @@ static int measure_view(const bench_frame *base, const bench_options *o, bench_r
 static void add_limits(bench_report *r)
 {
     bench_report_limit(
-        r, "The data set is in memory (null engine) and was verified when it was loaded, so that "
-           "no figure includes the disk. A frame is planning, drawing from memory and merging.");
+        r, "A frame begins with the data set in memory, so that no time includes the disk. It ends "
+           "with the picture in the memory of the program.");
     bench_report_limit(r,
                        "splats drawn: splats with a pixel centre in the footprint where their list "
                        "has weight, counted in an untimed frame. x kept: splats drawn / voxels "
@@ -138,7 +138,8 @@ static void add_limits(bench_report *r)
 int bench_orders(bench_scene *scene, const bench_options *o, bench_report *r)
 {
     int status = 0;
-    measure_progress_expect(o->progress, VIEWS * METHODS * (1 + o->repeat));
+    measure_progress_expect(o->progress,
+                            VIEWS * methods_of(scene->frame.renderer) * (1 + o->repeat));
     add_limits(r);
     for (int view = 0; view < VIEWS && !status; view++)
         status = measure_view(&scene->frame, o, r, view);

@@ -102,6 +102,8 @@ static int measure(const bench_frame *base, const bench_options *o, bench_report
         if (forms[i].primitives == FIXED)
             frames[i].settings.footprint = TRIP_FOOTPRINT_FIXED;
         status = warm_up(&frames[i], &counted[i], r, i);
+        if (!frames[i].renderer)
+            measure_progress_expect(o->progress, -o->repeat);
     }
     if (!status)
         status = bench_runs_take(&runs, frames, FORMS, o->repeat);
@@ -125,6 +127,9 @@ static void add_limits(bench_report *r)
         "memory. The papers compare two ways to fill vertex buffers, which both stay on the GPU.");
     bench_report_limit(r, "All sprites of the papers have the same size, like fixed sprites. "
                           "Sprites with the size of each splat are an addition here.");
+    bench_report_limit(r,
+                       "x kept: splats drawn / voxels kept per list. speed: time of the first row "
+                       "/ time.");
     bench_report_limit(r, "With software OpenGL, rasterising on the processor limits all forms.");
     bench_report_limit(r,
                        "merge has h = 0.85. Times are medians of runs that are taken alternately.");

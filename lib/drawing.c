@@ -131,16 +131,10 @@ static int use_level(triptych *t, unsigned level)
 static const char *needs_splats(triptych *t)
 {
     const char *option = draw_settings_of_splats(&t->given);
-    const trip_file_header *h = &t->session.data->header;
-    if (option) {
-        snprintf(t->why_splats, sizeof t->why_splats, "--%s is for splats", option);
-        return t->why_splats;
-    }
-    if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
-        return "the grid is one voxel thick";
-    if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
-        return "voxels were dropped, and the data set has no halo";
-    return NULL;
+    if (!option)
+        return session_needs_splats(&t->session);
+    snprintf(t->why_splats, sizeof t->why_splats, "--%s is for splats", option);
+    return t->why_splats;
 }
 
 bool trip_context_draws_values(const triptych *t)

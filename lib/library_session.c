@@ -273,6 +273,16 @@ int session_add_data(session *s, const char *input)
     return 0;
 }
 
+const char *session_needs_splats(const session *s)
+{
+    const trip_file_header *h = &s->data->header;
+    if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
+        return "the grid is one voxel thick";
+    if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
+        return "voxels were dropped, and the data set has no halo";
+    return NULL;
+}
+
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)
 {
     int status = session_open_data(s, input, memory_bytes);

@@ -60,6 +60,8 @@ void session_keep_tables(session *s);
 /* Returns the results of earlier frames at a level with the current function. Each frame adds to
  * them. */
 trip_classification *session_classified(const session *s, unsigned level);
+/* Returns why the data set can only be drawn as splats, or NULL if post can draw it. */
+const char *session_needs_splats(const session *s);
 /* Calls session_open_data() and session_use_function(). Close the session also after a failure. */
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);
 void session_close(session *s);

@@ -22,7 +22,7 @@ libraries="$small_libraries libopenvdb-dev libboost-iostreams-dev libopenimageio
 small="cmake ninja-build gcc libc6-dev pkg-config $small_libraries"
 build="$small g++ libgl1-mesa-dri libegl1 libgbm1 $libraries"
 tests="libcmocka-dev python3 python3-numpy python3-pil python3-xxhash python3-openvdb clang-14 libclang-rt-14-dev clang-format-14
- valgrind xauth xvfb chromium ffmpeg locales mesa-vulkan-drivers"
+ valgrind xauth xvfb libxtst6 chromium ffmpeg locales mesa-vulkan-drivers"
 compare="libopenvdb-tools python3-numpy python3-openvdb python3-pil python3-vtk9 xauth xvfb"
 avx512="libsimde-dev"
 arm64="gcc-aarch64-linux-gnu g++-aarch64-linux-gnu mmdebstrap qemu-user-static"

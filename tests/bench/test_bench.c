@@ -136,7 +136,8 @@ static const cJSON *stage(const cJSON *rows, const char *key)
 static void stream_reads_the_files_of_all_lists(void **state)
 {
     (void)state;
-    cJSON *root = bench("stream block.trip --renderer cpu --size 64x64 --repeat 2 --memory 64M");
+    cJSON *root = bench("stream block.trip --classify pre --renderer cpu --size 64x64 --repeat 2 "
+                        "--memory 64M");
     const cJSON *rows = rows_of(root, "stages");
     const cJSON *summary = cJSON_GetArrayItem(rows_of(root, "summary"), 0);
     double planes = file_bytes("block.trip/x0.voxels") + file_bytes("block.trip/y0.voxels") +
@@ -196,8 +197,8 @@ static void stream_of_post_reads_values_and_halo(void **state)
 static void renderers_has_a_row_for_each_renderer_size_and_threads(void **state)
 {
     (void)state;
-    cJSON *root = bench("renderers block.trip --renderer cpu,reference --size 32x32,48x40 "
-                        "--views 3 --threads 1,2");
+    cJSON *root = bench("renderers block.trip --classify pre --renderer cpu,reference "
+                        "--size 32x32,48x40 --views 3 --threads 1,2");
     const cJSON *rows = rows_of(root, "renderers"), *row;
     assert_int_equal(cJSON_GetArraySize(rows), 6);
     cJSON_ArrayForEach(row, rows)
@@ -211,6 +212,124 @@ static void renderers_has_a_row_for_each_renderer_size_and_threads(void **state)
                      number(row, "msplats_per_s") * number(row, "pixels_per_splat"));
     }
     cJSON_Delete(root);
+}
+
+/* Draws by `render` without options, and returns its statistics. */
+static cJSON *render_stats(const char *data, const char *options)
+{
+    static char text[65536];
+    program_run r;
+    program_call(&r, "render %s -o drawn.png --stats drawn.json %s", data, options);
+    assert_works(&r);
+    program_read("drawn.json", text, sizeof text);
+    cJSON *stats = cJSON_Parse(text);
+    assert_non_null(stats);
+    return stats;
+}
+
+static const char *text_of(const cJSON *row, const char *key)
+{
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItem(row, key));
+    assert_non_null(text);
+    return text;
+}
+
+/* The first row has the settings that `render` chooses by itself, for a volume and for a slice. */
+static void the_first_row_of_renderers_is_the_default_of_render(void **state)
+{
+    (void)state;
+    program_run r;
+    program_call(&r, "brick block.raw --size 360,16,1 --type uint8 --keep-all -o slice.trip -q");
+    assert_works(&r);
+    for (int slice = 0; slice < 2; slice++) {
+        const char *data = slice ? "slice.trip" : "block.trip";
+        char arguments[128], size[32];
+        snprintf(arguments, sizeof arguments,
+                 "renderers %s --views 2 --repeat 2 --renderer cpu --size 16x16", data);
+        cJSON *root = bench(arguments), *stats = render_stats(data, "");
+        const cJSON *rows = rows_of(root, "renderers"), *row = cJSON_GetArrayItem(rows, 0), *view;
+        check_times(row);
+        assert_string_equal(text_of(row, "name"), "default");
+        const cJSON *sides = cJSON_GetObjectItem(stats, "size");
+        snprintf(size, sizeof size, "%d x %d", cJSON_GetArrayItem(sides, 0)->valueint,
+                 cJSON_GetArrayItem(sides, 1)->valueint);
+        assert_string_equal(text_of(row, "size"), size);
+        assert_string_equal(text_of(row, "renderer"), text_of(stats, "renderer"));
+        assert_string_equal(text_of(row, "device"), text_of(stats, "device")); /* with threads */
+        assert_string_equal(text_of(row, "classify"), text_of(stats, "classify"));
+        assert_string_equal(text_of(row, "classify"), slice ? "pre" : "post");
+        assert_true(number(row, "early_termination") == number(stats, "early_termination"));
+        assert_null(cJSON_GetObjectItem(stats, "effects"));
+        assert_true(number(row, "effects") == 0);
+        if (!slice) {
+            assert_string_equal(text_of(row, "interpolation"), text_of(stats, "interpolation"));
+            assert_true(number(row, "samples_per_sheet") == number(stats, "samples_per_sheet"));
+        }
+        const cJSON *views = cJSON_GetObjectItem(row, "each_view");
+        assert_int_equal(cJSON_GetArraySize(views), 2);
+        cJSON_ArrayForEach(view, views)
+            assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(view, "ms")), 2);
+        /* The other rows classify like the default. */
+        for (int i = 1; i < cJSON_GetArraySize(rows); i++)
+            assert_int_equal(!strcmp(text_of(cJSON_GetArrayItem(rows, i), "name"), "post"), !slice);
+        cJSON_Delete(root);
+        cJSON_Delete(stats);
+    }
+}
+
+/* The camera of a view draws the picture of `render`. */
+static void the_default_is_seen_as_by_render(void **state)
+{
+    (void)state;
+    char options[512];
+    cJSON *root = bench("renderers block.trip --views 4 --renderer cpu --size 16x16");
+    const cJSON *views =
+        cJSON_GetObjectItem(cJSON_GetArrayItem(rows_of(root, "renderers"), 0), "each_view");
+    for (int i = 0; i < 2; i++) {
+        const cJSON *view = cJSON_GetArrayItem(views, i);
+        int at = snprintf(options, sizeof options, "--fov %.17g", number(view, "fov_degrees"));
+        static const char *const names[] = { "eye", "look", "up" };
+        for (int k = 0; k < 3; k++) {
+            const cJSON *p = cJSON_GetObjectItem(view, names[k]);
+            at += snprintf(options + at, sizeof options - (size_t)at, " --%s=%.17g,%.17g,%.17g",
+                           names[k], cJSON_GetArrayItem(p, 0)->valuedouble,
+                           cJSON_GetArrayItem(p, 1)->valuedouble,
+                           cJSON_GetArrayItem(p, 2)->valuedouble);
+        }
+        cJSON_Delete(render_stats("block.trip", options));
+        assert_int_equal(rename("drawn.png", "seen.png"), 0);
+        cJSON_Delete(render_stats("block.trip", i ? "--azimuth 90" : ""));
+        assert_int_equal(system("cmp -s drawn.png seen.png"), 0);
+    }
+    cJSON_Delete(root);
+}
+
+/* Each table names the options of `render` that draw like it. */
+static void tables_name_the_options_of_render(void **state)
+{
+    (void)state;
+    static const char *const cases[][2] = {
+        { "orders block.trip --size 16x16 --repeat 1 --renderer cpu",
+          "--classify pre --compositing splat --kernel-radius 2 --size 16x16 --renderer cpu" },
+        { "stream block.trip --size 16x16 --repeat 1 --renderer cpu",
+          "--classify post --size 16x16 --renderer cpu" },
+        { "stream block.trip --size 16x16 --repeat 1 --renderer cpu --compositing sheet",
+          "--classify pre --compositing sheet --kernel-radius 2 --size 16x16 --renderer cpu" },
+        { "renderers block.trip --size 16x16 --views 1 --renderer cpu --samples-per-sheet 3 "
+          "--threads 2 --no-shading --early-termination 0.01",
+          "--classify post --samples-per-sheet 3 --early-termination 0.01 --no-shading "
+          "--size 16x16 --renderer cpu --threads 2" },
+        { "popping block.trip --size 16x16", "--classify post --size 16x16 --renderer cpu" },
+        { "variants block.trip --size 16x16", "--classify pre --compositing splat --kernel-radius "
+                                              "2 --size 16x16 --renderer reference" },
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        cJSON *root = bench(cases[i][0]);
+        const cJSON *settings = cJSON_GetObjectItem(root, "settings");
+        assert_string_equal(text_of(settings, "options_of_render"), cases[i][1]);
+        cJSON_Delete(render_stats("block.trip", cases[i][1]));
+        cJSON_Delete(root);
+    }
 }
 
 static void renderers_reports_each_view_without_counts_too(void **state)
@@ -268,7 +387,7 @@ static void without_a_table_bench_lists_tables_and_runs_a_short_one(void **state
         snprintf(line, sizeof line, "\n  %s ", names[i]);
         assert_non_null(strstr(r.out, line));
     }
-    assert_non_null(strstr(r.out, "\n| cpu "));
+    assert_non_null(strstr(r.out, "\n| default | cpu "));
     assert_non_null(strstr(r.out, "\n- grid: 103 x 94 x 161\n")); /* from the header of the tooth */
     assert_string_equal(r.err, "");
     cJSON_Delete(bench("--renderer cpu --size 32x32 --views 1"));
@@ -380,7 +499,7 @@ static void levels_of_a_uniform_block_are_close_to_the_finest(void **state)
                  "brick plain.raw --size 32,32,32 --type uint8 --keep-all --tf plain.tf --levels 2 "
                  "--levels-for both -o plain.trip -q");
     assert_works(&r);
-    cJSON *root = bench("levels plain.trip --views 1 --no-shading");
+    cJSON *root = bench("levels plain.trip --classify pre --views 1 --no-shading");
     const cJSON *rows = rows_of(root, "levels"), *row;
     assert_int_equal(cJSON_GetArraySize(rows), 2);
     for (int level = 1; level <= 2; level++) {
@@ -507,7 +626,7 @@ static void printed_tables_name_the_command_and_their_limits(void **state)
     assert_works(&r);
     assert_non_null(strstr(r.out, "triptych bench orders block.trip --renderer cpu --size 32x32"));
     assert_non_null(strstr(r.out, "| merge, h = 0.85 |"));
-    assert_non_null(strstr(r.out, "\nLimits of these figures\n"));
+    assert_non_null(strstr(r.out, "\nWhat the figures mean\n"));
     assert_non_null(strstr(r.out, "\nMachine\n"));
 }
 
@@ -564,6 +683,9 @@ int main(void)
         cmocka_unit_test(stream_reads_the_files_of_all_lists),
         cmocka_unit_test(stream_of_post_reads_values_and_halo),
         cmocka_unit_test(renderers_has_a_row_for_each_renderer_size_and_threads),
+        cmocka_unit_test(the_first_row_of_renderers_is_the_default_of_render),
+        cmocka_unit_test(the_default_is_seen_as_by_render),
+        cmocka_unit_test(tables_name_the_options_of_render),
         cmocka_unit_test(renderers_reports_each_view_without_counts_too),
         cmocka_unit_test(submit_compares_methods_of_gl),
         cmocka_unit_test(without_a_table_bench_lists_tables_and_runs_a_short_one),

@@ -279,9 +279,9 @@ def write_report(folder, data_set, classify="post", levels_for="auto"):
             (checksum,) = struct.unpack_from("<Q", f.read(24), 16)
     os.makedirs(folder, exist_ok=True)
     row = {"name": "one", "options": {"renderer": "cpu", "classify": classify}, "ms": 1,
-           "total": {"worst_percentile_99": 1}}
+           "error": 1}
     with open(os.path.join(folder, "accuracy.json"), "w", encoding="utf-8") as f:
-        json.dump({"triptych_accuracy": 1, "checksum": f"{checksum:016x}",
+        json.dump({"triptych_accuracy": 2, "checksum": f"{checksum:016x}",
                    "levels_for": levels_for, "shading": True, "rows": [row]}, f)
 
 

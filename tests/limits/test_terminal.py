@@ -100,6 +100,7 @@ class Terminal(limits.Test):
         status, shown = self.on_terminal(arguments)
         self.assertEqual(status, 0, shown)
         self.assertRegex(shown, rf"\r\x1b\[K{table}  \d+:\d\d[^|]*\r[^|]*\r\x1b\[K[^\r]*bench")
+        self.assert_counts_to_its_end(arguments, shown)
 
     def test_every_bench_shows_progress(self):
         for table in "orders", "stream":
@@ -109,6 +110,33 @@ class Terminal(limits.Test):
     def test_the_bench_of_gl_shows_progress(self):
         limits.need_gl()
         self.check_bench("submit")
+
+    def assert_counts_to_its_end(self, arguments, shown):
+        steps = [tuple(map(int, pair)) for pair in re.findall(r"step (\d+) of (\d+)", shown)]
+        self.assertTrue(all(step <= end for step, end in steps), (arguments, steps))
+        self.assertEqual(*steps[-1], arguments)
+
+    def test_the_counter_of_every_table_ends_at_its_end(self):
+        """Some levels, methods and counts are left out."""
+        tiny = self.brick(self.generate("few.nrrd", "marschner-lobb", 12), "few.trip", "--keep-all")
+        coarse = self.brick(self.generate("coarse.nrrd", "shells", 150), "coarse.trip", "--levels-for", "both")
+        small = ["--size", "40x40"]
+        for table, data, *more in (["orders", tiny, *small, "--repeat", 1, "--renderer", "reference"],
+                                   ["renderers", tiny, *small, "--views", 2, "--classify", "pre"],
+                                   ["renderers", tiny, *small, "--views", 1, "--classify", "pre", "--no-counts"],
+                                   ["popping", tiny, *small], ["ewa", tiny, *small, "--repeat", 1],
+                                   ["popping", tiny, *small, "--renderer", "reference", "--classify", "pre"],
+                                   ["variants", tiny, *small], ["levels", coarse, "--views", 1],
+                                   ["levels", coarse, "--views", 2, "--classify", "pre"],
+                                   ["flight", tiny, "--seconds", 0.3]):
+            arguments = ["bench", table, data, *more]
+            status, shown = self.on_terminal(arguments)
+            self.assertEqual(status, 0, shown)
+            self.assert_counts_to_its_end(arguments, shown)
+        arguments = ["bench", "--views", 1, "--size", "40x40"]
+        status, shown = self.on_terminal(arguments)
+        self.assertEqual(status, 0, shown)
+        self.assert_counts_to_its_end(arguments, shown)
 
     def test_ctrl_c_ends_a_bench_and_leaves_nothing(self):
         temporary = self.path("temporary")
