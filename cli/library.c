@@ -51,6 +51,14 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
     return status || !heat ? status : triptych_set_heat(t, heat);
 }
 
+int library_open_quietly(triptych *t, const char *path, const triptych_resources *resources)
+{
+    triptych_set_messages(t, NULL, NULL);
+    int status = triptych_open(t, path, resources);
+    triptych_set_messages(t, pass_message, NULL);
+    return status;
+}
+
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function)
 {
     triptych_set_messages(t, NULL, NULL);

@@ -16,6 +16,8 @@ int library_add(triptych *t, const char *const *paths, int count, const char *he
 /* Fails if `heat` is neither NULL nor a usable data set of heat. Closes the open data set. */
 int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
+/* Opens a data set without printing warnings or failures. */
+int library_open_quietly(triptych *t, const char *path, const triptych_resources *resources);
 /* Sets the transfer function without printing warnings. Reports failures. */
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);
 
