@@ -3,6 +3,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -131,6 +132,11 @@ static int follow_link(cache_folder *c)
     if (lstat(c->path, &st) < 0 || !S_ISLNK(st.st_mode))
         return 0;
     char *target = realpath(c->path, NULL);
+    if (target && stat(target, &st) == 0 && !S_ISDIR(st.st_mode)) {
+        free(target);
+        target = NULL;
+        errno = ENOTDIR;
+    }
     if (!target)
         return trip_fail(TRIP_ERROR, "cache", c->path,
                          "is a link that leads to no folder: %s; make that folder, or remove the "
@@ -283,6 +289,13 @@ static int try_lock(const cache_folder *c, const cache_key *key)
     }
 }
 
+static int fail_to_lock(const cache_folder *c, const cache_key *key)
+{
+    char name[NAME_BYTES], path[PATH_MAX];
+    snprintf(path, sizeof path, "%s/%s", c->path, file_name(key, ".lock", name));
+    return fail_to_write(path, "made");
+}
+
 int cache_folder_lock(const cache_folder *c, const cache_key *key, void (*waiting)(void *user),
                       void *user)
 {
@@ -291,7 +304,7 @@ int cache_folder_lock(const cache_folder *c, const cache_key *key, void (*waitin
         if (fd >= 0)
             return fd;
         if (errno != EWOULDBLOCK)
-            return fail_to_write(c->path, "written");
+            return fail_to_lock(c, key);
         waiting(user);
         nanosleep(&(struct timespec){ .tv_nsec = 50000000 }, NULL);
         if (trip_interrupted())

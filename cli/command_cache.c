@@ -167,18 +167,20 @@ static uint64_t bytes_of(const cache_entry *entries, size_t count)
 /* Names the data sets that remain, in one line. */
 static int fail_if_left(const cache_folder *c, const cache_left *left)
 {
-    const size_t count = left->used + left->stuck + left->making;
-    char used[48] = "", making[48] = "", stuck[48] = "";
-    if (count == 0)
-        return 0;
-    if (left->used)
-        snprintf(used, sizeof used, ", %zu in use", left->used);
-    if (left->making)
-        snprintf(making, sizeof making, ", %zu being made", left->making);
-    if (left->stuck)
-        snprintf(stuck, sizeof stuck, ", %zu that cannot be removed", left->stuck);
-    return trip_fail(TRIP_ERROR, "cache", c->path, "%zu data set%s%s%s%s", count,
-                     count == 1 ? " remains" : "s remain", used, making, stuck);
+    const struct {
+        size_t count;
+        const char *why;
+    } kinds[] = { { left->used, "in use" },
+                  { left->making, "being made" },
+                  { left->stuck, "that cannot be removed" } };
+    size_t count = left->used + left->making + left->stuck;
+    char text[200] = "", *end = text;
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (kinds[i].count)
+            end += sprintf(end, "%s%zu %s", *text ? ", " : "", kinds[i].count, kinds[i].why);
+    return count ? trip_fail(TRIP_ERROR, "cache", c->path, "%zu data set%s: %s", count,
+                             count == 1 ? " remains" : "s remain", text)
+                 : 0;
 }
 
 static int clear(const cache_folder *c)

@@ -71,7 +71,7 @@ static int brick_volume(drawing *d)
     if (status == 0 && d->volume.seconds > 0 && !quiet)
         printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
     if (status == 0 && d->volume.wider && !quiet)
-        printf("%s: the cache has a data set for other values, which holds all values shown\n",
+        printf("%s: found in the cache, in a data set made for another transfer function\n",
                o->input);
     return status;
 }
