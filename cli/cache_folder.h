@@ -4,9 +4,9 @@
  * source: the volume and the options except for kept values. The others are the options for kept
  * values.
  *
- *   KEY.trip    a data set; its modification time is the time of its last use
- *   STATE.link  a symbolic link from the state of a volume's files to the source of its data sets
- *   KEY.lock, KEY.trip.partial, KEY.trip.spill, KEY.gone    while one is made or removed
+ *   KEY.trip    a data set; its modification time is the time of its last use.
+ *   STATE.link  a symbolic link from the state of a volume's files to the source of its data sets.
+ *   KEY.lock, KEY.trip.partial, KEY.trip.spill, KEY.gone    while one is made or removed.
  *
  * Only the user may write in the folder. No operation follows a link in it, or removes anything
  * outside the folder. Any number of processes may use it at once. Each cache_folder belongs to one

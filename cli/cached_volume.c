@@ -8,7 +8,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "budget.h"
 #include "clock.h"
 #include "fastest.h"
 #include "report.h"
@@ -26,6 +25,7 @@ typedef struct search {
     const char *volume;
     triptych_brick_options options;
     const cached_wish *wish;
+    const char *checksum;       /* the wanted one, or NULL */
     triptych_identity identity; /* of the files when the source was found */
     cache_source source;
     bool damaged; /* a damaged data set was removed */
@@ -139,16 +139,16 @@ static int check_unchanged(search *s)
     return status;
 }
 
-static bool is_measured(const search *s)
+static bool has_checksum(const search *s)
 {
     char checksum[ACCURACY_CHECKSUM_BYTES];
     triptych_info info;
-    if (!s->wish->checksum || !*s->wish->checksum)
+    if (!s->checksum)
         return true;
     if (triptych_get_info(s->t, &info) < 0)
         return false;
     accuracy_checksum_text(info.checksum, checksum);
-    return !strcmp(checksum, s->wish->checksum);
+    return !strcmp(checksum, s->checksum);
 }
 
 /* Returns whether the open data set keeps all wanted values. */
@@ -157,19 +157,6 @@ static bool holds(const search *s)
     triptych_brick_options needed = s->options;
     needed.keep_all = needed.keep_all && !s->wish->shown;
     return triptych_holds(s->t, &needed, s->wish->shown) > 0;
-}
-
-/* Returns whether the index of the held data set fits the memory. */
-static bool fits(const search *s)
-{
-    struct stat st;
-    trip_budget *budget;
-    if (trip_budget_create(&budget, s->options.memory_bytes) < 0)
-        return false;
-    bool enough = fstatat(s->v->hold, INDEX_NAME, &st, AT_SYMLINK_NOFOLLOW) < 0 ||
-                  (uint64_t)st.st_size <= trip_budget_left_bytes(budget);
-    trip_budget_destroy(budget);
-    return enough;
 }
 
 static void let_go(cached_volume *v)
@@ -190,25 +177,39 @@ static int aim_at(cached_volume *v, const cache_key *key)
 
 typedef enum offer { SERVES, SERVES_NOT, DAMAGED } offer;
 
-/* Examines the data set at v->path. If its own options were wanted, it serves also if its index
- * does not fit the memory: drawing reports that failure. */
+/* Tells a damaged data set from one that needs more memory. */
+static offer examine_unopened(const search *s, bool own)
+{
+    int status = triptych_open(s->t, s->v->path, NULL);
+    triptych_close(s->t);
+    return status < 0 && !trip_interrupted() ? DAMAGED : own ? SERVES : SERVES_NOT;
+}
+
+/* Examines the data set at v->path. If its own options were wanted, it serves also if it does not
+ * fit the memory: drawing reports that failure. */
 static offer examine(const search *s, bool own)
 {
     const triptych_resources resources = { .memory_bytes = s->options.memory_bytes };
-    if (!fits(s))
-        return own ? SERVES : SERVES_NOT;
-    if (library_open_quietly(s->t, s->v->path, &resources) < 0)
-        return DAMAGED;
-    const bool serves = is_measured(s) && (own || holds(s));
+    library_hush(s->t, true);
+    int status = triptych_open(s->t, s->v->path, &resources);
+    const bool serves = status == 0 && has_checksum(s) && (own || holds(s));
     triptych_close(s->t);
-    return serves ? SERVES : SERVES_NOT;
+    const offer found = status < 0 ? examine_unopened(s, own) : serves ? SERVES : SERVES_NOT;
+    library_hush(s->t, false);
+    return found;
+}
+
+/* Returns the key of the data set that is made if none serves. */
+static cache_key own_key(const search *s)
+{
+    return cache_key_of(s->source.text, s->identity.kept);
 }
 
 /* Takes a data set of the source if it serves. Removes a damaged one. Returns 1, 0 or a failure. */
 static int take(search *s, const cache_key *key, bool locked)
 {
     cached_volume *v = s->v;
-    const cache_key wanted = cache_key_of(s->source.text, s->identity.kept);
+    const cache_key wanted = own_key(s);
     const bool own = !strcmp(key->text, wanted.text);
     int status = aim_at(v, key);
     if (status == 0)
@@ -244,6 +245,13 @@ static int take_smallest(search *s, bool locked)
         if (cache_key_has_source(&entries[i].key, &s->source))
             status = take(s, &entries[i].key, locked);
     free(entries);
+    if (status == 0 && s->checksum) { /* the caller reports that the checksum differs */
+        const cache_key own = own_key(s);
+        const char *checksum = s->checksum;
+        s->checksum = NULL;
+        status = take(s, &own, locked);
+        s->checksum = checksum;
+    }
     if (status == 0 && s->damaged)
         trip_warn(s->volume, "its data set in the cache is damaged and will be made again");
     s->damaged = false;
@@ -271,7 +279,7 @@ static int brick(search *s)
 static int make(search *s)
 {
     cached_volume *v = s->v;
-    const cache_key key = cache_key_of(s->source.text, s->identity.kept);
+    const cache_key key = own_key(s);
     trip_progress progress = trip_progress_start(false);
     int lock = cache_folder_lock(&v->folder, &key, on_wait, &progress);
     trip_progress_end(&progress);
@@ -293,6 +301,7 @@ static int open_volume(search *s, bool making)
     int status = cache_folder_open(&v->folder, true);
     if (status == 0)
         status = find_source(s);
+    s->checksum = s->wish->checksum && *s->wish->checksum ? s->wish->checksum : NULL;
     s->options.max_bytes = v->folder.limit_bytes;
     if (status == 0)
         status = take_smallest(s, false);
