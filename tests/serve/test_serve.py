@@ -5,7 +5,9 @@ import os
 import shlex
 import signal
 import struct
+import tempfile
 import time
+import unittest.mock
 import urllib.parse
 import zlib
 
@@ -265,6 +267,11 @@ class Serve(program.ProgramTest):
             self.assertEqual(self.status()["effects"], "emission of heat.trip, 500 to 3000 K")
 
     def test_a_volume_is_bricked_and_shown(self):
+        cache = tempfile.TemporaryDirectory(prefix="trip-cache-")  # no data set keeps more values
+        self.addCleanup(cache.cleanup)
+        changed = unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=cache.name)
+        changed.start()
+        self.addCleanup(changed.stop)
         self.tearDown()
         self.serve("v.nhdr")
         self.do("resize 40 30")
