@@ -58,8 +58,8 @@ class Background(program.ProgramTest):
         yield data, "--renderer", "cpu", "--samples-per-sheet", "4"
         yield data, "--renderer", "integral"
         yield volume, "--renderer", "integral", "--field", "source"
-        if "GL" not in program.SWITCHED_OFF:
-            yield data, "--renderer", "gl"
+        for gl in program.GL:
+            yield data, "--renderer", gl
 
     def test_fog_fades_out_beyond_its_last_voxels(self):
         made = self.brick("fog.vdb", "fog.trip", "--tf", "linear.tf")
