@@ -156,34 +156,51 @@ static int list(const cache_folder *c, const options *o)
     return status;
 }
 
-static void count_entries(const cache_entry *entries, size_t count, uint64_t *bytes)
+static uint64_t bytes_of(const cache_entry *entries, size_t count)
 {
-    *bytes = 0;
+    uint64_t bytes = 0;
     for (size_t i = 0; i < count; i++)
-        *bytes += entries[i].bytes;
+        bytes += entries[i].bytes;
+    return bytes;
+}
+
+/* Names the data sets that remain, in one line. */
+static int fail_if_left(const cache_folder *c, const cache_left *left)
+{
+    const struct {
+        size_t count;
+        const char *why;
+    } kinds[] = { { left->used, "in use" },
+                  { left->making, "being made" },
+                  { left->stuck, "that cannot be removed" } };
+    size_t count = left->used + left->making + left->stuck;
+    char text[200] = "", *end = text;
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (kinds[i].count)
+            end += sprintf(end, "%s%zu %s", *text ? ", " : "", kinds[i].count, kinds[i].why);
+    return count ? trip_fail(TRIP_ERROR, "cache", c->path, "%zu data set%s: %s", count,
+                             count == 1 ? " remains" : "s remain", text)
+                 : 0;
 }
 
 static int clear(const cache_folder *c)
 {
     cache_entry *before = NULL, *after = NULL;
     size_t had = 0, has = 0;
-    uint64_t had_bytes, has_bytes;
+    cache_left left = { 0 };
     char text[32];
     int status = c->fd < 0 ? 0 : cache_folder_list(c, &before, &had);
     if (status == 0 && c->fd >= 0)
-        status = cache_folder_shrink(c, 0);
+        status = cache_folder_shrink(c, 0, &left);
     if (status == 0 && c->fd >= 0)
         status = cache_folder_list(c, &after, &has);
-    count_entries(before, had, &had_bytes);
-    count_entries(after, has, &has_bytes);
     has = has < had ? has : had; /* another process may have added data sets */
-    has_bytes = has_bytes < had_bytes ? has_bytes : had_bytes;
+    const uint64_t had_bytes = bytes_of(before, had), has_bytes = bytes_of(after, has);
     if (status == 0)
         printf("removed %zu data set%s, %s\n", had - has, had - has == 1 ? "" : "s",
-               trip_format_bytes(had_bytes - has_bytes, text));
-    if (status == 0 && has > 0)
-        status = trip_fail(TRIP_ERROR, "cache", c->path,
-                           "%zu data sets remain: they are in use, or cannot be removed", has);
+               trip_format_bytes(had_bytes > has_bytes ? had_bytes - has_bytes : 0, text));
+    if (status == 0)
+        status = fail_if_left(c, &left);
     free(before);
     free(after);
     return status;

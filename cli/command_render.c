@@ -35,35 +35,44 @@ typedef struct drawing {
     int empty; /* number of pictures without any visible voxel */
 } drawing;
 
-/* Returns the options for bricking a volume. Bricking always keeps the voxels that the automatic
- * transfer function shows. With a sequence, it also keeps the voxels that the sequence's transfer
- * functions show. If a window moves the transfer function, it keeps every voxel, so that the next
- * window finds its voxels in the cache. */
-static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
+/* Returns the wanted data set of a volume. Bricking always keeps the voxels that the automatic
+ * transfer function shows, and the voxels that the sequence's transfer functions show. If a window
+ * moves the transfer function, bricking keeps every voxel, so that the next window finds its voxels
+ * in the cache. A smaller data set serves too if it holds the voxels of this window. */
+static cached_wish wish_of(const drawing *d)
 {
-    triptych_brick_options options = o->volume;
-    options.keep_all = shown && o->function.window > 0;
-    if (shown && !options.keep_all) {
-        options.functions = shown->names;
-        options.function_count = shown->name_count;
-        options.ranges = shown->ranges;
-        options.range_count = shown->range_count;
+    const render_options *o = &d->o;
+    const sequence *shown = &d->sequence;
+    cached_wish wish = { .options = o->volume, .checksum = o->quality.measured };
+    triptych_brick_options *options = &wish.options;
+    options->keep_all = o->function.window > 0;
+    options->functions = shown->names;
+    options->function_count = shown->name_count;
+    options->ranges = shown->ranges;
+    options->range_count = shown->range_count;
+    options->automatic = 1;
+    options->levels_for = o->levels_for;
+    options->memory_bytes = o->resources.memory_bytes;
+    options->threads = o->resources.threads;
+    if (options->keep_all) {
+        options->function_count = options->range_count = 0;
+        wish.shown = sequence_has_functions(shown) ? NULL : &o->function;
     }
-    options.automatic = 1;
-    options.levels_for = o->levels_for;
-    options.memory_bytes = o->resources.memory_bytes;
-    options.threads = o->resources.threads;
-    return options;
+    return wish;
 }
 
 static int brick_volume(drawing *d)
 {
     const render_options *o = &d->o;
-    const triptych_brick_options wanted = brick_options(o, &d->sequence);
-    int status = cached_volume_open(&d->volume, d->t, o->input, &wanted);
+    const cached_wish wish = wish_of(d);
+    int status = cached_volume_open(&d->volume, d->t, o->input, &wish);
+    const bool quiet = o->stats && !strcmp(o->stats, "-");
     trip_progress_end(&d->progress);
-    if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
+    if (status == 0 && d->volume.seconds > 0 && !quiet)
         printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
+    if (status == 0 && d->volume.wider && !quiet)
+        printf("%s: found in the cache, in a data set made for another transfer function\n",
+               o->input);
     return status;
 }
 
@@ -77,37 +86,9 @@ static int open_data(drawing *d, const char *path)
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
-/* Opens the data set that the cache holds for the default transfer function. Returns 1 if that data
- * set also holds every voxel that the given transfer function shows, else 0. Returns 0 too if the
- * sequence has transfer functions of its own. */
-static int open_default(drawing *d)
-{
-    triptych_transfer_function look = d->o.function;
-    const triptych_brick_options defaults = brick_options(&d->o, NULL);
-    const bool other = look.name || look.window > 0;
-    int status = other && !sequence_has_functions(&d->sequence)
-                     ? cached_volume_find(&d->volume, d->t, d->o.input, &defaults)
-                     : 0;
-    trip_progress_end(&d->progress);
-    if (status != 1)
-        return status;
-    look.all_values = 1;
-    status = open_data(d, d->volume.path);
-    if (!status)
-        status = triptych_set_transfer_function(d->t, &look);
-    if (status != TRIPTYCH_LEFT_OUT)
-        return status < 0 ? status : 1;
-    triptych_close(d->t);
-    cached_volume_close(&d->volume);
-    return 0;
-}
-
 static int open_from_cache(drawing *d)
 {
-    int status = open_default(d);
-    if (status != 0)
-        return status < 0 ? status : 0;
-    status = brick_volume(d);
+    int status = brick_volume(d);
     if (!status)
         status = open_data(d, d->volume.path);
     return status ? status : triptych_set_transfer_function(d->t, &d->o.function);

@@ -51,11 +51,16 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
     return status || !heat ? status : triptych_set_heat(t, heat);
 }
 
+void library_hush(triptych *t, bool quiet)
+{
+    triptych_set_messages(t, quiet ? NULL : pass_message, NULL);
+}
+
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function)
 {
-    triptych_set_messages(t, NULL, NULL);
+    library_hush(t, true);
     int status = triptych_set_transfer_function(t, function);
-    triptych_set_messages(t, pass_message, NULL);
+    library_hush(t, false);
     if (status)
         trip_report_line(triptych_error(t));
     return status;

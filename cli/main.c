@@ -3,6 +3,7 @@
 #include "interrupt.h"
 
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -13,18 +14,20 @@
 static const struct command {
     const char *name, *summary;
     int (*run)(int argc, char **argv);
+    bool prints; /* the results are on standard output */
 } commands[] = {
-    { "brick", "converts a volume into a data set that is drawn from disk", trip_command_brick },
-    { "info", "prints the contents of a data set, and checks it", trip_command_info },
-    { "render", "draws a volume or data set into image files", trip_command_render },
-    { "view", "shows volumes and data sets in a window", trip_command_view },
-    { "serve", "shows a volume or data set in a browser", trip_command_serve },
+    { "brick", "converts a volume into a data set that is drawn from disk", trip_command_brick,
+      false },
+    { "info", "prints the contents of a data set, and checks it", trip_command_info, true },
+    { "render", "draws a volume or data set into image files", trip_command_render, false },
+    { "view", "shows volumes and data sets in a window", trip_command_view, false },
+    { "serve", "shows a volume or data set in a browser", trip_command_serve, false },
     { "cache", "lists or clears the data sets that render, view and serve made of volumes",
-      trip_command_cache },
-    { "bench", "measures speed, as tables", trip_command_bench },
-    { "accuracy", "measures the error and time of each setting, as a report",
-      trip_command_accuracy },
-    { "tf", "lists, prints and converts transfer functions", trip_command_tf },
+      trip_command_cache, true },
+    { "bench", "measures speed, as tables", trip_command_bench, true },
+    { "accuracy", "measures the error and time of each setting, as a report", trip_command_accuracy,
+      false },
+    { "tf", "lists, prints and converts transfer functions", trip_command_tf, true },
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 
@@ -52,12 +55,36 @@ static void hold_standard_streams(void)
             (void)!open("/dev/null", O_RDONLY);
 }
 
-/* Flushes stdout, so that a full disk behind it is reported as a failure. */
-static int finish(int exit_status)
+/* Flushes stdout, so that a full disk behind it is reported as a failure. If nobody reads stdout
+ * any more, a command that prints its results ends as other programs do. The results of other
+ * commands are complete. */
+static int finish(int exit_status, bool prints)
 {
-    if (fflush(stdout) != 0 || ferror(stdout))
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return exit_status;
+    if (!trip_interrupt_is_unread(STDOUT_FILENO))
         return trip_exit_status(trip_fail_errno("write", "standard output", NULL));
+    if (prints)
+        trip_interrupt_die_of_pipe();
     return exit_status;
+}
+
+/* Drops the line about the interruption once nobody reads stdout. */
+static void pass_line(const char *line, void *user)
+{
+    (void)user;
+    if (!trip_interrupt_is_unread(STDOUT_FILENO))
+        trip_report_line(line);
+}
+
+static int run(const struct command *c, int argc, char **argv)
+{
+    trip_interrupt_install();
+    if (c->prints) {
+        trip_interrupt_at_end_of_output();
+        trip_report_redirect(pass_line, NULL);
+    }
+    return finish(c->run(argc, argv), c->prints);
 }
 
 /* Raises the limit on open files: every drawn data set has one open file for each list. */
@@ -81,16 +108,15 @@ int main(int argc, char **argv)
     const char *name = argv[1];
     if (!strcmp(name, "--help") || !strcmp(name, "help") || !strcmp(name, "-h")) {
         print_help();
-        return finish(0);
+        return finish(0, true);
     }
     if (!strcmp(name, "--version")) {
         printf("triptych %s\n", TRIP_VERSION);
-        return finish(0);
+        return finish(0, true);
     }
-    trip_interrupt_install();
     for (int i = 0; i < COMMANDS; i++)
         if (!strcmp(name, commands[i].name))
-            return finish(commands[i].run(argc - 1, argv + 1));
+            return run(&commands[i], argc - 1, argv + 1);
     if (access(name, F_OK) == 0)
         return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
                                           "is no command; `triptych render %s -o PICTURE.png` "

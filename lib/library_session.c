@@ -82,8 +82,7 @@ static void scale_extinction(trip_tf_entry *table, double scale)
             table[code].extinction = (float)(table[code].extinction * scale);
 }
 
-/* Loads the transfer function in data units and applies the window. */
-static int load_function(const session *s, const session_look *look, trip_tf **tf)
+int session_load_function(const session *s, const session_look *look, trip_tf **tf)
 {
     int status = look->tf_text ? trip_tf_parse(tf, s->input, look->tf_text, strlen(look->tf_text))
                  : look->tf    ? trip_tf_load(tf, look->tf)
@@ -172,7 +171,7 @@ int session_use_function(session *s, const session_look *look)
     if (!status && !s->table)
         status = take_tables(s);
     if (!status)
-        status = load_function(s, look, &tf);
+        status = session_load_function(s, look, &tf);
     if (!status && !find_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->typical_min, h->typical_max, s->input);
         for (unsigned i = 0; i < s->part_count; i++)

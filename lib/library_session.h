@@ -49,6 +49,8 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes);
 int session_add_data(session *s, const char *input);
 /* Reads the text that `brick` wrote for each part, unless it has been read. */
 int session_read_text(session *s);
+/* Loads a transfer function in data units and applies the window. The texts must have been read. */
+int session_load_function(const session *s, const session_look *look, trip_tf **tf);
 /* Sets the transfer function for later frames. Reads the texts and allocates the table if needed.
  * Warns about visible values that bricking dropped, with the command that bricks again. */
 int session_use_function(session *s, const session_look *look);

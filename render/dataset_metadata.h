@@ -54,6 +54,9 @@ int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset 
 /* Reads the histogram. Returns false, with a count of 0, if the text has none. */
 bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histogram *out);
 
+/* Returns whether the data set keeps all values from `lo` to `hi`. False without an envelope. */
+bool trip_dataset_metadata_keeps(const trip_dataset_metadata *t, double lo, double hi);
+
 /* Estimates from the histogram how many dropped voxels `tf` shows, and the range of their values. A
  * bin that is shown in part counts in proportion. Returns 0 if the text lacks a histogram or
  * envelope. */

@@ -7,8 +7,10 @@ import shlex
 import signal
 import socket
 import struct
+import tempfile
 import threading
 import time
+import unittest.mock
 import urllib.parse
 import zlib
 
@@ -273,6 +275,11 @@ class Serve(program.ProgramTest):
             self.assertEqual(self.status()["effects"], "emission of heat.trip, 500 to 3000 K")
 
     def test_a_volume_is_bricked_and_shown(self):
+        cache = tempfile.TemporaryDirectory(prefix="trip-cache-")  # no data set keeps more values
+        self.addCleanup(cache.cleanup)
+        changed = unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=cache.name)
+        changed.start()
+        self.addCleanup(changed.stop)
         self.tearDown()
         self.serve("v.nhdr")
         self.do("resize 40 30")
