@@ -380,6 +380,12 @@ static const trip_option rows[DRAW_OPTIONS] = {
                         "(requires --renderer reference --kernel ewa) or none",
                         "ewa", "pre only", .group = DRAW_GROUP_PAPERS, .measured = true,
                         AT(splat.low_pass), CHOICE(low_passes) },
+    [DRAW_LOW_PASS_WIDTH] = { "low-pass-width", "PX",
+                              "Sets the standard deviation of the low-pass filter in pixels; 0 "
+                              "draws plain splats, 1 is the width of the EWA paper",
+                              "0.4", "pre only, without --low-pass none",
+                              .group = DRAW_GROUP_PAPERS, .measured = true,
+                              .type = TRIP_OPTION_PART, AT(splat.low_pass_px), .lo = 0, .hi = 16 },
     [DRAW_METHOD] = { "method", "NAME",
                       "Selects how lists become a picture: merge, clip, axis, or image, which "
                       "implies --renderer reference and pre",

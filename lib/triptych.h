@@ -423,6 +423,9 @@ typedef struct triptych_splat_settings {
     triptych_compositing compositing;
     triptych_footprint footprint;
     triptych_low_pass low_pass;
+    /* Standard deviation of the low-pass filter in pixels, 0 (TRIPTYCH_ZERO, no filter) to 16; the
+     * default is 0.4. Zwicker et al. use 1. Not with TRIPTYCH_LOW_PASS_NONE. */
+    double low_pass_px;
     triptych_weights weights;
     /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1
      * (round, the default) to 100. Not with count_exactly. */

@@ -16,6 +16,7 @@ trip_settings trip_settings_default(void)
         .h = TRIP_H_AUTO,
         .early_termination = TRIP_EARLY_TERMINATION_AUTO,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
+        .low_pass_px = TRIP_LOW_PASS_PX,
         .flatten = 1,
         .background = { 0, 0, 0, 1 },
         .tolerance = 1e-4,
@@ -71,7 +72,8 @@ int trip_settings_check(const trip_settings *s)
     if (s->kernel == TRIP_KERNEL_NEAREST && s->samples_per_sheet != 2)
         return trip_fail(TRIP_USAGE, "render", "samples-per-sheet",
                          "nearest interpolation requires 2 samples per sheet");
-    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
+    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA ||
+        s->low_pass_px != TRIP_LOW_PASS_PX)
         return trip_fail(TRIP_USAGE, "render", "kernel",
                          "footprints and their low-pass filter apply to splats; use classify pre");
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)

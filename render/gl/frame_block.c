@@ -308,7 +308,7 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
     double k = fabs(trip_dot(c->r0, normal)), r_min = k / trip_length(normal);
     if (settings->footprint == TRIP_FOOTPRINT_EWA)
         r_max *= 1 + ratio * TRIP_SPLAT_AFFINE / (1 - TRIP_SPLAT_AFFINE);
-    double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
+    double room = half - TRIP_CUTOFF * trip_settings_low_pass_px(settings) * r_max / r_min;
     double wide = fmax(trip_length(c->rx), trip_length(c->ry));
     return room > 0 ? settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
 }
