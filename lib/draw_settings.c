@@ -221,7 +221,7 @@ static const char *const fields[] = { "stored", "splats", NULL };
 static const char *const compositings[] = { "splat", "sheet", NULL };
 static const char *const low_passes[] = { "ewa", "uniform", "none", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", "image", NULL };
-static const char *const lists[] = { "replicated", "indexed", NULL };
+static const char *const lists[] = { "replicated", "indexed", "resident", NULL };
 static const char *const primitives[] = { "sprites", "triangles", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
@@ -397,8 +397,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                          .group = DRAW_GROUP_PAPERS, .measured = true, .type = TRIP_OPTION_FLAG,
                          AT(all.normalise) },
     [DRAW_LISTS] = { "submit", "FORM",
-                     "Selects how gl receives splats: replicated or indexed, sprites or triangles, "
-                     "or one of each",
+                     "Selects how gl receives splats: replicated, indexed or resident lists, "
+                     "sprites or triangles, or one of each",
                      "replicated,sprites", "pre and gl only", .group = DRAW_GROUP_PAPERS,
                      .measured = true, AT(splat.lists), CHOICE(lists) },
     [DRAW_PRIMITIVES] = { "submit", .group = DRAW_GROUP_PAPERS, .measured = true,

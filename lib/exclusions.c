@@ -36,7 +36,7 @@ enum {
     MAY_LATTICE = 1 << 22,
     NARROW_TARGET = 1 << 23,
     SEVERAL_SAMPLES = 1 << 24,
-    INDEXED = 1 << 25,
+    STAYING = 1 << 25, /* lists stay in GPU memory */
     MAY_EMIT = 1 << 26,
     NEAREST = 1 << 27,
     UNFILTERED = 1 << 28,
@@ -110,7 +110,7 @@ static const struct rule {
     { ROW(TRAVERSAL), ALL, IMAGE | ASCENDING, 0, "must be outward with --method image", CONFLICT },
     { of_levels, ALL, IMAGE, 0, "does not apply to --method image", CONFLICT },
     { of_levels, ALL, FIXED, 0, "does not apply to --kernel fixed", CONFLICT },
-    { of_levels, ALL, INDEXED, 0, "does not apply to --submit indexed", CONFLICT },
+    { of_levels, ALL, STAYING, 0, "does not apply to --submit indexed or resident", CONFLICT },
     { ROW(METHOD), RENDERER(GL) | RENDERER(CPU), IMAGE, 0, "image requires --renderer reference",
       CONFLICT },
     { ROW(WEIGHTS), RENDERER(GL) | RENDERER(CPU), VERTEX, 0, "vertex requires --renderer reference",
@@ -177,7 +177,7 @@ static int facts_of_splats(const draw_settings *s)
            (p->low_pass == TRIPTYCH_LOW_PASS_NONE ? UNFILTERED : 0) |
            (p->flatten > 1 ? FLATTENED : 0) |
            (p->target > TRIPTYCH_TARGET_RGBA32F ? NARROW_TARGET : 0) |
-           (p->lists == TRIPTYCH_SUBMIT_INDEXED ? INDEXED : 0);
+           (p->lists >= TRIPTYCH_SUBMIT_INDEXED ? STAYING : 0);
 }
 
 triptych_classify draw_settings_classify(const draw_settings *s)

@@ -105,6 +105,7 @@ trip_settings trip_settings_of(const draw_settings *s)
     out.traversal = CHOSEN(trip_traversal, s->all.traversal);
     out.target = CHOSEN(trip_target, splat->target);
     out.indexed = splat->lists == TRIPTYCH_SUBMIT_INDEXED;
+    out.resident = splat->lists == TRIPTYCH_SUBMIT_RESIDENT;
     out.triangles = splat->primitives == TRIPTYCH_SUBMIT_TRIANGLES;
     out.depth = s->all.depth;
     out.h = number_or(s->all.h, TRIP_H_AUTO);

@@ -407,8 +407,10 @@ typedef enum triptych_target {
 /* The vertices that the GL renderer draws. */
 typedef enum triptych_submit_lists {
     TRIPTYCH_SUBMIT_DEFAULT,    /* replicated */
-    TRIPTYCH_SUBMIT_REPLICATED, /* a vertex array for each list */
-    TRIPTYCH_SUBMIT_INDEXED,    /* one vertex array with an index for each list; no coarse levels */
+    TRIPTYCH_SUBMIT_REPLICATED, /* the lists are sent in every frame */
+    /* Both stay in GPU memory, and have neither coarse levels nor clipping. */
+    TRIPTYCH_SUBMIT_INDEXED,  /* one vertex array with an index for each list */
+    TRIPTYCH_SUBMIT_RESIDENT, /* a vertex array for each list */
 } triptych_submit_lists;
 
 /* The primitives that the GL renderer draws. */

@@ -127,7 +127,14 @@ typedef struct trip_settings {
     trip_method method;
     trip_traversal traversal;
     trip_target target;
-    bool indexed;              /* one vertex array with three index lists instead of three lists */
+    bool indexed;  /* one vertex array with three index lists instead of three lists */
+    bool resident; /* three vertex arrays that stay in GL memory */
+    /* Selects every brick of the lists that are drawn, as if nothing could be left out. For
+     * measurements of splats. */
+    bool unculled;
+    /* Culls splats by the weights of two points (2008, 5.4; weight.h). May lose splats. Not for
+     * cpu. */
+    bool two_point_culling;
     bool triangles;            /* bounding quads of two triangles instead of point sprites */
     bool depth;                /* also computes distances (layer.h); rgba32f only */
     bool shading;              /* diffuse and specular light */
@@ -203,6 +210,12 @@ static inline double trip_settings_early_termination(const trip_settings *s)
 static inline double trip_settings_low_pass_px(const trip_settings *s)
 {
     return s->low_pass == TRIP_LOW_PASS_NONE ? 0 : s->low_pass_px;
+}
+
+/* Whether all splats stay in GL memory between frames. */
+static inline bool trip_settings_stays(const trip_settings *s)
+{
+    return s->indexed || s->resident;
 }
 
 /* Whether splats are added sheet by sheet. */

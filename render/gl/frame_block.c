@@ -254,8 +254,10 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_FLATTENED;
     if (effects & (TRIP_GL_SHADED | TRIP_GL_FLATTENED) && frame->data->header.normal_bytes == 3)
         effects |= TRIP_GL_COMPACT;
-    if (s->indexed)
-        effects |= TRIP_GL_INDEXED;
+    if (trip_settings_stays(s))
+        effects |= TRIP_GL_INDEXED | (s->indexed ? 0 : TRIP_GL_RESIDENT);
+    if (s->two_point_culling && s->method == TRIP_METHOD_MERGE && !camera->ortho)
+        effects |= TRIP_GL_TWO_POINTS;
     if (s->depth)
         effects |= TRIP_GL_DEPTH;
     effects |= trip_gl_frame_placed(s);

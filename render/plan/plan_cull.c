@@ -234,6 +234,8 @@ bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double h
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  const trip_file_slab *slab)
 {
+    if (cull->settings->unculled)
+        return TRIP_CULL_KEEP;
     if (is_transparent(cull, brick, slab))
         return TRIP_CULL_TRANSPARENT;
     trip_brick_box position = trip_brick_box_of(cull->header, slab, brick);
