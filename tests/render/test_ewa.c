@@ -398,7 +398,7 @@ static void pictures_are_sums_of_gaussians(void **state)
     scene_destroy(&s);
 }
 
-/* The narrowest filter is none. With the widest, no splat of these views is affine. */
+/* Standard deviations. 0 switches the filter off. At 16 pixels no splat of the views is affine. */
 static const double widths_px[] = { 0, 0.4, 1, 2.5, 16 };
 enum { WIDTHS = sizeof widths_px / sizeof *widths_px };
 
