@@ -77,6 +77,15 @@ static int read_no_shading(const trip_option *row, const char *text, void *base)
 
 static const char *const fields[] = { "marschner-lobb", "cloud", "shells", "filaments", NULL };
 
+static int read_culling(const trip_option *row, const char *text, void *base)
+{
+    static const char *const names[] = { "reach", "two-points", NULL };
+    int which = 0, status = trip_option_choice("--culling", text, names, &which);
+    (void)row;
+    ((bench_options *)base)->settings.two_point_culling = which == 1;
+    return status;
+}
+
 static int read_field(const trip_option *row, const char *text, void *base)
 {
     int which = 0, status = trip_option_choice("--field", text, fields, &which);
@@ -117,6 +126,7 @@ enum {
     FPS,
     SECONDS,
     COMPOSITING,
+    CULLING,
     KERNEL_RADIUS,
     ROWS
 };
@@ -198,6 +208,10 @@ static const trip_option rows[ROWS] = {
                       "Selects the unit of compositing of pre, as in `triptych render`", "splat",
                       "renderers, stream, popping and levels only", .group = DRAW_GROUP_PAPERS,
                       AT(settings.compositing), CHOICE(compositings) },
+    [CULLING] = { "culling", "reach|two-points",
+                  "Selects how splats without weight are culled: by the reach of each, which loses "
+                  "none, or by the weights of two points, as in 2008",
+                  "reach", "submit only", .group = DRAW_GROUP_PAPERS, CUSTOM(read_culling) },
     [KERNEL_RADIUS] = { "kernel-radius", "VOXELS", "Sets the radius of a splat", "2",
                         "not for flight", .group = DRAW_GROUP_PAPERS, .type = TRIP_OPTION_NUMBER,
                         AT(settings.kernel_radius), .lo = 0.1, .hi = 100 },
@@ -389,8 +403,9 @@ static int check(void *user)
     if (status)
         return status;
     const struct table *t = &tables[which];
+    const uint64_t refused = t->refused | (strcmp(t->name, "submit") ? BIT(CULLING) : 0);
     for (int i = 0; i < ROWS; i++)
-        if (given(p) & t->refused & UINT64_C(1) << i)
+        if (given(p) & refused & UINT64_C(1) << i)
             return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
                              rows[i].name);
     if (o->input && !strcmp(t->name, "levels") && given(p) & (OF_LEVELS | BIT(PLOT)))

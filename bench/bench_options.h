@@ -47,7 +47,7 @@ typedef struct bench_options {
     "  popping    jumps of pixels while the list of highest weight changes\n"                      \
     "  ewa        error and time of the affine EWA footprints\n"                                   \
     "  orders     ordering methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
-    "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                    \
+    "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Tables 3, 4\n"                \
     "  variants   changes of the picture by the shortcuts of the papers\n"
 
 /* Sets the classification that `render` chooses by itself, unless --classify was given.

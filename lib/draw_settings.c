@@ -221,7 +221,7 @@ static const char *const fields[] = { "stored", "splats", NULL };
 static const char *const compositings[] = { "splat", "sheet", NULL };
 static const char *const low_passes[] = { "ewa", "uniform", "none", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", "image", NULL };
-static const char *const lists[] = { "replicated", "indexed", NULL };
+static const char *const lists[] = { "replicated", "indexed", "resident", NULL };
 static const char *const primitives[] = { "sprites", "triangles", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
@@ -380,6 +380,12 @@ static const trip_option rows[DRAW_OPTIONS] = {
                         "(requires --renderer reference --kernel ewa) or none",
                         "ewa", "pre only", .group = DRAW_GROUP_PAPERS, .measured = true,
                         AT(splat.low_pass), CHOICE(low_passes) },
+    [DRAW_LOW_PASS_WIDTH] = { "low-pass-width", "PX",
+                              "Sets the standard deviation of the low-pass filter in pixels; 0 "
+                              "draws plain splats, 1 is the width of the EWA paper",
+                              "0.4", "pre only, without --low-pass none",
+                              .group = DRAW_GROUP_PAPERS, .measured = true,
+                              .type = TRIP_OPTION_PART, AT(splat.low_pass_px), .lo = 0, .hi = 16 },
     [DRAW_METHOD] = { "method", "NAME",
                       "Selects how lists become a picture: merge, clip, axis, or image, which "
                       "implies --renderer reference and pre",
@@ -391,8 +397,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                          .group = DRAW_GROUP_PAPERS, .measured = true, .type = TRIP_OPTION_FLAG,
                          AT(all.normalise) },
     [DRAW_LISTS] = { "submit", "FORM",
-                     "Selects how gl receives splats: replicated or indexed, sprites or triangles, "
-                     "or one of each",
+                     "Selects how gl receives splats: replicated, indexed or resident lists, "
+                     "sprites or triangles, or one of each",
                      "replicated,sprites", "pre and gl only", .group = DRAW_GROUP_PAPERS,
                      .measured = true, AT(splat.lists), CHOICE(lists) },
     [DRAW_PRIMITIVES] = { "submit", .group = DRAW_GROUP_PAPERS, .measured = true,

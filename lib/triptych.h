@@ -407,8 +407,10 @@ typedef enum triptych_target {
 /* The vertices that the GL renderer draws. */
 typedef enum triptych_submit_lists {
     TRIPTYCH_SUBMIT_DEFAULT,    /* replicated */
-    TRIPTYCH_SUBMIT_REPLICATED, /* a vertex array for each list */
-    TRIPTYCH_SUBMIT_INDEXED,    /* one vertex array with an index for each list; no coarse levels */
+    TRIPTYCH_SUBMIT_REPLICATED, /* the lists are sent in every frame */
+    /* Both stay in GPU memory, and have neither coarse levels nor clipping. */
+    TRIPTYCH_SUBMIT_INDEXED,  /* one vertex array with an index for each list */
+    TRIPTYCH_SUBMIT_RESIDENT, /* a vertex array for each list */
 } triptych_submit_lists;
 
 /* The primitives that the GL renderer draws. */
@@ -423,6 +425,9 @@ typedef struct triptych_splat_settings {
     triptych_compositing compositing;
     triptych_footprint footprint;
     triptych_low_pass low_pass;
+    /* Standard deviation of the low-pass filter in pixels, 0 (TRIPTYCH_ZERO, no filter) to 16; the
+     * default is 0.4. Zwicker et al. use 1. Not with TRIPTYCH_LOW_PASS_NONE. */
+    double low_pass_px;
     triptych_weights weights;
     /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1
      * (round, the default) to 100. Not with count_exactly. */

@@ -9,6 +9,7 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
     double cutoff2 = TRIP_CUTOFF * TRIP_CUTOFF;
     double two_pi = 6.28318530717958647692;
     double edge = exp(-cutoff2 / 2);
+    double low_pass_px = trip_settings_low_pass_px(settings);
     return (trip_splat_frame){
         .camera = *camera,
         .sigma = sigma,
@@ -19,8 +20,7 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
                      ? settings->sprite_px / (2 * TRIP_CUTOFF)
                      : 0,
         .flatten = settings->flatten > 1 ? 1 - 1 / (settings->flatten * settings->flatten) : 0,
-        .low_pass2 =
-            settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX,
+        .low_pass2 = low_pass_px * low_pass_px,
         .amplitude = 1 / (two_pi * sigma * sigma) / (1 - edge * (1 + cutoff2 / 2)),
         .edge = edge,
         .rxrx = trip_dot(camera->rx, camera->rx),
@@ -159,8 +159,7 @@ static void set_fixed(const trip_splat_frame *f, double z, trip_splat *s)
 
 double trip_splat_fixed_radius_px(const trip_settings *settings)
 {
-    return hypot(settings->sprite_px / 2,
-                 settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_CUTOFF * TRIP_LOW_PASS_PX);
+    return hypot(settings->sprite_px / 2, TRIP_CUTOFF * trip_settings_low_pass_px(settings));
 }
 
 /* Returns the cosine of the angle between the axis of view and the ray through a point; 1 in

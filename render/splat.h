@@ -24,7 +24,7 @@
  * ---------------
  * EWA volume splatting convolves the footprint with a screen filter (Zwicker et al. 2001). The
  * filter adds to the covariance and keeps the integral:
- *     S' = S + TRIP_LOW_PASS_PX^2 I
+ *     S' = S + w^2 I,  w = trip_settings_low_pass_px()                                [px^2]
  *     m(p)       = g(p) q^T S'^-1 q                                    squared radius, in std devs
  *     edge       = exp(-TRIP_CUTOFF^2 / 2)
  *     amplitude  = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) / (1 - edge (1 + TRIP_CUTOFF^2 / 2))
@@ -87,7 +87,7 @@
  * For near splats z may be 0, so m(p) and |S'| are computed across the ray, with the same values.
  * Let c = v - eye, let e1 and e2 be unit vectors at right angles to c and to one another, and let
  * rho(a) = (e1.a, e2.a). Then
- *     W    = I + (TRIP_LOW_PASS_PX max(0, z) / sigma)^2 (rho(rx) rho(rx)^T + rho(ry) rho(ry)^T)
+ *     W    = I + (w max(0, z) / sigma)^2 (rho(rx) rho(rx)^T + rho(ry) rho(ry)^T)
  *     m(p) = (|c| / sigma)^2 rho(r(p))^T W^-1 rho(r(p)) / |r(p)|^2,   |S| / |S'| = 1 / |W|
  *     s(p) = c.r(p) / (sigma |r(p)|)
  * Behind the eye there is no low-pass filter. In parallel views the formulas hold with three

@@ -74,8 +74,11 @@ static void check_times(const cJSON *row)
     assert_close(number(row, "fps"), 1000 / ms);
 }
 
-/* Checks the rows of the papers. `image` tells whether a row of image-aligned sheets follows. */
-static void check_orders(const cJSON *rows, const double multiples[5], bool image)
+/* Checks the rows of the papers. `lists` is the number of lists with weight. `normal_fps` has the
+ * column "Normal" of the paper's table. `image` tells whether a row of image-aligned sheets
+ * follows. */
+static void check_orders(const cJSON *rows, const double multiples[5], int lists,
+                         const double normal_fps[5], bool image)
 {
     static const char *const names[] = { "merge, h = 0.00", "merge, h = 0.85", "merge, h = 0.95",
                                          "clip", "axis" };
@@ -89,24 +92,49 @@ static void check_orders(const cJSON *rows, const double multiples[5], bool imag
         assert_true(number(row, "splats_drawn") >= number(axis, "splats_drawn"));
         assert_true(number(row, "splats_read") >= number(row, "splats_drawn"));
         assert_close(number(row, "paper_multiple"), number(row, "paper_splats") / 897229);
+        assert_true(number(row, "normal_read") == (i == 4 ? 1 : lists));
+        assert_true(number(row, "normal_read") >= number(row, "read"));
+        assert_close(number(row, "normal_part"), number(row, "ms") / number(row, "normal_ms"));
+        assert_true(number(row, "paper_normal_fps") == normal_fps[i]);
+        assert_close(number(row, "paper_normal_part"), normal_fps[i] / number(row, "paper_fps"));
         if (multiples[i] > 0)
             assert_true(number(row, "multiple") == multiples[i]);
     }
+}
+
+/* The volume has values up to 249, so that all of it is transparent. Normal reads it anyway. */
+static void normal_reads_transparent_voxels_too(void **state)
+{
+    (void)state;
+    FILE *f = fopen("none.tf", "w");
+    assert_non_null(f);
+    fputs("values data\nunit voxel\n250 1 1 1 0\n251 1 1 1 0.5\n", f);
+    assert_int_equal(fclose(f), 0);
+    cJSON *root = bench("orders block.trip --renderer cpu --size 32x32 --repeat 1 --tf none.tf");
+    const cJSON *row;
+    cJSON_ArrayForEach(row, rows_of(root, "lateral"))
+    {
+        assert_true(number(row, "normal_read") == 1);
+        assert_true(number(row, "read") == 0);
+    }
+    cJSON_Delete(root);
 }
 
 static void orders_draws_three_times_at_h_0_and_once_from_the_side(void **state)
 {
     static const double oblique[] = { 3, 0, 0, 0, 1 }, lateral[] = { 1, 1, 1, 1, 1 };
     (void)state;
-    static const char *const renderers[] = { "reference", "cpu" };
-    for (int i = 0; i < 2; i++) {
+    static const double table_1[] = { 0.790, 1.016, 1.143, 1.208, 2.062 };
+    static const double table_2[] = { 0.970, 1.333, 1.333, 1.333, 2.208 };
+    static const char *const renderers[] = { "reference", "cpu", "gl" };
+    for (int i = 0; i < (test_opengl() ? 3 : 2); i++) {
         char arguments[128];
         snprintf(arguments, sizeof arguments,
                  "orders block.trip --renderer %s --size 96x80 --repeat 3", renderers[i]);
         cJSON *root = bench(arguments);
         const cJSON *rows = rows_of(root, "oblique");
-        check_orders(rows, oblique, i == 0);
-        check_orders(rows_of(root, "lateral"), lateral, i == 0);
+        check_orders(rows, oblique, 3, table_1, i == 0);
+        check_orders(rows_of(root, "lateral"), lateral, 1, table_2, i == 0);
         for (int k = 0; k < 4; k++)
             assert_true(number(cJSON_GetArrayItem(rows, k), "splats_drawn") >=
                         number(cJSON_GetArrayItem(rows, k + 1), "splats_drawn"));
@@ -355,22 +383,37 @@ static void renderers_reports_each_view_without_counts_too(void **state)
 static void submit_compares_methods_of_gl(void **state)
 {
     (void)state;
-    program_run r;
     if (!test_opengl())
         skip();
-    program_call(&r, "bench submit block.trip --size 64x64 --repeat 1 --json");
-    assert_works(&r);
-    cJSON *root = cJSON_Parse(r.out);
-    const cJSON *rows = rows_of(root, "submit"), *row;
-    assert_int_equal(cJSON_GetArraySize(rows), 10);
-    cJSON_ArrayForEach(row, rows)
-    {
-        bool axis = !strcmp(cJSON_GetObjectItem(row, "orders")->valuestring, "axis");
-        check_times(row);
-        assert_true(axis ? number(row, "multiple") == 1 : number(row, "multiple") > 1);
+    double projected[14];
+    for (int two_points = 0; two_points < 2; two_points++) {
+        cJSON *root = bench(two_points ? "submit block.trip --size 64x64 --repeat 1 "
+                                         "--culling two-points"
+                                       : "submit block.trip --size 64x64 --repeat 1");
+        const cJSON *rows = rows_of(root, "submit"), *start = rows_of(root, "start");
+        assert_int_equal(cJSON_GetArraySize(rows), 14);
+        assert_int_equal(cJSON_GetArraySize(start), 14);
+        for (int i = 0; i < 14; i++) {
+            const cJSON *row = cJSON_GetArrayItem(rows, i);
+            bool axis = !strcmp(cJSON_GetObjectItem(row, "orders")->valuestring, "axis");
+            check_times(row);
+            assert_true(axis ? number(row, "multiple") == 1 : number(row, "multiple") > 1);
+            assert_true(number(row, "projected") >= number(row, "multiple"));
+            assert_true(number(cJSON_GetArrayItem(start, i), "start_s") > 0);
+            assert_true((cJSON_GetObjectItem(row, "lost_max") != NULL) == two_points);
+            if (two_points)
+                assert_true(number(row, "projected") <= projected[i]);
+            projected[i] = number(row, "projected");
+        }
+        assert_true(number(cJSON_GetArrayItem(rows, 0), "speed") == 1);
+        /* Replicated point sprites of the MRI in Tables 3 and 4 of the paper, three lists. */
+        assert_close(number(cJSON_GetArrayItem(rows, 1), "paper_mri"), 3.03 / 6.07);
+        assert_true(number(cJSON_GetArrayItem(start, 1), "paper_mri") == 55.51);
+        /* Indexed triangles of the Head. */
+        assert_close(number(cJSON_GetArrayItem(rows, 7), "paper_head"), 2.00 / 22.45);
+        assert_true(number(cJSON_GetArrayItem(start, 7), "paper_head") == 5.89);
+        cJSON_Delete(root);
     }
-    assert_true(number(cJSON_GetArrayItem(rows, 0), "speed") == 1);
-    cJSON_Delete(root);
 }
 
 static void without_a_table_bench_lists_tables_and_runs_a_short_one(void **state)
@@ -642,6 +685,8 @@ static void wrong_usage_is_refused_in_one_line(void **state)
         "bench orders block.trip --size 32x32,64x64",
         "bench orders block.trip --renderer cpu,gl",
         "bench submit block.trip --renderer cpu",
+        "bench submit block.trip --culling none",
+        "bench orders block.trip --culling two-points",
         "bench renderers block.trip --engine pread",
         "bench renderers block.trip --renderer none",
         "bench stream block.trip --views 2",
@@ -687,6 +732,7 @@ int main(void)
         cmocka_unit_test(the_default_is_seen_as_by_render),
         cmocka_unit_test(tables_name_the_options_of_render),
         cmocka_unit_test(renderers_reports_each_view_without_counts_too),
+        cmocka_unit_test(normal_reads_transparent_voxels_too),
         cmocka_unit_test(submit_compares_methods_of_gl),
         cmocka_unit_test(without_a_table_bench_lists_tables_and_runs_a_short_one),
         cmocka_unit_test(variants_compares_the_papers_with_the_default_picture),

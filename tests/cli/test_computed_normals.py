@@ -73,6 +73,7 @@ class ComputedNormals(program.ProgramTest):
         for renderer in "cpu", "reference", *program.GL:
             if renderer == "gl":
                 self.assert_alike("v", "--renderer", "gl", "--submit", "indexed")
+                self.assert_alike("v", "--renderer", "gl", "--submit", "resident")
             for view in (), ("--azimuth", 130, "--elevation", 50), INSIDE, ("--ortho", "fit"):
                 self.assert_alike("v", "--renderer", renderer, *view)
 

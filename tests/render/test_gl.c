@@ -97,18 +97,65 @@ static void submission_forms_give_the_same_picture_and_counts(void **state)
     trip_camera_params view = scene_view(&s, trip_v3(1, 0.8, 0.5), 80, 40, 120);
     trip_settings settings = trip_settings_default();
     scene_picture expected = scene_draw(&s, &reference, &view, &settings);
-    for (int form = 0; form < 4; form++) {
+    for (int form = 0; form < 6; form++) {
         static const char *const names[] = { "replicated sprites", "replicated triangles",
-                                             "indexed sprites", "indexed triangles" };
+                                             "indexed sprites",    "indexed triangles",
+                                             "resident sprites",   "resident triangles" };
         settings.triangles = form & 1;
-        settings.indexed = form & 2;
+        settings.indexed = form / 2 == 1;
+        settings.resident = form / 2 == 2;
         scene_picture p = scene_draw(&s, &gl, &view, &settings);
         assert_agrees(names[form], &expected, &p, &settings);
         assert_same_counts(&expected, &p);
-        assert_true((p.stats.reader.bytes_read == 0) == settings.indexed); /* resident lists */
+        assert_true((p.stats.reader.bytes_read == 0) == (form > 1)); /* lists that stay */
         scene_picture_free(&p);
     }
     scene_picture_free(&expected);
+    scene_destroy(&s);
+}
+
+/* The reference counts by trip_weight_of_two_points(), which test_weight.c compares with a closed
+ * form. */
+static void two_points_cull_as_in_the_reference(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.9, 0.8), 50, 60, 101);
+    trip_settings settings = trip_settings_default();
+    settings.two_point_culling = true;
+    scene_picture two = scene_draw(&s, &reference, &view, &settings);
+    compare("two points", &s, &view, &settings);
+    settings.indexed = true;
+    compare("two points, indexed", &s, &view, &settings);
+    settings = trip_settings_default();
+    scene_picture all = scene_draw(&s, &reference, &view, &settings);
+    assert_true(two.stats.all.splats_projected < all.stats.all.splats_projected);
+    scene_picture_free(&two);
+    scene_picture_free(&all);
+    scene_destroy(&s);
+}
+
+static void without_culling_every_brick_is_read_and_the_picture_stays(void **state)
+{
+    (void)state;
+    scene s;
+    make_shells(&s, &cubes);
+    trip_camera_params view = scene_view(&s, trip_v3(1, 0.9, 0.8), 12, 40, 101);
+    trip_settings settings = trip_settings_default();
+    for (int i = 0; i < 3; i++) {
+        const scene_renderer *r = i ? &gl : &reference;
+        settings.indexed = i == 2;
+        settings.unculled = false;
+        scene_picture some = scene_draw(&s, r, &view, &settings);
+        settings.unculled = true;
+        scene_picture all = scene_draw(&s, r, &view, &settings);
+        assert_true(scene_difference(&some, &all) <= 1e-5);
+        assert_int_equal(some.stats.all.splats_drawn, all.stats.all.splats_drawn);
+        assert_true(some.stats.all.splats_read < all.stats.all.splats_read);
+        scene_picture_free(&some);
+        scene_picture_free(&all);
+    }
     scene_destroy(&s);
 }
 
@@ -714,6 +761,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(submission_forms_give_the_same_picture_and_counts),
+        cmocka_unit_test(two_points_cull_as_in_the_reference),
+        cmocka_unit_test(without_culling_every_brick_is_read_and_the_picture_stays),
         cmocka_unit_test(every_method_and_traversal_agrees_with_the_reference),
         cmocka_unit_test(a_voxel_at_the_eye_is_lit_like_in_the_reference),
         cmocka_unit_test(grids_that_are_not_cubic_agree_with_the_reference),
