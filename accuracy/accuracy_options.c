@@ -71,7 +71,6 @@ static const trip_option rows[] = {
     { "output", "REPORT/",
       "Names the folder of the report: accuracy.json, accuracy.csv and index.html", "NAME.accuracy",
       .short_name = 'o', .group = DRAW_GROUP_OUTPUT, TEXT, AT(output) },
-    { "quiet", NULL, "Prints no progress", .group = DRAW_GROUP_OUTPUT, FLAG, AT(quiet) },
     { "list", NULL, "Prints the names of all settings, and ends", .group = DRAW_GROUP_PICTURE, FLAG,
       AT(list) },
     { "no-shading", NULL, "Draws the plain colours of the transfer function, and reads no normals",

@@ -23,7 +23,7 @@ typedef struct accuracy_options {
     int width, height, views, repeat, samples;
     double tolerance, budget_seconds;
     bool shading, ladder;
-    int no_shading, no_ladder, force, quiet, list, pictures;
+    int no_shading, no_ladder, force, list, pictures;
     unsigned threads; /* 0 selects one per processor */
     uint64_t memory_bytes;
 } accuracy_options;

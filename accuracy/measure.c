@@ -594,7 +594,7 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
         status = take_pictures(s);
     if (!status)
         status = leave_out_idle(s);
-    if (!status && !o->quiet)
+    if (!status && !command_line_quiet())
         s->progress = measure_progress_start_lines("accuracy");
     if (!status)
         status = measure_views(s);

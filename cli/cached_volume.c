@@ -183,7 +183,7 @@ static int brick(search *s)
 static int make(search *s)
 {
     cached_volume *v = s->v;
-    trip_progress progress = trip_progress_start(false);
+    trip_progress progress = trip_progress_start();
     int lock = cache_folder_lock(&v->folder, &v->key, on_wait, &progress);
     trip_progress_end(&progress);
     if (lock < 0)

@@ -25,7 +25,7 @@ typedef struct options {
     const char *functions[MAX_FUNCTIONS];
     triptych_range ranges[MAX_RANGES];
     char *default_output; /* freed at the end */
-    int quiet, json, dry_run, limits;
+    int json, dry_run, limits;
 } options;
 
 /* Parses "256,256,128" or "256x256x128". */
@@ -218,13 +218,10 @@ static const trip_option rows[] = {
     { "json", NULL, "Prints the summary as JSON", .group = DRAW_GROUP_OUTPUT, FLAG, AT(json) },
     { "limits", NULL,
       "Prints the time of each stage beside a plain read and a plain write of the same bytes", NULL,
-      "excludes --quiet and --dry-run", .group = DRAW_GROUP_OUTPUT, FLAG, AT(limits) },
+      "excludes --dry-run", .group = DRAW_GROUP_OUTPUT, FLAG, AT(limits) },
     { "output", "NAME.trip", "Names the data set", "the name of the input, in the current folder",
       .brief = "Names the data set", .short_name = 'o', .group = DRAW_GROUP_OUTPUT,
       .type = TRIP_OPTION_TEXT, AT(output) },
-    { "quiet", NULL, "Prints no progress and no summary", NULL, "excludes --json",
-      .brief = "Prints no progress and no summary", .short_name = 'q', .group = DRAW_GROUP_OUTPUT,
-      FLAG, AT(quiet) },
     { "resume", NULL, "Continues the same command after it was killed",
       .brief = "Continues the same command after it was killed", .group = DRAW_GROUP_OUTPUT, FLAG,
       AT(brick.resume) },
@@ -275,10 +272,8 @@ static int check_options(void *user)
         return trip_option_fail("--resume", "does not apply with --dry-run");
     if (p->levels < 0 && p->levels_for)
         return trip_option_fail("--levels-for", "does not apply with --levels 0");
-    if (o->limits && (o->quiet || o->dry_run))
-        return trip_option_fail("--limits", "does not apply with --quiet or --dry-run");
-    if (o->quiet && o->json)
-        return trip_option_fail("--json", "does not apply with --quiet");
+    if (o->limits && o->dry_run)
+        return trip_option_fail("--limits", "does not apply with --dry-run");
     return 0;
 }
 
@@ -445,7 +440,7 @@ static int dry_run(triptych *t, const options *o)
 {
     triptych_brick_estimate e;
     int status = triptych_estimate(t, o->volume, o->output, &o->brick, &e);
-    if (status < 0 || o->quiet)
+    if (status < 0)
         return status;
     if (o->json)
         return print_estimate_json(o, &e);
@@ -462,13 +457,14 @@ static int brick(triptych *t, const options *o)
     int status = triptych_brick(t, o->volume, o->output, &o->brick, &summary);
     if (status == 0 && o->limits)
         status = brick_limits_measure(&limits, o->volume, o->output, &summary);
-    if (status < 0 || o->quiet)
+    if (status < 0)
         return status;
     if (summary.note[0])
         trip_note(o->volume, "%s", summary.note);
     if (o->json)
         return print_json(o, &summary, &limits);
-    print_text(o, &summary);
+    if (!command_line_quiet())
+        print_text(o, &summary);
     if (o->limits)
         brick_limits_print(&limits, &summary);
     return 0;
@@ -477,7 +473,7 @@ static int brick(triptych *t, const options *o)
 static int run(options *o)
 {
     triptych *t = NULL;
-    trip_progress progress = trip_progress_start(o->quiet);
+    trip_progress progress = trip_progress_start();
     o->brick.functions = o->functions;
     o->brick.ranges = o->ranges;
     int status = library_create(&t, &progress);

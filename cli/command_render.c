@@ -138,7 +138,7 @@ static int open_input(drawing *d)
 
 static int create_context(drawing *d)
 {
-    d->progress = trip_progress_start(false);
+    d->progress = trip_progress_start();
     int status = library_create(&context, &d->progress);
     d->t = context;
     return status;
@@ -196,7 +196,7 @@ static int draw_frame(drawing *d)
 {
     enum { LOOK_NS = 20000000 };
     int status = 0;
-    d->progress = trip_progress_start(false);
+    d->progress = trip_progress_start();
     while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_STEP_WAITS)
         status = triptych_await(d->t, LOOK_NS);
     if (!status)

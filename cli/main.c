@@ -4,11 +4,15 @@
 
 #include <fcntl.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include "command_line.h"
 #include "report.h"
+#include "text.h"
 
 static const struct command {
     const char *name, *summary;
@@ -31,6 +35,54 @@ enum { COMMANDS = sizeof commands / sizeof commands[0] };
 int trip_exit_status(int status)
 {
     return status >= 0 ? 0 : status == TRIP_USAGE ? 2 : 1;
+}
+
+/* Prints the options of a command, then ends the process. */
+_Noreturn static void print_options(const struct command *c, int to)
+{
+    char name[16], help[] = "--help=names";
+    char *argv[] = { name, help, NULL };
+    snprintf(name, sizeof name, "%s", c->name);
+    if (dup2(to, STDOUT_FILENO) >= 0)
+        c->run(2, argv);
+    exit(EXIT_FAILURE);
+}
+
+/* Returns whether the option list of a command has the option. A process of its own prints the
+ * list, because each command knows only its own options. */
+static bool has_option(const struct command *c, const char *option)
+{
+    int ends[2];
+    char *line = NULL;
+    size_t room = 0;
+    bool found = false;
+    if (pipe(ends) != 0)
+        return false;
+    const pid_t child = fork();
+    if (child == 0)
+        print_options(c, ends[1]);
+    close(ends[1]);
+    FILE *list = fdopen(ends[0], "r");
+    while (list && getline(&line, &room, list) > 0)
+        found |= strcspn(line + 2, " \n") == strlen(option) &&
+                 !strncmp(line + 2, option, strlen(option));
+    free(line);
+    if (list)
+        fclose(list);
+    else
+        close(ends[0]);
+    if (child > 0)
+        waitpid(child, NULL, 0);
+    return found;
+}
+
+/* Returns the first command that has the option, or NULL. */
+static const char *find_command(const char *option)
+{
+    for (int i = 0; i < COMMANDS; i++)
+        if (has_option(&commands[i], option))
+            return commands[i].name;
+    return NULL;
 }
 
 static void print_help(void)
@@ -88,6 +140,7 @@ int main(int argc, char **argv)
         return finish(0);
     }
     trip_interrupt_install();
+    command_line_set_finder(find_command);
     for (int i = 0; i < COMMANDS; i++)
         if (!strcmp(name, commands[i].name))
             return finish(commands[i].run(argc - 1, argv + 1));
@@ -96,6 +149,11 @@ int main(int argc, char **argv)
                                           "is no command; `triptych render %s -o PICTURE.png` "
                                           "draws it, `triptych view %s` shows it",
                                           name, name));
+    trip_text_nearest nearest = { .text = name };
+    for (int i = 0; i < COMMANDS; i++)
+        trip_text_nearest_try(&nearest, commands[i].name);
     return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
-                                      "unknown command; `triptych --help` lists the commands"));
+                                      "unknown command;%s%s%s `triptych --help` lists the commands",
+                                      nearest.name ? " did you mean " : "",
+                                      nearest.name ? nearest.name : "", nearest.name ? "?" : ""));
 }

@@ -6,13 +6,14 @@
 #include <unistd.h>
 
 #include "clock.h"
+#include "command_line.h"
 
 static const double interval_seconds = 0.25;
 static const double steady_seconds = 1; /* a rate over a shorter time is too uncertain */
 
-trip_progress trip_progress_start(bool quiet)
+trip_progress trip_progress_start(void)
 {
-    return (trip_progress){ .shown = !quiet && isatty(STDERR_FILENO) == 1 };
+    return (trip_progress){ .shown = !command_line_quiet() && isatty(STDERR_FILENO) == 1 };
 }
 
 /* Formats a duration, for example "0:42", "12:05" or "3:02:10". */

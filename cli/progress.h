@@ -13,7 +13,7 @@ typedef struct trip_progress {
     double stage_begin, last_shown; /* seconds of the monotonic clock */
 } trip_progress;
 
-trip_progress trip_progress_start(bool quiet);
+trip_progress trip_progress_start(void);
 /* Shows `done` of `total` items in this stage, at most four times a second. `things` names the
  * items, for example "voxels". */
 void trip_progress_show(trip_progress *p, const char *stage, uint64_t done, uint64_t total,
