@@ -209,7 +209,9 @@ static int fail_unknown(const known *k, const char *option, size_t length)
     snprintf(text, sizeof text, "%.*s", (int)(length < 63 ? length : 63), option);
     snprintf(name, sizeof name, "%s", text + strspn(text, "-"));
     const bool is_word = name[0] && name[1];
-    const char *other = is_word && find_other_command ? find_other_command(name) : NULL;
+    int matches = 0;
+    const bool is_own = find_long(k, name, strlen(name), &matches) && matches == 1;
+    const char *other = is_word && !is_own && find_other_command ? find_other_command(name) : NULL;
     const char *nearest = is_word && !other ? nearest_long(k, name) : NULL;
     if (other)
         return trip_fail(TRIP_USAGE, "usage", text,
