@@ -122,6 +122,18 @@ static void allow_open_files(void)
     }
 }
 
+/* Names the commands for a file that was given in place of a command. */
+static int fail_file(const char *name)
+{
+    char *word = trip_text_word(name);
+    int status = trip_fail(TRIP_USAGE, "usage", name,
+                           "is no command; `triptych render %s -o PICTURE.png` draws it, "
+                           "`triptych view %s` shows it",
+                           word ? word : "VOLUME", word ? word : "VOLUME");
+    free(word);
+    return status;
+}
+
 int main(int argc, char **argv)
 {
     hold_standard_streams();
@@ -145,10 +157,7 @@ int main(int argc, char **argv)
         if (!strcmp(name, commands[i].name))
             return finish(commands[i].run(argc - 1, argv + 1));
     if (access(name, F_OK) == 0)
-        return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
-                                          "is no command; `triptych render %s -o PICTURE.png` "
-                                          "draws it, `triptych view %s` shows it",
-                                          name, name));
+        return trip_exit_status(fail_file(name));
     trip_text_nearest nearest = { .text = name };
     for (int i = 0; i < COMMANDS; i++)
         trip_text_nearest_try(&nearest, commands[i].name);

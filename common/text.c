@@ -129,6 +129,20 @@ void trip_text_write_word(FILE *f, const char *word)
     fputc('\'', f);
 }
 
+char *trip_text_word(const char *word)
+{
+    char *text = NULL;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    if (!f)
+        return NULL;
+    trip_text_write_word(f, word);
+    if (fclose(f) == 0)
+        return text;
+    free(text);
+    return NULL;
+}
+
 /* Returns the small letter of an ASCII capital. Independent of the locale. */
 static char small(char c)
 {

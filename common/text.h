@@ -53,6 +53,9 @@ void trip_text_write(FILE *f, const char *text);
  */
 void trip_text_write_word(FILE *f, const char *word);
 
+/* Returns such a word for free(), or NULL without memory. */
+char *trip_text_word(const char *word);
+
 /* Returns the Levenshtein distance of two texts in bytes, or SIZE_MAX if one has more than 63
  * bytes. ASCII letters are equal to their capitals. */
 size_t trip_text_distance(const char *a, const char *b);
