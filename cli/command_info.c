@@ -455,25 +455,37 @@ static void print_typical(const data_set *d)
            outside(d->source.root));
 }
 
+/* Prints the even steps of stored values. A byte stands for every 85th code of 258 such steps and
+ * more (FORMAT.md); 16 bits stand for every code. */
+static void print_steps(const triptych_info *info)
+{
+    enum { CODES_PER_BYTE_STEP = 85, FIRST_BYTE_STEP = 258, BYTE_STEPS = 255 };
+    const bool byte = info->code_bytes == 1;
+    const double step = info->code_step_min * (byte ? CODES_PER_BYTE_STEP : 1);
+    const double first = info->code_lo + (byte ? FIRST_BYTE_STEP * step : 0);
+    const double steps = byte ? BYTE_STEPS : round((info->code_hi - info->code_lo) / step);
+    const bool wider = first < info->value_min || first + steps * step > info->value_max;
+    char lo[32], hi[32];
+    printf("; %.0f steps of %.3g from %s to %s%s\n", steps, step, shortest(first, lo),
+           shortest(first + steps * step, hi),
+           wider && !byte ? ", with a margin around the values" : "");
+}
+
 static void print_codes(const triptych_info *info)
 {
-    const bool wider = info->code_lo < info->value_min || info->code_hi > info->value_max;
-    const char *margin = wider ? ", with a margin around the values" : "";
-    char lo[32], hi[32], least[32], most[32];
+    char lo[32], hi[32];
     shortest(info->code_lo, lo);
     shortest(info->code_hi, hi);
-    snprintf(least, sizeof least, "%.3g", info->code_step_min);
-    snprintf(most, sizeof most, "%.3g", info->code_step_max);
     printf("%-12s ", "stored as");
     size_print_each(info->code_bytes, info->normal_bytes);
     if (info->ids)
         printf("; %u whole numbers from %s to %s, exactly\n", info->ids, lo, hi);
     else if (info->code_step_min < info->code_step_max)
-        printf("; values from %s to %s%s in steps of %s to %s, finer where there are more values\n",
-               lo, hi, margin, least, most);
+        printf(
+            "; values from %s to %s in steps of %.3g to %.3g, finer where there are more values\n",
+            lo, hi, info->code_step_min, info->code_step_max);
     else
-        printf("; %.0f steps of %s from %s to %s%s\n",
-               (info->code_hi - info->code_lo) / info->code_step_min, least, lo, hi, margin);
+        print_steps(info);
 }
 
 static void print_text(const data_set *d)
