@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "path.h"
+#include "file_path.h"
 #include "report.h"
 #include "transfer_function.h"
 

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "path.h"
+#include "file_path.h"
 #include "text.h"
 
 static void write_word(FILE *f, const char *word)

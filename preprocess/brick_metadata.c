@@ -12,7 +12,7 @@
 #include "anatomy.h"
 #include "orientation.h"
 #include "json.h"
-#include "path.h"
+#include "file_path.h"
 #include "report.h"
 #include "text.h"
 

@@ -1,7 +1,7 @@
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
-#include "path.h"
+#include "file_path.h"
 
 #include <stdbool.h>
 #include <stdio.h>

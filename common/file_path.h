@@ -1,6 +1,6 @@
 /* Paths of files that belong together, such as a data set and its volume. Any thread. */
-#ifndef TRIP_PATH_H
-#define TRIP_PATH_H
+#ifndef TRIP_FILE_PATH_H
+#define TRIP_FILE_PATH_H
 
 #ifdef __cplusplus
 extern "C" {
