@@ -56,7 +56,7 @@ static const trip_option parse_rows[] = {
       "Measures another program in the same views, up to 4; requires --source; none leaves out the "
       "ray caster of VTK",
       .group = DRAW_GROUP_PICTURE, CUSTOM(read_compare) },
-    { "size", "WxH", "Sets the picture size in pixels, 32 to 4096 a side", "256x256",
+    { "size", "WxH|N", "Sets the picture size in pixels, 32 to 4096 a side", "256x256",
       .group = DRAW_GROUP_MEASUREMENT, CUSTOM(read_size) },
 };
 
