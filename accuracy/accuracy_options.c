@@ -61,7 +61,7 @@ static const trip_option parse_rows[] = {
       "Measures another program in the same views, up to 4; requires --source; none leaves out the "
       "ray caster of VTK",
       .group = DRAW_GROUP_PICTURE, CUSTOM(read_compare) },
-    { "size", "WxH", "Sets the picture size in pixels, 32 to 4096 a side", "256x256",
+    { "size", "WxH|N", "Sets the picture size in pixels, 32 to 4096 a side", "256x256",
       .group = DRAW_GROUP_MEASUREMENT, CUSTOM(read_size) },
 };
 
@@ -76,7 +76,6 @@ static const trip_option rows[] = {
     { "output", "REPORT/",
       "Names the folder of the report: accuracy.json, accuracy.csv and index.html", "NAME.accuracy",
       .short_name = 'o', .group = DRAW_GROUP_OUTPUT, TEXT, AT(output) },
-    { "quiet", NULL, "Prints no progress", .group = DRAW_GROUP_OUTPUT, FLAG, AT(quiet) },
     { "list", NULL, "Prints the names of all settings, and ends", .group = DRAW_GROUP_PICTURE, FLAG,
       AT(list) },
     { "no-shading", NULL, "Draws the plain colours of the transfer function, and reads no normals",

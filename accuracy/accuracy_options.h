@@ -24,7 +24,7 @@ typedef struct accuracy_options {
     int width, height, views, repeat, samples;
     double tolerance, budget_seconds;
     bool shading;
-    int no_shading, steps, force, quiet, list, pictures;
+    int no_shading, steps, force, list, pictures;
     unsigned threads; /* 0 selects one per processor */
     uint64_t memory_bytes;
 } accuracy_options;

@@ -732,7 +732,7 @@ static int begin_views(sweep *s)
         status = choose_gl(s);
     for (int i = 0; i < s->m->row_count; i++)
         s->rows_left += s->m->rows[i].state == ACCURACY_NOT_REACHED;
-    if (status || s->o->quiet)
+    if (status || command_line_quiet())
         return status;
     status = estimate(s, &seconds);
     if (!status)
@@ -743,7 +743,7 @@ static int begin_views(sweep *s)
 static int measure_views(sweep *s)
 {
     int status = begin_views(s);
-    if (!status && !s->o->quiet)
+    if (!status && !command_line_quiet())
         s->progress = measure_progress_start_lines("accuracy");
     measure_progress_expect(s->progress, s->o->views * (1 + s->rows_left) +
                                              ACCURACY_POPPING_ROWS * s->m->popping_count);

@@ -8,6 +8,7 @@
 
 #include "bench_sample.h"
 #include "bench_tables.h"
+#include "command_line.h"
 #include "machine.h"
 #include "new_file.h"
 #include "read_files.h"
@@ -126,7 +127,7 @@ static int measure(bench_options *o, bench_report *r)
     const size_t table = table_of(o);
     if (!o->input && tables[table].makes_volumes)
         bench_options_choose(o, false);
-    o->progress = measure_progress_start(o->table);
+    o->progress = command_line_quiet() ? NULL : measure_progress_start(o->table);
     int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
                                                           : measure_data(o, table, r);
     measure_progress_end(o->progress);
@@ -149,7 +150,7 @@ int trip_bench(int argc, char **argv)
     int status = bench_options_parse(&o, argc, argv);
     if (!status)
         status = check_plot(&o);
-    if (!status && o.in_short && !o.json)
+    if (!status && o.in_short && !o.json && !command_line_quiet())
         print_tables();
     if (!status)
         status = bench_report_create(&report, o.table, command ? command : "");

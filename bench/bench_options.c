@@ -159,7 +159,7 @@ static const trip_option rows[ROWS] = {
                    "submit is always gl, variants always reference", CUSTOM(read_renderers) },
     [REPEAT] = { "repeat", "N", "Sets the number of runs; a figure is their median",
                  "5; renderers: 1", .type = TRIP_OPTION_INTEGER, AT(repeat), .lo = 1, .hi = 1000 },
-    [SIZE] = { "size", "WxH[,...]", "Sets the picture sizes in pixels",
+    [SIZE] = { "size", "WxH|N[,...]", "Sets the picture sizes in pixels",
                "512x512; renderers: 512x512,1024x1024; stream: 1024x1024; popping and levels: "
                "256x256; variants: 128x128; flight: 800x600",
                CUSTOM(read_sizes) },

@@ -280,7 +280,7 @@ static int make(search *s)
 {
     cached_volume *v = s->v;
     const cache_key key = own_key(s);
-    trip_progress progress = trip_progress_start(false);
+    trip_progress progress = trip_progress_start();
     int lock = cache_folder_lock(&v->folder, &key, on_wait, &progress);
     trip_progress_end(&progress);
     if (lock < 0)

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cached_volume.h"
+#include "clock.h"
 #include "flight.h"
 #include "library.h"
 #include "piped_tf.h"
@@ -32,7 +33,9 @@ typedef struct drawing {
     video *video;    /* NULL if frames go into image files */
     render_stats *stats;
     trip_progress progress;
-    int empty; /* number of pictures without any visible voxel */
+    int empty;    /* number of pictures without any visible voxel */
+    int done;     /* number of finished pictures */
+    double begin; /* of the first picture, seconds of the monotonic clock */
 } drawing;
 
 /* Returns the wanted data set of a volume. Bricking always keeps the voxels that the automatic
@@ -61,16 +64,21 @@ static cached_wish wish_of(const drawing *d)
     return wish;
 }
 
+/* Returns whether stdout gets no lines about pictures. */
+static bool has_no_summary(const render_options *o)
+{
+    return command_line_quiet() || (o->stats && !strcmp(o->stats, "-"));
+}
+
 static int brick_volume(drawing *d)
 {
     const render_options *o = &d->o;
     const cached_wish wish = wish_of(d);
     int status = cached_volume_open(&d->volume, d->t, o->input, &wish);
-    const bool quiet = o->stats && !strcmp(o->stats, "-");
     trip_progress_end(&d->progress);
-    if (status == 0 && d->volume.seconds > 0 && !quiet)
+    if (status == 0 && d->volume.seconds > 0 && !has_no_summary(o))
         printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
-    if (status == 0 && d->volume.wider && !quiet)
+    if (status == 0 && d->volume.wider && !has_no_summary(o))
         printf("%s: found in the cache, in a data set made for another transfer function\n",
                o->input);
     return status;
@@ -119,7 +127,7 @@ static int open_input(drawing *d)
 
 static int create_context(drawing *d)
 {
-    d->progress = trip_progress_start(false);
+    d->progress = trip_progress_start();
     int status = library_create(&context, &d->progress);
     d->t = context;
     return status;
@@ -172,18 +180,24 @@ static int set_frame(drawing *d, int index)
     return triptych_turn(d->t, d->o.orbit ? 360.0 * index / d->o.orbit : 0);
 }
 
+/* Returns whether the pictures of a sequence get no lines of their own. */
+static bool is_silent(const drawing *d)
+{
+    return d->sequence.frames > 1 && !d->o.explain;
+}
+
 /* Draws the frame after triptych_begin(). */
 static int draw_frame(drawing *d)
 {
     enum { LOOK_NS = 20000000 };
     int status = 0;
-    d->progress = trip_progress_start(false);
     while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_STEP_WAITS)
         status = triptych_await(d->t, LOOK_NS);
     if (!status)
         status = d->depth ? triptych_picture_and_depth(d->t, d->rgba, d->depth)
                           : triptych_picture(d->t, d->rgba);
-    trip_progress_end(&d->progress);
+    if (status || !is_silent(d))
+        trip_progress_end(&d->progress);
     return status;
 }
 
@@ -246,11 +260,37 @@ static int finish_image(void *user, triptych *t, int index, const float *rgba)
     char path[RENDER_FILE_BYTES];
     int status = d->video ? video_add(d->video, rgba) : 0;
     d->empty += is_empty(&d->o, rgba);
-    if (!status)
-        status = render_file_name(&d->o, d->o.output, index, path);
-    if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
+    if (!status && is_silent(d))
+        trip_progress_pictures(&d->progress, ++d->done, d->sequence.frames);
+    else if (!status && !(status = render_file_name(&d->o, d->o.output, index, path)) &&
+             !has_no_summary(&d->o))
         status = render_stats_summary(path, &d->o, t, stdout);
     return status;
+}
+
+/* Prints one line for all pictures of a sequence. */
+static void print_sequence(const drawing *d, bool is_video)
+{
+    char first[RENDER_FILE_BYTES], last[RENDER_FILE_BYTES];
+    const int frames = d->sequence.frames;
+    if (!is_silent(d) || has_no_summary(&d->o) || render_file_name(&d->o, d->o.output, 0, first) ||
+        render_file_name(&d->o, d->o.output, frames - 1, last))
+        return;
+    render_stats_sequence(&(render_sequence){ .first = first,
+                                              .last = is_video ? NULL : last,
+                                              .frames = frames,
+                                              .seconds = trip_now_seconds() - d->begin },
+                          &d->o, stdout);
+}
+
+/* Tells how many pictures of a sequence exist after Ctrl-C. */
+static void note_interrupted(const drawing *d)
+{
+    if (d->video)
+        trip_note(d->o.output, "%d of %d pictures were drawn; no video is written", d->done,
+                  d->sequence.frames);
+    else
+        trip_note(d->o.output, "the first %d of %d pictures are written", d->done, d->sequence.frames);
 }
 
 static int draw_image(drawing *d, int index)
@@ -321,14 +361,23 @@ static int draw_images(drawing *d)
     d->by_cameras = d->o.path;
     if (!status)
         status = start_video(d);
+    d->begin = trip_now_seconds();
+    if (is_silent(d))
+        trip_progress_pictures(&d->progress, 0, d->sequence.frames);
     if (!status)
         status = draw_in_flight(d, &first);
     for (int i = first; i < d->sequence.frames && !status; i++)
         status = draw_image(d, i);
-    if (!status && d->video) {
+    trip_progress_end(&d->progress);
+    if (status == TRIP_INTERRUPTED && is_silent(d))
+        note_interrupted(d);
+    const bool is_video = d->video != NULL;
+    if (!status && is_video) {
         status = video_finish(d->video);
         d->video = NULL;
     }
+    if (!status)
+        print_sequence(d, is_video);
     return status;
 }
 

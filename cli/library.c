@@ -4,13 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "command_line.h"
 #include "json.h"
 #include "report.h"
 
 static void pass_message(void *user, const char *line)
 {
     (void)user;
-    trip_report_line(line);
+    if (!command_line_quiet() || !command_line_is_note(line))
+        trip_report_line(line);
 }
 
 static const char *things_of(const char *stage)

@@ -5,11 +5,15 @@
 #include <fcntl.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include "command_line.h"
 #include "report.h"
+#include "text.h"
 
 static const struct command {
     const char *name, *summary;
@@ -34,6 +38,54 @@ enum { COMMANDS = sizeof commands / sizeof commands[0] };
 int trip_exit_status(int status)
 {
     return status >= 0 ? 0 : status == TRIP_USAGE ? 2 : 1;
+}
+
+/* Prints the options of a command, then ends the process. */
+_Noreturn static void print_options(const struct command *c, int to)
+{
+    char name[16], help[] = "--help=names";
+    char *argv[] = { name, help, NULL };
+    snprintf(name, sizeof name, "%s", c->name);
+    if (dup2(to, STDOUT_FILENO) >= 0)
+        c->run(2, argv);
+    exit(EXIT_FAILURE);
+}
+
+/* Returns whether the option list of a command has the option. A process of its own prints the
+ * list, because each command knows only its own options. */
+static bool has_option(const struct command *c, const char *option)
+{
+    int ends[2];
+    char *line = NULL;
+    size_t room = 0;
+    bool found = false;
+    if (pipe(ends) != 0)
+        return false;
+    const pid_t child = fork();
+    if (child == 0)
+        print_options(c, ends[1]);
+    close(ends[1]);
+    FILE *list = fdopen(ends[0], "r");
+    while (list && getline(&line, &room, list) > 0)
+        found |= strcspn(line + 2, " \n") == strlen(option) &&
+                 !strncmp(line + 2, option, strlen(option));
+    free(line);
+    if (list)
+        fclose(list);
+    else
+        close(ends[0]);
+    if (child > 0)
+        waitpid(child, NULL, 0);
+    return found;
+}
+
+/* Returns the first command that has the option, or NULL. */
+static const char *find_command(const char *option)
+{
+    for (int i = 0; i < COMMANDS; i++)
+        if (has_option(&commands[i], option))
+            return commands[i].name;
+    return NULL;
 }
 
 static void print_help(void)
@@ -97,6 +149,18 @@ static void allow_open_files(void)
     }
 }
 
+/* Names the commands for a file that was given in place of a command. */
+static int fail_file(const char *name)
+{
+    char *word = trip_text_word(name);
+    int status = trip_fail(TRIP_USAGE, "usage", name,
+                           "is no command; `triptych render %s -o PICTURE.png` draws it, "
+                           "`triptych view %s` shows it",
+                           word ? word : "VOLUME", word ? word : "VOLUME");
+    free(word);
+    return status;
+}
+
 int main(int argc, char **argv)
 {
     hold_standard_streams();
@@ -114,14 +178,17 @@ int main(int argc, char **argv)
         printf("triptych %s\n", TRIP_VERSION);
         return finish(0, true);
     }
+    command_line_set_finder(find_command);
     for (int i = 0; i < COMMANDS; i++)
         if (!strcmp(name, commands[i].name))
             return run(&commands[i], argc - 1, argv + 1);
     if (access(name, F_OK) == 0)
-        return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
-                                          "is no command; `triptych render %s -o PICTURE.png` "
-                                          "draws it, `triptych view %s` shows it",
-                                          name, name));
+        return trip_exit_status(fail_file(name));
+    trip_text_nearest nearest = { .text = name };
+    for (int i = 0; i < COMMANDS; i++)
+        trip_text_nearest_try(&nearest, commands[i].name);
     return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
-                                      "unknown command; `triptych --help` lists the commands"));
+                                      "unknown command;%s%s%s `triptych --help` lists the commands",
+                                      nearest.name ? " did you mean " : "",
+                                      nearest.name ? nearest.name : "", nearest.name ? "?" : ""));
 }

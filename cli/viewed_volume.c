@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "file_path.h"
 #include "report.h"
 #include "transfer_function.h"
 
@@ -75,36 +76,31 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
     return status;
 }
 
-/* Returns the folder that contains a path, with its last slash; the caller frees it. */
-static char *folder_of(const char *path)
+/* Returns the path of a file that is named relative to a data set, or NULL if it cannot be read. */
+static char *readable(const char *data_set, const char *name)
 {
-    char *folder = strdup(path);
-    size_t n = folder ? strlen(folder) : 0;
-    while (n > 1 && folder[n - 1] == '/')
-        n--;
-    while (n > 0 && folder[n - 1] != '/')
-        n--;
-    if (folder)
-        folder[n] = 0;
-    return folder;
+    char *path = name ? trip_path_beside(data_set, name) : NULL;
+    if (path && access(path, R_OK) == 0)
+        return path;
+    free(path);
+    return NULL;
 }
 
 /* Returns the path of the volume that a data set was made of; the caller frees it. Returns NULL
- * after reporting that the volume is not beside the data set. */
+ * after reporting that the volume is neither at its recorded place nor beside the data set. */
 static char *source_of(triptych *t, const char *data_set)
 {
-    char *name = triptych_open(t, data_set, NULL) == 0 ? library_note(t, "source") : NULL;
-    char *folder = name ? folder_of(data_set) : NULL, *path = NULL;
+    const bool opened = triptych_open(t, data_set, NULL) == 0;
+    char *name = opened ? library_note(t, "source") : NULL;
+    char *recorded = opened ? library_note(t, "source_path") : NULL;
+    char *path = readable(data_set, recorded);
     triptych_close(t);
-    if (folder && asprintf(&path, "%s%s", folder, name) < 0)
-        path = NULL;
-    if (!path || access(path, R_OK)) {
+    if (!path)
+        path = readable(data_set, name);
+    if (!path)
         trip_fail(TRIP_ERROR, "brick", name ? name : data_set,
                   "the volume of this data set is not beside it");
-        free(path);
-        path = NULL;
-    }
-    free(folder);
+    free(recorded);
     free(name);
     return path;
 }

@@ -180,19 +180,81 @@ static bool same_clip_planes(const void *a, const void *b)
     return !memcmp(c->plane, d->plane, (size_t)c->planes * sizeof *c->plane);
 }
 
+/* The basic colours of CSS. */
+static const struct {
+    const char *name;
+    unsigned rgb;
+} colours[] = {
+    { "black", 0 },          { "white", 0xffffff }, { "grey", 0x808080 },   { "gray", 0x808080 },
+    { "silver", 0xc0c0c0 },  { "red", 0xff0000 },   { "green", 0x008000 },  { "blue", 0x0000ff },
+    { "navy", 0x000080 },    { "teal", 0x008080 },  { "aqua", 0x00ffff },   { "lime", 0x00ff00 },
+    { "yellow", 0xffff00 },  { "olive", 0x808000 }, { "maroon", 0x800000 }, { "purple", 0x800080 },
+    { "fuchsia", 0xff00ff },
+};
+
+/* Parses "transparent", its older name "none", or a colour of CSS. Returns false for others. */
+static bool read_colour_name(const char *text, double colour[4])
+{
+    if (!strcmp(text, "transparent") || !strcmp(text, "none")) {
+        colour[3] = 0;
+        return true;
+    }
+    for (size_t i = 0; i < sizeof colours / sizeof *colours; i++)
+        if (!strcmp(text, colours[i].name)) {
+            for (int c = 0; c < 3; c++)
+                colour[c] = (colours[i].rgb >> (16 - 8 * c) & 255) / 255.0;
+            return true;
+        }
+    return false;
+}
+
+/* Parses #RGB, #RGBA, #RRGGBB or #RRGGBBAA. */
+static bool read_hex_colour(const char *text, double colour[4])
+{
+    static const char digits[] = "0123456789abcdef0123456789ABCDEF";
+    const size_t length = strlen(text + 1);
+    const size_t each = length > 4 ? 2 : 1;
+    if ((length != 3 && length != 4 && length != 6 && length != 8) ||
+        strspn(text + 1, digits) != length)
+        return false;
+    for (size_t i = 0; i < length; i += each) {
+        const int high = (int)((strchr(digits, text[1 + i]) - digits) % 16);
+        const int low = (int)((strchr(digits, text[each + i]) - digits) % 16);
+        colour[i / each] = (16 * high + low) / 255.0;
+    }
+    return true;
+}
+
+static int fail_colour(const char *text)
+{
+    trip_text_nearest nearest = { .text = text };
+    for (size_t i = 0; i < sizeof colours / sizeof *colours; i++)
+        trip_text_nearest_try(&nearest, colours[i].name);
+    trip_text_nearest_try(&nearest, "transparent");
+    return trip_fail(TRIP_USAGE, "usage", "--background",
+                     "\"%s\" is not a colour;%s%s%s use a name like white, '#RRGGBB', R,G,B[,A] "
+                     "from 0 to 1, or transparent",
+                     text, nearest.name ? " did you mean " : "", nearest.name ? nearest.name : "",
+                     nearest.name ? "?" : "");
+}
+
 static int read_background(const trip_option *row, const char *text, void *base)
 {
     draw_settings *s = base;
     double colour[4] = { 0, 0, 0, 1 };
     int count, status = 0;
     (void)row;
-    if (!strcmp(text, "none"))
-        colour[3] = 0;
-    else
+    if (*text && strspn(text, "+-.0123456789") == 0) {
+        if (!(*text == '#' ? read_hex_colour(text, colour) : read_colour_name(text, colour)))
+            return fail_colour(text);
+    } else {
         status = trip_option_numbers("--background", text, 3, 4, colour, &count);
+    }
     for (int i = 0; i < 4 && !status; i++)
         if (colour[i] < 0 || colour[i] > 1)
-            return trip_option_fail("--background", "components must be between 0 and 1");
+            return trip_option_fail("--background",
+                                    "components must be between 0 and 1; for values up to 255 use "
+                                    "'#RRGGBB'");
     memcpy(s->background, colour, sizeof colour);
     s->has_background = 1;
     return status;
@@ -230,10 +292,11 @@ static const char *const weights[] = { "pixel", "vertex", NULL };
 #define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names), .first = 1
 
 static const trip_option rows[DRAW_OPTIONS] = {
-    [DRAW_BACKGROUND] = { "background", "R,G,B[,A]|none",
-                          "Sets the colour behind the volume; components are 0 to 1",
-                          "0,0,0; for .exr none",
-                          .brief = "Sets the colour behind the volume (default: black)",
+    [DRAW_BACKGROUND] = { "background", "COLOUR",
+                          "Sets the colour behind the volume: a name such as white, '#RRGGBB', "
+                          "R,G,B[,A] from 0 to 1, or transparent (.png, .tif and .exr only)",
+                          "black; for .exr transparent",
+                          .brief = "Sets the colour: white, '#RRGGBB', transparent, ...",
                           .group = DRAW_GROUP_PICTURE, .type = TRIP_OPTION_CUSTOM,
                           AT(has_background), .read = read_background, .print = print_background,
                           .same = same_background },

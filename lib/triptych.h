@@ -558,7 +558,8 @@ typedef struct triptych_settings {
     int depth;
     /* If not 0, triptych_list_stats has exact counts. Takes time, and draws occluded bricks too. */
     int count_exactly;
-    /* Red, green, blue, alpha, 0 to 1, not multiplied by alpha. NULL selects opaque black. */
+    /* Red, green, blue, alpha, 0 to 1, not multiplied by alpha. NULL selects opaque black. With
+     * alpha below 1, triptych_write() refuses JPEG. */
     const double *background;
     const triptych_splat_settings *splat;
     const triptych_sheet_settings *sheet;
@@ -760,7 +761,7 @@ TRIPTYCH_API int triptych_new_picture(triptych *t, int width, int height, int ch
 TRIPTYCH_API void triptych_release_picture(triptych *t, float *pixels);
 
 /* Writes a picture. The ending of `path` selects the format: .png, .jpg, .tif, or .exr (linear
- * light). */
+ * light). Colours are multiplied by alpha in .tif and .exr, but not in .png. */
 TRIPTYCH_API int triptych_write(triptych *t, const char *path, int width, int height,
                                 const float *rgba);
 /* Writes width * height distances as .exr (channel Z) or .tif. */

@@ -182,7 +182,7 @@ typedef struct triptych_brick_summary {
     /* Recognised kind of data, such as "ct" and "CT in Hounsfield units". */
     const char *kind, *kind_title;
     uint64_t input_bytes;       /* size of the volume, decompressed */
-    uint64_t bytes, halo_bytes; /* size of all lists; size of the halo lists */
+    uint64_t bytes, halo_bytes; /* size of all files on disk; size of the halo lists */
     uint64_t level_bytes;       /* size of the coarse levels' lists */
     unsigned levels;            /* number of coarse levels */
     /* Written to temporary files and removed again. */

@@ -152,6 +152,11 @@ const char *trip_dataset_metadata_source(const trip_dataset_metadata *t)
     return string_at(t, "source");
 }
 
+const char *trip_dataset_metadata_source_path(const trip_dataset_metadata *t)
+{
+    return string_at(t, "source_path");
+}
+
 const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, int i)
 {
     enum { MAX_OPTIONS = 32 };

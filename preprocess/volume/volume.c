@@ -19,6 +19,7 @@
 #include "sampled.h"
 #include "volume_coordinates.h"
 #include "volume_reader.h"
+#include "text.h"
 
 #define HEAD_BYTES 1024
 /* The default size of a portion. */
@@ -167,11 +168,15 @@ static int refuse_unknown(const char *path, trip_byte_encoding encoding)
     int status = encoding == TRIP_BYTES_PLAIN
                      ? 0
                      : trip_byte_stream_head(path, head, sizeof head, false, &bytes);
-    return status < 0 ? status
-                      : trip_fail(TRIP_ERROR, "read", path,
-                                  "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); "
-                                  "describe raw data with `triptych brick FILE --size X,Y,Z "
-                                  "--type uint8`");
+    if (status < 0)
+        return status;
+    char *word = trip_text_word(path);
+    status = trip_fail(TRIP_ERROR, "read", path,
+                       "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe "
+                       "raw data with `triptych brick %s --size X,Y,Z --type uint8`",
+                       word ? word : "FILE");
+    free(word);
+    return status;
 }
 
 int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,

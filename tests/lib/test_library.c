@@ -733,6 +733,11 @@ static void a_failure_gives_its_reason_and_the_context_continues(void **state)
                      t, &(triptych_transfer_function){ .name = "preset:no-such" }),
                  TRIPTYCH_USAGE, "no-such");
     assert_fails(t, triptych_write(t, "p.gif", SIZE, SIZE, rgba), TRIPTYCH_USAGE, "p.gif");
+    const double clear[4] = { 1, 1, 1, 0.5 };
+    assert_int_equal(triptych_set_settings(t, &(triptych_settings){ .background = clear }), 0);
+    assert_fails(t, triptych_write(t, "p.jpg", SIZE, SIZE, rgba), TRIPTYCH_USAGE,
+                 "p.jpg: cannot hold a transparent background");
+    assert_int_equal(triptych_set_settings(t, NULL), 0);
     assert_fails(t, triptych_prepare_write(t, "p.gif", NULL), TRIPTYCH_USAGE, "p.gif");
     assert_fails(t, triptych_prepare_write(t, "p.png", "z.png"), TRIPTYCH_USAGE, "z.png");
     assert_int_equal(triptych_prepare_write(t, "p.png", "z.exr"), TRIPTYCH_OK);

@@ -458,7 +458,7 @@ class View(program.ProgramTest):
         no_display = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
         self.fails(1, "view", "noise.trip", says="display", env=no_display)
         self.fails(1, "view", "missing.trip", says="missing.trip", env=self.screen.environment)
-        self.fails(2, "view", "--size=3", says="--size", env=self.screen.environment)
+        self.fails(2, "view", "--size=3x", says="--size", env=self.screen.environment)
         self.fails(2, "view", "--up=0,0,0", says="--up", env=self.screen.environment)
         glows = ["--effects=emission", "--emission=heat.trip"]
         for status, options, says in (
