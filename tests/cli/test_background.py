@@ -56,8 +56,8 @@ class Background(program.ProgramTest):
         """Yields the ways to draw a volume and its data set."""
         yield data, "--renderer", "reference"
         yield data, "--renderer", "cpu", "--samples-per-sheet", "4"
-        yield data, "--renderer", "integral"
-        yield volume, "--renderer", "integral", "--field", "source"
+        yield data, "--renderer", "integral", "--samples", "1"
+        yield volume, "--renderer", "integral", "--samples", "1", "--field", "source"
         if "GL" not in program.SWITCHED_OFF:
             yield data, "--renderer", "gl"
 
