@@ -290,7 +290,8 @@ static void note_interrupted(const drawing *d)
         trip_note(d->o.output, "%d of %d pictures were drawn; no video is written", d->done,
                   d->sequence.frames);
     else
-        trip_note(d->o.output, "the first %d of %d pictures are written", d->done, d->sequence.frames);
+        trip_note(d->o.output, "the first %d of %d pictures are written", d->done,
+                  d->sequence.frames);
 }
 
 static int draw_image(drawing *d, int index)

@@ -168,6 +168,17 @@ static int choose_interpolation(triptych *t)
     return status;
 }
 
+/* Lets the integral take the means over the areas of pixels. The rays may use one half of the
+ * tolerance, the means of rays the other. */
+static void choose_areas(triptych *t)
+{
+    trip_settings *s = &t->drawn_settings;
+    if (!t->given.integral.tolerance)
+        s->tolerance = TRIP_TOLERANCE_OF_AREAS;
+    s->tolerance /= 2;
+    s->samples = 0;
+}
+
 /* Chooses the settings that do not depend on the level, and the classification. */
 static int choose_settings(triptych *t)
 {
@@ -178,6 +189,8 @@ static int choose_settings(triptych *t)
     t->why_pre = automatic && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || integral)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
+    if (integral && !t->given.all.samples)
+        choose_areas(t);
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
         trip_settings_sum_sheets(&t->drawn_settings) &&
         t->drawn_settings.footprint ==

@@ -457,7 +457,9 @@ typedef enum triptych_field {
 /* Settings of the integral renderer. */
 typedef struct triptych_integral_settings {
     triptych_field field;
-    double tolerance; /* of each component of a pixel, 1e-12 to 0.1; default 1e-4 */
+    /* Bound of the error of each component of a pixel, 1e-12 to 0.1. The default is 1e-3 for the
+     * mean over the area of each pixel, and 1e-4 for a number of rays per pixel. */
+    double tolerance;
 } triptych_integral_settings;
 
 /* Levels of detail. The data set needs coarse levels for the classification
@@ -548,8 +550,9 @@ typedef struct triptych_settings {
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for
      * pre and 1/512 for post. GL uses at most the default in pre. */
     double early_termination;
-    /* Rays along each side of a pixel, 1 (the default) to 64. Other renderers than the integral
-     * draw a picture this many times wider and higher, and average it. Above 1 not with depth. */
+    /* Rays along each side of a pixel, 1 to 64. The integral takes the mean over the area of each
+     * pixel by default. The default of the other renderers is 1. They draw a picture this many
+     * times wider and higher, and average it. Above 1 not with depth. */
     int samples;
     /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
      * opaque. */

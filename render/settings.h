@@ -160,12 +160,17 @@ typedef struct trip_settings {
     trip_field_kind field;
     double tolerance; /* of each component of a pixel, 0 to 1 */
     /* Rays per pixel along x and along y; their mean is the pixel's colour. Frames of other
-     * renderers are this many times larger instead. */
+     * renderers are this many times larger instead. 0 (integral renderer only) takes the mean over
+     * the area of the pixel, to the tolerance (integral/pixel_area.h). */
     int samples;
     trip_clip clip; /* the part of the volume to draw; world space */
     trip_show show;
     trip_effects effects;
 } trip_settings;
+
+/* The default tolerance of means over the areas of pixels: a quarter of 1/255. A tenth of it takes
+ * about four times as many rays. */
+#define TRIP_TOLERANCE_OF_AREAS 1e-3
 
 /* The weight parameter h by classification: layers blend at rays with a second component above h.
  * Splats use 0.85, as the papers do. In `post` the layers agree so well that a narrow border hides

@@ -369,7 +369,7 @@ class Options(program.ProgramTest):
             "--renderer": ["cpu", "reference", "integral", "auto"],
             "--renderer=integral --field": ["stored", "splats"],
             "--renderer=integral --interpolation": ["nearest", "linear", "cubic"],
-            "--renderer=integral --tolerance": ["1e-8", "0.1"],
+            "--renderer=integral --samples=1 --tolerance": ["1e-8", "0.1"],
             "--renderer=integral --samples": ["1", "3"],
             "--renderer=integral --field=splats --kernel-radius": ["1", "2.5"],
             "--clip-box": ["1,1,1,9,9,9", "voxels:-5,0,0,1e9,8,8.5"],
