@@ -459,8 +459,8 @@ class Options(program.ProgramTest):
         self.assertEqual(program.read_exr("side.exr").shape, (19, 19, 4))
         run = self.works("bench", "renderers", "a.trip", "--renderer=reference", "--views=1",
                          "--size=12,8x6", "--json")
-        self.assertEqual({row["size"] for row in json.loads(run.stdout)["tables"]["renderers"]["rows"]},
-                         {"12 x 12", "8 x 6"})
+        rows = json.loads(run.stdout)["tables"]["renderers"]["rows"]
+        self.assertEqual({row["size"] for row in rows if row["name"] != "default"}, {"12 x 12", "8 x 6"})
         self.fails(2, "accuracy", "a.trip", "--size", "16", says="takes 32 to 4096 pixels a side")
 
     def test_unknown_names_suggest_similar_ones(self):
