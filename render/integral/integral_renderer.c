@@ -260,15 +260,15 @@ static void show_progress(integral *r, uint64_t pixels, unsigned thread)
 
 enum { PANE_PX_MIN = 8, PANE_PX_MAX = 128, MAX_PANES = 1 << 19 };
 
-/* The values at the corners of a row of pixels: corner [i] of a pane belongs to pixels i - 1 and i.
- */
-typedef double corner_row[PANE_PX_MAX + 1][4];
+/* The values at the corners of a row of squares: corner [i] belongs to squares i - 1 and i. */
+enum { SQUARES_MAX = 1024 };
+typedef double corner_row[SQUARES_MAX + 1][4];
 
-static int fill_corners(painter *p, int x0, int x1, int y, corner_row row)
+static int fill_corners(painter *p, int x0, int squares, double y, corner_row row)
 {
     int status = 0;
-    for (int x = x0; x <= x1 && !status; x++)
-        status = ray_at(p, x, y, row[x - x0]);
+    for (int i = 0; i <= squares && !status; i++)
+        status = ray_at(p, x0 + (double)i / p->r->first_squares, y, row[i]);
     return status;
 }
 
@@ -276,7 +276,7 @@ static int fill_corners(painter *p, int x0, int x1, int y, corner_row row)
  * end of the volume, at least 1. */
 static int first_squares(const integral *r)
 {
-    enum { MOST = TRIP_PIXEL_AREA_FIRST_MAX };
+    const int most = SQUARES_MAX / r->pane_px < 64 ? SQUARES_MAX / r->pane_px : 64;
     const trip_camera *c = r->in.camera;
     const trip_file_header *h = &r->frame->data->header;
     double farthest = 1;
@@ -287,21 +287,21 @@ static int first_squares(const integral *r)
         farthest = fmax(farthest, trip_dot(c->forward, trip_sub(corner, c->eye)));
     }
     const double voxels = farthest * fmax(trip_length(c->rx), trip_length(c->ry));
-    return voxels <= 0.5 ? 1 : voxels >= MOST - 1 ? MOST : (int)ceil(voxels) + 1;
+    return voxels <= 0.5 ? 1 : voxels >= most - 1 ? most : (int)ceil(voxels) + 1;
 }
 
-/* Makes a row of pixels by the means over their areas. `above` and `below` are the corners. */
-static int make_row_of_areas(painter *p, const trip_pixel_area *area, int x0, int x1, int y,
-                             corner_row above, corner_row below)
+/* Adds the means over a row of squares to the pixels of a row. `above` and `below` are the corners.
+ */
+static int add_squares(const trip_pixel_area *area, int x0, int squares, double y, corner_row above,
+                       corner_row below, double (*pixels)[4])
 {
     int status = 0;
-    for (int x = x0; x < x1 && !status && !trip_interrupted(); x++) {
-        const int i = x - x0;
+    for (int i = 0; i < squares && !status && !trip_interrupted(); i++) {
         const double *const corners[4] = { above[i], above[i + 1], below[i], below[i + 1] };
-        double rgba[4];
-        status = trip_pixel_area_mean(area, x, y, corners, rgba);
-        if (!status)
-            put_pixel(p->r, x, y, rgba);
+        double mean[4];
+        status = trip_pixel_area_square(area, x0 + (double)i / area->first, y, corners, mean);
+        for (int c = 0; c < 4 && !status; c++)
+            pixels[i / area->first][c] += mean[c] / (area->first * area->first);
     }
     return status;
 }
@@ -313,13 +313,18 @@ static int make_areas(painter *p, int x0, int x1, int y0, int y1)
                                    .user = p,
                                    .tolerance = p->r->in.settings->tolerance,
                                    .first = p->r->first_squares };
-    const bool shared = area.first == 1;
-    int status = shared ? fill_corners(p, x0, x1, y0, rows[y0 & 1]) : 0;
-    for (int y = y0; y < y1 && !status && !p->r->failed; y++) {
-        if (shared)
-            status = fill_corners(p, x0, x1, y + 1, rows[(y + 1) & 1]);
-        if (!status)
-            status = make_row_of_areas(p, &area, x0, x1, y, rows[y & 1], rows[(y + 1) & 1]);
+    const int squares = (x1 - x0) * area.first;
+    int status = fill_corners(p, x0, squares, y0, rows[0]);
+    for (int y = y0, row = 0; y < y1 && !status && !p->r->failed; y++) {
+        double pixels[PANE_PX_MAX][4] = { { 0 } };
+        for (int v = 0; v < area.first && !status; v++, row ^= 1) {
+            const double top = y + (double)v / area.first;
+            status = fill_corners(p, x0, squares, y + (v + 1.0) / area.first, rows[row ^ 1]);
+            if (!status)
+                status = add_squares(&area, x0, squares, top, rows[row], rows[row ^ 1], pixels);
+        }
+        for (int x = x0; x < x1 && !status; x++)
+            put_pixel(p->r, x, y, pixels[x - x0]);
     }
     return status;
 }
@@ -390,8 +395,8 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
     r->rgba = rgba;
     r->failed = false;
     r->done = 0;
-    r->first_squares = first_squares(r);
     trip_cpu_job job = { .run = make_pane, .context = r, .tasks = divide_picture(r) };
+    r->first_squares = first_squares(r);
     trip_cpu_pool_start(r->pool, &job);
     trip_cpu_pool_wait(r->pool, &job);
     return r->failed ? TRIP_ERROR : trip_frame_poll();

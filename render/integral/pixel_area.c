@@ -99,63 +99,19 @@ static int mean_of(const trip_pixel_area *a, const square *s, double out[4])
 {
     double corners[4];
     corner_mean(s, corners);
-    if (s->depth < TRIP_PIXEL_AREA_DEPTH && difference(corners, s->centre) > allowed(a, s->depth))
+    if (s->depth < TRIP_PIXEL_AREA_DEPTH &&
+        difference(corners, s->centre) > 2 * allowed(a, s->depth))
         return mean_of_parts(a, s, out);
     rule(s, out);
     return 0;
 }
 
-/* The values at the corners of a row of first squares. */
-typedef double corner_row[TRIP_PIXEL_AREA_FIRST_MAX + 1][4];
-
-static int fill_corners(const trip_pixel_area *a, double x, double y, corner_row row)
+int trip_pixel_area_square(const trip_pixel_area *a, double x, double y,
+                           const double *const corners[4], double out[4])
 {
-    int status = 0;
-    for (int i = 0; i <= a->first && !status; i++)
-        status = at(a, x + (double)i / a->first, y, row[i]);
-    return status;
-}
-
-/* Adds the mean of a first square to `out`, by its share of the pixel. */
-static int add_square(const trip_pixel_area *a, square *s, double out[4])
-{
-    double centre[4], mean[4];
-    int status = at(a, s->x + s->size / 2, s->y + s->size / 2, centre);
-    s->centre = centre;
-    if (!status)
-        status = mean_of(a, s, mean);
-    for (int c = 0; c < 4 && !status; c++)
-        out[c] += mean[c] * s->size * s->size;
-    return status;
-}
-
-static int mean_of_squares(const trip_pixel_area *a, double x, double y, double out[4])
-{
-    corner_row rows[2];
-    const double size = 1.0 / a->first;
-    int status = fill_corners(a, x, y, rows[0]);
-    memset(out, 0, 4 * sizeof *out);
-    for (int v = 0; v < a->first && !status; v++) {
-        double(*above)[4] = rows[v & 1], (*below)[4] = rows[(v + 1) & 1];
-        status = fill_corners(a, x, y + (v + 1) * size, below);
-        for (int u = 0; u < a->first && !status; u++) {
-            square s = { .x = x + u * size,
-                         .y = y + v * size,
-                         .size = size,
-                         .corner = { above[u], above[u + 1], below[u], below[u + 1] } };
-            status = add_square(a, &s, out);
-        }
-    }
-    return status;
-}
-
-int trip_pixel_area_mean(const trip_pixel_area *a, double x, double y,
-                         const double *const corners[4], double out[4])
-{
-    if (a->first > 1)
-        return mean_of_squares(a, x, y, out);
-    square s = { .x = x, .y = y, .size = 1 };
+    double centre[4];
+    square s = { .x = x, .y = y, .size = 1.0 / a->first, .centre = centre };
     memcpy(s.corner, corners, sizeof s.corner);
-    memset(out, 0, 4 * sizeof *out);
-    return add_square(a, &s, out);
+    int status = at(a, x + s.size / 2, y + s.size / 2, centre);
+    return status ? status : mean_of(a, &s, out);
 }
