@@ -106,6 +106,12 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info);
 #define TRIP_VOLUME_MINC                                                                           \
     "is a MINC file; the scales of its slices are not read: convert it to NIfTI with `mnc2nii`"
 
+/* The names of dimensions that all Exodus files have, which are netCDF, and why they are refused.
+ */
+#define TRIP_VOLUME_EXODUS_NODES "num_nodes"
+#define TRIP_VOLUME_EXODUS_BLOCKS "num_el_blk"
+#define TRIP_VOLUME_EXODUS "is an Exodus file of finite elements, not a volume; ParaView opens it"
+
 /* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
  * Returns false and fills `why` if `index` is none of them. The second function reports this and
  * returns a negative status. */
