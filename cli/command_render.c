@@ -14,6 +14,7 @@
 #include "render_options.h"
 #include "render_stats.h"
 #include "report.h"
+#include "text.h"
 #include "sequence.h"
 #include "video.h"
 
@@ -62,8 +63,10 @@ static int brick_volume(drawing *d)
     const triptych_brick_options wanted = brick_options(o, &d->sequence);
     int status = cached_volume_open(&d->volume, d->t, o->input, &wanted);
     trip_progress_end(&d->progress);
-    if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-")))
-        printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
+    if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-"))) {
+        trip_text_write(stdout, o->input);
+        printf(": bricked into the cache in %.2f s\n", d->volume.seconds);
+    }
     return status;
 }
 
