@@ -302,6 +302,18 @@ static int check_lengths(const trip_volume *v)
                              "drawn: set other lengths with --spacing X,Y,Z",
                              length, "ijk"[a], TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
     }
+    const double dims[3] = { (double)v->info.dims[0], (double)v->info.dims[1],
+                             (double)v->info.dims[2] };
+    const double far = trip_affine_farthest_voxels(&v->info.index_to_world, dims);
+    if (!(far <= TRIP_FARTHEST_VOXELS))
+        return trip_fail(
+            TRIP_ERROR, "read", v->path,
+            "its voxels lie up to %.3g voxels from the origin of world space; %.3g can "
+            "be told apart: move the origin in the file%s",
+            far, TRIP_FARTHEST_VOXELS,
+            v->info.index_to_world.m[0][3] == 0 ? " or set other lengths with "
+                                                  "--spacing X,Y,Z"
+                                                : "");
     return 0;
 }
 

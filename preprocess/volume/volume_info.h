@@ -64,7 +64,7 @@ typedef struct trip_fills {
 bool trip_fills_parse(const char *text, trip_fills *fills);
 
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
-#define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
+#define TRIP_VOLUME_AXIS_MAX ((int64_t)TRIP_AXIS_VOXELS_MAX)
 
 typedef struct trip_volume_info {
     int64_t dims[3]; /* voxels along i, j, k; each >= 1 */

@@ -73,9 +73,10 @@ class Names(program.ProgramTest):
 
     def test_the_cache_lists_names(self):
         self.clean("render", BAD + ".nrrd", "-o", "a.png", "--size", "16x16", shows=False)
-        self.clean("cache", "list")
-        listed = json.loads(self.works("cache", "list", "--json").stdout)
-        self.assertEqual(len(listed["data_sets"]), 1)
+        # The notes of a data set are JSON, whose texts are UTF-8.
+        text = self.clean("cache", "list", shows=False).stdout
+        self.assertIn(SHOWN[:-4].encode(), text)
+        json.loads(self.works("cache", "list", "--json").stdout)
 
     def test_converted_functions_have_escaped_names(self):
         for form in "tf", "paraview", "vp", "vp.json", "slicer", "vtk":
