@@ -1,5 +1,5 @@
-/* Prints the contents of a file that is no data and no volume, but that an option reads: a transfer
- * function, a camera path, a stored view, a script, a report. Main thread only. */
+/* Describes the files that options read: transfer functions, camera paths, stored views, scripts
+ * and reports. Main thread only. */
 #ifndef OWN_FILE_INFO_H
 #define OWN_FILE_INFO_H
 

@@ -73,7 +73,7 @@ typedef struct mark {
     size_t at;
     const char *bytes;
     size_t count;
-    const char *text; /* what it is, then the program that reads it */
+    const char *text; /* the kind, then the program that reads it */
 } mark;
 
 #define MARK(at, bytes, text)                                                                      \

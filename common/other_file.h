@@ -1,4 +1,4 @@
-/* Tells what a file is that is no volume, from its first bytes and its name. Any thread. */
+/* Recognises files that are no volumes, from their first bytes and names. Any thread. */
 #ifndef TRIP_OTHER_FILE_H
 #define TRIP_OTHER_FILE_H
 

@@ -24,7 +24,7 @@ typedef struct trip_brick_metadata {
  */
 trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h);
 
-/* Returns what the orientation of a volume comes from, a key of FORMAT.md. "values" stands for a
+/* Returns the source of the orientation of a volume, a key of FORMAT.md. "values" stands for a
  * guess from the values, which bricking makes. */
 const char *trip_brick_orientation(const trip_volume_info *info, const trip_volume_params *params);
 

@@ -3,9 +3,9 @@
 #include "ewa.h"
 #include "report.h"
 
-/* Returns the variance of the low-pass filter in pixels. A ray of the filter's support differs from
- * r_c by at most k |q| sqrt(largest eigenvalue of the matrix of rx and ry), and |r_c| |forward| is
- * at least 1. */
+/* Returns the variance of the low-pass filter in pixels. Let L be the largest eigenvalue of the
+ * matrix of rx and ry. A ray of the filter's support differs from r_c by at most k |q| sqrt(L).
+ * |r_c| |forward| is at least 1. */
 static double low_pass2_of(const trip_camera *c, const trip_settings *settings)
 {
     const double px2 = TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX;

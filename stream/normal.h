@@ -60,7 +60,7 @@ typedef struct trip_compact_normals {
 bool trip_compact_normals_choose(const trip_affine *index_to_world, double full, double unit,
                                  double step[3]);
 /* Returns whether renderers can compute with the steps in single precision: none is longer than
- * 1024 gradients of length `full`. Those of trip_compact_normals_choose() are far shorter. */
+ * 1024 gradients of length `full`. trip_compact_normals_choose() makes far shorter ones. */
 bool trip_compact_normals_possible(const trip_affine *index_to_world, double full,
                                    const double step[3]);
 trip_compact_normals trip_compact_normals_make(const trip_affine *index_to_world, double full,

@@ -73,7 +73,7 @@ class Names(program.ProgramTest):
 
     def test_the_cache_lists_names(self):
         self.clean("render", BAD + ".nrrd", "-o", "a.png", "--size", "16x16", shows=False)
-        # The notes of a data set are JSON, whose texts are UTF-8.
+        # The notes of a data set are JSON, so their texts are UTF-8.
         text = self.clean("cache", "list", shows=False).stdout
         self.assertIn(SHOWN[:-4].encode(), text)
         json.loads(self.works("cache", "list", "--json").stdout)
