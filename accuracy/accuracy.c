@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "accuracy_options.h"
+#include "command_line.h"
 #include "fastest.h"
 #include "measure.h"
 #include "report.h"
@@ -44,8 +45,9 @@ static int measure(const accuracy_options *o, accuracy_folder *folder, const cha
     if (!status)
         status = accuracy_folder_finish(folder);
     if (!status) {
-        printf("%s: %d settings from %d views in %.0f s\n", o->output, m.row_count, m.view_count,
-               m.seconds);
+        if (!command_line_quiet())
+            printf("%s: %d settings in %d views took %.0f s\n", o->output,
+                   cJSON_GetArraySize(r.shown), m.view_count, m.seconds);
         accuracy_report_print(stdout, &r);
     }
     accuracy_report_free(&r);

@@ -5,6 +5,11 @@
 #include "command_line.h"
 #include "draw_settings.h"
 
+/* The settings that people choose from. The others are variants of the papers, slow references and
+ * other programs. */
+#define ACCURACY_USUAL_SETTINGS                                                                    \
+    "quality-*,post-samples-per-sheet-[2346],post-lod-*,pre,pre-sheet,gl-*"
+
 /* State of parsing. */
 typedef struct parse {
     accuracy_options *o;
@@ -56,7 +61,7 @@ static const trip_option parse_rows[] = {
       "Measures another program in the same views, up to 4; requires --source; none leaves out the "
       "ray caster of VTK",
       .group = DRAW_GROUP_PICTURE, CUSTOM(read_compare) },
-    { "size", "WxH", "Sets the picture size in pixels, 32 to 4096 a side", "256x256",
+    { "size", "WxH|N", "Sets the picture size in pixels, 32 to 4096 a side", "256x256",
       .group = DRAW_GROUP_MEASUREMENT, CUSTOM(read_size) },
 };
 
@@ -71,18 +76,16 @@ static const trip_option rows[] = {
     { "output", "REPORT/",
       "Names the folder of the report: accuracy.json, accuracy.csv and index.html", "NAME.accuracy",
       .short_name = 'o', .group = DRAW_GROUP_OUTPUT, TEXT, AT(output) },
-    { "quiet", NULL, "Prints no progress", .group = DRAW_GROUP_OUTPUT, FLAG, AT(quiet) },
     { "list", NULL, "Prints the names of all settings, and ends", .group = DRAW_GROUP_PICTURE, FLAG,
       AT(list) },
     { "no-shading", NULL, "Draws the plain colours of the transfer function, and reads no normals",
       .group = DRAW_GROUP_PICTURE, FLAG, AT(no_shading) },
     { "settings", "PATTERN[,...]",
-      "Measures only settings with such names, with the wildcards of a shell: "
-      "'post*,pre,quality-*'",
-      "all", .group = DRAW_GROUP_PICTURE, TEXT, AT(settings) },
+      "Measures the settings with such names, with the wildcards of a shell: 'post*,pre'; all "
+      "selects all",
+      ACCURACY_USUAL_SETTINGS, .group = DRAW_GROUP_PICTURE, TEXT, AT(settings) },
     { "source", "VOLUME",
-      "Compares with the integral through this volume, from which the data set was made, and "
-      "measures the error of storing",
+      "Compares with the integral through this volume, from which the data set was made",
       .group = DRAW_GROUP_PICTURE, TEXT, AT(source) },
     { "tf", "NAME|FILE", "Selects the transfer function, a preset or a file",
       "the one in the data set", .group = DRAW_GROUP_PICTURE, TEXT, AT(tf) },
@@ -92,10 +95,6 @@ static const trip_option rows[] = {
     { "memory", "SIZE", "Limits the memory for data, for example 256M (MiB) or 2G (GiB)",
       "a quarter of the memory that the process may use", .group = DRAW_GROUP_MEASUREMENT,
       .type = TRIP_OPTION_BYTES_64, AT(memory_bytes) },
-    { "no-ladder", NULL,
-      "Measures only total errors, without the steps that each error consists of; the steps take "
-      "most of the time",
-      .group = DRAW_GROUP_MEASUREMENT, FLAG, AT(no_ladder) },
     { "pictures", NULL, "Keeps every picture, as OpenEXR", .group = DRAW_GROUP_MEASUREMENT, FLAG,
       AT(pictures) },
     { "repeat", "N", "Sets the timed frames per view and setting", "3",
@@ -104,6 +103,11 @@ static const trip_option rows[] = {
     { "samples", "N", "Draws the integral with N x N rays per pixel", "1",
       .group = DRAW_GROUP_MEASUREMENT, .type = TRIP_OPTION_INTEGER, AT(samples), .lo = 1,
       .hi = 16 },
+    { "steps", NULL,
+      "Divides each error into steps: storage, model, method, level and precision; takes many "
+      "times "
+      "as long",
+      .group = DRAW_GROUP_MEASUREMENT, FLAG, AT(steps) },
     { "threads", "N", "Sets the number of threads that draw and read", "one per processor",
       .group = DRAW_GROUP_MEASUREMENT, .type = TRIP_OPTION_INTEGER, AT(threads), .lo = 1,
       .hi = 256 },
@@ -142,7 +146,11 @@ static int check(void *user)
     for (int i = 0; i < p->also_count; i++)
         o->data[o->data_count++] = p->also[i];
     o->shading = !o->no_shading;
-    o->ladder = !o->no_ladder;
+    o->usual = !o->settings;
+    if (o->usual)
+        o->settings = ACCURACY_USUAL_SETTINGS;
+    else if (!strcmp(o->settings, "all"))
+        o->settings = "*";
     return 0;
 }
 
@@ -160,9 +168,11 @@ int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
                           { .table = &accuracy_table, .base = o } };
     const command_line c = {
         .args_doc = "NAME.trip",
-        .doc = "Measures the time and the error of every setting that trades accuracy for time, on "
-               "one data set. The error is the difference from the emission-absorption integral. "
-               "Writes a report: JSON, CSV and a page. `triptych render --error` reads it.",
+        .doc =
+            "Measures the time and the error of settings that trade accuracy for time, on one data "
+            "set. The error is the difference from the emission-absorption integral. "
+            "Prints a table and writes a report: JSON, CSV and a page. `triptych render --error` "
+            "reads it.",
         .sets = sets,
         .set_count = 2,
         .argument = add_data,

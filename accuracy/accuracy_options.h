@@ -19,11 +19,12 @@ typedef struct accuracy_options {
     const char *output;
     const char *source;   /* volume that the data set was made of, or NULL */
     const char *tf;       /* NULL selects the transfer function in the data set */
-    const char *settings; /* patterns joined by commas; NULL selects all */
+    const char *settings; /* patterns joined by commas */
+    bool usual;           /* --settings was not given */
     int width, height, views, repeat, samples;
     double tolerance, budget_seconds;
-    bool shading, ladder;
-    int no_shading, no_ladder, force, quiet, list, pictures;
+    bool shading;
+    int no_shading, steps, force, list, pictures;
     unsigned threads; /* 0 selects one per processor */
     uint64_t memory_bytes;
 } accuracy_options;

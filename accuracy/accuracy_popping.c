@@ -20,6 +20,7 @@ typedef struct orbit {
     draw_settings settings;
     float *rgba;
     measure_progress *progress; /* each setting is a step */
+    int *begun;                 /* number of its steps */
     const char *name;
     const measure_popping_setting *last;
 } orbit;
@@ -68,8 +69,10 @@ static int draw_step(void *user, const measure_popping_setting *of, double degre
 {
     orbit *turn = user;
     double ms;
-    if (of != turn->last)
+    if (of != turn->last) {
         measure_progress_step(turn->progress, turn->name);
+        ++*turn->begun;
+    }
     turn->last = of;
     turn->settings.all.method = of->method;
     turn->settings.all.h = of->method != TRIPTYCH_METHOD_MERGE ? 0
@@ -106,7 +109,8 @@ static int measure_rows(accuracy_popping *p, orbit *turn, size_t pixels)
 }
 
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const draw_settings *defaults, measure_progress *progress, float *rgba)
+                             const draw_settings *defaults, measure_progress *progress, float *rgba,
+                             int *begun)
 {
     const accuracy_options *o = contexts->options;
     triptych *t = contexts->contexts[0][TRIPTYCH_RENDERER_CPU];
@@ -114,6 +118,7 @@ int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
                    .settings = *defaults,
                    .rgba = rgba,
                    .progress = progress,
+                   .begun = begun,
                    .name = p->name };
     turn.settings.all.classify = p->classify;
     if (find_turn(t, &turn))

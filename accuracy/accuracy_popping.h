@@ -24,9 +24,10 @@ typedef struct accuracy_popping {
 extern const accuracy_popping accuracy_poppings[ACCURACY_POPPINGS];
 
 /* Measures popping on the first data set by the cpu renderer. Its context is open, and its view
- * changes. `defaults` has the settings that all share. `rgba` has room for one picture. */
+ * changes. `defaults` has the settings that all share. `rgba` has room for one picture.
+ * Adds the steps of progress that began to *begun. */
 int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
-                             const draw_settings *defaults, measure_progress *progress,
-                             float *rgba);
+                             const draw_settings *defaults, measure_progress *progress, float *rgba,
+                             int *begun);
 
 #endif

@@ -2,11 +2,20 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "fastest.h"
 #include "json.h"
 #include "new_file.h"
 #include "report.h"
 #include "text.h"
+
+bool accuracy_is_for_render(const cJSON *report, const cJSON *row)
+{
+    return cJSON_HasObjectItem(row, "options") &&
+           cJSON_Compare(cJSON_GetObjectItem(row, "data_set"),
+                         cJSON_GetObjectItem(report, "data_set"), true);
+}
 
 bool accuracy_is_on_front(const cJSON *rows, const cJSON *row, const char *error)
 {
@@ -21,6 +30,31 @@ bool accuracy_is_on_front(const cJSON *rows, const cJSON *row, const char *error
             front = false;
     }
     return front;
+}
+
+static int by_time(const void *a, const void *b)
+{
+    const double x = measure_number(*(cJSON *const *)a, "ms");
+    const double y = measure_number(*(cJSON *const *)b, "ms");
+    return (x > y) - (x < y);
+}
+
+/* Returns references to rows, the fastest first: the rows that `render --error` chooses from, or
+ * the others. */
+static cJSON *sorted_rows(const accuracy_report *r, bool chosen)
+{
+    const cJSON *row;
+    const int count = cJSON_GetArraySize(r->shown);
+    int taken = 0;
+    cJSON *out = cJSON_CreateArray(), **rows = calloc((size_t)count + 1, sizeof(cJSON *));
+    cJSON_ArrayForEach(row, r->shown) if (rows && accuracy_is_for_render(r->json, row) == chosen)
+        memcpy(&rows[taken++], &row, sizeof row);
+    if (rows)
+        qsort(rows, (size_t)taken, sizeof *rows, by_time);
+    for (int i = 0; i < taken; i++)
+        cJSON_AddItemReferenceToArray(out, rows[i]);
+    free(rows);
+    return out;
 }
 
 static int out_of_memory(void)
@@ -41,8 +75,11 @@ int accuracy_report_make(accuracy_report *r, const accuracy_measured *m, const c
         return out_of_memory();
     accuracy_report_json(r);
     cJSON *row;
+    cJSON *chosen = sorted_rows(r, true);
     cJSON_ArrayForEach(row, cJSON_GetObjectItem(r->json, "rows")) cJSON_AddBoolToObject(
-        row, "front", accuracy_is_on_front(r->shown, row, "total.percentile_99"));
+        row, "front",
+        accuracy_is_for_render(r->json, row) && accuracy_is_on_front(chosen, row, "error"));
+    cJSON_Delete(chosen);
     return 0;
 }
 
@@ -64,26 +101,16 @@ static void write_json(FILE *f, const accuracy_report *r)
 static void write_csv(FILE *f, const accuracy_report *r)
 {
 #define FIGURES(step) step ".max", step ".mean", step ".median", step ".percentile_99", step ".psnr"
-    static const char *const keys[] = { "name",
-                                        "data_set",
-                                        "options",
-                                        "views",
-                                        "frames",
-                                        "ms",
-                                        "ms_min",
-                                        "ms_max",
-                                        "splats",
-                                        "splats_drawn",
-                                        "bytes_read",
-                                        FIGURES("total"),
-                                        FIGURES("storage"),
-                                        FIGURES("model"),
-                                        FIGURES("method"),
-                                        FIGURES("level"),
-                                        FIGURES("precision"),
-                                        "total.worst_percentile_99",
-                                        "total.ssim",
-                                        "total.flip",
+    static const char *const keys[] = { "name",           "data_set",
+                                        "options",        "views",
+                                        "frames",         "ms",
+                                        "ms_min",         "ms_max",
+                                        "error",          "splats",
+                                        "splats_drawn",   "bytes_read",
+                                        FIGURES("total"), FIGURES("storage"),
+                                        FIGURES("model"), FIGURES("method"),
+                                        FIGURES("level"), FIGURES("precision"),
+                                        "total.ssim",     "total.flip",
                                         "front" };
     measure_table_csv(f, cJSON_GetObjectItem(r->json, "rows"), keys, sizeof keys / sizeof *keys);
 }
@@ -140,14 +167,37 @@ void accuracy_write_options(FILE *f, const accuracy_setting *s)
         fprintf(f, "%s--%s %s", i ? " " : "", options[i].name, options[i].value);
 }
 
+/* Returns whether an earlier entry has the same reason. */
+static bool is_repeated(const cJSON *list, const cJSON *one)
+{
+    const char *why = cJSON_GetObjectItem(one, "why")->valuestring;
+    const cJSON *other = list->child;
+    while (other != one && strcmp(cJSON_GetObjectItem(other, "why")->valuestring, why))
+        other = other->next;
+    return other != one;
+}
+
+/* Writes the names of an entry and of all later ones with the same reason. */
+static void write_names(FILE *f, const cJSON *one, void (*write)(FILE *f, const char *text))
+{
+    const char *why = cJSON_GetObjectItem(one, "why")->valuestring;
+    for (const cJSON *other = one; other; other = other->next)
+        if (!strcmp(cJSON_GetObjectItem(other, "why")->valuestring, why)) {
+            fputs(other == one ? "" : ", ", f);
+            write(f, cJSON_GetObjectItem(other, "name")->valuestring);
+        }
+}
+
 void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *before,
                              void (*write)(FILE *f, const char *text))
 {
-    const cJSON *one;
-    cJSON_ArrayForEach(one, cJSON_GetObjectItem(r->json, "left_out"))
+    const cJSON *list = cJSON_GetObjectItem(r->json, "left_out"), *one;
+    cJSON_ArrayForEach(one, list)
     {
+        if (is_repeated(list, one))
+            continue;
         fputs(before, f);
-        write(f, cJSON_GetObjectItem(one, "name")->valuestring);
+        write_names(f, one, write);
         fputs(": ", f);
         write(f, cJSON_GetObjectItem(one, "why")->valuestring);
         fputc('\n', f);
@@ -157,24 +207,51 @@ void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *befo
                 r->m->options->views);
 }
 
-void accuracy_report_print(FILE *f, const accuracy_report *r)
+static void print_rows(FILE *f, const cJSON *rows, const char *title)
 {
     static const measure_column columns[] = {
-        { "name", "settings", 0, 0 },
-        { "ms", "median ms", 1, 0 },
-        { "total.mean", "error of 255: mean", 2, 0 },
-        { "total.percentile_99", "99 %", 2, 0 },
-        { "total.max", "max", 2, 0 },
-        { "total.psnr", "PSNR, dB", 1, 0 },
-        { "total.ssim", "SSIM", 4, 0 },
-        { "total.flip", "FLIP", 4, 0 },
+        { "name", "setting", 0, 0 },
+        { "ms", "ms", 1, 0 },
+        { "error", "error", 2, 0 },
     };
-    fputc('\n', f);
-    measure_table_print(f, &(measure_table){ .rows = r->shown,
-                                             .columns = columns,
-                                             .count = sizeof columns / sizeof *columns,
-                                             .mark = "front" });
+    if (rows && rows->child)
+        measure_table_print(f, &(measure_table){ .title = title,
+                                                 .rows = rows,
+                                                 .columns = columns,
+                                                 .count = sizeof columns / sizeof *columns,
+                                                 .mark = "front" });
+}
+
+static void print_explanation(FILE *f, const accuracy_report *r)
+{
+    const accuracy_options *o = r->m->options;
+    char *usual = accuracy_report_path(o->data[0]);
     fprintf(f,
-            "\n* on the front: no other setting is as fast and as close at the 99th percentile.\n");
+            "\nerror: 99 %% of the pixels of the object are at most this far from the exact "
+            "picture, of 255,\n       in red, green, blue and opacity, in the worst of the views.\n"
+            "ms:    the median time of a frame, in milliseconds. The fastest setting comes first.\n"
+            "*      every faster setting has a larger error.\n\n"
+            "`triptych render ");
+    trip_text_write_word(f, o->data[0]);
+    fputs(" --error E", f);
+    if (!usual || strcmp(usual, o->output)) {
+        fputs(" --report ", f);
+        trip_text_write_word(f, o->output);
+    }
+    fputs("` uses the first setting with an error of at most E.\n"
+          "`triptych accuracy --list` prints the options of each setting.\n",
+          f);
+    free(usual);
+}
+
+void accuracy_report_print(FILE *f, const accuracy_report *r)
+{
+    cJSON *chosen = sorted_rows(r, true), *others = sorted_rows(r, false);
+    fputc('\n', f);
+    print_rows(f, chosen, NULL);
+    print_rows(f, others, "For comparison, never used by `render --error`:");
+    print_explanation(f, r);
     accuracy_print_left_out(f, r, "left out: ", trip_text_write);
+    cJSON_Delete(chosen);
+    cJSON_Delete(others);
 }

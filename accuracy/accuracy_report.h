@@ -39,6 +39,9 @@ int accuracy_report_write(const accuracy_report *r, const char *folder);
  * settings are better in one without being worse in the other. `error` is the key of the error. */
 bool accuracy_is_on_front(const cJSON *rows, const cJSON *row, const char *error);
 
+/* Returns whether `render --error` may choose a row: settings for the report's own data set. */
+bool accuracy_is_for_render(const cJSON *report, const cJSON *row);
+
 /* Makes accuracy.json without "front". */
 void accuracy_report_json(accuracy_report *r);
 void accuracy_report_html(FILE *f, const accuracy_report *r);

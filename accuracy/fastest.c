@@ -15,7 +15,7 @@
 #include "command_line.h"
 #include "report.h"
 
-enum { MAX_BYTES = 16 << 20, VERSION = 1 };
+enum { MAX_BYTES = 16 << 20 };
 
 char *accuracy_report_path(const char *data)
 {
@@ -72,8 +72,7 @@ static bool read_row(const cJSON *row, const char *data_set, accuracy_found *out
         if (!value || !accuracy_setting_read_option(&out->setting, option->string, value))
             return false;
     }
-    const cJSON *total = cJSON_GetObjectItemCaseSensitive(row, "total");
-    out->error = number_of(total, "worst_percentile_99");
+    out->error = number_of(row, "error");
     out->ms = number_of(row, "ms");
     return out->error >= 0 && out->ms >= 0;
 }
@@ -135,7 +134,7 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
         if (!read_row(row, data_set, &one) ||
             (w->renderers && !(w->renderers & 1u << one.setting.renderer)))
             continue;
-        if (one.error < w->error && one.ms < best.ms)
+        if (one.error <= w->error && one.ms < best.ms)
             best = one;
         if (one.error < closest.error)
             closest = one;
@@ -145,8 +144,8 @@ static int choose(const cJSON *root, const char *path, const accuracy_wanted *w,
                          "has no settings for this renderer; choose another --renderer");
     if (isinf(best.ms))
         return trip_fail(TRIP_ERROR, "--error", path,
-                         "no setting has an error below %g; %s has the smallest, %.2f", w->error,
-                         closest.setting.name, closest.error);
+                         "no setting has an error of at most %g; %s has the smallest, %.2f",
+                         w->error, closest.setting.name, closest.error);
     warn_of_differences(root, path, w, &defaults);
     *out = best;
     const char *checksum = text_of(root, "checksum");
@@ -160,9 +159,12 @@ int accuracy_fastest_in(const char *text, const char *path, const accuracy_wante
 {
     trip_json json = { 0 };
     int status = trip_json_parse(&json, text, path, NULL);
-    if (!status && number_of(json.root, "triptych_accuracy") != VERSION)
+    const double version = status ? NAN : number_of(json.root, "triptych_accuracy");
+    if (!status && version != ACCURACY_VERSION)
         status = trip_fail(TRIP_ERROR, "--error", path,
-                           "is not an accuracy.json of `triptych accuracy`");
+                           version > 0 ? "comes from another version of Triptych; run `triptych "
+                                         "accuracy` again"
+                                       : "is not an accuracy.json of `triptych accuracy`");
     if (!status)
         status = check_data(json.root, path, wanted);
     if (!status)

@@ -21,6 +21,9 @@
 
 enum { THUMBNAIL_PX = 128 };
 
+/* The share of the pixels that `render --error` promises. */
+#define PROMISED_SHARE 0.99
+
 /* Pictures of a view. */
 typedef enum which {
     TRUTH,
@@ -41,6 +44,9 @@ typedef struct sweep {
     float *pictures[PICTURES];
     size_t picture_bytes;
     double begin;
+    int rows_left;          /* rows that the next view measures */
+    double truth_seconds;   /* time of the integral in the first view */
+    double compare_seconds; /* time of one comparison with it */
     /* Data set and settings of the pictures STORED, FIELD and REFERENCE; -1 if there is no
      * picture. */
     int stored_data, field_data, reference_data;
@@ -72,7 +78,7 @@ static bool is_wanted(const char *patterns, const char *name)
             return true;
         rest = rest[length] ? rest + length + 1 : NULL;
     }
-    return !patterns;
+    return false;
 }
 
 static int add_row(accuracy_measured *m, int data, const accuracy_setting *setting)
@@ -96,7 +102,7 @@ static int add_others(accuracy_measured *m, const draw_settings *defaults)
             one.settings.all.classify = pre ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
             snprintf(one.name, sizeof one.name, "%s-%.30s", pre ? "pre" : "post",
                      slash && slash[1] ? slash + 1 : m->options->data[d]);
-            if (is_wanted(m->options->settings, one.name))
+            if (m->options->usual || is_wanted(m->options->settings, one.name))
                 status = add_row(m, d, &one);
         }
     return status;
@@ -167,6 +173,13 @@ __attribute__((format(printf, 2, 3))) static void leave_out(accuracy_row *row, c
     row->state = ACCURACY_LEFT_OUT;
 }
 
+/* A row that fails in a view leaves out its steps in the later views. */
+static void drop_steps(sweep *s, int view)
+{
+    s->rows_left--;
+    measure_progress_expect(s->progress, -(s->o->views - view - 1));
+}
+
 /* Returns whether the data set has coarse levels for a setting. */
 static bool has_levels(triptych *t, const draw_settings *settings)
 {
@@ -231,7 +244,7 @@ static int draw_integral(sweep *s, int data, int renderer, draw_settings setting
     double ms;
     settings.integral.tolerance = s->o->tolerance;
     settings.all.samples = s->o->samples;
-    measure_progress_step(s->progress, "integral");
+    measure_progress_part(s->progress, "integral");
     int status = accuracy_contexts_draw(&s->contexts, data, renderer, &settings, rgba, &ms);
     return status == TRIP_ERROR
                ? trip_fail(TRIP_ERROR, "accuracy",
@@ -287,7 +300,7 @@ static int need_reference(sweep *s, const accuracy_row *row)
     s->reference_data = -1;
     s->reference = settings;
     draw_settings_drop_excluded(&settings, TRIPTYCH_RENDERER_REFERENCE);
-    measure_progress_step(s->progress, "reference");
+    measure_progress_part(s->progress, "reference");
     int status = accuracy_contexts_draw(&s->contexts, row->data, TRIPTYCH_RENDERER_REFERENCE,
                                         &settings, s->pictures[REFERENCE], &ms);
     memcpy(s->pictures[FINE], s->pictures[REFERENCE], s->picture_bytes);
@@ -313,11 +326,11 @@ static bool is_pre(const triptych_frame_stats *stats)
 
 static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
 {
-    int status = need_stored(s, row->data);
-    if (!status && s->o->source)
-        compare(s, row, ACCURACY_STORAGE, STORED, TRUTH);
-    if (status || !s->o->ladder)
+    int status = s->o->steps ? need_stored(s, row->data) : 0;
+    if (status || !s->o->steps)
         return status;
+    if (s->o->source)
+        compare(s, row, ACCURACY_STORAGE, STORED, TRUTH);
     if (row->setting.renderer == TRIPTYCH_RENDERER_INTEGRAL) {
         compare(s, row, ACCURACY_PRECISION, RAN, STORED);
         return 0;
@@ -363,10 +376,8 @@ static int compare_with_truth(sweep *s, accuracy_row *row)
     double ssim, flip;
     const float *ran = s->pictures[RAN], *truth = s->pictures[TRUTH];
     compare(s, row, ACCURACY_TOTAL, RAN, TRUTH);
-    s->view = (measure_error){ 0 };
-    measure_error_add(&s->view, ran, truth, pixels_of(s));
-    row->worst_percentile_99 =
-        fmax(row->worst_percentile_99, measure_error_measure(&s->view).percentile_99);
+    row->bound =
+        fmax(row->bound, measure_error_bound(&s->view, ran, truth, pixels_of(s), PROMISED_SHARE));
     int status = accuracy_ssim(ran, truth, s->o->width, s->o->height, s->contexts.budget, &ssim);
     if (!status)
         status = accuracy_flip(ran, truth, s->o->width, s->o->height, s->contexts.budget, &flip);
@@ -441,6 +452,7 @@ static int measure_program(sweep *s, accuracy_row *row, int view)
         status = draw_program(s, row, view);
     if (status == TRIP_ERROR) {
         row->state = ACCURACY_LEFT_OUT;
+        drop_steps(s, view);
         return 0;
     }
     if (!status)
@@ -463,6 +475,7 @@ static int measure_row(sweep *s, accuracy_row *row, int view)
                                         s->pictures[RAN], &ms);
     if (status == TRIP_ERROR) {
         leave_out(row, "%s", s->contexts.why[row->data][renderer]);
+        drop_steps(s, view);
         return 0;
     }
     triptych *t = s->contexts.contexts[row->data][renderer];
@@ -491,6 +504,7 @@ static int measure_row(sweep *s, accuracy_row *row, int view)
 static int find_truth(sweep *s, int view)
 {
     int status;
+    const double begin = trip_now_seconds();
     s->stored_data = s->field_data = s->reference_data = -1;
     if (s->o->source)
         status = draw_integral(s, 0, ACCURACY_SOURCE, default_field(s), s->pictures[TRUTH]);
@@ -500,6 +514,7 @@ static int find_truth(sweep *s, int view)
     }
     if (status)
         return status;
+    s->truth_seconds = trip_now_seconds() - begin;
     if (view == 0)
         s->m->truth =
             accuracy_picture_data(s->pictures[TRUTH], s->o->width, s->o->height, THUMBNAIL_PX);
@@ -507,9 +522,7 @@ static int find_truth(sweep *s, int view)
     return keep_exr(s, t, TRUTH, view, "truth");
 }
 
-/* In the first view, a row starts only while the time budget lasts. Later views measure all rows
- * that the first view measured. */
-static int measure_view(sweep *s, int view)
+static int set_view(sweep *s, int view)
 {
     accuracy_measured *m = s->m;
     triptych *t = s->contexts.contexts[0][TRIPTYCH_RENDERER_CPU];
@@ -517,17 +530,43 @@ static int measure_view(sweep *s, int view)
         accuracy_view_find(t, s->o->width, s->o->height, view, s->o->views, &m->views[view]);
     if (!status)
         status = accuracy_contexts_look(&s->contexts, &m->views[view]);
-    if (status)
-        return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "cannot set a view: %s",
-                         triptych_error(t));
-    status = find_truth(s, view);
-    for (int i = 0; i < m->row_count && !status; i++)
-        if (m->rows[i].state == (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED) &&
-            (view || i == 0 || !is_over(s)))
-            status = m->rows[i].program ? measure_program(s, &m->rows[i], view)
-                                        : measure_row(s, &m->rows[i], view);
+    return status ? trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "cannot set a view: %s",
+                              triptych_error(t))
+                  : 0;
+}
+
+/* In the first view, a row starts only while the time budget lasts. Later views measure all rows
+ * that the first view measured. */
+static int measure_rows(sweep *s, int view)
+{
+    accuracy_measured *m = s->m;
+    int status = 0;
+    for (int i = 0; i < m->row_count && !status; i++) {
+        accuracy_row *row = &m->rows[i];
+        if (row->state != (view ? ACCURACY_MEASURED : ACCURACY_NOT_REACHED))
+            continue;
+        if (view == 0 && i > 0 && is_over(s)) {
+            measure_progress_expect(s->progress, -1);
+            drop_steps(s, view);
+        } else
+            status = row->program ? measure_program(s, row, view) : measure_row(s, row, view);
+    }
+    return status;
+}
+
+/* The first view is set, and its integral drawn. */
+static int measure_view(sweep *s, int view)
+{
+    int status = 0;
+    measure_progress_step(s->progress, "integral");
+    if (view > 0)
+        status = set_view(s, view);
+    if (!status && view > 0)
+        status = find_truth(s, view);
     if (!status)
-        m->view_count++;
+        status = measure_rows(s, view);
+    if (!status)
+        s->m->view_count++;
     return status;
 }
 
@@ -556,24 +595,162 @@ static draw_settings default_settings(const accuracy_options *o)
     return (draw_settings){ .light.no_shading = !o->shading, .has_background = 1 };
 }
 
+/* Measures popping while the time budget lasts. The remaining steps of a table that fails do not
+ * begin. */
 static int measure_popping(sweep *s)
 {
     int status = 0;
-    for (int i = 0; i < s->m->popping_count && !status && !is_over(s); i++)
-        status = accuracy_popping_measure(&s->m->popping[i], &s->contexts, &s->defaults,
-                                          s->progress, s->pictures[RAN]);
+    for (int i = 0; i < s->m->popping_count && !status; i++) {
+        int begun = 0;
+        if (!is_over(s))
+            status = accuracy_popping_measure(&s->m->popping[i], &s->contexts, &s->defaults,
+                                              s->progress, s->pictures[RAN], &begun);
+        measure_progress_expect(s->progress, begun - ACCURACY_POPPING_ROWS);
+    }
+    return status;
+}
+
+/* ---- the start ---- */
+
+/* Draws a frame and adds its seconds to *sum. Failures count as no time. */
+static int try_frame(sweep *s, int data, int renderer, draw_settings settings, double *sum)
+{
+    double ms = 0;
+    draw_settings_drop_excluded(&settings, (triptych_renderer)renderer);
+    const int status =
+        accuracy_contexts_draw(&s->contexts, data, renderer, &settings, s->pictures[RAN], &ms);
+    *sum += status ? 0 : ms / 1e3;
+    return status == TRIP_ERROR ? 0 : status;
+}
+
+/* Leaves out gl from the usual settings if `render` does not choose it here. */
+static int choose_gl(sweep *s)
+{
+    triptych_frame_stats stats;
+    double seconds = 0;
+    if (!s->o->usual)
+        return 0;
+    int status = try_frame(s, 0, TRIPTYCH_RENDERER_AUTO, s->defaults, &seconds);
+    triptych **t = &s->contexts.contexts[0][TRIPTYCH_RENDERER_AUTO];
+    const bool gl =
+        *t && triptych_get_frame_stats(*t, &stats) == 0 && !strcmp(stats.renderer, "gl");
+    triptych_destroy(*t);
+    *t = NULL;
+    for (int i = 0; i < s->m->row_count && !gl; i++)
+        if (s->m->rows[i].setting.renderer == TRIPTYCH_RENDERER_GL)
+            leave_out(&s->m->rows[i], "no graphics device; --settings 'gl-*' measures gl "
+                                      "on the processor");
+    return status;
+}
+
+/* Draws one frame of each row, and with --steps one reference for each classification. Sets *frames
+ * and *steps to the seconds of such frames in one view. */
+static int try_rows(sweep *s, double *frames, double *steps)
+{
+    double references[2] = { 0 };
+    int status = 0;
+    for (int i = 0; i < s->m->row_count && !status && !(i > 0 && is_over(s)); i++) {
+        const accuracy_row *row = &s->m->rows[i];
+        const draw_settings *own = &row->setting.settings;
+        double *reference = &references[own->all.classify == TRIPTYCH_CLASSIFY_PRE];
+        if (row->state != ACCURACY_NOT_REACHED || row->program)
+            continue;
+        status = try_frame(s, row->data, (int)row->setting.renderer, *own, frames);
+        if (!status && s->o->steps && *reference <= 0)
+            status = try_frame(s, row->data, TRIPTYCH_RENDERER_REFERENCE, *own, reference);
+        *steps += *reference;
+    }
+    return status;
+}
+
+static int try_comparison(sweep *s)
+{
+    accuracy_row trial = { .views = 1 }; /* without pictures for the page */
+    const double begin = trip_now_seconds();
+    int status = compare_with_truth(s, &trial);
+    s->compare_seconds = trip_now_seconds() - begin;
+    return status;
+}
+
+/* Estimates the seconds that all views and tables take, without other programs. */
+static int estimate(sweep *s, double *seconds)
+{
+    double frames = 0, steps = 0, turn = 0;
+    int status = try_rows(s, &frames, &steps);
+    if (!status)
+        status = try_comparison(s);
+    for (int i = 0; i < s->m->popping_count && !status; i++) {
+        draw_settings settings = s->defaults;
+        settings.all.classify = s->m->popping[i].classify;
+        status = try_frame(s, 0, TRIPTYCH_RENDERER_CPU, settings, &turn);
+    }
+    const double stored = s->o->steps && s->o->source ? s->truth_seconds : 0;
+    *seconds = s->o->views * (s->truth_seconds + stored + steps + (1 + s->o->repeat) * frames +
+                              s->rows_left * s->compare_seconds) -
+               s->truth_seconds + turn * ACCURACY_POPPING_ROWS * (MEASURE_POPPING_STEPS + 1);
+    return status;
+}
+
+static void write_time(double seconds, char text[32])
+{
+    if (seconds < 90)
+        snprintf(text, 32, "about %.0f seconds", fmax(1, seconds));
+    else
+        snprintf(text, 32, "about %.0f minutes", ceil(seconds / 60));
+}
+
+/* Prints the numbers of settings and views, the time needed, and the usual omissions. */
+static void say_start(const sweep *s, double seconds)
+{
+    const accuracy_measured *m = s->m;
+    char time[32];
+    accuracy_setting all[ACCURACY_SETTINGS_MAX];
+    const draw_settings defaults = { 0 };
+    const int others = accuracy_settings(all, &defaults) - m->row_count;
+    write_time(seconds, time);
+    trip_note("accuracy", "%d settings in %d views take %s%s%s", s->rows_left, s->o->views, time,
+              seconds > 90 ? "; --budget, --views or --settings shorten it" : "",
+              m->row_count && m->rows[m->row_count - 1].program
+                  ? ", and as long as the other programs take"
+                  : "");
+    if (s->o->usual)
+        trip_note("accuracy",
+                  "left out: %d other settings, which --settings all measures; the steps of each "
+                  "error, which --steps measures",
+                  others);
+}
+
+/* Draws the integral of the first view, tries one frame of each row, and says how long the
+ * measurement takes. */
+static int begin_views(sweep *s)
+{
+    double seconds = 0;
+    int status = set_view(s, 0);
+    if (!status)
+        status = find_truth(s, 0);
+    if (!status)
+        status = choose_gl(s);
+    for (int i = 0; i < s->m->row_count; i++)
+        s->rows_left += s->m->rows[i].state == ACCURACY_NOT_REACHED;
+    if (status || command_line_quiet())
+        return status;
+    status = estimate(s, &seconds);
+    if (!status)
+        say_start(s, seconds);
     return status;
 }
 
 static int measure_views(sweep *s)
 {
-    int status = 0, steps = 0;
-    for (int i = 0; i < s->m->row_count; i++)
-        steps += s->m->rows[i].state == ACCURACY_NOT_REACHED;
-    measure_progress_expect(s->progress, s->o->views * (s->o->ladder ? 3 + 2 * steps : 1 + steps));
-    measure_progress_expect(s->progress, ACCURACY_POPPING_ROWS * s->m->popping_count);
-    for (int view = 0; view < s->o->views && !status && has_time_for(s, view); view++)
+    int status = begin_views(s);
+    if (!status && !command_line_quiet())
+        s->progress = measure_progress_start_lines("accuracy");
+    measure_progress_expect(s->progress, s->o->views * (1 + s->rows_left) +
+                                             ACCURACY_POPPING_ROWS * s->m->popping_count);
+    int view = 0;
+    for (; view < s->o->views && !status && has_time_for(s, view); view++)
         status = measure_view(s, view);
+    measure_progress_expect(s->progress, -(s->o->views - view) * (1 + s->rows_left));
     return status ? status : measure_popping(s);
 }
 
@@ -594,8 +771,6 @@ int accuracy_measure(accuracy_measured *m, const accuracy_options *o, const char
         status = take_pictures(s);
     if (!status)
         status = leave_out_idle(s);
-    if (!status && !o->quiet)
-        s->progress = measure_progress_start_lines("accuracy");
     if (!status)
         status = measure_views(s);
     m->seconds = trip_now_seconds() - s->begin;

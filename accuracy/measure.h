@@ -39,8 +39,8 @@ typedef struct accuracy_row {
     char why[256]; /* reason if the row was left out */
     measure_error error[ACCURACY_STEPS];
     bool has[ACCURACY_STEPS];
-    double worst_percentile_99; /* total error in the worst view */
-    double ssim, flip;          /* sums over the views */
+    double bound; /* total error in the worst view: measure_error_bound() of 99 % of the pixels */
+    double ssim, flip; /* sums over the views */
     int views, frames;
     double *ms;                 /* of each frame */
     double splats, bytes_read;  /* read per frame; sums over the views */

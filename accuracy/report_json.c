@@ -39,14 +39,14 @@ static cJSON *add_row(cJSON *rows, const accuracy_report *r, const accuracy_row 
         cJSON_AddStringToObject(o, "version", row->program->about);
     else
         add_options(o, &row->setting);
-    measure_add(o, { "views", views }, { "ms", median }, { "ms_min", row->ms[0] },
-                { "ms_max", row->ms[row->frames - 1] }, { "frames", row->frames });
+    measure_add(o, { "views", views }, { "ms", median }, { "error", row->bound },
+                { "ms_min", row->ms[0] }, { "ms_max", row->ms[row->frames - 1] },
+                { "frames", row->frames });
     if (!row->program)
         measure_add(o, { "splats", row->splats / views },
                     { "splats_drawn", row->splats_drawn >= 0 ? row->splats_drawn : NAN },
                     { "bytes_read", row->bytes_read / views });
-    measure_add(add_step(o, row, ACCURACY_TOTAL),
-                { "worst_percentile_99", row->worst_percentile_99 }, { "ssim", row->ssim / views },
+    measure_add(add_step(o, row, ACCURACY_TOTAL), { "ssim", row->ssim / views },
                 { "flip", row->flip / views });
     for (int s = ACCURACY_TOTAL + 1; s < ACCURACY_STEPS; s++)
         if (row->has[s])
@@ -80,7 +80,7 @@ static void add_facts(cJSON *root, const accuracy_report *r)
     const accuracy_options *o = r->m->options;
     char checksum[ACCURACY_CHECKSUM_BYTES];
     accuracy_checksum_text(r->m->checksum, checksum);
-    cJSON_AddNumberToObject(root, "triptych_accuracy", 1);
+    cJSON_AddNumberToObject(root, "triptych_accuracy", ACCURACY_VERSION);
     cJSON_AddStringToObject(root, "version", triptych_version());
     cJSON_AddStringToObject(root, "command", r->command);
     cJSON_AddStringToObject(root, "data_set", o->data[0]);

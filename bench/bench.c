@@ -8,6 +8,7 @@
 
 #include "bench_sample.h"
 #include "bench_tables.h"
+#include "command_line.h"
 #include "machine.h"
 #include "new_file.h"
 #include "read_files.h"
@@ -44,18 +45,18 @@ static void describe(const session *s, const bench_options *o, bool included, be
 {
     cJSON *settings = r->settings;
     const trip_file_header *h = &s->data->header;
-    char text[64];
+    char text[64], render[256];
     snprintf(text, sizeof text, "%llu x %llu x %llu", (unsigned long long)h->dims[0],
              (unsigned long long)h->dims[1], (unsigned long long)h->dims[2]);
     cJSON_AddStringToObject(settings, "data_set", included ? "tooth, included" : o->input);
     cJSON_AddStringToObject(settings, "grid", text);
-    cJSON_AddNumberToObject(settings, "kept", (double)h->kept);
+    cJSON_AddNumberToObject(settings, "kept_voxels", (double)h->kept);
     cJSON_AddStringToObject(settings, "transfer_function",
                             o->tf ? o->tf : "stored in the data set");
     if (o->size_count == 1)
         bench_report_add_size(settings, o->sizes[0]);
-    if (o->settings.classify == TRIP_CLASSIFY_PRE)
-        cJSON_AddNumberToObject(settings, "kernel_radius", o->settings.kernel_radius);
+    bench_options_write(o, render, sizeof render);
+    cJSON_AddStringToObject(settings, "options_of_render", render);
     cJSON_AddBoolToObject(settings, "shading", is_lit(s, &o->settings));
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }
@@ -93,6 +94,8 @@ static int measure_data(bench_options *o, size_t table, bench_report *r)
     if (!status && !tables[table].opens)
         status = session_open(&s, o->input, &(session_look){ .tf = o->tf }, o->memory_bytes);
     if (!status && !tables[table].opens)
+        bench_options_choose(o, session_needs_splats(&s) != NULL);
+    if (!status && !tables[table].opens)
         describe(&s, o, included, r);
     if (!status)
         status = tables[table].run_scene ? run_scene(table, &s, o, r)
@@ -122,7 +125,9 @@ static int check_plot(const bench_options *o)
 static int measure(bench_options *o, bench_report *r)
 {
     const size_t table = table_of(o);
-    o->progress = measure_progress_start(o->table);
+    if (!o->input && tables[table].makes_volumes)
+        bench_options_choose(o, false);
+    o->progress = command_line_quiet() ? NULL : measure_progress_start(o->table);
     int status = !o->input && tables[table].makes_volumes ? tables[table].run(NULL, o, r)
                                                           : measure_data(o, table, r);
     measure_progress_end(o->progress);
@@ -145,7 +150,7 @@ int trip_bench(int argc, char **argv)
     int status = bench_options_parse(&o, argc, argv);
     if (!status)
         status = check_plot(&o);
-    if (!status && o.in_short && !o.json)
+    if (!status && o.in_short && !o.json && !command_line_quiet())
         print_tables();
     if (!status)
         status = bench_report_create(&report, o.table, command ? command : "");

@@ -178,9 +178,11 @@ static int save_plot(const cJSON *rows, const char *path)
 static void describe(const bench_options *o, bench_report *r)
 {
     cJSON *settings = r->settings;
+    char render[256];
     bench_report_add_size(settings, o->sizes[0]);
     cJSON_AddStringToObject(settings, "field", o->field);
-    cJSON_AddStringToObject(settings, "classified", bench_classified(&o->settings));
+    bench_options_write(o, render, sizeof render);
+    cJSON_AddStringToObject(settings, "options_of_render", render);
     cJSON_AddNumberToObject(settings, "repeat", o->repeat);
 }
 

@@ -72,10 +72,10 @@ static const measure_column part_columns[] = {
     { "part", "part", 0, 0 },
     { "pictures", "pictures", 0, 0 },
     { "fps", "pictures/s", 1, 0 },
-    { "ms", "ms between", 1, 0 },
+    { "ms", "ms between: median", 1, 0 },
     { "ms_99", "99 %", 1, 0 },
     { "ms_max", "max", 1, 0 },
-    { "age_ms", "ms from input", 1, 0 },
+    { "age_ms", "ms from input: median", 1, 0 },
     { "age_ms_99", "99 %", 1, 0 },
     { "stale", "outdated", 0, 0 },
     { "scale", "scale", 2, 0 },
@@ -174,6 +174,7 @@ static void describe(const flying *m)
     cJSON_AddStringToObject(settings, "transfer_function",
                             o->tf ? o->tf : "stored in the data set");
     bench_report_add_size(settings, o->sizes[0]);
+    cJSON_AddStringToObject(settings, "options_of_render", "none: the viewer draws its default");
     cJSON_AddStringToObject(settings, "renderer", m->status.renderer);
     cJSON_AddStringToObject(settings, "device", m->status.device);
     cJSON_AddNumberToObject(settings, "wanted_fps", o->frames_per_second);
@@ -217,6 +218,7 @@ int bench_flight(const session *s, const bench_options *o, bench_report *r)
 {
     flying m = { .options = o, .report = r };
     (void)s;
+    measure_progress_expect(o->progress, 1); /* the picture of the library at rest */
     int status = fly(&m);
     if (!status) {
         describe(&m);

@@ -18,6 +18,7 @@ enum {
     DOLLY_STEPS = 128,
     DOLLY_PX = 192,
     TOO_LARGE = 1,
+    STEPS_OF_VIEW = 6, /* frames of a level and a view */
 };
 
 /* The eye starts where voxels of level 0 are dolly_px wide, and ends dolly_times times as far
@@ -145,18 +146,21 @@ static int measure_levels(measuring *m)
 {
     cJSON *table = bench_report_table(
         m->report, "levels", "Each level with voxels one pixel wide: error of 255", level_columns);
-    int status = 0;
+    int status = 0, steps = (int)m->levels * m->options->views * STEPS_OF_VIEW;
     entry *e = malloc(sizeof *e);
     if (!e)
         return trip_fail(TRIP_ERROR, "bench", "levels", "out of memory");
     for (unsigned level = 1; level <= m->levels && !status; level++) {
         *e = (entry){ 0 };
-        for (int view = 0; view < m->options->views && !status; view++)
+        for (int view = 0; view < m->options->views && !status; view++) {
             status = measure_view(m, view, level, e);
+            steps -= status ? 0 : STEPS_OF_VIEW;
+        }
         if (!status)
             add_level(m, table, level, e);
     }
     free(e);
+    measure_progress_expect(m->options->progress, -steps); /* of levels left out */
     return status == TOO_LARGE ? 0 : status;
 }
 
@@ -293,7 +297,8 @@ int bench_levels(const session *s, const bench_options *o, bench_report *r)
             trip_fail(TRIP_ERROR, "bench", o->input,
                       "has no coarse levels for %s; `triptych brick --levels-for both` makes them",
                       o->settings.classify == TRIP_CLASSIFY_POST ? "post" : "pre");
-    measure_progress_expect(o->progress, (int)m.levels * o->views * 6 + 2 * (DOLLY_STEPS + 1));
+    measure_progress_expect(o->progress,
+                            (int)m.levels * o->views * STEPS_OF_VIEW + 2 * (DOLLY_STEPS + 1));
     if (!status)
         status = measure_levels(&m);
     if (!status)

@@ -1,6 +1,7 @@
 #include "bench_options.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "command_line.h"
@@ -76,6 +77,15 @@ static int read_no_shading(const trip_option *row, const char *text, void *base)
 
 static const char *const fields[] = { "marschner-lobb", "cloud", "shells", "filaments", NULL };
 
+static int read_culling(const trip_option *row, const char *text, void *base)
+{
+    static const char *const names[] = { "reach", "two-points", NULL };
+    int which = 0, status = trip_option_choice("--culling", text, names, &which);
+    (void)row;
+    ((bench_options *)base)->settings.two_point_culling = which == 1;
+    return status;
+}
+
 static int read_field(const trip_option *row, const char *text, void *base)
 {
     int which = 0, status = trip_option_choice("--field", text, fields, &which);
@@ -116,17 +126,17 @@ enum {
     FPS,
     SECONDS,
     COMPOSITING,
+    CULLING,
     KERNEL_RADIUS,
     ROWS
 };
 
-static const char *const classifies[] = { "pre", "post", NULL };
+static const char *const classifies[] = { "auto", "pre", "post", NULL };
 static const char *const engines[] = { "auto", "io_uring", "pread", NULL };
 static const char *const occluded[] = { "skip", "draw", NULL };
 static const char *const compositings[] = { "splat", "sheet", NULL };
 
 /* The names are in the order of the renderers' values. */
-_Static_assert(TRIP_CLASSIFY_PRE == 0 && TRIP_CLASSIFY_POST == 1, "classifies");
 _Static_assert(TRIP_COMPOSITING_SPLAT == 0 && TRIP_COMPOSITING_SHEET == 1, "compositings");
 _Static_assert(TRIP_ENGINE_AUTO == 0 && TRIP_ENGINE_PREAD == 2, "engines");
 
@@ -149,7 +159,7 @@ static const trip_option rows[ROWS] = {
                    "submit is always gl, variants always reference", CUSTOM(read_renderers) },
     [REPEAT] = { "repeat", "N", "Sets the number of runs; a figure is their median",
                  "5; renderers: 1", .type = TRIP_OPTION_INTEGER, AT(repeat), .lo = 1, .hi = 1000 },
-    [SIZE] = { "size", "WxH[,...]", "Sets the picture sizes in pixels",
+    [SIZE] = { "size", "WxH|N[,...]", "Sets the picture sizes in pixels",
                "512x512; renderers: 512x512,1024x1024; stream: 1024x1024; popping and levels: "
                "256x256; variants: 128x128; flight: 800x600",
                CUSTOM(read_sizes) },
@@ -157,9 +167,10 @@ static const trip_option rows[ROWS] = {
              "the one in the data set", .type = TRIP_OPTION_TEXT, AT(tf) },
     [THREADS] = { "threads", "N[,...]", "Sets the numbers of threads that draw and read, 1 to 256",
                   "one per processor", CUSTOM(read_threads) },
-    [CLASSIFY] = { "classify", "pre|post", "Selects the classification, as in `triptych render`",
-                   "pre", "renderers, stream, popping and levels only", TABLES,
-                   AT(settings.classify), CHOICE(classifies) },
+    [CLASSIFY] = { "classify", "auto|pre|post",
+                   "Selects the classification, as in `triptych render`", "auto",
+                   "renderers, stream, popping and levels only", TABLES, AT(classify),
+                   CHOICE(classifies) },
     [EARLY_TERMINATION] = { "early-termination", "T",
                             "Sets the transmittance below which a pixel stops",
                             "post 1/512, pre 1/8192", "renderers, stream, popping and levels only",
@@ -197,6 +208,10 @@ static const trip_option rows[ROWS] = {
                       "Selects the unit of compositing of pre, as in `triptych render`", "splat",
                       "renderers, stream, popping and levels only", .group = DRAW_GROUP_PAPERS,
                       AT(settings.compositing), CHOICE(compositings) },
+    [CULLING] = { "culling", "reach|two-points",
+                  "Selects how splats without weight are culled: by the reach of each, which loses "
+                  "none, or by the weights of two points, as in 2008",
+                  "reach", "submit only", .group = DRAW_GROUP_PAPERS, CUSTOM(read_culling) },
     [KERNEL_RADIUS] = { "kernel-radius", "VOXELS", "Sets the radius of a splat", "2",
                         "not for flight", .group = DRAW_GROUP_PAPERS, .type = TRIP_OPTION_NUMBER,
                         AT(settings.kernel_radius), .lo = 0.1, .hi = 100 },
@@ -208,6 +223,8 @@ static const trip_option_table bench_table = { rows, ROWS };
 #define OF_MODEL                                                                                   \
     (BIT(CLASSIFY) | BIT(COMPOSITING) | BIT(SAMPLES_PER_SHEET) | BIT(EARLY_TERMINATION))
 #define OF_FLIGHT (BIT(SECONDS) | BIT(FPS))
+/* These options change the drawing. The renderers, sizes and threads only add rows. */
+#define OF_DRAWING (OF_MODEL | BIT(NO_SHADING) | BIT(OCCLUDED) | BIT(KERNEL_RADIUS))
 #define OF_LEVELS (BIT(FIELD) | BIT(FINEST))
 
 static const struct table {
@@ -370,7 +387,7 @@ static void be_short(parse *p)
         o->renderers[o->renderer_count++] = TRIP_RENDERER_GL;
     }
     if (!(given(p) & BIT(VIEWS)))
-        o->views = 5;
+        o->views = 3;
 }
 
 static int check(void *user)
@@ -386,14 +403,19 @@ static int check(void *user)
     if (status)
         return status;
     const struct table *t = &tables[which];
+    const uint64_t refused = t->refused | (strcmp(t->name, "submit") ? BIT(CULLING) : 0);
     for (int i = 0; i < ROWS; i++)
-        if (given(p) & t->refused & UINT64_C(1) << i)
+        if (given(p) & refused & UINT64_C(1) << i)
             return trip_fail(TRIP_USAGE, "usage", t->name, "--%s does not apply to this table",
                              rows[i].name);
     if (o->input && !strcmp(t->name, "levels") && given(p) & (OF_LEVELS | BIT(PLOT)))
         return trip_option_fail("--field, --finest, --plot", "apply only without a data set");
     if (!(given(p) & BIT(OCCLUDED)))
         o->draw_occluded = t->draw_occluded;
+    o->usual = !(given(p) & OF_DRAWING);
+    o->chosen = given(p) & BIT(RENDERER);
+    if (t->refused & BIT(CLASSIFY) || given(p) & (BIT(COMPOSITING) | BIT(KERNEL_RADIUS)))
+        o->classify = o->classify ? o->classify : BENCH_CLASSIFY_PRE;
     fill_defaults(o, t);
     if (!t->lists && (o->size_count > 1 || o->renderer_count > 1 || o->thread_count > 1))
         return trip_fail(TRIP_USAGE, "usage", t->name,
@@ -414,6 +436,44 @@ static int add_word(void *user, char *word)
     return 0;
 }
 
+void bench_options_choose(bench_options *o, bool needs_splats)
+{
+    if (o->classify == BENCH_CLASSIFY_AUTO)
+        o->classify = needs_splats ? BENCH_CLASSIFY_PRE : BENCH_CLASSIFY_POST;
+    o->settings.classify =
+        o->classify == BENCH_CLASSIFY_POST ? TRIP_CLASSIFY_POST : TRIP_CLASSIFY_PRE;
+}
+
+void bench_options_write(const bench_options *o, char *text, size_t bytes)
+{
+    static const char *const renderers[] = { "auto", "gl", "cpu", "reference" };
+    const trip_settings *s = &o->settings;
+    char *buffer = NULL;
+    size_t length;
+    FILE *f = open_memstream(&buffer, &length);
+    if (!f)
+        return;
+    fprintf(f, "--classify %s", s->classify == TRIP_CLASSIFY_POST ? "post" : "pre");
+    if (s->classify == TRIP_CLASSIFY_PRE)
+        fprintf(f, " --compositing %s --kernel-radius %g", compositings[s->compositing],
+                s->kernel_radius);
+    if (s->classify == TRIP_CLASSIFY_POST && s->samples_per_sheet)
+        fprintf(f, " --samples-per-sheet %d", s->samples_per_sheet);
+    if (s->early_termination >= 0)
+        fprintf(f, " --early-termination %g", s->early_termination);
+    if (!s->shading)
+        fputs(" --no-shading", f);
+    if (o->size_count == 1)
+        fprintf(f, " --size %dx%d", o->sizes[0][0], o->sizes[0][1]);
+    if (o->renderer_count == 1)
+        fprintf(f, " --renderer %s", renderers[o->renderers[0]]);
+    if (o->thread_count == 1 && o->threads[0])
+        fprintf(f, " --threads %d", o->threads[0]);
+    fclose(f);
+    snprintf(text, bytes, "%s", buffer ? buffer : "");
+    free(buffer);
+}
+
 int bench_options_parse(bench_options *o, int argc, char **argv)
 {
     *o = (bench_options){ .field = "shells",
@@ -427,7 +487,8 @@ int bench_options_parse(bench_options *o, int argc, char **argv)
         .args_doc = "[TABLE [NAME.trip]]",
         .doc = "Measures how fast this machine draws a data set, and prints a table:\n" BENCH_TABLES
                "\vWithout NAME.trip, bench measures the included tooth. Without TABLE it measures "
-               "the renderers cpu and gl, in less than a minute. Compared settings take turns, so "
+               "the default of `render` and the renderers, in less than a minute. Compared "
+               "settings take turns, so "
                "that other load slows all of them.",
         .sets = &p.set,
         .set_count = 1,

@@ -9,6 +9,7 @@
 #include "settings.h"
 
 enum { BENCH_LIST_MAX = 16 };
+enum { BENCH_CLASSIFY_AUTO, BENCH_CLASSIFY_PRE, BENCH_CLASSIFY_POST };
 
 typedef struct bench_options {
     const char *table; /* a name of tables[] in bench.c */
@@ -25,6 +26,9 @@ typedef struct bench_options {
     const char *plot;         /* path of an SVG file for the table, or NULL */
     double seconds;           /* length of a flight */
     double frames_per_second; /* target of a flight */
+    int classify;             /* BENCH_CLASSIFY_... */
+    bool usual;  /* no option changes the drawing: renderers measures the default too */
+    bool chosen; /* --renderer was given */
     trip_settings settings;
     trip_engine engine;
     uint64_t memory_bytes; /* 0 selects the default */
@@ -43,9 +47,15 @@ typedef struct bench_options {
     "  popping    jumps of pixels while the list of highest weight changes\n"                      \
     "  ewa        error and time of the affine EWA footprints\n"                                   \
     "  orders     ordering methods of Hofsetz & Max 2005, Tables 1 and 2\n"                        \
-    "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Table 3\n"                    \
+    "  submit     forms of submission of Hofsetz, Max & Bastos 2008, Tables 3, 4\n"                \
     "  variants   changes of the picture by the shortcuts of the papers\n"
 
+/* Sets the classification that `render` chooses by itself, unless --classify was given.
+ * `needs_splats` tells whether the data set can only be drawn as splats. */
+void bench_options_choose(bench_options *o, bool needs_splats);
+/* Writes the options of `triptych render` that draw like the table. A table may vary some of them
+ * from row to row, and leave out the size and the renderer here. */
+void bench_options_write(const bench_options *o, char *text, size_t bytes);
 /* Returns 0, or TRIP_USAGE after reporting an error. --help prints the help and exits. */
 int bench_options_parse(bench_options *o, int argc, char **argv);
 

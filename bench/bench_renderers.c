@@ -1,10 +1,11 @@
 /* bench renderers: measures frames and splats per second of the available renderers, in views
- * around the object. */
+ * around the object. The first row is the default of `triptych render` (bench_default.c). */
 #include "bench_tables.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "bench_probe.h"
 #include "bench_view.h"
@@ -13,17 +14,19 @@
 
 enum { MAX_CONTENDERS = BENCH_LIST_MAX * BENCH_LIST_MAX, SAMPLE_EVERY = 16 };
 
-static const measure_column columns[] = {
-    { "renderer", "renderer", 0, 0 },
-    { "threads", "threads", 0, 0 },
-    { "size", "size", 0, 0 },
-    { "ms", "median ms", 1, 0 },
-    { "ms_min", "fastest", 1, 0 },
-    { "ms_max", "slowest", 1, 0 },
-    { "fps", "frames/s", 2, 0 },
-    { "msplats_per_s", "Msplats/s", 2, 0 },
+#define COLUMNS_OF_TIMES                                                                           \
+    { "name", "drawn", 0, 0 }, { "renderer", "renderer", 0, 0 }, { "threads", "threads", 0, 0 },   \
+        { "size", "size, pixels", 0, 0 }, { "ms", "ms: median", 1, 0 },                            \
+        { "ms_min", "fastest", 1, 0 }, { "ms_max", "slowest", 1, 0 },                              \
+    {                                                                                              \
+        "fps", "frames/s", 2, 0                                                                    \
+    }
+static const measure_column columns[] = { COLUMNS_OF_TIMES };
+static const measure_column counted_columns[] = {
+    COLUMNS_OF_TIMES,
+    { "msplats_per_s", "million splats/s", 2, 0 },
     { "pixels_per_splat", "pixels/splat", 1, 0 },
-    { "mpixels_per_s", "Mpixels/s", 1, 0 },
+    { "mpixels_per_s", "million pixels/s", 1, 0 },
 };
 
 /* A renderer and its number of threads; 0 means one per processor. */
@@ -61,6 +64,14 @@ static int add_contender(race *c, trip_renderer_kind kind, int threads, bench_re
     char why[256], key[32];
     own->threads = kind == TRIP_RENDERER_CPU ? threads : 0;
     int status = bench_renderer_create(c->session, &own->renderer, kind, threads, false, why);
+    if (!status && own->renderer && own->renderer->software && c->options->in_short &&
+        !c->options->chosen) {
+        bench_renderer_destroy(own->renderer);
+        own->renderer = NULL;
+        snprintf(why, sizeof why,
+                 "no graphics device; `triptych bench --renderer gl` measures gl on "
+                 "the processor");
+    }
     if (status || !own->renderer) {
         bench_report_limit(r, "left out: %s: %s", names[kind], why);
         return status;
@@ -183,10 +194,12 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
     }
     const double median = measure_median(values, frames);
     cJSON *row = measure_new_row(rows);
+    cJSON_AddStringToObject(row, "name", bench_classified(&c->options->settings));
     cJSON_AddStringToObject(row, "renderer", own->renderer->ops->name);
     cJSON_AddStringToObject(row, "device", own->renderer->ops->device(own->renderer));
-    if (own->threads)
-        cJSON_AddNumberToObject(row, "threads", own->threads);
+    if (!strcmp(own->renderer->ops->name, "cpu"))
+        cJSON_AddNumberToObject(
+            row, "threads", own->threads ? own->threads : (double)sysconf(_SC_NPROCESSORS_ONLN));
     bench_report_add_size(row, size);
     measure_add(row, { "views", c->options->views }, { "ms", median }, { "ms_min", values[0] },
                 { "ms_max", values[frames - 1] }, { "fps", 1e3 / median });
@@ -200,11 +213,9 @@ static void add_row(const race *c, const contender *own, const int size[2], doub
     add_views(c, own, row);
 }
 
-static int run(race *c, bench_report *r)
+static int run(race *c, cJSON *rows)
 {
     const bench_options *o = c->options;
-    cJSON *rows =
-        bench_report_table(r, "renderers", "Renderers, in views around the object", columns);
     double *values = calloc((size_t)(o->views * o->repeat), sizeof *values);
     c->loads = calloc((size_t)o->views, sizeof *c->loads);
     c->views = calloc((size_t)o->views, sizeof *c->views);
@@ -230,22 +241,26 @@ static bool leaves_out_occluded(const race *c)
 static void add_limits(const race *c, bench_report *r)
 {
     bench_report_limit(
-        r, "The data set is in memory (null engine) and was verified when it was loaded, so that "
-           "no figure includes the disk. A frame is planning, drawing from memory and merging; it "
-           "ends with the picture in the memory of the program.");
+        r, "A frame begins with the data set in memory, so that no time includes the disk. It ends "
+           "with the picture in the memory of the program.");
     if (counts(c)) {
-        bench_report_limit(r,
-                           "Msplats/s: splats with a pixel centre in their footprint where their "
-                           "list has weight, summed over all views / time of all views. Splats "
-                           "behind opaque ones count too, although a renderer may skip them.");
-        bench_report_limit(r,
-                           "Mpixels/s: pixel centres in these footprints, from every %dth splat.",
-                           SAMPLE_EVERY);
+        bench_report_limit(
+            r, "million splats/s: splats with a pixel centre in their footprint where their "
+               "list has weight, summed over all views / time of all views. Splats "
+               "behind opaque ones count too, although a renderer may skip them.");
+        bench_report_limit(
+            r, "million pixels/s: pixel centres in these footprints, from every %dth splat.",
+            SAMPLE_EVERY);
     }
     if (leaves_out_occluded(c))
         bench_report_limit(r, "cpu skips bricks behind opaque ones; the picture is the same.");
     bench_report_limit(r, "Times are over all views. In each view the renderers take turns, and "
                           "the first frame of each turn is untimed.");
+    if (c->options->usual)
+        bench_report_limit(
+            r, "default: the command `triptych render` without options, in views around "
+               "the object by --azimuth. The other rows draw with options, which "
+               "Settings lists.");
 }
 
 int bench_renderers(const session *s, const bench_options *o, bench_report *r)
@@ -258,13 +273,19 @@ int bench_renderers(const session *s, const bench_options *o, bench_report *r)
     cJSON_AddNumberToObject(r->settings, "views", o->views);
     int status = add_contenders(c, r);
     add_limits(c, r);
-    int frames = c->count * (1 + o->repeat) + (o->no_counts ? 0 : 2); /* per view */
+    int frames = c->count * (1 + o->repeat) + (counts(c) ? 2 : 0); /* per view */
     measure_progress_expect(o->progress, 1 + frames * o->views * o->size_count);
+    cJSON *rows = bench_report_add_table(
+        r, "renderers", "Frames of the renderers, in views around the object",
+        counts(c) ? counted_columns : columns,
+        (int)(counts(c) ? sizeof counted_columns : sizeof columns) / (int)sizeof *columns);
+    if (!status && o->usual)
+        status = bench_default(o, r, rows);
     measure_progress_step(o->progress, "loading the data set");
     if (!status)
         status = bench_reader_create(s, &c->reader, o, TRIP_ENGINE_NULL, NULL, occluder_of(c));
     if (!status)
-        status = run(c, r);
+        status = run(c, rows);
     if (c->reader)
         trip_reader_destroy(c->reader);
     for (int i = 0; i < c->count; i++) {

@@ -71,9 +71,18 @@ void bench_report_limit(bench_report *r, const char *sentence, ...)
     cJSON_AddItemToArray(r->limits, cJSON_CreateString(text));
 }
 
+/* Prints a key with spaces between its words. */
+static void print_key(const char *key, int length)
+{
+    fputs("- ", stdout);
+    for (int i = 0; i < length; i++)
+        putchar(key[i] == '_' ? ' ' : key[i]);
+    fputs(": ", stdout);
+}
+
 static void print_fact(const char *key, const char *text)
 {
-    printf("- %s: ", key);
+    print_key(key, (int)strlen(key));
     trip_text_write(stdout, text);
     putchar('\n');
 }
@@ -85,15 +94,18 @@ static void print_facts(const char *heading, const cJSON *facts)
     printf("\n%s\n\n", heading);
     cJSON_ArrayForEach(item, facts)
     {
-        if (cJSON_IsString(item))
+        const char *unit = strstr(item->string, "_bytes");
+        if (cJSON_IsString(item)) {
             print_fact(item->string, item->valuestring);
-        else if (cJSON_IsBool(item))
-            printf("- %s: %s\n", item->string, cJSON_IsTrue(item) ? "yes" : "no");
-        else if (strstr(item->string, "_bytes"))
-            printf("- %.*s: %s\n", (int)(strstr(item->string, "_bytes") - item->string),
-                   item->string, trip_format_bytes((uint64_t)item->valuedouble, bytes));
+            continue;
+        }
+        print_key(item->string, unit ? (int)(unit - item->string) : (int)strlen(item->string));
+        if (cJSON_IsBool(item))
+            puts(cJSON_IsTrue(item) ? "yes" : "no");
+        else if (unit)
+            puts(trip_format_bytes((uint64_t)item->valuedouble, bytes));
         else
-            printf("- %s: %.10g\n", item->string, item->valuedouble);
+            printf("%.10g\n", item->valuedouble);
     }
 }
 
@@ -116,7 +128,7 @@ int bench_report_print(bench_report *r, int json)
     putchar('\n');
     for (int i = 0; i < r->table_count; i++)
         measure_table_print(stdout, &r->shown[i]);
-    printf("\nLimits of these figures\n\n");
+    printf("\nWhat the figures mean\n\n");
     cJSON_ArrayForEach(limit, r->limits) printf("- %s\n", limit->valuestring);
     print_facts("Settings", r->settings);
     print_facts("Machine", r->machine);

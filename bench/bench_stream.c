@@ -24,7 +24,7 @@ static const double gigabyte = 1e9, second_ms = 1e3;
 
 static const measure_column stage_columns[] = {
     { "stage", "stage", 0, 0 },
-    { "ms", "median s", 3, second_ms },
+    { "ms", "s: median", 3, second_ms },
     { "ms_min", "fastest", 3, second_ms },
     { "ms_max", "slowest", 3, second_ms },
     { "bytes_read", "GB read", 3, gigabyte },
@@ -38,7 +38,7 @@ static const measure_column summary_columns[] = {
     { "memory_limit_bytes", "memory limit MB", 1, 1e6 },
     { "memory_peak_bytes", "peak MB", 1, 1e6 },
     { "peak_rss_bytes", "resident MB", 1, 1e6 },
-    { "seconds_per_frame", "s/frame", 3, 0 },
+    { "seconds_per_frame", "seconds/frame", 3, 0 },
     { "gb_per_s", "GB/s", 3, 0 },
     { "disk_gb_per_s", "disk GB/s", 3, 0 },
     { "frame_of_disk", "x disk", 3, 0 },
@@ -221,7 +221,7 @@ static void describe(const stream *t, bench_report *r)
         r, "read alone: the frame's plan, ring and checksums, with a renderer that does nothing. "
            "The plan leaves out bricks, so that it reads fewer bytes, with gaps between them.");
     bench_report_limit(
-        r, "draw alone: the same frame with the data set in memory (null engine), outside the "
+        r, "draw alone: the same frame with the data set in memory, outside the "
            "memory limit. gl copies the data to its own memory; cpu and reference do not.");
     if (t->frame->occluder)
         bench_report_limit(

@@ -16,6 +16,8 @@ int bench_finer(const bench_options *o, bench_report *r);
 int bench_flight(const session *s, const bench_options *o, bench_report *r);
 int bench_ewa(const session *s, const bench_options *o, bench_report *r);
 int bench_variants(bench_scene *scene, const bench_options *o, bench_report *r);
+/* Adds the row of the default of `render` to the table renderers. */
+int bench_default(const bench_options *o, bench_report *r, cJSON *rows);
 int bench_renderers(const session *s, const bench_options *o, bench_report *r);
 
 #endif

@@ -3,6 +3,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +16,7 @@
 #include "budget.h"
 #include "report.h"
 
-enum { KEY_LENGTH = sizeof(cache_key) - 1, NAME_BYTES = 64 };
+enum { KEY_LENGTH = sizeof(cache_key) - 1, NAME_BYTES = 96 };
 static const uint64_t min_limit = UINT64_C(4) << 30;
 
 /* Suffixes of files that a killed process may leave, besides its lock. */
@@ -38,6 +39,19 @@ static const char *parse_name(const char *name, cache_key *key)
     memcpy(key->text, name, KEY_LENGTH);
     key->text[KEY_LENGTH] = 0;
     return name + KEY_LENGTH;
+}
+
+cache_key cache_key_of(const char *source, const char *kept)
+{
+    cache_key key;
+    snprintf(key.text, sizeof key.text, "%.*s%.*s", CACHE_SOURCE_DIGITS, source,
+             KEY_LENGTH - CACHE_SOURCE_DIGITS, kept);
+    return key;
+}
+
+bool cache_key_has_source(const cache_key *key, const cache_source *source)
+{
+    return !memcmp(key->text, source->text, CACHE_SOURCE_DIGITS);
 }
 
 static int find_path(char **path)
@@ -111,10 +125,45 @@ static int find_limit(cache_folder *c)
     return 0;
 }
 
+/* Replaces the path of a link by the path of its folder. */
+static int follow_link(cache_folder *c)
+{
+    struct stat st;
+    if (lstat(c->path, &st) < 0 || !S_ISLNK(st.st_mode))
+        return 0;
+    char *target = realpath(c->path, NULL);
+    if (target && stat(target, &st) == 0 && !S_ISDIR(st.st_mode)) {
+        free(target);
+        target = NULL;
+        errno = ENOTDIR;
+    }
+    if (!target)
+        return trip_fail(TRIP_ERROR, "cache", c->path,
+                         "is a link that leads to no folder: %s; make that folder, or remove the "
+                         "link",
+                         strerror(errno));
+    free(c->path);
+    c->path = target;
+    return 0;
+}
+
+static int fail_to_open(const cache_folder *c)
+{
+    struct stat st;
+    const int error = errno;
+    if (lstat(c->path, &st) == 0 && !S_ISDIR(st.st_mode))
+        return trip_fail(TRIP_ERROR, "cache", c->path,
+                         "is no folder; remove it, or set XDG_CACHE_HOME to another folder");
+    errno = error;
+    return fail_to_write(c->path, "opened");
+}
+
 int cache_folder_open(cache_folder *c, bool make)
 {
     *c = (cache_folder){ .fd = -1 };
     int status = find_path(&c->path);
+    if (status == 0)
+        status = follow_link(c);
     if (status == 0 && make)
         status = make_folder(c->path);
     if (status < 0)
@@ -122,11 +171,8 @@ int cache_folder_open(cache_folder *c, bool make)
     c->fd = open(c->path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (c->fd < 0 && !make && errno == ENOENT)
         return 0;
-    if (c->fd < 0 && (errno == ELOOP || errno == ENOTDIR))
-        return trip_fail(TRIP_ERROR, "cache", c->path,
-                         "is a link or a file; remove it, or set XDG_CACHE_HOME to a folder");
     if (c->fd < 0)
-        return trip_fail_errno("cache", c->path, "cannot open");
+        return fail_to_open(c);
     status = check_folder(c);
     return status == 0 ? find_limit(c) : status;
 }
@@ -160,10 +206,8 @@ int cache_folder_hold(const cache_folder *c, const cache_key *key)
     char name[NAME_BYTES];
     flock(c->fd, LOCK_SH);
     int fd = open_folder(c, file_name(key, ".trip", name));
-    if (fd >= 0) {
+    if (fd >= 0)
         flock(fd, LOCK_SH | LOCK_NB);
-        futimens(fd, NULL);
-    }
     flock(c->fd, LOCK_UN);
     return fd;
 }
@@ -186,40 +230,25 @@ static bool remove_folder(const cache_folder *c, const char *name)
     return unlinkat(c->fd, name, AT_REMOVEDIR) == 0;
 }
 
-bool cache_folder_remove(const cache_folder *c, const cache_key *key)
-{
-    char name[NAME_BYTES], gone[NAME_BYTES];
-    file_name(key, ".trip", name);
-    file_name(key, ".gone", gone);
-    flock(c->fd, LOCK_EX);
-    int fd = open_folder(c, name);
-    bool unused = fd < 0 || flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
-    bool renamed = unused && renameat(c->fd, name, c->fd, gone) == 0;
-    flock(c->fd, LOCK_UN);
-    bool removed = renamed && remove_folder(c, gone);
-    if (fd >= 0)
-        close(fd);
-    return removed;
-}
-
-bool cache_folder_recall(const cache_folder *c, const cache_key *state, cache_key *key)
+bool cache_folder_recall(const cache_folder *c, const cache_key *state, cache_source *source)
 {
     char name[NAME_BYTES], target[NAME_BYTES];
     ssize_t n = readlinkat(c->fd, file_name(state, ".link", name), target, sizeof target - 1);
-    if (n < 0)
+    if (n != CACHE_SOURCE_DIGITS)
         return false;
     target[n] = 0;
-    const char *rest = parse_name(target, key);
-    return rest && !*rest;
+    memcpy(source->text, target, sizeof source->text);
+    return strspn(target, "0123456789abcdef") == CACHE_SOURCE_DIGITS;
 }
 
 /* The rename is atomic: another process sees either the old link or the new one. */
-void cache_folder_remember(const cache_folder *c, const cache_key *state, const cache_key *key)
+void cache_folder_remember(const cache_folder *c, const cache_key *state,
+                           const cache_source *source)
 {
     char name[NAME_BYTES], made[NAME_BYTES];
     snprintf(made, sizeof made, "%s.%ld.link", state->text, (long)getpid());
     unlinkat(c->fd, made, 0);
-    if (symlinkat(key->text, c->fd, made) == 0 &&
+    if (symlinkat(source->text, c->fd, made) == 0 &&
         renameat(c->fd, made, c->fd, file_name(state, ".link", name)) < 0)
         unlinkat(c->fd, made, 0);
 }
@@ -231,6 +260,12 @@ static bool is_named(const cache_folder *c, int fd, const char *name)
            a.st_dev == b.st_dev && a.st_ino == b.st_ino;
 }
 
+/* Removes a link, socket or empty folder from the place of a file. */
+static bool remove_obstacle(const cache_folder *c, const char *name)
+{
+    return unlinkat(c->fd, name, 0) == 0 || unlinkat(c->fd, name, AT_REMOVEDIR) == 0;
+}
+
 /* Returns -1 if another process holds the lock (errno is EWOULDBLOCK) or if opening failed. */
 static int try_lock(const cache_folder *c, const cache_key *key)
 {
@@ -238,6 +273,9 @@ static int try_lock(const cache_folder *c, const cache_key *key)
     file_name(key, ".lock", name);
     for (;;) {
         int fd = openat(c->fd, name, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK, 0600);
+        if (fd < 0 && (errno == ELOOP || errno == EISDIR || errno == ENXIO) &&
+            remove_obstacle(c, name))
+            continue;
         if (fd < 0 || (flock(fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK)) {
             int saved_errno = errno;
             if (fd >= 0)
@@ -251,6 +289,13 @@ static int try_lock(const cache_folder *c, const cache_key *key)
     }
 }
 
+static int fail_to_lock(const cache_folder *c, const cache_key *key)
+{
+    char name[NAME_BYTES], path[PATH_MAX];
+    snprintf(path, sizeof path, "%s/%s", c->path, file_name(key, ".lock", name));
+    return fail_to_write(path, "made");
+}
+
 int cache_folder_lock(const cache_folder *c, const cache_key *key, void (*waiting)(void *user),
                       void *user)
 {
@@ -259,7 +304,7 @@ int cache_folder_lock(const cache_folder *c, const cache_key *key, void (*waitin
         if (fd >= 0)
             return fd;
         if (errno != EWOULDBLOCK)
-            return fail_to_write(c->path, "written");
+            return fail_to_lock(c, key);
         waiting(user);
         nanosleep(&(struct timespec){ .tv_nsec = 50000000 }, NULL);
         if (trip_interrupted())
@@ -272,6 +317,58 @@ void cache_folder_unlock(const cache_folder *c, const cache_key *key, int fd)
     char name[NAME_BYTES];
     unlinkat(c->fd, file_name(key, ".lock", name), 0);
     close(fd);
+}
+
+typedef enum removal { REMOVED, USED, LOCKED, STUCK } removal;
+
+/* Removes a data set. The caller has its lock, so no process makes it. */
+static removal remove_locked(const cache_folder *c, const cache_key *key)
+{
+    char name[NAME_BYTES], gone[NAME_BYTES];
+    file_name(key, ".trip", name);
+    file_name(key, ".gone", gone);
+    flock(c->fd, LOCK_EX);
+    int fd = open_folder(c, name);
+    bool unused = fd < 0 || flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    bool renamed = unused && renameat(c->fd, name, c->fd, gone) == 0;
+    flock(c->fd, LOCK_UN);
+    bool removed = renamed && remove_folder(c, gone);
+    if (fd >= 0)
+        close(fd);
+    return removed ? REMOVED : unused ? STUCK : USED;
+}
+
+static removal remove_unlocked(const cache_folder *c, const cache_key *key)
+{
+    int lock = try_lock(c, key);
+    if (lock < 0)
+        return errno == EWOULDBLOCK ? LOCKED : STUCK;
+    removal result = remove_locked(c, key);
+    cache_folder_unlock(c, key, lock);
+    return result;
+}
+
+bool cache_folder_remove(const cache_folder *c, const cache_key *key, bool locked)
+{
+    return (locked ? remove_locked(c, key) : remove_unlocked(c, key)) == REMOVED;
+}
+
+int cache_folder_make_room(const cache_folder *c, const cache_key *key)
+{
+    char name[NAME_BYTES];
+    struct stat st;
+    const size_t places = LEFTOVERS + 1;
+    for (size_t i = 0; i < places; i++) {
+        file_name(key, i ? leftovers[i - 1] : ".trip", name);
+        if (fstatat(c->fd, name, &st, AT_SYMLINK_NOFOLLOW) == 0 && !S_ISDIR(st.st_mode))
+            unlinkat(c->fd, name, 0);
+    }
+    if (fstatat(c->fd, file_name(key, ".trip", name), &st, AT_SYMLINK_NOFOLLOW) < 0)
+        return 0;
+    return trip_fail(TRIP_ERROR, "cache", c->path,
+                     "its folder %s obstructs a new data set and cannot be removed; remove that "
+                     "folder",
+                     name);
 }
 
 static uint64_t folder_bytes(int fd)
@@ -368,46 +465,77 @@ int cache_folder_list(const cache_folder *c, cache_entry **out, size_t *count)
     return status;
 }
 
-/* Removes the leftovers of killed processes and links to data sets that no longer exist. */
+typedef struct cleaning {
+    const listing *kept; /* the data sets that remain */
+    cache_left *left;
+} cleaning;
+
+static bool has_data_set(const listing *l, const cache_source *source)
+{
+    bool found = false;
+    for (size_t i = 0; i < l->count; i++)
+        found = found || cache_key_has_source(&l->entries[i].key, source);
+    return found;
+}
+
+/* Removes the leftovers of killed processes and links to data sets that no longer exist. Counts the
+ * data sets that other processes make. */
 static int clean_name(const cache_folder *c, const char *name, const cache_key *key,
                       const char *rest, void *user)
 {
-    struct stat st;
-    cache_key target;
-    char entry[NAME_BYTES];
-    (void)user;
+    const cleaning *cl = user;
+    cache_source source;
     if (!strcmp(rest, ".link")) {
-        if (!cache_folder_recall(c, key, &target) ||
-            fstatat(c->fd, file_name(&target, ".trip", entry), &st, AT_SYMLINK_NOFOLLOW) < 0)
+        if (!cache_folder_recall(c, key, &source) || !has_data_set(cl->kept, &source))
             unlinkat(c->fd, name, 0);
         return 0;
     }
     size_t length = strlen(rest);
     if (length > 5 && !strcmp(rest + length - 5, ".link"))
         unlinkat(c->fd, name, 0);
-    bool leftover = !strcmp(rest, ".lock");
+    bool is_lock = !strcmp(rest, ".lock"), leftover = is_lock;
     for (int i = 0; i < LEFTOVERS; i++)
         leftover = leftover || !strcmp(rest, leftovers[i]);
     int lock = leftover ? try_lock(c, key) : -1;
-    if (lock < 0)
+    if (lock < 0) {
+        cl->left->making += is_lock && errno == EWOULDBLOCK;
         return 0;
-    if (strcmp(rest, ".lock"))
+    }
+    if (!is_lock)
         remove_folder(c, name);
     cache_folder_unlock(c, key, lock);
     return 0;
 }
 
-int cache_folder_shrink(const cache_folder *c, uint64_t bytes)
+static int clean(const cache_folder *c, cache_left *left)
+{
+    listing kept = { 0 };
+    int status = cache_folder_list(c, &kept.entries, &kept.count);
+    if (status == 0)
+        status = visit_names(c, clean_name, &(cleaning){ &kept, left });
+    free(kept.entries);
+    return status;
+}
+
+int cache_folder_shrink(const cache_folder *c, uint64_t bytes, cache_left *out)
 {
     cache_entry *entries;
+    cache_left left = { 0 };
     size_t count;
     uint64_t total = 0;
     int status = cache_folder_list(c, &entries, &count);
     for (size_t i = 0; i < count; i++)
         total += entries[i].bytes;
-    for (size_t i = 0; i < count && (total > bytes || bytes == 0); i++)
-        if (cache_folder_remove(c, &entries[i].key))
-            total -= entries[i].bytes;
+    for (size_t i = 0; i < count && (total > bytes || bytes == 0); i++) {
+        const removal result = remove_unlocked(c, &entries[i].key);
+        total -= result == REMOVED ? entries[i].bytes : 0;
+        left.used += result == USED;
+        left.stuck += result == STUCK;
+    }
     free(entries);
-    return status == 0 ? visit_names(c, clean_name, NULL) : status;
+    if (status == 0)
+        status = clean(c, &left);
+    if (out)
+        *out = left;
+    return status;
 }

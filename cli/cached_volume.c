@@ -8,8 +8,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "budget.h"
 #include "clock.h"
+#include "fastest.h"
 #include "report.h"
 
 #define INDEX_NAME "index.trip"
@@ -24,7 +24,11 @@ typedef struct search {
     triptych *t;
     const char *volume;
     triptych_brick_options options;
-    triptych_identity identity; /* of the files when the key was found */
+    const cached_wish *wish;
+    const char *checksum;       /* the wanted one, or NULL */
+    triptych_identity identity; /* of the files when the source was found */
+    cache_source source;
+    bool damaged; /* a damaged data set was removed */
 } search;
 
 static bool has_index(const char *folder)
@@ -83,125 +87,211 @@ static int wait_until_stable(search *s)
     return status;
 }
 
-static cache_key key_of(const char text[33])
+static cache_source source_of(const char *digits)
 {
-    cache_key key;
-    memcpy(key.text, text, sizeof key.text);
-    return key;
+    cache_source source;
+    snprintf(source.text, sizeof source.text, "%.*s", CACHE_SOURCE_DIGITS, digits);
+    return source;
 }
 
-/* Derives the key from the content of the files, or from their state if they are large. */
-static int find_content_key(search *s, cache_key *key)
+static cache_key state_of(const search *s)
+{
+    return cache_key_of(s->identity.state, s->identity.state + CACHE_SOURCE_DIGITS);
+}
+
+/* Derives the source from the content of the files, or from their state if they are large. */
+static int find_content(search *s, cache_source *source)
 {
     bool read = s->identity.bytes <= max_content_bytes;
     int status = read ? identify(s, max_content_bytes) : wait_until_stable(s);
     if (status == 0)
-        *key = key_of(*s->identity.content ? s->identity.content : s->identity.state);
+        *source = source_of(*s->identity.content ? s->identity.content : s->identity.state);
     return status;
 }
 
-static int find_key(search *s)
+static int find_source(search *s)
 {
     int status = identify(s, 0);
-    const cache_key state = key_of(s->identity.state);
+    cache_key state = state_of(s);
     if (status < 0 ||
-        (s->identity.stable && cache_folder_recall(&s->v->folder, &state, &s->v->key)))
+        (s->identity.stable && cache_folder_recall(&s->v->folder, &state, &s->source)))
         return status;
-    status = find_content_key(s, &s->v->key);
-    if (status == 0 && s->identity.stable) {
-        const cache_key read = key_of(s->identity.state);
-        cache_folder_remember(&s->v->folder, &read, &s->v->key);
-    }
+    status = find_content(s, &s->source);
+    state = state_of(s);
+    if (status == 0 && s->identity.stable)
+        cache_folder_remember(&s->v->folder, &state, &s->source);
     return status;
 }
 
-/* Checks that the files have not changed since their key was found. */
+/* Checks that the files have not changed since their source was found. */
 static int check_unchanged(search *s)
 {
     const triptych_identity before = s->identity;
-    cache_key key = s->v->key;
+    cache_source source = s->source;
     int status = identify(s, 0);
     bool same = status == 0 && !strcmp(before.state, s->identity.state);
     if (same && !before.stable)
-        status = find_content_key(s, &key);
-    if (status == 0 && (!same || strcmp(key.text, s->v->key.text)))
+        status = find_content(s, &source);
+    if (status == 0 && (!same || strcmp(source.text, s->source.text)))
         return trip_fail(
             TRIP_ERROR, "read", s->volume,
             "changed while it was read; run the command again when the file is complete");
     return status;
 }
 
-/* Returns true also if the index does not fit the memory: drawing reports that failure. */
-static bool opens(const search *s)
+static bool has_checksum(const search *s)
 {
-    struct stat st;
-    trip_budget *budget;
-    uint64_t memory_bytes = s->options.memory_bytes;
-    if (trip_budget_create(&budget, memory_bytes) < 0)
+    char checksum[ACCURACY_CHECKSUM_BYTES];
+    triptych_info info;
+    if (!s->checksum)
         return true;
-    bool fits = fstatat(s->v->hold, INDEX_NAME, &st, AT_SYMLINK_NOFOLLOW) < 0 ||
-                (uint64_t)st.st_size <= trip_budget_left_bytes(budget);
-    trip_budget_destroy(budget);
-    bool opened =
-        !fits ||
-        triptych_open(s->t, s->v->path, &(triptych_resources){ .memory_bytes = memory_bytes }) == 0;
-    triptych_close(s->t);
-    return opened;
+    if (triptych_get_info(s->t, &info) < 0)
+        return false;
+    accuracy_checksum_text(info.checksum, checksum);
+    return !strcmp(checksum, s->checksum);
 }
 
-/* Takes the data set from the cache if it exists and can be opened. Removes a damaged one. */
-static bool take(search *s)
+/* Returns whether the open data set keeps all wanted values. */
+static bool holds(const search *s)
+{
+    triptych_brick_options needed = s->options;
+    needed.keep_all = needed.keep_all && !s->wish->shown;
+    return triptych_holds(s->t, &needed, s->wish->shown) > 0;
+}
+
+static void let_go(cached_volume *v)
+{
+    if (v->hold >= 0)
+        close(v->hold);
+    free(v->path);
+    v->hold = -1;
+    v->path = NULL;
+}
+
+static int aim_at(cached_volume *v, const cache_key *key)
+{
+    v->key = *key;
+    v->path = cache_folder_path(&v->folder, key);
+    return v->path ? 0 : TRIP_ERROR;
+}
+
+typedef enum offer { SERVES, SERVES_NOT, DAMAGED } offer;
+
+/* Tells a damaged data set from one that needs more memory. */
+static offer examine_unopened(const search *s, bool own)
+{
+    int status = triptych_open(s->t, s->v->path, NULL);
+    triptych_close(s->t);
+    return status < 0 && !trip_interrupted() ? DAMAGED : own ? SERVES : SERVES_NOT;
+}
+
+/* Examines the data set at v->path. If its own options were wanted, it serves also if it does not
+ * fit the memory: drawing reports that failure. */
+static offer examine(const search *s, bool own)
+{
+    const triptych_resources resources = { .memory_bytes = s->options.memory_bytes };
+    library_hush(s->t, true);
+    int status = triptych_open(s->t, s->v->path, &resources);
+    const bool serves = status == 0 && has_checksum(s) && (own || holds(s));
+    triptych_close(s->t);
+    const offer found = status < 0 ? examine_unopened(s, own) : serves ? SERVES : SERVES_NOT;
+    library_hush(s->t, false);
+    return found;
+}
+
+/* Returns the key of the data set that is made if none serves. */
+static cache_key own_key(const search *s)
+{
+    return cache_key_of(s->source.text, s->identity.kept);
+}
+
+/* Takes a data set of the source if it serves. Removes a damaged one. Returns 1, 0 or a failure. */
+static int take(search *s, const cache_key *key, bool locked)
 {
     cached_volume *v = s->v;
-    v->hold = cache_folder_hold(&v->folder, &v->key);
-    if (v->hold < 0)
-        return false;
-    if (opens(s))
-        return true;
-    trip_warn(s->volume, "its data set in the cache is damaged and will be made again");
-    close(v->hold);
-    v->hold = -1;
-    cache_folder_remove(&v->folder, &v->key);
-    return false;
+    const cache_key wanted = own_key(s);
+    const bool own = !strcmp(key->text, wanted.text);
+    int status = aim_at(v, key);
+    if (status == 0)
+        v->hold = cache_folder_hold(&v->folder, key);
+    const offer found = v->hold >= 0 ? examine(s, own) : SERVES_NOT;
+    if (found == SERVES) {
+        futimens(v->hold, NULL); /* the time of the last use */
+        v->wider = !own;
+        return 1;
+    }
+    let_go(v);
+    if (found == DAMAGED)
+        cache_folder_remove(&v->folder, key, locked && own);
+    s->damaged = s->damaged || found == DAMAGED;
+    return status;
 }
 
+static int by_size(const void *a, const void *b)
+{
+    const cache_entry *x = a, *y = b;
+    return (x->bytes > y->bytes) - (x->bytes < y->bytes);
+}
+
+/* Takes the smallest data set that serves. Returns 1, 0 or a failure. */
+static int take_smallest(search *s, bool locked)
+{
+    cache_entry *entries;
+    size_t count;
+    int status = cache_folder_list(&s->v->folder, &entries, &count);
+    if (status == 0 && count)
+        qsort(entries, count, sizeof *entries, by_size);
+    for (size_t i = 0; i < count && status == 0; i++)
+        if (cache_key_has_source(&entries[i].key, &s->source))
+            status = take(s, &entries[i].key, locked);
+    free(entries);
+    if (status == 0 && s->checksum) { /* the caller reports that the checksum differs */
+        const cache_key own = own_key(s);
+        const char *checksum = s->checksum;
+        s->checksum = NULL;
+        status = take(s, &own, locked);
+        s->checksum = checksum;
+    }
+    if (status == 0 && s->damaged)
+        trip_warn(s->volume, "its data set in the cache is damaged and will be made again");
+    s->damaged = false;
+    return status;
+}
+
+/* The lock of v->key is held. */
 static int brick(search *s)
 {
     cached_volume *v = s->v;
     double begin = trip_now_seconds();
-    int status = triptych_brick(s->t, s->volume, v->path, &s->options, NULL);
+    int status = cache_folder_make_room(&v->folder, &v->key);
+    if (status == 0)
+        status = triptych_brick(s->t, s->volume, v->path, &s->options, NULL);
     if (status == 0 && (status = check_unchanged(s)) < 0)
-        cache_folder_remove(&v->folder, &v->key);
+        cache_folder_remove(&v->folder, &v->key, true);
     if (status < 0)
         return status;
     v->seconds = trip_now_seconds() - begin;
     v->hold = cache_folder_hold(&v->folder, &v->key);
-    return cache_folder_shrink(&v->folder, v->folder.limit_bytes);
+    return cache_folder_shrink(&v->folder, v->folder.limit_bytes, NULL);
 }
 
 /* Bricks the volume under a lock. Other processes that wait for the lock then find the data set. */
 static int make(search *s)
 {
     cached_volume *v = s->v;
-    trip_progress progress = trip_progress_start(false);
-    int lock = cache_folder_lock(&v->folder, &v->key, on_wait, &progress);
+    const cache_key key = own_key(s);
+    trip_progress progress = trip_progress_start();
+    int lock = cache_folder_lock(&v->folder, &key, on_wait, &progress);
     trip_progress_end(&progress);
     if (lock < 0)
         return lock;
-    int status = take(s) ? 0 : brick(s);
-    cache_folder_unlock(&v->folder, &v->key, lock);
+    int status = take_smallest(s, true);
+    if (status == 0)
+        status = aim_at(v, &key);
+    if (status == 0)
+        status = brick(s);
+    cache_folder_unlock(&v->folder, &key, lock);
     return status;
-}
-
-/* Returns 1 if the cache holds the data set, else 0. */
-static int find(search *s)
-{
-    cached_volume *v = s->v;
-    int status = find_key(s);
-    if (status == 0 && !(v->path = cache_folder_path(&v->folder, &v->key)))
-        status = TRIP_ERROR;
-    s->options.max_bytes = v->folder.limit_bytes;
-    return status == 0 ? take(s) : status;
 }
 
 static int open_volume(search *s, bool making)
@@ -210,24 +300,26 @@ static int open_volume(search *s, bool making)
     *v = (cached_volume){ .hold = -1 };
     int status = cache_folder_open(&v->folder, true);
     if (status == 0)
-        status = find(s);
+        status = find_source(s);
+    s->checksum = s->wish->checksum && *s->wish->checksum ? s->wish->checksum : NULL;
+    s->options.max_bytes = v->folder.limit_bytes;
+    if (status == 0)
+        status = take_smallest(s, false);
     return status == 0 && making ? make(s) : status;
 }
 
-int cached_volume_find(cached_volume *v, triptych *t, const char *volume,
-                       const triptych_brick_options *options)
+int cached_volume_find(cached_volume *v, triptych *t, const char *volume, const cached_wish *wish)
 {
-    search s = { .v = v, .t = t, .volume = volume, .options = *options };
+    search s = { .v = v, .t = t, .volume = volume, .wish = wish, .options = wish->options };
     int status = open_volume(&s, false);
     if (status == 0)
         cached_volume_close(v);
     return status;
 }
 
-int cached_volume_open(cached_volume *v, triptych *t, const char *volume,
-                       const triptych_brick_options *options)
+int cached_volume_open(cached_volume *v, triptych *t, const char *volume, const cached_wish *wish)
 {
-    search s = { .v = v, .t = t, .volume = volume, .options = *options };
+    search s = { .v = v, .t = t, .volume = volume, .wish = wish, .options = wish->options };
     int status = open_volume(&s, true);
     return status > 0 ? 0 : status;
 }
@@ -236,10 +328,8 @@ void cached_volume_close(cached_volume *v)
 {
     if (!v->path && !v->folder.path)
         return;
-    if (v->hold >= 0)
-        close(v->hold);
+    let_go(v);
     cache_folder_close(&v->folder);
-    free(v->path);
     *v = (cached_volume){ .hold = -1 };
 }
 
@@ -253,7 +343,7 @@ void cached_volume_check(cached_volume *v, triptych *t, const char *volume)
     if (status == TRIP_ERROR && !trip_interrupted()) {
         close(v->hold);
         v->hold = -1;
-        cache_folder_remove(&v->folder, &v->key);
+        cache_folder_remove(&v->folder, &v->key, false);
         trip_warn(volume, "its data set in the cache was damaged and has been removed; the same "
                           "command makes it again");
     }

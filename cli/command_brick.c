@@ -15,6 +15,7 @@
 #include "draw_options.h"
 #include "plain_disk.h"
 #include "report.h"
+#include "size_print.h"
 #include "text.h"
 
 enum { MAX_FUNCTIONS = 64, MAX_RANGES = 64 };
@@ -25,7 +26,7 @@ typedef struct options {
     const char *functions[MAX_FUNCTIONS];
     triptych_range ranges[MAX_RANGES];
     char *default_output; /* freed at the end */
-    int quiet, json, dry_run, limits;
+    int json, dry_run, limits;
 } options;
 
 /* Parses "256,256,128" or "256x256x128". */
@@ -218,13 +219,10 @@ static const trip_option rows[] = {
     { "json", NULL, "Prints the summary as JSON", .group = DRAW_GROUP_OUTPUT, FLAG, AT(json) },
     { "limits", NULL,
       "Prints the time of each stage beside a plain read and a plain write of the same bytes", NULL,
-      "excludes --quiet and --dry-run", .group = DRAW_GROUP_OUTPUT, FLAG, AT(limits) },
+      "excludes --dry-run", .group = DRAW_GROUP_OUTPUT, FLAG, AT(limits) },
     { "output", "NAME.trip", "Names the data set", "the name of the input, in the current folder",
       .brief = "Names the data set", .short_name = 'o', .group = DRAW_GROUP_OUTPUT,
       .type = TRIP_OPTION_TEXT, AT(output) },
-    { "quiet", NULL, "Prints no progress and no summary", NULL, "excludes --json",
-      .brief = "Prints no progress and no summary", .short_name = 'q', .group = DRAW_GROUP_OUTPUT,
-      FLAG, AT(quiet) },
     { "resume", NULL, "Continues the same command after it was killed",
       .brief = "Continues the same command after it was killed", .group = DRAW_GROUP_OUTPUT, FLAG,
       AT(brick.resume) },
@@ -275,10 +273,8 @@ static int check_options(void *user)
         return trip_option_fail("--resume", "does not apply with --dry-run");
     if (p->levels < 0 && p->levels_for)
         return trip_option_fail("--levels-for", "does not apply with --levels 0");
-    if (o->limits && (o->quiet || o->dry_run))
-        return trip_option_fail("--limits", "does not apply with --quiet or --dry-run");
-    if (o->quiet && o->json)
-        return trip_option_fail("--json", "does not apply with --quiet");
+    if (o->limits && o->dry_run)
+        return trip_option_fail("--limits", "does not apply with --dry-run");
     return 0;
 }
 
@@ -381,36 +377,38 @@ static void print_name(const char *label, const char *name)
 
 static void print_text(const options *o, const triptych_brick_summary *s)
 {
-    char bytes[32], temporary[32], peak[32], promise[32];
+    char temporary[32], peak[32], promise[32];
     double seconds = brick_seconds(s), kept = (double)s->kept, voxels = (double)s->voxels;
     print_name("data set", o->output);
-    printf("%-9s %lld x %lld x %lld, spacing %.6g x %.6g x %.6g\n", "grid", (long long)s->dims[0],
-           (long long)s->dims[1], (long long)s->dims[2], s->spacing[0], s->spacing[1],
-           s->spacing[2]);
+    printf("%-9s %lld x %lld x %lld voxels, spacing %.6g x %.6g x %.6g\n", "grid",
+           (long long)s->dims[0], (long long)s->dims[1], (long long)s->dims[2], s->spacing[0],
+           s->spacing[1], s->spacing[2]);
     printf("%-9s %llu read, values %.7g to %.7g\n", "voxels", (unsigned long long)s->voxels,
            s->value_min, s->value_max);
     printf("%-9s %s\n", "kind", s->kind_title);
-    printf("%-9s %llu (%.3g %%)\n", "kept", (unsigned long long)s->kept, 100 * kept / voxels);
+    printf("%-9s %llu voxels (%.3g %%)\n", "kept", (unsigned long long)s->kept,
+           100 * kept / voxels);
     if (s->halo)
-        printf("%-9s %llu neighbours of kept voxels, %s\n", "halo", (unsigned long long)s->halo,
-               trip_format_bytes(s->halo_bytes, bytes));
+        printf("%-9s %llu neighbours of kept voxels, for interpolation\n", "halo",
+               (unsigned long long)s->halo);
     if (s->levels)
-        printf("%-9s %u coarse, %s\n", "levels", s->levels,
-               trip_format_bytes(s->level_bytes, bytes));
-    printf("%-9s %s, %.3g bytes per kept voxel%s%s\n", "written",
-           trip_format_bytes(s->bytes, bytes),
-           (double)(s->bytes - s->halo_bytes - s->level_bytes) / kept,
-           s->halo ? " without the halo" : "", s->levels ? " at level 0" : "");
-    printf("%-9s codes %u, normals %u\n", "bytes", s->code_bytes, s->normal_bytes);
+        printf("%-9s %u coarse, each with half the resolution of the one before\n", "levels",
+               s->levels);
+    printf("%-9s ", "size");
+    size_print(&(data_set_size){ s->bytes, s->halo_bytes, s->level_bytes });
+    printf("%-9s ", "stored as");
+    size_print_each(s->code_bytes, s->normal_bytes);
+    putchar('\n');
     if (s->temporary_bytes)
-        printf("%-9s %s\n", "spilled", trip_format_bytes(s->temporary_bytes, temporary));
+        printf("%-9s %s, removed again\n", "temporary",
+               trip_format_bytes(s->temporary_bytes, temporary));
     printf("%-9s %.2f s (scan %.2f, read %.2f, merge %.2f, levels %.2f, finish %.2f), %.0f MB/s of "
            "input\n",
            "time", seconds, s->stages[TRIPTYCH_STAGE_SCAN].seconds,
            s->stages[TRIPTYCH_STAGE_READ].seconds, s->stages[TRIPTYCH_STAGE_MERGE].seconds,
            s->stages[TRIPTYCH_STAGE_LEVELS].seconds, s->stages[TRIPTYCH_STAGE_FINISH].seconds,
            (double)s->input_bytes / 1e6 / (seconds > 0 ? seconds : 1));
-    printf("%-9s %s resident at peak, %s limit for data\n", "memory",
+    printf("%-9s %s at peak; at most %s for data\n", "memory",
            trip_format_bytes(trip_memory_peak_rss_bytes(), peak),
            trip_format_bytes(s->memory_bytes, promise));
 }
@@ -435,17 +433,18 @@ static void print_estimate(const options *o, const triptych_brick_estimate *e)
     print_name("data set", o->output);
     printf("%-9s about %.3g of %.3g voxels, and %.3g halo voxels\n", "keeps", (double)e->kept,
            (double)e->voxels, (double)e->halo);
-    printf("%-9s about %s, and %s of temporary data; %s are free\n", "takes",
+    printf("%-9s about %s on disk, and %s of temporary files; %s are free\n", "size",
            trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),
            trip_format_bytes(e->free_bytes, there));
-    printf("%-9s about %.3g s\n", "time", e->seconds);
+    printf("%-9s about %.3g s, with reading and writing at the speed of the disk\n", "time",
+           e->seconds);
 }
 
 static int dry_run(triptych *t, const options *o)
 {
     triptych_brick_estimate e;
     int status = triptych_estimate(t, o->volume, o->output, &o->brick, &e);
-    if (status < 0 || o->quiet)
+    if (status < 0)
         return status;
     if (o->json)
         return print_estimate_json(o, &e);
@@ -462,13 +461,14 @@ static int brick(triptych *t, const options *o)
     int status = triptych_brick(t, o->volume, o->output, &o->brick, &summary);
     if (status == 0 && o->limits)
         status = brick_limits_measure(&limits, o->volume, o->output, &summary);
-    if (status < 0 || o->quiet)
+    if (status < 0)
         return status;
     if (summary.note[0])
         trip_note(o->volume, "%s", summary.note);
     if (o->json)
         return print_json(o, &summary, &limits);
-    print_text(o, &summary);
+    if (!command_line_quiet())
+        print_text(o, &summary);
     if (o->limits)
         brick_limits_print(&limits, &summary);
     return 0;
@@ -477,7 +477,7 @@ static int brick(triptych *t, const options *o)
 static int run(options *o)
 {
     triptych *t = NULL;
-    trip_progress progress = trip_progress_start(o->quiet);
+    trip_progress progress = trip_progress_start();
     o->brick.functions = o->functions;
     o->brick.ranges = o->ranges;
     int status = library_create(&t, &progress);

@@ -16,18 +16,20 @@
 #include "text.h"
 
 typedef struct options {
-    bool list, clear, json;
+    bool list, clear;
+    int json;
 } options;
 
-enum { KEY_JSON = 256 };
-
-static const struct argp_option option_table[] = {
-    { "json", KEY_JSON, NULL, 0, "Prints the list as JSON; list only", 0 },
-    { 0 },
+static const trip_option rows[] = {
+    { "json", NULL, "Prints the list as JSON; list only", .type = TRIP_OPTION_FLAG,
+      .at = offsetof(options, json) },
 };
 
-static error_t check_options(const options *o)
+static const trip_option_table cache_table = { rows, sizeof rows / sizeof *rows };
+
+static int check_options(void *user)
 {
+    const options *o = user;
     if (!o->list && !o->clear)
         return trip_option_fail(
             "ACTION", "no action given; use `triptych cache list` or `triptych cache clear`");
@@ -36,26 +38,17 @@ static error_t check_options(const options *o)
     return 0;
 }
 
-static error_t parse_option(int key, char *argument, struct argp_state *state)
+static int add_action(void *user, char *argument)
 {
-    options *o = state->input;
-    switch (key) {
-    case KEY_JSON:
-        o->json = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        if (o->list || o->clear)
-            return trip_option_fail(argument, "only one action is possible at a time");
-        o->list = !strcmp(argument, "list");
-        o->clear = !strcmp(argument, "clear");
-        return o->list || o->clear
-                   ? 0
-                   : trip_option_fail(argument, "unknown action; use list or clear");
-    case ARGP_KEY_END:
-        return check_options(o);
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+    static const char *const actions[] = { "list", "clear", NULL };
+    options *o = user;
+    int which = 0;
+    if (o->list || o->clear)
+        return trip_option_fail(argument, "only one action is possible at a time");
+    int status = trip_option_choice("ACTION", argument, actions, &which);
+    o->list = !status && which == 0;
+    o->clear = !status && which == 1;
+    return status;
 }
 
 /* Returns the volume's name from the notes of its data set; the caller frees it. Returns NULL
@@ -160,34 +153,51 @@ static int list(const cache_folder *c, const options *o)
     return status;
 }
 
-static void count_entries(const cache_entry *entries, size_t count, uint64_t *bytes)
+static uint64_t bytes_of(const cache_entry *entries, size_t count)
 {
-    *bytes = 0;
+    uint64_t bytes = 0;
     for (size_t i = 0; i < count; i++)
-        *bytes += entries[i].bytes;
+        bytes += entries[i].bytes;
+    return bytes;
+}
+
+/* Names the data sets that remain, in one line. */
+static int fail_if_left(const cache_folder *c, const cache_left *left)
+{
+    const struct {
+        size_t count;
+        const char *why;
+    } kinds[] = { { left->used, "in use" },
+                  { left->making, "being made" },
+                  { left->stuck, "that cannot be removed" } };
+    size_t count = left->used + left->making + left->stuck;
+    char text[200] = "", *end = text;
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (kinds[i].count)
+            end += sprintf(end, "%s%zu %s", *text ? ", " : "", kinds[i].count, kinds[i].why);
+    return count ? trip_fail(TRIP_ERROR, "cache", c->path, "%zu data set%s: %s", count,
+                             count == 1 ? " remains" : "s remain", text)
+                 : 0;
 }
 
 static int clear(const cache_folder *c)
 {
     cache_entry *before = NULL, *after = NULL;
     size_t had = 0, has = 0;
-    uint64_t had_bytes, has_bytes;
+    cache_left left = { 0 };
     char text[32];
     int status = c->fd < 0 ? 0 : cache_folder_list(c, &before, &had);
     if (status == 0 && c->fd >= 0)
-        status = cache_folder_shrink(c, 0);
+        status = cache_folder_shrink(c, 0, &left);
     if (status == 0 && c->fd >= 0)
         status = cache_folder_list(c, &after, &has);
-    count_entries(before, had, &had_bytes);
-    count_entries(after, has, &has_bytes);
     has = has < had ? has : had; /* another process may have added data sets */
-    has_bytes = has_bytes < had_bytes ? has_bytes : had_bytes;
-    if (status == 0)
+    const uint64_t had_bytes = bytes_of(before, had), has_bytes = bytes_of(after, has);
+    if (status == 0 && !command_line_quiet())
         printf("removed %zu data set%s, %s\n", had - has, had - has == 1 ? "" : "s",
-               trip_format_bytes(had_bytes - has_bytes, text));
-    if (status == 0 && has > 0)
-        status = trip_fail(TRIP_ERROR, "cache", c->path,
-                           "%zu data sets remain: they are in use, or cannot be removed", has);
+               trip_format_bytes(had_bytes > has_bytes ? had_bytes - has_bytes : 0, text));
+    if (status == 0)
+        status = fail_if_left(c, &left);
     free(before);
     free(after);
     return status;
@@ -195,15 +205,19 @@ static int clear(const cache_folder *c)
 
 int trip_command_cache(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse_option,
+    options o = { 0 };
+    option_set sets[] = { { .table = &cache_table, .base = &o } };
+    const command_line line = {
         .args_doc = "list|clear",
         .doc = "Lists or removes the data sets that render, view and serve made of volumes.",
+        .sets = sets,
+        .set_count = 1,
+        .argument = add_action,
+        .end = check_options,
+        .user = &o,
     };
-    options o = { 0 };
     cache_folder c = { .fd = -1 };
-    int status = trip_options_parse(&argp, argc, argv, &o);
+    int status = command_line_parse(&line, argc, argv);
     if (status == 0)
         status = cache_folder_open(&c, false);
     if (status == 0)

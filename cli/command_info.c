@@ -17,7 +17,9 @@
 #include "own_file_info.h"
 #include "command_line.h"
 #include "report.h"
+#include "size_print.h"
 #include "text.h"
+#include "transfer_function.h"
 #include "volume_info_print.h"
 
 typedef struct options {
@@ -139,6 +141,14 @@ static uint64_t halo_bytes(const data_set *d)
     uint64_t bytes = 0;
     for (unsigned i = 0; i < d->info.lists; i++)
         bytes += strcmp(d->lists[i].kind, "halo") ? 0 : d->lists[i].bytes;
+    return bytes;
+}
+
+static uint64_t level_bytes(const data_set *d)
+{
+    uint64_t bytes = 0;
+    for (unsigned i = 0; i < d->info.lists; i++)
+        bytes += d->lists[i].level > 0 ? d->lists[i].bytes : 0;
     return bytes;
 }
 
@@ -332,7 +342,7 @@ static void print_world(const triptych_info *info)
                    shortest(info->spacing_min[axis], a), shortest(info->spacing_max[axis], b));
     for (int row = 0; row < 3; row++) {
         const double *m = info->index_to_world[row];
-        printf("%-12s %12s %12s %12s %12s\n", row ? "" : "to world", shortest(m[0], a),
+        printf("world %c      = %s i + %s j + %s k + %s\n", 'x' + row, shortest(m[0], a),
                shortest(m[1], b), shortest(m[2], c), shortest(m[3], t));
     }
     grid_bounds(info, bounds);
@@ -352,18 +362,32 @@ static void print_anatomy(const triptych_info *info, const char *space)
                trip_anatomy_words(space, direction(info->index_to_world, a), words));
 }
 
+/* Other lines say the same in words. */
+static bool is_for_people(const char *key)
+{
+    static const char *const others[] = { "space", "mirror", "footing", "up" };
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (!strcmp(key, others[i]))
+            return false;
+    return true;
+}
+
 /* Prints the top-level strings of the notes that `triptych brick` stored. */
 static void print_notes(const cJSON *root)
 {
     for (const cJSON *item = root ? root->child : NULL; item; item = item->next)
-        if (cJSON_IsString(item) && strlen(item->valuestring) < 1024 &&
-            strlen(item->string) < 200 && !strchr(item->valuestring, '\n') &&
-            strcmp(item->string, "space") != 0 && strcmp(item->string, "orientation") != 0) {
-            trip_text_write(stdout, item->string);
-            for (size_t i = strlen(item->string); i < 12; i++)
+        if (is_for_people(item->string) && cJSON_IsString(item) &&
+            strlen(item->valuestring) < 1024 && strlen(item->string) < 200 &&
+            !strchr(item->valuestring, '\n') && strcmp(item->string, "orientation") != 0) {
+            const bool is_kind = !strcmp(item->string, "function_kind");
+            const char *label = is_kind ? "kind" : item->string;
+            trip_text_write(stdout, label);
+            for (size_t i = strlen(label); i < 12; i++)
                 putchar(' ');
             putchar(' ');
-            trip_text_write(stdout, item->valuestring);
+            trip_text_write(stdout,
+                            is_kind ? trip_tf_kind_title(trip_tf_kind_from_name(item->valuestring))
+                                    : item->valuestring);
             putchar('\n');
         }
 }
@@ -371,19 +395,8 @@ static void print_notes(const cJSON *root)
 static void print_sizes(const data_set *d)
 {
     const triptych_info *info = &d->info;
-    char bytes[32], index[32], halo[32];
-    double kept = info->kept ? (double)info->kept : 1, around = (double)halo_bytes(d);
-    printf("%-12s %s, %.4g per kept voxel", "size", trip_format_bytes(info->bytes, bytes),
-           ((double)info->bytes - around) / kept);
-    if (info->halo)
-        printf(" and %s of halo, %.4g with the halo", trip_format_bytes(halo_bytes(d), halo),
-               (double)info->bytes / kept);
-    printf("; index %s (%.2g %%)\n", trip_format_bytes(info->index_bytes, index),
-           100.0 * (double)info->index_bytes / (double)info->bytes);
-    printf("%-12s %u byte%s a code", "planes", info->code_bytes, info->code_bytes > 1 ? "s" : "");
-    if (info->normal_bytes)
-        printf(", %u a normal", info->normal_bytes);
-    putchar('\n');
+    printf("%-12s ", "size");
+    size_print(&(data_set_size){ info->bytes, halo_bytes(d), level_bytes(d) });
 }
 
 /* Returns the step along an axis of a list's grid, divided by the step of the data set's grid. */
@@ -396,13 +409,15 @@ static double ratio(const triptych_info *info, const triptych_list *list, int ax
 /* Prints a list, and its grid if it belongs to a coarse level. */
 static void print_list(const triptych_info *info, const triptych_list *list)
 {
-    char bytes[32], name[32], text[3][32];
-    snprintf(name, sizeof name, "%c%u %s", 'x' + list->axis, list->level, list->kind);
-    printf("%-12s %llu records, %llu bricks, %s", name, (unsigned long long)list->records,
+    char bytes[32], text[3][32];
+    printf("list %c       %s", 'x' + list->axis, list->kind);
+    if (list->level > 0)
+        printf(" of coarse level %u", list->level);
+    printf(": %llu in %llu bricks, %s", (unsigned long long)list->records,
            (unsigned long long)list->bricks, trip_format_bytes(list->bytes, bytes));
     if (list->level > 0)
-        printf("; %lld x %lld x %lld, %s x %s x %s voxels of level 0 each",
-               (long long)list->dims[0], (long long)list->dims[1], (long long)list->dims[2],
+        printf("; grid of %lld x %lld x %lld, each %s x %s x %s voxels", (long long)list->dims[0],
+               (long long)list->dims[1], (long long)list->dims[2],
                shortest(ratio(info, list, 0), text[0]), shortest(ratio(info, list, 1), text[1]),
                shortest(ratio(info, list, 2), text[2]));
     putchar('\n');
@@ -420,20 +435,37 @@ static void print_typical(const data_set *d)
            outside(d->source.root));
 }
 
+/* Prints the even steps of stored values. A byte stands for every 85th code of 258 such steps and
+ * more (FORMAT.md); 16 bits stand for every code. */
+static void print_steps(const triptych_info *info)
+{
+    enum { CODES_PER_BYTE_STEP = 85, FIRST_BYTE_STEP = 258, BYTE_STEPS = 255 };
+    const bool byte = info->code_bytes == 1;
+    const double step = info->code_step_min * (byte ? CODES_PER_BYTE_STEP : 1);
+    const double first = info->code_lo + (byte ? FIRST_BYTE_STEP * step : 0);
+    const double steps = byte ? BYTE_STEPS : round((info->code_hi - info->code_lo) / step);
+    const bool wider = first < info->value_min || first + steps * step > info->value_max;
+    char lo[32], hi[32];
+    printf("; %.0f steps of %.3g from %s to %s%s\n", steps, step, shortest(first, lo),
+           shortest(first + steps * step, hi),
+           wider && !byte ? ", with a margin around the values" : "");
+}
+
 static void print_codes(const triptych_info *info)
 {
-    char lo[32], hi[32], least[32], most[32];
+    char lo[32], hi[32];
     shortest(info->code_lo, lo);
     shortest(info->code_hi, hi);
-    shortest(info->code_step_min, least);
-    shortest(info->code_step_max, most);
+    printf("%-12s ", "stored as");
+    size_print_each(info->code_bytes, info->normal_bytes);
     if (info->ids)
-        printf("%-12s %u ids, %s to %s, exactly\n", "codes for", info->ids, lo, hi);
+        printf("; %u whole numbers from %s to %s, exactly\n", info->ids, lo, hi);
     else if (info->code_step_min < info->code_step_max)
-        printf("%-12s %s to %s, finer where values are dense: %s to %s apart\n", "codes for", lo,
-               hi, least, most);
+        printf(
+            "; values from %s to %s in steps of %.3g to %.3g, finer where there are more values\n",
+            lo, hi, info->code_step_min, info->code_step_max);
     else
-        printf("%-12s %s to %s, %s apart\n", "codes for", lo, hi, least);
+        print_steps(info);
 }
 
 static void print_text(const data_set *d)
@@ -443,8 +475,8 @@ static void print_text(const data_set *d)
     printf("%-12s ", "data set");
     trip_text_write(stdout, d->path);
     printf(" (format version %u)\n", info->format_version);
-    printf("%-12s %lld x %lld x %lld\n", "grid", (long long)info->dims[0], (long long)info->dims[1],
-           (long long)info->dims[2]);
+    printf("%-12s %lld x %lld x %lld voxels\n", "grid", (long long)info->dims[0],
+           (long long)info->dims[1], (long long)info->dims[2]);
     print_world(info);
     if (space_of(d->source.root))
         print_anatomy(info, space_of(d->source.root));
@@ -453,14 +485,14 @@ static void print_text(const data_set *d)
     print_typical(d);
     print_codes(info);
     printf("%-12s %llu\n", "voxels", (unsigned long long)info->voxels);
-    printf("%-12s %llu (%.3g %%), in each of three lists\n", "kept", (unsigned long long)info->kept,
+    printf("%-12s %llu voxels (%.3g %%)\n", "kept", (unsigned long long)info->kept,
            100.0 * (double)info->kept / voxels);
     if (info->halo)
-        printf("%-12s %llu neighbours of kept voxels, in each of three lists\n", "halo",
+        printf("%-12s %llu neighbours of kept voxels, for interpolation\n", "halo",
                (unsigned long long)info->halo);
     print_sizes(d);
-    printf("%-12s tiles of %u x %u voxels over %u sheets\n", "bricks", info->tile_voxels,
-           info->tile_voxels, info->slab_sheets);
+    printf("%-12s %u x %u x %u voxels each; they are read as a whole\n", "bricks",
+           info->tile_voxels, info->tile_voxels, info->slab_sheets);
     for (unsigned i = 0; i < info->lists; i++)
         print_list(info, &d->lists[i]);
     print_notes(d->source.root);

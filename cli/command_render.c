@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cached_volume.h"
+#include "clock.h"
 #include "flight.h"
 #include "library.h"
 #include "piped_tf.h"
@@ -33,39 +34,56 @@ typedef struct drawing {
     video *video;    /* NULL if frames go into image files */
     render_stats *stats;
     trip_progress progress;
-    int empty; /* number of pictures without any visible voxel */
+    int empty;    /* number of pictures without any visible voxel */
+    int done;     /* number of finished pictures */
+    double begin; /* of the first picture, seconds of the monotonic clock */
 } drawing;
 
-/* Returns the options for bricking a volume. Bricking always keeps the voxels that the automatic
- * transfer function shows. With a sequence, it also keeps the voxels that the sequence's transfer
- * functions show. If a window moves the transfer function, it keeps every voxel, so that the next
- * window finds its voxels in the cache. */
-static triptych_brick_options brick_options(const render_options *o, const sequence *shown)
+/* Returns the wanted data set of a volume. Bricking always keeps the voxels that the automatic
+ * transfer function shows, and the voxels that the sequence's transfer functions show. If a window
+ * moves the transfer function, bricking keeps every voxel, so that the next window finds its voxels
+ * in the cache. A smaller data set serves too if it holds the voxels of this window. */
+static cached_wish wish_of(const drawing *d)
 {
-    triptych_brick_options options = o->volume;
-    options.keep_all = shown && o->function.window > 0;
-    if (shown && !options.keep_all) {
-        options.functions = shown->names;
-        options.function_count = shown->name_count;
-        options.ranges = shown->ranges;
-        options.range_count = shown->range_count;
+    const render_options *o = &d->o;
+    const sequence *shown = &d->sequence;
+    cached_wish wish = { .options = o->volume, .checksum = o->quality.measured };
+    triptych_brick_options *options = &wish.options;
+    options->keep_all = o->function.window > 0;
+    options->functions = shown->names;
+    options->function_count = shown->name_count;
+    options->ranges = shown->ranges;
+    options->range_count = shown->range_count;
+    options->automatic = 1;
+    options->levels_for = o->levels_for;
+    options->memory_bytes = o->resources.memory_bytes;
+    options->threads = o->resources.threads;
+    if (options->keep_all) {
+        options->function_count = options->range_count = 0;
+        wish.shown = sequence_has_functions(shown) ? NULL : &o->function;
     }
-    options.automatic = 1;
-    options.levels_for = o->levels_for;
-    options.memory_bytes = o->resources.memory_bytes;
-    options.threads = o->resources.threads;
-    return options;
+    return wish;
+}
+
+/* Returns whether stdout gets no lines about pictures. */
+static bool has_no_summary(const render_options *o)
+{
+    return command_line_quiet() || (o->stats && !strcmp(o->stats, "-"));
 }
 
 static int brick_volume(drawing *d)
 {
     const render_options *o = &d->o;
-    const triptych_brick_options wanted = brick_options(o, &d->sequence);
-    int status = cached_volume_open(&d->volume, d->t, o->input, &wanted);
+    const cached_wish wish = wish_of(d);
+    int status = cached_volume_open(&d->volume, d->t, o->input, &wish);
     trip_progress_end(&d->progress);
-    if (status == 0 && d->volume.seconds > 0 && !(o->stats && !strcmp(o->stats, "-"))) {
+    if (status == 0 && d->volume.seconds > 0 && !has_no_summary(o)) {
         trip_text_write(stdout, o->input);
         printf(": bricked into the cache in %.2f s\n", d->volume.seconds);
+    }
+    if (status == 0 && d->volume.wider && !has_no_summary(o)) {
+        trip_text_write(stdout, o->input);
+        puts(": found in the cache, in a data set made for another transfer function");
     }
     return status;
 }
@@ -80,37 +98,9 @@ static int open_data(drawing *d, const char *path)
     return status ? status : library_add(d->t, o->more, o->more_count, o->heat);
 }
 
-/* Opens the data set that the cache holds for the default transfer function. Returns 1 if that data
- * set also holds every voxel that the given transfer function shows, else 0. Returns 0 too if the
- * sequence has transfer functions of its own. */
-static int open_default(drawing *d)
-{
-    triptych_transfer_function look = d->o.function;
-    const triptych_brick_options defaults = brick_options(&d->o, NULL);
-    const bool other = look.name || look.window > 0;
-    int status = other && !sequence_has_functions(&d->sequence)
-                     ? cached_volume_find(&d->volume, d->t, d->o.input, &defaults)
-                     : 0;
-    trip_progress_end(&d->progress);
-    if (status != 1)
-        return status;
-    look.all_values = 1;
-    status = open_data(d, d->volume.path);
-    if (!status)
-        status = triptych_set_transfer_function(d->t, &look);
-    if (status != TRIPTYCH_LEFT_OUT)
-        return status < 0 ? status : 1;
-    triptych_close(d->t);
-    cached_volume_close(&d->volume);
-    return 0;
-}
-
 static int open_from_cache(drawing *d)
 {
-    int status = open_default(d);
-    if (status != 0)
-        return status < 0 ? status : 0;
-    status = brick_volume(d);
+    int status = brick_volume(d);
     if (!status)
         status = open_data(d, d->volume.path);
     return status ? status : triptych_set_transfer_function(d->t, &d->o.function);
@@ -141,7 +131,7 @@ static int open_input(drawing *d)
 
 static int create_context(drawing *d)
 {
-    d->progress = trip_progress_start(false);
+    d->progress = trip_progress_start();
     int status = library_create(&context, &d->progress);
     d->t = context;
     return status;
@@ -194,18 +184,24 @@ static int set_frame(drawing *d, int index)
     return triptych_turn(d->t, d->o.orbit ? 360.0 * index / d->o.orbit : 0);
 }
 
+/* Returns whether the pictures of a sequence get no lines of their own. */
+static bool is_silent(const drawing *d)
+{
+    return d->sequence.frames > 1 && !d->o.explain;
+}
+
 /* Draws the frame after triptych_begin(). */
 static int draw_frame(drawing *d)
 {
     enum { LOOK_NS = 20000000 };
     int status = 0;
-    d->progress = trip_progress_start(false);
     while (!status && (status = triptych_step(d->t, UINT64_MAX)) == TRIPTYCH_STEP_WAITS)
         status = triptych_await(d->t, LOOK_NS);
     if (!status)
         status = d->depth ? triptych_picture_and_depth(d->t, d->rgba, d->depth)
                           : triptych_picture(d->t, d->rgba);
-    trip_progress_end(&d->progress);
+    if (status || !is_silent(d))
+        trip_progress_end(&d->progress);
     return status;
 }
 
@@ -268,11 +264,38 @@ static int finish_image(void *user, triptych *t, int index, const float *rgba)
     char path[RENDER_FILE_BYTES];
     int status = d->video ? video_add(d->video, rgba) : 0;
     d->empty += is_empty(&d->o, rgba);
-    if (!status)
-        status = render_file_name(&d->o, d->o.output, index, path);
-    if (!status && !(d->o.stats && !strcmp(d->o.stats, "-")))
+    if (!status && is_silent(d))
+        trip_progress_pictures(&d->progress, ++d->done, d->sequence.frames);
+    else if (!status && !(status = render_file_name(&d->o, d->o.output, index, path)) &&
+             !has_no_summary(&d->o))
         status = render_stats_summary(path, &d->o, t, stdout);
     return status;
+}
+
+/* Prints one line for all pictures of a sequence. */
+static void print_sequence(const drawing *d, bool is_video)
+{
+    char first[RENDER_FILE_BYTES], last[RENDER_FILE_BYTES];
+    const int frames = d->sequence.frames;
+    if (!is_silent(d) || has_no_summary(&d->o) || render_file_name(&d->o, d->o.output, 0, first) ||
+        render_file_name(&d->o, d->o.output, frames - 1, last))
+        return;
+    render_stats_sequence(&(render_sequence){ .first = first,
+                                              .last = is_video ? NULL : last,
+                                              .frames = frames,
+                                              .seconds = trip_now_seconds() - d->begin },
+                          &d->o, stdout);
+}
+
+/* Tells how many pictures of a sequence exist after Ctrl-C. */
+static void note_interrupted(const drawing *d)
+{
+    if (d->video)
+        trip_note(d->o.output, "%d of %d pictures were drawn; no video is written", d->done,
+                  d->sequence.frames);
+    else
+        trip_note(d->o.output, "the first %d of %d pictures are written", d->done,
+                  d->sequence.frames);
 }
 
 static int draw_image(drawing *d, int index)
@@ -343,14 +366,23 @@ static int draw_images(drawing *d)
     d->by_cameras = d->o.path;
     if (!status)
         status = start_video(d);
+    d->begin = trip_now_seconds();
+    if (is_silent(d))
+        trip_progress_pictures(&d->progress, 0, d->sequence.frames);
     if (!status)
         status = draw_in_flight(d, &first);
     for (int i = first; i < d->sequence.frames && !status; i++)
         status = draw_image(d, i);
-    if (!status && d->video) {
+    trip_progress_end(&d->progress);
+    if (status == TRIP_INTERRUPTED && is_silent(d))
+        note_interrupted(d);
+    const bool is_video = d->video != NULL;
+    if (!status && is_video) {
         status = video_finish(d->video);
         d->video = NULL;
     }
+    if (!status)
+        print_sequence(d, is_video);
     return status;
 }
 

@@ -1,6 +1,7 @@
 /* triptych serve: starts a server that shows a data set in a browser on this machine. */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "commands.h"
 #include "draw_options.h"
@@ -124,6 +125,8 @@ static void say(void *user, const char *address)
 {
     (void)user;
     puts(address);
+    if (isatty(STDOUT_FILENO) == 1 && !command_line_quiet())
+        puts("Open this address in a browser. Ctrl-C ends the server.");
     fflush(stdout);
 }
 

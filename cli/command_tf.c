@@ -16,8 +16,6 @@
 #include "report.h"
 #include "text.h"
 
-enum { KEY_TF = 256, KEY_RANGE, KEY_FORMAT, KEY_FORCE };
-
 typedef enum action { LIST, SHOW, CONVERT } action;
 
 typedef struct options {
@@ -25,30 +23,43 @@ typedef struct options {
     int count;
     action action;
     const char *tf;
-    double lo, hi;
-    bool range, force;
-    int format; /* index into formats[]; -1 selects by the name of OUT */
+    double range[2];
+    int force;
+    int format; /* 1 + index into formats[]; 0 selects by the name of OUT */
 } options;
-
-static const struct argp_option option_table[] = {
-    { "force", KEY_FORCE, NULL, 0, "Replaces OUT", 0 },
-    { "format", KEY_FORMAT, "NAME", 0,
-      "Selects the format of OUT: tf, paraview, vp or vp.json (3D Slicer), slicer (presets in XML) "
-      "or vtk (XML) (default: by the name of OUT: .tf, .json, .vp, .vp.json, .xml for slicer)",
-      0 },
-    { "range", KEY_RANGE, "LO:HI", 0,
-      "Sets the range of the data, for a transfer function that runs over this range", 0 },
-    { "tf", KEY_TF, "NAME|FILE", 0,
-      "Selects the transfer function to adapt to the data set or volume IN (default: the one in "
-      "the data set, the automatic one of the volume)",
-      0 },
-    { 0 },
-};
 
 static const char *const formats[] = { "tf", "paraview", "vp", "vp.json", "slicer", "vtk", NULL };
 
-static int check(options *o)
+static int read_range(const trip_option *row, const char *text, void *base)
 {
+    double *range = ((options *)base)->range;
+    (void)row;
+    return trip_option_range("--range", text, &range[0], &range[1]);
+}
+
+#define AT(member) .at = offsetof(options, member)
+
+static const trip_option rows[] = {
+    { "force", NULL, "Replaces OUT", .type = TRIP_OPTION_FLAG, AT(force) },
+    { "format", "NAME",
+      "Selects the format of OUT: tf, paraview, vp or vp.json (3D Slicer), slicer (presets in XML) "
+      "or vtk (XML)",
+      "by the name of OUT: .tf, .json, .vp, .vp.json, .xml for slicer", .type = TRIP_OPTION_CHOICE,
+      AT(format), .choices = formats, .first = 1 },
+    { "range", "LO:HI",
+      "Sets the range of the data, for a transfer function that runs over this range",
+      .type = TRIP_OPTION_CUSTOM, AT(range), .read = read_range },
+    { "tf", "NAME|FILE", "Selects the transfer function to adapt to the data set or volume IN",
+      "the one in the data set, the automatic one of the volume", .type = TRIP_OPTION_TEXT,
+      AT(tf) },
+};
+#undef AT
+
+static const trip_option_table tf_table = { rows, sizeof rows / sizeof *rows };
+
+static int check(void *user)
+{
+    options *o = user;
     static const char *const actions[] = { "list", "show", "convert", NULL };
     static const int words[] = { 1, 2, 3 };
     int which = 0;
@@ -65,39 +76,21 @@ static int check(options *o)
     if (o->count > words[which])
         return trip_option_fail(o->words[words[which]],
                                 "unexpected argument; see `triptych tf --help`");
-    if (o->action == LIST && (o->tf || o->range || o->format >= 0 || o->force))
+    if (o->action == LIST && (o->tf || o->range[0] < o->range[1] || o->format || o->force))
         return trip_option_fail("list", "takes no options");
-    if (o->action == SHOW && (o->format > 0 || o->force))
+    if (o->action == SHOW && (o->format > 1 || o->force))
         return trip_option_fail(
             "show", "prints `.tf` text only; use `triptych tf convert` for --format and --force");
     return 0;
 }
 
-static error_t parse_key(int key, char *arg, struct argp_state *state)
+static int add_word(void *user, char *word)
 {
-    options *o = state->input;
-    switch (key) {
-    case KEY_TF:
-        o->tf = arg;
-        return 0;
-    case KEY_RANGE:
-        o->range = true;
-        return trip_option_range("--range", arg, &o->lo, &o->hi);
-    case KEY_FORMAT:
-        return trip_option_choice("--format", arg, formats, &o->format);
-    case KEY_FORCE:
-        o->force = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        if (o->count == 3)
-            return trip_option_fail(arg, "unexpected argument; see `triptych tf --help`");
-        o->words[o->count++] = arg;
-        return 0;
-    case ARGP_KEY_END:
-        return check(o);
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+    options *o = user;
+    if (o->count == 3)
+        return trip_option_fail(word, "unexpected argument; see `triptych tf --help`");
+    o->words[o->count++] = word;
+    return 0;
 }
 
 static void list(void)
@@ -158,8 +151,8 @@ static int convert_in(triptych *t, const options *o, triptych_form form, char **
         return trip_option_fail("--tf", "applies to a data set or a volume only");
     } else {
         c.function = in;
-        c.lo = o->lo;
-        c.hi = o->hi;
+        c.lo = o->range[0];
+        c.hi = o->range[1];
     }
     return status ? status : triptych_convert(t, &c, text);
 }
@@ -179,7 +172,7 @@ static int check_replaced(triptych *t, const char *in, const char *out)
 static int make_text(const options *o, triptych_form form, char **text)
 {
     triptych *t = NULL;
-    trip_progress progress = trip_progress_start(false);
+    trip_progress progress = trip_progress_start();
     int status = library_create(&t, &progress);
     if (!status && o->action == CONVERT && strcmp(o->words[2], "-"))
         status = check_replaced(t, o->words[1], o->words[2]);
@@ -200,8 +193,8 @@ static int choose_form(const options *o, triptych_form *form)
                  { ".json", TRIPTYCH_FORM_PARAVIEW },
                  { ".vp", TRIPTYCH_FORM_VP },
                  { ".xml", TRIPTYCH_FORM_SLICER } };
-    if (o->format >= 0) {
-        *form = (triptych_form)o->format;
+    if (o->format) {
+        *form = (triptych_form)(o->format - 1);
         return 0;
     }
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
@@ -228,8 +221,7 @@ static int convert(const options *o)
     triptych_form form = TRIPTYCH_FORM_TF;
     const char *out = o->action == SHOW ? "-" : o->words[2];
     char *text = NULL;
-    int status =
-        o->action == SHOW || (!strcmp(out, "-") && o->format < 0) ? 0 : choose_form(o, &form);
+    int status = o->action == SHOW || (!strcmp(out, "-") && !o->format) ? 0 : choose_form(o, &form);
     if (!status)
         status = make_text(o, form, &text);
     if (!status && !strcmp(out, "-"))
@@ -242,16 +234,20 @@ static int convert(const options *o)
 
 int trip_command_tf(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse_key,
+    options o = { 0 };
+    option_set sets[] = { { .table = &tf_table, .base = &o } };
+    const command_line line = {
         .args_doc = "list\nshow NAME|FILE|DATA.trip|VOLUME\nconvert IN OUT",
         .doc = "Lists the built-in transfer functions; prints a transfer function, or the one of a "
                "data set or volume, as `.tf` text; converts between the formats of other programs. "
                "IN is anything that show takes. OUT is a file, or - for standard output.",
+        .sets = sets,
+        .set_count = 1,
+        .argument = add_word,
+        .end = check,
+        .user = &o,
     };
-    options o = { .format = -1 };
-    int status = trip_options_parse(&argp, argc, argv, &o);
+    int status = command_line_parse(&line, argc, argv);
     if (!status && o.action == LIST)
         list();
     else if (!status)

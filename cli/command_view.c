@@ -49,7 +49,7 @@ static const trip_option rows[] = {
     { "script", "FILE", "Replays the events in a file, then ends",
       .brief = "Replays the events in a file, then ends", .group = DRAW_GROUP_WINDOW,
       .type = TRIP_OPTION_TEXT, AT(params.script) },
-    { "size", "WxH", "Sets the size of the window in pixels", "1100x720",
+    { "size", "WxH|N", "Sets the size of the window in pixels", "1100x720",
       .brief = "Sets the size of the window (default: 1100x720)", .group = DRAW_GROUP_WINDOW,
       .type = TRIP_OPTION_CUSTOM, AT(params.width), .read = read_size },
 };

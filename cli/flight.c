@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "budget.h"
+#include "command_line.h"
 #include "library.h"
 #include "report.h"
 
@@ -86,9 +87,10 @@ static int draw(pilot *p)
 
 static void pass_remark(void *user, const char *line)
 {
-    static const char warning[] = "triptych: warning: ", note[] = "triptych: note: ";
+    static const char warning[] = "triptych: warning: ";
     (void)user;
-    if (!strncmp(line, warning, strlen(warning)) || !strncmp(line, note, strlen(note)))
+    if (!strncmp(line, warning, strlen(warning)) ||
+        (command_line_is_note(line) && !command_line_quiet()))
         trip_report_line(line);
 }
 

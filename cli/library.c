@@ -4,13 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "command_line.h"
 #include "json.h"
 #include "report.h"
 
 static void pass_message(void *user, const char *line)
 {
     (void)user;
-    trip_report_line(line);
+    if (!command_line_quiet() || !command_line_is_note(line))
+        trip_report_line(line);
 }
 
 static const char *things_of(const char *stage)
@@ -51,11 +53,16 @@ int library_check_heat(triptych *t, const char *heat, const triptych_resources *
     return status || !heat ? status : triptych_set_heat(t, heat);
 }
 
+void library_hush(triptych *t, bool quiet)
+{
+    triptych_set_messages(t, quiet ? NULL : pass_message, NULL);
+}
+
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function)
 {
-    triptych_set_messages(t, NULL, NULL);
+    library_hush(t, true);
     int status = triptych_set_transfer_function(t, function);
-    triptych_set_messages(t, pass_message, NULL);
+    library_hush(t, false);
     if (status)
         trip_report_line(triptych_error(t));
     return status;

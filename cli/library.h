@@ -3,6 +3,8 @@
 #ifndef TRIP_CLI_LIBRARY_H
 #define TRIP_CLI_LIBRARY_H
 
+#include <stdbool.h>
+
 #include "progress.h"
 #include "triptych.h"
 #include "triptych_brick.h"
@@ -16,6 +18,8 @@ int library_add(triptych *t, const char *const *paths, int count, const char *he
 /* Fails if `heat` is neither NULL nor a usable data set of heat. Closes the open data set. */
 int library_check_heat(triptych *t, const char *heat, const triptych_resources *resources);
 
+/* Switches the messages of the context off or on. */
+void library_hush(triptych *t, bool quiet);
 /* Sets the transfer function without printing warnings. Reports failures. */
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);
 

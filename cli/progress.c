@@ -6,13 +6,14 @@
 #include <unistd.h>
 
 #include "clock.h"
+#include "command_line.h"
 
 static const double interval_seconds = 0.25;
 static const double steady_seconds = 1; /* a rate over a shorter time is too uncertain */
 
-trip_progress trip_progress_start(bool quiet)
+trip_progress trip_progress_start(void)
 {
-    return (trip_progress){ .shown = !quiet && isatty(STDERR_FILENO) == 1 };
+    return (trip_progress){ .shown = !command_line_quiet() && isatty(STDERR_FILENO) == 1 };
 }
 
 /* Formats a duration, for example "0:42", "12:05" or "3:02:10". */
@@ -26,11 +27,44 @@ static const char *format_time(double seconds, char *text, size_t bytes)
     return text;
 }
 
+/* Starts the line with the finished pictures, for example "17 of 60, 0:12 left". */
+static void print_pictures(const trip_progress *p)
+{
+    char time_text[16];
+    const double spent = trip_now_seconds() - p->begin;
+    fprintf(stderr, "\r\033[K");
+    if (!p->pictures)
+        return;
+    fprintf(stderr, "%d of %d", p->done, p->pictures);
+    if (p->done > 0 && p->done < p->pictures)
+        fprintf(
+            stderr, ", %s left",
+            format_time(spent / p->done * (p->pictures - p->done), time_text, sizeof time_text));
+}
+
+void trip_progress_pictures(trip_progress *p, int done, int pictures)
+{
+    const double now = trip_now_seconds();
+    if (done == 0)
+        p->begin = now;
+    p->done = done;
+    p->pictures = pictures;
+    p->stage[0] = 0;
+    if (!p->shown || now - p->last_shown < interval_seconds)
+        return;
+    print_pictures(p);
+    fputc('\r', stderr);
+    fflush(stderr);
+    p->last_shown = now;
+    p->line = true;
+}
+
 static void print_line(const trip_progress *p, double share, double rate, double left,
                        const char *things)
 {
     char time_text[16];
-    fprintf(stderr, "\r\033[K%-6s %3.0f %%", p->stage, 100 * share);
+    print_pictures(p);
+    fprintf(stderr, "%s%-6s %3.0f %%", p->pictures ? "  " : "", p->stage, 100 * share);
     if (rate > 0)
         fprintf(stderr, "  %.*f million %s/s  %s left", rate < 1e7, rate / 1e6, things,
                 format_time(left, time_text, sizeof time_text));
@@ -47,7 +81,7 @@ void trip_progress_show(trip_progress *p, const char *stage, uint64_t done, uint
     if (strcmp(p->stage, stage) != 0) {
         snprintf(p->stage, sizeof p->stage, "%s", stage);
         p->stage_begin = now;
-        p->last_shown = 0;
+        p->last_shown = p->pictures ? p->last_shown : 0;
     }
     if (now - p->last_shown < interval_seconds)
         return;
@@ -63,4 +97,5 @@ void trip_progress_end(trip_progress *p)
     if (p->line)
         fputs("\r\033[K", stderr);
     p->line = false;
+    p->stage[0] = 0;
 }

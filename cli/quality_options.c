@@ -12,9 +12,9 @@
 
 static const trip_option rows[] = {
     { "error", "E",
-      "Selects the fastest settings that keep 99 % of the pixels within E of 255, as `triptych "
-      "accuracy` measured for this data",
-      NULL, "excludes --quality", .brief = "Keeps the measured error below E of 255",
+      "Selects the fastest settings that keep 99 % of the pixels within E of 255 in each view, as "
+      "`triptych accuracy` measured for this data",
+      NULL, "excludes --quality", .brief = "Keeps the measured error within E of 255",
       .group = DRAW_GROUP_ACCURACY, .type = TRIP_OPTION_NUMBER, AT(error), .lo = 1e-6, .hi = 255 },
     { "report", "REPORT/", "Names the report that --error reads", "NAME.accuracy beside the data",
       .group = DRAW_GROUP_ACCURACY, .type = TRIP_OPTION_TEXT, AT(report) },

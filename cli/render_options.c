@@ -137,6 +137,20 @@ static int check_input(const parse *p)
     return status ? status : check_more(o);
 }
 
+/* Refuses a transparent background for a file without alpha. */
+static int check_background(const render_options *o)
+{
+    const char *extension = strrchr(o->output, '.');
+    const bool jpeg =
+        extension && (!strcasecmp(extension, ".jpg") || !strcasecmp(extension, ".jpeg"));
+    if (draw_settings_background(&o->settings)[3] >= 1 || (!jpeg && !video_is_named(o->output)))
+        return 0;
+    return trip_fail(TRIP_USAGE, "usage", "--background",
+                     "%s cannot hold a transparent background; use .png, .tif or .exr, or a "
+                     "background without transparency",
+                     o->output);
+}
+
 /* Sets the settings that options of this command imply, and checks all of them. */
 static int check_settings(render_options *o, uint64_t given)
 {
@@ -166,7 +180,7 @@ static int check_settings(render_options *o, uint64_t given)
         return trip_option_fail("--count", "requires --stats or --explain");
     if (!o->settings.has_background && extension && !strcasecmp(extension, ".exr"))
         o->settings.has_background = 1; /* transparent */
-    return 0;
+    return check_background(o);
 }
 
 static int check(void *user)

@@ -423,3 +423,16 @@ int render_stats_summary(const char *path, const render_options *o, triptych *t,
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     return 0;
 }
+
+void render_stats_sequence(const render_sequence *s, const render_options *o, FILE *out)
+{
+    char memory[32];
+    trip_text_write(out, s->first);
+    if (s->last) {
+        fputs(" to ", out);
+        trip_text_write(out, s->last);
+    }
+    fprintf(out, ": %d pictures of %d x %d, %.3f s each, %.1f s in all, %s of memory at peak\n",
+            s->frames, o->view.view.width, o->view.view.height, s->seconds / s->frames, s->seconds,
+            trip_format_bytes(trip_memory_peak_rss_bytes(), memory));
+}

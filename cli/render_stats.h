@@ -39,4 +39,15 @@ int render_stats_explain_count(triptych *t, FILE *out);
  * voxels if values are interpolated. */
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out);
 
+/* The pictures of an orbit or a path. */
+typedef struct render_sequence {
+    const char *first, *last; /* names of files; `last` is NULL for a video */
+    int frames;
+    double seconds;
+} render_sequence;
+
+/* Prints a line such as "a-000.png to a-059.png: 60 pictures of 512 x 512, 0.034 s each, 2.0 s in
+ * all, 190 MB of memory at peak". */
+void render_stats_sequence(const render_sequence *s, const render_options *o, FILE *out);
+
 #endif

@@ -86,7 +86,15 @@ static int spawn(video *v, int frames, char *const *arguments)
     posix_spawn_file_actions_adddup2(&actions, frames, 0);
     posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, v->errors, 2);
-    int fault = posix_spawnp(&v->encoder, "ffmpeg", &actions, NULL, arguments, environ);
+    posix_spawnattr_t attributes;
+    sigset_t pipe_signal;
+    sigemptyset(&pipe_signal);
+    sigaddset(&pipe_signal, SIGPIPE); /* this program ignores it */
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setsigdefault(&attributes, &pipe_signal);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    int fault = posix_spawnp(&v->encoder, "ffmpeg", &actions, &attributes, arguments, environ);
+    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     if (fault)
         v->encoder = 0;
@@ -148,8 +156,8 @@ int video_create(video **out, const char *path, int width, int height, double fr
     return status;
 }
 
-/* Copies the last line of ffmpeg's messages, or "". */
-static void last_message(const video *v, char text[256])
+/* Describes the end of ffmpeg by the last line of its messages, or by its signal. */
+static void reason_of(const video *v, int how, char text[256])
 {
     off_t end = lseek(v->errors, 0, SEEK_END);
     char tail[256] = "";
@@ -157,7 +165,12 @@ static void last_message(const video *v, char text[256])
     for (; n > 0 && (tail[n - 1] == '\n' || tail[n - 1] == '\r'); n--)
         tail[n - 1] = 0;
     char *line = strrchr(tail, '\n');
-    snprintf(text, 256, "%s", line ? line + 1 : tail);
+    if (*tail)
+        snprintf(text, 256, "%s", line ? line + 1 : tail);
+    else if (WIFSIGNALED(how))
+        snprintf(text, 256, "a signal ended it (%s)", strsignal(WTERMSIG(how)));
+    else
+        snprintf(text, 256, "it ended early, with status %d", WEXITSTATUS(how));
 }
 
 static void wait_for_end(video *v, int *how)
@@ -175,8 +188,8 @@ static int fail_of_encoder(video *v)
     close(v->frames);
     v->frames = -1;
     wait_for_end(v, &how);
-    last_message(v, why);
-    return trip_fail(TRIP_ERROR, "write", v->path, "ffmpeg failed%s%s", *why ? ": " : "", why);
+    reason_of(v, how, why);
+    return trip_fail(TRIP_ERROR, "write", v->path, "ffmpeg failed: %s", why);
 }
 
 /* Rounds to the nearest 8-bit value, clamped, as image files do. */
@@ -218,10 +231,9 @@ int video_finish(video *v)
     close(v->frames);
     v->frames = -1;
     wait_for_end(v, &how);
-    last_message(v, why);
+    reason_of(v, how, why);
     if (how)
-        status =
-            trip_fail(TRIP_ERROR, "write", v->path, "ffmpeg failed%s%s", *why ? ": " : "", why);
+        status = trip_fail(TRIP_ERROR, "write", v->path, "ffmpeg failed: %s", why);
     if (!status)
         status = trip_new_file_finish(&v->file);
     else

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "file_path.h"
 #include "report.h"
 #include "transfer_function.h"
 
@@ -13,14 +14,22 @@
 #define LARGE_BYTES (UINT64_C(8) << 20)
 #define SMALL_VOXELS (UINT64_C(1) << 21)
 
-static triptych_brick_options options_of(const viewed_volume *s, bool keep_all)
+/* --error applies to the first data set of a volume. Data sets that are made later hold more
+ * voxels, and are not checked. */
+static bool is_measured(const viewed_volume *s, const char *volume, bool keep_all)
 {
-    triptych_brick_options wanted = s->options;
-    wanted.functions = &s->function;
-    wanted.function_count = s->function && !keep_all;
-    wanted.automatic = !keep_all;
-    wanted.keep_all = keep_all;
-    return wanted;
+    return !keep_all && s->measured && !strcmp(volume, s->measured_volume);
+}
+
+static cached_wish wish_of(const viewed_volume *s, const char *volume, bool keep_all)
+{
+    cached_wish wish = { .options = s->options };
+    wish.options.functions = &s->function;
+    wish.options.function_count = s->function && !keep_all;
+    wish.options.automatic = !keep_all;
+    wish.options.keep_all = keep_all;
+    wish.checksum = is_measured(s, volume, keep_all) ? s->measured : NULL;
+    return wish;
 }
 
 static int pass_file(void *user, const char *path)
@@ -67,46 +76,38 @@ int viewed_volume_check(const viewed_volume *s, triptych *t, const char *input,
     return status;
 }
 
-/* Returns the folder that contains a path, with its last slash; the caller frees it. */
-static char *folder_of(const char *path)
+/* Returns the path of a file that is named relative to a data set, or NULL if it cannot be read. */
+static char *readable(const char *data_set, const char *name)
 {
-    char *folder = strdup(path);
-    size_t n = folder ? strlen(folder) : 0;
-    while (n > 1 && folder[n - 1] == '/')
-        n--;
-    while (n > 0 && folder[n - 1] != '/')
-        n--;
-    if (folder)
-        folder[n] = 0;
-    return folder;
+    char *path = name ? trip_path_beside(data_set, name) : NULL;
+    if (path && access(path, R_OK) == 0)
+        return path;
+    free(path);
+    return NULL;
 }
 
 /* Returns the path of the volume that a data set was made of; the caller frees it. Returns NULL
- * after reporting that the volume is not beside the data set. */
+ * after reporting that the volume is neither at its recorded place nor beside the data set. */
 static char *source_of(triptych *t, const char *data_set)
 {
-    char *name = triptych_open(t, data_set, NULL) == 0 ? library_note(t, "source") : NULL;
-    char *folder = name ? folder_of(data_set) : NULL, *path = NULL;
+    const bool opened = triptych_open(t, data_set, NULL) == 0;
+    char *name = opened ? library_note(t, "source") : NULL;
+    char *recorded = opened ? library_note(t, "source_path") : NULL;
+    char *path = readable(data_set, recorded);
     triptych_close(t);
-    if (folder && asprintf(&path, "%s%s", folder, name) < 0)
-        path = NULL;
-    if (!path || access(path, R_OK)) {
+    if (!path)
+        path = readable(data_set, name);
+    if (!path)
         trip_fail(TRIP_ERROR, "brick", name ? name : data_set,
                   "the volume of this data set is not beside it");
-        free(path);
-        path = NULL;
-    }
-    free(folder);
+    free(recorded);
     free(name);
     return path;
 }
 
-/* Checks the first data set of a volume against the report of --error. Data sets that are made
- * later hold more voxels, and are not checked. */
+/* Checks a data set against the report of --error. */
 static int check_measured(const viewed_volume *s, triptych *t, const char *path, const char *volume)
 {
-    if (!s->measured || strcmp(volume, s->measured_volume) != 0)
-        return 0;
     int status = triptych_open(t, path, NULL);
     if (!status)
         status = quality_options_check_data(s->measured, t, volume);
@@ -117,10 +118,12 @@ static int check_measured(const viewed_volume *s, triptych *t, const char *path,
 static int open_volume(const viewed_volume *s, cached_volume *cached, triptych *t,
                        const char *input, bool keep_all)
 {
-    const triptych_brick_options wanted = options_of(s, keep_all);
     char *volume = cached_volume_wanted(input) ? strdup(input) : source_of(t, input);
-    int status = volume ? cached_volume_open(cached, t, volume, &wanted) : TRIP_ERROR;
-    if (!status && !keep_all)
+    if (!volume)
+        return TRIP_ERROR;
+    const cached_wish wish = wish_of(s, volume, keep_all);
+    int status = cached_volume_open(cached, t, volume, &wish);
+    if (!status && is_measured(s, volume, keep_all))
         status = check_measured(s, t, cached->path, volume);
     free(volume);
     return status;
@@ -129,24 +132,25 @@ static int open_volume(const viewed_volume *s, cached_volume *cached, triptych *
 /* Returns 1 if a small data set must be made first. */
 static int is_large(const viewed_volume *s, triptych *t, const char *volume)
 {
-    const triptych_brick_options wanted = options_of(s, false);
+    const cached_wish wish = wish_of(s, volume, false);
     cached_volume found = { .hold = -1 };
     triptych_identity identity;
-    int there = cached_volume_find(&found, t, volume, &wanted);
+    int there = cached_volume_find(&found, t, volume, &wish);
     if (there > 0)
         cached_volume_close(&found);
     if (there)
         return there < 0 ? there : 0;
-    int status = triptych_identify(t, volume, &wanted, 0, &identity);
+    int status = triptych_identify(t, volume, &wish.options, 0, &identity);
     return status ? status : identity.bytes > LARGE_BYTES;
 }
 
 static int open_small(viewed_volume *s, triptych *t, const char *volume)
 {
-    triptych_brick_options wanted = options_of(s, false);
-    wanted.max_voxels = SMALL_VOXELS;
-    wanted.levels = -1;
-    return cached_volume_open(&s->cached, t, volume, &wanted);
+    cached_wish wish = wish_of(s, volume, false);
+    wish.options.max_voxels = SMALL_VOXELS;
+    wish.options.levels = -1;
+    wish.checksum = NULL;
+    return cached_volume_open(&s->cached, t, volume, &wish);
 }
 
 int viewed_volume_find(void *user, triptych *t, const char *input, bool keep_all, bool *small,

@@ -145,8 +145,8 @@ static void print_text(const triptych_description *d, const triptych_values *v, 
     print_line("format", d->format);
     if (d->grid[0])
         print_line("name", d->grid);
-    printf("%-12s %lld x %lld x %lld, %s\n", "grid", (long long)d->dims[0], (long long)d->dims[1],
-           (long long)d->dims[2], d->type);
+    printf("%-12s %lld x %lld x %lld voxels, %s\n", "grid", (long long)d->dims[0],
+           (long long)d->dims[1], (long long)d->dims[2], d->type);
     printf("%-12s %.7g x %.7g x %.7g\n", "spacing", trip_length(direction(d, 0)),
            trip_length(direction(d, 1)), trip_length(direction(d, 2)));
     for (int a = 0; a < 3; a++)
@@ -154,7 +154,7 @@ static void print_text(const triptych_description *d, const triptych_values *v, 
             printf("%c %-10s %.7g to %.7g apart\n", 'i' + a, "voxels", d->spacing_min[a],
                    d->spacing_max[a]);
     for (int row = 0; row < 3; row++)
-        printf("%-12s %12.7g %12.7g %12.7g %12.7g\n", row ? "" : "to world",
+        printf("world %c      = %.7g i + %.7g j + %.7g k + %.7g\n", 'x' + row,
                d->index_to_world[row][0], d->index_to_world[row][1], d->index_to_world[row][2],
                d->index_to_world[row][3]);
     print_orientation(d->orientation);

@@ -67,15 +67,16 @@ typedef struct launch {
     volatile int error; /* errno if the program did not start */
 } launch;
 
-/* Resets signal handlers in the new process. Until execve() this process shares the memory of its
- * parent, so no handler may run in it. For this reason all signals are blocked before. */
+/* Resets signal handlers and SIGPIPE in the new process. Until execve() this process shares the
+ * memory of its parent, so no handler may run in it. For this reason all signals are blocked
+ * before. */
 static void reset_signals(void)
 {
     struct sigaction handler;
     sigset_t none;
     for (int s = 1; s < NSIG; s++)
-        if (sigaction(s, NULL, &handler) == 0 && handler.sa_handler != SIG_IGN &&
-            handler.sa_handler != SIG_DFL)
+        if (sigaction(s, NULL, &handler) == 0 && handler.sa_handler != SIG_DFL &&
+            (handler.sa_handler != SIG_IGN || s == SIGPIPE))
             signal(s, SIG_DFL);
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "budget.h"
@@ -78,20 +79,37 @@ int trip_option_bytes(const char *option, const char *text, uint64_t *out)
     return trip_fail(TRIP_USAGE, "usage", option, "\"%s\" is not a size like 512M or 2G", text);
 }
 
+/* Parses one side of a picture, and moves *text behind it. */
+static bool read_side(const char **text, int *pixels)
+{
+    const size_t digits = strspn(*text, "0123456789");
+    if (digits < 1 || digits > 5)
+        return false;
+    *pixels = atoi(*text);
+    *text += digits;
+    return *pixels >= 1 && *pixels <= 65536;
+}
+
 int trip_option_size(const char *option, const char *text, int *width, int *height)
 {
-    int used = 0;
-    if (sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && !text[used] && *width > 0 &&
-        *height > 0 && *width <= 65536 && *height <= 65536 &&
-        strspn(text, "0123456789x") == strlen(text))
+    const char *rest = text;
+    bool good = read_side(&rest, width);
+    *height = *width;
+    if (good && *rest == 'x') {
+        rest++;
+        good = read_side(&rest, height);
+    }
+    if (good && !*rest)
         return 0;
     return trip_fail(TRIP_USAGE, "usage", option,
-                     "\"%s\" is not a size like 1024x768, with 1 to 65536 pixels a side", text);
+                     "\"%s\" is not a size like 512 or 1024x768, with 1 to 65536 pixels a side",
+                     text);
 }
 
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out)
 {
     char list[256] = "";
+    trip_text_nearest nearest = { .text = text };
     for (int i = 0; names[i]; i++) {
         if (!strcmp(text, names[i])) {
             *out = i;
@@ -99,9 +117,11 @@ int trip_option_choice(const char *option, const char *text, const char *const *
         }
         size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", names[i]);
+        trip_text_nearest_try(&nearest, names[i]);
     }
-    return trip_fail(TRIP_USAGE, "usage", option, "invalid value \"%s\"; use one of %s", text,
-                     list);
+    return trip_fail(TRIP_USAGE, "usage", option, "invalid value \"%s\";%s%s%s use one of %s", text,
+                     nearest.name ? " did you mean " : "", nearest.name ? nearest.name : "",
+                     nearest.name ? "?" : "", list);
 }
 
 /* ---- rows ---- */

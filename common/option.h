@@ -94,7 +94,8 @@ int trip_option_numbers(const char *option, const char *text, int min, int max, 
 int trip_option_range(const char *option, const char *text, double *lo, double *hi);
 /* Parses a size with a binary suffix, for example "256M". */
 int trip_option_bytes(const char *option, const char *text, uint64_t *out);
-/* Parses a picture size, 1 to 65536 pixels a side, for example "1024x768". */
+/* Parses a picture size, 1 to 65536 pixels a side, for example "1024x768", or "512" for a square.
+ */
 int trip_option_size(const char *option, const char *text, int *width, int *height);
 /* Finds the index of `text` in a NULL-terminated list of names. */
 int trip_option_choice(const char *option, const char *text, const char *const *names, int *out);

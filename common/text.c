@@ -155,6 +155,26 @@ void trip_text_write_word(FILE *f, const char *word)
     fputc('\'', f);
 }
 
+char *trip_text_word(const char *word)
+{
+    char *text = NULL;
+    size_t bytes;
+    FILE *f = open_memstream(&text, &bytes);
+    if (!f)
+        return NULL;
+    trip_text_write_word(f, word);
+    if (fclose(f) == 0)
+        return text;
+    free(text);
+    return NULL;
+}
+
+/* Returns the small letter of an ASCII capital. Independent of the locale. */
+static char small(char c)
+{
+    return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
+}
+
 size_t trip_text_distance(const char *a, const char *b)
 {
     enum { MAX = 64 };
@@ -167,11 +187,21 @@ size_t trip_text_distance(const char *a, const char *b)
         size_t diagonal = row[0]; /* entry above and to the left */
         row[0] = i;
         for (size_t j = 1; j <= n; j++) {
-            size_t above = row[j], changed = diagonal + (a[i - 1] != b[j - 1]);
+            size_t above = row[j], changed = diagonal + (small(a[i - 1]) != small(b[j - 1]));
             size_t other = 1 + (above < row[j - 1] ? above : row[j - 1]);
             row[j] = changed < other ? changed : other;
             diagonal = above;
         }
     }
     return row[n];
+}
+
+void trip_text_nearest_try(trip_text_nearest *n, const char *name)
+{
+    const size_t length = strlen(n->text), limit = length < 4 ? 1 : length < 9 ? 2 : 3;
+    const size_t distance = trip_text_distance(n->text, name);
+    if (distance > limit || distance >= length || (n->name && distance >= n->distance))
+        return;
+    n->name = name;
+    n->distance = distance;
 }

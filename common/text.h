@@ -53,9 +53,23 @@ void trip_text_write(FILE *f, const char *text);
  * The form $'...' of bash holds characters that are not printable. */
 void trip_text_write_word(FILE *f, const char *word);
 
+/* Returns such a word for free(), or NULL without memory. */
+char *trip_text_word(const char *word);
+
 /* Returns the Levenshtein distance of two texts in bytes, or SIZE_MAX if one has more than 63
- * bytes. */
+ * bytes. ASCII letters are equal to their capitals. */
 size_t trip_text_distance(const char *a, const char *b);
+
+/* Finds the name that a mistyped text means. Zeroed at first, except `text`. */
+typedef struct trip_text_nearest {
+    const char *text;
+    const char *name; /* the most similar name so far, or NULL if none is similar */
+    size_t distance;
+} trip_text_nearest;
+
+/* Compares the text with one more name. The first of equally similar names is kept. Similar names
+ * differ in at most one letter from texts up to 3 letters, in 2 from texts up to 8, else in 3. */
+void trip_text_nearest_try(trip_text_nearest *nearest, const char *name);
 
 #ifdef __cplusplus
 }

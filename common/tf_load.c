@@ -25,6 +25,9 @@ static int fail_to_open(const char *path)
     const char *nearest = stem ? trip_tf_nearest_preset(stem) : NULL;
     free(stem);
     errno = error;
+    if (!nearest && error == ENOENT && !strpbrk(path, "/.")) /* no preset has a slash or a dot */
+        return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,
+                         "no such file or preset; `triptych tf list` lists the presets");
     if (!nearest)
         return trip_fail_errno(TRIP_TF_STAGE, path, "cannot open");
     return trip_fail(TRIP_ERROR, TRIP_TF_STAGE, path,

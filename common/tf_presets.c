@@ -131,28 +131,19 @@ bool trip_tf_is_preset(const char *name)
 
 const char *trip_tf_nearest_preset(const char *name)
 {
-    size_t best = strlen(name) < 4 ? 1 : 2, nearest = PRESETS;
-    for (size_t i = 0; i < PRESETS; i++) {
-        size_t distance = trip_text_distance(name, presets[i].name);
-        if (distance < best || (distance == best && nearest == PRESETS)) {
-            best = distance;
-            nearest = i;
-        }
-    }
-    return trip_tf_preset_name(nearest);
+    trip_text_nearest nearest = { .text = name };
+    for (size_t i = 0; i < PRESETS; i++)
+        trip_text_nearest_try(&nearest, presets[i].name);
+    return nearest.name;
 }
 
 static int fail_unknown(const char *name)
 {
-    char known[512] = "";
     const char *nearest = trip_tf_nearest_preset(name);
-    for (int i = 0; i < PRESETS; i++) {
-        size_t used = strlen(known);
-        snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "", presets[i].name);
-    }
-    return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, "preset", "no preset `%s`;%s%s%s there are %s",
-                     name, nearest ? " did you mean `" : "", nearest ? nearest : "",
-                     nearest ? "`?" : "", known);
+    return trip_fail(TRIP_USAGE, TRIP_TF_STAGE, "preset",
+                     "no preset `%s`;%s%s%s `triptych tf list` lists the presets", name,
+                     nearest ? " did you mean preset:" : "", nearest ? nearest : "",
+                     nearest ? "?" : "");
 }
 
 static bool is_end(const trip_tf_point *p)

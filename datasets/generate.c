@@ -221,6 +221,9 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
     job *j = state->input;
     char *end = NULL;
     switch (key) {
+    case 'h':
+        argp_state_help(state, stdout, ARGP_HELP_STD_HELP);
+        return 0;
     case 'o':
         j->output = arg;
         return 0;
@@ -267,6 +270,7 @@ static const struct argp_option options[] = {
       "Sets the fineness of the structure (default: longest side / 256, at least 1)", 0 },
     { "threads", 'j', "N", 0, "Sets the number of threads, 1 to 64 (default: one per processor)",
       0 },
+    { "help", 'h', NULL, 0, "Prints this help", -1 },
     { 0 },
 };
 
@@ -286,7 +290,7 @@ int main(int argc, char **argv)
         NULL
     };
     argp_err_exit_status = 2;
-    argp_parse(&argp, argc, argv, 0, NULL, &j);
+    argp_parse(&argp, argc, argv, ARGP_NO_HELP, NULL, &j);
     if (j.detail == 0) {
         long longest = j.dims[0];
         for (int a = 1; a < 3; a++)

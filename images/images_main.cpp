@@ -254,6 +254,7 @@ int main()
      * whether to end a request. */
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGHUP, SIG_IGN);
+    std::signal(SIGQUIT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN); /* write() then fails with EFBIG */
     (void)trip_sandbox_enter();    /* continues without a sandbox if the kernel has none */

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "file_path.h"
 #include "text.h"
 
 static void write_word(FILE *f, const char *word)
@@ -20,21 +21,26 @@ static void write_volume(FILE *f, const char *volume)
     write_word(f, volume);
 }
 
-/* Writes the path of the source: beside the data set, if it is there and not at the recorded path.
- * Otherwise writes the recorded path. */
-static void write_source(FILE *f, const char *path, const char *source)
+/* Returns whether a volume exists. A pattern of slices exists if its folder does. */
+static bool exists(const char *volume)
 {
-    char *beside = NULL;
-    size_t length = strlen(path);
-    while (length > 1 && path[length - 1] == '/')
-        length--;
-    while (length > 0 && path[length - 1] != '/')
-        length--;
-    bool near = access(source, F_OK) != 0 && length > 0 &&
-                asprintf(&beside, "%.*s%s", (int)length, path, source) >= 0 &&
-                access(beside, F_OK) == 0;
-    write_volume(f, near ? beside : source);
+    char *folder = strpbrk(volume, "*?[%") ? trip_path_beside(volume, ".") : NULL;
+    bool found = access(volume, F_OK) == 0 || (folder && access(folder, F_OK) == 0);
+    free(folder);
+    return found;
+}
+
+/* Writes the path of the source: where it lay when the data set was made, else beside the data set,
+ * else in the current folder. */
+static void write_source(FILE *f, const char *path, const trip_dataset_metadata *text)
+{
+    const char *source = trip_dataset_metadata_source(text);
+    const char *recorded = trip_dataset_metadata_source_path(text);
+    char *there = trip_path_beside(path, recorded ? recorded : source);
+    char *beside = trip_path_beside(path, source);
+    write_volume(f, there && exists(there) ? there : beside && exists(beside) ? beside : source);
     free(beside);
+    free(there);
 }
 
 char *brick_command(const trip_dataset_metadata *text, const char *path, const char *volume,
@@ -61,7 +67,7 @@ char *brick_command(const trip_dataset_metadata *text, const char *path, const c
     } else {
         fputs(" --force -o", f);
         write_word(f, path);
-        write_source(f, path, source);
+        write_source(f, path, text);
     }
     if (fclose(f) == 0)
         return command;

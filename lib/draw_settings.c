@@ -180,19 +180,81 @@ static bool same_clip_planes(const void *a, const void *b)
     return !memcmp(c->plane, d->plane, (size_t)c->planes * sizeof *c->plane);
 }
 
+/* The basic colours of CSS. */
+static const struct {
+    const char *name;
+    unsigned rgb;
+} colours[] = {
+    { "black", 0 },          { "white", 0xffffff }, { "grey", 0x808080 },   { "gray", 0x808080 },
+    { "silver", 0xc0c0c0 },  { "red", 0xff0000 },   { "green", 0x008000 },  { "blue", 0x0000ff },
+    { "navy", 0x000080 },    { "teal", 0x008080 },  { "aqua", 0x00ffff },   { "lime", 0x00ff00 },
+    { "yellow", 0xffff00 },  { "olive", 0x808000 }, { "maroon", 0x800000 }, { "purple", 0x800080 },
+    { "fuchsia", 0xff00ff },
+};
+
+/* Parses "transparent", its older name "none", or a colour of CSS. Returns false for others. */
+static bool read_colour_name(const char *text, double colour[4])
+{
+    if (!strcmp(text, "transparent") || !strcmp(text, "none")) {
+        colour[3] = 0;
+        return true;
+    }
+    for (size_t i = 0; i < sizeof colours / sizeof *colours; i++)
+        if (!strcmp(text, colours[i].name)) {
+            for (int c = 0; c < 3; c++)
+                colour[c] = (colours[i].rgb >> (16 - 8 * c) & 255) / 255.0;
+            return true;
+        }
+    return false;
+}
+
+/* Parses #RGB, #RGBA, #RRGGBB or #RRGGBBAA. */
+static bool read_hex_colour(const char *text, double colour[4])
+{
+    static const char digits[] = "0123456789abcdef0123456789ABCDEF";
+    const size_t length = strlen(text + 1);
+    const size_t each = length > 4 ? 2 : 1;
+    if ((length != 3 && length != 4 && length != 6 && length != 8) ||
+        strspn(text + 1, digits) != length)
+        return false;
+    for (size_t i = 0; i < length; i += each) {
+        const int high = (int)((strchr(digits, text[1 + i]) - digits) % 16);
+        const int low = (int)((strchr(digits, text[each + i]) - digits) % 16);
+        colour[i / each] = (16 * high + low) / 255.0;
+    }
+    return true;
+}
+
+static int fail_colour(const char *text)
+{
+    trip_text_nearest nearest = { .text = text };
+    for (size_t i = 0; i < sizeof colours / sizeof *colours; i++)
+        trip_text_nearest_try(&nearest, colours[i].name);
+    trip_text_nearest_try(&nearest, "transparent");
+    return trip_fail(TRIP_USAGE, "usage", "--background",
+                     "\"%s\" is not a colour;%s%s%s use a name like white, '#RRGGBB', R,G,B[,A] "
+                     "from 0 to 1, or transparent",
+                     text, nearest.name ? " did you mean " : "", nearest.name ? nearest.name : "",
+                     nearest.name ? "?" : "");
+}
+
 static int read_background(const trip_option *row, const char *text, void *base)
 {
     draw_settings *s = base;
     double colour[4] = { 0, 0, 0, 1 };
     int count, status = 0;
     (void)row;
-    if (!strcmp(text, "none"))
-        colour[3] = 0;
-    else
+    if (*text && strspn(text, "+-.0123456789") == 0) {
+        if (!(*text == '#' ? read_hex_colour(text, colour) : read_colour_name(text, colour)))
+            return fail_colour(text);
+    } else {
         status = trip_option_numbers("--background", text, 3, 4, colour, &count);
+    }
     for (int i = 0; i < 4 && !status; i++)
         if (colour[i] < 0 || colour[i] > 1)
-            return trip_option_fail("--background", "components must be between 0 and 1");
+            return trip_option_fail("--background",
+                                    "components must be between 0 and 1; for values up to 255 use "
+                                    "'#RRGGBB'");
     memcpy(s->background, colour, sizeof colour);
     s->has_background = 1;
     return status;
@@ -221,7 +283,7 @@ static const char *const fields[] = { "stored", "splats", NULL };
 static const char *const compositings[] = { "splat", "sheet", NULL };
 static const char *const low_passes[] = { "ewa", "uniform", "none", NULL };
 static const char *const methods[] = { "merge", "clip", "axis", "image", NULL };
-static const char *const lists[] = { "replicated", "indexed", NULL };
+static const char *const lists[] = { "replicated", "indexed", "resident", NULL };
 static const char *const primitives[] = { "sprites", "triangles", NULL };
 static const char *const targets[] = { "rgba32f", "rgba16f", "rgba8", NULL };
 static const char *const traversals[] = { "outward", "ascending", NULL };
@@ -230,10 +292,11 @@ static const char *const weights[] = { "pixel", "vertex", NULL };
 #define CHOICE(names) .type = TRIP_OPTION_CHOICE, .choices = (names), .first = 1
 
 static const trip_option rows[DRAW_OPTIONS] = {
-    [DRAW_BACKGROUND] = { "background", "R,G,B[,A]|none",
-                          "Sets the colour behind the volume; components are 0 to 1",
-                          "0,0,0; for .exr none",
-                          .brief = "Sets the colour behind the volume (default: black)",
+    [DRAW_BACKGROUND] = { "background", "COLOUR",
+                          "Sets the colour behind the volume: a name such as white, '#RRGGBB', "
+                          "R,G,B[,A] from 0 to 1, or transparent (.png, .tif and .exr only)",
+                          "black; for .exr transparent",
+                          .brief = "Sets the colour: white, '#RRGGBB', transparent, ...",
                           .group = DRAW_GROUP_PICTURE, .type = TRIP_OPTION_CUSTOM,
                           AT(has_background), .read = read_background, .print = print_background,
                           .same = same_background },
@@ -330,7 +393,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                       "picture then depends on the machine",
                       .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_NUMBER,
                       AT(lod.max_ms), .lo = 1e-3, .hi = 1e9 },
-    [DRAW_SAMPLES] = { "samples", "N", "Draws N x N rays per pixel, for antialiasing", "1",
+    [DRAW_SAMPLES] = { "samples", "N", "Draws N x N rays per pixel, for antialiasing",
+                       "1; with integral, the mean over the pixel's area",
                        .brief = "Draws N x N rays per pixel, for antialiasing",
                        .group = DRAW_GROUP_ACCURACY, .measured = true, .type = TRIP_OPTION_INTEGER,
                        AT(all.samples), .lo = 1, .hi = 64 },
@@ -356,9 +420,10 @@ static const trip_option rows[DRAW_OPTIONS] = {
     [DRAW_FIELD] = { "field", "NAME", "Selects the integrand: stored values or splats", "stored",
                      .group = DRAW_GROUP_INTEGRAL, .measured = true, AT(integral.field),
                      CHOICE(fields) },
-    [DRAW_TOLERANCE] = { "tolerance", "E", "Bounds the error of each component of a pixel", "1e-4",
-                         .group = DRAW_GROUP_INTEGRAL, .measured = true, .type = TRIP_OPTION_NUMBER,
-                         AT(integral.tolerance), .lo = 1e-12, .hi = 0.1 },
+    [DRAW_TOLERANCE] = { "tolerance", "E", "Bounds the error of each component of a pixel",
+                         "1e-3, and 1e-4 with --samples", .group = DRAW_GROUP_INTEGRAL,
+                         .measured = true, .type = TRIP_OPTION_NUMBER, AT(integral.tolerance),
+                         .lo = 1e-12, .hi = 0.1 },
     [DRAW_COMPOSITING] = { "compositing", "splat|sheet",
                            "Selects the unit of compositing: each splat in list order, or the sum "
                            "of the splats of a sheet",
@@ -380,6 +445,12 @@ static const trip_option rows[DRAW_OPTIONS] = {
                         "(requires --renderer reference --kernel ewa) or none",
                         "ewa", "pre only", .group = DRAW_GROUP_PAPERS, .measured = true,
                         AT(splat.low_pass), CHOICE(low_passes) },
+    [DRAW_LOW_PASS_WIDTH] = { "low-pass-width", "PX",
+                              "Sets the standard deviation of the low-pass filter in pixels; 0 "
+                              "draws plain splats, 1 is the width of the EWA paper",
+                              "0.4", "pre only, without --low-pass none",
+                              .group = DRAW_GROUP_PAPERS, .measured = true,
+                              .type = TRIP_OPTION_PART, AT(splat.low_pass_px), .lo = 0, .hi = 16 },
     [DRAW_METHOD] = { "method", "NAME",
                       "Selects how lists become a picture: merge, clip, axis, or image, which "
                       "implies --renderer reference and pre",
@@ -391,8 +462,8 @@ static const trip_option rows[DRAW_OPTIONS] = {
                          .group = DRAW_GROUP_PAPERS, .measured = true, .type = TRIP_OPTION_FLAG,
                          AT(all.normalise) },
     [DRAW_LISTS] = { "submit", "FORM",
-                     "Selects how gl receives splats: replicated or indexed, sprites or triangles, "
-                     "or one of each",
+                     "Selects how gl receives splats: replicated, indexed or resident lists, "
+                     "sprites or triangles, or one of each",
                      "replicated,sprites", "pre and gl only", .group = DRAW_GROUP_PAPERS,
                      .measured = true, AT(splat.lists), CHOICE(lists) },
     [DRAW_PRIMITIVES] = { "submit", .group = DRAW_GROUP_PAPERS, .measured = true,

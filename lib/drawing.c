@@ -131,16 +131,10 @@ static int use_level(triptych *t, unsigned level)
 static const char *needs_splats(triptych *t)
 {
     const char *option = draw_settings_of_splats(&t->given);
-    const trip_file_header *h = &t->session.data->header;
-    if (option) {
-        snprintf(t->why_splats, sizeof t->why_splats, "--%s is for splats", option);
-        return t->why_splats;
-    }
-    if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
-        return "the grid is one voxel thick";
-    if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
-        return "voxels were dropped, and the data set has no halo";
-    return NULL;
+    if (!option)
+        return session_needs_splats(&t->session);
+    snprintf(t->why_splats, sizeof t->why_splats, "--%s is for splats", option);
+    return t->why_splats;
 }
 
 bool trip_context_draws_values(const triptych *t)
@@ -174,6 +168,17 @@ static int choose_interpolation(triptych *t)
     return status;
 }
 
+/* Lets the integral take the means over the areas of pixels. The rays may use one half of the
+ * tolerance, the means of rays the other. */
+static void choose_areas(triptych *t)
+{
+    trip_settings *s = &t->drawn_settings;
+    if (!t->given.integral.tolerance)
+        s->tolerance = TRIP_TOLERANCE_OF_AREAS;
+    s->tolerance /= 2;
+    s->samples = 0;
+}
+
 /* Chooses the settings that do not depend on the level, and the classification. */
 static int choose_settings(triptych *t)
 {
@@ -184,6 +189,8 @@ static int choose_settings(triptych *t)
     t->why_pre = automatic && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || integral)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
+    if (integral && !t->given.all.samples)
+        choose_areas(t);
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
         trip_settings_sum_sheets(&t->drawn_settings) &&
         t->drawn_settings.footprint ==

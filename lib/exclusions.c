@@ -36,14 +36,15 @@ enum {
     MAY_LATTICE = 1 << 22,
     NARROW_TARGET = 1 << 23,
     SEVERAL_SAMPLES = 1 << 24,
-    INDEXED = 1 << 25,
+    STAYING = 1 << 25, /* lists stay in GPU memory */
     MAY_EMIT = 1 << 26,
     NEAREST = 1 << 27,
+    UNFILTERED = 1 << 28,
 };
 
-static const uint64_t of_splats = ROW(COMPOSITING) | ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN) |
-                                  ROW(WEIGHTS) | ROW(KERNEL_RADIUS) | ROW(TARGET) | ROW(LISTS) |
-                                  ROW(PRIMITIVES) | ROW(COUNT);
+static const uint64_t of_splats =
+    ROW(COMPOSITING) | ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(LOW_PASS_WIDTH) | ROW(FLATTEN) |
+    ROW(WEIGHTS) | ROW(KERNEL_RADIUS) | ROW(TARGET) | ROW(LISTS) | ROW(PRIMITIVES) | ROW(COUNT);
 static const uint64_t of_levels = ROW(LOD) | ROW(MAX_BYTES) | ROW(MAX_MS);
 
 /* A rule refuses the rows `given`, if any is set, for these renderers, if all facts `with` hold and
@@ -92,7 +93,7 @@ static const struct rule {
       "does not apply to --renderer integral, which draws the finest level", IDLE },
     { ROW(KERNEL_RADIUS), RENDERER(INTEGRAL), 0, FIELD_OF_SPLATS,
       "requires --field splats with --renderer integral", IDLE },
-    { ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(FLATTEN), RENDERER(INTEGRAL), 0, 0,
+    { ROW(FOOTPRINT) | ROW(LOW_PASS) | ROW(LOW_PASS_WIDTH) | ROW(FLATTEN), RENDERER(INTEGRAL), 0, 0,
       "is for footprints, which --renderer integral does not have", CONFLICT },
     { ROW(COUNT), RENDERER(INTEGRAL), 0, 0, "does not apply to --renderer integral", IDLE },
     /* footprints and methods */
@@ -100,6 +101,7 @@ static const struct rule {
       "uniform requires --renderer reference and --kernel ewa", CONFLICT },
     { ROW(LOW_PASS), ALL, UNIFORM, EWA, "uniform requires --renderer reference and --kernel ewa",
       CONFLICT },
+    { ROW(LOW_PASS_WIDTH), ALL, UNFILTERED, 0, "does not apply to --low-pass none", IDLE },
     { ROW(FLATTEN), ALL, FLATTENED, EWA, "requires --kernel ewa", CONFLICT },
     { ROW(FLATTEN), ALL, FLATTENED | COUNTED, 0, "does not apply with --count", CONFLICT },
     { ROW(WEIGHTS), ALL, VERTEX, MERGE, "vertex requires --method merge", CONFLICT },
@@ -108,7 +110,7 @@ static const struct rule {
     { ROW(TRAVERSAL), ALL, IMAGE | ASCENDING, 0, "must be outward with --method image", CONFLICT },
     { of_levels, ALL, IMAGE, 0, "does not apply to --method image", CONFLICT },
     { of_levels, ALL, FIXED, 0, "does not apply to --kernel fixed", CONFLICT },
-    { of_levels, ALL, INDEXED, 0, "does not apply to --submit indexed", CONFLICT },
+    { of_levels, ALL, STAYING, 0, "does not apply to --submit indexed or resident", CONFLICT },
     { ROW(METHOD), RENDERER(GL) | RENDERER(CPU), IMAGE, 0, "image requires --renderer reference",
       CONFLICT },
     { ROW(WEIGHTS), RENDERER(GL) | RENDERER(CPU), VERTEX, 0, "vertex requires --renderer reference",
@@ -119,7 +121,8 @@ static const struct rule {
     { ROW(SAMPLES_PER_SHEET) | ROW(INTERPOLATION), ALL & ~RENDERER(INTEGRAL), FOR_SPLATS,
       PRE | POST,
       "does not apply with options for splats: --kernel exact, ewa or fixed, --low-pass, "
-      "--flatten, --kernel-radius, --method image, --weights, --compositing, --target, --submit, "
+      "--low-pass-width, --flatten, --kernel-radius, --method image, --weights, --compositing, "
+      "--target, --submit, "
       "--count and --traversal ascending",
       true },
     { ROW(INTERPOLATION), ALL & ~RENDERER(INTEGRAL), PRE, 0,
@@ -171,9 +174,10 @@ static int facts_of_splats(const draw_settings *s)
            (p->footprint == TRIPTYCH_FOOTPRINT_EWA ? EWA : 0) |
            (p->footprint == TRIPTYCH_FOOTPRINT_FIXED ? FIXED : 0) |
            (p->low_pass == TRIPTYCH_LOW_PASS_UNIFORM ? UNIFORM : 0) |
+           (p->low_pass == TRIPTYCH_LOW_PASS_NONE ? UNFILTERED : 0) |
            (p->flatten > 1 ? FLATTENED : 0) |
            (p->target > TRIPTYCH_TARGET_RGBA32F ? NARROW_TARGET : 0) |
-           (p->lists == TRIPTYCH_SUBMIT_INDEXED ? INDEXED : 0);
+           (p->lists >= TRIPTYCH_SUBMIT_INDEXED ? STAYING : 0);
 }
 
 triptych_classify draw_settings_classify(const draw_settings *s)

@@ -1,10 +1,12 @@
 /* Transfer functions on their own: presets, histograms, and conversion to the formats of other
  * programs. */
+#include <stdlib.h>
 #include <string.h>
 
 #include "library_context.h"
 #include "report.h"
 #include "volume_tf.h"
+#include "text.h"
 
 int triptych_get_preset(unsigned number, triptych_preset *out)
 {
@@ -52,16 +54,25 @@ static int load_for_volume(triptych *t, const triptych_conversion *c, trip_tf **
     return trip_volume_tf(&params, tf);
 }
 
+static int fail_histogram(const char *function, const char *name)
+{
+    char *word = trip_text_word(function);
+    int status =
+        trip_fail(TRIP_USAGE, "tf", name,
+                  "needs a histogram; use `triptych tf show --tf %s DATA`, where DATA is a "
+                  "data set or a volume",
+                  word ? word : "NAME");
+    free(word);
+    return status;
+}
+
 static int load_alone(const triptych_conversion *c, const char *name, trip_tf **tf)
 {
     if (!c->function)
         return trip_fail(TRIP_USAGE, "tf", name, "give a transfer function or data");
     int status = trip_tf_load(tf, c->function);
     if (!status && trip_tf_needs_histogram(*tf))
-        return trip_fail(TRIP_USAGE, "tf", name,
-                         "needs a histogram; use `triptych tf show --tf %s DATA`, where DATA is a "
-                         "data set or a volume",
-                         name);
+        return fail_histogram(c->function, name);
     if (!status && c->lo < c->hi)
         trip_tf_denormalise(*tf, c->lo, c->hi);
     return status;

@@ -278,18 +278,30 @@ static void show_bytes(void *user, uint64_t done, uint64_t total)
 
 /* Describes the options and the version of the program, since another version may make a different
  * data set of the same volume. */
-static int describe_options(const trip_brick_params *params, char **text)
+static int describe_form(const trip_brick_params *params, char **text)
 {
-    char *options = NULL;
-    int status = trip_brick_options_text(params, &options);
+    char *form = NULL;
+    int status = trip_brick_form_text(params, &form);
     if (status)
         return status;
-    int length = asprintf(text, "%s" TRIP_VERSION "\n", options);
-    free(options);
+    int length = asprintf(text, "%s" TRIP_VERSION "\n", form);
+    free(form);
     if (length >= 0)
         return 0;
     *text = NULL;
     return trip_fail(TRIP_ERROR, "brick", params->input, "out of memory");
+}
+
+static int identify_kept(const trip_brick_params *params, triptych_identity *out)
+{
+    char *text = NULL;
+    int status = trip_brick_kept_text(params, &text);
+    if (status)
+        return status;
+    const trip_digest kept = trip_source_digest_text(text);
+    memcpy(out->kept, kept.text, sizeof out->kept);
+    free(text);
+    return 0;
 }
 
 static int identify(triptych *t, const trip_brick_params *params, uint64_t max_content_bytes,
@@ -300,7 +312,9 @@ static int identify(triptych *t, const trip_brick_params *params, uint64_t max_c
     char *text = NULL;
     int status = trip_source_find(&source, params->input, &params->volume);
     if (!status)
-        status = describe_options(params, &text);
+        status = describe_form(params, &text);
+    if (!status)
+        status = identify_kept(params, out);
     if (!status)
         status = trip_source_digest_state(&source, text, &state);
     out->stable = !status && trip_source_is_stable(&source); /* before the content is read */

@@ -220,7 +220,10 @@ int triptych_prepare_write(triptych *t, const char *path, const char *depth_path
 int triptych_write(triptych *t, const char *path, int width, int height, const float *rgba)
 {
     trip_scope *before = trip_context_enter_anew(t);
-    return trip_context_leave(before, trip_image_write(&t->files, path, width, height, rgba, NULL));
+    int status = t->settings.background[3] < 1 ? trip_image_check_transparent(path) : 0;
+    if (!status)
+        status = trip_image_write(&t->files, path, width, height, rgba, NULL);
+    return trip_context_leave(before, status);
 }
 
 int triptych_write_depth(triptych *t, const char *path, int width, int height, const float *depth)

@@ -82,8 +82,7 @@ static void scale_extinction(trip_tf_entry *table, double scale)
             table[code].extinction = (float)(table[code].extinction * scale);
 }
 
-/* Loads the transfer function in data units and applies the window. */
-static int load_function(const session *s, const session_look *look, trip_tf **tf)
+int session_load_function(const session *s, const session_look *look, trip_tf **tf)
 {
     int status = look->tf_text ? trip_tf_parse(tf, s->input, look->tf_text, strlen(look->tf_text))
                  : look->tf    ? trip_tf_load(tf, look->tf)
@@ -172,7 +171,7 @@ int session_use_function(session *s, const session_look *look)
     if (!status && !s->table)
         status = take_tables(s);
     if (!status)
-        status = load_function(s, look, &tf);
+        status = session_load_function(s, look, &tf);
     if (!status && !find_missing(s, tf, look)) {
         trip_tf_check_range(tf, h->typical_min, h->typical_max, s->input);
         for (unsigned i = 0; i < s->part_count; i++)
@@ -271,6 +270,16 @@ int session_add_data(session *s, const char *input)
     memset(s->classified, 0, LEVELS * sizeof *s->classified);
     trip_mean_tables_release(&s->mean_tables, s->budget);
     return 0;
+}
+
+const char *session_needs_splats(const session *s)
+{
+    const trip_file_header *h = &s->data->header;
+    if (h->dims[0] < 2 || h->dims[1] < 2 || h->dims[2] < 2)
+        return "the grid is one voxel thick";
+    if (h->halo == 0 && h->kept < h->dims[0] * h->dims[1] * h->dims[2])
+        return "voxels were dropped, and the data set has no halo";
+    return NULL;
 }
 
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes)

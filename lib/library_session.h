@@ -49,6 +49,8 @@ int session_open_data(session *s, const char *input, uint64_t memory_bytes);
 int session_add_data(session *s, const char *input);
 /* Reads the text that `brick` wrote for each part, unless it has been read. */
 int session_read_text(session *s);
+/* Loads a transfer function in data units and applies the window. The texts must have been read. */
+int session_load_function(const session *s, const session_look *look, trip_tf **tf);
 /* Sets the transfer function for later frames. Reads the texts and allocates the table if needed.
  * Warns about visible values that bricking dropped, with the command that bricks again. */
 int session_use_function(session *s, const session_look *look);
@@ -60,6 +62,8 @@ void session_keep_tables(session *s);
 /* Returns the results of earlier frames at a level with the current function. Each frame adds to
  * them. */
 trip_classification *session_classified(const session *s, unsigned level);
+/* Returns why the data set can only be drawn as splats, or NULL if post can draw it. */
+const char *session_needs_splats(const session *s);
 /* Calls session_open_data() and session_use_function(). Close the session also after a failure. */
 int session_open(session *s, const char *input, const session_look *look, uint64_t memory_bytes);
 void session_close(session *s);

@@ -97,6 +97,7 @@ trip_settings trip_settings_of(const draw_settings *s)
     out.compositing = CHOSEN(trip_compositing, splat->compositing);
     out.footprint = CHOSEN(trip_footprint, splat->footprint);
     out.low_pass = CHOSEN(trip_low_pass, splat->low_pass);
+    out.low_pass_px = number_or(splat->low_pass_px, out.low_pass_px);
     out.flatten = number_or(splat->flatten, out.flatten);
     out.vertex_weights = splat->weights == TRIPTYCH_WEIGHTS_VERTEX;
     out.samples_per_sheet = samples_per_sheet(s);
@@ -104,6 +105,7 @@ trip_settings trip_settings_of(const draw_settings *s)
     out.traversal = CHOSEN(trip_traversal, s->all.traversal);
     out.target = CHOSEN(trip_target, splat->target);
     out.indexed = splat->lists == TRIPTYCH_SUBMIT_INDEXED;
+    out.resident = splat->lists == TRIPTYCH_SUBMIT_RESIDENT;
     out.triangles = splat->primitives == TRIPTYCH_SUBMIT_TRIANGLES;
     out.depth = s->all.depth;
     out.h = number_or(s->all.h, TRIP_H_AUTO);

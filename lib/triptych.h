@@ -407,8 +407,10 @@ typedef enum triptych_target {
 /* The vertices that the GL renderer draws. */
 typedef enum triptych_submit_lists {
     TRIPTYCH_SUBMIT_DEFAULT,    /* replicated */
-    TRIPTYCH_SUBMIT_REPLICATED, /* a vertex array for each list */
-    TRIPTYCH_SUBMIT_INDEXED,    /* one vertex array with an index for each list; no coarse levels */
+    TRIPTYCH_SUBMIT_REPLICATED, /* the lists are sent in every frame */
+    /* Both stay in GPU memory, and have neither coarse levels nor clipping. */
+    TRIPTYCH_SUBMIT_INDEXED,  /* one vertex array with an index for each list */
+    TRIPTYCH_SUBMIT_RESIDENT, /* a vertex array for each list */
 } triptych_submit_lists;
 
 /* The primitives that the GL renderer draws. */
@@ -423,6 +425,9 @@ typedef struct triptych_splat_settings {
     triptych_compositing compositing;
     triptych_footprint footprint;
     triptych_low_pass low_pass;
+    /* Standard deviation of the low-pass filter in pixels, 0 (TRIPTYCH_ZERO, no filter) to 16; the
+     * default is 0.4. Zwicker et al. use 1. Not with TRIPTYCH_LOW_PASS_NONE. */
+    double low_pass_px;
     triptych_weights weights;
     /* EWA footprints: factor by which kernels are flattened along gradients of full shading, 1
      * (round, the default) to 100. Not with count_exactly. */
@@ -452,7 +457,9 @@ typedef enum triptych_field {
 /* Settings of the integral renderer. */
 typedef struct triptych_integral_settings {
     triptych_field field;
-    double tolerance; /* of each component of a pixel, 1e-12 to 0.1; default 1e-4 */
+    /* Bound of the error of each component of a pixel, 1e-12 to 0.1. The default is 1e-3 for the
+     * mean over the area of each pixel, and 1e-4 for a number of rays per pixel. */
+    double tolerance;
 } triptych_integral_settings;
 
 /* Levels of detail. The data set needs coarse levels for the classification
@@ -543,8 +550,9 @@ typedef struct triptych_settings {
      * to 0.1. No component of a pixel changes by more than this number. The default is 1/8192 for
      * pre and 1/512 for post. GL uses at most the default in pre. */
     double early_termination;
-    /* Rays along each side of a pixel, 1 (the default) to 64. Other renderers than the integral
-     * draw a picture this many times wider and higher, and average it. Above 1 not with depth. */
+    /* Rays along each side of a pixel, 1 to 64. The integral takes the mean over the area of each
+     * pixel by default. The default of the other renderers is 1. They draw a picture this many
+     * times wider and higher, and average it. Above 1 not with depth. */
     int samples;
     /* If not 0, colours are divided by the accumulated opacity, and every covered pixel becomes
      * opaque. */
@@ -553,7 +561,8 @@ typedef struct triptych_settings {
     int depth;
     /* If not 0, triptych_list_stats has exact counts. Takes time, and draws occluded bricks too. */
     int count_exactly;
-    /* Red, green, blue, alpha, 0 to 1, not multiplied by alpha. NULL selects opaque black. */
+    /* Red, green, blue, alpha, 0 to 1, not multiplied by alpha. NULL selects opaque black. With
+     * alpha below 1, triptych_write() refuses JPEG. */
     const double *background;
     const triptych_splat_settings *splat;
     const triptych_sheet_settings *sheet;
@@ -755,7 +764,7 @@ TRIPTYCH_API int triptych_new_picture(triptych *t, int width, int height, int ch
 TRIPTYCH_API void triptych_release_picture(triptych *t, float *pixels);
 
 /* Writes a picture. The ending of `path` selects the format: .png, .jpg, .tif, or .exr (linear
- * light). */
+ * light). Colours are multiplied by alpha in .tif and .exr, but not in .png. */
 TRIPTYCH_API int triptych_write(triptych *t, const char *path, int width, int height,
                                 const float *rgba);
 /* Writes width * height distances as .exr (channel Z) or .tif. */

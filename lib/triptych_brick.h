@@ -182,7 +182,7 @@ typedef struct triptych_brick_summary {
     /* Recognised kind of data, such as "ct" and "CT in Hounsfield units". */
     const char *kind, *kind_title;
     uint64_t input_bytes;       /* size of the volume, decompressed */
-    uint64_t bytes, halo_bytes; /* size of all lists; size of the halo lists */
+    uint64_t bytes, halo_bytes; /* size of all files on disk; size of the halo lists */
     uint64_t level_bytes;       /* size of the coarse levels' lists */
     unsigned levels;            /* number of coarse levels */
     /* Written to temporary files and removed again. */
@@ -224,11 +224,14 @@ TRIPTYCH_API int triptych_estimate(triptych *t, const char *volume, const char *
                                    triptych_brick_estimate *out);
 
 /* Identifies the data set that a volume and options would give, as keys for a cache. Each key has
- * 32 hexadecimal digits. */
+ * 32 hexadecimal digits. Data sets with the same `content` and different `kept` differ only in the
+ * values that they keep. */
 typedef struct triptych_identity {
-    char state[33]; /* from the options and the paths, sizes and times of the files */
-    /* From the options and all bytes of the files, or "" if the files were not read. */
+    /* From the paths, sizes and times of the files, and the options other than for kept values. */
+    char state[33];
+    /* From all bytes of the files, and the same options. "" if the files were not read. */
     char content[33];
+    char kept[33];  /* from the options for kept values, the opacity envelope */
     uint64_t bytes; /* total size of the files */
     /* 0 if a file changed so recently that another change might not change `state`. */
     int stable;
@@ -240,6 +243,12 @@ typedef struct triptych_identity {
 TRIPTYCH_API int triptych_identify(triptych *t, const char *volume,
                                    const triptych_brick_options *options,
                                    uint64_t max_content_bytes, triptych_identity *out);
+
+/* Returns 1 if the open data set holds every value that it would keep if its volume were bricked
+ * with these options, and every value that `shown` shows. Otherwise returns 0, or a negative code
+ * after a failure. Only the options for kept values count. Either may be NULL. */
+TRIPTYCH_API int triptych_holds(triptych *t, const triptych_brick_options *options,
+                                const triptych_transfer_function *shown);
 
 /* Receives the path of a file of a volume. A negative result ends triptych_list_files(). */
 typedef int (*triptych_file_callback)(void *user, const char *path);

@@ -1,6 +1,7 @@
 #include "error.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 static void add_channel(measure_error *e, double error)
 {
@@ -12,11 +13,17 @@ static void add_channel(measure_error *e, double error)
     e->max = fmax(e->max, error);
 }
 
+/* `i` is the index of the pixel's first channel. */
+static bool is_covered(const float *picture, const float *truth, size_t i)
+{
+    return picture[i + 3] > 1.0F / 255 || truth[i + 3] > 1.0F / 255;
+}
+
 void measure_error_add_apart(measure_error *colour, measure_error *alpha, const float *picture,
                              const float *truth, size_t pixels)
 {
     for (size_t i = 0; i < 4 * pixels; i += 4)
-        if (picture[i + 3] > 1.0F / 255 || truth[i + 3] > 1.0F / 255)
+        if (is_covered(picture, truth, i))
             for (size_t c = 0; c < 4; c++)
                 add_channel(c == 3 ? alpha : colour,
                             255 * fabs((double)picture[i + c] - (double)truth[i + c]));
@@ -37,6 +44,29 @@ static double percentile(const measure_error *e, double share)
             return fmin((double)i / MEASURE_ERROR_BINS_PER_LEVEL, e->max);
     }
     return e->max;
+}
+
+double measure_error_bound(measure_error *scratch, const float *picture, const float *truth,
+                           size_t pixels, double share)
+{
+    uint64_t below = 0;
+    *scratch = (measure_error){ 0 };
+    for (size_t i = 0; i < 4 * pixels; i += 4) {
+        double error = 0;
+        if (!is_covered(picture, truth, i))
+            continue;
+        for (size_t c = i; c < i + 4; c++)
+            error = fmax(error, fabs((double)picture[c] - (double)truth[c]));
+        const double bin = ceil(255 * error * MEASURE_ERROR_BINS_PER_LEVEL);
+        scratch->bins[(size_t)fmin(MEASURE_ERROR_BINS - 1, bin)]++;
+        scratch->count++;
+    }
+    for (size_t i = 0; i < MEASURE_ERROR_BINS && scratch->count; i++) {
+        below += scratch->bins[i];
+        if ((double)below >= share * (double)scratch->count)
+            return (double)i / MEASURE_ERROR_BINS_PER_LEVEL;
+    }
+    return 0;
 }
 
 measure_error_figures measure_error_measure(const measure_error *e)

@@ -29,6 +29,11 @@ void measure_error_add(measure_error *e, const float *picture, const float *trut
 /* Adds red, green and blue to `colour`, and alpha to `alpha`. */
 void measure_error_add_apart(measure_error *colour, measure_error *alpha, const float *picture,
                              const float *truth, size_t pixels);
+/* Returns the smallest multiple of 0.01 that a share of the covered pixels does not exceed. The
+ * error of a pixel is the largest one of its four channels, of 255. Overwrites *scratch. Returns 0
+ * if no pixel is covered. */
+double measure_error_bound(measure_error *scratch, const float *picture, const float *truth,
+                           size_t pixels, double share);
 /* Returns zeros and an infinite psnr if no pixel is covered. */
 measure_error_figures measure_error_measure(const measure_error *e);
 

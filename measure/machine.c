@@ -61,5 +61,6 @@ void measure_describe_renderer(cJSON *machine, const char *renderer, const char 
 {
     cJSON_AddStringToObject(machine, "renderer", renderer);
     cJSON_AddStringToObject(machine, "device", device);
-    cJSON_AddStringToObject(machine, "engine", engine);
+    cJSON_AddStringToObject(machine, "engine",
+                            strcmp(engine, "null") ? engine : "none: the data are in memory");
 }

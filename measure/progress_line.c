@@ -132,6 +132,15 @@ void measure_progress_step(measure_progress *p, const char *stage)
     pthread_mutex_unlock(&p->lock);
 }
 
+void measure_progress_part(measure_progress *p, const char *stage)
+{
+    if (!p)
+        return;
+    pthread_mutex_lock(&p->lock);
+    snprintf(p->stage, sizeof p->stage, "%s", stage);
+    pthread_mutex_unlock(&p->lock);
+}
+
 void measure_progress_end(measure_progress *p)
 {
     if (!p)
@@ -141,6 +150,8 @@ void measure_progress_end(measure_progress *p)
     pthread_cond_signal(&p->stop);
     pthread_mutex_unlock(&p->lock);
     pthread_join(p->thread, NULL);
+    if (p->begun == p->expected)
+        print_line(p);
     if (!p->lines)
         fputs("\r\033[K", stderr);
     release(p);

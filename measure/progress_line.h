@@ -11,11 +11,13 @@ measure_progress *measure_progress_start(const char *name);
 /* Like measure_progress_start(), but prints a line every two seconds if stderr is not a terminal.
  */
 measure_progress *measure_progress_start_lines(const char *name);
-/* Adds to the number of expected steps. */
+/* Adds to the number of expected steps, or subtracts steps that will not begin. */
 void measure_progress_expect(measure_progress *p, int steps);
 /* Begins the next step, named for example "frame of cpu". */
 void measure_progress_step(measure_progress *p, const char *stage);
-/* Clears the line and frees *p. */
+/* Renames the current step, for a part of it. */
+void measure_progress_part(measure_progress *p, const char *stage);
+/* Shows the counter at its end if all steps began. Clears the line and frees *p. */
 void measure_progress_end(measure_progress *p);
 
 #endif

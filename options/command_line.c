@@ -3,6 +3,7 @@
 #endif
 #include "command_line.h"
 
+#include <argp.h>
 #include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -11,6 +12,7 @@
 
 #include "draw_settings.h"
 #include "report.h"
+#include "text.h"
 
 const char *const trip_levels_for_names[] = { "auto", "post", "pre", "both", NULL };
 
@@ -19,7 +21,7 @@ const char *const trip_levels_for_names[] = { "auto", "post", "pre", "both", NUL
  * name. */
 static char error_prefix[64], help_name[64];
 
-enum { KEY_HELP = 1000 };
+enum { KEY_HELP = 'h', KEY_QUIET = 'q' };
 
 static bool is_end(const struct argp_option *o)
 {
@@ -68,19 +70,52 @@ static void print_man(const struct argp_option *options)
     }
 }
 
+#define QUIET_HELP "Prints no progress, notes and summary"
+
+/* The options of every command. */
 static const struct argp_option common_options[] = {
+    { "quiet", KEY_QUIET, NULL, 0, QUIET_HELP "; warnings and errors still appear", -1 },
     { "help", KEY_HELP, "all", OPTION_ARG_OPTIONAL,
       "Prints the common options, or with =all every option", -1 },
     { 0 },
 };
 
+static bool quiet;
+
+bool command_line_quiet(void)
+{
+    return quiet;
+}
+
+bool command_line_is_note(const char *line)
+{
+    static const char note[] = "triptych: note: ";
+    return !strncmp(line, note, strlen(note));
+}
+
+static void drop_notes(const char *line, void *user)
+{
+    (void)user;
+    if (!command_line_is_note(line))
+        trip_report_line(line);
+}
+
+static void be_quiet(void)
+{
+    quiet = true;
+    trip_report_redirect(drop_notes, NULL);
+}
+
 static error_t print_for_programs(const char *what, const struct argp_option *options)
 {
-    if (!strcmp(what, "names"))
+    if (!strcmp(what, "names")) {
         print_names(options);
-    else if (!strcmp(what, "man"))
+        printf("--%s\n", common_options->name);
+    } else if (!strcmp(what, "man")) {
         print_man(options);
-    else
+        printf(".SS Messages\n");
+        print_man_option(common_options);
+    } else
         return trip_option_fail("--help", "takes nothing or all, --help=all");
     exit(EXIT_SUCCESS);
 }
@@ -91,6 +126,9 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     case ARGP_KEY_INIT:
         state->err_stream = NULL;
         state->child_inputs[0] = state->input;
+        return 0;
+    case KEY_QUIET:
+        be_quiet();
         return 0;
     case KEY_HELP:
         if (arg && strcmp(arg, "all"))
@@ -103,32 +141,153 @@ static error_t parse_key(int key, char *arg, struct argp_state *state)
     }
 }
 
-/* Returns the first argument that starts like an option but contains bytes other than visible
- * ASCII, or NULL. getopt would send these bytes to the terminal unchanged. */
-static const char *find_hidden_name(int argc, char **argv)
+/* ---- unknown options ---- */
+
+/* The options of a command as getopt finds them, and the program's function for other commands. */
+typedef struct known {
+    const struct argp_option *tables[2];
+    const char *command;
+} known;
+
+static const char *(*find_other_command)(const char *option);
+
+void command_line_set_finder(const char *(*find)(const char *option))
 {
-    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
-        const char *p = argv[i];
-        bool is_long = strncmp(p, "--", 2) == 0;
-        if (*p++ != '-' || !*p)
-            continue;
-        do
-            if (*p <= ' ' || *p > '~')
-                return argv[i];
-        while (is_long && *++p && *p != '=');
-    }
+    find_other_command = find;
+}
+
+/* Returns the option with this name, or the last one that starts with it. Sets *matches to their
+ * number. An alias stands for the option before it. */
+static const struct argp_option *find_long(const known *k, const char *name, size_t length,
+                                           int *matches)
+{
+    const struct argp_option *found = NULL, *real = NULL;
+    *matches = 0;
+    for (int t = 0; t < 2; t++)
+        for (const struct argp_option *o = k->tables[t]; o && !is_end(o); o++) {
+            real = o->flags & OPTION_ALIAS ? real : o;
+            if (!o->name || strncmp(o->name, name, length) != 0)
+                continue;
+            if (!o->name[length]) {
+                *matches = 1;
+                return real;
+            }
+            *matches += found != real;
+            found = real;
+        }
+    return found;
+}
+
+static const struct argp_option *find_short(const known *k, char letter)
+{
+    for (int t = 0; t < 2; t++)
+        for (const struct argp_option *o = k->tables[t]; o && !is_end(o); o++)
+            if (o->key == letter)
+                return o;
     return NULL;
 }
 
-int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input)
+static bool takes_next(const struct argp_option *o)
+{
+    return o->arg && !(o->flags & OPTION_ARG_OPTIONAL);
+}
+
+static const char *nearest_long(const known *k, const char *name)
+{
+    trip_text_nearest nearest = { .text = name };
+    for (int t = 0; t < 2; t++)
+        for (const struct argp_option *o = k->tables[t]; o && !is_end(o); o++)
+            if (o->name && !(o->flags & OPTION_ALIAS))
+                trip_text_nearest_try(&nearest, o->name);
+    return nearest.name;
+}
+
+/* Reports an option that the command lacks. Names a command that has it, or a similar option. */
+static int fail_unknown(const known *k, const char *option, size_t length)
+{
+    char text[64], name[64];
+    snprintf(text, sizeof text, "%.*s", (int)(length < 63 ? length : 63), option);
+    snprintf(name, sizeof name, "%s", text + strspn(text, "-"));
+    const bool is_word = name[0] && name[1];
+    int matches = 0;
+    const bool is_own = find_long(k, name, strlen(name), &matches) && matches == 1;
+    const char *other = is_word && !is_own && find_other_command ? find_other_command(name) : NULL;
+    const char *nearest = is_word && !other ? nearest_long(k, name) : NULL;
+    if (other)
+        return trip_fail(TRIP_USAGE, "usage", text,
+                         "unknown option of %s; `triptych %s` has it; `triptych %s --help` lists "
+                         "the options of %s",
+                         k->command, other, k->command, k->command);
+    return trip_fail(
+        TRIP_USAGE, "usage", text, "unknown option;%s%s%s `triptych %s --help` lists the options",
+        nearest ? " did you mean --" : "", nearest ? nearest : "", nearest ? "?" : "", k->command);
+}
+
+static int fail_ambiguous(const known *k, const char *option, size_t length)
+{
+    char text[64], list[256] = "";
+    snprintf(text, sizeof text, "%.*s", (int)(length < 63 ? length : 63), option);
+    for (int t = 0; t < 2; t++)
+        for (const struct argp_option *o = k->tables[t]; o && !is_end(o); o++) {
+            const size_t used = strlen(list);
+            if (o->name && !(o->flags & OPTION_ALIAS) &&
+                !strncmp(o->name, text + 2, strlen(text + 2)))
+                snprintf(list + used, sizeof list - used, "%s--%s", used ? ", " : "", o->name);
+        }
+    return trip_fail(TRIP_USAGE, "usage", text, "short for several options: %s", list);
+}
+
+/* Checks a group of one-letter options. Returns 1 if the last one takes the next argument. */
+static int check_letters(const known *k, const char *letters)
+{
+    for (const char *p = letters + 1; *p; p++) {
+        const struct argp_option *o = find_short(k, *p);
+        if (!o)
+            return fail_unknown(k, letters, strlen(letters));
+        if (o->arg)
+            return !p[1] && takes_next(o);
+    }
+    return 0;
+}
+
+/* Checks an argument that starts with a dash. Returns 1 if it takes the next argument. */
+static int check_option(const known *k, const char *option)
+{
+    const size_t length = strcspn(option, "=");
+    int matches;
+    if (strncmp(option, "--", 2) != 0)
+        return check_letters(k, option);
+    const struct argp_option *o =
+        length > 2 ? find_long(k, option + 2, length - 2, &matches) : NULL;
+    if (!o)
+        return fail_unknown(k, option, length);
+    if (matches > 1)
+        return fail_ambiguous(k, option, length);
+    return !option[length] && takes_next(o);
+}
+
+/* Reports the first unknown or ambiguous option, which getopt would print without a remedy, and
+ * with its control characters. */
+static int check_names(const known *k, int argc, char **argv)
+{
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
+        int status = argv[i][0] == '-' && argv[i][1] ? check_option(k, argv[i]) : 0;
+        if (status < 0)
+            return status;
+        i += status;
+    }
+    return 0;
+}
+
+static int parse_arguments(const struct argp *argp, int argc, char **argv, void *input)
 {
     const struct argp_child children[] = { { argp, 0, NULL, 0 }, { 0 } };
     const struct argp outer = { .options = common_options,
                                 .parser = parse_key,
                                 .children = children };
-    const char *hidden = find_hidden_name(argc, argv);
-    if (hidden)
-        return trip_option_fail(hidden, "unknown option");
+    const known k = { { argp->options, common_options }, argv[0] };
+    if (check_names(&k, argc, argv))
+        return TRIP_USAGE;
     snprintf(help_name, sizeof help_name, "triptych %s", argv[0]);
     snprintf(error_prefix, sizeof error_prefix, "triptych: usage: %s", argv[0]);
     argv[0] = error_prefix;
@@ -282,6 +441,7 @@ static void print_short_help(const command_line *c, const char *name)
     print_sentence(c->doc);
     for (int group = 1; group < GROUPS; group++)
         print_group(c, group, true);
+    printf("\n  %-25s%s\n", "-q, --quiet", QUIET_HELP);
     printf("\n--help=all lists every option, and triptych-%s(1) explains them.\n", name);
     exit(EXIT_SUCCESS);
 }
@@ -313,14 +473,14 @@ int command_line_parse(const command_line *c, int argc, char **argv)
     if (!p)
         return trip_fail(TRIP_ERROR, "usage", argv[0], "out of memory");
     for (int i = 1; i < argc && strcmp(argv[i], "--"); i++)
-        if (!strcmp(argv[i], "--help") && has_short_help(c))
+        if ((!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) && has_short_help(c))
             print_short_help(c, argv[0]);
     p->c = c;
     add_rows(p);
     const struct argp argp = {
         .options = p->options, .parser = parse_row, .args_doc = c->args_doc, .doc = c->doc
     };
-    int status = trip_options_parse(&argp, argc, argv, p);
+    int status = parse_arguments(&argp, argc, argv, p);
     free(p);
     return status;
 }

@@ -1,11 +1,10 @@
 /* Command lines from tables of options (common/option.h), by argp. Errors have one line and exit
- * status 2. --help prints the common options, and --help=all every option. For other programs,
+ * status 2. --help and -h print the common options, and --help=all every option. For other
+ * programs,
  * --help=names prints names and arguments (completion.bash), and --help=man a man page's list. Main
  * thread only. */
 #ifndef TRIP_COMMAND_LINE_H
 #define TRIP_COMMAND_LINE_H
-
-#include <argp.h>
 
 #include "option.h"
 
@@ -31,8 +30,16 @@ typedef struct command_line {
 /* Parses argv, which starts with the name of the command. --help prints the help and exits. Returns
  * 0, or TRIP_USAGE after reporting an error. */
 int command_line_parse(const command_line *c, int argc, char **argv);
-/* Does the same for a command with an argp parser of its own. */
-int trip_options_parse(const struct argp *argp, int argc, char **argv, void *input);
+
+/* Returns whether --quiet was given. Every command has it. Notes that the main thread makes are
+ * then discarded; other threads and the sinks of libraries check command_line_is_note(). */
+bool command_line_quiet(void);
+/* Returns whether a line of a report is a note, not a warning or a failure. */
+bool command_line_is_note(const char *line);
+
+/* Sets the function that names a command with an option, or returns NULL. The message about an
+ * unknown option uses it. */
+void command_line_set_finder(const char *(*find)(const char *option));
 
 /* Names of triptych_levels_for, terminated by NULL. */
 extern const char *const trip_levels_for_names[];

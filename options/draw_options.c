@@ -74,7 +74,8 @@ static const char *const sides[] = {
 #define CUSTOM(function) .type = TRIP_OPTION_CUSTOM, .read = (function)
 
 static const trip_option view_rows[VIEW_OPTIONS] = {
-    [VIEW_SIZE] = { "size", "WxH", "Sets the picture size in pixels, 1 to 65536 a side",
+    [VIEW_SIZE] = { "size", "WxH|N",
+                    "Sets the picture size in pixels, 1 to 65536 a side; N is a square",
                     "1024x1024", .brief = "Sets the picture size in pixels (default: 1024x1024)",
                     .group = DRAW_GROUP_PICTURE, AT(view.width), CUSTOM(read_size) },
     [VIEW_AZIMUTH] = { "azimuth", "DEGREES", "Turns the eye around the object, to your right", "0",

@@ -1,9 +1,13 @@
+#ifndef _GNU_SOURCE
+#define _GNU_SOURCE
+#endif
 #include "brick.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "brick_codes.h"
 #include "brick_input.h"
@@ -176,7 +180,7 @@ static int summarise_done(brick *b)
     b->summary->halo = d->header.halo;
     b->summary->code_bytes = d->header.code_bytes;
     b->summary->normal_bytes = d->header.normal_bytes;
-    b->summary->bytes = d->bytes - d->header.index_bytes;
+    b->summary->bytes = d->bytes;
     for (unsigned i = 0; i < d->list_count; i++) {
         const trip_list *l = &d->lists[i];
         uint64_t bytes = l->plane_bytes[TRIP_PLANE_VOXELS] + l->plane_bytes[TRIP_PLANE_NORMALS];
@@ -453,6 +457,23 @@ static trip_brick_metadata metadata_of(const brick *b)
                                   .upright = b->upright };
 }
 
+/* Adds the index, which the writer has completed, to the size. The writer is gone. */
+static int add_index(brick *b)
+{
+    char *path = NULL;
+    struct stat st;
+    int status = 0;
+    b->writer = NULL;
+    if (asprintf(&path, "%s/" TRIP_INDEX_NAME, b->params->output) < 0)
+        return trip_fail(TRIP_ERROR, "brick", b->params->output, "out of memory");
+    if (stat(path, &st) == 0)
+        b->summary->bytes += (uint64_t)st.st_size;
+    else
+        status = trip_fail_errno("brick", path, "cannot read the size");
+    free(path);
+    return status;
+}
+
 static int finish_output(brick *b)
 {
     double begin = trip_now_seconds();
@@ -473,7 +494,7 @@ static int finish_output(brick *b)
     if (status == 0)
         status = trip_writer_finish(b->writer, &s);
     if (status == 0)
-        b->writer = NULL;
+        status = add_index(b);
     free(text);
     b->summary->stages[TRIP_BRICK_FINISH].seconds = trip_now_seconds() - begin;
     return status;

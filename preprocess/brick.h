@@ -32,7 +32,7 @@ typedef struct trip_brick_summary {
     double value_min, value_max;
     trip_tf_kind kind;        /* recognised kind of the volume */
     uint64_t input_bytes;     /* bytes of values, decompressed */
-    uint64_t bytes;           /* bytes of all lists */
+    uint64_t bytes;           /* bytes of all files */
     uint64_t halo_bytes;      /* bytes of the halo's lists */
     unsigned levels;          /* coarse levels */
     uint64_t level_bytes;     /* bytes of the coarse levels' lists */

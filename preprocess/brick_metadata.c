@@ -12,6 +12,7 @@
 #include "anatomy.h"
 #include "orientation.h"
 #include "json.h"
+#include "file_path.h"
 #include "report.h"
 #include "text.h"
 
@@ -346,13 +347,25 @@ static void add_orientation(cJSON *root, const trip_brick_metadata *t)
         cJSON_AddStringToObject(root, "footing", trip_orientation_base_name(t->upright.footing));
 }
 
+/* Adds the path of the source relative to the data set, unless the source lies beside it. The data
+ * sets in the cache are not beside their volume, and serve every copy of it. */
+static void add_source_path(cJSON *root, const trip_brick_params *p)
+{
+    char *path = p->max_bytes ? NULL : trip_path_relative(p->output, p->input);
+    if (path && strchr(path, '/'))
+        cJSON_AddStringToObject(root, "source_path", path);
+    free(path);
+}
+
 char *trip_brick_metadata_make(const trip_brick_metadata *t)
 {
     char note[TRIP_BRICK_NOTE_BYTES];
     trip_brick_metadata_note(t, note);
     cJSON *root = cJSON_CreateObject();
-    if (strcmp(t->info->format, "memory") != 0)
+    if (strcmp(t->info->format, "memory") != 0) {
         cJSON_AddStringToObject(root, "source", base_name(t->params->input));
+        add_source_path(root, t->params);
+    }
     add_source_options(root, t->params);
     cJSON_AddStringToObject(root, "format", t->info->format);
     if (t->info->name[0])

@@ -11,15 +11,15 @@
 #include <unistd.h>
 
 #include "clock.h"
+#include "disk_time.h"
 #include "levels.h"
 #include "report.h"
+#include "source.h"
 
 /* Number of portions in a sample, and slices of each if memory permits. */
 enum { SAMPLES = 16, SAMPLE_SLICES = 4 };
 /* Status that ends a scan at its time limit. */
 enum { STOPPED = -100 };
-/* Bytes written to measure the disk's speed. */
-#define TRIAL_BYTES ((size_t)32 << 20)
 /* Time limit in seconds of the sample before a run, and the addition per voxel of the grid. */
 static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
 /* Bytes of masks per record; the masks of a halo have fewer bits set. */
@@ -167,24 +167,27 @@ static void estimate_sizes(const trip_brick_input *in, const trip_piece_format *
     e->free_bytes = free_bytes(in->params->output);
 }
 
-/* Measures the seconds per written byte on the output's disk with an unnamed file. */
-static double seconds_per_byte(const char *output)
+/* Returns the cost of reading the volume's files, before the estimate itself reads them. Volumes in
+ * memory have no files. */
+static trip_read_cost read_cost(const trip_brick_input *in)
 {
-    char *folder = folder_of(output);
-    void *data = aligned_alloc(4096, TRIAL_BYTES);
-    double seconds = 1e-9;
-    int fd = folder ? open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC | O_DIRECT, 0600) : -1;
-    if (fd >= 0 && data) {
-        memset(data, 1, TRIAL_BYTES);
-        double begin = trip_now_seconds();
-        if (write(fd, data, TRIAL_BYTES) == (ssize_t)TRIAL_BYTES)
-            seconds = (trip_now_seconds() - begin) / (double)TRIAL_BYTES;
+    trip_source source = { 0 };
+    trip_read_cost cost = { .cache_bytes = trip_memory_available_bytes(),
+                            .passes = trip_brick_input_needs_scan(in) ? 2 : 1 };
+    const trip_source_file *largest = NULL;
+    if (in->params->volume.memory.data || in->params->volume.memory.read_slices ||
+        trip_source_find(&source, in->params->input, &in->params->volume) < 0)
+        return cost;
+    for (size_t i = 0; i < source.count; i++) {
+        const trip_source_file *file = &source.files[i];
+        largest = !largest || file->bytes > largest->bytes ? file : largest;
+        cost.uncached_bytes += trip_disk_time_uncached(file->path);
     }
-    if (fd >= 0)
-        close(fd);
-    free(data);
-    free(folder);
-    return seconds;
+    cost.bytes = source.bytes;
+    if (largest && (cost.uncached_bytes > 0 || cost.bytes > cost.cache_bytes))
+        cost.seconds_per_byte = trip_disk_time_reading(largest->path);
+    trip_source_free(&source);
+    return cost;
 }
 
 /* Estimates from a sample. Replaces the scan that a run makes first. */
@@ -205,6 +208,7 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
     const trip_brick_params *p = in->params;
     trip_piece_format format = trip_brick_format(p);
     trip_memory_plan plan;
+    trip_read_cost cost = read_cost(in);
     format.quantised = trip_brick_will_be_quantised(in);
     int status =
         trip_memory_plan_make(&plan, p->input, in->info, &format, trip_workers_count(in->workers),
@@ -218,7 +222,9 @@ static int estimate(trip_brick_input *in, trip_brick_estimate *e)
     if (status < 0)
         return status;
     estimate_sizes(in, &format, &plan, e);
-    e->seconds += (double)(e->bytes + 2 * e->temporary_bytes) * seconds_per_byte(p->output);
+    cost.compute_seconds = e->seconds;
+    e->seconds = trip_disk_time_read(&cost) +
+                 (double)(e->bytes + 2 * e->temporary_bytes) * trip_disk_time_writing(p->output);
     return 0;
 }
 

@@ -152,6 +152,11 @@ const char *trip_dataset_metadata_source(const trip_dataset_metadata *t)
     return string_at(t, "source");
 }
 
+const char *trip_dataset_metadata_source_path(const trip_dataset_metadata *t)
+{
+    return string_at(t, "source_path");
+}
+
 const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, int i)
 {
     enum { MAX_OPTIONS = 32 };
@@ -175,8 +180,7 @@ int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset 
     return trip_tf_from_points(out, ramp, 2, false, 0);
 }
 
-/* Returns whether the envelope contains [lo, hi]. */
-static bool envelope_holds(const trip_dataset_metadata *t, double lo, double hi)
+bool trip_dataset_metadata_keeps(const trip_dataset_metadata *t, double lo, double hi)
 {
     size_t begin = 0, end = t->envelope_count; /* the last interval that starts at or before `lo` */
     while (begin < end) {
@@ -194,11 +198,12 @@ static double culled_share(const trip_dataset_metadata *t, const trip_tf *tf, do
 {
     enum { SAMPLES = 16 };
     int culled = 0;
-    if (!trip_tf_visible_in(tf, lo, hi) || envelope_holds(t, lo, hi))
+    if (!trip_tf_visible_in(tf, lo, hi) || trip_dataset_metadata_keeps(t, lo, hi))
         return 0;
     for (int i = 0; i < SAMPLES; i++) {
         double value = lo + (hi - lo) * (i + 0.5) / SAMPLES;
-        culled += trip_tf_evaluate(tf, value).opacity > 0 && !envelope_holds(t, value, value);
+        culled += trip_tf_evaluate(tf, value).opacity > 0 &&
+                  !trip_dataset_metadata_keeps(t, value, value);
     }
     return (double)culled / SAMPLES;
 }

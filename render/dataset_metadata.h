@@ -10,6 +10,7 @@
  *   "footing"            "-x" ... "+z": the only side of the grid at which the kept voxels are
  *                        level; for volumes without orientation
  *   "source"             the volume's file; absent for a volume from memory
+ *   "source_path"        its path relative to the data set's folder, if it does not lie in it
  *   "source_options"     the options of `brick` that make the data set again, without the options
  *                        for kept values
  *   "note"               a choice that the file left open, for people
@@ -38,6 +39,8 @@ void trip_dataset_metadata_destroy(trip_dataset_metadata *t);
 /* Return the source file's name without its folder, and option number i of `brick` that makes the
  * data set again. They return NULL if the text has none, or beyond the last option. */
 const char *trip_dataset_metadata_source(const trip_dataset_metadata *t);
+/* Returns the source's path relative to the data set's folder, or NULL if the text has none. */
+const char *trip_dataset_metadata_source_path(const trip_dataset_metadata *t);
 const char *trip_dataset_metadata_source_option(const trip_dataset_metadata *t, int i);
 
 /* Returns the kind of the volume, or TRIP_TF_SIMULATION if the text has none. */
@@ -53,6 +56,9 @@ int trip_dataset_metadata_tf(const trip_dataset_metadata *t, const trip_dataset 
 
 /* Reads the histogram. Returns false, with a count of 0, if the text has none. */
 bool trip_dataset_metadata_histogram(const trip_dataset_metadata *t, trip_histogram *out);
+
+/* Returns whether the data set keeps all values from `lo` to `hi`. False without an envelope. */
+bool trip_dataset_metadata_keeps(const trip_dataset_metadata *t, double lo, double hi);
 
 /* Estimates from the histogram how many dropped voxels `tf` shows, and the range of their values. A
  * bin that is shown in part counts in proportion. Returns 0 if the text lacks a histogram or

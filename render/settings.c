@@ -16,6 +16,7 @@ trip_settings trip_settings_default(void)
         .h = TRIP_H_AUTO,
         .early_termination = TRIP_EARLY_TERMINATION_AUTO,
         .kernel_radius = TRIP_KERNEL_RADIUS_VOXELS,
+        .low_pass_px = TRIP_LOW_PASS_PX,
         .flatten = 1,
         .background = { 0, 0, 0, 1 },
         .tolerance = 1e-4,
@@ -53,12 +54,12 @@ int trip_settings_check(const trip_settings *s)
     if (s->depth && s->target != TRIP_TARGET_RGBA32F)
         return trip_fail(TRIP_USAGE, "render", "depth",
                          "rounded layers have no depth; leave the target at rgba32f");
-    if (s->indexed && trip_settings_has_levels(s))
+    if (trip_settings_stays(s) && trip_settings_has_levels(s))
         return trip_fail(TRIP_USAGE, "render", "levels",
-                         "one vertex array holds only the finest level; use three lists");
-    if (s->indexed && s->clip.count > 0)
+                         "lists in GPU memory hold only the finest level; use --submit replicated");
+    if (trip_settings_stays(s) && s->clip.count > 0)
         return trip_fail(TRIP_USAGE, "render", "clipping",
-                         "one vertex array cannot be clipped; use three lists");
+                         "lists in GPU memory cannot be clipped; use --submit replicated");
     if (s->effects.shadows && s->headlight)
         return trip_fail(TRIP_USAGE, "render", "shadows",
                          "light from the eye casts no visible shadows; give its direction");
@@ -71,13 +72,14 @@ int trip_settings_check(const trip_settings *s)
     if (s->kernel == TRIP_KERNEL_NEAREST && s->samples_per_sheet != 2)
         return trip_fail(TRIP_USAGE, "render", "samples-per-sheet",
                          "nearest interpolation requires 2 samples per sheet");
-    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA)
+    if (s->footprint != TRIP_FOOTPRINT_EXACT || s->low_pass != TRIP_LOW_PASS_EWA ||
+        s->low_pass_px != TRIP_LOW_PASS_PX)
         return trip_fail(TRIP_USAGE, "render", "kernel",
                          "footprints and their low-pass filter apply to splats; use classify pre");
     if (s->traversal == TRIP_TRAVERSAL_ASCENDING)
         return trip_fail(TRIP_USAGE, "render", "traversal",
                          "classify post requires traversal outward");
-    if (s->target != TRIP_TARGET_RGBA32F || s->indexed || s->triangles)
+    if (s->target != TRIP_TARGET_RGBA32F || trip_settings_stays(s) || s->triangles)
         return trip_fail(TRIP_USAGE, "render", "settings",
                          "targets and forms of submission apply to splats; use classify pre");
     return 0;

@@ -15,9 +15,10 @@
  * footprint ends at 0. */
 #define TRIP_CUTOFF (10.0 / 3.0)
 #define TRIP_KERNEL_RADIUS_VOXELS 2.0
-/* Standard deviation of the low-pass Gaussian in pixels. The filter keeps splats from falling
- * between pixel centres. Zwicker et al. 2001 (EWA volume resampling filter) use 1 pixel. */
+/* Default standard deviation of the low-pass Gaussian in pixels. The filter keeps splats from
+ * falling between pixel centres. Zwicker et al. 2001 (EWA volume resampling filter) use 1 pixel. */
 #define TRIP_LOW_PASS_PX 0.4
+#define TRIP_LOW_PASS_PX_MAX 16.0
 typedef enum trip_method {
     TRIP_METHOD_MERGE, /* three layers blended by w^2 (2005, 5.2; 2008, 4.2) */
     TRIP_METHOD_CLIP,  /* each pixel from the list its ray is most aligned with (2005, 5.1) */
@@ -115,6 +116,7 @@ typedef struct trip_settings {
     trip_compositing compositing; /* of splats */
     trip_footprint footprint;     /* of splats */
     trip_low_pass low_pass;       /* of splats */
+    double low_pass_px;           /* its standard deviation, 0 to TRIP_LOW_PASS_PX_MAX */
     /* EWA footprints: how many times flatter kernels are along the gradient. 1 keeps them round. */
     double flatten;
     double sprite_px; /* width of fixed footprints, see trip_splat_sprite_px() */
@@ -125,7 +127,14 @@ typedef struct trip_settings {
     trip_method method;
     trip_traversal traversal;
     trip_target target;
-    bool indexed;              /* one vertex array with three index lists instead of three lists */
+    bool indexed;  /* one vertex array with three index lists instead of three lists */
+    bool resident; /* three vertex arrays that stay in GL memory */
+    /* Selects every brick of the lists that are drawn, as if nothing could be left out. For
+     * measurements of splats. */
+    bool unculled;
+    /* Culls splats by the weights of two points (2008, 5.4; weight.h). May lose splats. Not for
+     * cpu. */
+    bool two_point_culling;
     bool triangles;            /* bounding quads of two triangles instead of point sprites */
     bool depth;                /* also computes distances (layer.h); rgba32f only */
     bool shading;              /* diffuse and specular light */
@@ -151,12 +160,17 @@ typedef struct trip_settings {
     trip_field_kind field;
     double tolerance; /* of each component of a pixel, 0 to 1 */
     /* Rays per pixel along x and along y; their mean is the pixel's colour. Frames of other
-     * renderers are this many times larger instead. */
+     * renderers are this many times larger instead. 0 (integral renderer only) takes the mean over
+     * the area of the pixel, to the tolerance (integral/pixel_area.h). */
     int samples;
     trip_clip clip; /* the part of the volume to draw; world space */
     trip_show show;
     trip_effects effects;
 } trip_settings;
+
+/* The default tolerance of means over the areas of pixels: a quarter of 1/255. A tenth of it takes
+ * about four times as many rays. */
+#define TRIP_TOLERANCE_OF_AREAS 1e-3
 
 /* The weight parameter h by classification: layers blend at rays with a second component above h.
  * Splats use 0.85, as the papers do. In `post` the layers agree so well that a narrow border hides
@@ -195,6 +209,18 @@ static inline double trip_settings_early_termination(const trip_settings *s)
     return s->early_termination >= 0 ? s->early_termination
            : post                    ? TRIP_EARLY_TERMINATION_POST
                                      : TRIP_EARLY_TERMINATION_PRE;
+}
+
+/* Returns the standard deviation of the low-pass filter in pixels; 0 without a filter. */
+static inline double trip_settings_low_pass_px(const trip_settings *s)
+{
+    return s->low_pass == TRIP_LOW_PASS_NONE ? 0 : s->low_pass_px;
+}
+
+/* Whether all splats stay in GL memory between frames. */
+static inline bool trip_settings_stays(const trip_settings *s)
+{
+    return s->indexed || s->resident;
 }
 
 /* Whether splats are added sheet by sheet. */

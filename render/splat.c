@@ -8,9 +8,7 @@
  * |r_c| |forward| is at least 1. */
 static double low_pass2_of(const trip_camera *c, const trip_settings *settings)
 {
-    const double px2 = TRIP_LOW_PASS_PX * TRIP_LOW_PASS_PX;
-    if (settings->low_pass == TRIP_LOW_PASS_NONE)
-        return 0;
+    const double px = trip_settings_low_pass_px(settings), px2 = px * px;
     if (c->ortho)
         return px2;
     const double xx = trip_dot(c->rx, c->rx), yy = trip_dot(c->ry, c->ry);
@@ -175,8 +173,7 @@ static void set_fixed(const trip_splat_frame *f, double z, trip_splat *s)
 
 double trip_splat_fixed_radius_px(const trip_settings *settings)
 {
-    return hypot(settings->sprite_px / 2,
-                 settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : TRIP_CUTOFF * TRIP_LOW_PASS_PX);
+    return hypot(settings->sprite_px / 2, TRIP_CUTOFF * trip_settings_low_pass_px(settings));
 }
 
 /* Returns the cosine of the angle between the axis of view and the ray through a point; 1 in

@@ -24,18 +24,18 @@
  * ---------------
  * EWA volume splatting convolves the footprint with a screen filter (Zwicker et al. 2001). The
  * filter adds to the covariance and keeps the integral:
- *     S' = S + TRIP_LOW_PASS_PX^2 I
+ *     S' = S + w^2 I,  w = trip_settings_low_pass_px()                                [px^2]
  *     m(p)       = g(p) q^T S'^-1 q                                    squared radius, in std devs
  *     edge       = exp(-TRIP_CUTOFF^2 / 2)
  *     amplitude  = 1 / (2 pi sigma^2) sqrt(|S| / |S'|) / (1 - edge (1 + TRIP_CUTOFF^2 / 2))
  *     footprint' = front(p) amplitude (exp(-m(p) / 2) - edge)
  *                                                       where m(p) <= TRIP_CUTOFF^2, else nothing
+ *
  * In a wide view a pixel in the middle of the picture spans so much that the filter's support would
- * have no end: g(p) falls as fast as q^2 grows, from TRIP_CUTOFF TRIP_LOW_PASS_PX |rx| = |r_c| on.
- * There the filter is narrower than TRIP_LOW_PASS_PX: its rays differ from r_c by at most
- * TRIP_SPLAT_AFFINE |r_c|, the bound of affine footprints. With square pixels and cubic voxels,
- * this begins where tan(fov / 2) exceeds 0.1875 times the height in pixels: at 174 degrees for 100
- * pixels, at 179.4 degrees for 1024.
+ * have no end: g(p) falls as fast as q^2 grows, from TRIP_CUTOFF w |rx| = |r_c| on. There w is
+ * smaller, so that the filter's rays differ from r_c by at most TRIP_SPLAT_AFFINE |r_c|, the bound
+ * of affine footprints. With w = 0.4, square pixels and cubic voxels, this begins where tan(fov /
+ * 2) exceeds 0.1875 times the height in pixels: at 174 degrees for 100 pixels, at 179.4 for 1024.
  *
  * The footprint ends at zero, so that rounding at its edge is not visible. The last factor of the
  * amplitude restores the mass that the cut-off removes.
@@ -94,7 +94,7 @@
  * For near splats z may be 0, so m(p) and |S'| are computed across the ray, with the same values.
  * Let c = v - eye, let e1 and e2 be unit vectors at right angles to c and to one another, and let
  * rho(a) = (e1.a, e2.a). Then
- *     W    = I + (TRIP_LOW_PASS_PX max(0, z) / sigma)^2 (rho(rx) rho(rx)^T + rho(ry) rho(ry)^T)
+ *     W    = I + (w max(0, z) / sigma)^2 (rho(rx) rho(rx)^T + rho(ry) rho(ry)^T)
  *     m(p) = (|c| / sigma)^2 rho(r(p))^T W^-1 rho(r(p)) / |r(p)|^2,   |S| / |S'| = 1 / |W|
  *     s(p) = c.r(p) / (sigma |r(p)|)
  * Behind the eye there is no low-pass filter. In parallel views the formulas hold with three

@@ -14,6 +14,7 @@ libraries=$(scripts/install-dependencies.sh --libraries)
 release=$(. /etc/os-release && echo "$VERSION_CODENAME")
 root=$(pwd)/build/arm64-sysroot
 if [ "$(cat "$root/packages" 2>/dev/null)" != "$release $libraries" ]; then
+    echo "Fetching and unpacking ARM's packages takes minutes"
     mirror=$(scripts/mirror.sh "$release")
     mkdir -p build
     rm -rf "$root"

@@ -2,8 +2,8 @@
 // In: the storage blocks of the batch, with blocks and normals as in the files. Out: position
 // relative to the eye (list axes), code and normal.
 // Mirrors stream/block.h. With INDEXED a run refers to the order array of its list, which holds
-// indices into one array of vertices (x, y, z and code, 16 bits each). With UNEVEN a table gives
-// the positions of voxels (coordinates.h).
+// indices into one array of vertices (x, y, z and code, 16 bits each). With RESIDENT too, a run refers
+// to the vertices of its axis. With UNEVEN a table gives the positions of voxels (coordinates.h).
 #include "real.glsl"
 #include "effects.glsl"
 
@@ -12,7 +12,9 @@ layout(std430, binding = TRIP_GL_RUN_OF) readonly buffer trip_gl_run_of { uint r
 layout(std430, binding = TRIP_GL_NORMALS) readonly buffer trip_gl_normals { uint normals[]; };
 #ifdef INDEXED
 layout(std430, binding = TRIP_GL_VERTICES) readonly buffer trip_gl_vertices { uvec2 vertices[]; };
+#ifndef RESIDENT
 layout(std430, binding = TRIP_GL_ORDER) readonly buffer trip_gl_order { uint order[]; };
+#endif
 #else
 layout(std430, binding = TRIP_GL_VOXELS) readonly buffer trip_gl_voxels { uint voxels[]; };
 layout(std430, binding = TRIP_GL_SQUARES) readonly buffer trip_gl_squares { trip_gl_square squares[]; };
@@ -132,7 +134,11 @@ record fetch_record(uint position)
     record r;
 #ifdef INDEXED
     trip_gl_run run = runs[run_of[position]];
+#ifdef RESIDENT
+    uint at = uint(run.first + run.step * int(position));
+#else
     uint at = order[uint(run.first + run.step * int(position))];
+#endif
     real3 offset = offset_of(at, r.code);
     const ivec3 origin = ivec3(0);
 #else

@@ -49,12 +49,19 @@ bool goes(real2 pixel, int axis, int way)
     return way == TRIP_GL_WAY_ANY || (pixel_ray(pixel)[axis] >= 0.0) == (way == TRIP_GL_WAY_UP);
 }
 
-// Mirrors trip_weight_may_reach() for a splat in list axes. The plan has already culled by constant
-// weights.
+// Mirrors trip_weight_may_reach() for a splat in list axes, or trip_weight_of_two_points() with
+// TWO_POINTS. The plan has already culled by constant weights.
 bool may_reach(real3 from_eye, real radius)
 {
 #ifdef WEIGHT_IS_CONSTANT
     return true;
+#elif defined(TWO_POINTS)
+    int axis = int(weight.z);
+    real3 right = real3(camera_rx[axis], camera_rx[(axis + 1) % 3], camera_rx[(axis + 2) % 3]);
+    right *= 0.5 * sqrt(kernel.x * kernel.y) / length(right);
+    real3 c = from_eye * to_grid.xyz, beside = c + right * to_grid.xyz;
+    real w = abs(c.x) / largest_of(c) - weight.x, v = abs(beside.x) / largest_of(beside) - weight.x;
+    return w + abs(w - v) > 0.0;
 #else
     real3 c = from_eye * to_grid.xyz;
     real bound = abs(c.x) - weight.x * largest_of(c) + weight.y * (radius * to_grid.w);

@@ -71,6 +71,7 @@ static void add_document(cJSON *root, trip_viewer *v)
         cJSON_AddStringToObject(root, "camera", camera);
     cJSON_AddNumberToObject(root, "width", v->width);
     cJSON_AddNumberToObject(root, "height", v->height);
+    cJSON_AddItemToObject(root, "pointer", cJSON_CreateDoubleArray(v->at, 2));
     free(camera);
 }
 

@@ -100,22 +100,20 @@ static bool lies_still(trip_player *p, const trip_player_window *w, const trip_e
     return still;
 }
 
-/* Presses and releases in separate pictures. */
+/* The window presses and releases in separate pictures. */
 static int play_click(trip_player *p, const trip_player_window *w, const trip_event *e,
                       double seconds)
 {
-    if (p->phase == 0 && !lies_still(p, w, e))
+    if (!lies_still(p, w, e))
         return is_late(p, seconds, 10) ? trip_fail(TRIP_ERROR, "script", e->text,
                                                    "the panel has no control with this label")
                                        : 1;
-    if (p->phase == 0)
+    w->send(w->user,
+            &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = p->position[0], .y = p->position[1] });
+    for (int down = 1; down >= 0; down--)
         w->send(w->user,
-                &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = p->position[0], .y = p->position[1] });
-    else if (p->phase >= 2)
-        w->send(w->user, &(trip_event){ .kind = TRIP_EVENT_BUTTON,
-                                        .code = TRIP_BUTTON_LEFT,
-                                        .down = p->phase == 2 });
-    return p->phase++ < 3;
+                &(trip_event){ .kind = TRIP_EVENT_BUTTON, .code = TRIP_BUTTON_LEFT, .down = down });
+    return 0;
 }
 
 static int play_resize(trip_player *p, const trip_player_window *w, const trip_event *e,

@@ -688,6 +688,7 @@ static void on_key(trip_viewer *v, const trip_event *e)
         return;
     v->modifiers = e->modifiers;
     v->held[e->code] = e->down;
+    v->tapped[e->code] |= e->down;
     if (e->down)
         press(v, e->code);
 }
@@ -696,6 +697,7 @@ void trip_viewer_let_go(trip_viewer *v)
 {
     memset(v->buttons, 0, sizeof v->buttons);
     memset(v->held, 0, sizeof v->held);
+    memset(v->tapped, 0, sizeof v->tapped);
 }
 
 /* A dropped transfer function applies to the current data set. */
@@ -754,11 +756,16 @@ void trip_viewer_event(trip_viewer *v, const trip_event *e)
 
 /* ---- time ---- */
 
-/* Flies the distance to the point looked at in 1.5 s; with shift, four times as fast. */
+/* Flies the distance to the point looked at in 1.5 s; with shift, four times as fast. A key that
+ * was pressed and released between two ticks flies for one tick. */
 static bool fly(trip_viewer *v, double seconds)
 {
     trip_document *d = navigable(v);
-    const bool *k = v->held;
+    bool k[TRIP_KEYS];
+    for (int i = 0; i < TRIP_KEYS; i++)
+        k[i] = v->held[i] || v->tapped[i];
+    if (seconds > 0)
+        memset(v->tapped, 0, sizeof v->tapped);
     if (!d)
         return false;
     const double way = depth_of(d) / 1.5 * fmin(seconds, 0.1) * (v->modifiers & TRIP_SHIFT ? 4 : 1);

@@ -55,6 +55,7 @@ typedef struct trip_viewer {
     double at[2];               /* pointer position, px */
     bool buttons[TRIP_BUTTONS]; /* held since a press in the picture */
     bool held[TRIP_KEYS];       /* keys held */
+    bool tapped[TRIP_KEYS];     /* keys pressed since the last tick, held or not */
     unsigned modifiers;
     double probed[2];            /* position of the last probe, px */
     trip_navigation probed_from; /* view of the last probe */

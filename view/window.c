@@ -8,6 +8,7 @@
 
 #include "blit.h"
 #include "gauges.h"
+#include "input_queue.h"
 #include "panel.h"
 #include "player.h"
 #include "report.h"
@@ -30,10 +31,13 @@ typedef struct window {
     trip_panel *panel;
     trip_blit *blit;
     atomic_bool woken;
+    trip_input_queue queue;
     int to_draw;        /* pictures of the window still to draw */
     bool hidden;        /* minimised */
     trip_picture shown; /* in the texture; its pixels are gone */
     double last;        /* time of the viewer's last tick, seconds */
+    double panel_at;    /* time of the panel's last picture, seconds */
+    double sent_at;     /* arrival of the last event sent since that picture; 0 if none */
     double input_at;    /* time of the oldest input without a picture yet; 0 if none */
     trip_gauges gauges;
     trip_player player;
@@ -52,11 +56,12 @@ static int fail_of_glfw(const char *where)
 
 /* ---- input ---- */
 
-static void note_input(window *w)
+static void note_input(window *w, double seconds)
 {
     w->to_draw = PICTURES_AFTER_INPUT;
+    w->sent_at = seconds;
     if (w->input_at == 0)
-        w->input_at = glfwGetTime();
+        w->input_at = seconds;
 }
 
 static bool is_of_pointer(const trip_event *e)
@@ -82,12 +87,12 @@ static bool is_for_panel(const window *w, const trip_event *e)
 }
 
 /* Both the panel and the picture get releases and pointer moves. */
-static void send(window *w, const trip_event *e)
+static void send(window *w, const trip_event *e, double seconds)
 {
     trip_viewer *v = &w->viewer;
     const bool for_panel = is_for_panel(w, e);
     const bool begins = e->down && (e->kind == TRIP_EVENT_KEY || e->kind == TRIP_EVENT_BUTTON);
-    note_input(w);
+    note_input(w, seconds);
     if (e->kind == TRIP_EVENT_ICONIFY)
         w->hidden = e->down;
     if (for_panel || !begins || (e->kind == TRIP_EVENT_BUTTON && !is_held(v)))
@@ -96,6 +101,28 @@ static void send(window *w, const trip_event *e)
         trip_viewer_event(v, e);
     else if (e->kind == TRIP_EVENT_MOVE)
         memcpy(v->at, (double[2]){ e->x, e->y }, sizeof v->at);
+}
+
+static bool draws_pictures(const window *w)
+{
+    return !w->hidden && w->viewer.width > 0 && w->viewer.height > 0;
+}
+
+/* Sends the events that need no picture before them. */
+static void send_queued(window *w)
+{
+    trip_queued_event one;
+    while (trip_input_queue_next(&w->queue, &one)) {
+        send(w, &one.event, one.seconds);
+        free(one.event.text);
+        if (!draws_pictures(w))
+            trip_input_queue_drawn(&w->queue);
+    }
+}
+
+static void queue(window *w, const trip_event *e)
+{
+    trip_input_queue_push(&w->queue, e, glfwGetTime());
 }
 
 static unsigned modifiers_of(int mods)
@@ -116,23 +143,23 @@ static void on_move(GLFWwindow *glfw, double x, double y)
 {
     window *w = glfwGetWindowUserPointer(glfw);
     const double ratio = pixels_a_unit(w);
-    send(w, &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = x * ratio, .y = y * ratio });
+    queue(w, &(trip_event){ .kind = TRIP_EVENT_MOVE, .x = x * ratio, .y = y * ratio });
 }
 
 static void on_button(GLFWwindow *glfw, int button, int action, int mods)
 {
     if (button >= TRIP_BUTTONS)
         return;
-    send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_BUTTON,
-                                                        .code = button,
-                                                        .modifiers = modifiers_of(mods),
-                                                        .down = action == GLFW_PRESS });
+    queue(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_BUTTON,
+                                                         .code = button,
+                                                         .modifiers = modifiers_of(mods),
+                                                         .down = action == GLFW_PRESS });
 }
 
 static void on_wheel(GLFWwindow *glfw, double x, double y)
 {
     (void)x;
-    send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_WHEEL, .y = y });
+    queue(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_WHEEL, .y = y });
 }
 
 /* Maps letters and digits by the user's keyboard layout. */
@@ -170,22 +197,22 @@ static void on_key(GLFWwindow *glfw, int key, int scancode, int action, int mods
     const int code = key_of(key, scancode);
     if (code < 0 || action == GLFW_REPEAT)
         return;
-    send(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_KEY,
-                                                        .code = code,
-                                                        .modifiers = modifiers_of(mods),
-                                                        .down = action == GLFW_PRESS });
+    queue(glfwGetWindowUserPointer(glfw), &(trip_event){ .kind = TRIP_EVENT_KEY,
+                                                         .code = code,
+                                                         .modifiers = modifiers_of(mods),
+                                                         .down = action == GLFW_PRESS });
 }
 
 static void on_text(GLFWwindow *glfw, unsigned code)
 {
     window *w = glfwGetWindowUserPointer(glfw);
-    send(w, &(trip_event){ .kind = TRIP_EVENT_TEXT, .code = (int)code });
+    queue(w, &(trip_event){ .kind = TRIP_EVENT_TEXT, .code = (int)code });
 }
 
 static void on_size(GLFWwindow *glfw, int width, int height)
 {
     window *w = glfwGetWindowUserPointer(glfw);
-    send(w, &(trip_event){ .kind = TRIP_EVENT_RESIZE, .x = width, .y = height });
+    queue(w, &(trip_event){ .kind = TRIP_EVENT_RESIZE, .x = width, .y = height });
 }
 
 static void on_drop(GLFWwindow *glfw, int count, const char **paths)
@@ -193,8 +220,8 @@ static void on_drop(GLFWwindow *glfw, int count, const char **paths)
     for (int i = 0; i < count; i++) {
         char *path = strdup(paths[i]);
         if (path)
-            send(glfwGetWindowUserPointer(glfw),
-                 &(trip_event){ .kind = TRIP_EVENT_DROP, .text = path });
+            queue(glfwGetWindowUserPointer(glfw),
+                  &(trip_event){ .kind = TRIP_EVENT_DROP, .text = path });
         free(path);
     }
 }
@@ -202,14 +229,14 @@ static void on_drop(GLFWwindow *glfw, int count, const char **paths)
 static void on_iconify(GLFWwindow *glfw, int iconified)
 {
     window *w = glfwGetWindowUserPointer(glfw);
-    send(w, &(trip_event){ .kind = TRIP_EVENT_ICONIFY, .down = iconified });
+    queue(w, &(trip_event){ .kind = TRIP_EVENT_ICONIFY, .down = iconified });
 }
 
 static void on_focus(GLFWwindow *glfw, int focused)
 {
     window *w = glfwGetWindowUserPointer(glfw);
     if (!focused && !w->plays)
-        trip_viewer_let_go(&w->viewer);
+        trip_input_queue_release_all(&w->queue, glfwGetTime());
 }
 
 static void on_refresh(GLFWwindow *glfw)
@@ -248,7 +275,7 @@ static void play_event(void *user, const trip_event *e)
         glfwIconifyWindow(w->glfw);
     else if (e->kind == TRIP_EVENT_ICONIFY)
         glfwRestoreWindow(w->glfw);
-    send(w, e);
+    queue(w, e);
 }
 
 /* Returns whether the complete picture is in the texture. */
@@ -311,7 +338,7 @@ static int play(window *w)
     const trip_player_window methods = { w,          play_event, play_rests, play_has_size,
                                          play_find,  play_shoot, play_save,  play_saved,
                                          play_report };
-    if (!w->plays || w->shot)
+    if (!w->plays || w->shot || w->queue.count)
         return 0;
     w->player.width = w->viewer.width;
     w->player.height = w->viewer.height;
@@ -372,16 +399,27 @@ static void clear(const window *w)
     trip_blit_clear(v->width, v->height, colour[0], colour[1], colour[2]);
 }
 
-static int draw(window *w, double seconds)
+/* Advances the panel's clock and returns the seconds since its last picture. Events that waited for
+ * slow pictures keep their times, so that two quick clicks remain a double click. */
+static double tick_panel(window *w)
 {
-    const trip_viewer *v = &w->viewer;
-    if (w->hidden || v->width < 1 || v->height < 1) {
-        w->input_at = 0; /* no picture answers the input */
+    const double now = w->sent_at > 0 ? w->sent_at : glfwGetTime();
+    const double seconds = fmax(now - w->panel_at, 0);
+    w->panel_at += seconds;
+    w->sent_at = 0;
+    return seconds;
+}
+
+static int draw(window *w)
+{
+    if (!draws_pictures(w)) {
+        w->input_at = w->sent_at = 0; /* no picture answers the input */
         return 0;
     }
     clear(w);
     draw_picture(w);
-    trip_panel_draw(w->panel, &w->viewer, seconds);
+    trip_panel_draw(w->panel, &w->viewer, tick_panel(w));
+    trip_input_queue_drawn(&w->queue);
     int status = w->shot ? write_shot(w) : 0;
     glfwSwapBuffers(w->glfw);
     if (w->input_at > 0)
@@ -500,6 +538,7 @@ static int pass(window *w)
     int status = play(w);
     if (status)
         return status;
+    send_queued(w);
     const double now = glfwGetTime(), seconds = now - w->last;
     w->last = now;
     if (atomic_exchange(&w->woken, false) && !w->to_draw)
@@ -507,10 +546,12 @@ static int pass(window *w)
     const bool goes_on = trip_viewer_tick(&w->viewer, seconds);
     trip_frames_use_picture(w->frames, w->shown.number, upload, w);
     show_title(w);
-    if (w->to_draw || goes_on)
-        status = draw(w, seconds);
+    if (w->to_draw || goes_on || w->queue.count)
+        status = draw(w);
     w->to_draw -= w->to_draw > 0;
-    if (w->plays)
+    if (w->queue.count)
+        glfwPollEvents();
+    else if (w->plays)
         glfwWaitEventsTimeout(script_seconds);
     else if (w->to_draw || goes_on)
         glfwWaitEventsTimeout(0.008);
@@ -538,6 +579,7 @@ static void close_window(window *w)
     trip_panel_destroy(w->panel);
     trip_blit_destroy(w->blit);
     trip_script_free(&w->player.script);
+    trip_input_queue_free(&w->queue);
     triptych_destroy(w->t);
     free(w->shot);
     if (w->glfw)

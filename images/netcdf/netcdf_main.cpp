@@ -89,6 +89,7 @@ int main()
      * whether to end a request. */
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGHUP, SIG_IGN);
+    std::signal(SIGQUIT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     (void)trip_sandbox_enter(); /* continues without a sandbox if the kernel has none */
     Session session;

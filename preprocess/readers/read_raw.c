@@ -12,6 +12,7 @@
 #include "dense_file.h"
 #include "report.h"
 #include "volume_reader.h"
+#include "text.h"
 
 /* Returns the length of the path without ".gz" or ".bz2". */
 static size_t uncompressed_length(const char *path)
@@ -62,7 +63,7 @@ static bool raw_probe(const char *path, const unsigned char *head, size_t bytes,
 
 static int no_size(const char *path)
 {
-    char header[4096];
+    char header[4096], *word = NULL;
     size_t stem = uncompressed_length(path);
     if (stem > 4 && stem < sizeof header - 8) {
         snprintf(header, sizeof header, "%.*s.nhdr", (int)(stem - 4), path);
@@ -72,9 +73,13 @@ static int no_size(const char *path)
                              "--type to `triptych brick`",
                              header);
     }
-    return trip_fail(TRIP_USAGE, "read", path,
-                     "has no header: describe it with `triptych brick FILE --size X,Y,Z --type "
-                     "uint8` (also --spacing, --endian and --offset)");
+    word = trip_text_word(path);
+    int status = trip_fail(TRIP_USAGE, "read", path,
+                           "has no header: describe it with `triptych brick %s --size X,Y,Z --type "
+                           "uint8` (also --spacing, --endian and --offset)",
+                           word ? word : "FILE");
+    free(word);
+    return status;
 }
 
 /* Takes the layout from the options, and missing parts from the file's name. */

@@ -33,14 +33,21 @@ static void write_volume_params(FILE *f, const trip_volume_params *v)
         fprintf(f, "%" PRId64 " %a\n", v->raw_dims[a], v->spacing[a]);
 }
 
-static void write_params(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
+/* Writes the parameters of the stored form. */
+static void write_form(FILE *f, const trip_brick_params *p)
 {
     const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
-    fprintf(f, "%d %d %d %d %d %d %d %u %u %d %d %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION,
-            p->keep_all, p->automatic, (int)p->code_bits, (int)p->normals, p->no_halo,
-            p->tile_voxels, p->slab_sheets, p->levels, kinds.means, kinds.values);
+    fprintf(f, "%d %d %d %d %d %u %u %d %d %d\n", BRICKER_VERSION, TRIP_FORMAT_VERSION,
+            (int)p->code_bits, (int)p->normals, p->no_halo, p->tile_voxels, p->slab_sheets,
+            p->levels, kinds.means, kinds.values);
     for (int a = 0; a < 3 && !trip_region_is_whole(&p->region); a++)
         fprintf(f, "%" PRId64 ":%" PRId64 "\n", p->region.first[a], p->region.past[a]);
+}
+
+/* Writes the parameters of the opacity envelope. */
+static void write_kept(FILE *f, const trip_brick_params *p, trip_tf *const *functions)
+{
+    fprintf(f, "%d %d\n", p->keep_all, p->automatic);
     for (size_t i = 0; i < p->range_count; i++)
         fprintf(f, "%a %a\n", p->ranges[i].lo, p->ranges[i].hi);
     for (size_t i = 0; i < p->function_count; i++) {
@@ -55,20 +62,26 @@ static int fail_memory(const trip_brick_params *p)
     return trip_fail(TRIP_ERROR, "brick", p->input, "out of memory");
 }
 
-/* Returns the parameters after the input's name, for free(). */
+enum { FORM = 1, KEPT = 2 };
+
+/* Returns the parameters that `parts` names, for free(). `input` is their first line. */
 static int make_text(const trip_brick_params *p, const char *input, trip_tf *const *functions,
-                     char **out)
+                     int parts, char **out)
 {
     size_t bytes;
     FILE *f = open_memstream(out, &bytes);
     if (!f)
         return fail_memory(p);
     fputs(input, f);
-    if (p->input && trip_volume_is_named_labels(p->input)) /* chooses the kind of the volume */
-        fputs("labels\n", f);
     locale_t before = trip_text_use_points();
-    write_volume_params(f, &p->volume);
-    write_params(f, p, functions);
+    if (parts & FORM) {
+        if (p->input && trip_volume_is_named_labels(p->input)) /* chooses the kind of the volume */
+            fputs("labels\n", f);
+        write_volume_params(f, &p->volume);
+        write_form(f, p);
+    }
+    if (parts & KEPT)
+        write_kept(f, p, functions);
     uselocale(before);
     return fclose(f) == 0 ? 0 : fail_memory(p);
 }
@@ -78,7 +91,7 @@ int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, u
     trip_source source = { 0 };
     trip_digest state;
     char *text = NULL;
-    int status = make_text(p, p->input, functions, &text);
+    int status = make_text(p, p->input, functions, FORM | KEPT, &text);
     if (status == 0)
         status = trip_source_find(&source, p->input, &p->volume);
     if (status == 0)
@@ -98,12 +111,17 @@ static int load_functions(const trip_brick_params *p, trip_tf **functions)
     return status;
 }
 
-int trip_brick_options_text(const trip_brick_params *p, char **out)
+int trip_brick_form_text(const trip_brick_params *p, char **out)
+{
+    return make_text(p, "", NULL, FORM, out);
+}
+
+int trip_brick_kept_text(const trip_brick_params *p, char **out)
 {
     trip_tf **functions = calloc(p->function_count + 1, sizeof *functions);
     int status = functions ? load_functions(p, functions) : fail_memory(p);
     if (status == 0)
-        status = make_text(p, "", functions, out);
+        status = make_text(p, "", functions, KEPT, out);
     for (size_t i = 0; functions && i < p->function_count; i++)
         trip_tf_destroy(functions[i]);
     free(functions);

@@ -11,8 +11,11 @@
  * failures. */
 int trip_brick_identity(const trip_brick_params *p, trip_tf *const *functions, uint64_t *out);
 
-/* Returns all parameters except input, memory and threads as text, for free(), with the versions of
- * the bricker and the format. Loads the transfer functions that the parameters name. */
-int trip_brick_options_text(const trip_brick_params *p, char **out);
+/* Return parameters as text, for free(). The first text has all parameters except the input,
+ * memory, threads and the opacity envelope, and the versions of the bricker and the format. The
+ * second text has the parameters of the opacity envelope, with the transfer functions, which it
+ * loads. */
+int trip_brick_form_text(const trip_brick_params *p, char **out);
+int trip_brick_kept_text(const trip_brick_params *p, char **out);
 
 #endif

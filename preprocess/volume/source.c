@@ -102,12 +102,23 @@ static int begin(XXH3_state_t **hash, const trip_source *s, const char *text)
     return 0;
 }
 
+static trip_digest digest_of(XXH128_hash_t h)
+{
+    trip_digest out;
+    snprintf(out.text, sizeof out.text, "%016llx%016llx", (unsigned long long)h.high64,
+             (unsigned long long)h.low64);
+    return out;
+}
+
 static void end(XXH3_state_t *hash, trip_digest *out)
 {
-    XXH128_hash_t h = XXH3_128bits_digest(hash);
-    snprintf(out->text, sizeof out->text, "%016llx%016llx", (unsigned long long)h.high64,
-             (unsigned long long)h.low64);
+    *out = digest_of(XXH3_128bits_digest(hash));
     XXH3_freeState(hash);
+}
+
+trip_digest trip_source_digest_text(const char *text)
+{
+    return digest_of(XXH3_128bits(text, strlen(text)));
 }
 
 static void add_state(XXH3_state_t *hash, const trip_source_file *f)

@@ -38,6 +38,9 @@ typedef struct trip_digest {
     char text[33];
 } trip_digest;
 
+/* Hashes a text alone. */
+trip_digest trip_source_digest_text(const char *text);
+
 /* Hashes `text` with the files' paths, inodes, lengths and times. */
 int trip_source_digest_state(const trip_source *s, const char *text, trip_digest *out);
 

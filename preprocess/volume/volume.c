@@ -20,6 +20,7 @@
 #include "sampled.h"
 #include "volume_coordinates.h"
 #include "volume_reader.h"
+#include "text.h"
 
 #define HEAD_BYTES TRIP_OTHER_HEAD_BYTES
 /* The default size of a portion. */
@@ -174,9 +175,13 @@ static int refuse_unknown(const char *path, const unsigned char *head, size_t by
         return status;
     if (trip_other_file_tell(path, head, bytes, text))
         return trip_fail(TRIP_ERROR, "read", path, "%s", text);
-    return trip_fail(TRIP_ERROR, "read", path,
-                     "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe raw "
-                     "data with `triptych brick FILE --size X,Y,Z --type uint8`");
+    char *word = trip_text_word(path);
+    status = trip_fail(TRIP_ERROR, "read", path,
+                       "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe "
+                       "raw data with `triptych brick %s --size X,Y,Z --type uint8`",
+                       word ? word : "FILE");
+    free(word);
+    return status;
 }
 
 int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,

@@ -62,6 +62,14 @@ bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axi
     return s->method == TRIP_METHOD_CLIP ? bound >= 0 : bound > 0;
 }
 
+bool trip_weight_of_two_points(const trip_settings *s, int axis, trip_vec3 centre_from_eye,
+                               trip_vec3 beside)
+{
+    const double w = trip_weight_signed(s, centre_from_eye, axis);
+    const double v = trip_weight_signed(s, trip_add(centre_from_eye, beside), axis);
+    return w + fabs(w - v) > 0;
+}
+
 trip_ray_bounds trip_ray_bounds_of(const double lo[3], const double hi[3])
 {
     trip_ray_bounds b;

@@ -38,6 +38,13 @@ static inline double trip_weight_h(const trip_settings *s)
 bool trip_weight_may_reach(const trip_settings *s, const trip_camera *c, int axis_of_view, int axis,
                            trip_vec3 centre_from_eye, double radius);
 
+/* The test of 2008, section 5.4: returns w + |w - v| > 0. Here w is the weight of the ray through
+ * the centre, and v of the ray through a point half a kernel's radius b beside it. `beside` is the
+ * camera's right vector, b / 2 long. The test is exact only if the weight changes alike on all
+ * sides of the centre. For merge in perspective. */
+bool trip_weight_of_two_points(const trip_settings *s, int axis, trip_vec3 centre_from_eye,
+                               trip_vec3 beside);
+
 /* The direction of a ray along a list's axis. A ray that goes up meets the sheets in ascending
  * order, a ray that goes down in descending order. */
 typedef enum trip_way { TRIP_WAY_ANY, TRIP_WAY_UP, TRIP_WAY_DOWN } trip_way;

@@ -64,6 +64,7 @@ static void fill_list(trip_gl_constants *c, const trip_frame *frame, const trip_
         .sheet_cost = trip_settings_sum_sheets(&settings) ? sheet_cost(frame->camera) : 0,
         .tile_voxels = (double)(1u << frame->data->header.tile_log2),
         .kernel_radius = settings.kernel_radius,
+        .low_pass_px = trip_settings_low_pass_px(&settings),
         .quads = settings.triangles,
         .sprite_depth = trip_gl_frame_sprite_depth(&settings, camera, ratio, point_size_px),
         .near_depth = trip_gl_frame_near_depth(&settings, camera, ratio),

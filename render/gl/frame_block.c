@@ -254,8 +254,10 @@ unsigned trip_gl_frame_effects(const trip_frame *frame, const trip_camera *camer
         effects |= TRIP_GL_FLATTENED;
     if (effects & (TRIP_GL_SHADED | TRIP_GL_FLATTENED) && frame->data->header.normal_bytes == 3)
         effects |= TRIP_GL_COMPACT;
-    if (s->indexed)
-        effects |= TRIP_GL_INDEXED;
+    if (trip_settings_stays(s))
+        effects |= TRIP_GL_INDEXED | (s->indexed ? 0 : TRIP_GL_RESIDENT);
+    if (s->two_point_culling && s->method == TRIP_METHOD_MERGE && !camera->ortho)
+        effects |= TRIP_GL_TWO_POINTS;
     if (s->depth)
         effects |= TRIP_GL_DEPTH;
     effects |= trip_gl_frame_placed(s);
@@ -308,7 +310,7 @@ double trip_gl_frame_sprite_depth(const trip_settings *settings, const trip_came
     double k = fabs(trip_dot(c->r0, normal)), r_min = k / trip_length(normal);
     if (settings->footprint == TRIP_FOOTPRINT_EWA)
         r_max *= 1 + ratio * TRIP_SPLAT_AFFINE / (1 - TRIP_SPLAT_AFFINE);
-    double room = half - TRIP_CUTOFF * TRIP_LOW_PASS_PX * r_max / r_min;
+    double room = half - TRIP_CUTOFF * trip_settings_low_pass_px(settings) * r_max / r_min;
     double wide = fmax(trip_length(c->rx), trip_length(c->ry));
     return room > 0 ? settings->kernel_radius * wide * r_max / (k * room) : HUGE_VAL;
 }

@@ -34,9 +34,11 @@ enum trip_gl_effect {
     TRIP_GL_EMISSION = 524288,
     TRIP_GL_PLACED = TRIP_GL_CUED | TRIP_GL_SHADOWS | TRIP_GL_OCCLUSION | TRIP_GL_EMISSION,
     TRIP_GL_CLOSED = 1048576,
-    TRIP_GL_EXACT = 2097152,   /* post: sheets hold exact draw codes (draw_codes.h) */
-    TRIP_GL_NEAREST = 4194304, /* values and outlines of the nearest voxels (render/sheet.h) */
-    TRIP_GL_EFFECT_SETS = 8388608,
+    TRIP_GL_EXACT = 2097152,    /* post: sheets hold exact draw codes (draw_codes.h) */
+    TRIP_GL_NEAREST = 4194304,  /* values and outlines of the nearest voxels (render/sheet.h) */
+    TRIP_GL_RESIDENT = 8388608, /* with INDEXED: an array of vertices for each list, no indices */
+    TRIP_GL_TWO_POINTS = 16777216, /* culls by trip_weight_of_two_points() */
+    TRIP_GL_EFFECT_SETS = 33554432,
 };
 
 /* Returns x minus x rounded to float. The variable is volatile because GCC 12 replaces

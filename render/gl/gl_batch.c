@@ -251,7 +251,7 @@ static bool needs_quads(const trip_gl_placing *p, double depth)
 /* Returns an upper bound on the length of a splat at a depth along a pixel step of the camera. */
 static double length_px(const trip_gl_placing *p, trip_vec3 step, double depth, double image_px)
 {
-    double low_pass = 2 * TRIP_CUTOFF * TRIP_LOW_PASS_PX;
+    double low_pass = 2 * TRIP_CUTOFF * p->low_pass_px;
     double px = low_pass + 2 * p->kernel_radius / (depth * trip_length(step));
     return depth > 0 ? fmin(px, image_px) : image_px;
 }

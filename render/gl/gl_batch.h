@@ -21,6 +21,7 @@ typedef struct trip_gl_placing {
     int axis;
     double tile_voxels;
     double kernel_radius; /* of the widest kernel */
+    double low_pass_px;   /* see trip_settings_low_pass_px() */
     bool quads;           /* always draws quads */
     double sprite_depth;  /* draws quads below this depth; see trip_gl_frame_sprite_depth() */
     double near_depth;    /* see trip_gl_frame_near_depth() */

@@ -52,7 +52,7 @@ typedef struct gl_renderer {
     bool in_batch;             /* the batch is not completely drawn */
     bool prepared;             /* prepare() has finished for this frame */
     const trip_gl_band *band;  /* the current band */
-    trip_gl_resident resident; /* only for the submission form "indexed" */
+    trip_gl_resident resident; /* for the submission forms indexed and resident */
     GLuint vertex_array, quad_indices;
     GLuint counts;
     trip_gl_constants constants;
@@ -150,8 +150,9 @@ static int prepare(gl_renderer *r)
         status = trip_gl_lattices_begin(&r->lattices, r->context, frame);
     if (!status)
         status = fit_stats(r, frame->data->list_count);
-    if (!status && frame->settings->indexed)
+    if (!status && trip_settings_stays(frame->settings))
         status = trip_gl_resident_begin(&r->resident, frame->data, frame->plan->planes,
+                                        !frame->settings->indexed,
                                         trip_gl_context_limits(r->context)->storage_block_bytes);
     if (status)
         return status;
@@ -198,7 +199,7 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
         status = trip_gl_context_use(r->context);
     if (status)
         return status;
-    r->base.resident = frame->settings->indexed;
+    r->base.resident = trip_settings_stays(frame->settings);
     r->frame = frame;
     r->layers = 0;
     r->quads = 0;
@@ -218,7 +219,7 @@ static int load(trip_renderer *base)
         status = prepare_when_done(r);
     if (!status)
         status = trip_gl_lattices_load(&r->lattices, r->context, r->frame);
-    if (status || !r->frame->settings->indexed)
+    if (status || !trip_settings_stays(r->frame->settings))
         return status;
     return trip_gl_resident_load(&r->resident);
 }
@@ -226,7 +227,7 @@ static int load(trip_renderer *base)
 static void await(trip_renderer *base, uint64_t timeout_ns)
 {
     gl_renderer *r = (gl_renderer *)base;
-    if (r->prepared && r->frame->settings->indexed && r->resident.loading)
+    if (r->prepared && trip_settings_stays(r->frame->settings) && r->resident.loading)
         trip_gl_resident_await(&r->resident, timeout_ns);
     else if (trip_gl_context_use(r->context) == TRIP_OK)
         trip_gl_queue_await(&r->queue, timeout_ns);
@@ -369,7 +370,7 @@ static int begin_layer(trip_renderer *base, int axis)
     r->masked = !whole;
     r->way = trip_plan_way(frame->plan, axis, false);
     r->in_layer = true;
-    if (frame->settings->indexed)
+    if (trip_settings_stays(frame->settings))
         trip_gl_resident_bind(&r->resident, axis);
     return trip_gl_check(r->context, "layer");
 }
@@ -464,7 +465,7 @@ static void prepare_drawing(gl_renderer *r, bool front_to_back)
         draw_masked(r);
     r->sums.front_to_back = front_to_back;
     bind_batch(&r->batch);
-    trip_gl_voxel_positions_bind(&r->positions, r->frame->settings->indexed);
+    trip_gl_voxel_positions_bind(&r->positions, trip_settings_stays(r->frame->settings));
     trip_gl_lattices_bind(&r->lattices);
 }
 
@@ -515,8 +516,9 @@ static int begin_batch(gl_renderer *r, const trip_batch *batch)
     trip_gl_slot *slot = trip_gl_slots_find(&r->slots, batch->planes[TRIP_PLANE_VOXELS]);
     int status = use_way(r, batch);
     if (!status)
-        status = trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, r->frame->plan, batch,
-                                    slot, r->frame->settings->indexed ? r->resident.lists : NULL);
+        status =
+            trip_gl_batch_fill(&r->batch, &r->ring, r->constants.lists, r->frame->plan, batch, slot,
+                               trip_settings_stays(r->frame->settings) ? r->resident.lists : NULL);
     if (status)
         return status;
     count_read(r, batch);

@@ -14,12 +14,21 @@ static_assert(TRIP_RUN_RECORDS_MAX <= TRIP_FRAME_PIECE, "a run fits a piece");
 
 enum { MAX_COORDINATE = 65536, AXES = 3 };
 
-const trip_list *trip_gl_resident_base(const trip_dataset *data, const trip_list *list)
+/* Returns the list with the vertices for `list`: itself in the form resident. Otherwise it is the Z
+ * list of the same level and kind, or else Y, or X. */
+static const trip_list *base_for(const trip_gl_resident *r, const trip_list *list)
 {
-    const trip_list *base = NULL;
+    const trip_dataset *data = r->data;
+    const trip_list *base = r->replicated ? list : NULL;
     for (int axis = AXES - 1; axis >= 0 && !base; axis--)
         base = trip_dataset_along(data, list, axis);
     return base;
+}
+
+/* Returns the number of the vertex array for lists along an axis. */
+static int array_of(const trip_gl_resident *r, int axis)
+{
+    return r->replicated ? axis : 0;
 }
 
 static bool is_splatted(const trip_list *list)
@@ -37,16 +46,17 @@ static void lay_out(trip_gl_resident *r)
         if (!is_splatted(list))
             continue;
         r->lists[i].order_first = r->order_counts[list->axis];
+        r->lists[i].vertex_first = r->replicated ? r->lists[i].order_first : r->vertex_count;
         r->order_counts[list->axis] += list->records;
-        if (trip_gl_resident_base(data, list) != list)
-            continue;
-        r->lists[i].vertex_first = r->vertex_count;
-        r->vertex_count += list->records;
+        if (!r->replicated && base_for(r, list) == list)
+            r->vertex_count += list->records;
     }
     for (unsigned i = 0; i < data->list_count; i++)
         if (is_splatted(&data->lists[i]))
-            r->lists[i].vertex_first =
-                r->lists[trip_gl_resident_base(data, &data->lists[i])->index].vertex_first;
+            r->lists[i].vertex_first = r->lists[base_for(r, &data->lists[i])->index].vertex_first;
+    for (int a = 0; a < AXES && r->replicated; a++)
+        r->vertex_count =
+            r->order_counts[a] > r->vertex_count ? r->order_counts[a] : r->vertex_count;
 }
 
 static int check_size(const trip_gl_resident *r, size_t block_bytes)
@@ -55,28 +65,29 @@ static int check_size(const trip_gl_resident *r, size_t block_bytes)
     for (unsigned i = 0; i < data->list_count; i++)
         for (int a = 0; a < AXES; a++)
             if (is_splatted(&data->lists[i]) && data->lists[i].dims[a] > MAX_COORDINATE)
-                return trip_fail(TRIP_ERROR, "gl", data->path,
-                                 "indexed lists are limited to %d voxels along each axis; use "
-                                 "replicated lists",
-                                 MAX_COORDINATE);
+                return trip_fail(
+                    TRIP_ERROR, "gl", data->path,
+                    "lists in GPU memory are limited to %d voxels along each axis; use "
+                    "--submit replicated",
+                    MAX_COORDINATE);
     uint64_t max = r->vertex_count;
     for (int a = 0; a < AXES; a++)
         max = r->order_counts[a] > max ? r->order_counts[a] : max;
     if (max <= block_bytes / sizeof(trip_gl_vertex) && max <= INT32_MAX)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", data->path,
-                     "indexed lists of %" PRIu64
+                     "lists in GPU memory of %" PRIu64
                      " splats exceed this driver's buffer limit of %zu bytes; "
-                     "use replicated lists",
+                     "use --submit replicated",
                      max, block_bytes);
 }
 
 static int no_memory(const trip_gl_resident *r)
 {
     return trip_fail(TRIP_ERROR, "gl", r->data->path,
-                     "indexed lists hold the whole data set, %" PRIu64
+                     "lists in GPU memory hold the whole data set, %" PRIu64
                      " splats, which does not fit the memory given; raise --memory or use "
-                     "replicated lists",
+                     "--submit replicated",
                      r->vertex_count);
 }
 
@@ -90,17 +101,22 @@ static int make_array(trip_gl_resident *r, GLuint *buffer, uint64_t count, size_
     glNamedBufferStorage(*buffer, (GLsizeiptr)bytes, NULL, GL_DYNAMIC_STORAGE_BIT);
     if (glGetError() == GL_NO_ERROR)
         return TRIP_OK;
-    return trip_fail(TRIP_ERROR, "gl", r->data->path,
-                     "indexed lists do not fit the memory of the GPU; use replicated lists");
+    return trip_fail(
+        TRIP_ERROR, "gl", r->data->path,
+        "lists in GPU memory do not fit the memory of the GPU; use --submit replicated");
 }
 
 static int make_arrays(trip_gl_resident *r)
 {
-    int status = make_array(r, &r->vertices, r->vertex_count, sizeof(trip_gl_vertex));
-    for (int a = 0; a < AXES && !status; a++)
+    int status = TRIP_OK;
+    for (int a = 0; a < (r->replicated ? AXES : 1) && !status; a++) {
+        const uint64_t count = r->replicated ? r->order_counts[a] : r->vertex_count;
+        status = make_array(r, &r->vertices[a], count, sizeof(trip_gl_vertex));
+        if (!status && r->planes >> TRIP_PLANE_NORMALS & 1)
+            status = make_array(r, &r->normals[a], count, sizeof(uint32_t));
+    }
+    for (int a = 0; a < AXES && !status && !r->replicated; a++)
         status = make_array(r, &r->order[a], r->order_counts[a], sizeof(uint32_t));
-    if (!status && r->planes >> TRIP_PLANE_NORMALS & 1)
-        status = make_array(r, &r->normals, r->vertex_count, sizeof(uint32_t));
     return status;
 }
 
@@ -245,13 +261,15 @@ static void upload(trip_gl_loading *l)
     uint64_t first = l->filled - l->piece, vertex = at->vertex_first + first;
     for (uint32_t k = 0; k < l->piece; k++)
         l->positions[k] += (uint32_t)at->vertex_first;
-    upload_part(to->order[l->list->axis], at->order_first + first, l->piece, sizeof *l->positions,
-                l->positions);
+    const int array = array_of(to, l->list->axis);
+    if (!to->replicated)
+        upload_part(to->order[l->list->axis], at->order_first + first, l->piece,
+                    sizeof *l->positions, l->positions);
     if (l->list != base_of(l))
         return;
-    upload_part(to->vertices, vertex, l->piece, sizeof *l->vertices, l->vertices + first);
-    if (to->normals)
-        upload_part(to->normals, vertex, l->piece, sizeof *l->normals, l->normals);
+    upload_part(to->vertices[array], vertex, l->piece, sizeof *l->vertices, l->vertices + first);
+    if (to->normals[array])
+        upload_part(to->normals[array], vertex, l->piece, sizeof *l->normals, l->normals);
 }
 
 static int load_piece(trip_gl_loading *l)
@@ -280,9 +298,10 @@ static const trip_list *next_list(trip_gl_loading *l)
     for (; l->base < data->list_count; l->base++, l->turn = 0) {
         const trip_list *base = base_of(l), *list = NULL;
         if (!trip_kind_of(base->kind)->splatted || trip_kind_of(base->kind)->coarse ||
-            trip_gl_resident_base(data, base) != base)
+            base_for(l->to, base) != base)
             continue;
-        for (; l->turn < 3 && !list; l->turn += !list)
+        const int turns = l->to->replicated ? 1 : AXES;
+        for (; l->turn < turns && !list; l->turn += !list)
             list = trip_dataset_along(data, base, (base->axis + l->turn) % 3);
         if (list)
             return list;
@@ -308,8 +327,8 @@ static int make_room(trip_gl_loading *l)
     if (l->vertices && l->sheet_firsts)
         return TRIP_OK;
     return trip_fail(TRIP_ERROR, "gl", l->to->data->path,
-                     "indexed lists do not fit the memory given; raise --memory or use replicated "
-                     "lists");
+                     "lists in GPU memory do not fit the memory given; raise --memory or use "
+                     "--submit replicated");
 }
 
 static void drop_around(trip_gl_loading *l)
@@ -426,8 +445,9 @@ static int create_loading(trip_gl_loading **out, trip_gl_resident *to)
     trip_gl_loading *l = trip_budget_take(to->budget, sizeof *l);
     *out = l;
     if (!l)
-        return trip_fail(TRIP_ERROR, "gl", to->data->path,
-                         "the memory given does not suffice to load indexed lists; raise --memory");
+        return trip_fail(
+            TRIP_ERROR, "gl", to->data->path,
+            "the memory given does not suffice to load lists in GPU memory; raise --memory");
     l->to = to;
     return TRIP_OK;
 }
@@ -483,14 +503,15 @@ static bool holds(const trip_gl_resident *r, const trip_dataset *data, unsigned 
 }
 
 int trip_gl_resident_begin(trip_gl_resident *r, const trip_dataset *data, unsigned planes,
-                           size_t block_bytes)
+                           bool replicated, size_t block_bytes)
 {
     int status = TRIP_OK;
-    if (!holds(r, data, planes)) {
+    if (!holds(r, data, planes) || r->replicated != replicated) {
         trip_gl_resident_release(r);
         r->data = data;
         r->checksum = data->header.header_checksum;
         r->planes = planes;
+        r->replicated = replicated;
         r->list_count = data->list_count;
         status = begin_loading(r, block_bytes);
     }
@@ -529,17 +550,19 @@ void trip_gl_resident_pause(trip_gl_resident *r)
 
 void trip_gl_resident_bind(const trip_gl_resident *r, int axis)
 {
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_VERTICES, r->vertices);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_ORDER, r->order[axis]);
-    if (r->normals)
-        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_NORMALS, r->normals);
+    const int array = array_of(r, axis);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_VERTICES, r->vertices[array]);
+    if (!r->replicated)
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_ORDER, r->order[axis]);
+    if (r->normals[array])
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, TRIP_GL_NORMALS, r->normals[array]);
 }
 
 void trip_gl_resident_release(trip_gl_resident *r)
 {
     destroy_loading(r->loading);
-    glDeleteBuffers(1, &r->vertices);
-    glDeleteBuffers(1, &r->normals);
+    glDeleteBuffers(AXES, r->vertices);
+    glDeleteBuffers(AXES, r->normals);
     glDeleteBuffers(AXES, r->order);
     trip_budget_discharge(r->budget, r->bytes);
     trip_budget_release(r->budget, r->lists, r->list_count * sizeof *r->lists);

@@ -1,11 +1,15 @@
-/* The submission form "indexed" (2008, section 5.1). Each level of the data set has one vertex
- * array: the voxels of one list with explicit positions. Each list has an array of indices into it.
+/* The submission forms of lists that stay on the GPU (2008, section 5.1).
+ * - indexed: one vertex array holds the voxels of one list with explicit positions. Each list has
+ *   an array of indices into it.
+ * - resident: each axis has a vertex array of its own, in the order of its lists.
+ *
  * All arrays stay in GL memory and must fit the budget. They are loaded in pieces when a data set
  * is first drawn. Owned by one renderer; the context must be current. */
 #ifndef TRIP_GL_RESIDENT_H
 #define TRIP_GL_RESIDENT_H
 
 #include <epoxy/gl.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -19,7 +23,7 @@ typedef struct trip_gl_vertex {
 /* The first elements of a list in the arrays. */
 typedef struct trip_gl_resident_list {
     uint64_t order_first;  /* of its records in the array of its axis */
-    uint64_t vertex_first; /* of the vertices of its level */
+    uint64_t vertex_first; /* of the vertices of its level; resident: same as order_first */
 } trip_gl_resident_list;
 
 typedef struct trip_gl_loading trip_gl_loading;
@@ -29,19 +33,23 @@ typedef struct trip_gl_resident {
     const trip_dataset *data;
     uint64_t checksum; /* of the data set's header */
     unsigned planes;
-    uint64_t vertex_count, order_counts[3];
+    bool replicated;       /* the form resident */
+    uint64_t vertex_count; /* of the largest vertex array */
+    uint64_t order_counts[3];
     trip_gl_resident_list
         *lists; /* by list index; filled only for lists that are drawn as splats */
     unsigned list_count;
     uint64_t bytes; /* of GL memory */
-    GLuint vertices, normals, order[3];
+    /* By axis. The form indexed uses the first of `vertices` and `normals`, the form resident no
+     * `order`. */
+    GLuint vertices[3], normals[3], order[3];
     trip_gl_loading *loading; /* NULL when loading is complete */
 } trip_gl_resident;
 
 /* Begins to load a data set, or resumes loading after a pause. Does nothing if it is loaded.
  * `block_bytes` limits the size of each array. */
 int trip_gl_resident_begin(trip_gl_resident *r, const trip_dataset *data, unsigned planes,
-                           size_t block_bytes);
+                           bool replicated, size_t block_bytes);
 /* Loads a piece; implements trip_renderer_ops.load. */
 int trip_gl_resident_load(trip_gl_resident *r);
 /* Waits until a piece can be loaded, for at most `timeout_ns`. */
@@ -51,9 +59,5 @@ void trip_gl_resident_pause(trip_gl_resident *r);
 /* Binds the arrays of an axis, before its first batch. */
 void trip_gl_resident_bind(const trip_gl_resident *r, int axis);
 void trip_gl_resident_release(trip_gl_resident *r);
-
-/* Returns the list with the vertices for the level and kind of `list`: the Z list, or else Y, or X.
- */
-const trip_list *trip_gl_resident_base(const trip_dataset *data, const trip_list *list);
 
 #endif

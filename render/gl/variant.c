@@ -21,8 +21,9 @@ static const struct {
     [TRIP_GL_PASS_SPLAT] = { "splat.vert", "splat.frag", NULL, TRIP_GL_EFFECT_SETS - 1, false },
     [TRIP_GL_PASS_SUM] = { "screen.vert", "sum.frag", NULL, TRIP_GL_DEPTH, false },
     [TRIP_GL_PASS_COUNT] = { NULL, NULL, "count.comp",
-                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_AFFINE | TRIP_GL_FIXED |
-                                 TRIP_GL_UNEVEN,
+                             TRIP_GL_PARALLEL | TRIP_GL_INDEXED | TRIP_GL_RESIDENT |
+                                 TRIP_GL_AFFINE | TRIP_GL_FIXED | TRIP_GL_UNEVEN |
+                                 TRIP_GL_TWO_POINTS,
                              true },
     [TRIP_GL_PASS_REGION] = { "screen.vert", "region.frag", NULL, 0, true },
     [TRIP_GL_PASS_MERGE] = { "screen.vert", "merge.frag", NULL, TRIP_GL_DEPTH, true },
@@ -43,18 +44,19 @@ static void write_effects(FILE *out, unsigned effects)
         unsigned effect;
         const char *name;
     } names[] = {
-        { TRIP_GL_PARALLEL, "PARALLEL" },   { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
-        { TRIP_GL_SHADED, "SHADED" },       { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
-        { TRIP_GL_INDEXED, "INDEXED" },     { TRIP_GL_QUADS, "QUADS" },
-        { TRIP_GL_UNCULLED, "UNCULLED" },   { TRIP_GL_COMPACT, "COMPACT" },
-        { TRIP_GL_DEPTH, "DEPTH" },         { TRIP_GL_NEAR, "NEAR" },
-        { TRIP_GL_SUMMED, "SUMS" },         { TRIP_GL_AFFINE, "AFFINE" },
-        { TRIP_GL_FLATTENED, "FLATTENED" }, { TRIP_GL_WIDE, "WIDE" },
-        { TRIP_GL_FIXED, "FIXED" },         { TRIP_GL_CUED, "CUED" },
-        { TRIP_GL_UNEVEN, "UNEVEN" },       { TRIP_GL_SHADOWS, "SHADOWS" },
-        { TRIP_GL_OCCLUSION, "OCCLUSION" }, { TRIP_GL_EMISSION, "EMISSION" },
-        { TRIP_GL_CLOSED, "CLOSED" },       { TRIP_GL_EXACT, "EXACT" },
-        { TRIP_GL_NEAREST, "NEAREST" },
+        { TRIP_GL_PARALLEL, "PARALLEL" },     { TRIP_GL_ANISOTROPIC, "ANISOTROPIC" },
+        { TRIP_GL_SHADED, "SHADED" },         { TRIP_GL_HEADLIGHT, "HEADLIGHT" },
+        { TRIP_GL_INDEXED, "INDEXED" },       { TRIP_GL_QUADS, "QUADS" },
+        { TRIP_GL_UNCULLED, "UNCULLED" },     { TRIP_GL_COMPACT, "COMPACT" },
+        { TRIP_GL_DEPTH, "DEPTH" },           { TRIP_GL_NEAR, "NEAR" },
+        { TRIP_GL_SUMMED, "SUMS" },           { TRIP_GL_AFFINE, "AFFINE" },
+        { TRIP_GL_FLATTENED, "FLATTENED" },   { TRIP_GL_WIDE, "WIDE" },
+        { TRIP_GL_FIXED, "FIXED" },           { TRIP_GL_CUED, "CUED" },
+        { TRIP_GL_UNEVEN, "UNEVEN" },         { TRIP_GL_SHADOWS, "SHADOWS" },
+        { TRIP_GL_OCCLUSION, "OCCLUSION" },   { TRIP_GL_EMISSION, "EMISSION" },
+        { TRIP_GL_CLOSED, "CLOSED" },         { TRIP_GL_EXACT, "EXACT" },
+        { TRIP_GL_NEAREST, "NEAREST" },       { TRIP_GL_RESIDENT, "RESIDENT" },
+        { TRIP_GL_TWO_POINTS, "TWO_POINTS" },
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (effects & names[i].effect)
@@ -99,11 +101,11 @@ static int build(const trip_gl_variant *variant, GLuint *program)
                                           });
 }
 
-static_assert(TRIP_GL_EFFECT_SETS <= 1 << 24, "effects are 24 bits of a key");
+static_assert(TRIP_GL_EFFECT_SETS <= 1 << 30, "effects are 32 bits of a key");
 static uint64_t key_of(const trip_gl_variant *v)
 {
     return (uint64_t)v->pass | (uint64_t)v->method << 4 | (uint64_t)v->effects << 8 |
-           (uint64_t)v->layers << 32;
+           (uint64_t)v->layers << 40;
 }
 
 int trip_gl_variants_get(trip_gl_variants *v, trip_gl_variant variant, GLuint *program)

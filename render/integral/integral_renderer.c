@@ -3,6 +3,8 @@
  * frames. The picture is then integrated ray by ray. */
 #include "renderer.h"
 
+#include <assert.h>
+#include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
@@ -10,6 +12,7 @@
 #include "emission.h"
 #include "field_fill.h"
 #include "integrand.h"
+#include "pixel_area.h"
 #include "report.h"
 #include "shade.h"
 
@@ -33,6 +36,7 @@ typedef struct integral {
     uint64_t splats[TRIP_KINDS]; /* records received, by the kind of their list */
     float *rgba;                 /* of the current picture */
     int pane_px, panes_x;        /* threads share the picture in squares of pane_px */
+    int first_squares;           /* along each side of a pixel (pixel_area.h) */
     _Atomic bool failed;         /* set by any thread to give up the picture */
     _Atomic uint64_t done;       /* pixels, added by any thread */
     trip_field_fill fill;
@@ -187,42 +191,53 @@ static int complete_field(integral *r)
     return status;
 }
 
-static int integrate(integral *r, double x, double y, trip_splat_hits *hits, trip_ray_sum *sum)
+/* A thread's way to the picture's function. */
+typedef struct painter {
+    integral *r;
+    trip_splat_hits *hits;
+} painter;
+
+/* Writes colour and opacity of the ray at a position. */
+static int ray_at(void *user, double x, double y, double rgba[4])
 {
-    const trip_ray ray = trip_ray_make(r->in.camera, x, y);
-    if (is_of_splats(r))
-        return trip_integrate_splats(&r->in, &ray, hits, sum);
-    *sum = trip_integrate_values(&r->in, &ray);
+    const painter *p = user;
+    const trip_integrand *in = &p->r->in;
+    const trip_ray ray = trip_ray_make(in->camera, x, y);
+    trip_ray_sum sum;
+    int status = 0;
+    if (is_of_splats(p->r))
+        status = trip_integrate_splats(in, &ray, p->hits, &sum);
+    else
+        sum = trip_integrate_values(in, &ray);
+    if (status)
+        return status;
+    memcpy(rgba, sum.rgb, sizeof sum.rgb);
+    rgba[3] = 1 - sum.transmittance;
     return 0;
 }
 
 /* Computes the mean over a grid of positions in the pixel. */
-static int integrate_pixel(integral *r, int x, int y, trip_splat_hits *hits, double rgba[4])
+static int mean_of_rays(painter *p, int x, int y, double rgba[4])
 {
-    const int samples = r->in.settings->samples;
+    const int samples = p->r->in.settings->samples;
     memset(rgba, 0, 4 * sizeof *rgba);
     for (int n = 0; n < samples * samples; n++) {
-        trip_ray_sum sum;
-        double share = 1.0 / (samples * samples);
-        int status = integrate(r, x + (n % samples + 0.5) / samples,
-                               y + (n / samples + 0.5) / samples, hits, &sum);
+        double one[4];
+        int status =
+            ray_at(p, x + (n % samples + 0.5) / samples, y + (n / samples + 0.5) / samples, one);
         if (status)
             return status;
-        for (int c = 0; c < 3; c++)
-            rgba[c] += share * sum.rgb[c];
-        rgba[3] += share * (1 - sum.transmittance);
+        for (int c = 0; c < 4; c++)
+            rgba[c] += one[c] / (samples * samples);
     }
     return 0;
 }
 
-static void make_pixel(integral *r, int x, int y, unsigned thread)
+static void put_pixel(integral *r, int x, int y, const double rgba[4])
 {
     const double *background = r->in.settings->background;
     float *out = r->rgba + ((size_t)y * (size_t)r->in.camera->width + (size_t)x) * 4;
-    double rgba[4] = { 0 };
-    if (r->in.field && integrate_pixel(r, x, y, &r->hits[thread], rgba))
-        r->failed = true;
-    double through = (1 - rgba[3]) * background[3];
+    const double through = (1 - rgba[3]) * background[3];
     for (int c = 0; c < 3; c++)
         out[c] = (float)(rgba[c] + through * background[c]);
     out[3] = (float)(rgba[3] + through);
@@ -243,15 +258,104 @@ static void show_progress(integral *r, uint64_t pixels, unsigned thread)
         frame->progress(frame->progress_user, "integrate", done, total);
 }
 
+enum { PANE_PX_MIN = 8, PANE_PX_MAX = 128, MAX_PANES = 1 << 19 };
+
+/* The values at the corners of a row of pixels: corner [i] of a pane belongs to pixels i - 1 and i.
+ */
+typedef double corner_row[PANE_PX_MAX + 1][4];
+
+static int fill_corners(painter *p, int x0, int x1, int y, corner_row row)
+{
+    int status = 0;
+    for (int x = x0; x <= x1 && !status; x++)
+        status = ray_at(p, x, y, row[x - x0]);
+    return status;
+}
+
+/* Returns the number of squares along each side of a pixel that are smaller than a voxel at the far
+ * end of the volume, at least 1. */
+static int first_squares(const integral *r)
+{
+    enum { MOST = TRIP_PIXEL_AREA_FIRST_MAX };
+    const trip_camera *c = r->in.camera;
+    const trip_file_header *h = &r->frame->data->header;
+    double farthest = 1;
+    for (int i = 0; i < 8 && !c->ortho; i++) {
+        const trip_vec3 corner = { i & 1 ? (double)h->dims[0] - 1 : 0,
+                                   i & 2 ? (double)h->dims[1] - 1 : 0,
+                                   i & 4 ? (double)h->dims[2] - 1 : 0 };
+        farthest = fmax(farthest, trip_dot(c->forward, trip_sub(corner, c->eye)));
+    }
+    const double voxels = farthest * fmax(trip_length(c->rx), trip_length(c->ry));
+    return voxels <= 0.5 ? 1 : voxels >= MOST - 1 ? MOST : (int)ceil(voxels) + 1;
+}
+
+/* Makes a row of pixels by the means over their areas. `above` and `below` are the corners. */
+static int make_row_of_areas(painter *p, const trip_pixel_area *area, int x0, int x1, int y,
+                             corner_row above, corner_row below)
+{
+    int status = 0;
+    for (int x = x0; x < x1 && !status && !trip_interrupted(); x++) {
+        const int i = x - x0;
+        const double *const corners[4] = { above[i], above[i + 1], below[i], below[i + 1] };
+        double rgba[4];
+        status = trip_pixel_area_mean(area, x, y, corners, rgba);
+        if (!status)
+            put_pixel(p->r, x, y, rgba);
+    }
+    return status;
+}
+
+static int make_areas(painter *p, int x0, int x1, int y0, int y1)
+{
+    corner_row rows[2] = { { { 0 } } };
+    const trip_pixel_area area = { .function = ray_at,
+                                   .user = p,
+                                   .tolerance = p->r->in.settings->tolerance,
+                                   .first = p->r->first_squares };
+    const bool shared = area.first == 1;
+    int status = shared ? fill_corners(p, x0, x1, y0, rows[y0 & 1]) : 0;
+    for (int y = y0; y < y1 && !status && !p->r->failed; y++) {
+        if (shared)
+            status = fill_corners(p, x0, x1, y + 1, rows[(y + 1) & 1]);
+        if (!status)
+            status = make_row_of_areas(p, &area, x0, x1, y, rows[y & 1], rows[(y + 1) & 1]);
+    }
+    return status;
+}
+
+static int make_rays(painter *p, int x0, int x1, int y0, int y1)
+{
+    int status = 0;
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1 && !status && !trip_interrupted() && !p->r->failed; x++) {
+            double rgba[4];
+            status = mean_of_rays(p, x, y, rgba);
+            if (!status)
+                put_pixel(p->r, x, y, rgba);
+        }
+    return status;
+}
+
+static void make_background(integral *r, int x0, int x1, int y0, int y1)
+{
+    static const double nothing[4] = { 0 };
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++)
+            put_pixel(r, x, y, nothing);
+}
+
 static void make_pane(void *context, unsigned pane, unsigned thread)
 {
     integral *r = context;
+    painter p = { r, &r->hits[thread] };
     const trip_camera *c = r->in.camera;
     const int x0 = (int)pane % r->panes_x * r->pane_px, y0 = (int)pane / r->panes_x * r->pane_px;
     const int x1 = smaller(x0 + r->pane_px, c->width), y1 = smaller(y0 + r->pane_px, c->height);
-    for (int y = y0; y < y1; y++)
-        for (int x = x0; x < x1 && !trip_interrupted() && !r->failed; x++)
-            make_pixel(r, x, y, thread);
+    if (!r->in.field)
+        make_background(r, x0, x1, y0, y1);
+    else if ((r->in.settings->samples ? make_rays : make_areas)(&p, x0, x1, y0, y1))
+        r->failed = true;
     show_progress(r, (uint64_t)(x1 - x0) * (uint64_t)(y1 - y0), thread);
 }
 
@@ -259,10 +363,13 @@ static void make_pane(void *context, unsigned pane, unsigned thread)
  * more than the pool allows. */
 static unsigned divide_picture(integral *r)
 {
-    enum { FIRST_PANE_PX = 8, MAX_PANES = 1 << 19 };
     const trip_camera *c = r->in.camera;
     int64_t panes;
-    r->pane_px = FIRST_PANE_PX / 2;
+    static_assert((int64_t)TRIP_PICTURE_MAX_PX / PANE_PX_MAX *
+                          (TRIP_PICTURE_MAX_PX / PANE_PX_MAX) <=
+                      MAX_PANES,
+                  "the largest picture has few enough of the largest panes");
+    r->pane_px = PANE_PX_MIN / 2;
     do {
         r->pane_px *= 2;
         r->panes_x = (c->width + r->pane_px - 1) / r->pane_px;
@@ -283,6 +390,7 @@ static int picture(trip_renderer *base, float *rgba, float *depth)
     r->rgba = rgba;
     r->failed = false;
     r->done = 0;
+    r->first_squares = first_squares(r);
     trip_cpu_job job = { .run = make_pane, .context = r, .tasks = divide_picture(r) };
     trip_cpu_pool_start(r->pool, &job);
     trip_cpu_pool_wait(r->pool, &job);

@@ -158,17 +158,17 @@ static int write_png(int fd, const char *path, int width, int height, const floa
 /* The depths that a format can hold, default first. */
 typedef struct format {
     const char *extension;
-    bool is_png;
+    bool is_png, has_alpha;
     trip_image_depth depths[3];
 } format;
 
 static const format formats[] = {
-    { "png", true, { TRIP_IMAGE_U8, TRIP_IMAGE_U16 } },
-    { "jpg", false, { TRIP_IMAGE_U8 } },
-    { "jpeg", false, { TRIP_IMAGE_U8 } },
-    { "tif", false, { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
-    { "tiff", false, { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
-    { "exr", false, { TRIP_IMAGE_FLOAT, TRIP_IMAGE_HALF } },
+    { "png", true, true, { TRIP_IMAGE_U8, TRIP_IMAGE_U16 } },
+    { "jpg", false, false, { TRIP_IMAGE_U8 } },
+    { "jpeg", false, false, { TRIP_IMAGE_U8 } },
+    { "tif", false, true, { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
+    { "tiff", false, true, { TRIP_IMAGE_U16, TRIP_IMAGE_U8, TRIP_IMAGE_FLOAT } },
+    { "exr", false, true, { TRIP_IMAGE_FLOAT, TRIP_IMAGE_HALF } },
 };
 
 static const format *find_format(const char *path)
@@ -188,6 +188,17 @@ static bool holds(const format *f, trip_image_depth depth)
         if (f->depths[i] == depth)
             return true;
     return false;
+}
+
+int trip_image_check_transparent(const char *path)
+{
+    const format *f = find_format(path);
+    if (!f || f->has_alpha)
+        return 0;
+    return trip_fail(
+        TRIP_USAGE, "write", path,
+        "cannot hold a transparent background; use .png, .tif or .exr, or a background "
+        "without transparency");
 }
 
 int trip_image_check_path(const char *path, const trip_image_params *params)

@@ -39,6 +39,9 @@ typedef struct trip_image_files {
  * with one line that names the formats. */
 int trip_image_check_path(const char *path, const trip_image_params *params);
 
+/* Fails for a path of JPEG, which cannot store a transparent background. */
+int trip_image_check_transparent(const char *path);
+
 /* Starts the helper early if `path` needs it. The helper takes a fifth of a second to start, so the
  * first picture need not wait. A missing helper fails before any work is done. */
 int trip_image_prepare(trip_image_files *files, const char *path);

@@ -614,6 +614,8 @@ static void explain_footprints(const trip_settings *s, FILE *out)
     else if (s->low_pass == TRIP_LOW_PASS_UNIFORM)
         fprintf(out, "low-pass    uniform: footprints are scaled until no axis is shorter than the "
                      "filter's\n");
+    if (s->low_pass != TRIP_LOW_PASS_NONE && s->low_pass_px != TRIP_LOW_PASS_PX)
+        fprintf(out, "low-pass    the filter's standard deviation is %g pixels\n", s->low_pass_px);
     if (s->flatten > 1)
         fprintf(out, "flattening  runs: kernels are up to %g times flatter along gradients\n",
                 s->flatten);

@@ -56,7 +56,8 @@ trip_cull trip_cull_make(const trip_dataset *data, const trip_camera *camera,
     radius *= data->coordinates.widest;
     double pixel2 = trip_dot(camera->rx, camera->rx) + trip_dot(camera->ry, camera->ry);
     const bool fixed = settings->footprint == TRIP_FOOTPRINT_FIXED;
-    double widest = fixed ? trip_splat_fixed_radius_px(settings) : TRIP_CUTOFF * TRIP_LOW_PASS_PX;
+    double widest = fixed ? trip_splat_fixed_radius_px(settings)
+                          : TRIP_CUTOFF * trip_settings_low_pass_px(settings);
     return (trip_cull){
         .camera = camera,
         .settings = settings,
@@ -233,6 +234,8 @@ bool trip_cull_may_see(const trip_cull *cull, const double lo[3], const double h
 trip_cull_reason trip_cull_brick(trip_cull *cull, int axis, const trip_file_brick *brick,
                                  const trip_file_slab *slab)
 {
+    if (cull->settings->unculled)
+        return TRIP_CULL_KEEP;
     if (is_transparent(cull, brick, slab))
         return TRIP_CULL_TRANSPARENT;
     trip_brick_box position = trip_brick_box_of(cull->header, slab, brick);

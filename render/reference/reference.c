@@ -416,6 +416,13 @@ static bool may_reach(const reference *r, trip_vec3 voxel, double radius)
     const trip_frame *frame = r->frame;
     const trip_list_grid *grid = &r->list->grid;
     trip_vec3 from_eye = trip_list_grid_vector(grid, trip_sub(voxel, r->list->camera.eye));
+    if (frame->settings->two_point_culling && frame->settings->method == TRIP_METHOD_MERGE &&
+        !frame->camera->ortho) {
+        const trip_vec3 right = trip_normalize(r->list->camera.rx);
+        const trip_vec3 beside = trip_scale(right, 0.5 * frame->settings->kernel_radius);
+        return trip_weight_of_two_points(frame->settings, r->axis, from_eye,
+                                         trip_list_grid_vector(grid, beside));
+    }
     return trip_weight_may_reach(frame->settings, frame->camera, frame->plan->axis_of_view, r->axis,
                                  from_eye, radius * trip_list_grid_growth(grid));
 }

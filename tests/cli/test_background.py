@@ -56,10 +56,10 @@ class Background(program.ProgramTest):
         """Yields the ways to draw a volume and its data set."""
         yield data, "--renderer", "reference"
         yield data, "--renderer", "cpu", "--samples-per-sheet", "4"
-        yield data, "--renderer", "integral"
-        yield volume, "--renderer", "integral", "--field", "source"
-        if "GL" not in program.SWITCHED_OFF:
-            yield data, "--renderer", "gl"
+        for gl in program.GL:
+            yield data, "--renderer", gl
+        yield data, "--renderer", "integral", "--samples", "1"
+        yield volume, "--renderer", "integral", "--samples", "1", "--field", "source"
 
     def test_fog_fades_out_beyond_its_last_voxels(self):
         made = self.brick("fog.vdb", "fog.trip", "--tf", "linear.tf")

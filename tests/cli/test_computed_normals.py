@@ -70,11 +70,10 @@ class ComputedNormals(program.ProgramTest):
             self.assertFalse(self.info(entry["path"])["normals"])
 
     def test_all_renderers_light_alike(self):
-        for renderer in "cpu", "reference", "gl":
-            if renderer == "gl" and "GL" in program.SWITCHED_OFF:
-                continue
+        for renderer in "cpu", "reference", *program.GL:
             if renderer == "gl":
                 self.assert_alike("v", "--renderer", "gl", "--submit", "indexed")
+                self.assert_alike("v", "--renderer", "gl", "--submit", "resident")
             for view in (), ("--azimuth", 130, "--elevation", 50), INSIDE, ("--ortho", "fit"):
                 self.assert_alike("v", "--renderer", renderer, *view)
 

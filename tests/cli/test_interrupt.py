@@ -82,11 +82,7 @@ class Interrupt(program.ProgramTest):
         )
 
     def check(self, renderer, size=SIZE):
-        draws = program.call(
-            "render", "a.trip", "-o", "a.png", "--size=8x8", f"--renderer={renderer}"
-        )
-        if draws.returncode and renderer == "gl":
-            self.skipTest("this machine has no OpenGL 4.5 by EGL")
+        self.works("render", "a.trip", "-o", "a.png", "--size=8x8", f"--renderer={renderer}")
         draw = ["render", "a.trip", "-o", "p.png", f"--size={size}", f"--renderer={renderer}"]
         self.times(f"{renderer}, {size}", "p.png", (0.2, 1, 3), *draw)
 
@@ -100,13 +96,14 @@ class Interrupt(program.ProgramTest):
         self.check("integral")
 
     def test_gl_can_be_interrupted(self):
+        program.need_gl()
         self.check("gl")
         self.check("gl", "8192x8192")
 
     def test_bricking_beyond_memory_can_be_interrupted(self):
         program.write_nrrd("b.nrrd", program.noise((160, 256, 256), "u2"), encoding="gzip")
         brick = ["brick", "b.nrrd", "-o", "b.trip", "--keep-all", "--memory=64M"]
-        self.times("brick", "b.trip", (0.2, 0.5, 1, 1.5, 2, 3, 5), *brick)
+        self.times("brick", "b.trip", (0.2, 0.6, 1.2, 2, 3.5), *brick)
         os.remove("b.nrrd")
 
 

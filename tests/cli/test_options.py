@@ -1,6 +1,7 @@
 """Tests every option of every command. A wrong value gives one line and exit status 2, and each
 valid value works."""
 import concurrent.futures
+import json
 import os
 import re
 import subprocess
@@ -43,10 +44,10 @@ BRICK = {
     "--halo": ["", "2", "-1", "yes"],
     "--levels": ["", "-1", "25", "1.5", "yes"],
     "--levels-for": NAMES + ["means"],
-    "--quiet": None,
     "--resume": None,
     "--dry-run": None,
     "--limits": None,
+    "--quiet": None,
     "--grid": [],
     "--output": [],
 }
@@ -69,7 +70,9 @@ RENDER = {
     "--coordinates": ["", "x.txt", "x.txt,y.txt", "x.txt,y.txt,z.txt", "a,b,c,d"],
     "--size": [
         "",
-        "10",
+        "0",
+        "65537",
+        "123456",
         "10x",
         "x10",
         "0x10",
@@ -94,7 +97,9 @@ RENDER = {
     "--elevation": NUMBERS + ["1e9"],
     "--roll": NUMBERS + ["1e9"],
     "--zoom": NUMBERS + ["0", "-1", "1e9"],
-    "--background": POINTS[:2] + ["1,2", "white", "2,0,0", "-1,0,0", "0,0,0,2", "nan,0,0"],
+    "--background": POINTS[:2] + ["1,2", "whit", "White", "2,0,0", "-1,0,0", "0,0,0,2",
+                                       "nan,0,0", "#", "#12", "#12345", "#gggggg", "#fffffffff",
+                                       "ffffff", "255,255,255"],
     "--tf": ["preset:nonsense", "preset:"],
     "--opacity-scale": NUMBERS + ["0", "-1", "1e9"],
     "--window": NUMBERS + ["0", "-5", "100"],
@@ -114,6 +119,7 @@ RENDER = {
     "--report": [],
     "--kernel-radius": NUMBERS + ["0", "-1", "1e9"],
     "--low-pass": NAMES + ["gaussian"],
+    "--low-pass-width": NUMBERS + ["-1", "17", "none"],
     "--weights": NAMES,
     "--normalise": None,
     "--flatten": NUMBERS + ["0", "0.5", "1e9"],
@@ -138,16 +144,19 @@ RENDER = {
     "--explain": None,
     "--count": None,
     "--output": [],
+    "--quiet": None,
     "--stats": [],
     "--depth": ["z.png", "z.jpg", "z"],
 }
 INFO = {
     "--verify": None,
     "--json": None,
+    "--quiet": None,
     **{name: RENDER[name] for name in (
         "--allow-gaps", "--axes", "--channel", "--coordinates", "--fill", "--grid", "--level-set",
         "--series", "--spacing", "--time")},
 }
+COMMANDS = ("accuracy", "bench", "brick", "cache", "info", "render", "serve", "tf", "view")
 
 
 def options_of(command):
@@ -188,7 +197,7 @@ class Options(program.ProgramTest):
     def test_man_pages_have_every_option(self):
         pages = os.path.join(os.path.dirname(__file__), "..", "..", "cli", "man")
         made = os.path.join(os.path.dirname(program.PROGRAM), "cli")
-        for command in "accuracy", "bench", "brick", "cache", "info", "render", "serve", "tf", "view":
+        for command in COMMANDS:
             page = f"triptych-{command}.1"
             folder = made if os.path.exists(os.path.join(made, page)) else pages
             with open(os.path.join(folder, page), encoding="utf-8") as f:
@@ -251,7 +260,6 @@ class Options(program.ProgramTest):
         self.all_fail(
             [
                 brick + ["--keep-all", "--range=1:2"],
-                brick + ["--quiet", "--json"],
                 brick + ["--levels=0", "--levels-for=pre"],
                 brick + ["--halo=0", "--levels-for=post"],
                 brick + ["--halo=0", "--levels-for=both"],
@@ -269,6 +277,9 @@ class Options(program.ProgramTest):
                 render + ["--clip-plane=1,0,0,0", "--submit=indexed"],
                 render + ["--target=rgba8", "--renderer=reference"],
                 render + ["--submit=indexed", "--renderer=reference"],
+                render + ["--submit=resident", "--renderer=reference"],
+                render + ["--clip-plane=1,0,0,0", "--submit=resident"],
+                render + ["--lod=1", "--submit=resident"],
                 render + ["--occluded=skip", "--renderer=gl"],
                 render + ["--samples=2", "--depth=d.tif"],
                 render + ["--tolerance=0.01"],
@@ -276,6 +287,10 @@ class Options(program.ProgramTest):
                 render + ["--kernel=ewa", "--classify=post"],
                 render + ["--kernel=ewa", "--samples-per-sheet=2"],
                 render + ["--low-pass=none", "--classify=post"],
+                render + ["--low-pass-width=1", "--classify=post"],
+                render + ["--low-pass-width=1", "--renderer=integral"],
+                render + ["--low-pass-width=1", "--low-pass=none"],
+                render + ["--low-pass-width=1", "--samples-per-sheet=2"],
                 render + ["--low-pass=uniform", "--kernel=ewa"],
                 render + ["--low-pass=uniform", "--renderer=reference"],
                 render + ["--flatten=3"],
@@ -354,7 +369,7 @@ class Options(program.ProgramTest):
             "--renderer": ["cpu", "reference", "integral", "auto"],
             "--renderer=integral --field": ["stored", "splats"],
             "--renderer=integral --interpolation": ["nearest", "linear", "cubic"],
-            "--renderer=integral --tolerance": ["1e-8", "0.1"],
+            "--renderer=integral --samples=1 --tolerance": ["1e-8", "0.1"],
             "--renderer=integral --samples": ["1", "3"],
             "--renderer=integral --field=splats --kernel-radius": ["1", "2.5"],
             "--clip-box": ["1,1,1,9,9,9", "voxels:-5,0,0,1e9,8,8.5"],
@@ -378,7 +393,7 @@ class Options(program.ProgramTest):
             "--effects=auto --anisotropy": ["-0.95", "0", "0.95"],
             "--effects=cueing --cueing": ["1", "1e-3"],
             "--effects=occlusion --light-cells": ["8", "128"],
-            "--background": ["none", "1,0,0", "0,0.5,1,0.25"],
+            "--background": ["none", "transparent", "white", "#fff", "1,0,0", "0,0.5,1,0.25"],
             "--occluded": ["skip", "draw"],
             "--opacity-scale": ["0.01", "1", "1e6"],
             "--window=50 --level": ["-10", "0", "100"],
@@ -393,7 +408,7 @@ class Options(program.ProgramTest):
             "--elevation": ["90", "-90", "180"],
             "--roll": ["-45", "360"],
             "--zoom": ["0.1", "1", "1e3"],
-            "--size": ["1x1", "1x50", "50x1", "333x7"],
+            "--size": ["1x1", "1x50", "50x1", "333x7", "17"],
             "--orbit": ["1", "2"],
             "--orbit=3 --in-flight": ["1", "3", "16"],
             "--tf": [
@@ -438,6 +453,72 @@ class Options(program.ProgramTest):
         if "the system refuses io_uring" in run.stderr:
             self.skipTest("the system refuses io_uring")
         self.assertEqual((run.returncode, run.stderr), (0, ""))
+
+    def test_a_side_alone_is_a_square(self):
+        self.works("render", "a.trip", "-o", "side.exr", "--size", "19")
+        self.assertEqual(program.read_exr("side.exr").shape, (19, 19, 4))
+        run = self.works("bench", "renderers", "a.trip", "--renderer=reference", "--views=1",
+                         "--size=12,8x6", "--json")
+        self.assertEqual({row["size"] for row in json.loads(run.stdout)["tables"]["renderers"]["rows"]},
+                         {"12 x 12", "8 x 6"})
+        self.fails(2, "accuracy", "a.trip", "--size", "16", says="takes 32 to 4096 pixels a side")
+
+    def test_unknown_names_suggest_similar_ones(self):
+        render = ["render", "a.trip", "-o", "a.png"]
+        for arguments, *says in (
+            (["rendr"], "rendr: unknown command; did you mean render?"),
+            (["Info", "a.trip"], "did you mean info?"),
+            ([*render, "--orbti=4"], "--orbti: unknown option; did you mean --orbit? ",
+             "`triptych render --help`"),
+            ([*render, "-size", "3x3"], "-size: unknown option; did you mean --size?"),
+            ([*render, "--clip=3"], "--clip: short for several options: --clip-box, --clip-plane"),
+            (["brick", "--orbit", "3", self.source], "unknown option of brick; `triptych render` has it"),
+            (["info", "--no-panel", "a.trip"], "`triptych view` has it"),
+            (["cache", "list", "--jsno"], "did you mean --json?"),
+            ([*render, "--view=fornt"], "did you mean front? use one of front, back, "),
+            ([*render, "--effects=shadow"], "did you mean shadows?"),
+            ([*render, "--background=whiet"], "did you mean white?"),
+            ([*render, "--tf=preset:viridsi"], "no preset `viridsi`; did you mean preset:viridis?"),
+            (["bench", "rendrers"], "did you mean renderers?"),
+            (["tf", "lsit"], "did you mean list?"),
+            (["cache", "claer"], "did you mean clear?"),
+        ):
+            run = self.fails(2, *arguments, says=says[0])
+            for more in says[1:]:
+                self.assertIn(more, run.stderr)
+            self.assertLess(len(run.stderr), 160, run.stderr)
+        self.assertNotIn("did you mean", self.fails(2, *render, "--frobnicate").stderr)
+        self.fails(1, *render, "--tf=ct-bnoe", says="did you mean preset:ct-bone?")
+        self.fails(1, *render, "--tf=unlike-any", says="no such file or preset; `triptych tf list`")
+
+    def test_h_prints_the_help(self):
+        for command in (), *((name,) for name in COMMANDS):
+            self.assertEqual(self.works(*command, "-h").stdout, self.works(*command, "--help").stdout)
+        run = program.call("-h", program=program.GENERATE)
+        self.assertEqual((run.returncode, run.stderr), (0, ""))
+        self.assertIn(b"--size=", run.stdout)
+
+    def test_quiet_leaves_only_results(self):
+        """Notes and summaries disappear. Requested output, warnings and errors stay."""
+        program.write("none.tf", b"1e6 1 1 1 0\n2e6 1 1 1 1\n")
+        draw = ["render", self.source, "-o", "q.png", "--size=16", "--effects=shadows"]
+        loud = self.works(*draw)
+        self.assertIn(b"bricked into the cache", loud.stdout)
+        self.assertIn("note: ", loud.stderr)
+        for more in [], ["--orbit=2"]:
+            run = self.works(*draw, "-q", *more)
+            self.assertEqual((run.stdout, run.stderr), (b"", ""))
+        self.assertIn(b'"frames"', self.works(*draw, "-q", "--stats=-").stdout)
+        self.assertIn("warning: ", self.works(*draw, "-q", "--tf=none.tf").stderr)
+        self.fails(2, *draw, "-q", "--size=x", says="--size")
+        brick = ["brick", self.source, "-o", "q.trip", "--force", "-q"]
+        self.assertEqual(self.works(*brick).stdout, b"")
+        self.assertIn("bytes", json.loads(self.works(*brick, "--json").stdout))
+        self.assertIn(b"about", self.works("brick", self.source, "-q", "--dry-run").stdout)
+        for results in (["info", "a.trip"], ["info", self.source], ["tf", "list"],
+                        ["tf", "show", self.source], ["cache", "list"]):
+            self.assertEqual(self.works(*results, "-q").stdout, self.works(*results).stdout)
+        self.assertEqual(self.works("cache", "clear", "--quiet").stdout, b"")
 
     def test_help_and_version_print(self):
         for command in (), ("brick",), ("info",), ("render",):

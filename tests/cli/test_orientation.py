@@ -272,13 +272,7 @@ class Orientation(program.ProgramTest):
                 expected = self.picture("a.trip", "--renderer=reference", *options)
                 for renderer in "cpu", *program.GL:
                     given = f"--renderer={renderer}", *options
-                    run = program.call(
-                        "render", "a.trip", "-o", "b.exr", *given, program=program.QUICK_PROGRAM
-                    )
-                    if "no device here offers OpenGL" in run.stderr:
-                        self.skipTest("no OpenGL 4.5 here")
-                    self.assertEqual(run.returncode, 0, run.stderr)
-                    drawn = program.read_exr("b.exr")
+                    drawn = self.picture("a.trip", *given)
                     about = name, renderer, classify
                     self.alike(drawn, expected, about, most=most / 255, mean=mean / 255)
 

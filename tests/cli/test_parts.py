@@ -96,6 +96,7 @@ class Parts(program.ProgramTest):
             self.assert_alike(self.halves, 2, "--classify", "pre", "--renderer", renderer)
         if program.GL:
             self.assert_alike(self.halves, 2, "--submit", "indexed")
+            self.assert_alike(self.halves, 2, "--submit", "resident")
 
     def test_the_integral_equals_the_whole(self):
         self.assert_alike(self.octants, 0, "--renderer", "integral", "--size", "20x16")

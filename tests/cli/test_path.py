@@ -3,6 +3,7 @@ by a stand-in that keeps its input or fails."""
 import json
 import math
 import os
+import signal
 import shutil
 import stat
 import subprocess
@@ -211,7 +212,7 @@ class Paths(program.ProgramTest):
             run = self.works(
                 *("render", "v.trip", "-o", "a.mp4", *SIZE, *more), env=self.with_encoder
             )
-            self.assertEqual(run.stdout.count(b"a.mp4: 40 x 30, "), 5)
+            self.assertRegex(run.stdout, rb"\Aa\.mp4: 5 pictures of 40 x 30, [\d.]+ s each, [^\n]*\n\Z")
             with open("a.mp4", "rb") as f:
                 video = numpy.frombuffer(f.read(), numpy.uint8).reshape(5, 30, 40, 3)
             given = open("given").read().split("\n")
@@ -230,6 +231,34 @@ class Paths(program.ProgramTest):
         self.assertEqual(given[given.index("-framerate") + 1], "12.5")
         self.assertEqual(os.path.getsize("a.webm"), 3 * 3600)
         os.remove("a.webm")
+
+    def test_a_turntable_prints_one_line(self):
+        orbit = ("render", "v.trip", *SIZE, "--orbit", "4", "-o", "turn.png")
+        line = (rb"turn-000\.png to turn-003\.png: 4 pictures of 40 x 30, [\d.]+ s each, "
+                rb"[\d.]+ s in all, [\d.]+ MB of memory at peak\n")
+        for more in (), ("--in-flight", "1"), ("--stats", "s.json"):
+            run = self.works(*orbit, *more)
+            self.assertRegex(run.stdout, rb"\A" + line + rb"\Z")
+            self.assertEqual(run.stderr, "")
+        self.assertEqual(self.works(*orbit, "-q").stdout, b"")
+        named = self.works(*orbit, "--explain").stdout  # a line ends each picture's explanation
+        self.assertEqual([named.count(b"turn-%03d.png: 40 x 30, " % i) for i in range(4)], [1] * 4)
+
+    def test_an_interrupted_turntable_counts_its_pictures(self):
+        for output, says in ("turn.png", "are written"), ("turn.mp4", "no video is written"):
+            process = program.start(
+                "render", "v.trip", "-o", output, "--size", "600x600", "--orbit", "5000",
+                "--renderer", "integral", env=self.with_encoder)
+            program.await_handler(process)
+            process.send_signal(signal.SIGINT)
+            err = process.communicate()[1].decode()
+            self.assertEqual(process.returncode, 1)
+            lines = err.splitlines()
+            self.assertIn("interrupted", lines[0])
+            if len(lines) > 1:  # the signal came while pictures were drawn
+                self.assertRegex(lines[1], rf"note: {output}: .*\d+ of 5000 pictures .*{says}")
+            self.assertLessEqual(len(lines), 2)
+            self.assertFalse(os.path.exists("turn.mp4"))
 
     def test_a_higher_frame_rate_keeps_the_duration(self):
         path = self.path(key(0, 0), key(1, 60))

@@ -19,7 +19,7 @@ ELSEWHERE = ("./demo.sh", "./check.sh", "export", "tests/compare/compare", "trip
              "triptych serve", "triptych bench", "triptych accuracy")
 # Replacements that make an example faster: smaller volumes, fewer pictures, a given error.
 SMALLER = (("512x512x512", "128x128x128"), ("-s 512", "-s 128"), ("--memory 64M", "--memory 96M"),
-           ("--orbit 60", "--orbit 3"), ("turn.mp4", "turn.png"), ("--size 512x512", "--size 96x96"))
+           ("--orbit 60", "--orbit 3"), ("turn.mp4", "turn.png"), ("--size 512", "--size 96"))
 
 
 def examples():

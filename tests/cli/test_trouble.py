@@ -1,16 +1,21 @@
 """Tests of faults of the machine: missing rights, a full disk, too little memory, Ctrl-C, a closed
-standard output. Each gives one error line and exit status 1, and leaves no file under the final
+terminal, a closed standard output. Each gives one error line and exit status 1, and leaves no file under the final
 name."""
+import fcntl
 import json
 import os
 import pathlib
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import tempfile
+import termios
 import time
 import unittest
+import urllib.parse
+import urllib.request
 
 import program
 
@@ -296,6 +301,93 @@ class Trouble(program.ProgramTest):
         self.assertEqual(run.returncode, 1)
         self.works("info", "--verify", "quiet.trip")
 
+    def unread(self, *arguments, lines=0, **options):
+        """Runs the program with a reader of standard output that ends after some lines. Returns the
+        exit status and stderr."""
+        run = program.start(*arguments, **options)
+        self.addCleanup(run.kill)
+        for _ in range(lines):
+            self.assertTrue(run.stdout.readline())
+        run.stdout.close()
+        err = run.stderr.read().decode()
+        run.stderr.close()
+        return run.wait(timeout=120), err
+
+    def test_pictures_are_written_although_nobody_reads_standard_output(self):
+        os.makedirs("unread", exist_ok=True)
+        pictures = [f"p-{i:03d}.png" for i in range(12)]
+        video = bool(shutil.which("ffmpeg"))
+        for lines in 0, 1:
+            draw = ["render", "small.trip", "--size", "64x64", "--orbit", 12, "-o", "unread/p.png"]
+            self.assertEqual(self.unread(*draw, "--explain", lines=lines), (0, ""))
+            self.assertEqual(sorted(os.listdir("unread")), pictures)
+            if video:
+                self.assertEqual(self.unread(*draw[:-1], "unread/p.mp4", lines=lines), (0, ""))
+                self.assertEqual(sorted(os.listdir("unread")), [*pictures, "p.mp4"])
+                self.assertGreater(os.path.getsize("unread/p.mp4"), 1000)
+                os.remove("unread/p.mp4")
+            for name in pictures:
+                os.remove(f"unread/{name}")
+        self.assertEqual(self.unread("brick", "small.nrrd", "-o", "out.trip"), (0, ""))
+        self.works("info", "--verify", "out.trip")
+        self.assertEqual(leftovers(), ["out.trip"])
+        shutil.rmtree("out.trip")
+
+    def test_pictures_are_written_although_nobody_reads_the_messages(self):
+        values = program.noise((20, 30, 40), "f4")
+        values[3] = float("nan")
+        program.write_nrrd("holes.nrrd", values)
+        out, into = os.pipe()
+        os.close(out)
+        try:
+            for arguments in (["render", "holes.nrrd", "-o", "holes.png", "--size", "40x40"],
+                              ["brick", "holes.nrrd", "-o", "holes.trip"]):
+                self.assertEqual(program.start(*arguments, stdout=into, stderr=into).wait(60), 0)
+                self.assertTrue(os.path.exists(arguments[3]))
+            self.assertEqual(program.start("info", "none.trip", stderr=into).wait(60), 1)
+        finally:
+            os.close(into)
+            shutil.rmtree("holes.trip", ignore_errors=True)
+        self.assertEqual([n for n in os.listdir(".") if n.startswith("holes.")
+                          and n not in ("holes.nrrd", "holes.png")], [])
+
+    def test_commands_that_print_end_as_other_programs_do(self):
+        self.works("render", "small.nrrd", "-o", "s.png", "--size", "20x20")
+        for arguments in (["info", "small.trip"], ["info", "--json", "small.trip"],
+                          ["info", "small.nrrd"], ["cache", "list"], ["cache", "list", "--json"],
+                          ["tf", "list"], ["tf", "show", "--tf", "grey", "small.trip"], ["--help"],
+                          ["--version"]):
+            self.assertEqual(self.unread(*arguments), (-signal.SIGPIPE, ""), arguments)
+
+    def test_serving_goes_on_although_nobody_reads_standard_output(self):
+        if "SERVE" in program.SWITCHED_OFF:
+            self.skipTest("built without serve")
+        run = program.start("serve", "small.trip", "--port", "0")
+        self.addCleanup(run.kill)
+        address = run.stdout.readline().decode().split()[-1]
+        run.stdout.close()
+        for _ in range(3):
+            with urllib.request.urlopen(address, timeout=30) as page:
+                self.assertIn(b"<html", page.read().lower())
+            reader = socket.create_connection(urllib.parse.urlsplit(address)[1].split(":"))
+            reader.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+            reader.close()  # nobody reads the answer
+        self.assertIsNone(run.poll())
+        run.send_signal(signal.SIGTERM)
+        run.stderr.close()
+        self.assertIn(run.wait(timeout=60), (0, 1))
+
+    def test_an_ending_ffmpeg_is_one_line(self):
+        os.makedirs("bin", exist_ok=True)
+        path = os.path.abspath("bin") + os.pathsep + os.environ["PATH"]
+        for script, says in (("kill -9 $$", "Killed"), ("exit 3", "status 3"),
+                             ("head -c 100 >/dev/null; echo no codec >&2; exit 1", "no codec"),
+                             ("head -c 5000000 >/dev/null; kill -SEGV $$", "Segmentation fault")):
+            program.write("bin/ffmpeg", f"#!/bin/sh\n{script}\n".encode())
+            os.chmod("bin/ffmpeg", 0o755)
+            self.leaves_nothing(1, "render", "small.trip", "-o", "out.mp4", "--size", "128x128",
+                                "--orbit", 60, says=says, env=dict(os.environ, PATH=path))
+
     # Memory
 
     def test_too_little_memory_is_one_line(self):
@@ -359,7 +451,8 @@ class Trouble(program.ProgramTest):
             if status == 0:
                 break
             self.assertEqual(status, 1)
-            self.assertRegex(err, r"\Atriptych: [^\n]*interrupted[^\n]*\n\Z")
+            note = r"(triptych: note: [^\n]* of 400 pictures are written\n)?"  # of a turntable
+            self.assertRegex(err, r"\Atriptych: [^\n]*interrupted[^\n]*\n" + note + r"\Z")
             self.assertFalse(os.path.exists(arguments[3]))
             met += 1
         self.assertGreater(met, 0)
@@ -374,6 +467,50 @@ class Trouble(program.ProgramTest):
         self.works("info", "--verify", "out.trip")
         self.assertEqual(leftovers(), ["out.trip"])
         shutil.rmtree("out.trip")
+
+    def begin(self, *arguments, **options):
+        """Starts a run, and waits until it has a temporary file or folder beside its output."""
+        before = set(os.listdir("."))
+        run = program.start(*arguments, **options)
+        self.addCleanup(run.kill)
+        while run.poll() is None and set(os.listdir(".")) == before:
+            time.sleep(0.001)
+        self.assertIsNone(run.poll())
+        return run, before
+
+    def test_every_signal_that_ends_the_program_leaves_nothing(self):
+        video = [["render", "cloud.trip", "-o", "out.mp4", "--orbit", 400, "--size", "200x200"]]
+        for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT:
+            for arguments in (["brick", "cloud.nrrd", "-o", "out.trip", "--keep-all"],
+                              *(video if shutil.which("ffmpeg") else [])):
+                run, before = self.begin(*arguments)
+                run.send_signal(number)
+                _, err = run.communicate(timeout=60)
+                self.assertEqual(run.returncode, 1, err)
+                self.assertRegex(err.decode(), r"\Atriptych: [^\n]*interrupted[^\n]*\n\Z")
+                self.assertEqual(set(os.listdir(".")), before, (number, arguments))
+
+    def test_a_closed_terminal_leaves_nothing(self):
+        """The program is alone on a terminal, which ends with all its readers."""
+        for arguments in (["brick", "cloud.nrrd", "-o", "out.trip", "--keep-all"],
+                          ["render", "cloud.trip", "-o", "out.tif", "--size", "3000x3000"]):
+            inner, outer = os.openpty()
+
+            def take_terminal():
+                os.setsid()
+                fcntl.ioctl(outer, termios.TIOCSCTTY, 0)
+
+            run = program.start(*arguments, stdin=outer, stdout=outer, stderr=outer,
+                                preexec_fn=take_terminal)
+            self.addCleanup(run.kill)
+            before = set(os.listdir("."))
+            program.await_handler(run)
+            time.sleep(0.1)
+            os.close(outer)
+            os.close(inner)
+            self.assertEqual(run.wait(timeout=60), 1)
+            self.assertEqual(leftovers(), [])
+            self.assertLessEqual(set(os.listdir(".")), before)
 
     def test_interrupted_drawing_leaves_nothing(self):
         self.check_interrupted(

@@ -81,8 +81,8 @@ class Uncalled(program.ProgramTest):
             program.write(path, f"#ifdef {define}\n#error uncalled for\n#endif\n{text}".encode())
         return dict(os.environ, TRIPTYCH_SHADER_DIR=os.path.abspath("shaders"))
 
-    @unittest.skipIf("GL" in program.SWITCHED_OFF, "built without OpenGL")
     def test_shaders_are_compiled_only_for_features_in_use(self):
+        program.need_gl()
         for define, scenes in CALLED_FOR.items():
             environment = self.shaders_without(define)
             for scene in scenes:

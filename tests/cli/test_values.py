@@ -315,7 +315,7 @@ class Ids(program.ProgramTest):
         colours = {tuple(round(255 * c) for c in p[1:4]) for p in points if p[4] > 0}
         for renderer in ("cpu", "integral", *program.GL):
             pixels = self.picture("v.trip", "--renderer", renderer, "--size=100x100", "--tf=solid.tf",
-                                  "--no-shading").reshape(-1, 4)
+                                  "--no-shading", "--samples=1").reshape(-1, 4)
             opaque = pixels[pixels[:, 3] > 0.99]
             seen = {tuple(int(round(255 * c)) for c in p[:3]) for p in opaque}
             near = {c for c in colours for p in seen if max(abs(a - b) for a, b in zip(c, p)) <= 2}

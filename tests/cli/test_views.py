@@ -286,7 +286,7 @@ class Views(program.ProgramTest):
         visible pixels, of 255."""
         options = name, "--size", "200x200", "--background", "none", *view
         drawn = self.picture(*options, "--renderer=cpu")
-        exact = self.picture(*options, "--renderer=integral")
+        exact = self.picture(*options, "--renderer=integral", "--samples=1")
         apart = 255 * abs(drawn - exact).max(axis=-1)[exact[..., 3] > 1 / 255]
         return apart.mean(), numpy.percentile(apart, 99)
 

@@ -140,20 +140,56 @@ static void first_signal_sets_a_flag(void **state)
     raise(SIGHUP);
     assert_true(trip_interrupted());
     trip_interrupt_install();
+    raise(SIGQUIT);
+    assert_true(trip_interrupted());
+    trip_interrupt_install();
 }
 
 static void an_ignored_hangup_stays_ignored(void **state)
 {
     (void)state;
-    signal(SIGHUP, SIG_IGN);
+    static const int ignored[] = { SIGHUP, SIGQUIT };
+    for (int i = 0; i < 2; i++) {
+        signal(ignored[i], SIG_IGN);
+        trip_interrupt_install();
+        raise(ignored[i]);
+        assert_false(trip_interrupted());
+        raise(SIGINT);
+        raise(ignored[i]);
+        assert_true(trip_interrupted());
+        trip_interrupt_install();
+        signal(ignored[i], SIG_DFL);
+    }
+}
+
+/* Writes to a pipe without a reader, and returns the error of the write. */
+static int write_unread(int fd)
+{
+    int ends[2], keep = dup(fd);
+    assert_int_equal(pipe(ends), 0);
+    dup2(ends[1], fd);
+    close(ends[0]);
+    close(ends[1]);
+    const int error = write(fd, "x", 1) < 0 ? errno : 0;
+    assert_true(trip_interrupt_is_unread(fd));
+    dup2(keep, fd);
+    close(keep);
+    return error;
+}
+
+static void a_pipe_without_a_reader_ends_only_programs_that_print_their_results(void **state)
+{
+    (void)state;
+    fflush(stdout);
     trip_interrupt_install();
-    raise(SIGHUP);
+    assert_int_equal(write_unread(STDOUT_FILENO), EPIPE);
     assert_false(trip_interrupted());
-    raise(SIGINT);
-    raise(SIGHUP);
+    trip_interrupt_at_end_of_output();
+    assert_int_equal(write_unread(STDERR_FILENO), EPIPE);
+    assert_false(trip_interrupted());
+    assert_int_equal(write_unread(STDOUT_FILENO), EPIPE);
     assert_true(trip_interrupted());
     trip_interrupt_install();
-    signal(SIGHUP, SIG_DFL);
 }
 
 static void a_signal_interrupts_only_scopes_that_heed_its_flag(void **state)
@@ -364,6 +400,7 @@ int main(void)
         cmocka_unit_test(without_a_sink_lines_go_to_stderr),
         cmocka_unit_test(first_signal_sets_a_flag),
         cmocka_unit_test(an_ignored_hangup_stays_ignored),
+        cmocka_unit_test(a_pipe_without_a_reader_ends_only_programs_that_print_their_results),
         cmocka_unit_test(a_signal_interrupts_only_scopes_that_heed_its_flag),
         cmocka_unit_test(an_interrupt_is_reported_once),
         cmocka_unit_test(a_scope_gets_only_the_lines_of_its_threads),

@@ -138,9 +138,47 @@ static void the_distance_counts_changes_of_single_characters(void **state)
     assert_true(trip_text_distance(lengthy, "a") == SIZE_MAX);
 }
 
+static const char *nearest(const char *text)
+{
+    static const char *const names[] = { "orbit", "size", "samples", "background", "tf" };
+    trip_text_nearest n = { .text = text };
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        trip_text_nearest_try(&n, names[i]);
+    return n.name ? n.name : "";
+}
+
+static void the_nearest_name_differs_in_few_letters(void **state)
+{
+    (void)state;
+    assert_string_equal(nearest("orbti"), "orbit");
+    assert_string_equal(nearest("Size"), "size");
+    assert_string_equal(nearest("sample"), "samples");
+    assert_string_equal(nearest("bakcgroundd"), "background");
+    assert_string_equal(nearest("frt"), "");
+    assert_string_equal(nearest("t"), "");
+    assert_string_equal(nearest("orrr"), "");
+    assert_string_equal(nearest(""), "");
+}
+
+static void words_of_a_shell_are_quoted(void **state)
+{
+    (void)state;
+    static const char *const words[][2] = { { "a/b-1.nrrd", "a/b-1.nrrd" },
+                                            { "", "''" },
+                                            { "it's a $x;", "'it'\\''s a $x;'" } };
+    for (int i = 0; i < 3; i++) {
+        char *word = trip_text_word(words[i][0]);
+        assert_non_null(word);
+        assert_string_equal(word, words[i][1]);
+        free(word);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_nearest_name_differs_in_few_letters),
+        cmocka_unit_test(words_of_a_shell_are_quoted),
         cmocka_unit_test(decimal_numbers_are_read),
         cmocka_unit_test(other_texts_are_not_numbers),
         cmocka_unit_test(written_numbers_can_be_read_without_loss),

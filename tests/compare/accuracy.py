@@ -20,8 +20,8 @@ def integral(prepared, view, size, threads, path):
     """Writes the integral of a view to `path`, as a PNG with the alpha of the programs'
     pictures."""
     command = [prepared.triptych, "render", prepared.volume, "-o", path, "--renderer", "integral",
-               "--field", "source", "--tolerance", str(TOLERANCE), "--tf", prepared.function_path,
-               "--threads", str(threads), "--size", "%dx%d" % (size, size),
+               "--field", "source", "--samples", "1", "--tolerance", str(TOLERANCE),
+               "--tf", prepared.function_path, "--threads", str(threads), "--size", "%dx%d" % (size, size),
                "--eye=" + _numbers(view["eye"]), "--look=" + _numbers(view["look"]),
                "--up=" + _numbers(view["up"]), "--fov", repr(view["fov_degrees"]),
                "--background", "none"]

@@ -102,14 +102,15 @@ class Frames:
         self.options = options
         text = run([options.triptych, "bench", "renderers", options.dataset, "--renderer=cpu",
                     "--threads=1", "--occluded=draw", "--json", "--size=" + options.size,
-                    "--views=%d" % options.views] + options.look
+                    "--views=%d" % options.views, *([] if options.post else ["--classify=pre"])]
+                   + options.look
                    + (["--no-counts"] if options.post else []))
         result = json.loads(text)
         row = result["tables"]["renderers"]["rows"][0]
         self.views = row["each_view"]
         if options.post:
             width, height = options.size.split("x")
-            self.splats = result["settings"]["kept"] * len(self.views)
+            self.splats = result["settings"]["kept_voxels"] * len(self.views)
             self.pixels = int(width) * int(height) * len(self.views)
             return
         self.splats = row["splats_drawn"] * len(self.views)

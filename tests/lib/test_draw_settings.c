@@ -14,8 +14,9 @@ static draw_settings full(void)
         " --quality high --classify pre --early-termination 0 --kernel ewa --interpolation cubic"
         " --lod 1.5 --max-bytes 1048576 --max-ms 20 --samples 3 --samples-per-sheet auto"
         " --depth --count --show levels --field splats --tolerance 0.001 --compositing sheet"
-        " --flatten 3 --h 0 --kernel-radius 2.5 --low-pass none --method clip --normalise"
-        " --submit indexed --submit triangles --target rgba16f --traversal ascending"
+        " --flatten 3 --h 0 --kernel-radius 2.5 --low-pass ewa --low-pass-width 0"
+        " --method clip --normalise --submit indexed --submit triangles --target rgba16f "
+        "--traversal ascending"
         " --weights vertex";
     draw_settings s = { .has_background = 0 };
     assert_int_equal(draw_settings_read_text(&s, options), 0);
@@ -50,6 +51,7 @@ static void options_set_the_members_of_their_names(void **state)
     assert_int_equal(s.all.interpolation, TRIPTYCH_INTERPOLATION_CUBIC);
     assert_int_equal(s.splat.footprint, TRIPTYCH_FOOTPRINT_EWA);
     assert_true(s.all.early_termination == TRIPTYCH_ZERO && s.all.h == TRIPTYCH_ZERO);
+    assert_true(s.splat.low_pass_px == TRIPTYCH_ZERO);
     assert_int_equal(s.sheet.samples, -1);
     assert_int_equal(s.splat.lists, TRIPTYCH_SUBMIT_INDEXED);
     assert_int_equal(s.splat.primitives, TRIPTYCH_SUBMIT_TRIANGLES);

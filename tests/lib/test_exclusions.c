@@ -51,6 +51,7 @@ static void the_message_names_the_option_and_the_reason(void **state)
     assert_refused("--low-pass uniform --kernel ewa", any, "uniform requires --renderer reference");
     assert_refused("--kernel gaussian", integral, "must be nearest, linear or cubic");
     assert_refused("--depth --samples 2", any, "--depth: requires --samples 1");
+    assert_refused("--lod 1 --submit resident", any, "--submit indexed or resident");
     assert_refused("--lod 1 --submit indexed", any, "--lod: does not apply to --submit indexed");
     assert_refused("--method image", TRIPTYCH_RENDERER_CPU, "image requires --renderer reference");
 }

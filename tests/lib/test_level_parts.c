@@ -96,6 +96,7 @@ static draw_settings plain(double lod_px)
     s.light.no_shading = 1;
     s.lod.voxel_px = lod_px;
     s.integral.tolerance = 1e-4;
+    s.all.samples = 1;
     s.clip = inside;
     s.has_background = 1;
     return s;

@@ -624,10 +624,61 @@ static void volumes_are_identified_by_content_and_state(void **state)
     assert_string_not_equal(a.state, copy.state);
     assert_string_equal(a.state, unread.state);
     assert_string_equal(unread.content, "");
-    assert_string_not_equal(a.content, all.content);
+    assert_string_equal(a.content, all.content); /* only the kept values differ */
+    assert_int_equal(strlen(a.kept), 32);
+    assert_string_equal(a.kept, unread.kept);
+    assert_string_not_equal(a.kept, all.kept);
     assert_string_not_equal(a.content, changed.content);
     triptych_destroy(t);
     assert_int_equal(system("rm -r identity identity_4x4x4_uint8.raw"), 0);
+}
+
+static int holds_range(triptych *t, double lo, double hi)
+{
+    const triptych_range range = { lo, hi };
+    return triptych_holds(t, &(triptych_brick_options){ .ranges = &range, .range_count = 1 }, NULL);
+}
+
+/* The data set keeps 100 to 200 and 900 to 1000. The volume has no values above 1300. */
+static void a_data_set_tells_whether_it_holds_values(void **state)
+{
+    (void)state;
+    triptych *t = new_context();
+    const triptych_range ranges[] = { { 100, 200 }, { 900, 1000 } };
+    const triptych_brick_options o = { .ranges = ranges, .range_count = 2 },
+                                 all = { .keep_all = 1 };
+    const triptych_brick_options automatic = { 0 };
+    triptych_transfer_function inside = {
+        .text = "values data\n110 1 1 1 0\n150 1 1 1 0.5\n190 1 1 1 0\n"
+    };
+    const char *below = "values data\n99 1 1 1 0.1\n150 1 1 1 0.5\n190 1 1 1 0\n";
+    assert_int_equal(triptych_brick(t, VOLUME, "held.trip", &o, NULL), TRIPTYCH_OK);
+    assert_fails(t, triptych_holds(t, &o, NULL), TRIPTYCH_USAGE, "open");
+    assert_int_equal(triptych_open(t, "held.trip", NULL), TRIPTYCH_OK);
+    assert_int_equal(triptych_holds(t, NULL, NULL), 1);
+    assert_int_equal(triptych_holds(t, &o, NULL), 1);
+    assert_int_equal(triptych_holds(t, &all, NULL), 0);
+    assert_int_equal(triptych_holds(t, &automatic, NULL), 0);
+    assert_int_equal(holds_range(t, 100, 200), 1);
+    assert_int_equal(holds_range(t, nextafterf(100, 0), 200), 0);
+    assert_int_equal(holds_range(t, 120, 920), 0);
+    assert_int_equal(holds_range(t, 1500, 1e9), 1);
+    assert_int_equal(holds_range(t, 900, 1e9), 0);
+    assert_int_equal(triptych_holds(t, NULL, &inside), 1);
+    assert_int_equal(triptych_holds(t, &all, &inside), 0);
+    inside.window = 400; /* stretches it over 150 to 550 */
+    inside.level = 350;
+    assert_int_equal(triptych_holds(t, NULL, &inside), 0);
+    assert_int_equal(triptych_holds(t, NULL, &(triptych_transfer_function){ .text = below }), 0);
+    triptych_close(t);
+    assert_int_equal(triptych_brick(t, VOLUME, "held.trip",
+                                    &(triptych_brick_options){ .keep_all = 1, .replace = 1 }, NULL),
+                     TRIPTYCH_OK);
+    assert_int_equal(triptych_open(t, "held.trip", NULL), TRIPTYCH_OK);
+    assert_int_equal(triptych_holds(t, &all, &inside), 1);
+    assert_int_equal(triptych_holds(t, &automatic, NULL), 1);
+    triptych_destroy(t);
+    assert_int_equal(system("rm -r held.trip"), 0);
 }
 
 static int count_file(void *user, const char *path)
@@ -682,6 +733,11 @@ static void a_failure_gives_its_reason_and_the_context_continues(void **state)
                      t, &(triptych_transfer_function){ .name = "preset:no-such" }),
                  TRIPTYCH_USAGE, "no-such");
     assert_fails(t, triptych_write(t, "p.gif", SIZE, SIZE, rgba), TRIPTYCH_USAGE, "p.gif");
+    const double clear[4] = { 1, 1, 1, 0.5 };
+    assert_int_equal(triptych_set_settings(t, &(triptych_settings){ .background = clear }), 0);
+    assert_fails(t, triptych_write(t, "p.jpg", SIZE, SIZE, rgba), TRIPTYCH_USAGE,
+                 "p.jpg: cannot hold a transparent background");
+    assert_int_equal(triptych_set_settings(t, NULL), 0);
     assert_fails(t, triptych_prepare_write(t, "p.gif", NULL), TRIPTYCH_USAGE, "p.gif");
     assert_fails(t, triptych_prepare_write(t, "p.png", "z.png"), TRIPTYCH_USAGE, "z.png");
     assert_int_equal(triptych_prepare_write(t, "p.png", "z.exr"), TRIPTYCH_OK);
@@ -1390,6 +1446,7 @@ int main(void)
         cmocka_unit_test(progress_is_reported_by_stage),
         cmocka_unit_test(bricking_describes_its_result),
         cmocka_unit_test(volumes_are_identified_by_content_and_state),
+        cmocka_unit_test(a_data_set_tells_whether_it_holds_values),
         cmocka_unit_test(the_files_of_a_volume_are_listed),
         cmocka_unit_test(a_failure_gives_its_reason_and_the_context_continues),
         cmocka_unit_test(a_too_small_kernel_gives_one_warning),

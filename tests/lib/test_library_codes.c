@@ -61,6 +61,7 @@ static triptych *open_scene(const scene *s, triptych_renderer renderer)
     const triptych_light light = { .no_shading = 1 };
     triptych_settings settings = { 0 };
     settings.classify = TRIPTYCH_CLASSIFY_POST;
+    settings.samples = 1;
     settings.light = &light;
     if (triptych_open(t, s->path, &resources))
         fail_msg("%s", triptych_error(t));
@@ -176,6 +177,7 @@ static void the_probe_returns_the_id_of_the_nearest_voxel(void **state)
     triptych *t = open_scene(&s, TRIPTYCH_RENDERER_CPU);
     triptych_settings settings = { 0 };
     settings.classify = TRIPTYCH_CLASSIFY_POST;
+    settings.samples = 1;
     settings.interpolation = TRIPTYCH_INTERPOLATION_NEAREST;
     assert_int_equal(triptych_set_settings(t, &settings), 0);
     write_function("ids.tf", 1, 7);

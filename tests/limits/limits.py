@@ -64,6 +64,16 @@ def run(name, *arguments, **popen):
                        err.read().decode(errors="replace"), usage.ru_maxrss * 1024, seconds)
 
 
+def need_gl():
+    """Skips a test if gl is switched off, or no driver offers OpenGL 4.5. A program of tests/quick
+    tells which drivers there are."""
+    if "GL" in options.get("switched_off", "").split():
+        raise unittest.SkipTest("built without OpenGL")
+    driver = os.path.join(os.path.dirname(options["quick"]), "opengl")
+    if subprocess.run([driver], stdout=subprocess.DEVNULL).returncode:
+        raise unittest.SkipTest("this machine lacks OpenGL 4.5 by EGL")
+
+
 def read_bytes(path):
     with open(path, "rb") as f:
         return f.read()

@@ -115,7 +115,9 @@ class Kill(limits.Test):
         with open(self.volume, "r+b") as f:
             f.seek(len(changed) // 2)
             f.write(bytes([changed[len(changed) // 2] ^ 0x80]))
-        fresh = self.path("fresh.trip")
+        # A data set names its volume relative to its own folder: both folders are siblings.
+        os.makedirs(self.path("other"), exist_ok=True)
+        fresh = os.path.join(self.path("other"), "fresh.trip")
         self.works("triptych", *self.arguments[:2], "-o", fresh, *self.arguments[4:])
         r = limits.run("triptych", *self.arguments, "--resume")
         if r.status:

@@ -104,7 +104,10 @@ static void the_envelope_selects_the_kept_voxels(void **state)
     assert_int_equal(l.header.kept, kept);
     assert_int_equal(s.kept, kept);
     assert_int_equal(s.voxels, N);
-    assert_int_equal(s.bytes, bytes_of_lists("a.trip", s.halo_bytes) + s.level_bytes);
+    struct stat index;
+    assert_int_equal(stat(test_path("a.trip/index.trip"), &index), 0);
+    assert_int_equal(s.bytes, bytes_of_lists("a.trip", s.halo_bytes) + s.level_bytes +
+                                  (uint64_t)index.st_size);
     assert_false(test_exists("a.trip.partial"));
     assert_false(test_exists("a.trip.spill"));
     test_free_lists(&l);
@@ -880,19 +883,23 @@ static void the_summary_tells_the_requested_levels(void **state)
 static void a_locale_with_decimal_commas_changes_nothing(void **state)
 {
     (void)state;
-    char *points = NULL, *commas = NULL;
+    char *points[2] = { 0 }, *commas[2] = { 0 };
     trip_brick_params p = params_for("uint8", "a.trip");
     p.ranges = (const trip_value_range[]){ { 60.3, 255 } };
     p.range_count = 1;
     p.volume.spacing[0] = 0.7;
-    assert_int_equal(trip_brick_options_text(&p, &points), 0);
+    assert_int_equal(trip_brick_form_text(&p, &points[0]), 0);
+    assert_int_equal(trip_brick_kept_text(&p, &points[1]), 0);
     need_comma_locale();
-    const int status = trip_brick_options_text(&p, &commas);
+    const int form = trip_brick_form_text(&p, &commas[0]);
+    const int kept = trip_brick_kept_text(&p, &commas[1]);
     setlocale(LC_ALL, "C");
-    assert_int_equal(status, 0);
-    assert_string_equal(commas, points);
-    free(commas);
-    free(points);
+    assert_true(form == 0 && kept == 0);
+    for (int i = 0; i < 2; i++) {
+        assert_string_equal(commas[i], points[i]);
+        free(commas[i]);
+        free(points[i]);
+    }
 }
 
 static void levels_of_uneven_grids_are_refused(void **state)

@@ -1,12 +1,17 @@
-/* The text of the options names every option that changes the data set, and no other option. */
+/* The texts of the options name every option that changes the data set, and no other option. The
+ * options for kept values are in the second text alone. */
 #include "brick_files.h"
 
 #include "identity.h"
 
 static char *text_of(const trip_brick_params *p)
 {
-    char *text;
-    assert_int_equal(trip_brick_options_text(p, &text), 0);
+    char *form, *kept, *text;
+    assert_int_equal(trip_brick_form_text(p, &form), 0);
+    assert_int_equal(trip_brick_kept_text(p, &kept), 0);
+    assert_true(asprintf(&text, "%s|%s", form, kept) > 0);
+    free(form);
+    free(kept);
     return text;
 }
 
@@ -79,6 +84,28 @@ static void every_relevant_option_changes_the_text(void **state)
         free(texts[i]);
 }
 
+/* Compares both texts with the texts of the defaults. */
+static void options_for_kept_values_are_in_their_own_text(void **state)
+{
+    (void)state;
+    char *form, *kept;
+    assert_int_equal(trip_brick_form_text(&different[0], &form), 0);
+    assert_int_equal(trip_brick_kept_text(&different[0], &kept), 0);
+    for (int i = 1; i < COUNT; i++) {
+        const trip_brick_params *p = &different[i];
+        const bool keeps = p->keep_all || p->automatic || p->function_count || p->range_count;
+        char *other_form, *other_kept;
+        assert_int_equal(trip_brick_form_text(p, &other_form), 0);
+        assert_int_equal(trip_brick_kept_text(p, &other_kept), 0);
+        assert_int_equal(!strcmp(form, other_form), keeps);
+        assert_int_equal(!strcmp(kept, other_kept), !keeps);
+        free(other_form);
+        free(other_kept);
+    }
+    free(form);
+    free(kept);
+}
+
 static void irrelevant_options_leave_the_text_unchanged(void **state)
 {
     (void)state;
@@ -101,6 +128,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_relevant_option_changes_the_text),
+        cmocka_unit_test(options_for_kept_values_are_in_their_own_text),
         cmocka_unit_test(irrelevant_options_leave_the_text_unchanged),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -7,7 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#ifndef TRIP_WITHOUT_GL
+#include "gl/gl_context.h"
+#endif
 #include "normal.h"
+#include "opengl.h"
 
 const trip_affine scene_sheared = { { { 1, 0.2, 0, 3 }, { 0, 2, 0.3, -1 }, { 0.1, 0, 0.5, 2 } } };
 
@@ -259,32 +263,37 @@ static int create_cpu(trip_renderer **out, trip_budget *budget)
     return trip_cpu_create(out, budget, 3);
 }
 
-static void drop(const char *line, void *user)
+#ifdef TRIP_WITHOUT_GL
+bool scene_has_gl(void)
 {
-    (void)line;
-    (void)user;
+    test_lacks("gl, which is switched off");
+    return false;
+}
+#else
+/* Checks that gl draws with the driver that the test was started for. */
+static void check_driver(const char *device)
+{
+    const char *wanted = getenv("TRIP_TEST_DRIVER");
+    print_message("gl draws with %s\n", device);
+    if (wanted && !strstr(device, wanted))
+        fail_msg("gl draws with %s; install the driver %s (mesa-vulkan-drivers)", device, wanted);
 }
 
-/* Checks whether this machine can run the gl renderer. Software drivers draw in threads of their
- * own. ThreadSanitizer cannot see their synchronisation and reports it, so its builds omit gl. */
-static bool has_gl(void)
+bool scene_has_gl(void)
 {
-#if TEST_THREAD_SANITIZER
+    trip_gl_context *context;
+    if (trip_gl_context_create(&context) == 0) {
+        check_driver(trip_gl_context_device(context));
+        trip_gl_context_destroy(context);
+        return true;
+    }
+    const char *driver = test_opengl();
+    if (driver)
+        fail_msg("gl cannot be created, although %s offers OpenGL 4.5", driver);
+    test_lacks("OpenGL 4.5 by EGL");
     return false;
-#endif
-    trip_budget *budget;
-    trip_renderer *gl;
-    assert_int_equal(trip_budget_create(&budget, UINT64_C(1) << 30), 0);
-    trip_report_redirect(drop, NULL);
-    bool has = trip_gl_create(&gl, budget) == 0;
-    trip_report_redirect(NULL, NULL);
-    if (has)
-        gl->ops->destroy(gl);
-    else
-        test_lacks("OpenGL 4.5 by EGL");
-    trip_budget_destroy(budget);
-    return has;
 }
+#endif
 
 const scene_renderer *scene_renderers(void)
 {
@@ -293,7 +302,7 @@ const scene_renderer *scene_renderers(void)
         { "cpu", create_cpu, 1.0 / 255 },
     };
     static bool looked;
-    if (!looked && has_gl())
+    if (!looked && scene_has_gl())
         all[2] = (scene_renderer){ "gl", trip_gl_create, 1.0 / 255 };
     looked = true;
     return all;

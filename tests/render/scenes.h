@@ -98,6 +98,10 @@ typedef struct scene_renderer {
     double tolerance; /* of a premultiplied component, against the reference */
 } scene_renderer;
 
+/* Tells whether this machine can run gl. Notes in the test if it cannot. Fails if gl cannot be
+ * created although a driver is there, or draws with another driver than TRIP_TEST_DRIVER. */
+bool scene_has_gl(void);
+
 /* Returns every renderer that this machine can run. An entry without a name ends the array. */
 const scene_renderer *scene_renderers(void);
 
@@ -155,6 +159,16 @@ static inline const float *scene_pixel(const scene_picture *p, int x, int y)
 
 /* Returns the maximum opacity of all pixels. */
 double scene_max_opaque(const scene_picture *p);
+
+/* Returns the maximum difference of a picture of gl or cpu from the reference. A rounding may end a
+ * pixel one sample or splat earlier or later, which changes less than the transmittance of early
+ * termination. Single precision adds the rest. In `post` it also moves the samples: far from the
+ * origin their places have fewer bits. */
+static inline double scene_bound(const trip_settings *s)
+{
+    const double rounding = s->classify == TRIP_CLASSIFY_POST ? 0.15 / 255 : 0.05 / 255;
+    return trip_settings_early_termination(s) + rounding;
+}
 
 /* Returns the largest difference of any component. */
 double scene_difference(const scene_picture *a, const scene_picture *b);

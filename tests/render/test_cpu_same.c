@@ -10,7 +10,7 @@
 
 static trip_camera_params side_view(const scene *s)
 {
-    return scene_view(s, trip_v3(1, 0.7, 0.5), 48, 50, 150);
+    return scene_view(s, trip_v3(1, 0.7, 0.5), 48, 50, 110);
 }
 
 /* Returns a wide view from inside. The rays of a list go in both directions, in separate panes and

@@ -339,7 +339,8 @@ static double expected_depth(const trip_camera *c, const trip_settings *settings
                              double x, double y)
 {
     double sigma = settings->kernel_radius / TRIP_CUTOFF, k2 = TRIP_CUTOFF * TRIP_CUTOFF, sum = 0;
-    double edge = exp(-k2 / 2), low_pass = settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : 0.4;
+    double edge = exp(-k2 / 2),
+           low_pass = settings->low_pass == TRIP_LOW_PASS_NONE ? 0 : settings->low_pass_px;
     for (int i = 0; i < 9; i++)
         for (int j = 0; j < 9; j++) {
             if ((i + 2 * j) % 5 != 0)
@@ -397,6 +398,40 @@ static void pictures_are_sums_of_gaussians(void **state)
     scene_destroy(&s);
 }
 
+/* Standard deviations. 0 switches the filter off. At 16 pixels no splat of the views is affine. */
+static const double widths_px[] = { 0, 0.4, 1, 2.5, 16 };
+enum { WIDTHS = sizeof widths_px / sizeof *widths_px };
+
+static void filters_are_as_wide_as_the_setting(void **state)
+{
+    (void)state;
+    trip_affine map = uneven_map();
+    scene s;
+    scene_create(&s,
+                 &(scene_params){ .dims = { 9, 9, 4 }, .index_to_world = map, .voxel = scattered });
+    s.table[65535] = (trip_tf_entry){ 1, 1, 1, 0.7f };
+    trip_camera_params view = scene_view(&s, trip_v3(0.3, 0.2, 1), 60, 50, 60);
+    trip_camera c;
+    assert_int_equal(trip_camera_make(&c, &view, &map), 0);
+    for (int i = 0; i < WIDTHS - 1; i++) {
+        trip_settings settings = ewa_settings();
+        settings.shading = false;
+        settings.method = TRIP_METHOD_AXIS;
+        settings.compositing = TRIP_COMPOSITING_SHEET;
+        settings.background[3] = 0;
+        settings.low_pass_px = widths_px[i];
+        scene_turn turn = scene_turns(scene_renderers(), &s, &view, &settings);
+        while (scene_take_turn(&turn))
+            for (int y = 0; y < 60; y++)
+                for (int x = 0; x < 60; x++) {
+                    double depth = expected_depth(&c, &settings, (double)0.7f, x + 0.5, y + 0.5);
+                    assert_close((double)scene_pixel(&turn.picture, x, y)[3], -expm1(-depth),
+                                 fmax(1e-5, turn.renderer->tolerance));
+                }
+    }
+    scene_destroy(&s);
+}
+
 /* Compares every renderer with the reference. */
 static void compare(const scene *s, const trip_camera_params *view, const trip_settings *settings)
 {
@@ -441,6 +476,23 @@ static void renderers_agree_with_the_reference(void **state)
 {
     (void)state;
     compare_views(1);
+}
+
+static void renderers_agree_for_every_width_of_the_filter(void **state)
+{
+    (void)state;
+    const trip_affine sheared = cpu_scenes_sheared();
+    scene s;
+    cpu_scenes_blobs(&s, 16, &sheared);
+    for (int i = 0; i < 3 * WIDTHS; i++) {
+        trip_settings settings = ewa_settings();
+        settings.footprint = i % 2 ? TRIP_FOOTPRINT_EWA : TRIP_FOOTPRINT_EXACT;
+        settings.low_pass_px = widths_px[i / 3];
+        trip_camera_params view =
+            scene_view(&s, trip_v3(1, 0.7 - 0.1 * i, 0.4), i % 3 == 1 ? 4 : 70, 60, 32);
+        compare(&s, &view, &settings);
+    }
+    scene_destroy(&s);
 }
 
 static void renderers_flatten_like_the_reference(void **state)
@@ -562,7 +614,9 @@ int main(void)
         cmocka_unit_test(affine_supports_are_ellipses_within_their_radius),
         cmocka_unit_test(scaled_flat_supports_are_within_their_radius),
         cmocka_unit_test(pictures_are_sums_of_gaussians),
+        cmocka_unit_test(filters_are_as_wide_as_the_setting),
         cmocka_unit_test(renderers_agree_with_the_reference),
+        cmocka_unit_test(renderers_agree_for_every_width_of_the_filter),
         cmocka_unit_test(renderers_flatten_like_the_reference),
         cmocka_unit_test(scaled_flat_splats_reach_across_borders_between_lists),
         cmocka_unit_test(scaled_flat_splats_reach_in_from_outside_the_picture),

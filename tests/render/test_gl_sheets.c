@@ -58,7 +58,10 @@ static trip_settings post(void)
     return s;
 }
 
-static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b)
+/* Few pixels come near the bound. There, a rounding decides at early termination, at the border of
+ * the grid or at a change of lists. */
+static void assert_agrees(const char *label, const scene_picture *a, const scene_picture *b,
+                          const trip_settings *settings)
 {
     size_t count = 4 * (size_t)a->width * (size_t)a->height;
     double max = scene_difference(a, b), sum = 0;
@@ -66,8 +69,8 @@ static void assert_agrees(const char *label, const scene_picture *a, const scene
         sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
     print_message("%-36s most %.4f mean %.5f of 1/255\n", label, 255 * max,
                   255 * sum / (double)count);
-    assert_true(max <= 1.0 / 255);
-    assert_true(sum / (double)count < 0.05 / 255);
+    assert_true(max <= scene_bound(settings));
+    assert_true(sum / (double)count < 0.005 / 255);
 }
 
 static void compare(const char *label, const scene *s, const trip_camera_params *view,
@@ -75,17 +78,9 @@ static void compare(const char *label, const scene *s, const trip_camera_params 
 {
     scene_picture a = scene_draw(s, &reference, view, settings);
     scene_picture b = scene_draw(s, &gl, view, settings);
-    assert_agrees(label, &a, &b);
+    assert_agrees(label, &a, &b, settings);
     scene_picture_free(&a);
     scene_picture_free(&b);
-}
-
-static bool has_gl(void)
-{
-    for (const scene_renderer *r = scene_renderers(); r->name; r++)
-        if (!strcmp(r->name, "gl"))
-            return true;
-    return false;
 }
 
 static void grids_of_any_shape_agree_with_the_reference(void **state)
@@ -238,7 +233,7 @@ static void depths_agree_with_the_reference(void **state)
             seen++;
         }
         assert_true(seen > 500);
-        assert_agrees("with depths", &a, &b);
+        assert_agrees("with depths", &a, &b, &settings);
         scene_picture_free(&a);
         scene_picture_free(&b);
     }
@@ -428,7 +423,7 @@ int main(void)
         cmocka_unit_test(frames_cancelled_anywhere_leave_the_next_unchanged),
         cmocka_unit_test(memory_changes_no_bit_and_too_little_is_refused),
     };
-    if (!has_gl())
+    if (!scene_has_gl())
         return 77;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -90,13 +90,14 @@ typedef struct tally {
     double max, sum, components;
 } tally;
 
-static void add(tally *t, const scene_picture *a, const scene_picture *b, const char *view)
+static void add(tally *t, const scene_picture *a, const scene_picture *b,
+                const trip_settings *settings, const char *view)
 {
     double sum = 0, max = scene_difference(a, b);
     size_t n = 4 * (size_t)a->width * (size_t)a->height;
     for (size_t i = 0; i < n; i++)
         sum += fabs((double)a->rgba[i] - (double)b->rgba[i]);
-    if (!(max <= 1.0 / 255 && sum / (double)n < 0.05 / 255))
+    if (!(max <= scene_bound(settings) && sum / (double)n < 0.005 / 255))
         fail_msg("%s: most %.4f, mean %.5f of 1/255", view, 255 * max, 255 * sum / (double)n);
     t->max = fmax(t->max, max);
     t->sum += sum;
@@ -115,7 +116,7 @@ static void check_view(const scene *s, int i, trip_classify classify, tally *tal
         if (classify == TRIP_CLASSIFY_POST && strcmp(all[r].name, "gl") != 0)
             continue;
         scene_picture p = scene_draw(s, &all[r], &view, &settings);
-        add(&tallies[r], &expected, &p, views[i].name);
+        add(&tallies[r], &expected, &p, &settings, views[i].name);
         for (int axis = 0; axis < 3; axis++)
             scene_compare_counts(&expected.lists[axis], &p.lists[axis], all[r].name);
         scene_picture_free(&p);
@@ -214,7 +215,7 @@ static void means_agree_with_the_reference(void **state)
             assert_true(coarse > 0);
             for (int r = 1; all[r].name; r++) {
                 scene_picture p = scene_draw(&s, &all[r], &view, &settings);
-                add(&tallies[r], &expected, &p, views[i].name);
+                add(&tallies[r], &expected, &p, &settings, views[i].name);
                 scene_picture_free(&p);
             }
             scene_picture_free(&expected);

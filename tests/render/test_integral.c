@@ -628,6 +628,77 @@ static void samples_are_the_mean_of_a_finer_picture(void **state)
     scene_destroy(&s);
 }
 
+/* Seen along an axis in a parallel view, a constant body is a square with one opacity. A pixel at
+ * its border has the opacity times the share of its area that the square covers. */
+static void a_pixel_counts_by_its_area(void **state)
+{
+    (void)state;
+    enum { SIZE = 8 };
+    const double alpha = 1 - exp(-0.05F * (EDGE - 1)), tolerance = 1e-3;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { EDGE, EDGE, EDGE },
+                                      .index_to_world = trip_affine_identity() });
+    for (int code = 0; code < 65536; code++)
+        s.table[code] = (trip_tf_entry){ 1, 0.5F, 0.25F, 0.05F };
+    for (double height = 23.7; height < 300; height *= 1.37) {
+        trip_camera_params view = scene_view(&s, trip_v3(0, 0, 1), 60, 40, SIZE);
+        view.ortho_height = height;
+        trip_settings settings = exact(tolerance);
+        settings.samples = 0;
+        scene_picture p = integrate(&s, &view, &settings);
+        const double half = (EDGE - 1) / height * SIZE / 2; /* of the square, in pixels */
+        for (int n = 0; n < SIZE * SIZE; n++) {
+            double share = 1;
+            for (int axis = 0; axis < 2; axis++) {
+                const double from = (axis ? n / SIZE : n % SIZE) - SIZE / 2;
+                share *= fmax(0, fmin(from + 1, half) - fmax(from, -half));
+            }
+            assert_close(scene_pixel(&p, n % SIZE, n / SIZE)[3], share * alpha, tolerance);
+            assert_close(scene_pixel(&p, n % SIZE, n / SIZE)[1], share * alpha / 2, tolerance);
+        }
+        scene_picture_free(&p);
+    }
+    scene_destroy(&s);
+}
+
+static double mean_difference(const scene_picture *a, const scene_picture *b)
+{
+    const int count = 4 * a->width * a->height;
+    double sum = 0;
+    for (int i = 0; i < count; i++)
+        sum += fabs((double)a->rgba[i] - (double)b->rgba[i]) / count;
+    return sum;
+}
+
+/* Compares with many rays per pixel, for pixels smaller and larger than voxels. The values are
+ * noise and the stripes narrow, so that a square may hold several steps. Then its points may agree
+ * by chance, and a few pixels miss the tolerance. */
+static void the_mean_over_the_area_is_the_limit_of_many_rays(void **state)
+{
+    (void)state;
+    scene s;
+    scene_create(&s, &(scene_params){ .dims = { 10, 10, 10 }, .normals = true, .voxel = noise });
+    set_stripes(&s);
+    for (int i = 0; i < 4; i++) {
+        const double tolerance = 4e-3;
+        trip_camera_params view =
+            scene_view(&s, trip_v3(1, 0.3, -0.4), 20, i % 2 ? 60 : 25, i % 2 ? 4 : 8);
+        trip_settings settings = exact(1e-4);
+        settings.shading = true;
+        settings.field = i < 2 ? TRIP_FIELD_VALUES : TRIP_FIELD_SPLATS;
+        settings.samples = 25;
+        scene_picture many = integrate(&s, &view, &settings);
+        settings.samples = 0;
+        settings.tolerance = tolerance;
+        scene_picture area = integrate(&s, &view, &settings);
+        assert_true(mean_difference(&area, &many) <= tolerance / 4);
+        assert_true(scene_difference(&area, &many) <= 3 * tolerance);
+        scene_picture_free(&area);
+        scene_picture_free(&many);
+    }
+    scene_destroy(&s);
+}
+
 /* A data set rounds values to whole codes. If extinction is linear in the code, the optical depth
  * of a path differs by at most half a code along the path. */
 static void codes_lose_at_most_their_rounding(void **state)
@@ -734,6 +805,8 @@ int main(void)
         cmocka_unit_test(threads_and_panes_change_no_bit),
         cmocka_unit_test(progress_rises_to_the_number_of_pixels),
         cmocka_unit_test(samples_are_the_mean_of_a_finer_picture),
+        cmocka_unit_test(a_pixel_counts_by_its_area),
+        cmocka_unit_test(the_mean_over_the_area_is_the_limit_of_many_rays),
         cmocka_unit_test(codes_lose_at_most_their_rounding),
         cmocka_unit_test(the_reference_converges_to_the_integral_of_its_splats),
         cmocka_unit_test(integrals_that_exceed_the_memory_are_refused),

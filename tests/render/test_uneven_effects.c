@@ -243,7 +243,7 @@ static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
 {
     (void)state;
     const trip_affine identity = trip_affine_identity();
-    for (int n = 0; n < 6; n++) {
+    for (int n = 0; n < 6; n += n ? 2 : 1) { /* 0, 1, 3, 5 */
         const trip_affine *map = n % 2 ? &scene_sheared : &identity;
         uneven u;
         scene few, all;
@@ -252,7 +252,7 @@ static void an_even_grid_with_the_same_field_has_the_same_light(void **state)
         create_blob(&all, &u, true, false, map);
         brighten(&few);
         brighten(&all);
-        const trip_camera_params view = scene_view(&few, trip_v3(0.4, -1, 0.5), 60, 25, SIZE);
+        const trip_camera_params view = scene_view(&few, trip_v3(0.4, -1, 0.5), 60, 25, 7);
         trip_settings settings = scene_with_shadows(trip_v3(0.8, -0.3, 0.6));
         settings.effects.shadows = n < 4;
         settings.effects.occlusion = n >= 4;
@@ -433,7 +433,7 @@ static void even_coordinates_change_nothing(void **state)
     create_blob(&hot[1], &none, false, false, &scene_sheared);
     begin_heat(&with, &hot[0]);
     begin_heat(&without, &hot[1]);
-    const trip_camera_params view = scene_view(&with, trip_v3(0.4, -1, 0.5), 60, 50, 20);
+    const trip_camera_params view = scene_view(&with, trip_v3(0.4, -1, 0.5), 60, 50, 12);
     for (int n = 0; n < 16; n++) {
         const trip_settings settings = some_effects(n);
         for (int i = 0; i < renderers(); i++) {

@@ -169,7 +169,7 @@ static void gl_draws_the_sprites_of_the_reference(void **state)
     const scene_renderer *gl = next_with(scene_renderers(), "gl", "gl");
     const trip_affine sheared = cpu_scenes_sheared();
     if (!gl->name)
-        skip();
+        skip(); /* scene_has_gl() checked why */
     for (int i = 0; i < 6; i++) {
         scene s;
         cpu_scenes_blobs(&s, 32, i % 2 ? &sheared : NULL);

@@ -45,6 +45,27 @@ static void merge_weights_follow_the_papers_formula(void **state)
     assert_close(trip_weight(&s, 0, ray, 2), 0.25, 1e-15);
 }
 
+/* With h = 1/2 the ray (1, 4, 0) has the signed weight -1/2 in list X. */
+static void two_points_cull_by_the_difference_of_their_weights(void **state)
+{
+    (void)state;
+    trip_settings s = with(TRIP_METHOD_MERGE, 0.5);
+    const trip_vec3 c = { 1, 4, 0 };
+    static const struct {
+        double x, y; /* of the vector to the second point */
+        bool reaches;
+    } cases[] = {
+        { 0, 0, false },    { 0.5, 0, false }, /* -1/2 + 1/4 */
+        { 1.5, 0, true },                      /* -1/2 + 3/4 */
+        { -1.5, 0, false }, /* -1/2 + 1/4: the other side would reach, but is not tested */
+        { 0, -3, true },    /* the second ray is (1, 1, 0), of weight 1 */
+    };
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(trip_weight_of_two_points(&s, 0, c, trip_v3(cases[i].x, cases[i].y, 0)),
+                         cases[i].reaches);
+    assert_true(trip_weight_of_two_points(&s, 1, c, trip_v3(0, 0, 0)));
+}
+
 static void clip_takes_the_axis_most_aligned_with_the_ray(void **state)
 {
     (void)state;
@@ -223,6 +244,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(merge_weights_follow_the_papers_formula),
+        cmocka_unit_test(two_points_cull_by_the_difference_of_their_weights),
         cmocka_unit_test(clip_takes_the_axis_most_aligned_with_the_ray),
         cmocka_unit_test(axis_takes_the_list_of_the_image_centre),
         cmocka_unit_test(at_every_pixel_of_any_camera_one_weight_is_1),

@@ -2,6 +2,7 @@
 by its DevTools protocol: JSON messages through a pair of pipes. Without Chromium they are
 skipped."""
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -222,6 +223,45 @@ class InBrowser(program.ProgramTest):
         self.assertEqual(self.sent(), [])
         self.browser.value("put = kept")
         self.exact()
+
+    def touch(self, kind, *points):
+        self.browser.call("Input.dispatchTouchEvent", type=kind,
+                          touchPoints=[{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)])
+
+    def test_a_finger_drags_and_two_fingers_zoom(self):
+        self.exact()
+        self.browser.value("log = []; kept = put; put = line => { log.push(line); kept(line); };")
+        self.touch("touchStart", (200, 100))
+        self.touch("touchMove", (260, 120))
+        self.touch("touchEnd")
+        self.assertEqual(self.sent(), ["move 200 100", "press left", "move 260 120", "move 260 120",
+                                       "release left"])
+        # Fingers twice as far apart come as close as log(2) / -log(0.88) wheel steps.
+        self.touch("touchStart", (150, 100))
+        self.touch("touchStart", (150, 100), (200, 100))
+        self.touch("touchMove", (150, 100), (250, 100))
+        self.touch("touchEnd")
+        lines = self.sent()
+        self.assertEqual(lines[:3], ["move 150 100", "press left", "release left"])
+        steps = [float(line.split()[1]) for line in lines if line.startswith("wheel")]
+        self.assertAlmostEqual(sum(steps), math.log(2) / -math.log(0.88), 3)
+        self.assertEqual([line for line in lines[3:] if not line.startswith("wheel")], ["move 250 100"])
+        # The browser takes the pointer away.
+        self.touch("touchStart", (200, 100))
+        self.touch("touchCancel")
+        self.assertEqual(self.sent()[-1], "release left")
+        self.browser.value("put = kept")
+
+    def test_a_tapped_key_flies(self):
+        """The page may send the press and the release together."""
+        self.exact()
+        before = self.status()["camera"]
+        self.browser.value("events.push('hold w', 'let w'), send(), 0")
+        for _ in range(1000):
+            if self.status()["camera"] != before:
+                return
+            time.sleep(0.01)
+        raise AssertionError("the eye has not moved")
 
     def test_a_reloaded_page_shows_current_settings_and_warnings(self):
         before = self.exact()

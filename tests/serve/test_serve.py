@@ -2,16 +2,26 @@
 import http.client
 import json
 import os
+import select
 import shlex
 import signal
+import socket
 import struct
+import tempfile
+import threading
 import time
+import unittest.mock
 import urllib.parse
 import zlib
 
 import numpy
 
 import program
+
+ANSWER_S = 3  # a request with the token is answered within this time
+STRANGER_S = 5  # whole time of a connection that has not shown the token
+GUEST_S = 10  # time of each step of a connection that has
+LATE_S = 4  # for a loaded machine
 
 
 def read_png(data):
@@ -265,6 +275,11 @@ class Serve(program.ProgramTest):
             self.assertEqual(self.status()["effects"], "emission of heat.trip, 500 to 3000 K")
 
     def test_a_volume_is_bricked_and_shown(self):
+        cache = tempfile.TemporaryDirectory(prefix="trip-cache-")  # no data set keeps more values
+        self.addCleanup(cache.cleanup)
+        changed = unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=cache.name)
+        changed.start()
+        self.addCleanup(changed.stop)
         self.tearDown()
         self.serve("v.nhdr")
         self.do("resize 40 30")
@@ -411,6 +426,263 @@ class Serve(program.ProgramTest):
         self.fails(2, "serve", "v.trip", "--emission", "heat.trip", says="--effects emission")
         self.fails(1, "serve", "v.trip", "--effects", "auto", "--emission", "no.trip", says="no.trip")
         self.fails(1, "serve", "v.trip", "--port", self.port, says="--port, or 0 for a free")
+    def test_port_80_is_left_out_of_the_host(self):
+        self.tearDown()
+        self.server = program.start("serve", "v.trip", "--port", "80")
+        address = self.server.stdout.readline().decode().strip()
+        if not address:
+            self.skipTest(f"no server on port 80 here: {self.server.stderr.read().decode()}")
+        self.host, self.port, self.token = "127.0.0.1", 80, address.partition("token=")[2]
+        for host, status in (("127.0.0.1", 200), ("localhost", 200), ("127.0.0.1:80", 200),
+                             ("127.0.0.1:81", 403), ("evil.example", 403)):
+            self.assertEqual(self.ask("/status", headers={"Host": host})[0], status, host)
+        for origin, status in (("http://localhost", 204), ("http://evil.example", 403)):
+            said = self.ask("/events", "POST", "move 1 1", headers={"Origin": origin})
+            self.assertEqual(said[0], status, origin)
+
+
+class Connections(program.ProgramTest):
+    """Sends bytes that no browser would send, at times that no browser would choose."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nrrd("v.nhdr", program.noise((12, 14, 16)))
+        run = program.call("brick", "v.nhdr", "-o", "v.trip", "-q", "--keep-all")
+        assert run.returncode == 0, run.stderr
+
+    def setUp(self):
+        self.server = program.start("serve", "v.trip", "--memory", "128M", "--threads", "2")
+        url = urllib.parse.urlsplit(self.server.stdout.readline().decode().strip())
+        self.port, self.token = url.port, url.query
+        self.host = f"Host: 127.0.0.1:{self.port}\r\n"
+        self.sockets = []
+
+    def tearDown(self):
+        for s in self.sockets:
+            s.close()
+        self.server.kill()
+        self.server.communicate()
+
+    def connect(self, data=b"", buffer=None):
+        s = socket.socket()
+        self.sockets.append(s)
+        s.settimeout(60)
+        if buffer:
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+        s.connect(("127.0.0.1", self.port))
+        try:
+            s.sendall(data)
+        except OSError:  # the server has dropped it
+            pass
+        return s
+
+    def request(self, line, *headers, body="", token=True):
+        """Returns a request's bytes. `line` is a method, a path and perhaps a version."""
+        method, path, version = (line.split() + ["HTTP/1.1"])[:3]
+        query = f"?{self.token}" if token else ""
+        lines = "".join(h + "\r\n" for h in headers)
+        return f"{method} {path}{query} {version}\r\n{self.host}{lines}\r\n{body}".encode()
+
+    def reply(self, data):
+        """Sends bytes. Returns the status, or 0 without a reply, and the whole reply."""
+        s, said = self.connect(data), b""
+        try:
+            while b"\r\n\r\n" not in said:
+                part = s.recv(65536)
+                if not part:
+                    break
+                said += part
+        except ConnectionResetError:
+            pass
+        s.close()
+        self.assertTrue(not said or said.startswith(b"HTTP/1.1 "), said)
+        return int(said.split()[1]) if said else 0, said
+
+    def status(self, line, *headers, body="", token=True):
+        start = time.monotonic()
+        status, said = self.reply(self.request(line, *headers, body=body, token=token))
+        self.assertLess(time.monotonic() - start, ANSWER_S, (line, headers))
+        return status
+
+    def threads(self):
+        return len(os.listdir(f"/proc/{self.server.pid}/task"))
+
+    def open_sockets(self):
+        """Counts the server's sockets. It closes one when the thread of its connection has ended."""
+        folder = f"/proc/{self.server.pid}/fd"
+        count = 0
+        for name in os.listdir(folder):
+            try:
+                count += os.readlink(f"{folder}/{name}").startswith("socket:")
+            except FileNotFoundError:
+                pass
+        return count
+
+    def test_half_requests_lock_nobody_out(self):
+        halves = (b"", b"GET / HT", self.request("GET /status")[:-2],
+                  self.request("POST /events", "Content-Length: 60000", token=False))
+        for i in range(64):
+            self.connect(halves[i % len(halves)])
+        self.assertEqual(self.status("GET /status"), 200)
+        stop = threading.Event()
+
+        def flood():  # keeps every place taken
+            while not stop.is_set():
+                self.connect(b"GET / HT")
+                if len(self.sockets) > 500:
+                    self.sockets.pop(0).close()
+                time.sleep(0.002)
+
+        thread = threading.Thread(target=flood)
+        thread.start()
+        try:
+            for _ in range(10):
+                time.sleep(0.1)
+                self.assertEqual(self.status("GET /status"), 200)
+        finally:
+            stop.set()
+            thread.join()
+        self.assertLess(self.threads(), 100)
+
+    def test_the_last_connection_with_the_token_is_answered(self):
+        first = self.connect(self.request("GET /presets"))
+        for _ in range(100):
+            s = self.connect(self.request("GET /status"))
+            self.assertIn(b"200 OK", s.recv(65536))
+        first.settimeout(ANSWER_S)  # 100 later connections have taken its place
+        try:
+            while first.recv(65536):
+                pass
+        except ConnectionResetError:
+            pass
+        self.assertEqual(self.status("GET /status"), 200)
+        self.assertLess(self.threads(), 100)
+
+    def test_no_step_of_a_connection_outlasts_its_time(self):
+        """A byte every now and then keeps no connection."""
+        before = self.open_sockets()
+        body = self.request("POST /events", "Content-Length: 60000")
+        slow = {
+            "silence": (self.connect(), b"", STRANGER_S),
+            "header": (self.connect(b"GET /"), b"a", STRANGER_S),
+            "refused body": (self.connect(b"POST / HTTP/1.1\r\n"), b"x: y\r\n", STRANGER_S),
+            "body": (self.connect(body), b"#", GUEST_S),
+            "second header": (self.connect(self.request("GET /presets") + b"GET /"), b"a", GUEST_S),
+            "rest": (self.connect(self.request("GET /presets")), b"", GUEST_S),
+            "reply": (self.connect(self.request("GET /") * 4000, buffer=4096), b"", GUEST_S),
+        }
+        self.assertEqual(self.status("GET /status"), 200)
+        start, ended = time.monotonic(), {}
+        while len(ended) < len(slow) and time.monotonic() - start < GUEST_S + LATE_S:
+            for name in slow.keys() - ended.keys():
+                s, byte, _ = slow[name]
+                poll = select.poll()
+                poll.register(s, select.POLLRDHUP)
+                if poll.poll(0):
+                    ended[name] = time.monotonic() - start
+                    continue
+                try:
+                    s.sendall(byte)
+                except OSError:
+                    pass
+            time.sleep(0.2)
+        for name, (_, _, limit) in slow.items():
+            self.assertIn(name, ended)
+            self.assertLess(ended[name], limit + LATE_S, name)
+            self.assertGreater(ended[name], limit - 1, name)
+        for _ in range(10 * LATE_S):
+            if self.open_sockets() == before:
+                break
+            time.sleep(0.1)
+        self.assertEqual(self.open_sockets(), before)
+
+    def test_requests_are_refused_before_their_body(self):
+        long, waits = "Content-Length: 1000000000", "Expect: 100-continue"
+        for headers in (long,), (long, waits), ("Content-Length: 8", waits):
+            for line, token, wanted in (("POST /events", False, 403), ("DELETE /events", True, 405)):
+                status, said = self.reply(self.request(line, *headers, token=token))
+                self.assertEqual(status, wanted, headers)
+                self.assertIn(b"Connection: close", said)
+        self.assertEqual(self.status("POST /events", long), 413)
+        self.assertEqual(self.status("POST /events", long, waits), 413)
+        self.assertEqual(self.status("POST /events", "Content-Length: 65537"), 413)
+        self.assertEqual(self.status("POST /events", "Content-Length: 65536", waits), 100)
+        status, said = self.reply(f"POST /events?{self.token} HTTP/1.1\r\nHost: evil\r\n{long}\r\n"
+                                  "\r\n".encode())
+        self.assertEqual(status, 403)
+        for origin, wanted in (("http://evil.example", 403), ("null", 403), ("", 403),
+                               ("https://127.0.0.1:1", 403), (f"http://127.0.0.1:{self.port}", 204),
+                               (f"http://127.0.0.1:{self.port}0", 403),
+                               (f"http://localhost:{self.port}", 204)):
+            said = self.status("POST /events", f"Origin: {origin}", "Content-Length: 8",
+                               body="move 1 1")
+            self.assertEqual(said, wanted, origin)
+        self.assertEqual(self.status("POST /events", long, "Origin: http://evil.example"), 403)
+
+    def test_headers_have_a_limit(self):
+        cookie = "Cookie: " + "c" * 6000  # of another server on this machine
+        self.assertEqual(self.status("GET /status", cookie), 200)
+        self.assertEqual(self.status("GET /status", "x: " + "y" * 20000), 431)
+        self.assertEqual(self.status("GET /status", *["x: y"] * 2000), 431)
+        self.assertEqual(self.status("GET /" + "y" * 20000), 414)
+        self.assertIn(self.reply(b"GET / HTTP/1.1\r\nx: " + b"y" * 1000000)[0], (431, 0))
+        self.assertIn(self.reply(b"G" * 1000000)[0], (400, 414, 431, 0))
+
+    def test_every_form_of_request_is_answered_or_refused(self):
+        self.assertEqual(self.status("GET /status HTTP/1.0"), 200)
+        self.assertEqual(self.status("GET /status HTTP/9.1"), 505)
+        self.assertEqual(self.status("GET /status", self.host.strip()), 403)
+        self.assertEqual(self.reply(f"GET /?{self.token} HTTP/1.0\r\n\r\n".encode())[0], 403)
+        self.assertEqual(self.reply(f"GET /?{self.token} HTTP/1.1\r\n\r\n".encode())[0], 400)
+        for path in "/", "/status", "/presets":
+            status, said = self.reply(self.request(f"HEAD {path}"))
+            self.assertEqual(status, 200)
+            self.assertTrue(said.endswith(b"\r\n\r\n"), said)
+        for method in "OPTIONS", "PUT", "DELETE", "TRACE", "PATCH", "TRIPTYCH", "get":
+            status, said = self.reply(self.request(f"{method} /status"))
+            self.assertEqual(status, 405)
+            self.assertIn(b"Allow: GET, HEAD, POST\r\n", said)
+            self.assertEqual(self.status(f"{method} /status", token=False), 403)
+        chunks = "Transfer-Encoding: chunked"
+        event, part = "8\r\nmove 1 1\r\n", "1000\r\n" + "move 1 1" * 512 + "\r\n"
+        for headers, body, wanted in (
+            ([chunks], event + "0\r\n\r\n", 204),
+            ([chunks], "-" + event, 400),
+            ([chunks], "ffffffffffffffffff\r\nmove 1 1", 413),
+            ([chunks], part * 17, 0),
+            ([chunks, "Content-Length: 8"], event + "0\r\n\r\n", 400),
+            (["Content-Length: 8"] * 2, "move 1 1", 400),
+            (["Content-Length: 8", "Content-Length: 7"], "move 1 1", 400),
+            (["Content-Length: -1"], "move 1 1", 400),
+            (["Content-Length: 99999999999999999999"], "move 1 1", 413),
+            ([], "", 204),
+        ):
+            self.assertEqual(self.status("POST /events", *headers, body=body), wanted,
+                             (headers, body[:20]))
+        s = self.connect(self.request("GET /presets") * 2 +
+                         self.request("GET /nothing", "Connection: close"))
+        said = b""
+        while part := s.recv(65536):
+            said += part
+        self.assertEqual([r.split()[0] for r in said.split(b"HTTP/1.1 ")[1:]],
+                         [b"200", b"200", b"404"])
+
+    def test_only_the_pages_of_the_server_are_sent(self):
+        for path in ("/index.html", "/page.html", "//", "/../v.trip", "/v.trip", "/v.nhdr",
+                     "/../../../../etc/passwd", "/%2e%2e/v.trip", "/..%2fv.trip", "/status/",
+                     "/status/../presets", "/%2fetc%2fpasswd", "\\v.trip"):
+            self.assertEqual(self.status(f"GET {path}"), 404, path)
+
+    def test_slow_clients_do_not_delay_the_end(self):
+        for _ in range(20):
+            self.connect(b"GET / HT")
+            self.connect(self.request("POST /events", "Content-Length: 9"))
+        self.connect(self.request("GET /") * 4000, buffer=4096)
+        self.connect(self.request("GET /picture"))
+        self.assertEqual(self.status("GET /status"), 200)
+        self.server.send_signal(signal.SIGINT)
+        self.assertEqual(self.server.wait(ANSWER_S), 0)
 
 
 if __name__ == "__main__":

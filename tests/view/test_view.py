@@ -8,7 +8,9 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 import unittest
+import unittest.mock
 
 sys.path.insert(0, os.path.join(os.environ["TRIP_SOURCE_DIR"], "tests", "cli"))
 import numpy
@@ -351,6 +353,20 @@ class View(program.ProgramTest):
                    "--background=0,0,0")
         self.assertTrue((seen == program.read_exr("drawn.exr")).all())
 
+    def test_a_volume_is_shown_from_a_data_set_with_more_values(self):
+        with tempfile.TemporaryDirectory(prefix="trip-cache-") as cache:
+            with unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=cache):
+                self.works("render", "ball.nrrd", "-o", "x.png", "--size=20x20", "--tf=grey",
+                           "--window=1", "--level=0")
+                before = os.listdir(os.path.join(cache, "triptych"))
+                self.view("wait\nstatus status.json\n", "ball.nrrd", "--tf=grey")
+                self.assertTrue(self.status()["exact"])
+                self.assertFalse(self.status()["failed"])
+                after = os.listdir(os.path.join(cache, "triptych"))
+        trips = lambda names: [n for n in names if n.endswith(".trip")]
+        self.assertEqual(len(trips(before)), 1)
+        self.assertEqual(trips(after), trips(before))
+
     def test_a_report_must_measure_the_data_set_of_the_volume(self):
         self.works("brick", "ball.nrrd", "-q", "-o", "usual.trip")
         program.write_report("usual", "usual.trip")
@@ -442,7 +458,7 @@ class View(program.ProgramTest):
         no_display = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
         self.fails(1, "view", "noise.trip", says="display", env=no_display)
         self.fails(1, "view", "missing.trip", says="missing.trip", env=self.screen.environment)
-        self.fails(2, "view", "--size=3", says="--size", env=self.screen.environment)
+        self.fails(2, "view", "--size=3x", says="--size", env=self.screen.environment)
         self.fails(2, "view", "--up=0,0,0", says="--up", env=self.screen.environment)
         glows = ["--effects=emission", "--emission=heat.trip"]
         for status, options, says in (

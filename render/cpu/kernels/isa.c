@@ -13,23 +13,31 @@ __attribute__((constructor)) static void find_runnable(void)
     int n = 0;
 #if defined(__x86_64__)
     __builtin_cpu_init();
-    bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
-#if !defined(TRIP_CPU_WITHOUT_AVX512)
+    struct {
+        bool avx2, avx512, vbmi2;
+    } has;
+    has.avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+               __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
 #if defined(TRIP_CPU_EMULATED_AVX512)
-    bool avx512 = avx2, vbmi2 = true;
+    has.avx512 = has.avx2, has.vbmi2 = true;
 #else
-    bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-                  __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-    bool vbmi2 = __builtin_cpu_supports("avx512vbmi2");
+    has.avx512 = has.avx2 && __builtin_cpu_supports("avx512f") &&
+                 __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+                 __builtin_cpu_supports("avx512vl");
+    has.vbmi2 = __builtin_cpu_supports("avx512vbmi2");
 #endif
-    if (avx512 && vbmi2)
+#if !defined(TRIP_CPU_WITHOUT_AVX512_VBMI2)
+    if (has.avx512 && has.vbmi2)
         runnable[n++] = &trip_cpu_avx512_vbmi2;
-    if (avx512)
+#endif
+#if !defined(TRIP_CPU_WITHOUT_AVX512)
+    if (has.avx512)
         runnable[n++] = &trip_cpu_avx512;
 #endif
-    if (avx2)
+#if !defined(TRIP_CPU_WITHOUT_AVX2)
+    if (has.avx2)
         runnable[n++] = &trip_cpu_avx2;
+#endif
 #elif defined(__aarch64__)
     runnable[n++] = &trip_cpu_neon;
 #endif

@@ -157,7 +157,7 @@ static inline const trip_tf_entry *trip_cpu_rows(const trip_cpu_view *view)
  * ray of a pixel has
  *     |r|^2 = (a^2 + b^2 + along^2) sigma^2 / |c|^2.
  * Here a and b are the values before the low-pass filter. The filter adds to a^2 and b^2 at most
- * the squared angle of TRIP_LOW_PASS_PX pixels times |r c / sigma|^2. Without EWA all splats count
+ * the squared angle of low_pass_px pixels times |r c / sigma|^2. Without EWA all splats count
  * as near. */
 static inline bool trip_cpu_own_rays(const trip_cpu_view *view)
 {
