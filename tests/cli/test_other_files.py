@@ -212,7 +212,7 @@ class LookAtValues(program.ProgramTest):
         os.truncate("v.nrrd", os.path.getsize("v.nrrd") - 500)
         run = self.works("info", "v.nrrd")
         self.assertTrue(program.LINE.fullmatch(run.stderr), run.stderr)
-        self.assertIn(b"14 x 12 x 10, float", run.stdout)
+        self.assertIn(b"14 x 12 x 10 voxels, float", run.stdout)
 
 
 if __name__ == "__main__":
