@@ -88,7 +88,9 @@ static void print_text(const cache_folder *c, const cache_entry *entries, size_t
     uint64_t total = 0;
     for (size_t i = 0; i < count; i++)
         total += entries[i].bytes;
-    printf("%-9s %s\n", "folder", c->path);
+    printf("%-9s ", "folder");
+    trip_text_write(stdout, c->path);
+    putchar('\n');
     printf("%-9s %zu data set%s, %s", "holds", count, count == 1 ? "" : "s",
            trip_format_bytes(total, bytes));
     if (c->fd >= 0)
@@ -99,7 +101,9 @@ static void print_text(const cache_folder *c, const cache_entry *entries, size_t
         printf("%9s  %s  ", trip_format_bytes(entries[i].bytes, bytes),
                format_time(entries[i].used_ns, true, used));
         trip_text_write(stdout, name ? name : "(damaged, or of another version)");
-        printf("  %s\n", path ? path : "");
+        fputs("  ", stdout);
+        trip_text_write(stdout, path ? path : "");
+        putchar('\n');
         free(name);
         free(path);
     }

@@ -14,6 +14,7 @@
 #include "geometry.h"
 #include "json.h"
 #include "library.h"
+#include "own_file_info.h"
 #include "command_line.h"
 #include "report.h"
 #include "size_print.h"
@@ -361,27 +362,6 @@ static void print_anatomy(const triptych_info *info, const char *space)
                trip_anatomy_words(space, direction(info->index_to_world, a), words));
 }
 
-static void print_orientation(const char *orientation)
-{
-    static const struct {
-        const char *name, *words;
-    } sources[] = {
-        { "space", "from the space of the patient in the file" },
-        { "file", "from the directions in the file" },
-        { "axes", "from --axes" },
-        { "program", "from the program that wrote the file" },
-        { "symmetry", "guessed from the mirror symmetry" },
-        { "voxels", "guessed from the long voxels" },
-        { "base", "guessed from the level base" },
-        { "length", "guessed from the longest side" },
-        { "format", "guessed from the format" },
-        { "none", "not in the file; z is up by default" },
-    };
-    for (size_t i = 0; orientation && i < sizeof sources / sizeof *sources; i++)
-        if (!strcmp(orientation, sources[i].name))
-            printf("%-12s %s\n", "orientation", sources[i].words);
-}
-
 /* Other lines say the same in words. */
 static bool is_for_people(const char *key)
 {
@@ -516,6 +496,9 @@ static void print_text(const data_set *d)
     for (unsigned i = 0; i < info->lists; i++)
         print_list(info, &d->lists[i]);
     print_notes(d->source.root);
+    printf("%-12s triptych render ", "to draw it");
+    trip_text_write_word(stdout, d->path);
+    puts(" -o NAME.png");
 }
 
 static int read_lists(data_set *d)
@@ -571,7 +554,8 @@ int trip_command_info(int argc, char **argv)
     const command_line c = {
         .args_doc = "NAME.trip|VOLUME",
         .doc = "Prints the contents of a data set: grid, values, sizes and source. Of a volume, it "
-               "prints the grid, and the series of a DICOM folder.",
+               "prints the grid, a look at the values, and the series of a DICOM folder. Of other "
+               "files, it prints what they are and what reads them.",
         .sets = p.sets,
         .set_count = SETS,
         .argument = add_input,
@@ -581,9 +565,12 @@ int trip_command_info(int argc, char **argv)
     data_set d = { 0 };
     int status = command_line_parse(&c, argc, argv);
     d.path = o.path;
-    if (status == 0)
+    const bool own = status == 0 && !o.verify && own_file_wanted(o.path);
+    if (status == 0 && !own)
         status = library_create(&d.t, NULL);
-    if (status == 0)
+    if (own)
+        status = own_file_info(o.path, o.json != 0);
+    else if (status == 0)
         status = cached_volume_wanted(o.path)
                      ? volume_info_print(d.t, o.path, &o.volume, o.json != 0)
                      : show_data_set(&o, &d);

@@ -15,6 +15,7 @@
 #include "render_options.h"
 #include "render_stats.h"
 #include "report.h"
+#include "text.h"
 #include "sequence.h"
 #include "video.h"
 
@@ -76,11 +77,14 @@ static int brick_volume(drawing *d)
     const cached_wish wish = wish_of(d);
     int status = cached_volume_open(&d->volume, d->t, o->input, &wish);
     trip_progress_end(&d->progress);
-    if (status == 0 && d->volume.seconds > 0 && !has_no_summary(o))
-        printf("%s: bricked into the cache in %.2f s\n", o->input, d->volume.seconds);
-    if (status == 0 && d->volume.wider && !has_no_summary(o))
-        printf("%s: found in the cache, in a data set made for another transfer function\n",
-               o->input);
+    if (status == 0 && d->volume.seconds > 0 && !has_no_summary(o)) {
+        trip_text_write(stdout, o->input);
+        printf(": bricked into the cache in %.2f s\n", d->volume.seconds);
+    }
+    if (status == 0 && d->volume.wider && !has_no_summary(o)) {
+        trip_text_write(stdout, o->input);
+        puts(": found in the cache, in a data set made for another transfer function");
+    }
     return status;
 }
 

@@ -68,6 +68,15 @@ int library_set_function_quietly(triptych *t, const triptych_transfer_function *
     return status;
 }
 
+void library_sample_values(triptych *t, const char *volume, const triptych_brick_options *options,
+                           triptych_values *v)
+{
+    triptych_set_messages(t, NULL, NULL);
+    if (triptych_sample_values(t, volume, options, v))
+        trip_report_line(triptych_error(t));
+    triptych_set_messages(t, pass_message, NULL);
+}
+
 char *library_note(triptych *t, const char *key)
 {
     triptych_info info;

@@ -23,6 +23,11 @@ void library_hush(triptych *t, bool quiet);
 /* Sets the transfer function without printing warnings. Reports failures. */
 int library_set_function_quietly(triptych *t, const triptych_transfer_function *function);
 
+/* Looks at a volume's values without printing notes. A failure is printed and leaves a share of 0.
+ */
+void library_sample_values(triptych *t, const char *volume, const triptych_brick_options *options,
+                           triptych_values *v);
+
 /* Returns a string from the notes of the open data set; the caller frees it. Returns NULL if there
  * is none. */
 char *library_note(triptych *t, const char *key);

@@ -3,12 +3,18 @@
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "anatomy.h"
+#include "budget.h"
 #include "geometry.h"
 #include "json.h"
+#include "library.h"
 #include "report.h"
 #include "text.h"
+
+/* From this size on, a data set of one's own is worth making. */
+#define LARGE_BYTES 4e9
 
 static int add_series(void *user, const char *text)
 {
@@ -26,8 +32,42 @@ static void add_numbers(cJSON *root, const char *name, const double *values, int
     cJSON_AddItemToObject(root, name, cJSON_CreateDoubleArray(values, count));
 }
 
-static int print_json(const triptych_description *d, const char *path, const char *fill,
-                      cJSON *series)
+void print_orientation(const char *from)
+{
+    static const struct {
+        const char *name, *words;
+    } sources[] = {
+        { "space", "from the space of the patient in the file" },
+        { "file", "from the directions in the file" },
+        { "axes", "from --axes" },
+        { "program", "from the program that wrote the file" },
+        { "symmetry", "guessed from the mirror symmetry" },
+        { "voxels", "guessed from the long voxels" },
+        { "base", "guessed from the level base" },
+        { "length", "guessed from the longest side" },
+        { "format", "guessed from the format" },
+        { "values", "not in the file; drawing guesses it from the values" },
+        { "none", "not in the file; z is up by default" },
+    };
+    for (size_t i = 0; from && i < sizeof sources / sizeof *sources; i++)
+        if (!strcmp(from, sources[i].name))
+            printf("%-12s %s\n", "orientation", sources[i].words);
+}
+
+/* Returns the size of all values. */
+static double bytes_of(const triptych_description *d)
+{
+    static const char *const types[] = { "int8",   "uint8", "int16", "uint16", "half",  "int32",
+                                         "uint32", "float", "int64", "uint64", "double" };
+    static const int bytes[] = { 1, 1, 2, 2, 2, 4, 4, 4, 8, 8, 8 };
+    double size = 0;
+    for (size_t i = 0; i < sizeof types / sizeof *types; i++)
+        size = strcmp(d->type, types[i]) ? size : bytes[i];
+    return size * (double)d->dims[0] * (double)d->dims[1] * (double)d->dims[2];
+}
+
+static int print_json(const triptych_description *d, const triptych_values *v, const char *path,
+                      const char *fill, cJSON *series)
 {
     cJSON *root = cJSON_CreateObject();
     const double dims[3] = { (double)d->dims[0], (double)d->dims[1], (double)d->dims[2] };
@@ -41,6 +81,17 @@ static int print_json(const triptych_description *d, const char *path, const cha
         cJSON_AddItemToArray(rows, cJSON_CreateDoubleArray(d->index_to_world[row], 4));
     if (d->space[0])
         cJSON_AddStringToObject(root, "space", d->space);
+    cJSON_AddStringToObject(root, "orientation", d->orientation);
+    if (d->grid[0])
+        cJSON_AddStringToObject(root, "grid", d->grid);
+    cJSON_AddNumberToObject(root, "value_bytes", bytes_of(d));
+    if (v->share > 0) {
+        cJSON_AddNumberToObject(root, "value_min", v->value_min);
+        cJSON_AddNumberToObject(root, "value_max", v->value_max);
+        cJSON_AddNumberToObject(root, "typical_min", v->typical_min);
+        cJSON_AddNumberToObject(root, "typical_max", v->typical_max);
+        cJSON_AddNumberToObject(root, "share_read", v->share);
+    }
     if (d->modality[0])
         cJSON_AddStringToObject(root, "modality", d->modality);
     if (d->note[0])
@@ -64,12 +115,36 @@ static void print_line(const char *label, const char *text)
     putchar('\n');
 }
 
-static void print_text(const triptych_description *d, const char *path, const char *fill,
-                       const cJSON *series)
+static void print_values(const triptych_values *v)
 {
-    char words[TRIP_ANATOMY_WORDS];
+    if (!(v->share > 0))
+        return;
+    printf("%-12s %.7g to %.7g", "values", v->value_min, v->value_max);
+    if (v->typical_min > v->value_min || v->typical_max < v->value_max)
+        printf(", most from %.7g to %.7g", v->typical_min, v->typical_max);
+    if (v->share < 1)
+        printf(v->share >= 0.01 ? "; in the %.0f %% that were read" : "; in the few that were read",
+               100 * v->share);
+    putchar('\n');
+}
+
+/* Prints the command that draws the volume. */
+static void print_command(const triptych_description *d, const char *path)
+{
+    const bool is_large = bytes_of(d) > LARGE_BYTES;
+    printf("%-12s triptych %s ", "to draw it", is_large ? "brick" : "render");
+    trip_text_write_word(stdout, path);
+    puts(is_large ? " -o NAME.trip; triptych render NAME.trip -o NAME.png" : " -o NAME.png");
+}
+
+static void print_text(const triptych_description *d, const triptych_values *v, const char *path,
+                       const char *fill, const cJSON *series)
+{
+    char words[TRIP_ANATOMY_WORDS], bytes[32];
     print_line("volume", path);
     print_line("format", d->format);
+    if (d->grid[0])
+        print_line("name", d->grid);
     printf("%-12s %lld x %lld x %lld voxels, %s\n", "grid", (long long)d->dims[0],
            (long long)d->dims[1], (long long)d->dims[2], d->type);
     printf("%-12s %.7g x %.7g x %.7g\n", "spacing", trip_length(direction(d, 0)),
@@ -82,11 +157,15 @@ static void print_text(const triptych_description *d, const char *path, const ch
         printf("world %c      = %.7g i + %.7g j + %.7g k + %.7g\n", 'x' + row,
                d->index_to_world[row][0], d->index_to_world[row][1], d->index_to_world[row][2],
                d->index_to_world[row][3]);
+    print_orientation(d->orientation);
     if (d->space[0])
         print_line("space", d->space);
     for (int a = 0; a < 3 && d->space[0]; a++)
         printf("%c %-10s %s\n", 'i' + a, "points to",
                trip_anatomy_words(d->space, direction(d, a), words));
+    print_values(v);
+    printf("%-12s %s of values; `--memory` limits what drawing takes\n", "memory",
+           trip_format_bytes((uint64_t)bytes_of(d), bytes));
     if (d->modality[0])
         print_line("modality", d->modality);
     if (fill)
@@ -95,20 +174,24 @@ static void print_text(const triptych_description *d, const char *path, const ch
     cJSON_ArrayForEach(line, series) print_line("series", line->valuestring);
     if (d->note[0])
         print_line("note", d->note);
+    print_command(d, path);
 }
 
 int volume_info_print(triptych *t, const char *path, const triptych_brick_options *options,
                       bool json)
 {
     triptych_description d;
+    triptych_values v = { 0 };
     cJSON *series = cJSON_CreateArray();
     if (!series)
         return trip_fail(TRIP_ERROR, "info", path, "out of memory");
     int status = triptych_describe(t, path, options, &d, add_series, series);
+    if (status == 0)
+        library_sample_values(t, path, options, &v);
     if (status == 0 && json)
-        status = print_json(&d, path, options->fill, series);
+        status = print_json(&d, &v, path, options->fill, series);
     else if (status == 0)
-        print_text(&d, path, options->fill, series);
+        print_text(&d, &v, path, options->fill, series);
     cJSON_Delete(series);
     return status;
 }

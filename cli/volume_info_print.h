@@ -6,6 +6,9 @@
 
 #include "triptych_brick.h"
 
+/* Prints the source of an orientation in words. Prints nothing for NULL. */
+void print_orientation(const char *from);
+
 /* Returns a negative status after a reported failure. */
 int volume_info_print(triptych *t, const char *path, const triptych_brick_options *options,
                       bool json);

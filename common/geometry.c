@@ -83,3 +83,19 @@ bool trip_affine_invert(const trip_affine *a, trip_affine *out)
                 return false;
     return true;
 }
+
+double trip_affine_farthest_voxels(const trip_affine *a, const double dims[3])
+{
+    double shortest = INFINITY, farthest = 0;
+    for (int k = 0; k < 3; k++)
+        shortest = fmin(shortest, trip_length(trip_v3(a->m[0][k], a->m[1][k], a->m[2][k])));
+    for (int corner = 0; corner < 8; corner++) {
+        const trip_vec3 p =
+            trip_affine_point(a, trip_v3(corner & 1 ? dims[0] - 1 : 0, corner & 2 ? dims[1] - 1 : 0,
+                                         corner & 4 ? dims[2] - 1 : 0));
+        farthest = fmax(farthest, fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))));
+        if (!isfinite(p.x + p.y + p.z))
+            return INFINITY;
+    }
+    return shortest > 0 ? farthest / shortest : INFINITY;
+}

@@ -25,6 +25,13 @@ typedef struct trip_affine {
 #define TRIP_VOXEL_WORLD_MIN 1e-32
 #define TRIP_VOXEL_WORLD_MAX 1e32
 
+/* Maximum number of voxels along an axis of a grid. */
+#define TRIP_AXIS_VOXELS_MAX (1 << 24)
+
+/* Maximum distance of a voxel from the origin of world space, and of the eye from the first voxel,
+ * in voxels. Double precision has an error of a hundredth of a voxel there. */
+#define TRIP_FARTHEST_VOXELS 0x1p46
+
 static inline trip_vec3 trip_v3(double x, double y, double z)
 {
     return (trip_vec3){ x, y, z };
@@ -104,6 +111,11 @@ double trip_affine_determinant(const trip_affine *a);
 bool trip_affine_is_similarity(const trip_affine *a);
 /* Returns false if the map is singular or not finite. */
 bool trip_affine_invert(const trip_affine *a, trip_affine *out);
+
+/* Returns the greatest coordinate in world space of the voxels of a grid, divided by the length of
+ * its shortest voxel. Beyond TRIP_FARTHEST_VOXELS, positions lose their place. Infinite if numbers
+ * overflow. */
+double trip_affine_farthest_voxels(const trip_affine *a, const double dims[3]);
 
 #ifdef __cplusplus
 }

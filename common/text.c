@@ -112,12 +112,38 @@ void trip_text_write(FILE *f, const char *text)
     }
 }
 
+static bool is_shown_unchanged(const char *text)
+{
+    for (trip_text_character c; *text; text += c.bytes)
+        if (c = trip_text_next(text), !c.printable)
+            return false;
+    return true;
+}
+
+/* Writes a word in the form $'...' of bash, with escapes. */
+static void write_escaped_word(FILE *f, const char *word)
+{
+    fputs("$'", f);
+    for (trip_text_character c; *word; word += c.bytes) {
+        char shown[TRIP_TEXT_SHOWN_BYTES];
+        c = trip_text_next(word);
+        if (*word == '\'' || *word == '\\')
+            fputc('\\', f);
+        fwrite(shown, 1, trip_text_show(word, c, shown), f);
+    }
+    fputc('\'', f);
+}
+
 void trip_text_write_word(FILE *f, const char *word)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
                                 "_-+=.,/:@%";
     if (*word && strspn(word, plain) == strlen(word)) {
         fputs(word, f);
+        return;
+    }
+    if (!is_shown_unchanged(word)) {
+        write_escaped_word(f, word);
         return;
     }
     fputc('\'', f);

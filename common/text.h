@@ -50,7 +50,7 @@ unsigned trip_text_show(const char *text, trip_text_character c, char *shown);
 void trip_text_write(FILE *f, const char *text);
 
 /* Writes a text as one word of a shell, in single quotes if a shell would interpret it otherwise.
- */
+ * The form $'...' of bash holds characters that are not printable. */
 void trip_text_write_word(FILE *f, const char *word);
 
 /* Returns such a word for free(), or NULL without memory. */

@@ -40,7 +40,9 @@ void drop_copies(std::vector<trip_dicom_ref> &slices)
     }
     if (!copies.empty())
         trip_warn((*copies.begin())->path.c_str(),
-                  "is a copy of another file, as are %zu more; copies are left out",
+                  copies.size() > 1
+                      ? "is a copy of another file, as are %zu more; copies are left out"
+                      : "is a copy of another file, and is left out",
                   copies.size() - 1);
     slices = left;
 }

@@ -7,7 +7,9 @@
 
 #include "anatomy.h"
 #include "brick.h"
+#include "brick_metadata.h"
 #include "estimate.h"
+#include "glance.h"
 #include "library_context.h"
 #include "identity.h"
 #include "report.h"
@@ -380,7 +382,8 @@ static int each_line(char *text, triptych_text_callback found, void *user)
     return status < 0 ? status : 0;
 }
 
-static triptych_description description_of(const trip_volume_info *info)
+static triptych_description description_of(const trip_volume_info *info,
+                                           const trip_volume_params *params)
 {
     triptych_description d = { .format = info->format, .type = trip_scalar_name(info->type) };
     for (int a = 0; a < 3; a++) {
@@ -398,35 +401,53 @@ static triptych_description description_of(const trip_volume_info *info)
     }
     memcpy(d.index_to_world, info->index_to_world.m, sizeof d.index_to_world);
     snprintf(d.space, sizeof d.space, "%s", info->space);
+    d.orientation = trip_brick_orientation(info, params);
+    snprintf(d.grid, sizeof d.grid, "%s", info->name);
     snprintf(d.modality, sizeof d.modality, "%s", info->modality);
     snprintf(d.note, sizeof d.note, "%s", info->note);
     return d;
 }
 
-static int describe(const char *path, const triptych_brick_options *o, triptych_description *out,
-                    triptych_text_callback series, void *user)
+typedef struct opened_volume {
+    trip_budget *budget;
+    trip_volume *volume;
+} opened_volume;
+
+static int open_volume(opened_volume *v, const char *path, const triptych_brick_options *o)
 {
     const char *fault = fault_of_volume(o);
-    trip_budget *budget = NULL;
-    trip_volume *v = NULL;
+    *v = (opened_volume){ 0 };
     if (fault)
         return trip_fail(TRIP_USAGE, "read", path, "%s", fault);
     const trip_volume_params params = volume_params(o);
-    int status = trip_budget_create(&budget, o->memory_bytes);
+    int status = trip_budget_create(&v->budget, o->memory_bytes);
+    return status ? status : trip_volume_open(&v->volume, path, &params, v->budget);
+}
+
+static void close_volume(opened_volume *v)
+{
+    trip_volume_close(v->volume);
+    if (v->budget)
+        trip_budget_destroy(v->budget);
+}
+
+static int describe(const char *path, const triptych_brick_options *o, triptych_description *out,
+                    triptych_text_callback series, void *user)
+{
+    opened_volume v;
+    int status = open_volume(&v, path, o);
+    const trip_volume_info *info = status ? NULL : trip_volume_get_info(v.volume);
+    const trip_volume_params params = status ? (trip_volume_params){ 0 } : volume_params(o);
     if (!status)
-        status = trip_volume_open(&v, path, &params, budget);
-    if (!status)
-        *out = description_of(trip_volume_get_info(v));
-    char *parts = !status ? trip_volume_get_info(v)->parts : NULL;
+        *out = description_of(info, &params);
+    char *parts = info ? info->parts : NULL;
     if (parts && series && !(parts = strdup(parts)))
         status = trip_fail(TRIP_ERROR, "read", path, "out of memory");
     else if (parts && series) {
         status = each_line(parts, series, user);
         free(parts);
     }
-    trip_volume_close(v);
-    if (budget)
-        trip_budget_destroy(budget);
+    close_volume(&v);
     return status;
 }
 
@@ -438,6 +459,28 @@ int triptych_describe(triptych *t, const char *volume, const triptych_brick_opti
     *out = (triptych_description){ 0 };
     return trip_context_leave(before,
                               describe(volume, options ? options : &defaults, out, series, user));
+}
+
+static int sample_values(const char *path, const triptych_brick_options *o, triptych_values *out)
+{
+    opened_volume v;
+    trip_glance g = { 0 };
+    int status = open_volume(&v, path, o);
+    if (!status)
+        status = trip_glance_at(&g, v.volume, path, v.budget);
+    if (!status)
+        *out = (triptych_values){ g.share, g.value_min, g.value_max, g.typical_min, g.typical_max };
+    close_volume(&v);
+    return status;
+}
+
+int triptych_sample_values(triptych *t, const char *volume, const triptych_brick_options *options,
+                           triptych_values *out)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const triptych_brick_options defaults = { 0 };
+    *out = (triptych_values){ 0 };
+    return trip_context_leave(before, sample_values(volume, options ? options : &defaults, out));
 }
 
 static int use_source(triptych *t, const char *path, const triptych_brick_options *o)

@@ -268,8 +268,12 @@ typedef struct triptych_description {
     double index_to_world[3][4];
     double spacing_min[3], spacing_max[3]; /* distances of neighbouring voxels; equal if even */
     char space[8];                         /* "RAS" or "" */
-    char modality[24];                     /* of DICOM: "CT", "MR", ..., or "" */
-    char note[1024];                       /* choices made where the file leaves several, or "" */
+    /* The source of the orientation, a constant: "space", "file", "axes", "program", "format", or
+     * "values" for a guess that bricking makes. */
+    const char *orientation;
+    char grid[128];    /* name of the grid or variable, or "" */
+    char modality[24]; /* of DICOM: "CT", "MR", ..., or "" */
+    char note[1024];   /* choices made where the file leaves several, or "" */
 } triptych_description;
 
 /* Receives a line of text. A negative result ends the function that calls it. */
@@ -281,6 +285,19 @@ typedef int (*triptych_text_callback)(void *user, const char *text);
 TRIPTYCH_API int triptych_describe(triptych *t, const char *volume,
                                    const triptych_brick_options *options, triptych_description *out,
                                    triptych_text_callback series, void *user);
+
+/* The range of a part of a volume's values. */
+typedef struct triptych_values {
+    double share; /* of the volume; 1 for all of it, 0 if nothing is known */
+    double value_min, value_max;
+    double typical_min, typical_max; /* without the few values far outside */
+} triptych_values;
+
+/* Looks at a volume's values for about a second, whatever its size. Only the options for reading
+ * count; NULL is allowed. */
+TRIPTYCH_API int triptych_sample_values(triptych *t, const char *volume,
+                                        const triptych_brick_options *options,
+                                        triptych_values *out);
 
 /* Returns 1 if `name` is a valid triptych_brick_options.raw_type, otherwise 0. */
 TRIPTYCH_API int triptych_is_raw_type(const char *name);

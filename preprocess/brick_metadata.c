@@ -298,20 +298,29 @@ static orientation guess(const trip_volume_info *info, trip_orientation u)
 }
 
 /* Matches trip_dataset_metadata_orient() in render/dataset_metadata.c. */
-static orientation orientation_of(const trip_brick_metadata *t)
+static orientation orientation_of(const trip_volume_info *info, const trip_volume_params *params,
+                                  trip_orientation upright)
 {
-    const trip_volume_info *info = t->info;
-    if (t->params->volume.axes)
+    if (params->axes)
         return (orientation){ .from = "axes" };
     if (info->space[0] || info->oriented)
         return (orientation){ .from = info->space[0] ? "space" : "file" };
-    return guess(info, t->upright);
+    return guess(info, upright);
+}
+
+const char *trip_brick_orientation(const trip_volume_info *info, const trip_volume_params *params)
+{
+    const orientation o =
+        orientation_of(info, params, (trip_orientation){ .mirror = -1, .footing = -1 });
+    const bool decided = strcmp(o.from, "none") && strcmp(o.from, "voxels") &&
+                         (strcmp(info->format, "openvdb") != 0 || info->up[0]);
+    return decided ? o.from : "values";
 }
 
 void trip_brick_metadata_note(const trip_brick_metadata *t, char note[TRIP_BRICK_NOTE_BYTES])
 {
     const trip_volume_info *info = t->info;
-    const orientation o = orientation_of(t);
+    const orientation o = orientation_of(t->info, &t->params->volume, t->upright);
     const size_t length = (size_t)snprintf(note, TRIP_BRICK_NOTE_BYTES, "%s%s", info->note,
                                            o.why && info->note[0] ? "; " : "");
     if (o.why)
@@ -324,7 +333,7 @@ void trip_brick_metadata_note(const trip_brick_metadata *t, char note[TRIP_BRICK
 static void add_orientation(cJSON *root, const trip_brick_metadata *t)
 {
     static const char *const axes[] = { "x", "y", "z" };
-    const orientation o = orientation_of(t);
+    const orientation o = orientation_of(t->info, &t->params->volume, t->upright);
     cJSON_AddStringToObject(root, "orientation", o.from);
     if (t->info->space[0])
         cJSON_AddStringToObject(root, "space", t->info->space);

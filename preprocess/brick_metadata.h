@@ -24,6 +24,10 @@ typedef struct trip_brick_metadata {
  */
 trip_tf_kind trip_brick_kind(const trip_volume_info *info, const trip_histogram *h);
 
+/* Returns the source of the orientation of a volume, a key of FORMAT.md. "values" stands for a
+ * guess from the values, which bricking makes. */
+const char *trip_brick_orientation(const trip_volume_info *info, const trip_volume_params *params);
+
 /* Writes the note for the user: the reader's choices, and the orientation guessed from the shape.
  * "" if there is none. */
 enum { TRIP_BRICK_NOTE_BYTES = 1536 };

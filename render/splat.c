@@ -3,13 +3,27 @@
 #include "ewa.h"
 #include "report.h"
 
+/* Returns the variance of the low-pass filter in pixels. Let L be the largest eigenvalue of the
+ * matrix of rx and ry. A ray of the filter's support differs from r_c by at most k |q| sqrt(L).
+ * |r_c| |forward| is at least 1. */
+static double low_pass2_of(const trip_camera *c, const trip_settings *settings)
+{
+    const double px = trip_settings_low_pass_px(settings), px2 = px * px;
+    if (c->ortho)
+        return px2;
+    const double xx = trip_dot(c->rx, c->rx), yy = trip_dot(c->ry, c->ry);
+    const double largest = (xx + yy) / 2 + hypot((xx - yy) / 2, trip_dot(c->rx, c->ry));
+    const double apart2 =
+        TRIP_CUTOFF * TRIP_CUTOFF * largest * trip_dot(c->forward, c->forward); /* of one pixel */
+    return fmin(px2, TRIP_SPLAT_AFFINE * TRIP_SPLAT_AFFINE / apart2);
+}
+
 trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_settings *settings)
 {
     double sigma = settings->kernel_radius / TRIP_CUTOFF;
     double cutoff2 = TRIP_CUTOFF * TRIP_CUTOFF;
     double two_pi = 6.28318530717958647692;
     double edge = exp(-cutoff2 / 2);
-    double low_pass_px = trip_settings_low_pass_px(settings);
     return (trip_splat_frame){
         .camera = *camera,
         .sigma = sigma,
@@ -20,7 +34,7 @@ trip_splat_frame trip_splat_frame_make(const trip_camera *camera, const trip_set
                      ? settings->sprite_px / (2 * TRIP_CUTOFF)
                      : 0,
         .flatten = settings->flatten > 1 ? 1 - 1 / (settings->flatten * settings->flatten) : 0,
-        .low_pass2 = low_pass_px * low_pass_px,
+        .low_pass2 = low_pass2_of(camera, settings),
         .amplitude = 1 / (two_pi * sigma * sigma) / (1 - edge * (1 + cutoff2 / 2)),
         .edge = edge,
         .rxrx = trip_dot(camera->rx, camera->rx),

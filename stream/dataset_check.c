@@ -5,6 +5,7 @@
 #include "coordinates.h"
 #include "geometry.h"
 #include "kind.h"
+#include "normal.h"
 #include "report.h"
 
 #include <math.h>
@@ -70,18 +71,35 @@ static bool is_length(double x)
     return isfinite(x) && x >= 0;
 }
 
+/* Returns why a grid cannot be drawn, or NULL. The map is invertible. */
+static const char *fault_of_map(const trip_affine *map, const uint64_t dims[3])
+{
+    const double sizes[3] = { (double)dims[0], (double)dims[1], (double)dims[2] };
+    for (int a = 0; a < 3; a++) {
+        const double length = trip_length(trip_v3(map->m[0][a], map->m[1][a], map->m[2][a]));
+        if (!(length >= TRIP_VOXEL_WORLD_MIN && length <= TRIP_VOXEL_WORLD_MAX))
+            return "the voxels are too small or too large to be drawn";
+    }
+    return trip_affine_farthest_voxels(map, sizes) <= TRIP_FARTHEST_VOXELS
+               ? NULL
+               : "the grid lies too far from the origin of world space to be drawn";
+}
+
 static int check_grid(const trip_file_header *h, const char *where)
 {
     trip_affine map, inverse;
     double voxels = 1;
     for (int a = 0; a < 3; a++) {
-        if (h->dims[a] < 1 || h->dims[a] > INT32_MAX)
-            return FAIL_FIELD(dims, "grid size outside 1 to 2147483647");
+        if (h->dims[a] < 1 || h->dims[a] > TRIP_AXIS_VOXELS_MAX)
+            return FAIL_FIELD(dims, "grid size outside 1 to 16777216");
         voxels *= (double)h->dims[a];
     }
     memcpy(map.m, h->index_to_world, sizeof map.m);
     if (!trip_affine_invert(&map, &inverse))
         return FAIL_FIELD(index_to_world, "the index-to-world map is singular or not finite");
+    const char *fault = fault_of_map(&map, h->dims);
+    if (fault)
+        return FAIL_FIELD(index_to_world, fault);
     if (!isfinite(h->code_lo) || !isfinite(h->code_hi) || h->code_lo > h->code_hi)
         return FAIL_FIELD(code_lo, "the range of codes is invalid");
     if (!isfinite(h->value_min) || !isfinite(h->value_max) || h->value_min > h->value_max)
@@ -98,6 +116,9 @@ static int check_grid(const trip_file_header *h, const char *where)
     for (int a = 0; a < 3; a++)
         if (!is_length(h->gradient_step[a]))
             return FAIL_FIELD(gradient_step, "the gradient step is invalid");
+    if (h->normal_bytes == 3 &&
+        !trip_compact_normals_possible(&map, h->gradient_full, h->gradient_step))
+        return FAIL_FIELD(gradient_step, "the gradient step is too large for gradient_full");
     if ((double)h->voxels > voxels)
         return FAIL_FIELD(voxels, "more voxels than the grid has");
     if (h->kept > h->voxels)
@@ -208,8 +229,8 @@ static int check_list_grid(const trip_file_header *h, const trip_file_list *f, c
     trip_affine map, inverse;
     double voxels = 1;
     for (int a = 0; a < 3; a++) {
-        if (f->dims[a] < 1 || f->dims[a] > INT32_MAX)
-            return fail_at(where, at, "the list's grid size is outside 1 to 2147483647");
+        if (f->dims[a] < 1 || f->dims[a] > TRIP_AXIS_VOXELS_MAX)
+            return fail_at(where, at, "the list's grid size is outside 1 to 16777216");
         voxels *= (double)f->dims[a];
     }
     if ((double)f->records > voxels)

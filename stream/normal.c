@@ -5,7 +5,13 @@
 #include "clones.h"
 
 enum { COORDINATE_MAX = 4095, PART_BITS = 10, PART_MAX = 511, LENGTH_MAX = 127 };
-enum { STEPS_MAX = 127, P_MAX = 4095, Q_MAX = 2047, COMPACT_STRONG = 1 << 23 };
+enum {
+    STEPS_MAX = 127,
+    STEP_LENGTHS_MAX = 1024,
+    P_MAX = 4095,
+    Q_MAX = 2047,
+    COMPACT_STRONG = 1 << 23
+};
 static const uint32_t STRONG = UINT32_C(1) << 31, CENTRE = UINT32_C(1) << 30;
 
 static double fold(double a, double b)
@@ -200,6 +206,18 @@ bool trip_compact_normals_choose(const trip_affine *index_to_world, double full,
         exact = exact && unit * STEPS_MAX >= max;
     }
     return exact;
+}
+
+bool trip_compact_normals_possible(const trip_affine *index_to_world, double full,
+                                   const double step[3])
+{
+    const double(*m)[4] = index_to_world->m;
+    bool possible = true;
+    for (int a = 0; a < 3; a++) {
+        const double max = full * trip_length(trip_v3(m[0][a], m[1][a], m[2][a]));
+        possible = possible && step[a] <= STEP_LENGTHS_MAX * max;
+    }
+    return possible;
 }
 
 trip_compact_normals trip_compact_normals_make(const trip_affine *index_to_world, double full,

@@ -59,6 +59,10 @@ typedef struct trip_compact_normals {
  * smallest difference. */
 bool trip_compact_normals_choose(const trip_affine *index_to_world, double full, double unit,
                                  double step[3]);
+/* Returns whether renderers can compute with the steps in single precision: none is longer than
+ * 1024 gradients of length `full`. trip_compact_normals_choose() makes far shorter ones. */
+bool trip_compact_normals_possible(const trip_affine *index_to_world, double full,
+                                   const double step[3]);
 trip_compact_normals trip_compact_normals_make(const trip_affine *index_to_world, double full,
                                                const double step[3]);
 /* Packs the gradient in index space. Returns 0 if it is not finite. */

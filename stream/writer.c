@@ -88,8 +88,8 @@ static int check_list(const trip_writer_params *p, unsigned i, const char *path)
             return fail_list(path, i, "another list of its level has a different grid");
     }
     for (int a = 0; a < 3; a++)
-        if (l->dims[a] < 1 || l->dims[a] > INT32_MAX)
-            return fail_list(path, i, "its grid must have 1 to 2147483647 voxels along each axis");
+        if (l->dims[a] < 1 || l->dims[a] > TRIP_AXIS_VOXELS_MAX)
+            return fail_list(path, i, "its grid must have 1 to 16777216 voxels along each axis");
     if (!trip_affine_invert(&l->index_to_world, &inverse))
         return fail_list(path, i, "its index-to-world map is singular or not finite");
     if (!(l->sheet_step > 0) ||
@@ -137,9 +137,9 @@ static int check_params(const trip_writer_params *p, const char *path)
 {
     trip_affine inverse;
     for (int a = 0; a < 3; a++)
-        if (p->dims[a] < 1 || p->dims[a] > INT32_MAX)
+        if (p->dims[a] < 1 || p->dims[a] > TRIP_AXIS_VOXELS_MAX)
             return trip_fail(TRIP_ERROR, "write", path, "%lld voxels along axis %d; use 1 to %d",
-                             (long long)p->dims[a], a, INT32_MAX);
+                             (long long)p->dims[a], a, TRIP_AXIS_VOXELS_MAX);
     if (!is_power_of_two(p->tile_voxels) || p->tile_voxels < 16 || p->tile_voxels > 128)
         return trip_fail(TRIP_USAGE, "write", path, "tile of %u voxels; use 16, 32, 64 or 128",
                          p->tile_voxels);

@@ -240,9 +240,14 @@ void trip_netcdf_file::open_variable(const std::string &name, const trip_netcdf_
     int minc;
     if (nc_inq_grp_ncid(file_, "minc-2.0", &minc) == NC_NOERR)
         throw trip_netcdf_error(TRIP_VOLUME_MINC);
+    int nodes, blocks;
+    if (nc_inq_dimid(file_, TRIP_VOLUME_EXODUS_NODES, &nodes) == NC_NOERR &&
+        nc_inq_dimid(file_, TRIP_VOLUME_EXODUS_BLOCKS, &blocks) == NC_NOERR)
+        throw trip_netcdf_error(TRIP_VOLUME_EXODUS);
     find(file_, "", name, found);
     if (found.number < 0)
-        throw trip_netcdf_error(name.empty() ? "has no variable of numbers with three dimensions"
+        throw trip_netcdf_error(name.empty() ? "is HDF5 or netCDF-4 without an array of numbers on "
+                                               "three axes; `h5dump -n` lists its contents"
                                              : "has no variable \"" + name + "\"");
     if (!(found.values > 0))
         throw trip_netcdf_error("its variable \"" + found.name +

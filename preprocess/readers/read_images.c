@@ -116,6 +116,10 @@ static void describe(const trip_image_stack *stack, trip_volume_info *info)
     snprintf(info->up, sizeof info->up, "%.2s", stack->up);
     memcpy(info->modality, stack->modality, sizeof info->modality);
     snprintf(info->note, sizeof info->note, "%s", stack->note);
+    if (stack->dims[2] == 1 && !stack->modality[0])
+        trip_append_note(info->note, sizeof info->note,
+                         "a single picture, drawn as one slice; a stack is a folder of slices or a "
+                         "pattern such as slice%03d.png");
     info->oriented = stack->oriented != 0;
     info->type = (trip_scalar)stack->type;
     info->slope = stack->slope;

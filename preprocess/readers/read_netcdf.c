@@ -400,6 +400,17 @@ static int refuse_minc(const header *h)
     return image && marked ? trip_fail(TRIP_ERROR, "read", h->path, "%s", TRIP_VOLUME_MINC) : 0;
 }
 
+/* Exodus files hold finite elements. Their arrays with three axes are no grids. */
+static int refuse_exodus(const header *h)
+{
+    bool nodes = false, blocks = false;
+    for (uint64_t i = 0; i < h->dim_count; i++) {
+        nodes |= is_named(h->dims[i].name, TRIP_VOLUME_EXODUS_NODES);
+        blocks |= is_named(h->dims[i].name, TRIP_VOLUME_EXODUS_BLOCKS);
+    }
+    return nodes && blocks ? trip_fail(TRIP_ERROR, "read", h->path, "%s", TRIP_VOLUME_EXODUS) : 0;
+}
+
 /* Chooses the named variable, or else the variable with the most values. */
 static int choose_variable(const header *h, const char *name, const variable **out)
 {
@@ -411,8 +422,11 @@ static int choose_variable(const header *h, const char *name, const variable **o
         *out = wanted ? v : *out;
     }
     if (!*out)
-        return trip_fail(TRIP_ERROR, "read", h->path, name ? "has no variable \"%s\"" : "%s",
-                         name ? name : "has no numeric variable with three dimensions");
+        return trip_fail(
+            TRIP_ERROR, "read", h->path, name ? "has no variable \"%s\"" : "%s",
+            name ? name
+                 : "is netCDF without a numeric variable with three dimensions; `ncdump -h` lists "
+                   "its variables");
     return volume_of(h, *out) > 0
                ? 0
                : trip_fail(TRIP_ERROR, "read", h->path,
@@ -565,6 +579,8 @@ static int open_variable(netcdf *n, const trip_volume_params *params, trip_volum
     int status = read_header(&h, n->fd, n->path);
     if (!status)
         status = refuse_minc(&h);
+    if (status == 0)
+        status = refuse_exodus(&h);
     if (!status)
         status = choose_variable(&h, params->grid, &v);
     if (!status)

@@ -13,6 +13,7 @@
 
 #include "byte_stream.h"
 #include "dense_file.h"
+#include "other_file.h"
 #include "report.h"
 #include "volume_reader.h"
 
@@ -134,6 +135,12 @@ static nifti_2_header widen(const nifti_1_header *h)
 
 static int not_nifti(const char *path)
 {
+    unsigned char head[TRIP_OTHER_HEAD_BYTES];
+    char text[TRIP_OTHER_TEXT_BYTES];
+    size_t bytes = 0;
+    if (trip_byte_stream_head(path, head, sizeof head, true, &bytes) == 0 &&
+        trip_other_file_tell(path, head, bytes, text))
+        return trip_fail(TRIP_ERROR, "read", path, "%s", text);
     return trip_fail(TRIP_ERROR, "read", path, "is not a NIfTI-1 or NIfTI-2 header");
 }
 

@@ -15,13 +15,14 @@
 #include "anatomy.h"
 #include "byte_stream.h"
 #include "dense_file.h"
+#include "other_file.h"
 #include "report.h"
 #include "sampled.h"
 #include "volume_coordinates.h"
 #include "volume_reader.h"
 #include "text.h"
 
-#define HEAD_BYTES 1024
+#define HEAD_BYTES TRIP_OTHER_HEAD_BYTES
 /* The default size of a portion. */
 #define PORTION_BYTES ((int64_t)16 << 20)
 
@@ -161,15 +162,19 @@ static int refuse_compressed(const char *path, const char *format, trip_byte_enc
 }
 
 /* Reports that no reader knows the file, or that its compressed data are damaged. */
-static int refuse_unknown(const char *path, trip_byte_encoding encoding)
+static int refuse_unknown(const char *path, const unsigned char *head, size_t bytes,
+                          trip_byte_encoding encoding)
 {
-    unsigned char head[HEAD_BYTES];
-    size_t bytes;
+    unsigned char inner[HEAD_BYTES];
+    size_t inner_bytes;
+    char text[TRIP_OTHER_TEXT_BYTES];
     int status = encoding == TRIP_BYTES_PLAIN
                      ? 0
-                     : trip_byte_stream_head(path, head, sizeof head, false, &bytes);
+                     : trip_byte_stream_head(path, inner, sizeof inner, false, &inner_bytes);
     if (status < 0)
         return status;
+    if (trip_other_file_tell(path, head, bytes, text))
+        return trip_fail(TRIP_ERROR, "read", path, "%s", text);
     char *word = trip_text_word(path);
     status = trip_fail(TRIP_ERROR, "read", path,
                        "is of no known format (VDB, NRRD, NIfTI, netCDF, .vol, images); describe "
@@ -190,6 +195,9 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
     }
     trip_byte_encoding encoding;
     int status = read_head(path, head, &bytes, &encoding);
+    char text[TRIP_OTHER_TEXT_BYTES];
+    if (status == 0 && bytes == 0 && trip_other_file_tell(path, head, 0, text))
+        status = trip_fail(TRIP_ERROR, "read", path, "%s", text);
     if (status < 0)
         return status;
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
@@ -200,7 +208,7 @@ int trip_volume_choose_reader(const trip_volume_reader **out, const char *path,
             return refuse_compressed(path, readers[i]->format, encoding);
         return check_options(path, readers[i]->format, params);
     }
-    return refuse_unknown(path, encoding);
+    return refuse_unknown(path, head, bytes, encoding);
 }
 
 /* Returns the length of an index axis in world space, or 0 if the axis has no direction. */
@@ -299,6 +307,18 @@ static int check_lengths(const trip_volume *v)
                              "drawn: set other lengths with --spacing X,Y,Z",
                              length, "ijk"[a], TRIP_VOXEL_WORLD_MIN, TRIP_VOXEL_WORLD_MAX);
     }
+    const double dims[3] = { (double)v->info.dims[0], (double)v->info.dims[1],
+                             (double)v->info.dims[2] };
+    const double far = trip_affine_farthest_voxels(&v->info.index_to_world, dims);
+    if (!(far <= TRIP_FARTHEST_VOXELS))
+        return trip_fail(
+            TRIP_ERROR, "read", v->path,
+            "its voxels lie up to %.3g voxels from the origin of world space; %.3g can "
+            "be told apart: move the origin in the file%s",
+            far, TRIP_FARTHEST_VOXELS,
+            v->info.index_to_world.m[0][3] == 0 ? " or set other lengths with "
+                                                  "--spacing X,Y,Z"
+                                                : "");
     return 0;
 }
 

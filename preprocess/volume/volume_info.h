@@ -64,7 +64,7 @@ typedef struct trip_fills {
 bool trip_fills_parse(const char *text, trip_fills *fills);
 
 /* Maximum number of voxels along an axis of a volume that is bricked or has coordinate tables. */
-#define TRIP_VOLUME_AXIS_MAX (INT64_C(1) << 24)
+#define TRIP_VOLUME_AXIS_MAX ((int64_t)TRIP_AXIS_VOXELS_MAX)
 
 typedef struct trip_volume_info {
     int64_t dims[3]; /* voxels along i, j, k; each >= 1 */
@@ -105,6 +105,12 @@ int trip_volume_check_axes(const char *path, const trip_volume_info *info);
 /* Why MINC files, which are netCDF or HDF5, are refused. */
 #define TRIP_VOLUME_MINC                                                                           \
     "is a MINC file; the scales of its slices are not read: convert it to NIfTI with `mnc2nii`"
+
+/* The names of dimensions that all Exodus files have, which are netCDF, and why they are refused.
+ */
+#define TRIP_VOLUME_EXODUS_NODES "num_nodes"
+#define TRIP_VOLUME_EXODUS_BLOCKS "num_el_blk"
+#define TRIP_VOLUME_EXODUS "is an Exodus file of finite elements, not a volume; ParaView opens it"
 
 /* Checks --channel ("channel") or --time ("time") against the number of entries in the file.
  * Returns false and fills `why` if `index` is none of them. The second function reports this and

@@ -39,7 +39,7 @@ class Dataset:
     def plane_names(self, number):
         at = self.list_at(number)
         axis, level, kind, planes = struct.unpack_from("<4I", self.index, at)
-        names = (("voxels", "normals"), ("halo",))[kind][: planes.bit_length()]
+        names = (("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values",))[kind][: planes.bit_length()]
         return [f"{'xyz'[axis]}{level}.{name}" for name in names]
 
     def bricks(self, number):

@@ -4,9 +4,11 @@ import concurrent.futures
 import os
 import random
 import shutil
+import struct
 
 import numpy
 
+import craft
 import program
 
 PLANES = "voxels", "normals", "halo"
@@ -112,6 +114,83 @@ class BadDatasets(program.ProgramTest):
             changes += [lambda path, n=name: os.remove(f"{path}/{n}"), swap, folder, dangling]
         changes.append(lambda path: os.replace(f"{path}/x0.voxels", f"{path}/y0.voxels"))
         self.check_all(changes)
+
+    def hostile(self, change):
+        """Changes the index of a copy, with valid checksums. Returns the path."""
+        data = craft.Dataset("a.trip")
+        change(data)
+        shutil.rmtree("hostile.trip", ignore_errors=True)
+        shutil.copytree("a.trip", "hostile.trip")
+        data.write("hostile.trip")
+        return "hostile.trip"
+
+    def test_numbers_that_no_grid_has_are_refused_with_valid_checksums(self):
+        def set_step(value):
+            return lambda d: d.put("<3d", 208, *[value] * 3)
+
+        def set_map(column, value):
+            def change(d):
+                for at in [72, *(d.list_at(n) + 40 for n in range(d.lists))]:
+                    d.put("<d", at + 8 * column, value)
+            return change
+
+        def set_size(voxels):
+            def change(d):
+                for axis in range(3):
+                    d.put("<Q", 48 + 8 * axis, voxels)
+                    for number in range(d.lists):
+                        d.put("<Q", d.list_at(number) + 16 + 8 * axis, voxels)
+            return change
+
+        self.assertEqual(craft.Dataset("a.trip").number("<I", 284), 3)  # bytes of a normal
+        for change, says in (
+            *((set_step(v), "the gradient step is too large") for v in (1e6, 1e19, 1e38, 1e308)),
+            *((set_map(3, v), "too far from the origin") for v in (1e15, -1e30, 1e300)),
+            *((set_map(0, v), "too small or too large") for v in (1e-300, 1e-33, 1e33, 1e150)),
+            *((set_size(v), "grid size outside 1 to 16777216") for v in (2**24 + 1, 2**31 - 1)),
+        ):
+            path = self.hostile(change)
+            self.fails(1, "info", path, says=says)
+            for renderer in "reference", "cpu", "integral", *program.GL:
+                self.fails(1, "render", path, "-o", "no.exr", "--renderer", renderer, *VIEW,
+                           says=says, program=program.QUICK_PROGRAM)
+        self.assertFalse(os.path.exists("no.exr"))
+
+    def test_random_hostile_numbers_give_a_picture_or_a_line(self):
+        """Numbers of the header change under valid checksums. A picture is finite."""
+        chance = random.Random(int(os.environ.get("TRIP_SEED", 7)))
+        reals = 0, -1, 5e-324, 1e-300, 1e-40, 1e-12, 1e12, 1e20, 1e38, 1e40, 1e150, 1e300
+        renderers = "cpu", "reference", "integral", *program.GL
+        for number in range(24 * int(os.environ.get("TRIP_LONGER", 1))):
+            where = chance.choice((168, 176, 184, 192, 208, 216, 224, 232, 344, 352, "map", "scale"))
+            value = chance.choice(reals)
+
+            def change(d):
+                maps = [72, *(d.list_at(n) + 40 for n in range(d.lists))]
+                column = chance.randrange(12)
+                if where == "map":
+                    for at in maps:
+                        d.put("<d", at + 8 * column, value)
+                elif where == "scale":
+                    for at in maps:
+                        row = struct.unpack_from("<12d", d.index, at)
+                        d.put("<12d", at, *(x * abs(value) for x in row))
+                else:
+                    d.put("<d", where, value)
+
+            path, renderer = self.hostile(change), chance.choice(renderers)
+            run = program.call("render", path, "-o", "h.exr", "--renderer", renderer, "--size",
+                               "16x16", "--no-shading" if chance.random() < 0.3 else "--roll=5",
+                               program=program.QUICK_PROGRAM)
+            about = (number, where, value, renderer, run.returncode, run.stderr)
+            self.assertIn(run.returncode, (0, 1, 2), about)
+            if run.returncode:
+                self.assertTrue(program.LINE.fullmatch(run.stderr.splitlines(True)[-1]), about)
+                self.assertNotIn("not a finite number", run.stderr, about)
+            else:
+                picture = program.read_linear_exr("h.exr")
+                self.assertTrue(numpy.isfinite(picture).all(), about)
+                self.assertTrue(picture[..., 3].max() > 0 or "warning" in run.stderr, about)
 
     def test_other_paths_are_refused(self):
         os.mkdir("empty.trip")

@@ -242,6 +242,33 @@ class BadVolumes(program.ProgramTest):
             self.later(self.refused_bytes, data, ".nrrd")
         self.finish()
 
+    def test_voxels_too_far_from_the_origin_are_refused(self):
+        """Positions are doubles, which tell 2^46 = 7.04e13 voxels apart, to a hundredth of one."""
+        says = "lie up to .* voxels from the origin of world space"
+        grid = ("space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: "
+                "({},0,0)\n")
+        for origin, good in (1e13, True), (7e13, True), (7.1e13, False), (1e30, False), (1e300, False):
+            source = self.name(".nrrd")
+            program.write(source, b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 14 12 10\n"
+                          b"encoding: raw\n" + grid.format(origin).encode() + b"\n" + VALUES.tobytes())
+            if good:
+                self.works("render", source, "-o", "far.png", "--size", "16x16")
+            else:
+                self.assertRegex(self.refused(source), says)
+        program.write_nifti("made.nii", VALUES)
+        changed = bytearray(read("made.nii"))
+        struct.pack_into("<2h", changed, 252, 0, 1)  # the sform counts
+        struct.pack_into("<12f", changed, 280, 1, 0, 0, 1e30, 0, 1, 0, 0, 0, 0, 1, 0)
+        self.assertRegex(self.refused_bytes(bytes(changed), ".nii"), says)
+        for axis, value in (0, "1e300"), (2, "1e15"):
+            for a, count in enumerate((14, 12, 10)):
+                with open(f"c{a}.txt", "w", encoding="ascii") as f:
+                    f.writelines(f"{float(value) * (1 + i / 100) if a == axis else i}\n" for i in range(count))
+            program.write_nrrd("plain.nrrd", VALUES)
+            self.refused("plain.nrrd", "--coordinates=c0.txt,c1.txt,c2.txt")
+        for spacing in "1e-300,1e-300,1e-300", "1e300,1e300,1e300", "1,1,1e-20":
+            self.refused("plain.nrrd", f"--spacing={spacing}")
+
     # NIfTI
 
     def test_bad_nifti_files_are_refused(self):

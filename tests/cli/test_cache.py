@@ -934,9 +934,9 @@ class Cache(program.ProgramTest):
         self.assertEqual(self.entries(), [])
 
     def test_files_that_are_no_volumes_leave_nothing(self):
-        program.write("text.txt", b"hello\n" * 100)
+        program.write("unknown.dat", bytes(range(1, 30)) * 40)
         program.write("plain.raw", bytes(1000))
-        self.leaves_nothing(1, "render", "text.txt", "-o", "x.png", says="triptych brick text.txt --size")
+        self.leaves_nothing(1, "render", "unknown.dat", "-o", "x.png", says="triptych brick unknown.dat --size")
         self.leaves_nothing(2, "render", "plain.raw", "-o", "x.png", says="triptych brick plain.raw --size")
         self.leaves_nothing(1, "render", "missing.nii", "-o", "x.png", says="No such file")
         self.leaves_nothing(1, "render", "missing.trip", "-o", "x.png", says="No such file")

@@ -10,7 +10,8 @@ import numpy
 import program
 
 VIEW = ("--size=40x40", "--look=20,15,10", "--eye=80,-60,70")
-FAR = 2147483647 - 64
+LARGEST = 16777216
+FAR = LARGEST - 64
 
 
 class Records(program.ProgramTest):
@@ -132,9 +133,9 @@ class Records(program.ProgramTest):
         offset = FAR >> 7 << 7
         self.assertTrue(max(tile_log2, slab_sheets.bit_length() - 1) <= 7)
         for axis in range(3):
-            data.put("<Q", 48 + 8 * axis, 2147483647)
+            data.put("<Q", 48 + 8 * axis, LARGEST)
         for number in range(data.lists):
-            data.put("<3Q", data.list_at(number) + 16, *3 * [2147483647])
+            data.put("<3Q", data.list_at(number) + 16, *3 * [LARGEST])
             for brick in data.bricks(number):
                 u, v = struct.unpack_from("<2I", data.index, brick)
                 tiles = offset >> tile_log2

@@ -403,7 +403,7 @@ static void errors_name_the_file_that_cannot_be_opened(void **state)
     (void)state;
     assert_refused(path_of("missing.nrrd"), "missing.nrrd: cannot open: No such file");
     assert_refused(write_bytes("empty.nrrd", "", 0), "is empty");
-    assert_refused(write_bytes("text.txt", "hello", 5), "is of no known format");
+    assert_refused(write_bytes("text.txt", "hello", 5), "is text, not a volume");
     assert_refused("/dev/null", "not a regular file");
 }
 
