@@ -132,6 +132,9 @@ static void empty_staged(const trip_cpu *r, trip_cpu_worker *w, trip_cpu_chunk *
 {
     const _Atomic uint64_t *open = much_is_occluded(r) ? r->mask.panes : NULL;
     uint32_t at = chunk->splat + chunk->splats;
+    /* The last vector may be part full. A code left there from voxels with longer codes has no row
+     * in this table. */
+    memset(w->scratch.staged.code + *staged, 0, 16 * sizeof *w->scratch.staged.code);
     chunk->splats +=
         r->project(&r->views[chunk->list], open, &w->scratch.staged, *staged, &w->scratch.lanes,
                    r->filling->splats + at, trip_cpu_depths_from(r->filling, at));

@@ -197,10 +197,13 @@ typedef struct painter {
     trip_splat_hits *hits;
 } painter;
 
-/* Writes colour and opacity of the ray at a position. */
+/* Writes colour and opacity of the ray at a position. Returns TRIP_INTERRUPTED without a message.
+ */
 static int ray_at(void *user, double x, double y, double rgba[4])
 {
     const painter *p = user;
+    if (trip_interrupted())
+        return TRIP_INTERRUPTED;
     const trip_integrand *in = &p->r->in;
     const trip_ray ray = trip_ray_make(in->camera, x, y);
     trip_ray_sum sum;
@@ -296,7 +299,7 @@ static int add_squares(const trip_pixel_area *area, int x0, int squares, double 
                        corner_row below, double (*pixels)[4])
 {
     int status = 0;
-    for (int i = 0; i < squares && !status && !trip_interrupted(); i++) {
+    for (int i = 0; i < squares && !status; i++) {
         const double *const corners[4] = { above[i], above[i + 1], below[i], below[i + 1] };
         double mean[4];
         status = trip_pixel_area_square(area, x0 + (double)i / area->first, y, corners, mean);
@@ -333,7 +336,7 @@ static int make_rays(painter *p, int x0, int x1, int y0, int y1)
 {
     int status = 0;
     for (int y = y0; y < y1; y++)
-        for (int x = x0; x < x1 && !status && !trip_interrupted() && !p->r->failed; x++) {
+        for (int x = x0; x < x1 && !status && !p->r->failed; x++) {
             double rgba[4];
             status = mean_of_rays(p, x, y, rgba);
             if (!status)
@@ -357,9 +360,12 @@ static void make_pane(void *context, unsigned pane, unsigned thread)
     const trip_camera *c = r->in.camera;
     const int x0 = (int)pane % r->panes_x * r->pane_px, y0 = (int)pane / r->panes_x * r->pane_px;
     const int x1 = smaller(x0 + r->pane_px, c->width), y1 = smaller(y0 + r->pane_px, c->height);
+    int status = 0;
     if (!r->in.field)
         make_background(r, x0, x1, y0, y1);
-    else if ((r->in.settings->samples ? make_rays : make_areas)(&p, x0, x1, y0, y1))
+    else
+        status = (r->in.settings->samples ? make_rays : make_areas)(&p, x0, x1, y0, y1);
+    if (status && status != TRIP_INTERRUPTED)
         r->failed = true;
     show_progress(r, (uint64_t)(x1 - x0) * (uint64_t)(y1 - y0), thread);
 }
