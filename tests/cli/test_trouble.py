@@ -501,12 +501,8 @@ class Trouble(program.ProgramTest):
                 os.setsid()
                 fcntl.ioctl(outer, termios.TIOCSCTTY, 0)
 
-            run = program.start(*arguments, stdin=outer, stdout=outer, stderr=outer,
-                                preexec_fn=take_terminal)
-            self.addCleanup(run.kill)
-            before = set(os.listdir("."))
-            program.await_handler(run)
-            time.sleep(0.1)
+            run, before = self.begin(*arguments, stdin=outer, stdout=outer, stderr=outer,
+                                     preexec_fn=take_terminal)
             os.close(outer)
             os.close(inner)
             self.assertEqual(run.wait(timeout=60), 1)
