@@ -31,11 +31,12 @@
  *     footprint' = front(p) amplitude (exp(-m(p) / 2) - edge)
  *                                                       where m(p) <= TRIP_CUTOFF^2, else nothing
  *
- * In a wide view a pixel in the middle of the picture spans so much that the filter's support would
- * have no end: g(p) falls as fast as q^2 grows, from TRIP_CUTOFF w |rx| = |r_c| on. There w is
- * smaller, so that the filter's rays differ from r_c by at most TRIP_SPLAT_AFFINE |r_c|, the bound
- * of affine footprints. With w = 0.4, square pixels and cubic voxels, this begins where tan(fov /
- * 2) exceeds 0.1875 times the height in pixels: at 174 degrees for 100 pixels, at 179.4 for 1024.
+ * In a very wide view, a pixel in the middle of the picture spans a large angle. The filter's
+ * support would have no end from TRIP_CUTOFF w |rx| = |r_c| on: there g(p) falls as fast as q^2
+ * grows. So w is smaller in such views. The filter's rays then differ from r_c by at most
+ * TRIP_SPLAT_AFFINE |r_c|, the bound of affine footprints. With the default w, square pixels and
+ * cubic voxels, this begins where tan(fov / 2) exceeds 0.1875 times the height in pixels. For 100
+ * pixels that is at 174 degrees, for 1024 pixels at 179.4 degrees.
  *
  * The footprint ends at zero, so that rounding at its edge is not visible. The last factor of the
  * amplitude restores the mass that the cut-off removes.

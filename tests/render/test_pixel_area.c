@@ -113,8 +113,8 @@ static double half_plane_at(const void *of, double x, double y)
     return p->nx * x + p->ny * y < p->d;
 }
 
-/* Returns the area of the part of the unit square where nx x + ny y < d, for nx, ny > 0: a triangle
- * less its two tips outside of the square. */
+/* Returns the area of the part of the unit square where nx x + ny y < d. Both nx and ny are
+ * positive. The part is a triangle less the two tips outside of the square. */
 static double area_below(const half_plane *p)
 {
     const double twice = 2 * p->nx * p->ny;
