@@ -28,9 +28,10 @@ typedef struct trip_affine {
 /* Maximum number of voxels along an axis of a grid. */
 #define TRIP_AXIS_VOXELS_MAX (1 << 24)
 
-/* Maximum distance of a voxel from the origin of world space, and of the eye from the first voxel,
- * in voxels. Double precision has an error of a hundredth of a voxel there. */
-#define TRIP_FARTHEST_VOXELS 0x1p46
+/* Maximum distance of a voxel from the origin of world space, in voxels. Double precision has an
+ * error of an eighth of a voxel there. Drawing itself loses nothing, since it works in index space.
+ */
+#define TRIP_FARTHEST_VOXELS 0x1p50
 
 static inline trip_vec3 trip_v3(double x, double y, double z)
 {

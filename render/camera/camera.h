@@ -45,8 +45,9 @@ typedef struct trip_camera {
     trip_vec3 world_forward; /* for lighting; unit length */
 } trip_camera;
 
-/* Maximum distance of the eye from the first voxel, in voxels. */
-#define TRIP_CAMERA_FARTHEST_VOXELS TRIP_FARTHEST_VOXELS
+/* Maximum distance of the eye from the first voxel, in voxels. Double precision has an error of a
+ * hundredth of a voxel there. */
+#define TRIP_CAMERA_FARTHEST_VOXELS 0x1p46
 /* Maximum size of a pixel in voxels (at depth 1 in perspective); the minimum is its inverse. */
 #define TRIP_CAMERA_PIXEL_VOXELS 1e15
 

@@ -243,11 +243,11 @@ class BadVolumes(program.ProgramTest):
         self.finish()
 
     def test_voxels_too_far_from_the_origin_are_refused(self):
-        """Positions are doubles, which tell 2^46 = 7.04e13 voxels apart, to a hundredth of one."""
+        """Positions are doubles, which tell 2^50 = 1.126e15 voxels apart, to a quarter of one."""
         says = "lie up to .* voxels from the origin of world space"
         grid = ("space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: "
                 "({},0,0)\n")
-        for origin, good in (1e13, True), (7e13, True), (7.1e13, False), (1e30, False), (1e300, False):
+        for origin, good in (1e13, True), (1.12e15, True), (1.13e15, False), (1e30, False), (1e300, False):
             source = self.name(".nrrd")
             program.write(source, b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 14 12 10\n"
                           b"encoding: raw\n" + grid.format(origin).encode() + b"\n" + VALUES.tobytes())
@@ -260,7 +260,7 @@ class BadVolumes(program.ProgramTest):
         struct.pack_into("<2h", changed, 252, 0, 1)  # the sform counts
         struct.pack_into("<12f", changed, 280, 1, 0, 0, 1e30, 0, 1, 0, 0, 0, 0, 1, 0)
         self.assertRegex(self.refused_bytes(bytes(changed), ".nii"), says)
-        for axis, value in (0, "1e300"), (2, "1e15"):
+        for axis, value in (0, "1e300"), (2, "1e17"):
             for a, count in enumerate((14, 12, 10)):
                 with open(f"c{a}.txt", "w", encoding="ascii") as f:
                     f.writelines(f"{float(value) * (1 + i / 100) if a == axis else i}\n" for i in range(count))
