@@ -429,14 +429,15 @@ static int print_estimate_json(const options *o, const triptych_brick_estimate *
 
 static void print_estimate(const options *o, const triptych_brick_estimate *e)
 {
-    char bytes[32], temporary[32], there[32];
+    char bytes[32], temporary[32], there[32], voxels[32], kept[32], halo[32];
     print_name("data set", o->output);
-    printf("%-9s about %.3g of %.3g voxels, and %.3g halo voxels\n", "keeps", (double)e->kept,
-           (double)e->voxels, (double)e->halo);
+    printf("%-9s about %s of %s voxels, and %s halo voxels\n", "keeps",
+           size_print_count(e->kept, kept), size_print_count(e->voxels, voxels),
+           size_print_count(e->halo, halo));
     printf("%-9s about %s on disk, and %s of temporary files; %s are free\n", "size",
            trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),
            trip_format_bytes(e->free_bytes, there));
-    printf("%-9s about %.3g s, with reading and writing at the speed of the disk\n", "time",
+    printf("%-9s about %.2f s, with reading and writing at the speed of the disk\n", "time",
            e->seconds);
 }
 

@@ -1,5 +1,6 @@
 #include "size_print.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 
 #include "budget.h"
@@ -16,6 +17,15 @@ void size_print(const data_set_size *s)
     if (s->levels)
         printf(", %s of coarse levels", trip_format_bytes(s->levels, part));
     putchar('\n');
+}
+
+const char *size_print_count(uint64_t count, char text[static 32])
+{
+    if (count < 1000000)
+        snprintf(text, 32, "%" PRIu64, count);
+    else
+        snprintf(text, 32, "%.2f million", (double)count * 1e-6);
+    return text;
 }
 
 void size_print_each(unsigned code_bytes, unsigned normal_bytes)
