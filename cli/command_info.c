@@ -308,7 +308,7 @@ static int print_json(const data_set *d, bool verified)
 
 static const char *shortest(double value, char *text)
 {
-    snprintf(text, 32, "%.7g", value);
+    snprintf(text, 32, "%.7g", value + 0.0); /* prints a negative zero as 0 */
     return text;
 }
 
@@ -372,6 +372,19 @@ static bool is_for_people(const char *key)
     return true;
 }
 
+/* Returns the label of a note. The data set has a grid and a format of its own. */
+static const char *label_of(const char *key)
+{
+    static const char *const labels[][2] = { { "function_kind", "kind" },
+                                             { "source_path", "source path" },
+                                             { "format", "file format" },
+                                             { "grid", "grid name" } };
+    for (size_t i = 0; i < sizeof labels / sizeof *labels; i++)
+        if (!strcmp(key, labels[i][0]))
+            return labels[i][1];
+    return key;
+}
+
 /* Prints the top-level strings of the notes that `triptych brick` stored. */
 static void print_notes(const cJSON *root)
 {
@@ -380,7 +393,7 @@ static void print_notes(const cJSON *root)
             strlen(item->valuestring) < 1024 && strlen(item->string) < 200 &&
             !strchr(item->valuestring, '\n') && strcmp(item->string, "orientation") != 0) {
             const bool is_kind = !strcmp(item->string, "function_kind");
-            const char *label = is_kind ? "kind" : item->string;
+            const char *label = label_of(item->string);
             trip_text_write(stdout, label);
             for (size_t i = strlen(label); i < 12; i++)
                 putchar(' ');

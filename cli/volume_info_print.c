@@ -91,6 +91,8 @@ static int print_json(const triptych_description *d, const triptych_values *v, c
         cJSON_AddNumberToObject(root, "typical_min", v->typical_min);
         cJSON_AddNumberToObject(root, "typical_max", v->typical_max);
         cJSON_AddNumberToObject(root, "share_read", v->share);
+        if (v->fill_count)
+            add_numbers(root, "fills", v->fills, (int)v->fill_count);
     }
     if (d->modality[0])
         cJSON_AddStringToObject(root, "modality", d->modality);
@@ -125,6 +127,11 @@ static void print_values(const triptych_values *v)
     if (v->share < 1)
         printf(v->share >= 0.01 ? "; in the %.0f %% that were read" : "; in the few that were read",
                100 * v->share);
+    for (unsigned i = 0; i < v->fill_count; i++)
+        printf("%s%.7g", i ? " and " : "; ", v->fills[i]);
+    if (v->fill_count)
+        printf(" count%s as absent, --fill none keeps %s", v->fill_count > 1 ? "" : "s",
+               v->fill_count > 1 ? "them" : "it");
     putchar('\n');
 }
 
@@ -142,9 +149,9 @@ static void print_text(const triptych_description *d, const triptych_values *v, 
 {
     char words[TRIP_ANATOMY_WORDS], bytes[32];
     print_line("volume", path);
-    print_line("format", d->format);
+    print_line("format", cJSON_GetArraySize(series) ? "images (DICOM)" : d->format);
     if (d->grid[0])
-        print_line("name", d->grid);
+        print_line("grid name", d->grid);
     printf("%-12s %lld x %lld x %lld voxels, %s\n", "grid", (long long)d->dims[0],
            (long long)d->dims[1], (long long)d->dims[2], d->type);
     printf("%-12s %.7g x %.7g x %.7g\n", "spacing", trip_length(direction(d, 0)),
@@ -153,10 +160,11 @@ static void print_text(const triptych_description *d, const triptych_values *v, 
         if (d->spacing_min[a] < d->spacing_max[a])
             printf("%c %-10s %.7g to %.7g apart\n", 'i' + a, "voxels", d->spacing_min[a],
                    d->spacing_max[a]);
+    /* + 0.0 prints a negative zero as 0. */
     for (int row = 0; row < 3; row++)
         printf("world %c      = %.7g i + %.7g j + %.7g k + %.7g\n", 'x' + row,
-               d->index_to_world[row][0], d->index_to_world[row][1], d->index_to_world[row][2],
-               d->index_to_world[row][3]);
+               d->index_to_world[row][0] + 0.0, d->index_to_world[row][1] + 0.0,
+               d->index_to_world[row][2] + 0.0, d->index_to_world[row][3] + 0.0);
     print_orientation(d->orientation);
     if (d->space[0])
         print_line("space", d->space);
