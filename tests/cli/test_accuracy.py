@@ -354,7 +354,8 @@ class Accuracy(program.ProgramTest):
 
     def test_an_error_bound_without_a_report_is_refused(self):
         size = ["--size", "40x32", "-o", "e.exr"]
-        self.fails(1, "render", "a.trip", *size, "--error", "1", says="triptych accuracy")
+        self.fails(1, "render", "a.trip", *size, "--error", "1",
+                   says="a.accuracy/accuracy.json: does not exist; `triptych accuracy NAME.trip` makes")
         self.fails(1, "render", "a.trip", *size, "--error", "1", "--report", "a.tf", says="accuracy.json")
         self.fails(1, "render", "a.trip", *size, "--error", "1e-6", "--report", "report",
                    says="has the smallest")
