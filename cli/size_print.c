@@ -1,6 +1,8 @@
 #include "size_print.h"
 
 #include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 
 #include "budget.h"
@@ -25,6 +27,13 @@ const char *size_print_count(uint64_t count, char text[static 32])
         snprintf(text, 32, "%" PRIu64, count);
     else
         snprintf(text, 32, "%.2f million", (double)count * 1e-6);
+    return text;
+}
+
+const char *size_print_number(double value, char text[static 32])
+{
+    const bool whole = fabs(value) < 1e15 && floor(value) == value;
+    snprintf(text, 32, whole ? "%.0f" : "%.7g", value + 0.0);
     return text;
 }
 

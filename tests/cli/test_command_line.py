@@ -203,6 +203,14 @@ class CommandLine(program.ProgramTest):
                                "--method=axis", "--opacity-scale=0.001").stdout.decode()
             self.assertIn(f"edge.png: 40 x 40, {count} voxels, ", drawn)
 
+    def test_large_whole_values_have_all_digits(self):
+        volume = numpy.zeros((4, 4, 4), "u4")
+        volume[1, 2, 3] = 4000000001
+        program.write_nrrd("ids.nrrd", volume)
+        run = self.works("brick", "ids.nrrd", "--keep-all", "--force", "-o", "ids.trip")
+        self.assertIn(b"values 0 to 4000000001\n", run.stdout)
+        self.assertIn(b"\nvalues       0 to 4000000001\n", self.works("info", "ids.trip").stdout)
+
     def test_each_line_of_info_has_its_own_label(self):
         os.makedirs("sub", exist_ok=True)
         affine = -numpy.eye(4)
