@@ -1,6 +1,7 @@
 #include "fastest.h"
 
 #include <cjson/cJSON.h>
+#include <errno.h>
 #include <inttypes.h>
 #include <limits.h>
 #include <math.h>
@@ -177,12 +178,14 @@ static int read_text(const char *path, char *text)
 {
     int fd = trip_input_open(path);
     ssize_t bytes = fd >= 0 ? trip_input_read(fd, text, MAX_BYTES + 1) : -1;
-    int status =
-        bytes < 0
-            ? trip_fail_errno("--error", path, "cannot open; `triptych accuracy` makes this report")
-        : bytes > MAX_BYTES ? trip_fail(TRIP_ERROR, "--error", path,
-                                        "is too large for a report; at most 16 MiB are possible")
-                            : 0;
+    int status = fd < 0 && errno == ENOENT
+                     ? trip_fail(TRIP_ERROR, "--error", path,
+                                 "does not exist; `triptych accuracy NAME.trip` makes this report")
+                 : bytes < 0 ? trip_fail_errno("--error", path, "cannot read")
+                 : bytes > MAX_BYTES
+                     ? trip_fail(TRIP_ERROR, "--error", path,
+                                 "is too large for a report; at most 16 MiB are possible")
+                     : 0;
     if (fd >= 0)
         close(fd);
     if (!status)

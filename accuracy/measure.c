@@ -205,6 +205,14 @@ static void note_levels(accuracy_measured *m, const char *notes)
     trip_json_free(&json);
 }
 
+/* Returns the message without the path at its beginning. */
+static const char *without_path(const char *why, const char *path)
+{
+    const size_t length = strlen(path);
+    const bool begins = !strncmp(why, path, length) && !strncmp(why + length, ": ", 2);
+    return begins ? why + length + 2 : why;
+}
+
 /* Marks the rows that would measure nothing here, and keeps the reason. */
 static int leave_out_idle(sweep *s)
 {
@@ -213,7 +221,7 @@ static int leave_out_idle(sweep *s)
     triptych_info info;
     if (status == TRIP_ERROR)
         return trip_fail(TRIP_ERROR, "accuracy", s->o->data[0], "%s",
-                         s->contexts.why[0][TRIPTYCH_RENDERER_CPU]);
+                         without_path(s->contexts.why[0][TRIPTYCH_RENDERER_CPU], s->o->data[0]));
     if (status || triptych_get_info(t, &info))
         return status ? status : TRIP_ERROR;
     s->m->checksum = info.checksum;

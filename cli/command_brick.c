@@ -377,14 +377,14 @@ static void print_name(const char *label, const char *name)
 
 static void print_text(const options *o, const triptych_brick_summary *s)
 {
-    char temporary[32], peak[32], promise[32];
+    char temporary[32], peak[32], promise[32], low[32], high[32];
     double seconds = brick_seconds(s), kept = (double)s->kept, voxels = (double)s->voxels;
     print_name("data set", o->output);
     printf("%-9s %lld x %lld x %lld voxels, spacing %.6g x %.6g x %.6g\n", "grid",
            (long long)s->dims[0], (long long)s->dims[1], (long long)s->dims[2], s->spacing[0],
            s->spacing[1], s->spacing[2]);
-    printf("%-9s %llu read, values %.7g to %.7g\n", "voxels", (unsigned long long)s->voxels,
-           s->value_min, s->value_max);
+    printf("%-9s %llu read, values %s to %s\n", "voxels", (unsigned long long)s->voxels,
+           size_print_number(s->value_min, low), size_print_number(s->value_max, high));
     printf("%-9s %s\n", "kind", s->kind_title);
     printf("%-9s %llu voxels (%.3g %%)\n", "kept", (unsigned long long)s->kept,
            100 * kept / voxels);
@@ -429,14 +429,15 @@ static int print_estimate_json(const options *o, const triptych_brick_estimate *
 
 static void print_estimate(const options *o, const triptych_brick_estimate *e)
 {
-    char bytes[32], temporary[32], there[32];
+    char bytes[32], temporary[32], there[32], voxels[32], kept[32], halo[32];
     print_name("data set", o->output);
-    printf("%-9s about %.3g of %.3g voxels, and %.3g halo voxels\n", "keeps", (double)e->kept,
-           (double)e->voxels, (double)e->halo);
+    printf("%-9s about %s of %s voxels, and %s halo voxels\n", "keeps",
+           size_print_count(e->kept, kept), size_print_count(e->voxels, voxels),
+           size_print_count(e->halo, halo));
     printf("%-9s about %s on disk, and %s of temporary files; %s are free\n", "size",
            trip_format_bytes(e->bytes, bytes), trip_format_bytes(e->temporary_bytes, temporary),
            trip_format_bytes(e->free_bytes, there));
-    printf("%-9s about %.3g s, with reading and writing at the speed of the disk\n", "time",
+    printf("%-9s about %.2f s, with reading and writing at the speed of the disk\n", "time",
            e->seconds);
 }
 

@@ -306,16 +306,10 @@ static int print_json(const data_set *d, bool verified)
     return TRIP_OK;
 }
 
-static const char *shortest(double value, char *text)
-{
-    snprintf(text, 32, "%.7g", value);
-    return text;
-}
-
 static void print_range(const char *label, double lo, double hi)
 {
     char a[32], b[32];
-    printf("%-12s %s to %s\n", label, shortest(lo, a), shortest(hi, b));
+    printf("%-12s %s to %s\n", label, size_print_number(lo, a), size_print_number(hi, b));
 }
 
 static void print_bounds(const char *label, double bounds[2][3])
@@ -323,8 +317,8 @@ static void print_bounds(const char *label, double bounds[2][3])
     char lo[32], hi[32];
     printf("%-12s", label);
     for (int a = 0; a < 3; a++)
-        printf("%s %c %s to %s", a ? "," : "", 'x' + a, shortest(bounds[0][a], lo),
-               shortest(bounds[1][a], hi));
+        printf("%s %c %s to %s", a ? "," : "", 'x' + a, size_print_number(bounds[0][a], lo),
+               size_print_number(bounds[1][a], hi));
     putchar('\n');
 }
 
@@ -333,17 +327,18 @@ static void print_world(const triptych_info *info)
     char a[32], b[32], c[32], t[32];
     double bounds[2][3];
     printf("%-12s %s x %s x %s\n", "spacing",
-           shortest(trip_length(direction(info->index_to_world, 0)), a),
-           shortest(trip_length(direction(info->index_to_world, 1)), b),
-           shortest(trip_length(direction(info->index_to_world, 2)), c));
+           size_print_number(trip_length(direction(info->index_to_world, 0)), a),
+           size_print_number(trip_length(direction(info->index_to_world, 1)), b),
+           size_print_number(trip_length(direction(info->index_to_world, 2)), c));
     for (int axis = 0; axis < 3; axis++)
         if (info->spacing_min[axis] < info->spacing_max[axis])
             printf("%c %-10s %s to %s apart\n", 'i' + axis, "voxels",
-                   shortest(info->spacing_min[axis], a), shortest(info->spacing_max[axis], b));
+                   size_print_number(info->spacing_min[axis], a),
+                   size_print_number(info->spacing_max[axis], b));
     for (int row = 0; row < 3; row++) {
         const double *m = info->index_to_world[row];
-        printf("world %c      = %s i + %s j + %s k + %s\n", 'x' + row, shortest(m[0], a),
-               shortest(m[1], b), shortest(m[2], c), shortest(m[3], t));
+        printf("world %c      = %s i + %s j + %s k + %s\n", 'x' + row, size_print_number(m[0], a),
+               size_print_number(m[1], b), size_print_number(m[2], c), size_print_number(m[3], t));
     }
     grid_bounds(info, bounds);
     print_bounds("bounds", bounds);
@@ -372,6 +367,19 @@ static bool is_for_people(const char *key)
     return true;
 }
 
+/* Returns the label of a note. The data set has a grid and a format of its own. */
+static const char *label_of(const char *key)
+{
+    static const char *const labels[][2] = { { "function_kind", "kind" },
+                                             { "source_path", "source path" },
+                                             { "format", "file format" },
+                                             { "grid", "grid name" } };
+    for (size_t i = 0; i < sizeof labels / sizeof *labels; i++)
+        if (!strcmp(key, labels[i][0]))
+            return labels[i][1];
+    return key;
+}
+
 /* Prints the top-level strings of the notes that `triptych brick` stored. */
 static void print_notes(const cJSON *root)
 {
@@ -380,7 +388,7 @@ static void print_notes(const cJSON *root)
             strlen(item->valuestring) < 1024 && strlen(item->string) < 200 &&
             !strchr(item->valuestring, '\n') && strcmp(item->string, "orientation") != 0) {
             const bool is_kind = !strcmp(item->string, "function_kind");
-            const char *label = is_kind ? "kind" : item->string;
+            const char *label = label_of(item->string);
             trip_text_write(stdout, label);
             for (size_t i = strlen(label); i < 12; i++)
                 putchar(' ');
@@ -418,8 +426,9 @@ static void print_list(const triptych_info *info, const triptych_list *list)
     if (list->level > 0)
         printf("; grid of %lld x %lld x %lld, each %s x %s x %s voxels", (long long)list->dims[0],
                (long long)list->dims[1], (long long)list->dims[2],
-               shortest(ratio(info, list, 0), text[0]), shortest(ratio(info, list, 1), text[1]),
-               shortest(ratio(info, list, 2), text[2]));
+               size_print_number(ratio(info, list, 0), text[0]),
+               size_print_number(ratio(info, list, 1), text[1]),
+               size_print_number(ratio(info, list, 2), text[2]));
     putchar('\n');
 }
 
@@ -431,7 +440,7 @@ static void print_typical(const data_set *d)
     if (info->typical_min == info->value_min && info->typical_max == info->value_max)
         return;
     printf("%-12s %s to %s, without %.0f values far outside\n", "typical",
-           shortest(info->typical_min, lo), shortest(info->typical_max, hi),
+           size_print_number(info->typical_min, lo), size_print_number(info->typical_max, hi),
            outside(d->source.root));
 }
 
@@ -446,16 +455,16 @@ static void print_steps(const triptych_info *info)
     const double steps = byte ? BYTE_STEPS : round((info->code_hi - info->code_lo) / step);
     const bool wider = first < info->value_min || first + steps * step > info->value_max;
     char lo[32], hi[32];
-    printf("; %.0f steps of %.3g from %s to %s%s\n", steps, step, shortest(first, lo),
-           shortest(first + steps * step, hi),
+    printf("; %.0f steps of %.3g from %s to %s%s\n", steps, step, size_print_number(first, lo),
+           size_print_number(first + steps * step, hi),
            wider && !byte ? ", with a margin around the values" : "");
 }
 
 static void print_codes(const triptych_info *info)
 {
     char lo[32], hi[32];
-    shortest(info->code_lo, lo);
-    shortest(info->code_hi, hi);
+    size_print_number(info->code_lo, lo);
+    size_print_number(info->code_hi, hi);
     printf("%-12s ", "stored as");
     size_print_each(info->code_bytes, info->normal_bytes);
     if (info->ids)

@@ -170,6 +170,13 @@ int main(int argc, char **argv)
             trip_fail(TRIP_USAGE, "usage", "command",
                       "no command given; `triptych --help` lists the commands"));
     const char *name = argv[1];
+    char help[] = "--help";
+    if (!strcmp(name, "help") && argc > 2) { /* is COMMAND --help */
+        argv[1] = argv[2];
+        argv[2] = help;
+        argc = 3;
+        name = argv[1];
+    }
     if (!strcmp(name, "--help") || !strcmp(name, "help") || !strcmp(name, "-h")) {
         print_help();
         return finish(0, true);
@@ -187,6 +194,8 @@ int main(int argc, char **argv)
     trip_text_nearest nearest = { .text = name };
     for (int i = 0; i < COMMANDS; i++)
         trip_text_nearest_try(&nearest, commands[i].name);
+    trip_text_nearest_try(&nearest, "--help");
+    trip_text_nearest_try(&nearest, "--version");
     return trip_exit_status(trip_fail(TRIP_USAGE, "usage", name,
                                       "unknown command;%s%s%s `triptych --help` lists the commands",
                                       nearest.name ? " did you mean " : "",

@@ -14,6 +14,7 @@
 #include "navigation.h"
 #include "new_file.h"
 #include "report.h"
+#include "size_print.h"
 #include "text.h"
 
 struct render_stats {
@@ -412,14 +413,14 @@ int render_stats_explain_count(triptych *t, FILE *out)
 
 int render_stats_summary(const char *path, const render_options *o, triptych *t, FILE *out)
 {
-    char text[32];
+    char count[32], text[32];
     triptych_frame_stats frame;
     int status = triptych_get_frame_stats(t, &frame);
     if (status)
         return status;
     trip_text_write(out, path);
-    fprintf(out, ": %d x %d, %.2f million %s, %s read, %.2f s\n", o->view.view.width,
-            o->view.view.height, (double)frame.splats * 1e-6, things_read(o, &frame),
+    fprintf(out, ": %d x %d, %s %s, %s read, %.2f s\n", o->view.view.width, o->view.view.height,
+            size_print_count(frame.splats, count), things_read(o, &frame),
             trip_format_bytes(frame.bytes_read, text), frame.ms * 1e-3);
     return 0;
 }
@@ -432,7 +433,7 @@ void render_stats_sequence(const render_sequence *s, const render_options *o, FI
         fputs(" to ", out);
         trip_text_write(out, s->last);
     }
-    fprintf(out, ": %d pictures of %d x %d, %.3f s each, %.1f s in all, %s of memory at peak\n",
+    fprintf(out, ": %d pictures of %d x %d, %.3f s each, %.2f s in all, %s of memory at peak\n",
             s->frames, o->view.view.width, o->view.view.height, s->seconds / s->frames, s->seconds,
             trip_format_bytes(trip_memory_peak_rss_bytes(), memory));
 }

@@ -1,5 +1,8 @@
 #include "size_print.h"
 
+#include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 
 #include "budget.h"
@@ -16,6 +19,22 @@ void size_print(const data_set_size *s)
     if (s->levels)
         printf(", %s of coarse levels", trip_format_bytes(s->levels, part));
     putchar('\n');
+}
+
+const char *size_print_count(uint64_t count, char text[static 32])
+{
+    if (count < 1000000)
+        snprintf(text, 32, "%" PRIu64, count);
+    else
+        snprintf(text, 32, "%.2f million", (double)count * 1e-6);
+    return text;
+}
+
+const char *size_print_number(double value, char text[static 32])
+{
+    const bool whole = fabs(value) < 1e15 && floor(value) == value;
+    snprintf(text, 32, whole ? "%.0f" : "%.7g", value + 0.0);
+    return text;
 }
 
 void size_print_each(unsigned code_bytes, unsigned normal_bytes)

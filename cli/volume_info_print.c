@@ -11,6 +11,7 @@
 #include "json.h"
 #include "library.h"
 #include "report.h"
+#include "size_print.h"
 #include "text.h"
 
 /* From this size on, a data set of one's own is worth making. */
@@ -91,6 +92,8 @@ static int print_json(const triptych_description *d, const triptych_values *v, c
         cJSON_AddNumberToObject(root, "typical_min", v->typical_min);
         cJSON_AddNumberToObject(root, "typical_max", v->typical_max);
         cJSON_AddNumberToObject(root, "share_read", v->share);
+        if (v->fill_count)
+            add_numbers(root, "fills", v->fills, (int)v->fill_count);
     }
     if (d->modality[0])
         cJSON_AddStringToObject(root, "modality", d->modality);
@@ -125,6 +128,11 @@ static void print_values(const triptych_values *v)
     if (v->share < 1)
         printf(v->share >= 0.01 ? "; in the %.0f %% that were read" : "; in the few that were read",
                100 * v->share);
+    for (unsigned i = 0; i < v->fill_count; i++)
+        printf("%s%.7g", i ? " and " : "; ", v->fills[i]);
+    if (v->fill_count)
+        printf(" count%s as absent, --fill none keeps %s", v->fill_count > 1 ? "" : "s",
+               v->fill_count > 1 ? "them" : "it");
     putchar('\n');
 }
 
@@ -140,29 +148,30 @@ static void print_command(const triptych_description *d, const char *path)
 static void print_text(const triptych_description *d, const triptych_values *v, const char *path,
                        const char *fill, const cJSON *series)
 {
-    char words[TRIP_ANATOMY_WORDS], bytes[32];
+    char words[TRIP_ANATOMY_WORDS], bytes[32], a[32], b[32], c[32], t[32];
     print_line("volume", path);
-    print_line("format", d->format);
+    print_line("format", cJSON_GetArraySize(series) ? "images (DICOM)" : d->format);
     if (d->grid[0])
-        print_line("name", d->grid);
+        print_line("grid name", d->grid);
     printf("%-12s %lld x %lld x %lld voxels, %s\n", "grid", (long long)d->dims[0],
            (long long)d->dims[1], (long long)d->dims[2], d->type);
     printf("%-12s %.7g x %.7g x %.7g\n", "spacing", trip_length(direction(d, 0)),
            trip_length(direction(d, 1)), trip_length(direction(d, 2)));
-    for (int a = 0; a < 3; a++)
-        if (d->spacing_min[a] < d->spacing_max[a])
-            printf("%c %-10s %.7g to %.7g apart\n", 'i' + a, "voxels", d->spacing_min[a],
-                   d->spacing_max[a]);
-    for (int row = 0; row < 3; row++)
-        printf("world %c      = %.7g i + %.7g j + %.7g k + %.7g\n", 'x' + row,
-               d->index_to_world[row][0], d->index_to_world[row][1], d->index_to_world[row][2],
-               d->index_to_world[row][3]);
+    for (int axis = 0; axis < 3; axis++)
+        if (d->spacing_min[axis] < d->spacing_max[axis])
+            printf("%c %-10s %.7g to %.7g apart\n", 'i' + axis, "voxels", d->spacing_min[axis],
+                   d->spacing_max[axis]);
+    for (int row = 0; row < 3; row++) {
+        const double *m = d->index_to_world[row];
+        printf("world %c      = %s i + %s j + %s k + %s\n", 'x' + row, size_print_number(m[0], a),
+               size_print_number(m[1], b), size_print_number(m[2], c), size_print_number(m[3], t));
+    }
     print_orientation(d->orientation);
     if (d->space[0])
         print_line("space", d->space);
-    for (int a = 0; a < 3 && d->space[0]; a++)
-        printf("%c %-10s %s\n", 'i' + a, "points to",
-               trip_anatomy_words(d->space, direction(d, a), words));
+    for (int axis = 0; axis < 3 && d->space[0]; axis++)
+        printf("%c %-10s %s\n", 'i' + axis, "points to",
+               trip_anatomy_words(d->space, direction(d, axis), words));
     print_values(v);
     printf("%-12s %s of values; `--memory` limits what drawing takes\n", "memory",
            trip_format_bytes((uint64_t)bytes_of(d), bytes));

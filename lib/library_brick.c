@@ -469,7 +469,14 @@ static int sample_values(const char *path, const triptych_brick_options *o, trip
     if (!status)
         status = trip_glance_at(&g, v.volume, path, v.budget);
     if (!status)
-        *out = (triptych_values){ g.share, g.value_min, g.value_max, g.typical_min, g.typical_max };
+        *out = (triptych_values){ .share = g.share,
+                                  .value_min = g.value_min,
+                                  .value_max = g.value_max,
+                                  .typical_min = g.typical_min,
+                                  .typical_max = g.typical_max,
+                                  .fill_count = o->fill ? 0 : (unsigned)g.fills.count };
+    if (!status)
+        memcpy(out->fills, g.fills.values, sizeof out->fills);
     close_volume(&v);
     return status;
 }

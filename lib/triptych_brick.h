@@ -291,6 +291,8 @@ typedef struct triptych_values {
     double share; /* of the volume; 1 for all of it, 0 if nothing is known */
     double value_min, value_max;
     double typical_min, typical_max; /* without the few values far outside */
+    unsigned fill_count;
+    double fills[8]; /* values among them that count as absent; see triptych_brick_options.fill */
 } triptych_values;
 
 /* Looks at a volume's values for about a second, whatever its size. Only the options for reading

@@ -118,6 +118,7 @@ int trip_brick_input_find_fills(trip_brick_input *in, const trip_tally *t)
 
 static int open_volume(trip_brick_input *in)
 {
+    char allowed[32];
     const trip_brick_params *p = in->params;
     int status = trip_budget_create(&in->budget, p->memory_bytes);
     if (status == 0)
@@ -132,7 +133,9 @@ static int open_volume(trip_brick_input *in)
     in->grid_voxels = count_voxels(in->info->dims);
     in->tally = trip_budget_take(in->budget, sizeof *in->tally);
     if (!in->tally)
-        return trip_fail(TRIP_ERROR, "brick", p->input, "--memory is far too small");
+        return trip_fail(TRIP_ERROR, "brick", p->input,
+                         "needs more memory than the %s allowed; raise --memory",
+                         trip_format_bytes(trip_budget_limit_bytes(in->budget), allowed));
     trip_tally_clear(in->tally);
     in->memory_bytes = trip_budget_left_bytes(in->budget);
     status = trip_volume_check_axes(p->input, in->info);

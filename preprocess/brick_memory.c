@@ -101,9 +101,9 @@ static int refuse(const char *path, const trip_volume_info *info, const needs *n
     uint64_t min = TAKEN_BYTES + n->opened_bytes + n->late_bytes + reader_bytes(n, slices, false) +
                    n->list_min_bytes;
     return trip_fail(TRIP_ERROR, "brick", path,
-                     "slices of %" PRId64 " x %" PRId64 " and %u threads need --memory %" PRIu64
+                     "slices of %" PRId64 " x %" PRId64 " and %u thread%s need --memory %" PRIu64
                      "M or more%s",
-                     info->dims[0], info->dims[1], threads, (min >> 20) + 1,
+                     info->dims[0], info->dims[1], threads, threads > 1 ? "s" : "", (min >> 20) + 1,
                      threads > 1 ? "; fewer --threads need less" : "");
 }
 

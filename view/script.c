@@ -337,7 +337,7 @@ static int parse_line(parser *p, char *line)
     p->count = 1;
     p->modifiers = 0;
     if (!c)
-        return fail_at(p, "`%.40s` is not an event; script.h and triptych-view(1) list them", line);
+        return fail_at(p, "`%.40s` is not an event; triptych-view(1) lists them", line);
     int status = 0;
     if (c->words != REST)
         status = cut_words(p, rest);

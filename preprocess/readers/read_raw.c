@@ -82,6 +82,26 @@ static int no_size(const char *path)
     return status;
 }
 
+/* Refuses the default type if the file has exactly 2, 4 or 8 bytes for each voxel. */
+static int check_default_type(const char *path, const trip_volume_params *params,
+                              const int64_t dims[3])
+{
+    uint64_t bytes = 0;
+    if (trip_byte_encoding_of(path) != TRIP_BYTES_PLAIN || trip_file_size(path, &bytes) < 0)
+        return 0;
+    const double each = ((double)bytes - (double)params->raw_offset_bytes) /
+                        ((double)dims[0] * (double)dims[1] * (double)dims[2]);
+    if (each != 2 && each != 4 && each != 8)
+        return 0;
+    return trip_fail(TRIP_USAGE, "read", path,
+                     "has %.0f bytes for each voxel, so that the default type uint8 does not fit; "
+                     "give --type, for example %s",
+                     each,
+                     each == 2   ? "uint16"
+                     : each == 4 ? "float"
+                                 : "double");
+}
+
 /* Takes the layout from the options, and missing parts from the file's name. */
 static int find_layout(const char *path, const trip_volume_params *params, trip_volume_info *info)
 {
@@ -103,7 +123,7 @@ static int find_layout(const char *path, const trip_volume_params *params, trip_
             params->raw_type);
     memcpy(info->dims, dims, sizeof dims);
     info->type = (trip_scalar)type;
-    return 0;
+    return params->raw_type || named ? 0 : check_default_type(path, params, dims);
 }
 
 /* The content tells whether a file is compressed. Values can look like the start of a compressed

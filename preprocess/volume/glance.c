@@ -128,7 +128,9 @@ static int look_at(look *l, trip_glance *out, const char *path)
                               .value_max = l->tally->value_max,
                               .typical_min = l->tally->typical_min,
                               .typical_max = l->tally->typical_max };
-    return status;
+    if (status == 0)
+        status = trip_typical_find_fills(l->tally, l->info, &out->fills, path);
+    return status < 0 ? status : 0;
 }
 
 int trip_glance_at(trip_glance *out, trip_volume *volume, const char *path, trip_budget *budget)

@@ -7,6 +7,7 @@
 typedef struct trip_glance {
     double share; /* of the volume that was read, above 0; 1 for all of it */
     double value_min, value_max, typical_min, typical_max; /* of the values that were read */
+    trip_fills fills; /* values among them that stand for "no value" */
 } trip_glance;
 
 /* Reads slices at even distances, or the first portions of a sparse volume, for about a second. The

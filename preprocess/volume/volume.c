@@ -75,12 +75,12 @@ static int check_options(const char *path, const char *format, const trip_volume
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is %s; --size, --type, --endian and --offset require raw data",
                          format);
-    if (strcmp(format, "openvdb") != 0 &&
-        ((p->grid && strcmp(format, "netcdf") != 0) || p->level_set))
-        return trip_fail(TRIP_USAGE, "read", path,
-                         "its format is %s; --level-set requires OpenVDB, --grid OpenVDB or "
-                         "netCDF",
+    if (strcmp(format, "openvdb") != 0 && p->level_set)
+        return trip_fail(TRIP_USAGE, "read", path, "its format is %s; --level-set requires OpenVDB",
                          format);
+    if (strcmp(format, "openvdb") != 0 && strcmp(format, "netcdf") != 0 && p->grid)
+        return trip_fail(TRIP_USAGE, "read", path,
+                         "its format is %s; --grid requires OpenVDB or netCDF", format);
     if (strcmp(format, "openvdb") == 0 && p->coordinates)
         return trip_fail(TRIP_USAGE, "read", path,
                          "its format is openvdb, which has even spacing; --coordinates requires "

@@ -352,9 +352,15 @@ class Accuracy(program.ProgramTest):
         self.assertIn("the data set's own; errors", run.stderr)
         self.assertIn("measured with light", run.stderr)
 
+    def test_the_reason_of_a_refused_data_set_names_its_path_once(self):
+        program.write("no.trip", b"text")
+        run = self.fails(1, "accuracy", "no.trip", "-o", "no", says="accuracy: no.trip: is not a data set")
+        self.assertEqual(run.stderr.count("no.trip"), 1)
+
     def test_an_error_bound_without_a_report_is_refused(self):
         size = ["--size", "40x32", "-o", "e.exr"]
-        self.fails(1, "render", "a.trip", *size, "--error", "1", says="triptych accuracy")
+        self.fails(1, "render", "a.trip", *size, "--error", "1",
+                   says="a.accuracy/accuracy.json: does not exist; `triptych accuracy NAME.trip` makes")
         self.fails(1, "render", "a.trip", *size, "--error", "1", "--report", "a.tf", says="accuracy.json")
         self.fails(1, "render", "a.trip", *size, "--error", "1e-6", "--report", "report",
                    says="has the smallest")

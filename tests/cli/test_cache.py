@@ -949,7 +949,8 @@ class Cache(program.ProgramTest):
         for option in (("--allow-gaps",), ("--grid", "a"), ("--level-set", "band"), ("--spacing", "1,1,1"),
                        ("--axes", "PIR"), ("--channel", "0"), ("--series", "1"), ("--time", "1")):
             self.fails(2, "render", "v.trip", "-o", "x.png", *option, says="is a data set")
-        self.fails(2, "render", "v.nrrd", "-o", "x.png", "--grid", "a", says="--level-set requires OpenVDB, --grid OpenVDB or netCDF")
+        self.fails(2, "render", "v.nrrd", "-o", "x.png", "--grid", "a", says="nrrd; --grid requires OpenVDB or netCDF")
+        self.fails(2, "render", "v.nrrd", "-o", "x.png", "--level-set", "band", says="nrrd; --level-set requires OpenVDB")
 
 
 if __name__ == "__main__":

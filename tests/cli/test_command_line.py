@@ -193,6 +193,38 @@ class CommandLine(program.ProgramTest):
                                              "--dry-run", "--json", *options).stdout)
             self.assertTrue(size / 2 < estimate["bytes"] < 2 * size, (estimate, size))
 
+    def test_counts_of_voxels_are_whole_below_a_million(self):
+        for edge, count in (12, "1728"), (99, "970299"), (100, "1.00 million"), (128, "2.10 million"):
+            program.write_nrrd("edge.nrrd", program.noise((edge, edge, edge)))
+            brick = "brick", "edge.nrrd", "--keep-all", "--levels=0", "--force", "-o", "edge.trip"
+            self.assertIn(f" of {count} voxels, ".encode(), self.works(*brick, "--dry-run").stdout)
+            self.works(*brick)
+            drawn = self.works("render", "edge.trip", "-o", "edge.png", "--size=40", "--occluded=draw",
+                               "--method=axis", "--opacity-scale=0.001").stdout.decode()
+            self.assertIn(f"edge.png: 40 x 40, {count} voxels, ", drawn)
+
+    def test_large_whole_values_have_all_digits(self):
+        volume = numpy.zeros((4, 4, 4), "u4")
+        volume[1, 2, 3] = 4000000001
+        program.write_nrrd("ids.nrrd", volume)
+        run = self.works("brick", "ids.nrrd", "--keep-all", "--force", "-o", "ids.trip")
+        self.assertIn(b"values 0 to 4000000001\n", run.stdout)
+        self.assertIn(b"\nvalues       0 to 4000000001\n", self.works("info", "ids.trip").stdout)
+
+    def test_each_line_of_info_has_its_own_label(self):
+        os.makedirs("sub", exist_ok=True)
+        affine = -numpy.eye(4)
+        affine[:3, :3] = numpy.diag([-1.0, -1, 1])
+        affine[:3, :3][affine[:3, :3] == 0] = -0.0
+        program.write_nifti("sub/labels.nii", program.noise((12, 12, 12)), affine)
+        self.works("brick", "sub/labels.nii", "--keep-all", "--force", "-o", "labels.trip")
+        for path in "sub/labels.nii", "labels.trip":
+            text = self.works("info", path).stdout.decode()
+            labels = [line[:12] for line in text.splitlines() if not line.startswith("list ")]
+            self.assertEqual(len(labels), len(set(labels)), text)
+            self.assertIn("world x      = -1 i + 0 j + 0 k + 0\n", text)  # no -0
+        self.assertIn("source path  sub/labels.nii\nfile format  nifti\n", text)
+
     def test_info_tells_how_values_are_stored(self):
         """Integers of 8 and 16 bits are stored exactly. Floats have 2^16 codes, with a quarter of
         the range of values as a margin on either side (FORMAT.md)."""

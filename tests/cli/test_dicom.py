@@ -206,6 +206,7 @@ class Dicom(program.ProgramTest):
         self.same(self.drawn("two"), self.raw(self.values[4:], range(5)))
         self.same(self.drawn("two", "--series", 4), self.raw(self.values[:4], range(4)))
         self.assertIn(f"series       {series[0]}\n", self.works("info", "two").stdout.decode())
+        self.assertIn("format       images (DICOM)\n", self.works("info", "two").stdout.decode())
         self.fails(2, "info", "two", "--series=1", says=f"has no series 1; it has {', '.join(series)}")
         # Pictures that are drawn through the cache follow the option, too.
         chosen = self.picture("two", *VIEW, "--series", 4)

@@ -194,6 +194,11 @@ class Options(program.ProgramTest):
         self.assertLessEqual(max(map(len, text.splitlines())), 79)
         self.assertTrue(set(re.findall(r"--[a-z][a-z-]*", text)) - {"--help"} <= options_of("render"))
 
+    def test_help_of_a_command_is_its_help(self):
+        for command in COMMANDS:
+            self.assertEqual(self.works("help", command).stdout,
+                             self.works(command, "--help").stdout)
+
     def test_man_pages_have_every_option(self):
         pages = os.path.join(os.path.dirname(__file__), "..", "..", "cli", "man")
         made = os.path.join(os.path.dirname(program.PROGRAM), "cli")
@@ -468,6 +473,8 @@ class Options(program.ProgramTest):
         for arguments, *says in (
             (["rendr"], "rendr: unknown command; did you mean render?"),
             (["Info", "a.trip"], "did you mean info?"),
+            (["--verison"], "--verison: unknown command; did you mean --version?"),
+            (["help", "rendr"], "did you mean render?"),
             ([*render, "--orbti=4"], "--orbti: unknown option; did you mean --orbit? ",
              "`triptych render --help`"),
             ([*render, "-size", "3x3"], "-size: unknown option; did you mean --size?"),

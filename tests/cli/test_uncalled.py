@@ -102,8 +102,9 @@ class Uncalled(program.ProgramTest):
             plain, said = self.draw(*options)
             same, auto = self.draw(*options, "--effects", "auto", "--light", "1,1,1")
             self.assertNotRegex(said + auto, "(?m)^light ")
-            read = re.compile(r"(?m)^cost .*|million splats, .* read")
+            read = re.compile(r"(?m)^cost .*|[\d.]+(?: million)? (?:splats|voxels), .* read")
             self.assertEqual(read.findall(said), read.findall(auto))
+            self.assertRegex(read.findall(said)[-1], "read$")
             for on in ["shadows", "--light", "1,1,1"], ["occlusion"], ["cueing"], EFFECTS[4:]:
                 on = on if on[0][0] != "-" else ["emission", *on]
                 other, said = self.draw(*options, "--effects", *on)

@@ -159,6 +159,11 @@ class Fills(program.ProgramTest):
     def check(self, volume, fill, *options):
         """Checks that the voxels with the fill value are absent, and that --fill none keeps them."""
         program.write_nrrd("v.nrrd", volume)
+        self.assertEqual(self.info("v.nrrd")["fills"], [fill])
+        self.assertNotIn("fills", json.loads(self.works("info", "v.nrrd", "--json", "--fill",
+                                                        "none").stdout))
+        self.assertRegex(self.works("info", "v.nrrd").stdout.decode(),
+                         r"(?m)^values .*; \S+ counts as absent, --fill none keeps it$")
         others = volume[volume != volume.dtype.type(fill)].astype(float)
         run = self.works("brick", "v.nrrd", "-o", "v.trip", "--force", "--json", *options)
         summary, info = json.loads(run.stdout), self.info("v.trip")
@@ -251,6 +256,7 @@ class Fills(program.ProgramTest):
         volume[5, 5, 5] = -999
         program.write_nrrd("v.nrrd", volume)
         self.assertNotIn("fills", self.brick("v.nrrd", "v.trip")["source"])
+        self.assertNotIn("fills", self.info("v.nrrd"))
 
 
 def summary_text(fill):

@@ -138,6 +138,27 @@ static void a_long_file_is_read_with_a_warning(void **state)
     assert_non_null(strstr(reported, "9 bytes are after the expected"));
 }
 
+static void the_default_type_is_refused_if_voxels_are_larger(void **state)
+{
+    (void)state;
+    const trip_volume_params no_type = { .raw_dims = { 4, 3, 2 } };
+    const trip_volume_params after_two = { .raw_dims = { 4, 3, 2 }, .raw_offset_bytes = 2 };
+    const trip_volume_params with_type = { .raw_dims = { 4, 3, 2 }, .raw_type = "uint8" };
+    float values[24];
+    bytes b = { .count = 0 };
+    for (int i = 0; i < 48; i++)
+        append_text(&b, "a");
+    assert_refused_as(TRIP_USAGE, write_file("wide.raw", &b), &no_type,
+                      "has 2 bytes for each voxel");
+    assert_int_equal(read_volume(path_of("wide.raw"), &with_type, 3, values, 24, NULL), 0);
+    append_text(&b, "aa");
+    assert_refused_as(TRIP_USAGE, write_file("wide.raw", &b), &after_two, "for example uint16");
+    assert_int_equal(read_volume(path_of("wide.raw"), &no_type, 3, values, 24, NULL), 0);
+    for (int i = 0; i < 46; i++)
+        append_text(&b, "a");
+    assert_refused_as(TRIP_USAGE, write_file("wide.raw", &b), &no_type, "for example float");
+}
+
 static void impossible_sizes_are_refused(void **state)
 {
     (void)state;
@@ -189,6 +210,7 @@ int main(void)
         cmocka_unit_test(an_error_points_at_a_header_in_the_folder),
         cmocka_unit_test(a_short_file_is_refused_before_reading),
         cmocka_unit_test(a_long_file_is_read_with_a_warning),
+        cmocka_unit_test(the_default_type_is_refused_if_voxels_are_larger),
         cmocka_unit_test(impossible_sizes_are_refused),
         cmocka_unit_test(a_wrong_type_or_offset_is_refused),
     };

@@ -150,7 +150,8 @@ static void a_locale_with_decimal_commas_has_no_effect(void **state)
 static void an_invalid_event_is_refused_with_its_line(void **state)
 {
     (void)state;
-    assert_refused("wait\njump 3\n", "test.script: line 2: `jump` is not an event");
+    assert_refused("wait\njump 3\n",
+                   "test.script: line 2: `jump` is not an event; triptych-view(1) lists them");
     assert_refused("move 1", "`move` takes 2 words after it, not 1");
     assert_refused("move 1 2 3", "takes 2 words");
     assert_refused("move 1 nan", "`nan` is not a number");
