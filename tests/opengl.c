@@ -1,5 +1,7 @@
 #include "opengl.h"
 
+#include <stddef.h>
+
 #ifdef TRIP_WITHOUT_GL
 
 const char *test_opengl(void)
