@@ -253,9 +253,8 @@ static void add_method(cJSON *root, const render_options *o, const triptych_fram
                                               [RENDER_FIELD_STORED] = "stored",
                                               [RENDER_FIELD_SOURCE] = "source",
                                               [RENDER_FIELD_SPLATS] = "splats" };
-        const double tolerance = o->settings.integral.tolerance;
         cJSON_AddStringToObject(root, "field", fields[o->field]);
-        cJSON_AddNumberToObject(root, "tolerance", tolerance > 0 ? tolerance : 1e-4);
+        cJSON_AddNumberToObject(root, "tolerance", frame->tolerance);
         return;
     }
     cJSON_AddStringToObject(root, "classify",

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <math.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +15,7 @@
 
 #include "new_file.h"
 #include "report.h"
+#include "start_program.h"
 #include "text.h"
 
 extern char **environ;
@@ -86,16 +86,7 @@ static int spawn(video *v, int frames, char *const *arguments)
     posix_spawn_file_actions_adddup2(&actions, frames, 0);
     posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, v->errors, 2);
-    posix_spawnattr_t attributes;
-    sigset_t pipe_signal;
-    sigemptyset(&pipe_signal);
-    sigaddset(&pipe_signal, SIGPIPE); /* this program ignores it */
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setsigdefault(&attributes, &pipe_signal);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
-    int fault = posix_spawnp(&v->encoder, "ffmpeg", &actions, &attributes, arguments, environ);
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&actions);
+    int fault = trip_start_program(&v->encoder, &actions, arguments);
     if (fault)
         v->encoder = 0;
     return fault

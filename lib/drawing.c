@@ -168,15 +168,12 @@ static int choose_interpolation(triptych *t)
     return status;
 }
 
-/* Lets the integral take the means over the areas of pixels. The rays may use one half of the
- * tolerance, the means of rays the other. */
+/* Lets the integral take the means over the areas of pixels. */
 static void choose_areas(triptych *t)
 {
-    trip_settings *s = &t->drawn_settings;
+    t->drawn_settings.samples = 0;
     if (!t->given.integral.tolerance)
-        s->tolerance = TRIP_TOLERANCE_OF_AREAS;
-    s->tolerance /= 2;
-    s->samples = 0;
+        t->drawn_settings.tolerance = TRIP_TOLERANCE_OF_AREAS;
 }
 
 /* Chooses the settings that do not depend on the level, and the classification. */

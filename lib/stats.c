@@ -152,6 +152,7 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .footprint = (triptych_footprint)(t->drawn_settings.footprint + 1),
         .early_termination =
             t->plan.gathers ? -1 : trip_settings_early_termination(&t->drawn_settings),
+        .tolerance = t->plan.gathers ? t->drawn_settings.tolerance : 0,
         .ring = ring_text(t->renderer, t->reader),
         .effects = effects_of(&t->drawn_settings.effects),
         .light_bytes_read = light.bytes_read,

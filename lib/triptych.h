@@ -720,7 +720,8 @@ typedef struct triptych_frame_stats {
     triptych_footprint footprint; /* pre, as drawn */
     /* Transmittance below which pixels took no more samples; -1 with the integral. */
     double early_termination;
-    int effects; /* effects that were drawn */
+    double tolerance; /* bound of the error of each component of a pixel; 0 without the integral */
+    int effects;      /* effects that were drawn */
     /* For shadows and occlusion. Not in bytes_read. 0 if the lattice was kept from an earlier
      * frame. */
     uint64_t light_bytes_read;

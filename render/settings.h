@@ -168,8 +168,7 @@ typedef struct trip_settings {
     trip_effects effects;
 } trip_settings;
 
-/* The default tolerance of means over the areas of pixels: a quarter of 1/255. A tenth of it takes
- * about four times as many rays. */
+/* The default tolerance of means over the areas of pixels: a quarter of 1/255. */
 #define TRIP_TOLERANCE_OF_AREAS 1e-3
 
 /* The weight parameter h by classification: layers blend at rays with a second component above h.

@@ -121,20 +121,22 @@ static int begin_frame(trip_renderer *base, const trip_frame *frame)
     const trip_file_header *header = &frame->data->header;
     const bool nearest = frame->settings->kernel == TRIP_KERNEL_NEAREST &&
                          frame->settings->field == TRIP_FIELD_VALUES;
+    /* The means over areas may use the other half. */
+    const double tolerance = frame->settings->tolerance / (frame->settings->samples ? 1 : 2);
     r->frame = frame;
     memset(r->splats, 0, sizeof r->splats);
     int status = check_frame(frame);
     if (!status)
         status = begin_field(r);
     base->resident = r->complete;
-    trip_classes_make(r->classes, frame->table, frame->camera->voxel_world,
-                      frame->settings->tolerance);
+    trip_classes_make(r->classes, frame->table, frame->camera->voxel_world, tolerance);
     r->in = (trip_integrand){
         .coordinates = &frame->data->coordinates,
         .classes = r->classes,
         .settings = frame->settings,
         .camera = frame->camera,
         .clip = &frame->plan->clip,
+        .tolerance = tolerance,
         .shaded = frame->settings->shading && (frame->settings->field == TRIP_FIELD_VALUES ||
                                                header->planes >> TRIP_PLANE_NORMALS & 1),
         .nearest = nearest,
@@ -312,10 +314,9 @@ static int add_squares(const trip_pixel_area *area, int x0, int squares, double 
 static int make_areas(painter *p, int x0, int x1, int y0, int y1)
 {
     corner_row rows[2] = { { { 0 } } };
-    const trip_pixel_area area = { .function = ray_at,
-                                   .user = p,
-                                   .tolerance = p->r->in.settings->tolerance,
-                                   .first = p->r->first_squares };
+    const trip_pixel_area area = {
+        .function = ray_at, .user = p, .tolerance = p->r->in.tolerance, .first = p->r->first_squares
+    };
     const int squares = (x1 - x0) * area.first;
     int status = fill_corners(p, x0, squares, y0, rows[0]);
     for (int y = y0, row = 0; y < y1 && !status && !p->r->failed; y++) {

@@ -209,7 +209,7 @@ int trip_integrate_splats(const trip_integrand *in, const trip_ray *ray, trip_sp
                   .sigma = f.sigma,
                   .radius = f.sigma * TRIP_CUTOFF,
                   .amplitude = f.amplitude / (sqrt(two_pi) * f.sigma) };
-    *out = trip_ray_sum_begin(in->settings->tolerance, 1);
+    *out = trip_ray_sum_begin(in->tolerance, 1);
     int status = gather_hits(&p);
     if (!status && hits->count > 0)
         add_pieces(&p, out);

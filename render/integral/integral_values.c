@@ -233,7 +233,7 @@ trip_ray_sum trip_integrate_values(const trip_integrand *in, const trip_ray *ray
                                    .edge = TRIP_FIELD_EDGE,
                                    .coordinates = in->coordinates };
     double from = 0, to = ray->end;
-    passage p = { .in = in, .ray = ray, .sum = trip_ray_sum_begin(in->settings->tolerance, 1) };
+    passage p = { .in = in, .ray = ray, .sum = trip_ray_sum_begin(in->tolerance, 1) };
     if (trip_ray_clip(ray, &cubes, &from, &to) &&
         trip_clip_ray(in->clip, ray->origin, ray->direction, &from, &to)) {
         p.light = light_at(in, trip_ray_at(ray, 1));

@@ -18,6 +18,7 @@ typedef struct trip_integrand {
     const trip_settings *settings;
     const trip_camera *camera; /* of the field's grid */
     const trip_clip *clip;     /* for rays (values) or voxels (splats); index space */
+    double tolerance;          /* of each component of a ray */
     bool shaded;
     bool nearest;         /* the value of the nearest voxel (sheet.h), with gradients of outlines */
     trip_affine to_index; /* from world space; for gradients of outlines */

@@ -54,7 +54,10 @@ class Costs(program.ProgramTest):
         self.assertEqual((stats["classify"], stats["kernel"]), ("pre", "exact"))
         self.assertEqual(costs, {"y": info["kept"]})
         stats, costs = self.render("ball.trip", "--renderer", "integral")
-        self.assertEqual(stats["field"], "stored")
+        self.assertEqual((stats["field"], stats["tolerance"]), ("stored", 1e-3))
+        for options, tolerance in (["--samples=1"], 1e-4), (["--tolerance=0.01"], 0.01):
+            self.assertEqual(self.render("ball.trip", "--renderer", "integral", *options)[0]["tolerance"],
+                             tolerance)
         self.assertFalse({"classify", "kernel", "method", "compositing"} & set(stats))
         self.assertEqual(costs, {"z": info["kept"], "z halo": info["halo"]})
 
