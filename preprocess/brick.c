@@ -183,7 +183,9 @@ static int summarise_done(brick *b)
     b->summary->bytes = d->bytes;
     for (unsigned i = 0; i < d->list_count; i++) {
         const trip_list *l = &d->lists[i];
-        uint64_t bytes = l->plane_bytes[TRIP_PLANE_VOXELS] + l->plane_bytes[TRIP_PLANE_NORMALS];
+        uint64_t bytes = 0;
+        for (int plane = 0; plane < TRIP_PLANES; plane++)
+            bytes += l->plane_bytes[plane];
         b->summary->halo_bytes += l->kind == TRIP_KIND_HALO ? bytes : 0;
         b->summary->level_bytes += l->level > 0 ? bytes : 0;
         b->summary->levels = l->level > b->summary->levels ? l->level : b->summary->levels;

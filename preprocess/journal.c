@@ -127,7 +127,7 @@ static bool is_later(const trip_checkpoint *before, const trip_checkpoint *c)
 {
     bool fits = c->done >= before->done && c->kept >= before->kept && c->halo >= before->halo &&
                 c->runs >= before->runs && c->ordered_splats >= before->ordered_splats;
-    for (int i = 0; i < TRIP_PLANES; i++)
+    for (int i = 0; i < TRIP_PLANES_OF_VOXELS; i++)
         fits = fits && c->ordered_bytes[i] >= before->ordered_bytes[i];
     return fits;
 }
@@ -175,7 +175,7 @@ static int check_checkpoint(const trip_journal *j, const trip_checkpoint *c)
 static bool has_ordered(const trip_journal *j, const trip_checkpoint *c)
 {
     bool has = true;
-    for (int i = 0; i < TRIP_PLANES; i++)
+    for (int i = 0; i < TRIP_PLANES_OF_VOXELS; i++)
         has = has && c->ordered_bytes[i] <= j->params.ordered_bytes[i];
     return has;
 }

@@ -23,12 +23,12 @@ typedef struct trip_journal_start {
 /* A checkpoint: all pieces of the first part of the volume are on disk, in sequences or in the
  * ordered list. */
 typedef struct trip_checkpoint {
-    uint64_t done;                       /* length of the first part, as trip_walk() counts */
-    uint64_t kept, halo;                 /* splats of the first part */
-    uint64_t sequences;                  /* number of sequences in the spill */
-    uint64_t runs, ordered_splats;       /* runs and splats appended to the ordered list */
-    uint64_t ordered_bytes[TRIP_PLANES]; /* bytes of the ordered list's planes */
-    trip_tally tally;                    /* tally of the first part's values, unless scanned */
+    uint64_t done;                 /* length of the first part, as trip_walk() counts */
+    uint64_t kept, halo;           /* splats of the first part */
+    uint64_t sequences;            /* number of sequences in the spill */
+    uint64_t runs, ordered_splats; /* runs and splats appended to the ordered list */
+    uint64_t ordered_bytes[TRIP_PLANES_OF_VOXELS]; /* bytes of the ordered list's planes */
+    trip_tally tally; /* tally of the first part's values, unless scanned */
 } trip_checkpoint;
 
 /* Identifies the folder of the output. Written before the data set gets its final name. */
@@ -50,12 +50,12 @@ typedef struct trip_journal trip_journal;
 typedef struct trip_journal_params {
     bool resume;
     uint64_t identity;
-    bool scanned;                        /* a run with these parameters scans the volume first */
-    uint64_t voxels;                     /* voxels in the grid */
-    uint64_t slice_voxels;               /* voxels in a slice; 0 for a sparse volume */
-    bool halo;                           /* the data set has a halo */
-    uint64_t ordered_bytes[TRIP_PLANES]; /* bytes of the ordered list's planes that the interrupted
-                                            run left */
+    bool scanned;          /* a run with these parameters scans the volume first */
+    uint64_t voxels;       /* voxels in the grid */
+    uint64_t slice_voxels; /* voxels in a slice; 0 for a sparse volume */
+    bool halo;             /* the data set has a halo */
+    uint64_t ordered_bytes[TRIP_PLANES_OF_VOXELS]; /* bytes of the ordered list's planes that the
+                                            interrupted run left */
 } trip_journal_params;
 
 /* Opens the journal in the folder of `spill`. With `resume`, reads an existing journal up to the

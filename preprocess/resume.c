@@ -38,7 +38,7 @@ int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *
 {
     int partial = open(partial_path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC), status = 0;
     *out = trip_leftover_none();
-    for (int i = 0; i < TRIP_PLANES && status == 0; i++) {
+    for (int i = 0; i < TRIP_PLANES_OF_VOXELS && status == 0; i++) {
         struct stat st;
         out->bytes[i] = UINT64_MAX;
         if (i == TRIP_PLANE_NORMALS && !format->normals)
@@ -54,7 +54,7 @@ int trip_leftover_take(trip_leftover *out, const trip_spill *spill, const char *
 
 void trip_leftover_close(trip_leftover *l)
 {
-    for (int i = 0; i < TRIP_PLANES; i++)
+    for (int i = 0; i < TRIP_PLANES_OF_VOXELS; i++)
         if (l->fd[i] >= 0)
             close(l->fd[i]);
 }
@@ -70,7 +70,7 @@ typedef struct replay {
     const trip_leftover *leftover;
     const trip_block_form *form;
     trip_list_output *output;
-    uint64_t at[TRIP_PLANES]; /* bytes read of each plane */
+    uint64_t at[TRIP_PLANES_OF_VOXELS]; /* bytes read of each plane */
     uint64_t splats;
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     unsigned char packed[TRIP_RUN_RECORDS_MAX * sizeof(uint32_t)];
@@ -155,7 +155,7 @@ static bool is_all(const replay *r, const trip_checkpoint *c)
 {
     const trip_list_output *o = r->output;
     bool is_same = r->splats == c->ordered_splats;
-    for (int i = 0; i < TRIP_PLANES; i++)
+    for (int i = 0; i < TRIP_PLANES_OF_VOXELS; i++)
         is_same = is_same && r->at[i] == c->ordered_bytes[i] &&
                   trip_writer_plane_bytes(o->writer, o->list, i) == c->ordered_bytes[i];
     return is_same;

@@ -8,8 +8,8 @@
 #include "list_builder.h"
 
 typedef struct trip_leftover {
-    int fd[TRIP_PLANES];         /* -1 if absent */
-    uint64_t bytes[TRIP_PLANES]; /* length; UINT64_MAX if the format has no such plane */
+    int fd[TRIP_PLANES_OF_VOXELS];         /* -1 if absent */
+    uint64_t bytes[TRIP_PLANES_OF_VOXELS]; /* length; UINT64_MAX if the format has no such plane */
 } trip_leftover;
 
 static inline trip_leftover trip_leftover_none(void)

@@ -6,8 +6,8 @@
 #include "selection.h"
 
 /* Runs ready to draw, in draw order. The block of run i, already checked, is at
- * planes[TRIP_PLANE_VOXELS] + runs[i].at[TRIP_PLANE_VOXELS]. Its normals are found in the same way.
- */
+ * planes[TRIP_PLANE_VOXELS] + runs[i].at[TRIP_PLANE_VOXELS]. Its normals and
+ * deviations are found in the same way. */
 typedef struct trip_batch {
     const trip_pass *pass;
     /* NULL for planes that are not read, and if only runs are wanted. */
@@ -30,10 +30,15 @@ static inline trip_block trip_block_of(const trip_batch *b, const trip_run *run)
 {
     const trip_selection *s = &b->pass->selections[run->selection];
     const trip_block_form form = trip_block_form_of(&s->data->header, s->list->kind);
-    bool normals = b->planes[TRIP_PLANE_NORMALS] && s->list->planes >> TRIP_PLANE_NORMALS & 1;
-    return trip_block_make(
-        &form, run->count, run->words, b->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS],
-        normals ? b->planes[TRIP_PLANE_NORMALS] + run->at[TRIP_PLANE_NORMALS] : NULL);
+    const unsigned char *at[TRIP_PLANES];
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        at[plane] = b->planes[plane] && s->list->planes >> plane & 1
+                        ? b->planes[plane] + run->at[plane]
+                        : NULL;
+    trip_block block = trip_block_make(&form, run->count, run->words, at[TRIP_PLANE_VOXELS],
+                                       at[TRIP_PLANE_NORMALS]);
+    block.deviations = at[TRIP_PLANE_DEVIATIONS];
+    return block;
 }
 
 #endif

@@ -50,6 +50,7 @@ typedef struct trip_block {
     unsigned step; /* difference of neighbouring codes */
     const uint64_t *present, *masks;
     const unsigned char *normals; /* NULL if the plane is not read */
+    const uint8_t *deviations;    /* one byte per record; NULL if the plane is not read */
 } trip_block;
 
 /* A square of a block and its codes. A code is (min + the packed bits) * step. */

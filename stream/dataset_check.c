@@ -40,16 +40,17 @@ static int check_identity(const trip_file_header *h, uint64_t file_bytes, const 
     copy.header_checksum = 0;
     if (memcmp(h->magic, TRIP_MAGIC, sizeof h->magic) != 0)
         return FAIL_FIELD(magic, "not the index of a data set (no " TRIP_MAGIC ")");
-    if (h->version > 0 && h->version < TRIP_FORMAT_VERSION)
+    if (h->version > 0 && h->version < TRIP_FORMAT_OLDEST)
         return trip_fail(TRIP_ERROR, "open", where,
                          "byte %zu: format version %u is no longer supported; make the data set "
                          "again with `triptych brick`",
                          offsetof(trip_file_header, version), h->version);
-    if (h->version != TRIP_FORMAT_VERSION)
+    if (h->version == 0 || h->version > TRIP_FORMAT_VERSION)
         return trip_fail(
             TRIP_ERROR, "open", where,
-            "byte %zu: format version %u is not supported; this program reads version %d",
-            offsetof(trip_file_header, version), h->version, TRIP_FORMAT_VERSION);
+            "byte %zu: format version %u is not supported; this program reads versions %d to %d",
+            offsetof(trip_file_header, version), h->version, TRIP_FORMAT_OLDEST,
+            TRIP_FORMAT_VERSION);
     if (XXH64(&copy, sizeof copy, 0) != h->header_checksum)
         return FAIL_FIELD(header_checksum, "the header is damaged (checksum)");
     if (h->header_bytes != TRIP_HEADER_BYTES)
@@ -136,7 +137,8 @@ static int check_layout(const trip_file_header *h, const char *where)
         return FAIL_FIELD(slab_sheets, "sheets per slab outside 1 to 64");
     if (h->page_log2 < 12 || h->page_log2 > 24)
         return FAIL_FIELD(page_log2, "page size outside 4096 to 16777216");
-    if (!(h->planes & 1u << TRIP_PLANE_VOXELS) || h->planes >> TRIP_PLANES)
+    const unsigned planes = h->version < 7 ? TRIP_PLANE_DEVIATIONS : TRIP_PLANES;
+    if (!(h->planes & 1u << TRIP_PLANE_VOXELS) || h->planes >> planes)
         return FAIL_FIELD(planes, "unknown planes, or no voxels");
     if (h->code_bytes < 1 || h->code_bytes > 2)
         return FAIL_FIELD(code_bytes, "codes must have 1 or 2 bytes");
@@ -256,6 +258,9 @@ static bool plane_bytes_fit(const trip_file_header *h, const trip_file_list *f)
         if (!(f->planes >> plane & 1) && f->plane_bytes[plane] != 0)
             return false;
     if (f->plane_bytes[TRIP_PLANE_VOXELS] % 8 || f->plane_bytes[TRIP_PLANE_VOXELS] > INT64_MAX)
+        return false;
+    if (f->planes >> TRIP_PLANE_DEVIATIONS & 1 &&
+        f->plane_bytes[TRIP_PLANE_DEVIATIONS] != f->records)
         return false;
     if (!(f->planes >> TRIP_PLANE_NORMALS & 1))
         return true;

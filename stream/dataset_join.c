@@ -151,10 +151,11 @@ static void add_header(trip_dataset *d, const trip_dataset *part)
     d->bytes += part->bytes;
 }
 
-/* Hides the normals of all parts, unless each part stores normals. */
-static void hide_normals(trip_dataset *d, trip_dataset *const *parts, unsigned count)
+/* Level 0 has no deviations. Hides the normals of all parts, unless each part stores normals. */
+static void hide_planes(trip_dataset *d, trip_dataset *const *parts, unsigned count)
 {
     bool all = true;
+    d->header.planes &= ~(1u << TRIP_PLANE_DEVIATIONS);
     for (unsigned p = 0; p < count; p++)
         all = all && parts[p]->header.normal_bytes > 0;
     if (all)
@@ -187,7 +188,7 @@ int trip_dataset_join(trip_dataset **out, trip_dataset *const *parts, unsigned c
         if (p > 0)
             add_header(d, parts[p]);
     }
-    hide_normals(d, parts, count);
+    hide_planes(d, parts, count);
     *out = d;
     return TRIP_OK;
 }

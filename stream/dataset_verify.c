@@ -16,7 +16,9 @@ typedef struct voxel_sums {
 typedef struct list_verifier {
     const trip_dataset *data;
     const trip_list *list;
-    uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX]; /* of one run */
+    uint32_t voxels[TRIP_RUN_RECORDS_MAX]; /* of one run */
+    /* Normals or deviations of the run, or zeros. */
+    uint32_t beside[TRIP_RUN_RECORDS_MAX];
     voxel_sums sums;
 } list_verifier;
 
@@ -38,10 +40,11 @@ static uint64_t mix(uint64_t x)
     return x ^ x >> 31;
 }
 
-static void add_voxel(voxel_sums *s, const uint64_t p[3], uint32_t code, uint32_t normal)
+/* `beside` is the normal or the deviation of the voxel, or 0. */
+static void add_voxel(voxel_sums *s, const uint64_t p[3], uint32_t code, uint32_t beside)
 {
     uint64_t position = mix(p[0] | p[1] << 32) + mix(p[2] | (uint64_t)code << 32);
-    uint64_t voxel = mix(position + mix(normal + UINT64_C(0x9e3779b97f4a7c15)));
+    uint64_t voxel = mix(position + mix(beside + UINT64_C(0x9e3779b97f4a7c15)));
     s->sum += voxel;
     s->twist += mix(voxel ^ UINT64_C(0xd1b54a32d192ed03));
 }
@@ -118,14 +121,15 @@ static int check_run(list_verifier *v, const run_stream *s)
     if (!kind->is_padded(&s->block))
         return fail_run(v->data, v->list, run, "the padding is not zero");
     kind->unpack(&s->block, 0, run->count, v->voxels);
+    for (uint32_t i = 0; i < run->count; i++)
+        v->beside[i] = s->block.deviations ? s->block.deviations[i] : 0;
     if (s->block.normals)
-        trip_block_normals(&s->block, 0, run->count, v->normals);
+        trip_block_normals(&s->block, 0, run->count, v->beside);
     p[axis] = (uint64_t)run->sheet;
     for (uint32_t i = 0; i < run->count; i++) {
         p[(axis + 1) % 3] = (uint64_t)run->u + trip_voxel_u(v->voxels[i]);
         p[(axis + 2) % 3] = (uint64_t)run->v + trip_voxel_v(v->voxels[i]);
-        add_voxel(&v->sums, p, trip_voxel_code(v->voxels[i]) >> own,
-                  s->block.normals ? v->normals[i] : 0);
+        add_voxel(&v->sums, p, trip_voxel_code(v->voxels[i]) >> own, v->beside[i]);
     }
     return TRIP_OK;
 }

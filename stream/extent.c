@@ -16,14 +16,14 @@ static size_t paged_bytes(const trip_planner *p, uint64_t low, uint64_t high)
 size_t trip_planner_min_slot(const trip_dataset *d, unsigned planes)
 {
     const size_t page = (size_t)1 << d->header.page_log2;
-    size_t bytes = 0, words = 0, normals = 0;
+    size_t bytes = 0, words = 0;
     for (unsigned i = 0; i < d->list_count; i++) {
         const trip_block_form form = trip_block_form_of(&d->header, d->lists[i].kind);
         const size_t own = trip_kind_of(d->lists[i].kind)->max_words(&form);
         words = own > words ? own : words;
-        normals = ((size_t)1 << 2 * form.tile_log2) * form.normal_bytes;
     }
-    const size_t max[TRIP_PLANES] = { 8 * words, normals };
+    const size_t records = (size_t)1 << 2 * d->header.tile_log2;
+    const size_t max[TRIP_PLANES] = { 8 * words, records * d->header.normal_bytes, records };
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         if (planes >> plane & 1) /* a run may start anywhere in a page */
             bytes += (max[plane] + page - 1) / page * page + page;
@@ -49,7 +49,14 @@ void trip_planner_begin(trip_planner *p, const trip_pass *pass, trip_pass_cursor
 
 static size_t run_bytes(const trip_planner *p, const trip_run *run, int plane)
 {
-    return plane == TRIP_PLANE_VOXELS ? 8 * (size_t)run->words : run->count * p->normal_bytes;
+    switch (plane) {
+    case TRIP_PLANE_VOXELS:
+        return 8 * (size_t)run->words;
+    case TRIP_PLANE_NORMALS:
+        return run->count * p->normal_bytes;
+    default:
+        return run->count;
+    }
 }
 
 /* Returns the next run as a piece of its own. */

@@ -1,10 +1,11 @@
-/* The bytes of a data set on disk, `NAME.trip/`, format version 6. FORMAT.md describes them for
+/* The bytes of a data set on disk, `NAME.trip/`, format version 7. FORMAT.md describes them for
  * people. Fixed width, little-endian, no pointers. Reserved bits are zero; other values are
  * refused.
  *
  *   index.trip               header, list descriptors, slabs, bricks, runs, page checksums, text
  *   x0.voxels x0.normals     plane files of the list of voxels along X at level 0
  *   x0.halo                  plane file of its halo list; likewise for Y, Z and other levels
+ *   x1.values x1.deviations  plane files of the list of values along X at level 1
  *
  * A list along axis a holds its records by ascending sheet (coordinate along a). Within a sheet
  * they are in the order of the Morton code of (u, v), with u = axis (a + 1) mod 3 in the even bits
@@ -16,7 +17,7 @@
  * Morton order of (tile_u, tile_v).
  *
  * In the voxel plane a run is a block (block.h). In the plane of normals it has normal_bytes per
- * record.
+ * record, in the plane of deviations one byte.
  *
  * Every plane file has a checksum (XXH64, seed 0) per page of 2^page_log2 bytes; the last page is
  * short. The index file is checked in the same way. Its page checksums are at its end, and their
@@ -29,7 +30,8 @@
 #include <stdint.h>
 
 #define TRIP_MAGIC "TRIPTYCH"
-#define TRIP_FORMAT_VERSION 6
+#define TRIP_FORMAT_VERSION 7
+#define TRIP_FORMAT_OLDEST 6 /* the oldest version that is read; it has no deviations */
 #define TRIP_HEADER_BYTES 1024
 #define TRIP_LISTS_MAX 4096
 #define TRIP_TEXT_BYTES_MAX (UINT64_C(1) << 24)
@@ -39,13 +41,15 @@
 enum trip_plane {
     TRIP_PLANE_VOXELS,
     TRIP_PLANE_NORMALS,
+    TRIP_PLANE_DEVIATIONS, /* of lists of values (deviation.h) */
     TRIP_PLANES,
+    TRIP_PLANES_OF_VOXELS = TRIP_PLANE_DEVIATIONS, /* lists of voxels have only these planes */
 };
 
 /* The header, at offset 0 of index.trip. Offsets are from the start of index.trip. */
 typedef struct trip_file_header {
     char magic[8];            /* TRIP_MAGIC, without a terminator */
-    uint32_t version;         /* TRIP_FORMAT_VERSION */
+    uint32_t version;         /* TRIP_FORMAT_OLDEST to TRIP_FORMAT_VERSION */
     uint32_t header_bytes;    /* TRIP_HEADER_BYTES */
     uint64_t header_checksum; /* XXH64 of the header with this field zero */
     uint64_t index_bytes;     /* length of index.trip */

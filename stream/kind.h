@@ -20,11 +20,11 @@ typedef enum trip_kind {
 } trip_kind;
 
 typedef struct trip_kind_info {
-    const char *name;           /* "voxels", "halo", ... */
-    const char *plane_names[2]; /* file names by trip_plane; NULL if the kind lacks the plane */
-    unsigned planes;            /* one bit per trip_plane that such a list may have */
-    bool splatted;              /* drawn as splats */
-    bool lattice;               /* records are grid points and are culled as such */
+    const char *name;                     /* "voxels", "halo", ... */
+    const char *plane_names[TRIP_PLANES]; /* file names; NULL if the kind lacks the plane */
+    unsigned planes;                      /* one bit per trip_plane that such a list may have */
+    bool splatted;                        /* drawn as splats */
+    bool lattice;                         /* records are grid points and are culled as such */
     /* code_bytes: 0 selects the header's. The lowest axis_bits of a code depend on the list's axis,
      * so lists along other axes hold other codes. */
     unsigned code_bytes, axis_bits;

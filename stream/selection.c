@@ -142,7 +142,7 @@ static trip_run take_run(trip_run_iterator *it)
     it->record = s->descending ? first : first + r->records;
     it->block = s->descending ? block : block + bytes;
     trip_run run = { .first = first,
-                     .at = { block, first * s->data->header.normal_bytes },
+                     .at = { block, first * s->data->header.normal_bytes, first },
                      .count = r->records,
                      .words = r->words,
                      .brick = (uint32_t)brick,

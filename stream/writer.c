@@ -217,7 +217,7 @@ static size_t larger(size_t a, size_t b)
 static size_t plane_buffer_bytes(const trip_writer *w, unsigned level)
 {
     size_t share = level ? SPOOL_BUFFER_BYTES : PLANE_BUFFER_BYTES, lists = 0;
-    for (unsigned i = 0; i < w->list_count; i++)
+    for (unsigned i = 0; level == 0 && i < w->list_count; i++)
         lists += w->params.lists[i].level == 0;
     while (level == 0 && share > SPOOL_BUFFER_BYTES && share * lists > 3 * PLANE_BUFFER_BYTES)
         share /= 2;
@@ -306,6 +306,21 @@ int trip_writer_open(trip_writer **out, const char *path, const trip_writer_para
     return TRIP_OK;
 }
 
+int trip_writer_add_deviations(trip_writer *w)
+{
+    int status = TRIP_OK;
+    w->header.planes |= 1u << TRIP_PLANE_DEVIATIONS;
+    for (unsigned i = 0; i < w->list_count && status == TRIP_OK; i++) {
+        trip_list_writer *l = &w->lists[i];
+        if (l->is.kind != TRIP_KIND_VALUES)
+            continue;
+        assert(l->records == 0);
+        l->planes_present |= 1u << TRIP_PLANE_DEVIATIONS;
+        status = open_plane(w, l, TRIP_PLANE_DEVIATIONS);
+    }
+    return status;
+}
+
 int trip_writer_end_slab(trip_writer *w, trip_list_writer *l)
 {
     size_t n = l->slab.brick_count;
@@ -389,6 +404,20 @@ static int append_normals(trip_list_writer *l, const uint32_t *normals, uint32_t
     return trip_output_append(o, packed, (size_t)count * l->form.normal_bytes);
 }
 
+static int append_deviations(trip_list_writer *l, const uint32_t *deviations, uint32_t count)
+{
+    uint8_t bytes[TRIP_RUN_RECORDS_MAX];
+    for (uint32_t i = 0; i < count; i++)
+        bytes[i] = (uint8_t)deviations[i];
+    return trip_output_append(&l->planes[TRIP_PLANE_DEVIATIONS], bytes, count);
+}
+
+static int append_beside(trip_list_writer *l, const uint32_t *beside, uint32_t count)
+{
+    return l->planes_present >> TRIP_PLANE_NORMALS & 1 ? append_normals(l, beside, count)
+                                                       : append_deviations(l, beside, count);
+}
+
 /* Appends a run that is in order. */
 static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint32_t tile_u,
                       uint32_t tile_v, const uint32_t *voxels, uint32_t count)
@@ -409,12 +438,12 @@ static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint3
 }
 
 int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t tile_u,
-                       uint32_t tile_v, const uint32_t *voxels, const uint32_t *normals,
+                       uint32_t tile_v, const uint32_t *voxels, const uint32_t *beside,
                        uint32_t count)
 {
     assert(list < w->list_count);
     trip_list_writer *l = &w->lists[list];
-    assert(!normals == !(l->planes_present >> TRIP_PLANE_NORMALS & 1));
+    assert(!beside == !(l->planes_present & ~(1u << TRIP_PLANE_VOXELS)));
     if (count == 0)
         return TRIP_OK;
     int status = check_run(w, l, sheet, tile_u, tile_v, count);
@@ -422,12 +451,13 @@ int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t t
         status = enter_sheet(w, l, sheet, trip_morton(tile_u, tile_v));
     if (status == TRIP_OK)
         status = append_run(w, l, sheet, tile_u, tile_v, voxels, count);
-    if (status == TRIP_OK && normals)
-        status = append_normals(l, normals, count);
+    if (status == TRIP_OK && beside)
+        status = append_beside(l, beside, count);
     l->records += count;
-    atomic_store_explicit(&l->bytes,
-                          l->planes[TRIP_PLANE_VOXELS].bytes + l->planes[TRIP_PLANE_NORMALS].bytes,
-                          memory_order_relaxed);
+    uint64_t bytes = 0;
+    for (int plane = 0; plane < TRIP_PLANES; plane++)
+        bytes += l->planes[plane].bytes;
+    atomic_store_explicit(&l->bytes, bytes, memory_order_relaxed);
     return status;
 }
 

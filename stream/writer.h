@@ -61,11 +61,15 @@ typedef struct trip_writer_params {
 int trip_writer_open(trip_writer **out, const char *path, const trip_writer_params *params,
                      trip_budget *budget);
 
+/* Gives the lists of values planes of deviations. Call before the first run of these lists. */
+int trip_writer_add_deviations(trip_writer *w);
+
 /* Appends one run: `count` records of tile (tile_u, tile_v) in `sheet` of list `list`. Voxels are
- * in Morton order of (u, v). Normals have the form of normal_bytes, in the low bits, and are NULL
- * if the list has none. Runs must come in list order (sheet, then Morton code of the tile). */
+ * in Morton order of (u, v). `beside` has the records of the list's other plane in the low bits:
+ * normals in the form of normal_bytes, or deviations. It is NULL if the list has neither. Runs must
+ * come in list order (sheet, then Morton code of the tile). */
 int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t tile_u,
-                       uint32_t tile_v, const uint32_t *voxels, const uint32_t *normals,
+                       uint32_t tile_v, const uint32_t *voxels, const uint32_t *beside,
                        uint32_t count);
 
 /* Replaces the scale of codes and gradients from the parameters. Records hold codes, so the range

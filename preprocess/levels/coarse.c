@@ -10,10 +10,19 @@ static uint16_t eighth(uint32_t sum)
     return (uint16_t)(sum > 0 && part == 0 ? 1 : part);
 }
 
+/* Returns the variance of the codes: the mean of the variances plus the variance of the means. */
+static float variance_of(const trip_coarse_value_sum *s)
+{
+    const double known = s->known, codes = (double)s->codes;
+    const double variance = (s->squares * known - codes * codes) / (known * known);
+    return (float)(variance > 0 ? variance : 0);
+}
+
 void trip_coarse_value_get(const trip_coarse_value_sum *s, trip_coarse_value *out)
 {
     out->known = eighth(s->known);
-    out->value = (uint16_t)((s->value + s->known / 2) / s->known);
+    out->value = (uint16_t)((s->codes + s->known / 2) / s->known);
+    out->variance = variance_of(s);
     out->around = s->below > UINT16_MAX - TRIP_COARSE_ALL_KEPT ? (uint16_t)(UINT16_MAX - s->below)
                                                                : TRIP_COARSE_ALL_KEPT;
     if (!s->kept)

@@ -18,6 +18,7 @@ typedef struct trip_coarse_value {
      * (trip_coarse_turned()) of the dropped ones. Neighbours without a value take it. Otherwise
      * TRIP_COARSE_NONE_KEPT or TRIP_COARSE_ALL_KEPT. */
     uint16_t around;
+    float variance; /* of the codes of its level 0 voxels with a value */
 } trip_coarse_value;
 
 enum {
@@ -63,10 +64,10 @@ static inline void trip_coarse_vote(trip_coarse_uneven *s, uint32_t share, uint1
 
 /* Sums over the voxels of one coarse voxel. Zero-initialise it. */
 typedef struct trip_coarse_value_sum {
-    union {
-        uint64_t value; /* sum of codes times known shares */
-        trip_coarse_uneven uneven;
-    };
+    /* Sums of codes and of their squares, times known shares. Sums of codes are whole. */
+    uint64_t codes;
+    double squares;
+    trip_coarse_uneven uneven;
     uint32_t known;
     uint16_t below; /* UINT16_MAX minus `around` of dropped voxels; 0 if there are none */
     bool kept;
@@ -78,30 +79,26 @@ static inline void trip_coarse_value_add_around(trip_coarse_value_sum *s, uint16
     s->below = below > s->below ? below : s->below;
 }
 
-/* Adds a voxel of the level below, apart from its value. */
-static inline void trip_coarse_value_add_share(trip_coarse_value_sum *s,
-                                               const trip_coarse_value *value, bool round)
+/* Adds a voxel of the level below. */
+static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value,
+                                         bool round)
 {
     const bool kept = value->around != TRIP_COARSE_NONE_KEPT;
+    s->codes += (uint64_t)value->known * value->value;
+    s->squares += value->known * ((double)value->value * value->value + (double)value->variance);
     s->known += value->known;
     s->kept |= kept;
     trip_coarse_value_add_around(s, kept ? value->around : trip_coarse_turned(value->value, round));
 }
 
-/* Adds a voxel of the level below. */
-static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_coarse_value *value,
-                                         bool round)
-{
-    s->value += (uint64_t)value->known * value->value;
-    trip_coarse_value_add_share(s, value, round);
-}
-
-/* Adds several level 0 voxels at once by the sum of their codes. */
+/* Adds several level 0 voxels at once by the sums of their codes and of
+ * the squares. */
 static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_t count,
-                                               uint32_t codes, bool kept)
+                                               uint32_t codes, uint64_t squares, bool kept)
 {
+    s->codes += (uint64_t)codes * TRIP_COARSE_ALL;
+    s->squares += (double)squares * TRIP_COARSE_ALL;
     s->known += count * TRIP_COARSE_ALL;
-    s->value += (uint64_t)codes * TRIP_COARSE_ALL;
     s->kept |= kept;
 }
 

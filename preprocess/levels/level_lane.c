@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "clones.h"
+#include "deviation.h"
 #include "format.h"
 
 size_t trip_level_lane_make(trip_level_lane *l, const trip_level_work *w, unsigned producer,
@@ -150,12 +151,16 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
 {
     const uint32_t corner = trip_square_corner(of);
     const size_t first = position_of(w, square, trip_voxel_u(corner), trip_voxel_v(corner)).at;
-    uint32_t sums[65]; /* sums[i] adds up the first i codes */
+    uint32_t sums[65]; /* sums[i] adds up the first i codes, squares[i] their squares */
+    uint64_t squares[65];
     uint16_t codes[64], around[16];
     trip_square_codes(of, codes);
     sums[0] = 0;
-    for (uint32_t i = 0; i < of->count; i++)
+    squares[0] = 0;
+    for (uint32_t i = 0; i < of->count; i++) {
         sums[i + 1] = sums[i] + codes[i];
+        squares[i + 1] = squares[i] + (uint32_t)codes[i] * codes[i];
+    }
     if (!square->kept)
         find_around(of, codes, w->hidden_above, around);
     const uint64_t counts = counts_of(of->mask);
@@ -165,11 +170,8 @@ static void add_values(trip_level_lane *l, const trip_level_work *w,
         const uint32_t count = counts >> bit & 15;
         const size_t at = first + ((size_t)cells[n][1] << w->edge_log2) + cells[n][0];
         touch(l, at);
-        if (has_table(w))
-            trip_coarse_value_add_whole(&l->value_sums[at], count, 0, square->kept);
-        else
-            trip_coarse_value_add_whole(&l->value_sums[at], count,
-                                        sums[before + count] - sums[before], square->kept);
+        trip_coarse_value_add_whole(&l->value_sums[at], count, sums[before + count] - sums[before],
+                                    squares[before + count] - squares[before], square->kept);
         for (uint32_t i = before; i < before + count && has_table(w); i++)
             add_uneven(w, &l->value_sums[at].uneven, TRIP_COARSE_ALL, codes[i]);
         if (!square->kept)
@@ -250,12 +252,9 @@ static int add_voxels(trip_level_lane *l, const trip_level_work *w, const trip_l
         const trip_coarse_value *value = &l->values_below[i];
         const position p = position_of(w, square, value->u, value->v);
         touch(l, p.at);
-        if (has_table(w)) {
-            trip_coarse_value_add_share(&l->value_sums[p.at], value, w->hidden_above);
+        trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
+        if (has_table(w))
             add_uneven(w, &l->value_sums[p.at].uneven, value->known, value->value);
-        } else {
-            trip_coarse_value_add(&l->value_sums[p.at], value, w->hidden_above);
-        }
         if (l->value_votes)
             trip_coarse_votes_add(&l->value_votes[p.at], value->value, value->known);
         if (!l->means_below || !l->means_below[i].kept)
@@ -400,6 +399,12 @@ static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *vo
     return (voxel->value + step / 2) / step * step;
 }
 
+/* Returns the code of a voxel's deviation. Sharpening does not change the deviation. */
+static uint32_t deviation(const trip_level_work *w, const trip_coarse_value *voxel)
+{
+    return w->format.deviations ? trip_deviation_pack((double)voxel->variance) : 0;
+}
+
 /* Puts the sharpened voxels of a square into the box. */
 static void put_values(trip_level_lane *l, const trip_level_work *w, uint32_t count, int sheet)
 {
@@ -410,7 +415,7 @@ static void put_values(trip_level_lane *l, const trip_level_work *w, uint32_t co
         uint32_t *row = l->box.values + trip_splat_box_row(&l->box, y, sheet);
         unsigned n = 0;
         for (; i < count && voxels[i].v == y && n < TRIP_TILE_MAX_EDGE; i++) {
-            row[voxels[i].u] = value_code(w, &voxels[i]);
+            row[voxels[i].u] = value_code(w, &voxels[i]) | deviation(w, &voxels[i]) << 16;
             x[n++] = voxels[i].u;
         }
         trip_splat_box_mark(&l->box, y, sheet, x, n);

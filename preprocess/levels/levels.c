@@ -104,6 +104,12 @@ trip_level_kinds trip_levels_kinds(trip_brick_levels_for wanted, bool halo)
                                .values = halo && wanted != TRIP_LEVELS_FOR_PRE };
 }
 
+/* Labels have no mean, and hence no deviation from it. */
+static bool has_deviations(const trip_levels_params *p)
+{
+    return p->kinds.values && !p->labels && !p->quantiser.ids;
+}
+
 /* Adds three lists of a kind after `n` others. Returns the new number. */
 static unsigned add_lists(trip_writer_list *lists, unsigned n, trip_writer_list list,
                           trip_kind kind)
@@ -516,6 +522,7 @@ static void begin(making *m, const trip_levels_params *params, unsigned level,
     w->format.quantised = true; /* pieces of coarse levels always hold codes */
     w->format.halo = params->kinds.values;
     w->format.normals = params->format.normals && params->kinds.means;
+    w->format.deviations = has_deviations(params);
     w->means = params->kinds.means;
     w->values = params->kinds.values;
     w->hidden_above = params->hidden_above;
@@ -552,6 +559,8 @@ int trip_levels_make(const trip_levels_params *params, trip_budget *budget)
     uint64_t sheets = 0, before = 0;
     double *value_of = NULL;
     int status = m ? make_values_of_codes(params, &value_of, budget) : trip_level_fail_memory();
+    if (status == 0 && has_deviations(params))
+        status = trip_writer_add_deviations(params->writer);
     for (unsigned level = 1; level <= params->levels; level++)
         sheets += (uint64_t)((params->dims[2] - 1) >> level) + 1;
     for (unsigned level = 1; level <= params->levels && status == 0; level++) {

@@ -72,7 +72,7 @@ static void free_chain(trip_list_builder *b, trip_chain *c)
  * checkpoint contains the lengths of this list. */
 static int note_checkpoint(trip_list_builder *b, trip_checkpoint *c)
 {
-    for (int plane = 0; plane < TRIP_PLANES; plane++)
+    for (int plane = 0; plane < TRIP_PLANES_OF_VOXELS; plane++)
         c->ordered_bytes[plane] = trip_writer_plane_bytes(b->params.writer, ORDERED_LIST, plane);
     return trip_journal_write_checkpoint(b->params.journal, c, b->params.spill);
 }

@@ -21,6 +21,10 @@ trip_piece_parts trip_piece_layout(const trip_piece_format *f, uint32_t splats, 
     size_t positions = words ? (mask_count(f) + words) * 8 : padded(splats * sizeof(uint16_t));
     parts.values = parts.positions + positions;
     parts.bytes = parts.values + padded(splats * (f->quantised ? sizeof(uint16_t) : sizeof(float)));
+    if (f->deviations) {
+        parts.deviations = parts.bytes;
+        parts.bytes += padded(splats);
+    }
     if (!f->normals)
         return parts;
     parts.normals = parts.bytes;

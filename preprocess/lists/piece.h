@@ -9,6 +9,7 @@
  *                nonzero word of the tile's bitmap, then these `words` 64-bit words.
  *   values       codes (uint16), or float32 while the range of values is unknown.
  *   normals      packed (uint32), without magnitude while the range of values is unknown.
+ *   deviations   packed (uint8, deviation.h), only of coarse values.
  *   magnitudes   float32, gradients per gradient_unit; only while the range of values is unknown.
  */
 #ifndef TRIP_PIECE_H
@@ -73,7 +74,8 @@ typedef struct trip_piece_format {
     bool quantised; /* values are codes; otherwise values are floats, and normals store magnitudes
                        separately */
     bool normals;
-    bool halo; /* the data set has lists of the halo */
+    bool halo;       /* the data set has lists of the halo */
+    bool deviations; /* the lists of the halo are coarse values with deviations */
 } trip_piece_format;
 
 static inline unsigned trip_piece_list_count(const trip_piece_format *f)
@@ -92,6 +94,7 @@ static inline trip_piece_format trip_piece_format_of(const trip_piece_format *f,
 {
     trip_piece_format own = *f;
     own.normals = f->normals && list < TRIP_HALO_LISTS;
+    own.deviations = f->deviations && list >= TRIP_HALO_LISTS;
     return own;
 }
 
@@ -105,7 +108,7 @@ typedef struct trip_piece {
 /* Offsets of the parts in bytes from the start of a piece, and its length. Absent parts have offset
  * 0. */
 typedef struct trip_piece_parts {
-    size_t positions, values, normals, magnitudes, bytes;
+    size_t positions, values, normals, deviations, magnitudes, bytes;
 } trip_piece_parts;
 
 trip_piece_parts trip_piece_layout(const trip_piece_format *f, uint32_t splats, unsigned words);

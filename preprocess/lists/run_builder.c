@@ -20,11 +20,17 @@ struct trip_run_builder {
     uint16_t positions[TRIP_TILE_MAX_SPLATS];
     uint16_t uv[TRIP_TILE_MAX_SPLATS]; /* u and v of a position, one byte each */
     uint32_t values[TRIP_TILE_MAX_SPLATS];
-    uint32_t normals[TRIP_TILE_MAX_SPLATS];
+    uint32_t normals[TRIP_TILE_MAX_SPLATS]; /* or deviations */
     float magnitudes[TRIP_TILE_MAX_SPLATS];
     uint32_t voxel_records[TRIP_TILE_MAX_SPLATS];
     uint32_t normal_records[TRIP_TILE_MAX_SPLATS];
 };
+
+/* Whether records of normals or deviations belong to the voxels. */
+static bool has_beside(const trip_run_builder *b)
+{
+    return b->format.normals || b->format.deviations;
+}
 
 int trip_run_builder_create(trip_run_builder **out, const trip_piece_format *f, trip_budget *budget)
 {
@@ -54,6 +60,8 @@ static void add_first(trip_run_builder *b, const trip_piece *p)
     b->first_count = trip_piece_positions(p, &b->format, b->first_positions);
     for (uint32_t i = 0; i < b->first_count; i++)
         b->voxel_records[i] = codes[i];
+    for (uint32_t i = 0; parts.deviations && i < b->first_count; i++)
+        b->normal_records[i] = base[parts.deviations + i];
     if (parts.normals)
         memcpy(b->normal_records, base + parts.normals, b->first_count * sizeof *b->normal_records);
 }
@@ -66,7 +74,7 @@ static void scatter_first(trip_run_builder *b)
         b->bits[position / 64] |= UINT64_C(1) << (position % 64);
         b->values[position] = b->voxel_records[i];
     }
-    for (uint32_t i = 0; b->format.normals && i < b->first_count; i++)
+    for (uint32_t i = 0; has_beside(b) && i < b->first_count; i++)
         b->normals[b->first_positions[i]] = b->normal_records[i];
     b->first_count = 0;
 }
@@ -91,6 +99,8 @@ static void scatter_piece(trip_run_builder *b, const trip_piece *p)
     for (uint32_t i = 0; i < splats; i++)
         b->bits[b->positions[i] / 64] |= UINT64_C(1) << (b->positions[i] % 64);
     scatter_values(b, base + parts.values, splats);
+    for (uint32_t i = 0; parts.deviations && i < splats; i++)
+        b->normals[b->positions[i]] = base[parts.deviations + i];
     const uint32_t *normals = (const void *)(base + parts.normals);
     if (parts.normals)
         for (uint32_t i = 0; i < splats; i++)
@@ -159,16 +169,16 @@ static uint32_t take_scattered(trip_run_builder *b, const trip_quantiser *q)
         unsigned position = b->positions[i];
         b->voxel_records[i] = b->uv[position] | code_of(b, q, position) << 16;
     }
-    for (uint32_t i = 0; b->format.normals && i < splats; i++)
+    for (uint32_t i = 0; has_beside(b) && i < splats; i++)
         b->normal_records[i] = normal_of(b, q, b->positions[i]);
     return splats;
 }
 
 TRIP_ALSO_V3 uint32_t trip_run_builder_take(trip_run_builder *b, const trip_quantiser *q,
-                                            const uint32_t **voxels, const uint32_t **normals)
+                                            const uint32_t **voxels, const uint32_t **beside)
 {
     b->started = false;
     *voxels = b->voxel_records;
-    *normals = b->format.normals ? b->normal_records : NULL;
+    *beside = has_beside(b) ? b->normal_records : NULL;
     return b->first_count ? take_first(b) : take_scattered(b, q);
 }

@@ -14,9 +14,9 @@ void trip_run_builder_destroy(trip_run_builder *b);
  * voxel in several pieces becomes one record. */
 void trip_run_builder_add(trip_run_builder *b, const trip_piece *p);
 /* Ends the run and returns the number of its records. Sets the pointers to records in list order,
- * in the form that trip_writer_append() takes. *normals is NULL without normals. The records are
- * valid until the next piece is added. */
+ * in the form that trip_writer_append() takes. *beside points to normals or deviations, or is NULL
+ * without either. The records are valid until the next piece is added. */
 uint32_t trip_run_builder_take(trip_run_builder *b, const trip_quantiser *q,
-                               const uint32_t **voxels, const uint32_t **normals);
+                               const uint32_t **voxels, const uint32_t **beside);
 
 #endif

@@ -110,6 +110,8 @@ static void fill_piece(const trip_splat_box *c, const trip_piece_format *f, trip
     else
         for (uint32_t i = 0; i < splats; i++)
             floats[i] = c->values[indices[i]];
+    for (uint32_t i = 0; i < splats && parts.deviations; i++)
+        base[parts.deviations + i] = (uint8_t)(c->values[indices[i]] >> 16);
     if (parts.normals)
         for (uint32_t i = 0; i < splats; i++)
             normals[i] = c->normals[indices[i]];

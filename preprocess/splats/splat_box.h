@@ -21,7 +21,7 @@ typedef struct trip_splat_box_tables {
  * An entry is valid if the voxel has a splat. */
 typedef struct trip_splat_box {
     const trip_splat_box_tables *tables;
-    uint32_t *values;  /* codes, or the bits of floats */
+    uint32_t *values;  /* codes with deviations above them, or the bits of floats */
     uint32_t *normals; /* normals and magnitudes: as in pieces, if the pieces have them */
     float *magnitudes;
     uint64_t *bits[3]; /* bitmaps, `words` for each local sheet of the axis */

@@ -202,6 +202,8 @@ static void count_runs(const selecting *of, uint64_t index, int64_t slab_sheet)
         bytes[TRIP_PLANE_VOXELS] += passes * 8 * runs[s].words;
         if (of->list->planes >> TRIP_PLANE_NORMALS & 1 && !of->p->data->computes_normals)
             bytes[TRIP_PLANE_NORMALS] += passes * runs[s].records * h->normal_bytes;
+        if (of->list->planes >> TRIP_PLANE_DEVIATIONS & 1)
+            bytes[TRIP_PLANE_DEVIATIONS] += passes * runs[s].records;
     }
 }
 
@@ -379,13 +381,15 @@ static int take_lists(trip_plan *plan, unsigned count, trip_budget *budget)
                      "%u lists do not fit the memory given; raise --memory", count);
 }
 
-/* `post` reads no normals: it lights by differences of values. */
+/* `post` reads no normals: it lights by differences of values. Coarse values have deviations. */
 static unsigned planes_of(const trip_dataset *data, const trip_settings *settings)
 {
     bool wanted = settings->shading || settings->flatten > 1;
     bool read = wanted && settings->classify == TRIP_CLASSIFY_PRE;
     unsigned normals = read ? 1u << TRIP_PLANE_NORMALS : 0;
-    return 1u << TRIP_PLANE_VOXELS | (data->header.planes & normals);
+    bool coarse = settings->classify == TRIP_CLASSIFY_POST && trip_settings_has_levels(settings);
+    unsigned deviations = coarse ? 1u << TRIP_PLANE_DEVIATIONS : 0;
+    return 1u << TRIP_PLANE_VOXELS | (data->header.planes & (normals | deviations));
 }
 
 int trip_plan_check_cells(const trip_dataset *data, const char *instead)

@@ -83,7 +83,7 @@ class Drawn(program.ProgramTest):
         for name in self.kept:
             info = self.info(f"{name}.trip")
             self.assertLessEqual(INFO_KEYS, info.keys())
-            self.assertEqual(info["format_version"], 6)
+            self.assertEqual(info["format_version"], 7)
             self.assertEqual([len(info["dims"]), len(info["spacing"])], [3, 3])
             self.assertEqual(numpy.array(info["index_to_world"]).shape, (3, 4))
             files = (os.path.join(f"{name}.trip", f) for f in os.listdir(f"{name}.trip"))

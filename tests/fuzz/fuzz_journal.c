@@ -90,7 +90,7 @@ static void check_journal(const trip_journal *j, const trip_journal_params *p,
         return;
     FUZZ_PROMISE(start && c->kept <= VOXELS && c->halo <= 26 * c->kept);
     FUZZ_PROMISE(c->ordered_splats <= c->kept);
-    for (int i = 0; i < TRIP_PLANES; i++)
+    for (int i = 0; i < TRIP_PLANES_OF_VOXELS; i++)
         FUZZ_PROMISE(c->ordered_bytes[i] <= p->ordered_bytes[i]);
     FUZZ_PROMISE(!p->slice_voxels || c->done <= SLICES);
     FUZZ_PROMISE(c->runs <= 1000 && c->sequences == trip_spill_count(spill));

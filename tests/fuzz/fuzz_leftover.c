@@ -27,8 +27,8 @@ typedef struct given {
     trip_piece_format format;
     given_run runs[MAX_RUNS];
     size_t run_count;
-    const uint8_t *planes[TRIP_PLANES];
-    size_t bytes[TRIP_PLANES];
+    const uint8_t *planes[TRIP_PLANES_OF_VOXELS];
+    size_t bytes[TRIP_PLANES_OF_VOXELS];
 } given;
 
 static char folder[64], path[128];
@@ -84,7 +84,7 @@ static void write_plane(const given *g, int plane)
 
 /* Returns the checksum of the run at `at`, and advances `at`. Returns 0 if the run does not decode.
  */
-static uint32_t checksum_of(const given *g, uint32_t splats, size_t at[TRIP_PLANES])
+static uint32_t checksum_of(const given *g, uint32_t splats, size_t at[TRIP_PLANES_OF_VOXELS])
 {
     static uint64_t words[TRIP_BLOCK_WORDS_MAX];
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX], normals[TRIP_RUN_RECORDS_MAX];
@@ -120,7 +120,7 @@ static void write_journal(const given *g, trip_budget *budget)
     trip_spill *spill;
     trip_journal *j;
     trip_checkpoint *c = calloc(1, sizeof *c);
-    size_t at[TRIP_PLANES] = { 0 };
+    size_t at[TRIP_PLANES_OF_VOXELS] = { 0 };
     FUZZ_PROMISE(c && trip_spill_open(&spill, in_folder("spill"), false, budget) == 0);
     FUZZ_PROMISE(trip_journal_open(&j, spill, &(trip_journal_params){ 0 }, budget) == 0);
     start.scanned = 1;
@@ -182,7 +182,7 @@ static void replay(const given *g, const trip_leftover *l, trip_spill *spill, tr
     building b = open_building(g, spill, j, budget);
     if (trip_leftover_replay(l, j, b.builder, &g->form, budget) == 0) {
         FUZZ_PROMISE(trip_writer_records(b.writer, TRIP_ORDERED_LIST) == c->ordered_splats);
-        for (int i = 0; i < TRIP_PLANES; i++)
+        for (int i = 0; i < TRIP_PLANES_OF_VOXELS; i++)
             FUZZ_PROMISE(trip_writer_plane_bytes(b.writer, TRIP_ORDERED_LIST, i) ==
                          c->ordered_bytes[i]);
     }

@@ -36,7 +36,7 @@ static void values_are_weighted_by_their_known_share(void **state)
                             some = { .known = 1, .value = UINT16_MAX };
     trip_coarse_value_sum sum = { 0 };
     trip_coarse_value out;
-    trip_coarse_value_add_whole(&sum, 4, 1 + 2 + 2 + 2, true);
+    trip_coarse_value_add_whole(&sum, 4, 1 + 2 + 2 + 2, 1 + 4 + 4 + 4, true);
     trip_coarse_value_get(&sum, &out);
     assert_int_equal(out.value, 2); /* 1.75 */
     assert_int_equal(out.known, (TRIP_COARSE_ALL + 1) / 2);

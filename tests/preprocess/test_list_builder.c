@@ -24,7 +24,7 @@ typedef struct building {
     trip_list_builder *builder;
 } building;
 
-static const trip_piece_format format = { 5, true, true, false };
+static const trip_piece_format format = { 5, true, true, false, false };
 static const int64_t dims[3] = { NX, NY, NZ };
 
 static void open_building(building *b, const char *name, const run_params *p)

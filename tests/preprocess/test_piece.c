@@ -108,7 +108,7 @@ static void pieces_of_a_tile_merge_into_one_run(void **state)
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 26), 0);
     for (unsigned log2 = 4; log2 <= 7; log2++)
         for (int kind = 0; kind < 4; kind++)
-            check_format(&(trip_piece_format){ log2, kind & 1, kind & 2, false }, budget);
+            check_format(&(trip_piece_format){ log2, kind & 1, kind & 2, false, false }, budget);
     trip_budget_destroy(budget);
 }
 
@@ -123,7 +123,7 @@ static void damaged_pieces_are_refused_or_harmless(void **state)
     uint64_t random = 5;
     assert_int_equal(trip_budget_create(&budget, (uint64_t)1 << 26), 0);
     for (unsigned log2 = 4; log2 <= 7; log2++) {
-        const trip_piece_format f = { log2, true, true, false };
+        const trip_piece_format f = { log2, true, true, false, false };
         uint64_t bitmap[TRIP_TILE_MAX_WORDS] = { 0 };
         trip_run_builder *builder;
         assert_int_equal(trip_run_builder_create(&builder, &f, budget), 0);
@@ -154,7 +154,7 @@ static void repeated_positions_and_positions_beyond_the_tile_are_refused(void **
 {
     (void)state;
     static sample s;
-    const trip_piece_format f = { 4, true, false, false };
+    const trip_piece_format f = { 4, true, false, false, false };
     const uint64_t many[TRIP_TILE_MAX_WORDS] = { UINT64_MAX, 1 }, few[TRIP_TILE_MAX_WORDS] = { 7 };
     make_piece(&s, &f, many);
     assert_true(s.piece.words == 2 && trip_piece_check(&s.piece, &f, s.length));

@@ -3,13 +3,14 @@
 
 Checks every checksum and prints one line for each record of each list, in the order of the lists:
 
-    LIST i j k code [normal gx gy gz]
+    LIST i j k code [normal gx gy gz] [deviation]
 
 LIST        the axis ("x") for voxels of level 0, else axis, level and kind ("z0.halo", "y1.means")
 code        the 16-bit code; a code of means includes depth and cover
 normal      the record of the normal, in hexadecimal
 gx gy gz    the gradient in world space; if the record stores the direction only, its length is
             gradient_full
+deviation   the standard deviation of the voxels of level 0 below a coarse value, in codes
 
 The reader loads whole files. It serves tests and explains the format; it is not for large data.
 """
@@ -23,7 +24,12 @@ except ImportError as missing:
     print(f"plain_reader: {missing} (packages python3-numpy, python3-xxhash)", file=sys.stderr)
     sys.exit(77)
 
-KINDS = (("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values",))
+KINDS = (
+    ("voxels", "normals"),
+    ("halo",),
+    ("means", "mean-normals"),
+    ("values", None, "deviations"),
+)
 PACKED = (2, 3)  # kinds with packed codes for every value of code_bytes
 VALUES = 3
 
@@ -70,7 +76,7 @@ def read_header(index):
         index,
         0,
     )
-    if at != 360 or header["version"] != 6 or header["header_bytes"] != 1024:
+    if at != 360 or header["version"] not in (6, 7) or header["header_bytes"] != 1024:
         fail("index.trip", 8, "version or header size")
     if header["reserved"] or header["reserved_scale"] or any(index[360:1024]):
         fail("index.trip", 360, "reserved bytes")
@@ -78,6 +84,8 @@ def read_header(index):
         fail("index.trip", 24, "length of the file")
     if xxh64(index[:16] + bytes(8) + index[24:1024]) != header["header_checksum"]:
         fail("index.trip", 16, "header checksum")
+    if header["planes"] >> (header["version"] - 4):  # version 7 adds bit 2
+        fail("index.trip", 276, "planes")
     return header
 
 
@@ -111,7 +119,7 @@ def read_list(index, header, number):
     if a_list["axis"] > 2 or a_list["kind"] >= len(KINDS) or any(index[end : at + 320]):
         fail("index.trip", at, "list descriptor")
     a_list["files"] = [
-        f"{'xyz'[a_list['axis']]}{a_list['level']}.{plane}" for plane in KINDS[a_list["kind"]]
+        plane and f"{'xyz'[a_list['axis']]}{a_list['level']}.{plane}" for plane in KINDS[a_list["kind"]]
     ]
     plain = a_list["level"] == 0 and a_list["kind"] == 0
     a_list["name"] = "xyz"[a_list["axis"]] if plain else a_list["files"][0]
@@ -278,10 +286,21 @@ def read_normals(folder, index, header, a_list):
     return normals, narrow_gradients(normals, header)
 
 
+def read_deviations(folder, index, header, a_list):
+    """Returns the deviations in codes, or None if the list has none."""
+    if a_list["planes"] >> 2 == 0:
+        return None
+    data = numpy.frombuffer(read_plane(folder, index, header, a_list, 2), "u1")
+    if len(data) != a_list["records"]:
+        fail(a_list["files"][2], len(data), "length of the file")
+    return 32767.5 * (data / 255) ** 2
+
+
 def print_list(folder, index, header, number, out):
     a_list = read_list(index, header, number)
     voxels = read_plane(folder, index, header, a_list, 0)
     normals, gradient = read_normals(folder, index, header, a_list)
+    deviations = read_deviations(folder, index, header, a_list)
     tile, axis = 1 << header["tile_log2"], a_list["axis"]
     for sheet, tile_u, tile_v, first, count, at, size in runs(index, header, a_list):
         block = decode_block(header, a_list["kind"], a_list["files"][0], at, voxels[at : at + size], count)
@@ -293,6 +312,8 @@ def print_list(folder, index, header, number, out):
             line = "%s %d %d %d %d" % (a_list["name"], *where, code)
             if normals is not None:
                 line += " %08x %.9g %.9g %.9g" % (normals[n], *gradient[n])
+            if deviations is not None:
+                line += " %.6g" % deviations[n]
             out.write(line + "\n")
 
 

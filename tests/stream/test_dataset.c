@@ -285,7 +285,7 @@ static void an_invalid_header_with_valid_checksum_is_refused(void **state)
     REFUSE(c.header->version = 3, "format version 3 is no longer supported");
     REFUSE(c.header->version = 4, "format version 4 is no longer supported");
     REFUSE(c.header->version = 5, "format version 5 is no longer supported");
-    REFUSE(c.header->version = 7, "format version 7");
+    REFUSE(c.header->version = 8, "format version 8");
     REFUSE(c.header->header_bytes = 512, "header size");
     REFUSE(c.header->reserved[660] = 1, "reserved");
     REFUSE(c.header->reserved0 = 1, "reserved");
@@ -317,7 +317,8 @@ static void an_invalid_header_with_valid_checksum_is_refused(void **state)
     REFUSE(c.header->page_log2 = 11, "page size");
     REFUSE(c.header->page_log2 = 25, "page size");
     REFUSE(c.header->page_log2 = 40, "page size");
-    REFUSE(c.header->planes = 7, "planes");
+    REFUSE(c.header->planes = 15, "planes");
+    REFUSE(c.header->version = 6; c.header->planes = 7, "planes");
     REFUSE(c.header->planes = 2, "planes");
     REFUSE(c.header->list_count = 2, "number of lists");
     REFUSE(c.header->list_count = 4097, "number of lists");

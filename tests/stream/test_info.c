@@ -42,7 +42,7 @@ static void json_has_the_fields_that_programs_use(void **state)
     assert_int_equal(run(arguments, output, sizeof output), 0);
     cJSON *root = cJSON_Parse(output);
     assert_non_null(root);
-    assert_true(number(root, "format_version") == 6);
+    assert_true(number(root, "format_version") == 7);
     assert_true(number(root, "value_min") == -1 && number(root, "value_max") == 2);
     assert_true(number(root, "voxels") == 6000);
     assert_true(number(root, "kept") == (double)f.count);
