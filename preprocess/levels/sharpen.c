@@ -215,12 +215,14 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
         return status;
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     memset(l->value_sums, 0, sizeof *l->value_sums << 2 * s->edge_log2);
-    memset(l->square_sums, 0, sizeof *l->square_sums << 2 * s->edge_log2);
+    if (s->shown > 0)
+        memset(l->square_sums, 0, sizeof *l->square_sums << 2 * s->edge_log2);
     if (status == 0)
         status = add_around(s, l, of->beside);
     for (uint32_t i = 0; i < position->count && status == 0; i++) {
         l->values[i].value = sharpened_value(s, l, &l->values[i]);
-        l->values[i].variance = variance_left(s, l, &l->values[i]);
+        if (s->shown > 0)
+            l->values[i].variance = variance_left(s, l, &l->values[i]);
     }
     return status;
 }
