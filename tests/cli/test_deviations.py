@@ -103,6 +103,32 @@ class Deviations(program.ProgramTest):
             added += self.check_list(lists[f"z{number}.values"], level)
         self.assertGreater(added, 0)
 
+    def test_info_tells_the_bytes(self):
+        self.works("brick", os.path.join(program.DATASETS, "tooth.nhdr"), "-o", "b.trip", "-q")
+        for entry in self.info("b.trip")["lists"]:
+            name = f"b.trip/{entry['axis']}{entry['level']}.deviations"
+            size = os.path.getsize(name) if entry["kind"] == "values" else 0
+            self.assertEqual(entry["deviation_bytes"], size)
+            self.assertEqual(size > 0, entry["level"] > 0)
+
+    def test_codes_of_knots_deviate_from_their_mean(self):
+        """All cubes of level 1 hold the same eight values, so that interpolation shows nothing."""
+        values = numpy.array([0.001, 0.002, 0.01, 0.05, 2, 2.5, 300, 9e4], "f4")
+        cubes = numpy.tile(values.reshape(2, 2, 2), (16, 12, 9))
+        program.write_nrrd("knots.nrrd", cubes)
+        self.works("brick", "knots.nrrd", "-o", "knots.trip", "-q", "--keep-all", "--levels=2")
+        info = self.info("knots.trip")
+        self.assertLess(info["code_step_min"], info["code_step_max"])
+        lists = read_lists("knots.trip")
+        codes = lists["z"][:, 3]
+        self.assertEqual(len(codes), cubes.size)
+        self.assertEqual(len(set(codes)), 8)
+        for name in "x1.values", "y1.values", "z2.values":
+            deviations = lists[name][:, 4]
+            self.assertEqual(len(set(deviations)), 1)
+            code = deviation_code(codes.var())
+            self.assertAlmostEqual(255 * (deviations[0] / 32767.5) ** 0.5, code, delta=0.51)
+
 
 if __name__ == "__main__":
     program.main()

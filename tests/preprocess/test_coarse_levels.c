@@ -644,34 +644,37 @@ static void deviations_of_ramps_and_stripes_have_closed_forms(void **state)
     }
 }
 
-/* Labels have no mean, and numbers of the same type that are no labels have one. */
+/* Labels have no mean. Labels of more than 16 bits are stored as ids. */
 static void labels_have_no_deviations(void **state)
 {
-    static uint8_t labels[32 * 32 * 32];
+    static uint32_t labels[32 * 32 * 32];
     (void)state;
-    const char header[] = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 32 32 32\n"
-                          "encoding: raw\ndata file: v.raw\n";
-    for (int i = 0; i < 32 * 32 * 32; i++)
-        labels[i] = (uint8_t)((i % 32 / 8 + i / 32 % 32 / 8 * 3 + i / 1024 / 8 * 5) % 7);
-    test_write("v.raw", labels, sizeof labels);
-    test_write("v-labels.nhdr", header, sizeof header - 1);
+    const char header[] = "NRRD0004\ntype: uint32\ndimension: 3\nsizes: 32 32 32\n"
+                          "encoding: raw\nendian: little\ndata file: v.raw\n";
     static char input[128], output[128];
-    trip_brick_summary s;
     strcpy(input, test_path("v-labels.nhdr"));
     strcpy(output, test_path("labels.trip"));
-    assert_int_equal(
-        trip_brick(
-            &(trip_brick_params){ .input = input, .output = output, .keep_all = true, .levels = 1 },
-            &s),
-        0);
-    trip_budget *budget;
-    trip_dataset *d = open_data_set("labels.trip", &budget);
-    assert_int_equal(d->header.planes & 1u << TRIP_PLANE_DEVIATIONS, 0);
-    assert_true(trip_dataset_find(d, 0, 1, TRIP_KIND_VALUES)->records > 0);
-    assert_false(test_exists("labels.trip/x1.deviations"));
-    assert_true(test_exists("labels.trip/x1.values"));
-    trip_dataset_close(d);
-    trip_budget_destroy(budget);
+    for (uint32_t scale = 1; scale <= 100000000; scale *= 100000000) {
+        trip_brick_summary s;
+        trip_budget *budget;
+        for (uint32_t i = 0; i < 32 * 32 * 32; i++)
+            labels[i] = scale * ((i % 32 / 8 + i / 32 % 32 / 8 * 3 + i / 1024 / 8 * 5) % 7);
+        test_write("v.raw", labels, sizeof labels);
+        test_write("v-labels.nhdr", header, sizeof header - 1);
+        const trip_brick_params p = {
+            .input = input, .output = output, .keep_all = true, .levels = 1, .replace = true
+        };
+        if (trip_brick(&p, &s) != 0)
+            fail_msg("%s", test_report);
+        trip_dataset *d = open_data_set("labels.trip", &budget);
+        assert_int_equal(d->header.planes & 1u << TRIP_PLANE_DEVIATIONS, 0);
+        assert_true(trip_dataset_find(d, 0, 1, TRIP_KIND_VALUES)->records > 0);
+        assert_false(test_exists("labels.trip/x1.deviations"));
+        assert_true(test_exists("labels.trip/x1.values"));
+        assert_int_equal(trip_codes_even(&d->codes), scale == 1);
+        trip_dataset_close(d);
+        trip_budget_destroy(budget);
+    }
 }
 
 static void expect_records(const char *name, unsigned level, uint64_t records)
