@@ -300,8 +300,8 @@ static int first_squares(const integral *r)
         farthest = fmax(farthest, trip_dot(c->forward, trip_sub(corner, c->eye)));
     }
     const double voxels = farthest * fmax(trip_length(c->rx), trip_length(c->ry));
-    /* At most three quarters of a voxel wide, or one more than the voxels. */
-    const double squares = fmin(ceil(voxels / 0.75), ceil(voxels) + 1);
+    /* A square is at most two thirds of a voxel wide, or there is one more square than voxels. */
+    const double squares = fmin(ceil(1.5 * voxels), ceil(voxels) + 1);
     return (int)fmax(1, fmin(most, squares));
 }
 
