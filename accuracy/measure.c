@@ -101,9 +101,11 @@ static int add_others(accuracy_measured *m, const draw_settings *defaults)
     int status = 0;
     for (int d = 1; d < m->options->data_count && !status; d++)
         for (int pre = 0; pre < 2 && !status; pre++) {
-            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU, .settings = *defaults };
+            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU,
+                                     .settings = accuracy_setting_fixed(
+                                         defaults,
+                                         pre ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST) };
             const char *slash = strrchr(m->options->data[d], '/');
-            one.settings.all.classify = pre ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
             snprintf(one.name, sizeof one.name, "%s-%.30s", pre ? "pre" : "post",
                      slash && slash[1] ? slash + 1 : m->options->data[d]);
             if (m->options->usual || is_wanted(m->options->settings, one.name))

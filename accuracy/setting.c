@@ -155,7 +155,7 @@ static void add_levels(sweep *w)
 static void add_renderers(sweep *w)
 {
     draw_settings s = w->post;
-    s.all.samples = 0; /* the mean over the area */
+    s.all.samples = s.sheet.samples = 0; /* the mean over the area */
     add(w, TRIPTYCH_RENDERER_GL, w->post, "gl-post");
     add(w, TRIPTYCH_RENDERER_GL, w->pre, "gl-pre");
     add(w, TRIPTYCH_RENDERER_REFERENCE, w->post, "reference-post");
@@ -181,9 +181,7 @@ static void add_samples(sweep *w)
     }
 }
 
-/* Returns the settings of rows that choose nothing by themselves: one ray per pixel, the finest
- * level, and a number of samples per sheet with post. */
-static draw_settings fixed(const draw_settings *defaults, triptych_classify classify)
+draw_settings accuracy_setting_fixed(const draw_settings *defaults, triptych_classify classify)
 {
     draw_settings s = *defaults;
     s.all.classify = classify;
@@ -197,8 +195,8 @@ static draw_settings fixed(const draw_settings *defaults, triptych_classify clas
 int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_settings *defaults)
 {
     sweep w = { .out = out,
-                .pre = fixed(defaults, TRIPTYCH_CLASSIFY_PRE),
-                .post = fixed(defaults, TRIPTYCH_CLASSIFY_POST) };
+                .pre = accuracy_setting_fixed(defaults, TRIPTYCH_CLASSIFY_PRE),
+                .post = accuracy_setting_fixed(defaults, TRIPTYCH_CLASSIFY_POST) };
     add_qualities(&w, defaults);
     add_post(&w);
     add_pre(&w, TRIPTYCH_COMPOSITING_SPLAT);

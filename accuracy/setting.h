@@ -27,6 +27,10 @@ typedef enum accuracy_state {
  * shading and background. Returns their number. */
 int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_settings *defaults);
 
+/* Returns settings that choose nothing by the view: one ray per pixel, the finest level, and with
+ * post 4 samples per sheet. */
+draw_settings accuracy_setting_fixed(const draw_settings *defaults, triptych_classify classify);
+
 /* Returns the mean error that the quality of a setting promises, of 255; 0 if it promises none. */
 double accuracy_setting_promise(const accuracy_setting *s);
 

@@ -20,7 +20,7 @@ import numpy
 import program
 
 SMALL = ["--size", "40x32", "--views", "2", "--repeat", "1", "--tolerance", "1e-3", "--quiet"]
-STEPS = ("total", "storage", "model", "method", "level", "precision")
+STEPS = ("total", "pixel", "rays", "storage", "model", "method", "level", "precision")
 
 
 def covered_errors(picture, truth):
@@ -153,7 +153,8 @@ class Accuracy(program.ProgramTest):
                             "--levels-for", "both").returncode == 0
         run = program.call(
             "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", "--pictures", "--source", "a.nrrd", "--steps",
-            "--settings", "post,post-samples-per-sheet-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2,popping-post",
+            "--settings", "quality-high,post,post-samples-per-sheet-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,"
+            "post-samples-2,popping-post",
             program=program.QUICK_PROGRAM)
         assert run.returncode == 0, run.stderr
         assert run.stderr == "", run.stderr
@@ -191,8 +192,8 @@ class Accuracy(program.ProgramTest):
         self.assertLess(rows["post"]["storage"]["max"], 0.1)
         for name, row in rows.items():
             self.assertEqual("level" in row, name == "pre-lod-4", name)
-            for step in "total", "storage", "model", "method", "precision":
-                self.assertIn(step, row, name)
+            for step in "pixel", "rays", "storage", "model", "method", "precision":
+                self.assertEqual(step in row, name != "quality-high", (name, step))
         self.assertEqual(rows["post"]["model"]["max"], 0)
         self.assertEqual(rows["pre-ewa"]["model"], rows["pre"]["model"])
         self.assertNotEqual(rows["pre-ewa"]["method"], rows["pre"]["method"])
@@ -221,7 +222,7 @@ class Accuracy(program.ProgramTest):
         eye = look + way / numpy.linalg.norm(way) * numpy.linalg.norm(eye - look)
         return self.picture(
             "a.trip", "--size", "40x32", "--fov", repr(view["fov_degrees"]), "--tf", "a.tf",
-            "--classify", "post", "--method", method, "--eye=" + ",".join(map(repr, map(float, eye))),
+            "--classify", "post", "--samples", "1", "--samples-per-sheet", "4", "--method", method, "--eye=" + ",".join(map(repr, map(float, eye))),
             "--look=" + ",".join(map(repr, view["look"])), "--up=0,0,1")
 
     def test_popping_equals_changes_between_pictures(self):
@@ -277,11 +278,55 @@ class Accuracy(program.ProgramTest):
         self.assertTrue(models["post"] == 0 < models["pre"], models)
         self.assertIn("left out: post-cubic: uneven.trip: has uneven spacing", run.stdout.decode())
 
+    def integral(self, view, rays, tolerance):
+        """Draws the integral of a view of the report, along rays x rays rays per pixel."""
+        view = self.report["views"][view]
+        camera = [f"--{k}=" + ",".join(map(repr, view[k])) for k in ("eye", "look", "up")]
+        camera += (["--fov", repr(view["fov_degrees"])] if "fov_degrees" in view
+                   else ["--ortho", repr(view["ortho_height"])])
+        return self.picture("a.nrrd", "--size", "40x32", "--tf", "a.tf", *camera, "--renderer", "integral",
+                            "--field", "source", "--samples", str(rays), "--tolerance", repr(tolerance))
+
+    def test_the_truth_is_the_mean_over_the_area_of_each_pixel(self):
+        """The mean of 20 x 20 rays is closer to it than a tenth of the error of the closest row."""
+        for view in range(2):
+            truth = program.read_exr(f"report/truth-{view}.exr")
+            apart = covered_errors(self.integral(view, 20, 1e-4), truth)
+            self.assertLess(apart.mean(), 0.1 * self.rows["post-samples-2"]["total"]["mean"])
+            self.assertLess(apart.mean(), 0.02)
+            self.assertLess(apart.max(), 1)
+
+    def test_pixel_and_rays_compare_with_the_integral_along_the_rays(self):
+        for name, rays in ("post", 1), ("pre", 1), ("post-samples-2", 2):
+            along = [self.integral(view, rays, 1e-4) for view in range(2)]
+            pairs = list(self.pictures(name))
+            pixel = numpy.concatenate([covered_errors(a, truth) for a, (_, truth) in zip(along, pairs)])
+            apart = numpy.concatenate([covered_errors(p, a) for a, (p, _) in zip(along, pairs)])
+            self.assertAlmostEqual(self.rows[name]["pixel"]["mean"], pixel.mean(), 3)
+            self.assertAlmostEqual(self.rows[name]["rays"]["mean"], apart.mean(), 3)
+            self.assertGreater(pixel.mean(), 0.01)
+        self.assertLess(self.rows["post-samples-2"]["pixel"]["mean"], 0.5 * self.rows["post"]["pixel"]["mean"])
+
+    def test_without_steps_only_single_rays_are_compared_along_rays(self):
+        self.works("accuracy", "a.trip", "-o", "short", *SMALL, "--tf", "a.tf", "--settings",
+                   "quality-*,post,post-samples-2")
+        with open("short/accuracy.json", encoding="utf-8") as f:
+            rows = {row["name"]: row for row in json.load(f)["rows"]}
+        self.assertEqual([name for name in rows if "rays" in rows[name]], ["post"])
+        self.assertEqual([name for name in rows if "pixel" in rows[name]], ["post"])
+        self.assertEqual({name: row["promise"] for name, row in rows.items() if "promise" in row},
+                         {"quality-draft": 4, "quality-normal": 1, "quality-high": 0.3})
+
     def test_settings_left_out_are_listed(self):
-        (left_out,) = self.report["left_out"]
-        self.assertEqual(left_out["name"], "post-samples-2")
-        self.assertIn("--samples 2", left_out["why"])
-        self.assertIn("post-samples-2", self.out)
+        self.assertEqual(self.report["left_out"], [])
+        self.brick("a.nrrd", "flat.trip", "--levels", "0")
+        run = self.works("accuracy", "flat.trip", "-o", "flat", *SMALL, "--tf", "a.tf", "--settings",
+                         "post,post-lod-1")
+        with open("flat/accuracy.json", encoding="utf-8") as f:
+            [left_out] = json.load(f)["left_out"]
+        self.assertEqual(left_out["name"], "post-lod-1")
+        self.assertIn("no coarse levels", left_out["why"])
+        self.assertIn("left out: post-lod-1: ", run.stdout.decode())
 
     def test_csv_has_the_same_figures(self):
         with open("report/accuracy.csv", encoding="utf-8", newline="") as f:
@@ -311,7 +356,7 @@ class Accuracy(program.ProgramTest):
         """Returns name, time and error of each row of the first printed table."""
         table = re.search(r"(?m)^\| setting .*\n\|-.*\n((?:\|.*\n)+)", out)[1]
         rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
-        return [(name.removesuffix(" *"), float(ms), float(error)) for name, ms, error in rows]
+        return [(name.removesuffix(" *"), float(ms), float(error)) for name, ms, error, *_ in rows]
 
     def test_the_table_has_one_error_for_each_setting(self):
         """The fastest setting comes first."""
