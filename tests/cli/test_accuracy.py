@@ -308,9 +308,9 @@ class Accuracy(program.ProgramTest):
         self.assertLess(self.rows["post-samples-2"]["pixel"]["mean"], 0.5 * self.rows["post"]["pixel"]["mean"])
 
     def test_without_steps_only_single_rays_are_compared_along_rays(self):
-        self.works("accuracy", "a.trip", "-o", "short", *SMALL, "--tf", "a.tf", "--settings",
+        self.works("accuracy", "a.trip", "-o", "single-rays", *SMALL, "--tf", "a.tf", "--settings",
                    "quality-*,post,post-samples-2")
-        with open("short/accuracy.json", encoding="utf-8") as f:
+        with open("single-rays/accuracy.json", encoding="utf-8") as f:
             rows = {row["name"]: row for row in json.load(f)["rows"]}
         self.assertEqual([name for name in rows if "rays" in rows[name]], ["post"])
         self.assertEqual([name for name in rows if "pixel" in rows[name]], ["post"])
@@ -483,8 +483,8 @@ class Accuracy(program.ProgramTest):
         self.assertIn("</html>", run.stdout)
 
     def test_the_time_budget_limits_the_work(self):
-        self.works("accuracy", "a.trip", "-o", "short", *SMALL, "--budget", "0", "--settings", "post,pre*")
-        with open("short/accuracy.json", encoding="utf-8") as f:
+        self.works("accuracy", "a.trip", "-o", "unsplit", *SMALL, "--budget", "0", "--settings", "post,pre*")
+        with open("unsplit/accuracy.json", encoding="utf-8") as f:
             report = json.load(f)
         self.assertEqual([row["name"] for row in report["rows"]], ["post"])
         self.assertNotIn("method", report["rows"][0])
@@ -501,17 +501,17 @@ class Accuracy(program.ProgramTest):
     def test_progress_ends_exactly_at_its_end(self):
         """A step is the integral of a view, a setting in a view, or a row of popping."""
         self.brick("a.nrrd", "bare.trip", "--tf", "a.tf", "--halo", "0")
-        coarse = ["--settings", "post,pre-lod-4,post-samples-2"]  # the last one is left out
-        cases = [([], 2 * (1 + 13)),
-                 (["--source", "a.nrrd"], 2 * (1 + 13)),
+        coarse = ["--settings", "post,pre-lod-4,post-samples-2"]
+        cases = [([], 2 * (1 + 20)),
+                 (["--source", "a.nrrd"], 2 * (1 + 20)),
                  (["--settings", "post,pre"], 2 * (1 + 2)),
                  (["--settings", "post,pre,post-cubic", "--steps"], 2 * (1 + 3)),
                  (["--settings", "post,pre,post-cubic", "--steps", "--source", "a.nrrd"], 2 * (1 + 3)),
                  (["--settings", "popping-pre"], 2 + 7),
                  (["--settings", "post,popping-post"], 2 * (1 + 1) + 7),
-                 ([*coarse, "--steps"], 2 * (1 + 2)),
+                 ([*coarse, "--steps"], 2 * (1 + 3)),
                  (["--settings", "post,pre", "--also", "bare.trip"], 2 * (1 + 2)),
-                 (["--also", "bare.trip"], 2 * (1 + 15)),
+                 (["--also", "bare.trip"], 2 * (1 + 22)),
                  (["--settings", "post,pre", "--budget", "0"], 1 + 1),
                  (["--settings", "post,popping-pre", "--budget", "0"], 1 + 1),
                  (["--settings", "post", "--source", "a.nrrd", "--compare", "exit 3"], 2 * (1 + 1) + 1)]
@@ -523,7 +523,7 @@ class Accuracy(program.ProgramTest):
     def test_the_start_says_how_long_it_takes(self):
         _, err = self.steps_of_progress()
         first, second, *rest = err.splitlines()
-        self.assertRegex(first, r"^triptych: note: accuracy: 13 settings in 2 views take about \d+ seconds$")
+        self.assertRegex(first, r"^triptych: note: accuracy: 20 settings in 2 views take about \d+ seconds$")
         self.assertRegex(second, r"^triptych: note: accuracy: left out: \d+ other settings, which "
                                  r"--settings all measures; ")
         self.assertRegex(rest[0], r"^accuracy  0:00")
