@@ -8,7 +8,7 @@
 /* The settings that people choose from. The others are variants of the papers, slow references and
  * other programs. */
 #define ACCURACY_USUAL_SETTINGS                                                                    \
-    "quality-*,post-samples-per-sheet-[2346],post-lod-*,pre,pre-sheet,gl-*"
+    "quality-*,post-samples-per-sheet-[2346],post-samples-[24]*,post-lod-*,pre,pre-sheet,gl-*"
 
 /* State of parsing. */
 typedef struct parse {
@@ -100,18 +100,14 @@ static const trip_option rows[] = {
     { "repeat", "N", "Sets the timed frames per view and setting", "3",
       .group = DRAW_GROUP_MEASUREMENT, .type = TRIP_OPTION_INTEGER, AT(repeat), .lo = 1,
       .hi = 1000 },
-    { "samples", "N", "Draws the integral with N x N rays per pixel", "1",
-      .group = DRAW_GROUP_MEASUREMENT, .type = TRIP_OPTION_INTEGER, AT(samples), .lo = 1,
-      .hi = 16 },
     { "steps", NULL,
-      "Divides each error into steps: storage, model, method, level and precision; takes many "
-      "times "
-      "as long",
+      "Divides each error into steps: pixel, storage, model, method, level and precision; takes "
+      "many times as long",
       .group = DRAW_GROUP_MEASUREMENT, FLAG, AT(steps) },
     { "threads", "N", "Sets the number of threads that draw and read", "one per processor",
       .group = DRAW_GROUP_MEASUREMENT, .type = TRIP_OPTION_INTEGER, AT(threads), .lo = 1,
       .hi = 256 },
-    { "tolerance", "E", "Bounds the error of each component of the integral", "1e-4",
+    { "tolerance", "E", "Bounds the error of each component of the integral over a pixel", "4e-3",
       .group = DRAW_GROUP_MEASUREMENT, .type = TRIP_OPTION_NUMBER, AT(tolerance), .lo = 1e-8,
       .hi = 0.01 },
     { "views", "N",
@@ -160,8 +156,7 @@ int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
                              .height = 256,
                              .views = 4,
                              .repeat = 3,
-                             .samples = 1,
-                             .tolerance = 1e-4,
+                             .tolerance = 4e-3,
                              .budget_seconds = 1e9 };
     parse p = { .o = o };
     option_set sets[] = { { .table = &parse_table, .base = &p },
@@ -170,7 +165,8 @@ int accuracy_options_parse(accuracy_options *o, int argc, char **argv)
         .args_doc = "NAME.trip",
         .doc =
             "Measures the time and the error of settings that trade accuracy for time, on one data "
-            "set. The error is the difference from the emission-absorption integral. "
+            "set. The error is the difference from the emission-absorption integral, as its mean "
+            "over the area of each pixel. "
             "Prints a table and writes a report: JSON, CSV and a page. `triptych render --error` "
             "reads it.",
         .sets = sets,

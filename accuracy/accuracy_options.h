@@ -21,7 +21,7 @@ typedef struct accuracy_options {
     const char *tf;       /* NULL selects the transfer function in the data set */
     const char *settings; /* patterns joined by commas */
     bool usual;           /* --settings was not given */
-    int width, height, views, repeat, samples;
+    int width, height, views, repeat;
     double tolerance, budget_seconds;
     bool shading;
     int no_shading, steps, force, list, pictures;

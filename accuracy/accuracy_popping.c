@@ -115,12 +115,11 @@ int accuracy_popping_measure(accuracy_popping *p, accuracy_contexts *contexts,
     const accuracy_options *o = contexts->options;
     triptych *t = contexts->contexts[0][TRIPTYCH_RENDERER_CPU];
     orbit turn = { .contexts = contexts,
-                   .settings = *defaults,
+                   .settings = accuracy_setting_fixed(defaults, p->classify),
                    .rgba = rgba,
                    .progress = progress,
                    .begun = begun,
                    .name = p->name };
-    turn.settings.all.classify = p->classify;
     if (find_turn(t, &turn))
         return trip_fail(TRIP_ERROR, "accuracy", o->data[0], "cannot set a view: %s",
                          triptych_error(t));

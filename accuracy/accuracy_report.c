@@ -101,16 +101,29 @@ static void write_json(FILE *f, const accuracy_report *r)
 static void write_csv(FILE *f, const accuracy_report *r)
 {
 #define FIGURES(step) step ".max", step ".mean", step ".median", step ".percentile_99", step ".psnr"
-    static const char *const keys[] = { "name",           "data_set",
-                                        "options",        "views",
-                                        "frames",         "ms",
-                                        "ms_min",         "ms_max",
-                                        "error",          "splats",
-                                        "splats_drawn",   "bytes_read",
-                                        FIGURES("total"), FIGURES("storage"),
-                                        FIGURES("model"), FIGURES("method"),
-                                        FIGURES("level"), FIGURES("precision"),
-                                        "total.ssim",     "total.flip",
+    static const char *const keys[] = { "name",
+                                        "data_set",
+                                        "options",
+                                        "views",
+                                        "frames",
+                                        "ms",
+                                        "ms_min",
+                                        "ms_max",
+                                        "error",
+                                        "splats",
+                                        "splats_drawn",
+                                        "bytes_read",
+                                        "promise",
+                                        FIGURES("total"),
+                                        FIGURES("pixel"),
+                                        FIGURES("rays"),
+                                        FIGURES("storage"),
+                                        FIGURES("model"),
+                                        FIGURES("method"),
+                                        FIGURES("level"),
+                                        FIGURES("precision"),
+                                        "total.ssim",
+                                        "total.flip",
                                         "front" };
     measure_table_csv(f, cJSON_GetObjectItem(r->json, "rows"), keys, sizeof keys / sizeof *keys);
 }
@@ -210,9 +223,9 @@ void accuracy_print_left_out(FILE *f, const accuracy_report *r, const char *befo
 static void print_rows(FILE *f, const cJSON *rows, const char *title)
 {
     static const measure_column columns[] = {
-        { "name", "setting", 0, 0 },
-        { "ms", "ms", 1, 0 },
-        { "error", "error", 2, 0 },
+        { "name", "setting", 0, 0 },     { "ms", "ms", 1, 0 },
+        { "error", "error", 2, 0 },      { "total.mean", "mean", 2, 0 },
+        { "promise", "promised", 1, 0 }, { "rays.mean", "along rays", 2, 0 },
     };
     if (rows && rows->child)
         measure_table_print(f, &(measure_table){ .title = title,
@@ -229,6 +242,11 @@ static void print_explanation(FILE *f, const accuracy_report *r)
     fprintf(f,
             "\nerror: 99 %% of the pixels of the object are at most this far from the exact "
             "picture, of 255,\n       in red, green, blue and opacity, in the worst of the views.\n"
+            "       The exact picture has the mean of the integral over the area of each pixel.\n"
+            "mean:  the mean difference from the exact picture, over all views.\n"
+            "promised: the mean that the quality promises.\n"
+            "along rays: the mean difference from the integral along the same rays, one per "
+            "pixel.\n"
             "ms:    the median time of a frame, in milliseconds. The fastest setting comes first.\n"
             "*      every faster setting has a larger error.\n\n"
             "`triptych render ");

@@ -10,7 +10,7 @@
 #include "triptych_brick.h"
 
 /* Bytes of triptych_info.checksum as text, with its terminating zero. */
-enum { ACCURACY_CHECKSUM_BYTES = 17, ACCURACY_VERSION = 2 /* of accuracy.json */ };
+enum { ACCURACY_CHECKSUM_BYTES = 17, ACCURACY_VERSION = 3 /* of accuracy.json */ };
 void accuracy_checksum_text(uint64_t checksum, char text[ACCURACY_CHECKSUM_BYTES]);
 
 typedef struct accuracy_wanted {

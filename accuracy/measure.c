@@ -27,6 +27,7 @@ enum { THUMBNAIL_PX = 128 };
 /* Pictures of a view. */
 typedef enum which {
     TRUTH,
+    ALONG,     /* integral of the truth's volume along the rays of a row */
     STORED,    /* integral of the values in a data set */
     FIELD,     /* integral of the drawn field: splats, or values by another kernel */
     FINE,      /* reference at the finest level */
@@ -45,12 +46,15 @@ typedef struct sweep {
     size_t picture_bytes;
     double begin;
     int rows_left;          /* rows that the next view measures */
-    double truth_seconds;   /* time of the integral in the first view */
-    double compare_seconds; /* time of one comparison with it */
-    /* Data set and settings of the pictures STORED, FIELD and REFERENCE; -1 if there is no
+    double truth_seconds;   /* time of the integral over pixels in the first view */
+    double truth_covered;   /* share of the pixels that the object covers there */
+    double along_seconds;   /* time of an integral along one ray per pixel */
+    double compare_seconds; /* time of one comparison with the truth */
+    /* Data sets and settings of the pictures STORED, FIELD and REFERENCE; -1 if there is no
      * picture. */
     int stored_data, field_data, reference_data;
-    draw_settings field; /* only the settings that change the integral */
+    int along_rays, stored_rays; /* along each side of a pixel, of the pictures ALONG and STORED */
+    draw_settings field;         /* only the settings that change the integral */
     draw_settings reference;
     measure_error view; /* scratch memory */
 } sweep;
@@ -97,9 +101,11 @@ static int add_others(accuracy_measured *m, const draw_settings *defaults)
     int status = 0;
     for (int d = 1; d < m->options->data_count && !status; d++)
         for (int pre = 0; pre < 2 && !status; pre++) {
-            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU, .settings = *defaults };
+            accuracy_setting one = { .renderer = TRIPTYCH_RENDERER_CPU,
+                                     .settings = accuracy_setting_fixed(
+                                         defaults,
+                                         pre ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST) };
             const char *slash = strrchr(m->options->data[d], '/');
-            one.settings.all.classify = pre ? TRIPTYCH_CLASSIFY_PRE : TRIPTYCH_CLASSIFY_POST;
             snprintf(one.name, sizeof one.name, "%s-%.30s", pre ? "pre" : "post",
                      slash && slash[1] ? slash + 1 : m->options->data[d]);
             if (m->options->usual || is_wanted(m->options->settings, one.name))
@@ -237,21 +243,20 @@ static int leave_out_idle(sweep *s)
             continue;
         if (row->setting.settings.lod.voxel_px > 0 && !has_levels(t, &row->setting.settings))
             leave_out(row, "the data set has no coarse levels for this setting");
-        else if (row->setting.settings.all.samples > s->o->samples)
-            leave_out(row,
-                      "the integral has %d x %d rays per pixel; --samples %d compares this setting",
-                      s->o->samples, s->o->samples, row->setting.settings.all.samples);
     }
     return 0;
 }
 
 /* ---- pictures of the steps ---- */
 
-static int draw_integral(sweep *s, int data, int renderer, draw_settings settings, float *rgba)
+/* Draws the integral along rays x rays rays per pixel, or its mean over the area if `rays` is 0. */
+static int draw_integral(sweep *s, int data, int renderer, draw_settings settings, int rays,
+                         float *rgba)
 {
     double ms;
-    settings.integral.tolerance = s->o->tolerance;
-    settings.all.samples = s->o->samples;
+    settings.integral.tolerance =
+        rays ? fmin(s->o->tolerance, ACCURACY_RAY_TOLERANCE) : s->o->tolerance;
+    settings.all.samples = rays;
     measure_progress_part(s->progress, "integral");
     int status = accuracy_contexts_draw(&s->contexts, data, renderer, &settings, rgba, &ms);
     return status == TRIP_ERROR
@@ -269,12 +274,41 @@ static draw_settings default_field(const sweep *s)
     return settings;
 }
 
-static int need_stored(sweep *s, int data)
+/* Draws the integral of the source if it is given, else of the data set. */
+static int draw_truth(sweep *s, int rays, which picture)
 {
-    if (s->stored_data == data)
+    return draw_integral(s, 0, s->o->source ? ACCURACY_SOURCE : TRIPTYCH_RENDERER_INTEGRAL,
+                         default_field(s), rays, s->pictures[picture]);
+}
+
+/* Returns the rays along each side of a pixel, or 0 if the program chooses them itself. Other
+ * programs are taken to draw one ray per pixel. */
+static int rays_of(const accuracy_row *row)
+{
+    return row->program ? 1 : row->setting.settings.all.samples;
+}
+
+static int need_along(sweep *s, const accuracy_row *row)
+{
+    const int rays = rays_of(row);
+    if (s->along_rays == rays)
         return 0;
-    s->stored_data = data;
-    return draw_integral(s, data, TRIPTYCH_RENDERER_INTEGRAL, default_field(s),
+    s->along_rays = rays;
+    return draw_truth(s, rays, ALONG);
+}
+
+static int need_stored(sweep *s, const accuracy_row *row)
+{
+    const int rays = rays_of(row);
+    if (s->stored_data == row->data && s->stored_rays == rays)
+        return 0;
+    s->stored_data = row->data;
+    s->stored_rays = rays;
+    if (row->data == 0 && !s->o->source && s->along_rays == rays) {
+        memcpy(s->pictures[STORED], s->pictures[ALONG], s->picture_bytes);
+        return 0;
+    }
+    return draw_integral(s, row->data, TRIPTYCH_RENDERER_INTEGRAL, default_field(s), rays,
                          s->pictures[STORED]);
 }
 
@@ -284,6 +318,7 @@ static int need_field(sweep *s, const accuracy_row *row, bool splats)
 {
     const draw_settings *drawn = &row->setting.settings;
     draw_settings field = default_field(s);
+    field.all.samples = rays_of(row);
     if (splats) {
         field.integral.field = TRIPTYCH_FIELD_SPLATS;
         field.splat.kernel_radius = drawn->splat.kernel_radius;
@@ -294,7 +329,8 @@ static int need_field(sweep *s, const accuracy_row *row, bool splats)
         return 0;
     s->field_data = row->data;
     s->field = field;
-    return draw_integral(s, row->data, TRIPTYCH_RENDERER_INTEGRAL, field, s->pictures[FIELD]);
+    return draw_integral(s, row->data, TRIPTYCH_RENDERER_INTEGRAL, field, rays_of(row),
+                         s->pictures[FIELD]);
 }
 
 /* Draws the reference with a row's settings, and at the finest level if the row draws coarse
@@ -332,17 +368,30 @@ static bool is_pre(const triptych_frame_stats *stats)
     return stats->classify == TRIPTYCH_CLASSIFY_PRE;
 }
 
+/* Compares with the integral along the rays of a row. Without --steps, only rows with one ray per
+ * pixel are compared, since they share one picture, and more rays take long. */
+static int compare_along(sweep *s, accuracy_row *row)
+{
+    const int rays = rays_of(row);
+    if (!rays || (rays > 1 && !s->o->steps))
+        return 0;
+    const int status = need_along(s, row);
+    if (!status) {
+        compare(s, row, ACCURACY_PIXEL, ALONG, TRUTH);
+        compare(s, row, ACCURACY_RAYS, RAN, ALONG);
+    }
+    return status;
+}
+
 static int climb(sweep *s, accuracy_row *row, const triptych_frame_stats *stats)
 {
-    int status = s->o->steps ? need_stored(s, row->data) : 0;
-    if (status || !s->o->steps)
+    if (!s->o->steps || !rays_of(row))
+        return 0;
+    int status = need_stored(s, row);
+    if (status)
         return status;
     if (s->o->source)
-        compare(s, row, ACCURACY_STORAGE, STORED, TRUTH);
-    if (row->setting.renderer == TRIPTYCH_RENDERER_INTEGRAL) {
-        compare(s, row, ACCURACY_PRECISION, RAN, STORED);
-        return 0;
-    }
+        compare(s, row, ACCURACY_STORAGE, STORED, ALONG);
     /* The integral has no Gaussian interpolation. The smoothing by that kernel counts as a
      * method error. */
     const triptych_interpolation interpolation = row->setting.settings.all.interpolation;
@@ -466,6 +515,8 @@ static int measure_program(sweep *s, accuracy_row *row, int view)
     if (!status)
         status = compare_with_truth(s, row);
     if (!status)
+        status = compare_along(s, row);
+    if (!status)
         status = keep_exr(s, t, RAN, view, row->setting.name);
     row->views++;
     row->state = ACCURACY_MEASURED;
@@ -495,6 +546,8 @@ static int measure_row(sweep *s, accuracy_row *row, int view)
     if (!status)
         status = keep_exr(s, t, RAN, view, row->setting.name);
     if (!status)
+        status = compare_along(s, row);
+    if (!status)
         status = climb(s, row, &stats);
     if (!status)
         status = time_row(s, row);
@@ -507,22 +560,26 @@ static int measure_row(sweep *s, accuracy_row *row, int view)
 
 /* ---- views ---- */
 
-/* Draws the reference for all errors: the integral of the source if it is given, else of the data
- * set. */
+/* Returns the share of the pixels that the object covers. */
+static double covered_share(const sweep *s)
+{
+    size_t covered = 0;
+    for (size_t i = 0; i < pixels_of(s); i++)
+        covered += s->pictures[TRUTH][4 * i + 3] > 1.0F / 255;
+    return (double)covered / (double)pixels_of(s);
+}
+
+/* Draws the truth of a view. */
 static int find_truth(sweep *s, int view)
 {
-    int status;
     const double begin = trip_now_seconds();
     s->stored_data = s->field_data = s->reference_data = -1;
-    if (s->o->source)
-        status = draw_integral(s, 0, ACCURACY_SOURCE, default_field(s), s->pictures[TRUTH]);
-    else {
-        status = need_stored(s, 0);
-        memcpy(s->pictures[TRUTH], s->pictures[STORED], s->picture_bytes);
-    }
+    s->along_rays = 0;
+    int status = draw_truth(s, 0, TRUTH);
     if (status)
         return status;
     s->truth_seconds = trip_now_seconds() - begin;
+    s->truth_covered = covered_share(s);
     if (view == 0)
         s->m->truth =
             accuracy_picture_data(s->pictures[TRUTH], s->o->width, s->o->height, THUMBNAIL_PX);
@@ -664,9 +721,9 @@ static int try_rows(sweep *s, double *frames, double *steps)
         if (row->state != ACCURACY_NOT_REACHED || row->program)
             continue;
         status = try_frame(s, row->data, (int)row->setting.renderer, *own, frames);
-        if (!status && s->o->steps && *reference <= 0)
+        if (!status && s->o->steps && rays_of(row) && *reference <= 0)
             status = try_frame(s, row->data, TRIPTYCH_RENDERER_REFERENCE, *own, reference);
-        *steps += *reference;
+        *steps += *reference * rays_of(row) * rays_of(row);
     }
     return status;
 }
@@ -680,11 +737,44 @@ static int try_comparison(sweep *s)
     return status;
 }
 
+/* Draws the integral along one ray per pixel if a row needs it. Sets *seconds to the time of all
+ * integrals along rays in one view. */
+static int try_rays(sweep *s, double *seconds)
+{
+    bool seen[ACCURACY_RAYS_MAX + 1] = { true };
+    const accuracy_row one = { .setting.settings.all.samples = 1 };
+    const double begin = trip_now_seconds();
+    int rays2 = 0, status = 0;
+    for (int i = 0; i < s->m->row_count; i++) {
+        const int rays = rays_of(&s->m->rows[i]);
+        if (s->m->rows[i].state != ACCURACY_NOT_REACHED || seen[rays] || (rays > 1 && !s->o->steps))
+            continue;
+        seen[rays] = true;
+        rays2 += rays * rays;
+    }
+    if (rays2)
+        status = need_along(s, &one);
+    *seconds = (trip_now_seconds() - begin) * rays2 * (s->o->steps && s->o->source ? 2 : 1);
+    return status;
+}
+
+/* Returns the time of the integrals in all views, relative to the first view. The object covers
+ * the whole picture in views from inside and from nearby. */
+static double views_of_integral(const sweep *s)
+{
+    double views = 0;
+    for (int i = 0; i < s->o->views; i++)
+        views += i % 4 < 2 || !(s->truth_covered > 0) ? 1 : 1 / s->truth_covered;
+    return views;
+}
+
 /* Estimates the seconds that all views and tables take, without other programs. */
 static int estimate(sweep *s, double *seconds)
 {
-    double frames = 0, steps = 0, turn = 0;
+    double frames = 0, steps = 0, turn = 0, rays = 0;
     int status = try_rows(s, &frames, &steps);
+    if (!status)
+        status = try_rays(s, &rays);
     if (!status)
         status = try_comparison(s);
     for (int i = 0; i < s->m->popping_count && !status; i++) {
@@ -692,10 +782,10 @@ static int estimate(sweep *s, double *seconds)
         settings.all.classify = s->m->popping[i].classify;
         status = try_frame(s, 0, TRIPTYCH_RENDERER_CPU, settings, &turn);
     }
-    const double stored = s->o->steps && s->o->source ? s->truth_seconds : 0;
-    *seconds = s->o->views * (s->truth_seconds + stored + steps + (1 + s->o->repeat) * frames +
-                              s->rows_left * s->compare_seconds) -
-               s->truth_seconds + turn * ACCURACY_POPPING_ROWS * (MEASURE_POPPING_STEPS + 1);
+    *seconds =
+        views_of_integral(s) * (s->truth_seconds + rays) - s->truth_seconds +
+        s->o->views * (steps + (1 + s->o->repeat) * frames + s->rows_left * s->compare_seconds) +
+        turn * ACCURACY_POPPING_ROWS * (MEASURE_POPPING_STEPS + 1);
     return status;
 }
 

@@ -1,7 +1,13 @@
 /* Draws every setting from every view, measures its time, and splits its error into steps. Each
- * step compares two consecutive pictures of this list: the integral of the source volume, the
- * integral of the stored values, the integral of the drawn field, the reference in double
- * precision, and the picture. One thread. */
+ * step compares two consecutive pictures of this list:
+ * - the truth: the mean of the integral of the source volume over the area of each pixel,
+ * - the integral of the source volume along the rays of the setting,
+ * - the integral of the stored values along these rays,
+ * - the integral of the drawn field along these rays,
+ * - the reference in double precision,
+ * - the picture.
+ *
+ * A quality chooses its rays by itself and has no steps. One thread. */
 #ifndef TRIP_ACCURACY_MEASURE_H
 #define TRIP_ACCURACY_MEASURE_H
 
@@ -18,9 +24,14 @@ enum {
     ACCURACY_COMMAND_BYTES = 4200
 };
 
+/* The largest tolerance of the integral along rays. */
+#define ACCURACY_RAY_TOLERANCE 1e-4
+
 typedef enum accuracy_step {
-    ACCURACY_TOTAL,   /* picture against the integral of the source, or of the data set without
+    ACCURACY_TOTAL,   /* picture against the truth, of the source, or of the data set without
                          --source */
+    ACCURACY_PIXEL,   /* integral along the rays against the truth */
+    ACCURACY_RAYS,    /* picture against the integral along the rays: all of the later steps */
     ACCURACY_STORAGE, /* integral of the stored values against the integral of the source */
     ACCURACY_MODEL,   /* integral of the drawn field (splats or values) against the integral of the
                          stored values */

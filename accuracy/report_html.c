@@ -1,4 +1,5 @@
 /* index.html: a self-contained page with all tables, plots and pictures. */
+#include <math.h>
 #include <stdlib.h>
 
 #include "picture_data.h"
@@ -34,11 +35,13 @@ static void write_head(FILE *f, const accuracy_report *r)
         measure_write_escaped(f, o->source);
     } else
         fputs("through the values in the data set (no figure includes the error of storing)", f);
-    fprintf(f,
-            ". The integral has %d x %d rays per pixel and a tolerance of %g. Errors are "
-            "differences of red, green, blue (premultiplied) and alpha, of 255, over the pixels "
-            "that the object covers. Load of the machine: %.1f before, %.1f after.</p>\n",
-            o->samples, o->samples, o->tolerance, r->load_before, r->load_after);
+    fprintf(
+        f,
+        ". The exact picture has the mean of the integral over the area of each pixel (box "
+        "filter), with a tolerance of %g. Integrals along rays have a tolerance of %g. Errors "
+        "are differences of red, green, blue (premultiplied) and alpha, of 255, over the pixels "
+        "that the object covers. Load of the machine: %.1f before, %.1f after.</p>\n",
+        o->tolerance, fmin(o->tolerance, ACCURACY_RAY_TOLERANCE), r->load_before, r->load_after);
 }
 
 static void write_svg(FILE *f, char *svg)
@@ -50,7 +53,7 @@ static void write_svg(FILE *f, char *svg)
 static void write_plots(FILE *f, const accuracy_report *r)
 {
     fputs("<h2>Time and error</h2>\n<p>The line is the front: no other setting is both faster and "
-          "closer to the integral.</p>\n",
+          "closer to the exact picture.</p>\n",
           f);
     write_svg(
         f, accuracy_report_plot(r->shown, "error", "error of 255, 99 % of the pixels, worst view"));
@@ -60,23 +63,16 @@ static void write_plots(FILE *f, const accuracy_report *r)
 static void write_table(FILE *f, const accuracy_report *r)
 {
     static const measure_column columns[] = {
-        { "name", "settings", 0, 0 },
-        { "ms", "ms", 1, 0 },
-        { "error", "error", 2, 0 },
-        { "splats", "million splats", 3, 1e6 },
-        { "bytes_read", "MB read", 2, 1e6 },
-        { "total.max", "max", 1, 0 },
-        { "total.mean", "mean", 2, 0 },
-        { "total.median", "median", 2, 0 },
-        { "total.percentile_99", "99 %", 2, 0 },
-        { "total.psnr", "PSNR", 1, 0 },
-        { "total.ssim", "SSIM", 4, 0 },
-        { "total.flip", "FLIP", 4, 0 },
-        { "storage", "storage", 2, 0 },
-        { "model", "model", 2, 0 },
-        { "method", "method", 2, 0 },
-        { "level", "level", 2, 0 },
-        { "precision", "precision", 2, 0 },
+        { "name", "settings", 0, 0 },        { "ms", "ms", 1, 0 },
+        { "error", "error", 2, 0 },          { "splats", "million splats", 3, 1e6 },
+        { "bytes_read", "MB read", 2, 1e6 }, { "total.max", "max", 1, 0 },
+        { "total.mean", "mean", 2, 0 },      { "promise", "promised mean", 1, 0 },
+        { "total.median", "median", 2, 0 },  { "total.percentile_99", "99 %", 2, 0 },
+        { "total.psnr", "PSNR", 1, 0 },      { "total.ssim", "SSIM", 4, 0 },
+        { "total.flip", "FLIP", 4, 0 },      { "pixel", "pixel", 2, 0 },
+        { "rays", "along rays", 2, 0 },      { "storage", "storage", 2, 0 },
+        { "model", "model", 2, 0 },          { "method", "method", 2, 0 },
+        { "level", "level", 2, 0 },          { "precision", "precision", 2, 0 },
     };
     fputs("<h2>Settings</h2>\n", f);
     measure_table_html(f, &(measure_table){ .rows = r->shown,
@@ -85,10 +81,17 @@ static void write_table(FILE *f, const accuracy_report *r)
                                             .mark = "front",
                                             .tips = { "options", "version" } });
     fputs("<p><b>error</b> is the figure of render --error: 99 % of the pixels of the object "
-          "are at most this far from the integral, of 255, in red, green, blue and opacity, in the "
+          "are at most this far from the exact picture, of 255, in red, green, blue and opacity, "
+          "in the "
           "worst view. Every setting that is faster than a bold one has a larger error. The other "
-          "figures are over all views together, and over all channels. The last columns split the "
-          "error into steps, as mean / 99th percentile. <b>storage</b> compares "
+          "figures are over all views together, and over all channels. <b>promised mean</b> is the "
+          "mean that a quality promises. The last columns split the "
+          "error into steps, as mean / 99th percentile. <b>pixel</b> compares the integral along "
+          "the rays of the setting with the exact picture. Only more rays per pixel make it "
+          "smaller. <b>along rays</b> compares the picture with the integral along the same rays. "
+          "Without --steps, only settings with one ray per pixel have these two figures. A quality "
+          "chooses its rays by itself and has no steps. The other steps divide the error along "
+          "the rays. <b>storage</b> compares "
           "the integral of the stored values with the integral of the source. <b>model</b> "
           "compares the integral of the drawn field (the sum of splats with pre, values with post) "
           "with the integral of the stored values. <b>method</b> compares the reference in double "
@@ -135,13 +138,15 @@ static void write_figure(FILE *f, const char *name, const char *picture, const c
 
 static void write_pictures(FILE *f, const accuracy_report *r)
 {
-    fprintf(f,
-            "<h2>Pictures of the first view</h2>\n<p>Beside each picture is its difference from "
-            "the integral, the maximum over the channels of a pixel: black is 0, and white is %g "
-            "of 255 or more. The figures are over all views.</p>\n",
-            ACCURACY_DIFFERENCE_MAX);
+    fprintf(
+        f,
+        "<h2>Pictures of the first view</h2>\n<p>Beside each picture is its difference from "
+        "the exact picture, the maximum over the channels of a pixel: black is 0, and white is %g "
+        "of 255 or more. The figures are over all views.</p>\n",
+        ACCURACY_DIFFERENCE_MAX);
     if (r->m->truth)
-        fprintf(f, "<figure><img alt='' src=\"%s\"><figcaption>integral</figcaption></figure>\n",
+        fprintf(f,
+                "<figure><img alt='' src=\"%s\"><figcaption>exact picture</figcaption></figure>\n",
                 r->m->truth);
     for (int i = 0; i < r->m->row_count; i++) {
         const accuracy_row *row = &r->m->rows[i];

@@ -7,8 +7,8 @@
 #include "machine.h"
 #include "median.h"
 
-static const char *const step_names[ACCURACY_STEPS] = { "total",  "storage", "model",
-                                                        "method", "level",   "precision" };
+static const char *const step_names[ACCURACY_STEPS] = { "total", "pixel",  "rays",  "storage",
+                                                        "model", "method", "level", "precision" };
 
 /* The PSNR of equal pictures is infinite, which becomes null. */
 static cJSON *add_step(cJSON *to, const accuracy_row *row, accuracy_step step)
@@ -39,6 +39,8 @@ static cJSON *add_row(cJSON *rows, const accuracy_report *r, const accuracy_row 
         cJSON_AddStringToObject(o, "version", row->program->about);
     else
         add_options(o, &row->setting);
+    if (!row->program && accuracy_setting_promise(&row->setting) > 0)
+        measure_add(o, { "promise", accuracy_setting_promise(&row->setting) });
     measure_add(o, { "views", views }, { "ms", median }, { "error", row->bound },
                 { "ms_min", row->ms[0] }, { "ms_max", row->ms[row->frames - 1] },
                 { "frames", row->frames });
@@ -91,10 +93,9 @@ static void add_facts(cJSON *root, const accuracy_report *r)
     cJSON_AddItemToObject(root, "transfer_function",
                           o->tf ? cJSON_CreateString(o->tf) : cJSON_CreateNull());
     cJSON_AddBoolToObject(root, "shading", o->shading);
-    measure_add(root, { "width", o->width }, { "height", o->height }, { "samples", o->samples },
-                { "tolerance", o->tolerance }, { "repeat", o->repeat },
-                { "load_before", r->load_before }, { "load_after", r->load_after },
-                { "seconds", r->m->seconds });
+    measure_add(root, { "width", o->width }, { "height", o->height }, { "tolerance", o->tolerance },
+                { "repeat", o->repeat }, { "load_before", r->load_before },
+                { "load_after", r->load_after }, { "seconds", r->m->seconds });
     measure_describe_machine(cJSON_AddObjectToObject(root, "machine"));
 }
 

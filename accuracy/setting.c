@@ -24,13 +24,18 @@ __attribute__((format(printf, 4, 5))) static void add(sweep *w, triptych_rendere
     one->settings = s;
 }
 
+/* The order of triptych_quality. */
+static const struct {
+    const char *name;
+    double promise; /* mean error of 255; 0 if the quality promises none */
+} qualities[] = { { "draft", 4 }, { "normal", 1 }, { "high", 0.3 }, { "exact", 0 } };
+
 static void add_qualities(sweep *w, const draw_settings *defaults)
 {
-    static const char *const names[] = { "draft", "normal", "high", "exact" };
-    for (int i = 0; i < 4; i++) {
+    for (size_t i = 0; i < sizeof qualities / sizeof *qualities; i++) {
         draw_settings s = *defaults;
         s.all.quality = (triptych_quality)(TRIPTYCH_QUALITY_DRAFT + i);
-        add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", names[i]);
+        add(w, TRIPTYCH_RENDERER_CPU, s, "quality-%s", qualities[i].name);
     }
 }
 
@@ -129,9 +134,16 @@ static void add_kernels(sweep *w)
     add(w, TRIPTYCH_RENDERER_CPU, s, "post-gaussian");
 }
 
+/* Adds coarse levels, with one ray per pixel and with 2 x 2. */
 static void add_levels(sweep *w)
 {
-    static const double widths[] = { 1, 2, 4 };
+    static const double widths[] = { 1, 2, 4 }, widths_of_rays[] = { 0.5, 1 };
+    for (size_t i = 0; i < sizeof widths_of_rays / sizeof *widths_of_rays; i++) {
+        draw_settings s = w->post;
+        s.lod.voxel_px = widths_of_rays[i];
+        s.all.samples = 2;
+        add(w, TRIPTYCH_RENDERER_CPU, s, "post-lod-%g-samples-2", widths_of_rays[i]);
+    }
     for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
         draw_settings pre = w->pre, post = w->post;
         pre.lod.voxel_px = post.lod.voxel_px = widths[i];
@@ -143,6 +155,7 @@ static void add_levels(sweep *w)
 static void add_renderers(sweep *w)
 {
     draw_settings s = w->post;
+    s.all.samples = s.sheet.samples = 0; /* the mean over the area */
     add(w, TRIPTYCH_RENDERER_GL, w->post, "gl-post");
     add(w, TRIPTYCH_RENDERER_GL, w->pre, "gl-pre");
     add(w, TRIPTYCH_RENDERER_REFERENCE, w->post, "reference-post");
@@ -151,21 +164,39 @@ static void add_renderers(sweep *w)
     add(w, TRIPTYCH_RENDERER_INTEGRAL, s, "integral-0.01");
 }
 
+/* Adds several rays per pixel. */
 static void add_samples(sweep *w)
 {
-    static const int samples[] = { 2, 4 };
-    for (size_t i = 0; i < sizeof samples / sizeof *samples; i++) {
+    static const struct {
+        int samples, per_sheet;
+    } rows[] = { { 2, 2 }, { 2, 4 }, { 2, 8 }, { 4, 4 }, { 4, 8 } };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         draw_settings s = w->post;
-        s.all.samples = samples[i];
-        add(w, TRIPTYCH_RENDERER_CPU, s, "post-samples-%d", samples[i]);
+        char per_sheet[32] = "";
+        s.all.samples = rows[i].samples;
+        s.sheet.samples = rows[i].per_sheet;
+        if (s.sheet.samples != w->post.sheet.samples)
+            snprintf(per_sheet, sizeof per_sheet, "-samples-per-sheet-%d", s.sheet.samples);
+        add(w, TRIPTYCH_RENDERER_CPU, s, "post-samples-%d%s", s.all.samples, per_sheet);
     }
+}
+
+draw_settings accuracy_setting_fixed(const draw_settings *defaults, triptych_classify classify)
+{
+    draw_settings s = *defaults;
+    s.all.classify = classify;
+    s.all.samples = 1;
+    s.lod.voxel_px = 0;
+    if (classify == TRIPTYCH_CLASSIFY_POST)
+        s.sheet.samples = 4;
+    return s;
 }
 
 int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_settings *defaults)
 {
-    sweep w = { .out = out, .pre = *defaults, .post = *defaults };
-    w.pre.all.classify = TRIPTYCH_CLASSIFY_PRE;
-    w.post.all.classify = TRIPTYCH_CLASSIFY_POST;
+    sweep w = { .out = out,
+                .pre = accuracy_setting_fixed(defaults, TRIPTYCH_CLASSIFY_PRE),
+                .post = accuracy_setting_fixed(defaults, TRIPTYCH_CLASSIFY_POST) };
     add_qualities(&w, defaults);
     add_post(&w);
     add_pre(&w, TRIPTYCH_COMPOSITING_SPLAT);
@@ -177,6 +208,12 @@ int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_se
     add_renderers(&w);
     add_samples(&w);
     return w.count;
+}
+
+double accuracy_setting_promise(const accuracy_setting *s)
+{
+    const int i = (int)s->settings.all.quality - TRIPTYCH_QUALITY_DRAFT;
+    return i >= 0 && i < (int)(sizeof qualities / sizeof *qualities) ? qualities[i].promise : 0;
 }
 
 /* Target and submission differ in rounding only. The reference renderer does not round. */

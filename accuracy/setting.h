@@ -8,6 +8,7 @@
 #include "draw_settings.h"
 
 enum { ACCURACY_NAME_BYTES = 48, ACCURACY_SETTINGS_MAX = 96, ACCURACY_OPTIONS_MAX = 14 };
+enum { ACCURACY_RAYS_MAX = 4 }; /* along each side of a pixel */
 
 typedef struct accuracy_setting {
     char name[ACCURACY_NAME_BYTES];
@@ -25,6 +26,13 @@ typedef enum accuracy_state {
 /* Lists all settings, the most important first. `defaults` has the settings that all share, such as
  * shading and background. Returns their number. */
 int accuracy_settings(accuracy_setting out[ACCURACY_SETTINGS_MAX], const draw_settings *defaults);
+
+/* Returns settings that choose nothing by the view: one ray per pixel, the finest level, and with
+ * post 4 samples per sheet. */
+draw_settings accuracy_setting_fixed(const draw_settings *defaults, triptych_classify classify);
+
+/* Returns the mean error that the quality of a setting promises, of 255; 0 if it promises none. */
+double accuracy_setting_promise(const accuracy_setting *s);
 
 /* Returns whether the reference renderer draws the same picture for both settings. */
 bool accuracy_setting_same_reference(const draw_settings *a, const draw_settings *b);

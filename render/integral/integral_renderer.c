@@ -16,6 +16,10 @@
 #include "report.h"
 #include "shade.h"
 
+/* The share of a mean's tolerance that its rays may use. Rays that end early in opaque parts err to
+ * the same side, and many squares share them. So the share is small. */
+#define RAY_SHARE (1.0 / 16)
+
 typedef struct integral {
     trip_renderer base;
     trip_budget *budget;
@@ -115,14 +119,18 @@ static int check_frame(const trip_frame *frame)
     return 0;
 }
 
+static bool is_of_areas(const trip_frame *frame)
+{
+    return frame->settings->samples == 0;
+}
+
 static int begin_frame(trip_renderer *base, const trip_frame *frame)
 {
     integral *r = (integral *)base;
     const trip_file_header *header = &frame->data->header;
     const bool nearest = frame->settings->kernel == TRIP_KERNEL_NEAREST &&
                          frame->settings->field == TRIP_FIELD_VALUES;
-    /* The means over areas may use the other half. */
-    const double tolerance = frame->settings->tolerance / (frame->settings->samples ? 1 : 2);
+    const double tolerance = frame->settings->tolerance * (is_of_areas(frame) ? RAY_SHARE : 1);
     r->frame = frame;
     memset(r->splats, 0, sizeof r->splats);
     int status = check_frame(frame);
@@ -292,7 +300,9 @@ static int first_squares(const integral *r)
         farthest = fmax(farthest, trip_dot(c->forward, trip_sub(corner, c->eye)));
     }
     const double voxels = farthest * fmax(trip_length(c->rx), trip_length(c->ry));
-    return voxels <= 0.5 ? 1 : voxels >= most - 1 ? most : (int)ceil(voxels) + 1;
+    /* A square is at most two thirds of a voxel wide, or there is one more square than voxels. */
+    const double squares = fmin(ceil(1.5 * voxels), ceil(voxels) + 1);
+    return (int)fmax(1, fmin(most, squares));
 }
 
 /* Adds the means over a row of squares to the pixels of a row. `above` and `below` are the corners.
@@ -315,7 +325,10 @@ static int make_areas(painter *p, int x0, int x1, int y0, int y1)
 {
     corner_row rows[2] = { { { 0 } } };
     const trip_pixel_area area = {
-        .function = ray_at, .user = p, .tolerance = p->r->in.tolerance, .first = p->r->first_squares
+        .function = ray_at,
+        .user = p,
+        .tolerance = p->r->in.settings->tolerance * (1 - RAY_SHARE),
+        .first = p->r->first_squares,
     };
     const int squares = (x1 - x0) * area.first;
     int status = fill_corners(p, x0, squares, y0, rows[0]);
@@ -365,7 +378,7 @@ static void make_pane(void *context, unsigned pane, unsigned thread)
     if (!r->in.field)
         make_background(r, x0, x1, y0, y1);
     else
-        status = (r->in.settings->samples ? make_rays : make_areas)(&p, x0, x1, y0, y1);
+        status = (is_of_areas(r->frame) ? make_areas : make_rays)(&p, x0, x1, y0, y1);
     if (status && status != TRIP_INTERRUPTED)
         r->failed = true;
     show_progress(r, (uint64_t)(x1 - x0) * (uint64_t)(y1 - y0), thread);

@@ -46,7 +46,7 @@ static void unknown_options_are_refused(void **state)
     ",\"options\":{" options "}}"
 #define ROW(name, ms, error, options) ROW_OF("a.trip", name, ms, error, options)
 #define REPORT(rows)                                                                               \
-    "{\"triptych_accuracy\":2,\"data_set\":\"a.trip\",\"transfer_function\":null,"                 \
+    "{\"triptych_accuracy\":3,\"data_set\":\"a.trip\",\"transfer_function\":null,"                 \
     "\"shading\":true,\"rows\":[" rows "]}"
 
 #define OF_REFERENCE "\"renderer\":\"reference\",\"classify\":\"post\""
@@ -106,7 +106,7 @@ static void invalid_reports_are_refused(void **state)
     static const char *const texts[] = {
         "",          "x",
         "{}",        "[]",
-        REPORT("1"), "{\"triptych_accuracy\":1,\"rows\":[]}",
+        REPORT("1"), "{\"triptych_accuracy\":2,\"rows\":[]}",
         REPORT(""),  REPORT("{\"name\":\"a\",\"data_set\":\"a.trip\"}")
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
@@ -135,7 +135,7 @@ static void a_report_of_another_data_set_is_refused(void **state)
         char text[512];
         accuracy_found found = { .setting.settings = (draw_settings){ .has_background = 0 } };
         snprintf(text, sizeof text,
-                 "{\"triptych_accuracy\":2,\"data_set\":\"a.trip\",\"shading\":true,%s%s",
+                 "{\"triptych_accuracy\":3,\"data_set\":\"a.trip\",\"shading\":true,%s%s",
                  cases[i].checksum, row);
         test_catch_reports();
         int status = accuracy_fastest_in(
@@ -165,7 +165,7 @@ static void a_report_names_the_levels_of_its_data_set(void **state)
         accuracy_found found = { .setting.settings = (draw_settings){ .has_background = 0 } };
         snprintf(
             text, sizeof text,
-            "{\"triptych_accuracy\":2,\"data_set\":\"a.trip\",\"shading\":true,%s\"rows\":[" ROW(
+            "{\"triptych_accuracy\":3,\"data_set\":\"a.trip\",\"shading\":true,%s\"rows\":[" ROW(
                 "a", "1", "1", "") "]}",
             cases[i].text);
         assert_int_equal(

@@ -19,8 +19,8 @@ import numpy
 
 import program
 
-SMALL = ["--size", "40x32", "--views", "2", "--repeat", "1", "--tolerance", "1e-3", "--quiet"]
-STEPS = ("total", "storage", "model", "method", "level", "precision")
+SMALL = ["--size", "40x32", "--views", "2", "--repeat", "1", "--tolerance", "4e-3", "--quiet"]
+STEPS = ("total", "pixel", "rays", "storage", "model", "method", "level", "precision")
 
 
 def covered_errors(picture, truth):
@@ -153,7 +153,8 @@ class Accuracy(program.ProgramTest):
                             "--levels-for", "both").returncode == 0
         run = program.call(
             "accuracy", "a.trip", "-o", "report", *SMALL, "--tf", "a.tf", "--pictures", "--source", "a.nrrd", "--steps",
-            "--settings", "post,post-samples-per-sheet-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,post-samples-2,popping-post",
+            "--settings", "quality-high,post,post-samples-per-sheet-1,pre,pre-rgba8,pre-ewa,pre-lod-4,post-cubic,"
+            "post-samples-2,popping-post",
             program=program.QUICK_PROGRAM)
         assert run.returncode == 0, run.stderr
         assert run.stderr == "", run.stderr
@@ -191,8 +192,8 @@ class Accuracy(program.ProgramTest):
         self.assertLess(rows["post"]["storage"]["max"], 0.1)
         for name, row in rows.items():
             self.assertEqual("level" in row, name == "pre-lod-4", name)
-            for step in "total", "storage", "model", "method", "precision":
-                self.assertIn(step, row, name)
+            for step in "pixel", "rays", "storage", "model", "method", "precision":
+                self.assertEqual(step in row, name != "quality-high", (name, step))
         self.assertEqual(rows["post"]["model"]["max"], 0)
         self.assertEqual(rows["pre-ewa"]["model"], rows["pre"]["model"])
         self.assertNotEqual(rows["pre-ewa"]["method"], rows["pre"]["method"])
@@ -221,7 +222,7 @@ class Accuracy(program.ProgramTest):
         eye = look + way / numpy.linalg.norm(way) * numpy.linalg.norm(eye - look)
         return self.picture(
             "a.trip", "--size", "40x32", "--fov", repr(view["fov_degrees"]), "--tf", "a.tf",
-            "--classify", "post", "--method", method, "--eye=" + ",".join(map(repr, map(float, eye))),
+            "--classify", "post", "--samples", "1", "--samples-per-sheet", "4", "--method", method, "--eye=" + ",".join(map(repr, map(float, eye))),
             "--look=" + ",".join(map(repr, view["look"])), "--up=0,0,1")
 
     def test_popping_equals_changes_between_pictures(self):
@@ -250,8 +251,7 @@ class Accuracy(program.ProgramTest):
     def test_popping_is_left_out_in_little_memory(self):
         """A pixel needs 40 changes, the four components of the previous picture and one number for
         sorting, each of 4 bytes. The pictures to compare take half as much."""
-        small = [a if a != "40x32" else "300x300" for a in SMALL]
-        self.assertNotEqual(small, SMALL)
+        small = ["--size", "300x300", "--views", "1", "--repeat", "1", "--tolerance", "1e-2", "--quiet"]
         run = self.works("accuracy", "a.trip", "-o", "fits", *small, "--settings",
                          "post,popping-pre", "--memory", "108M")
         self.assertIn("left out: popping-pre: the changes need 16200000 bytes",
@@ -277,11 +277,55 @@ class Accuracy(program.ProgramTest):
         self.assertTrue(models["post"] == 0 < models["pre"], models)
         self.assertIn("left out: post-cubic: uneven.trip: has uneven spacing", run.stdout.decode())
 
+    def integral(self, view, rays, tolerance):
+        """Draws the integral of a view of the report, along rays x rays rays per pixel."""
+        view = self.report["views"][view]
+        camera = [f"--{k}=" + ",".join(map(repr, view[k])) for k in ("eye", "look", "up")]
+        camera += (["--fov", repr(view["fov_degrees"])] if "fov_degrees" in view
+                   else ["--ortho", repr(view["ortho_height"])])
+        return self.picture("a.nrrd", "--size", "40x32", "--tf", "a.tf", *camera, "--renderer", "integral",
+                            "--field", "source", "--samples", str(rays), "--tolerance", repr(tolerance))
+
+    def test_the_truth_is_the_mean_over_the_area_of_each_pixel(self):
+        """The mean of 20 x 20 rays is closer to it than a tenth of the error of the closest row."""
+        for view in range(2):
+            truth = program.read_exr(f"report/truth-{view}.exr")
+            apart = covered_errors(self.integral(view, 20, 1e-4), truth)
+            self.assertLess(apart.mean(), 0.1 * self.rows["post-samples-2"]["total"]["mean"])
+            self.assertLess(apart.mean(), 0.02)
+            self.assertLess(apart.max(), 1)
+
+    def test_pixel_and_rays_compare_with_the_integral_along_the_rays(self):
+        for name, rays in ("post", 1), ("pre", 1), ("post-samples-2", 2):
+            along = [self.integral(view, rays, 1e-4) for view in range(2)]
+            pairs = list(self.pictures(name))
+            pixel = numpy.concatenate([covered_errors(a, truth) for a, (_, truth) in zip(along, pairs)])
+            apart = numpy.concatenate([covered_errors(p, a) for a, (p, _) in zip(along, pairs)])
+            self.assertAlmostEqual(self.rows[name]["pixel"]["mean"], pixel.mean(), 3)
+            self.assertAlmostEqual(self.rows[name]["rays"]["mean"], apart.mean(), 3)
+            self.assertGreater(pixel.mean(), 0.01)
+        self.assertLess(self.rows["post-samples-2"]["pixel"]["mean"], 0.5 * self.rows["post"]["pixel"]["mean"])
+
+    def test_without_steps_only_single_rays_are_compared_along_rays(self):
+        self.works("accuracy", "a.trip", "-o", "single-rays", *SMALL, "--tf", "a.tf", "--settings",
+                   "quality-*,post,post-samples-2")
+        with open("single-rays/accuracy.json", encoding="utf-8") as f:
+            rows = {row["name"]: row for row in json.load(f)["rows"]}
+        self.assertEqual([name for name in rows if "rays" in rows[name]], ["post"])
+        self.assertEqual([name for name in rows if "pixel" in rows[name]], ["post"])
+        self.assertEqual({name: row["promise"] for name, row in rows.items() if "promise" in row},
+                         {"quality-draft": 4, "quality-normal": 1, "quality-high": 0.3})
+
     def test_settings_left_out_are_listed(self):
-        (left_out,) = self.report["left_out"]
-        self.assertEqual(left_out["name"], "post-samples-2")
-        self.assertIn("--samples 2", left_out["why"])
-        self.assertIn("post-samples-2", self.out)
+        self.assertEqual(self.report["left_out"], [])
+        self.brick("a.nrrd", "flat.trip", "--levels", "0")
+        run = self.works("accuracy", "flat.trip", "-o", "flat", *SMALL, "--tf", "a.tf", "--settings",
+                         "post,post-lod-1")
+        with open("flat/accuracy.json", encoding="utf-8") as f:
+            [left_out] = json.load(f)["left_out"]
+        self.assertEqual(left_out["name"], "post-lod-1")
+        self.assertIn("no coarse levels", left_out["why"])
+        self.assertIn("left out: post-lod-1: ", run.stdout.decode())
 
     def test_csv_has_the_same_figures(self):
         with open("report/accuracy.csv", encoding="utf-8", newline="") as f:
@@ -311,7 +355,7 @@ class Accuracy(program.ProgramTest):
         """Returns name, time and error of each row of the first printed table."""
         table = re.search(r"(?m)^\| setting .*\n\|-.*\n((?:\|.*\n)+)", out)[1]
         rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
-        return [(name.removesuffix(" *"), float(ms), float(error)) for name, ms, error in rows]
+        return [(name.removesuffix(" *"), float(ms), float(error)) for name, ms, error, *_ in rows]
 
     def test_the_table_has_one_error_for_each_setting(self):
         """The fastest setting comes first."""
@@ -438,8 +482,8 @@ class Accuracy(program.ProgramTest):
         self.assertIn("</html>", run.stdout)
 
     def test_the_time_budget_limits_the_work(self):
-        self.works("accuracy", "a.trip", "-o", "short", *SMALL, "--budget", "0", "--settings", "post,pre*")
-        with open("short/accuracy.json", encoding="utf-8") as f:
+        self.works("accuracy", "a.trip", "-o", "unsplit", *SMALL, "--budget", "0", "--settings", "post,pre*")
+        with open("unsplit/accuracy.json", encoding="utf-8") as f:
             report = json.load(f)
         self.assertEqual([row["name"] for row in report["rows"]], ["post"])
         self.assertNotIn("method", report["rows"][0])
@@ -456,17 +500,17 @@ class Accuracy(program.ProgramTest):
     def test_progress_ends_exactly_at_its_end(self):
         """A step is the integral of a view, a setting in a view, or a row of popping."""
         self.brick("a.nrrd", "bare.trip", "--tf", "a.tf", "--halo", "0")
-        coarse = ["--settings", "post,pre-lod-4,post-samples-2"]  # the last one is left out
-        cases = [([], 2 * (1 + 13)),
-                 (["--source", "a.nrrd"], 2 * (1 + 13)),
+        coarse = ["--settings", "post,pre-lod-4,post-samples-2"]
+        cases = [([], 2 * (1 + 20)),
+                 (["--source", "a.nrrd"], 2 * (1 + 20)),
                  (["--settings", "post,pre"], 2 * (1 + 2)),
                  (["--settings", "post,pre,post-cubic", "--steps"], 2 * (1 + 3)),
                  (["--settings", "post,pre,post-cubic", "--steps", "--source", "a.nrrd"], 2 * (1 + 3)),
                  (["--settings", "popping-pre"], 2 + 7),
                  (["--settings", "post,popping-post"], 2 * (1 + 1) + 7),
-                 ([*coarse, "--steps"], 2 * (1 + 2)),
+                 ([*coarse, "--steps"], 2 * (1 + 3)),
                  (["--settings", "post,pre", "--also", "bare.trip"], 2 * (1 + 2)),
-                 (["--also", "bare.trip"], 2 * (1 + 15)),
+                 (["--also", "bare.trip"], 2 * (1 + 22)),
                  (["--settings", "post,pre", "--budget", "0"], 1 + 1),
                  (["--settings", "post,popping-pre", "--budget", "0"], 1 + 1),
                  (["--settings", "post", "--source", "a.nrrd", "--compare", "exit 3"], 2 * (1 + 1) + 1)]
@@ -478,7 +522,7 @@ class Accuracy(program.ProgramTest):
     def test_the_start_says_how_long_it_takes(self):
         _, err = self.steps_of_progress()
         first, second, *rest = err.splitlines()
-        self.assertRegex(first, r"^triptych: note: accuracy: 13 settings in 2 views take about \d+ seconds$")
+        self.assertRegex(first, r"^triptych: note: accuracy: 20 settings in 2 views take about \d+ seconds$")
         self.assertRegex(second, r"^triptych: note: accuracy: left out: \d+ other settings, which "
                                  r"--settings all measures; ")
         self.assertRegex(rest[0], r"^accuracy  0:00")

@@ -40,7 +40,8 @@ NOTES = [
     "triptych-post-1, -2, -4: triptych-cpu with --classify post and 1, 2 or 4 samples per sheet. "
     "triptych-cpu and triptych-gl use --classify pre. vtk-cpu-half: vtk-cpu with a sample every "
     "half voxel. VTK's ray caster gets a view wider by a pixel, which it needs to show the same.",
-    "Errors: of 255, against the integral through the source volume (linear interpolation, "
+    "Errors: of 255, against the exact picture: the mean of the integral through the source volume "
+    "over the area of each pixel (linear interpolation, "
     "tolerance %g, 8 bits per channel), as the mean over the measured views. They cover the "
     "pixels where either opacity is above 1/255, in red, green, blue (premultiplied) and opacity, "
     "and in opacity alone. Light does not change opacity. VTK has its own gradients and lights "

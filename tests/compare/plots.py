@@ -1,6 +1,6 @@
 """Plots time and error of every program as SVG, one file for each scene and size. One panel shows
 colour, the other opacity, which light does not change. Left is faster, and down is closer to the
-integral. All axes are logarithmic."""
+exact picture. All axes are logarithmic."""
 import math
 from xml.sax.saxutils import escape
 
