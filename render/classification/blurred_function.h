@@ -23,7 +23,7 @@
 enum { TRIP_BLURRED_ROWS = 33 };
 
 #define TRIP_BLURRED_REACH 4.0
-#define TRIP_BLURRED_ERROR 2e-4
+#define TRIP_BLURRED_ERROR 5e-4
 
 /* Entry `first` + i belongs to code i 2^log2; the last one belongs to code 65536. */
 typedef struct trip_blurred_row {
