@@ -175,6 +175,7 @@ static cJSON *list_to_json(const triptych_list *list)
     cJSON_AddItemToObject(root, "slabs", number((double)list->slabs));
     cJSON_AddItemToObject(root, "bricks", number((double)list->bricks));
     cJSON_AddItemToObject(root, "bytes", number((double)list->bytes));
+    cJSON_AddItemToObject(root, "deviation_bytes", number((double)list->deviation_bytes));
     return root;
 }
 
@@ -423,6 +424,8 @@ static void print_list(const triptych_info *info, const triptych_list *list)
         printf(" of coarse level %u", list->level);
     printf(": %llu in %llu bricks, %s", (unsigned long long)list->records,
            (unsigned long long)list->bricks, trip_format_bytes(list->bytes, bytes));
+    if (list->deviation_bytes > 0)
+        printf(", %s of them deviations", trip_format_bytes(list->deviation_bytes, bytes));
     if (list->level > 0)
         printf("; grid of %lld x %lld x %lld, each %s x %s x %s voxels", (long long)list->dims[0],
                (long long)list->dims[1], (long long)list->dims[2],

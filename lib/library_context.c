@@ -451,6 +451,7 @@ static triptych_list list_of(const trip_list *l)
     memcpy(list.index_to_world, l->index_to_world.m, sizeof list.index_to_world);
     for (int plane = 0; plane < TRIP_PLANES; plane++)
         list.bytes += l->plane_bytes[plane];
+    list.deviation_bytes = l->plane_bytes[TRIP_PLANE_DEVIATIONS];
     return list;
 }
 

@@ -213,6 +213,7 @@ typedef struct triptych_list {
     /* Sheet s lies at sheet_first + sheet_step * s, in voxels of level 0 along the axis. */
     double sheet_first, sheet_step;
     uint64_t records, slabs, bricks, bytes;
+    uint64_t deviation_bytes; /* of `bytes`; 0 if the list has no deviations */
 } triptych_list;
 
 /* Describes a list. `number` is from 0 to triptych_info.lists - 1, otherwise TRIPTYCH_USAGE. */

@@ -26,8 +26,8 @@ static const double check_seconds = 3, check_seconds_per_voxel = 5e-11;
 static const double mask_bytes = 0.25, halo_mask_bytes = 0.7;
 /* Bytes of coarse levels relative to level 0. A level has an eighth of the voxels of the level
  * below for a body, a quarter for a surface, and more for thin vessels. Measured: 0.16 to 0.23 for
- * means with normals, 0.04 to 0.16 for values. */
-static const double means_part = 0.19, values_part = 0.06;
+ * means with normals, 0.12 to 0.25 for values, 0.07 to 0.17 for their deviations. */
+static const double means_part = 0.19, values_part = 0.14, deviations_part = 0.12;
 /* Estimates are uncertain: a run is refused only if this share of the estimate does not fit. */
 static const double surely = 0.7;
 
@@ -148,7 +148,9 @@ static double with_levels(const trip_brick_input *in, unsigned tile_voxels)
     const trip_level_kinds kinds = trip_levels_kinds(p->levels_for, !p->no_halo);
     if (trip_levels_count(in->info->dims, trip_brick_levels(in), tile_voxels) == 0)
         return 1;
-    return 1 + kinds.means * means_part + kinds.values * values_part;
+    const bool labels = in->info->labels || in->info->named_labels; /* as far as the file tells */
+    return 1 + kinds.means * means_part +
+           kinds.values * (values_part + (labels ? 0 : deviations_part));
 }
 
 /* Computes the sizes from the numbers of voxels. */

@@ -61,7 +61,7 @@ typedef struct trip_writer_params {
 int trip_writer_open(trip_writer **out, const char *path, const trip_writer_params *params,
                      trip_budget *budget);
 
-/* Gives the lists of values planes of deviations. Call before the first run of these lists. */
+/* Gives all lists of values planes of deviations. Lists of values must be empty. */
 int trip_writer_add_deviations(trip_writer *w);
 
 /* Appends one run: `count` records of tile (tile_u, tile_v) in `sheet` of list `list`. Voxels are

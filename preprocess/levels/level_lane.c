@@ -399,7 +399,7 @@ static uint32_t value_code(const trip_level_work *w, const trip_coarse_value *vo
     return (voxel->value + step / 2) / step * step;
 }
 
-/* Returns the code of a voxel's deviation. Sharpening does not change the deviation. */
+/* Returns the code of a sharpened voxel's deviation. */
 static uint32_t deviation(const trip_level_work *w, const trip_coarse_value *voxel)
 {
     return w->format.deviations ? trip_deviation_pack((double)voxel->variance) : 0;

@@ -473,6 +473,8 @@ static int open_sharpen(making *m)
     m->sharpen.value_of = m->work.value_of;
     m->sharpen.quantiser = &m->work.quantiser;
     m->sharpen.labels = m->params->labels;
+    if (m->work.format.deviations)
+        m->sharpen.shown = trip_sharpen_shown(m->level);
     return status;
 }
 

@@ -1,5 +1,6 @@
 #include "sharpen.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "clones.h"
@@ -27,6 +28,7 @@ size_t trip_sharpen_lane_make(trip_sharpen_lane *l, unsigned edge_log2, unsigned
     l->beside = trip_level_carve(memory, &at, plane * sizeof *l->beside);
     l->sums = trip_level_carve(memory, &at, plane * sizeof *l->sums);
     l->value_sums = trip_level_carve(memory, &at, plane * sizeof *l->value_sums);
+    l->square_sums = trip_level_carve(memory, &at, plane * sizeof *l->square_sums);
     l->squares = trip_level_carve(memory, &at, (1 + HELD) * sizeof *l->squares);
     for (int i = 0; i < 1 + HELD; i++) {
         uint16_t *known = trip_level_carve(memory, &at, plane * sizeof *known);
@@ -49,6 +51,11 @@ void trip_sharpen_close(trip_sharpen *s)
 {
     trip_level_positions_close(&s->positions);
     *s = (trip_sharpen){ 0 };
+}
+
+double trip_sharpen_shown(unsigned level)
+{
+    return (1 - ldexp(1, -2 * (int)level)) / 24;
 }
 
 /* Reads a square. `values` is a buffer of the lane. */
@@ -76,6 +83,16 @@ static int hold_square(const trip_sharpen *s, trip_sharpen_lane *l,
     return square->held && square->key == position->key
                ? 0
                : read_square(s, position, l->beside, square);
+}
+
+/* Adds squared differences to the neighbours that exist. They are whole numbers, hence exact. */
+static void add_squares(double *restrict squares, const uint16_t *here, const uint16_t *others,
+                        const uint16_t *known, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const double by = (here[i] & known[i]) - (others[i] & known[i]);
+        squares[i] += by * by;
+    }
 }
 
 /* Adds differences to the neighbours that exist. */
@@ -112,6 +129,9 @@ static void add_beside(const trip_sharpen *s, trip_sharpen_lane *l,
         else
             add_differences(l->sums + at, here->values + at, other->values + at + shift,
                             other->known + at + shift, width);
+        if (s->shown > 0)
+            add_squares(l->square_sums + at, here->values + at, other->values + at + shift,
+                        other->known + at + shift, width);
     }
 }
 
@@ -177,6 +197,15 @@ static uint16_t sharpened_value(const trip_sharpen *s, const trip_sharpen_lane *
     return voxel->known == 0 && towards ? voxel->value : sharpened(voxel->value, sum);
 }
 
+/* Returns the variance without the part that interpolation shows. */
+static float variance_left(const trip_sharpen *s, const trip_sharpen_lane *l,
+                           const trip_coarse_value *voxel)
+{
+    const size_t at = ((size_t)voxel->v << s->edge_log2) + voxel->u;
+    const double left = (double)voxel->variance - s->shown * l->square_sums[at];
+    return (float)(left > 0 ? left : 0);
+}
+
 TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
                                  const trip_sharpen_neighbourhood *of)
 {
@@ -186,10 +215,15 @@ TRIP_ALSO_V3 int trip_sharpen_do(const trip_sharpen *s, trip_sharpen_lane *l,
         return status;
     memset(l->sums, 0, sizeof *l->sums << 2 * s->edge_log2);
     memset(l->value_sums, 0, sizeof *l->value_sums << 2 * s->edge_log2);
+    if (s->shown > 0)
+        memset(l->square_sums, 0, sizeof *l->square_sums << 2 * s->edge_log2);
     if (status == 0)
         status = add_around(s, l, of->beside);
-    for (uint32_t i = 0; i < position->count && status == 0; i++)
+    for (uint32_t i = 0; i < position->count && status == 0; i++) {
         l->values[i].value = sharpened_value(s, l, &l->values[i]);
+        if (s->shown > 0)
+            l->values[i].variance = variance_left(s, l, &l->values[i]);
+    }
     return status;
 }
 

@@ -9,6 +9,14 @@
  * than the range of values (brick_codes.h). Voxels that cover no known value (level_halo.h) are
  * never moved towards visible values.
  *
+ * Interpolation already shows a part of the variance. Along an axis, from the centre of the cube to
+ * its face, it goes half-way from the mean m to the mean m' of the neighbour. Over these six ways
+ * the mean square of the way from m adds up to
+ *
+ *   the sum over the six neighbours of (m - m')^2 / 24
+ *
+ * At level n the 2^n voxels along an axis have 1 - 4^-n of it. This part is taken off the variance.
+ *
  * The voxels come from a file of trip_level_file_append(), square by square. They are taken in
  * columns: the squares at one position in a few consecutive sheets. The records of a column are
  * then contiguous in every list. Memory holds the positions of squares in these sheets and in the
@@ -49,6 +57,7 @@ typedef struct trip_sharpen_lane {
      * values for knots. */
     int32_t *sums;
     double *value_sums;
+    double *square_sums;          /* sums of the squared differences, in codes */
     trip_sharpen_square *squares; /* the current square, then some recently used ones */
 } trip_sharpen_lane;
 
@@ -59,6 +68,7 @@ typedef struct trip_sharpen {
     bool round;  /* codes in `around` are reversed, as dropped values lie above kept ones */
     const trip_quantiser *quantiser; /* NULL means even codes */
     const double *value_of;          /* value of each code, for knots */
+    double shown; /* variance that interpolation shows, per squared difference; 0 if not needed */
     trip_level_positions positions;
     uint64_t sheet; /* first sheet of the current columns; UINT64_MAX if there are none yet */
     size_t next[TRIP_SHARPEN_SHEETS]; /* next square in each of the sheets */
@@ -70,6 +80,9 @@ typedef struct trip_sharpen {
 void trip_sharpen_open(trip_sharpen *s, const trip_output *file, bool means, bool round,
                        unsigned edge_log2, trip_budget *budget);
 void trip_sharpen_close(trip_sharpen *s);
+
+/* Returns the variance that interpolation shows at a level, per squared difference of means. */
+double trip_sharpen_shown(unsigned level);
 
 /* Lays out a lane in `memory`, which must be zeroed and aligned to 64. Returns the size of a lane
  * in bytes; NULL computes only the size. */

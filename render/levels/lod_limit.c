@@ -25,10 +25,12 @@ static int lists_read(const trip_camera *camera, const trip_settings *settings)
     return lists;
 }
 
+/* Returns the bytes of a record's code and of its deviation, if it has one. */
 static double code_bytes(const trip_dataset *data, const trip_list *list)
 {
     const trip_kind_info *of = trip_kind_of(list->kind);
-    return of->code_bytes && !of->steps ? of->code_bytes : data->header.code_bytes;
+    const double code = of->code_bytes && !of->steps ? of->code_bytes : data->header.code_bytes;
+    return code + (list->planes >> TRIP_PLANE_DEVIATIONS & 1);
 }
 
 /* Returns whether a list along the third axis counts; the other two axes hold the same number of

@@ -22,7 +22,7 @@ class Dataset:
         self.names = [self.plane_names(number) for number in range(self.lists)]
         self.planes = {}
         for names in self.names:
-            for name in names:
+            for name in names.values():
                 with open(f"{path}/{name}", "rb") as f:
                     self.planes[name] = bytearray(f.read())
 
@@ -37,10 +37,16 @@ class Dataset:
         return self.number("<Q", 296) + 320 * number
 
     def plane_names(self, number):
+        """Returns the names of a list's files by plane."""
         at = self.list_at(number)
         axis, level, kind, planes = struct.unpack_from("<4I", self.index, at)
-        names = (("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values",))[kind][: planes.bit_length()]
-        return [f"{'xyz'[axis]}{level}.{name}" for name in names]
+        names = (
+            ("voxels", "normals"), ("halo",), ("means", "mean-normals"), ("values", None, "deviations")
+        )[kind]
+        return {
+            plane: f"{'xyz'[axis]}{level}.{name}"
+            for plane, name in enumerate(names) if planes >> plane & 1
+        }
 
     def bricks(self, number):
         """Returns the offsets of a list's bricks."""
@@ -77,7 +83,7 @@ class Dataset:
     def seal(self):
         """Writes valid checksums for the current bytes."""
         for number in range(self.lists):
-            for plane, name in enumerate(self.names[number]):
+            for plane, name in self.names[number].items():
                 sums = self.page_sums(self.planes[name])
                 at = self.number("<Q", self.list_at(number) + 232 + 8 * plane)
                 self.put(f"<{len(sums)}Q", at, *sums)

@@ -16,27 +16,15 @@ FILES = ["index.trip", *(f"{axis}0.{plane}" for axis in "xyz" for plane in PLANE
 VIEW = ("--size", "40x40", "--look", "20,15,10", "--eye", "80,-60,70")
 
 
-class BadDatasets(program.ProgramTest):
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        program.write_nrrd("a.nrrd", program.noise((20, 30, 40)))
-        program.write_nrrd("b.nrrd", program.noise((20, 30, 40), seed=2))
-        for name in "a", "b":
-            assert (
-                program.call(
-                    "brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=100:255",
-                    "--normals=stored"
-                ).returncode
-                == 0
-            )
-        assert sorted(os.listdir("a.trip")) == sorted(FILES)
-        cls.good = cls.draw(cls, "a.trip")[1]
+class Damage(program.ProgramTest):
+    """Damages copies of the data set a.trip."""
+
+    VIEW = VIEW
 
     def draw(self, path):
         """Draws a data set. Returns the finished process, and the picture or None."""
         output = f"{path}.exr"
-        run = program.call("render", path, "-o", output, *VIEW, program=program.QUICK_PROGRAM)
+        run = program.call("render", path, "-o", output, *self.VIEW, program=program.QUICK_PROGRAM)
         return run, program.read_exr(output) if run.returncode == 0 else None
 
     def check(self, name, change):
@@ -68,9 +56,22 @@ class BadDatasets(program.ProgramTest):
         faults = [str(w.exception()) for w in waiting if w.exception()]
         self.assertEqual(faults, [], "\n".join(faults))
 
+    def hostile(self, change):
+        """Changes the index of a copy, with valid checksums. Returns the path."""
+        data = craft.Dataset("a.trip")
+        change(data)
+        shutil.rmtree("hostile.trip", ignore_errors=True)
+        shutil.copytree("a.trip", "hostile.trip")
+        data.write("hostile.trip")
+        return "hostile.trip"
+
+
+class FileTests:
+    """Tests of each file of FILES."""
+
     def test_files_of_wrong_length_are_found(self):
         changes = []
-        for name in FILES:
+        for name in self.FILES:
             size = os.path.getsize(f"a.trip/{name}")
             for length in sorted({0, 1023, size // 2, size - 1, size + 1}):
                 changes.append(lambda path, n=name, l=length: os.truncate(f"{path}/{n}", l))
@@ -79,7 +80,7 @@ class BadDatasets(program.ProgramTest):
     def test_damaged_bytes_are_found(self):
         chance = random.Random(5)
         changes = []
-        for name in FILES:
+        for name in self.FILES:
             size = os.path.getsize(f"a.trip/{name}")
             places = [chance.randrange(size) for _ in range(3)]
             if name == "index.trip":
@@ -98,7 +99,7 @@ class BadDatasets(program.ProgramTest):
 
     def test_missing_and_exchanged_files_are_found(self):
         changes = []
-        for name in FILES:
+        for name in self.FILES:
 
             def swap(path, n=name):
                 shutil.copy(f"b.trip/{n}", f"{path}/{n}")
@@ -112,17 +113,28 @@ class BadDatasets(program.ProgramTest):
                 os.symlink("nowhere", f"{path}/{n}")
 
             changes += [lambda path, n=name: os.remove(f"{path}/{n}"), swap, folder, dangling]
-        changes.append(lambda path: os.replace(f"{path}/x0.voxels", f"{path}/y0.voxels"))
+        changes.append(lambda path: os.replace(f"{path}/{self.FILES[-3]}", f"{path}/{self.FILES[-1]}"))
         self.check_all(changes)
 
-    def hostile(self, change):
-        """Changes the index of a copy, with valid checksums. Returns the path."""
-        data = craft.Dataset("a.trip")
-        change(data)
-        shutil.rmtree("hostile.trip", ignore_errors=True)
-        shutil.copytree("a.trip", "hostile.trip")
-        data.write("hostile.trip")
-        return "hostile.trip"
+
+class BadDatasets(FileTests, Damage):
+    FILES = FILES
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nrrd("a.nrrd", program.noise((20, 30, 40)))
+        program.write_nrrd("b.nrrd", program.noise((20, 30, 40), seed=2))
+        for name in "a", "b":
+            assert (
+                program.call(
+                    "brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=100:255",
+                    "--normals=stored"
+                ).returncode
+                == 0
+            )
+        assert sorted(os.listdir("a.trip")) == sorted(FILES)
+        cls.good = cls.draw(cls, "a.trip")[1]
 
     def test_numbers_that_no_grid_has_are_refused_with_valid_checksums(self):
         def set_step(value):
@@ -223,6 +235,90 @@ class BadDatasets(program.ProgramTest):
     def test_a_slash_after_the_name_is_ignored(self):
         self.assertEqual(self.info("a.trip/")["kept"], self.info("a.trip")["kept"])
         self.assertTrue(numpy.array_equal(self.picture("./a.trip/", *VIEW), self.good))
+
+
+class BadDeviations(FileTests, Damage):
+    """The deviations of coarse values. The view draws level 1 alone."""
+
+    FILES = ["x1.values", *(f"{axis}1.deviations" for axis in "xyz")]
+    VIEW = (*VIEW, "--lod=100", "--ortho=50")
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        program.write_nrrd("a.nrrd", program.noise((20, 30, 40)))
+        program.write_nrrd("b.nrrd", program.noise((20, 30, 40), seed=2))
+        for name in "a", "b":
+            run = program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q",
+                               "--range=100:255", "--levels=1")
+            assert run.returncode == 0
+        cls.good = cls.draw(cls, "a.trip")[1]
+
+    @staticmethod
+    def fill(data, byte):
+        for name, plane in data.planes.items():
+            if name.endswith(".deviations"):
+                plane[:] = bytes([byte]) * len(plane)
+
+    @staticmethod
+    def old(data):
+        """Makes a data set of version 6, which has no deviations."""
+        data.put("<I", 8, 6)
+        data.put("<I", 276, data.number("<I", 276) & 3)
+        for number, names in enumerate(data.names):
+            at = data.list_at(number)
+            if 2 in names:
+                del data.planes[names.pop(2)]
+                data.put("<I", at + 12, 1)
+                data.put("<Q", at + 200 + 16, 0)
+                data.put("<Q", at + 232 + 16, 0)
+
+    def test_the_view_draws_the_level(self):
+        run = self.works("render", "a.trip", "-o", "a.png", "--explain", *self.VIEW)
+        self.assertIn(b"1 values read", run.stdout)
+
+    def test_every_deviation_is_valid(self):
+        for byte in 0, 1, 128, 255:
+            path = self.hostile(lambda data, b=byte: self.fill(data, b))
+            self.works("info", "--verify", path)
+            for renderer in "cpu", "reference", *program.GL:
+                picture = self.picture(path, *self.VIEW, "--renderer", renderer)
+                self.assertTrue(numpy.isfinite(picture).all())
+                self.assertGreater(picture[..., 3].max(), 0)
+
+    def test_lists_with_other_deviations_are_found(self):
+        def change(data):
+            data.planes["y1.deviations"][7] ^= 1
+
+        self.fails(1, "info", "--verify", self.hostile(change),
+                   says="the lists of values along x and y at level 1 differ in their records")
+
+    def test_numbers_that_deviations_cannot_have_are_refused(self):
+        data = craft.Dataset("a.trip")
+        (number,) = (n for n, names in enumerate(data.names) if names.get(2) == "z1.deviations")
+        at, bytes_ = data.list_at(number), len(data.planes["z1.deviations"])
+        for change, says in (
+            (lambda d: d.put("<Q", at + 200 + 16, bytes_ - 1), "planes do not match its records"),
+            (lambda d: d.put("<Q", at + 200 + 16, bytes_ + 1), "planes do not match its records"),
+            (lambda d: d.put("<Q", at + 200 + 16, 2**64 - 1), "planes do not match its records"),
+            (lambda d: d.put("<I", at + 12, 1), "does not have the planes of its kind"),
+            (lambda d: d.put("<I", 276, 1), "does not have the planes of its kind"),
+            (lambda d: d.put("<I", 8, 6), "unknown planes"),
+            (lambda d: d.put("<I", 276, 13), "unknown planes"),
+        ):
+            path = self.hostile(change)
+            self.fails(1, "info", path, says=says)
+            self.fails(1, "render", path, "-o", "no.exr", *self.VIEW, says=says)
+        self.assertFalse(os.path.exists("no.exr"))
+
+    def test_data_sets_of_version_6_draw_as_if_all_deviations_were_0(self):
+        zero = self.picture(self.hostile(lambda data: self.fill(data, 0)), *self.VIEW)
+        path = self.hostile(self.old)
+        for axis in "xyz":
+            os.remove(f"{path}/{axis}1.deviations")
+        self.works("info", "--verify", path)
+        self.assertEqual(self.info(path)["format_version"], 6)
+        self.assertTrue(numpy.array_equal(self.picture(path, *self.VIEW), zero))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ static unsigned char *seal(const uint8_t *data, size_t size, size_t *bytes)
     memcpy(index, data, content);
     trip_file_header *h = (trip_file_header *)(void *)index;
     memcpy(h->magic, TRIP_MAGIC, sizeof h->magic);
-    h->version = TRIP_FORMAT_VERSION;
+    h->version = given->version == TRIP_FORMAT_OLDEST ? TRIP_FORMAT_OLDEST : TRIP_FORMAT_VERSION;
     h->header_bytes = TRIP_HEADER_BYTES;
     h->checksums_offset = content;
     *bytes = content;
@@ -48,7 +48,7 @@ static void set_list(trip_dataset *d, unsigned i, const unsigned char *index)
                      .sheet_first = f->sheet_first,
                      .sheet_step = f->sheet_step,
                      .records = f->records,
-                     .plane_bytes = { f->plane_bytes[0], f->plane_bytes[1] },
+                     .plane_bytes = { f->plane_bytes[0], f->plane_bytes[1], f->plane_bytes[2] },
                      .slab_count = f->slab_count,
                      .brick_count = f->brick_count,
                      .slabs = (const void *)(index + f->slabs_offset),
@@ -62,6 +62,9 @@ static void check_run(const trip_list *l, unsigned tile_log2, const trip_run *ru
     FUZZ_PROMISE(run->count > 0 && run->first + run->count <= l->records);
     FUZZ_PROMISE(run->at[0] + 8 * (uint64_t)run->words <= l->plane_bytes[0]);
     FUZZ_PROMISE(run->count <= 1u << 2 * tile_log2);
+    if (l->planes >> TRIP_PLANE_DEVIATIONS & 1)
+        FUZZ_PROMISE(run->at[TRIP_PLANE_DEVIATIONS] + run->count <=
+                     l->plane_bytes[TRIP_PLANE_DEVIATIONS]);
     FUZZ_PROMISE(run->sheet < l->dims[l->axis]);
     FUZZ_PROMISE((int64_t)run->u + b->u_max < l->dims[(l->axis + 1) % 3]);
     FUZZ_PROMISE((int64_t)run->v + b->v_max < l->dims[(l->axis + 2) % 3]);

@@ -78,6 +78,7 @@ static trip_brick_summary brick_to(const char *output, trip_brick_params p)
 typedef struct cube {
     int kept, known, columns; /* columns along the axis that contain kept voxels */
     double mean, value;       /* codes */
+    double squares;           /* mean square of the codes of the known voxels */
 } cube;
 
 static cube sum_cube(const int64_t at[3], unsigned level, int axis)
@@ -94,6 +95,7 @@ static cube sum_cube(const int64_t at[3], unsigned level, int axis)
             code = 85.0 * (258 + bytes[(z * NY + y) * NX + x]);
             c.known++;
             c.value += code;
+            c.squares += code * code;
         }
         if (is_kept(x, y, z)) {
             c.kept++;
@@ -105,6 +107,7 @@ static cube sum_cube(const int64_t at[3], unsigned level, int axis)
         c.columns += column[i];
     c.mean /= c.kept ? c.kept : 1;
     c.value /= c.known ? c.known : 1;
+    c.squares /= c.known ? c.known : 1;
     return c;
 }
 
@@ -215,15 +218,18 @@ static double sharp_value(const int64_t at[3], unsigned level)
     return fmin(own->added ? own->value : 65535, fmax(0, sum));
 }
 
-/* Calls `each` with the position and the code of each record of a list. Returns the number of
- * records. */
+/* Calls `each` with the position, the code and the deviation of each record of a list. Lists of
+ * means have no deviations. Returns the number of records. */
 static uint64_t visit(const trip_dataset *d, const trip_list *list,
                       void (*each)(const trip_dataset *d, const trip_list *list,
-                                   const int64_t at[3], unsigned code, void *user),
+                                   const int64_t at[3], unsigned code, unsigned deviation,
+                                   void *user),
                       void *user)
 {
     static uint64_t words[TRIP_BLOCK_WORDS_MAX];
     static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
+    static uint8_t deviations[TRIP_RUN_RECORDS_MAX];
+    const int deviations_fd = list->plane_fd[TRIP_PLANE_DEVIATIONS];
     const trip_block_form form = trip_block_form_of(&d->header, list->kind);
     trip_selection all;
     trip_run run;
@@ -234,12 +240,16 @@ static uint64_t visit(const trip_dataset *d, const trip_list *list,
         assert_int_equal(pread(list->plane_fd[0], words, size, (off_t)run.at[0]), size);
         trip_block block = trip_block_make(&form, run.count, run.words, words, NULL);
         trip_block_voxels(&block, 0, run.count, voxels);
+        if (deviations_fd >= 0)
+            assert_int_equal(
+                pread(deviations_fd, deviations, run.count, (off_t)run.at[TRIP_PLANE_DEVIATIONS]),
+                run.count);
         for (uint32_t i = 0; i < run.count; i++) {
             int64_t at[3];
             at[list->axis] = run.sheet;
             at[(list->axis + 1) % 3] = run.u + (int64_t)trip_voxel_u(voxels[i]);
             at[(list->axis + 2) % 3] = run.v + (int64_t)trip_voxel_v(voxels[i]);
-            each(d, list, at, trip_voxel_code(voxels[i]), user);
+            each(d, list, at, trip_voxel_code(voxels[i]), deviations[i], user);
         }
         records += run.count;
     }
@@ -247,18 +257,52 @@ static uint64_t visit(const trip_dataset *d, const trip_list *list,
     return records;
 }
 
+static double deviation_code(double variance)
+{
+    return 255 * sqrt(sqrt(fmax(0, variance)) / 32767.5);
+}
+
+/* Checks the standard deviation of the known voxels of a cube. The part that interpolation shows is
+ * taken off its square. Means that the program rounded to codes limit the accuracy of the square.
+ * Returns whether this leaves at most two codes. */
+static bool check_deviation(const int64_t at[3], unsigned level, unsigned deviation)
+{
+    const cube c = sum_cube(at, level, 0);
+    const base *own = base_at(at[0], at[1], at[2], level);
+    const double variance = fmax(0, c.squares - c.value * c.value);
+    const double part = (1 - pow(4, -(double)level)) / 24;
+    double shown = 0, rounded = 4 * sqrt(variance) + 4 + 1e-4 * variance;
+    for (int n = 0; n < 6; n++) {
+        int64_t to[3] = { at[0], at[1], at[2] };
+        to[n / 2] += n % 2 ? 1 : -1;
+        const base *beside = base_at(to[0], to[1], to[2], level);
+        const double by = beside && beside->there ? own->value - beside->value : 0;
+        shown += by * by * part;
+        rounded += (4 * fabs(by) + 4) * part;
+    }
+    const double min = deviation_code(variance - shown - rounded);
+    const double max = deviation_code(variance - shown + rounded);
+    if (c.known == 0)
+        assert_int_equal(deviation, 0);
+    else
+        assert_true(deviation >= min - 0.5 && deviation <= max + 0.5);
+    return max - min < 1;
+}
+
 static void check_record(const trip_dataset *d, const trip_list *list, const int64_t at[3],
-                         unsigned code, void *user)
+                         unsigned code, unsigned deviation, void *user)
 {
     const trip_mean_scale scale =
         trip_mean_scale_make(d->header.value_min, d->header.value_max, &d->codes);
     const cube c = sum_cube(at, list->level, list->axis);
     const base *b = base_at(at[0], at[1], at[2], list->level);
-    (void)user;
-    if (list->kind == TRIP_KIND_MEANS)
+    uint64_t *sure = user;
+    if (list->kind == TRIP_KIND_MEANS) {
         expect_mean(&scale, &c, code, list->level);
-    else
+    } else {
         assert_true(fabs(code - sharp_value(at, list->level)) < 85);
+        *sure += check_deviation(at, list->level, deviation);
+    }
     assert_true(list->kind == TRIP_KIND_MEANS ? c.kept > 0 : b && b->there);
 }
 
@@ -287,8 +331,9 @@ static void check_data_set(const char *name, unsigned levels, unsigned lists)
     find_bases();
     for (unsigned i = 6; i < d->list_count; i++) {
         const trip_list *list = &d->lists[i];
-        uint64_t records = visit(d, list, check_record, NULL);
+        uint64_t sure = 0, records = visit(d, list, check_record, &sure);
         assert_true(records > 0);
+        assert_true(list->kind == TRIP_KIND_MEANS || sure > records / 2);
         if (list->axis == 0)
             assert_int_equal(records, count_cubes(list));
     }
@@ -317,10 +362,11 @@ typedef struct added {
 } added;
 
 static void check_added_record(const trip_dataset *d, const trip_list *list, const int64_t at[3],
-                               unsigned code, void *user)
+                               unsigned code, unsigned deviation, void *user)
 {
     added *a = user;
     (void)d;
+    (void)deviation;
     if (sum_cube(at, list->level, 0).known > 0)
         return;
     assert_true((int)code < 85 * (258 + a->shown_from) || (int)code > 85 * (258 + a->shown_to));
@@ -436,11 +482,12 @@ static double mean_of_shorts(const int64_t at[3])
 }
 
 static void check_short(const trip_dataset *d, const trip_list *list, const int64_t at[3],
-                        unsigned code, void *user)
+                        unsigned code, unsigned deviation, void *user)
 {
     const double own = mean_of_shorts(at);
     double sharp = own;
     (void)d;
+    (void)deviation;
     (void)list;
     for (int n = 0; n < 6; n++) {
         int64_t to[3] = { at[0], at[1], at[2] };
@@ -475,6 +522,159 @@ static void sharpened_values_are_nearest_codes_within_range(void **state)
         assert_true(counts[i] > 20);
     trip_dataset_close(d);
     trip_budget_destroy(budget);
+}
+
+enum { RX = 21, RY = 35, RZ = 10 };
+
+/* The steps of a ramp along each axis. Means of its cubes are whole codes. */
+static const double ramp_steps[3] = { 1000, 500, 100 };
+
+/* Whether all voxels of a cube are in the grid. */
+static bool is_full(const int64_t at[3], unsigned level)
+{
+    return (at[0] + 1) << level <= RX && (at[1] + 1) << level <= RY && (at[2] + 1) << level <= RZ;
+}
+
+/* Returns how many of the neighbours along an axis exist, or -1 if one is not full. */
+static int full_neighbours(const int64_t at[3], unsigned level, int axis)
+{
+    int count = 0;
+    for (int way = -1; way < 2; way += 2) {
+        const int64_t size = (((int64_t[]){ RX, RY, RZ }[axis] - 1) >> level) + 1;
+        int64_t to[3] = { at[0], at[1], at[2] };
+        to[axis] += way;
+        if (to[axis] < 0 || to[axis] >= size)
+            continue;
+        if (!is_full(to, level))
+            return -1;
+        count++;
+    }
+    return count;
+}
+
+typedef struct deviations_seen {
+    bool stripes;
+    uint64_t checked, zero;
+} deviations_seen;
+
+/* Along an axis, a ramp of step g has the variance g^2 (4^n - 1) / 12 in a cube of level n.
+ * Interpolation towards each of the two neighbours shows half of it. Stripes one voxel wide have
+ * equal means, and interpolation shows nothing. */
+static void expect_deviation(const trip_list *list, const int64_t at[3], unsigned deviation,
+                             deviations_seen *seen)
+{
+    double variance = seen->stripes ? 10000.0 * 10000 : 0;
+    if (!is_full(at, list->level))
+        return;
+    for (int axis = 0; axis < 3; axis++) {
+        const int beside = full_neighbours(at, list->level, axis);
+        if (beside < 0)
+            return;
+        if (!seen->stripes)
+            variance += (2 - beside) / 2.0 * ramp_steps[axis] * ramp_steps[axis] *
+                        (pow(4, list->level) - 1) / 12;
+    }
+    assert_int_equal(deviation, (int)floor(deviation_code(variance) + 0.5));
+    seen->checked++;
+    seen->zero += deviation == 0;
+}
+
+/* Reads a list as renderers do. */
+static void read_deviations(const trip_dataset *d, const trip_list *list, deviations_seen *seen)
+{
+    static uint32_t voxels[TRIP_RUN_RECORDS_MAX];
+    const trip_reader_params params = { .planes = list->planes };
+    trip_reader *reader;
+    trip_selection all;
+    trip_batch batch;
+    uint64_t records = 0;
+    assert_int_equal(trip_reader_create(&reader, d, &params, d->budget), 0);
+    assert_int_equal(trip_selection_create_whole(&all, d, list, false, d->budget), 0);
+    const trip_pass pass = trip_pass_of(&all);
+    assert_int_equal(trip_reader_begin(reader, &pass), 0);
+    while (trip_reader_next(reader, &batch) == 1) {
+        for (size_t i = 0; i < batch.run_count; i++) {
+            const trip_run *run = &batch.runs[i];
+            const trip_block block = trip_block_of(&batch, run);
+            assert_non_null(block.deviations);
+            assert_null(block.normals);
+            trip_block_voxels(&block, 0, run->count, voxels);
+            for (uint32_t n = 0; n < run->count; n++) {
+                int64_t at[3];
+                at[list->axis] = run->sheet;
+                at[(list->axis + 1) % 3] = run->u + (int64_t)trip_voxel_u(voxels[n]);
+                at[(list->axis + 2) % 3] = run->v + (int64_t)trip_voxel_v(voxels[n]);
+                expect_deviation(list, at, block.deviations[n], seen);
+            }
+            records += run->count;
+        }
+        trip_reader_release(reader, &batch);
+    }
+    assert_int_equal(records, list->records);
+    trip_reader_destroy(reader);
+    trip_selection_destroy(&all, d->budget);
+}
+
+static void deviations_of_ramps_and_stripes_have_closed_forms(void **state)
+{
+    static uint16_t values[RX * RY * RZ];
+    (void)state;
+    for (int stripes = 0; stripes < 2; stripes++) {
+        deviations_seen seen = { .stripes = stripes };
+        for (int i = 0; i < RX * RY * RZ; i++)
+            values[i] =
+                (uint16_t)(stripes ? (i % RX % 2 ? 30000 : 10000)
+                                   : ramp_steps[0] * (i % RX) + ramp_steps[1] * (i / RX % RY) +
+                                         ramp_steps[2] * (i / RX / RY));
+        test_write("v.raw", values, sizeof values);
+        brick_to("a.trip", (trip_brick_params){
+                               .volume = { .raw_dims = { RX, RY, RZ }, .raw_type = "uint16" },
+                               .keep_all = true,
+                               .levels = 3,
+                               .tile_voxels = 16 });
+        trip_budget *budget;
+        trip_dataset *d = open_data_set("a.trip", &budget);
+        for (unsigned level = 1; level <= 3; level++)
+            for (int axis = 0; axis < 3; axis++)
+                read_deviations(d, trip_dataset_find(d, axis, level, TRIP_KIND_VALUES), &seen);
+        assert_true(seen.checked > 3 * 400);
+        assert_true(stripes ? seen.zero == 0 : seen.zero > 3 * 200);
+        trip_dataset_close(d);
+        trip_budget_destroy(budget);
+    }
+}
+
+/* Labels have no mean. Labels of more than 16 bits are stored as ids. */
+static void labels_have_no_deviations(void **state)
+{
+    static uint32_t labels[32 * 32 * 32];
+    (void)state;
+    const char header[] = "NRRD0004\ntype: uint32\ndimension: 3\nsizes: 32 32 32\n"
+                          "encoding: raw\nendian: little\ndata file: v.raw\n";
+    static char input[128], output[128];
+    strcpy(input, test_path("v-labels.nhdr"));
+    strcpy(output, test_path("labels.trip"));
+    for (uint32_t scale = 1; scale <= 100000000; scale *= 100000000) {
+        trip_brick_summary s;
+        trip_budget *budget;
+        for (uint32_t i = 0; i < 32 * 32 * 32; i++)
+            labels[i] = scale * ((i % 32 / 8 + i / 32 % 32 / 8 * 3 + i / 1024 / 8 * 5) % 7);
+        test_write("v.raw", labels, sizeof labels);
+        test_write("v-labels.nhdr", header, sizeof header - 1);
+        const trip_brick_params p = {
+            .input = input, .output = output, .keep_all = true, .levels = 1, .replace = true
+        };
+        if (trip_brick(&p, &s) != 0)
+            fail_msg("%s", test_report);
+        trip_dataset *d = open_data_set("labels.trip", &budget);
+        assert_int_equal(d->header.planes & 1u << TRIP_PLANE_DEVIATIONS, 0);
+        assert_true(trip_dataset_find(d, 0, 1, TRIP_KIND_VALUES)->records > 0);
+        assert_false(test_exists("labels.trip/x1.deviations"));
+        assert_true(test_exists("labels.trip/x1.values"));
+        assert_int_equal(trip_codes_even(&d->codes), scale == 1);
+        trip_dataset_close(d);
+        trip_budget_destroy(budget);
+    }
 }
 
 static void expect_records(const char *name, unsigned level, uint64_t records)
@@ -568,6 +768,8 @@ static void levels_for_one_use_have_only_its_kind(void **state)
     expect_same_file("both.trip/y2.mean-normals", "pre.trip/y2.mean-normals");
     expect_same_file("both.trip/x1.values", "post.trip/x1.values");
     expect_same_file("both.trip/z2.values", "post.trip/z2.values");
+    expect_same_file("both.trip/y1.deviations", "post.trip/y1.deviations");
+    assert_false(test_exists("pre.trip/x1.deviations"));
     assert_false(test_exists("pre.trip/x1.values"));
     assert_false(test_exists("post.trip/x1.means"));
     check_data_set("pre.trip", 2, 3);
@@ -677,6 +879,9 @@ int main(void)
                                         test_end),
         cmocka_unit_test_setup_teardown(sharpened_values_are_nearest_codes_within_range, test_begin,
                                         test_end),
+        cmocka_unit_test_setup_teardown(deviations_of_ramps_and_stripes_have_closed_forms,
+                                        test_begin, test_end),
+        cmocka_unit_test_setup_teardown(labels_have_no_deviations, test_begin, test_end),
         cmocka_unit_test_setup_teardown(neighbours_are_added_at_any_position, test_begin, test_end),
         cmocka_unit_test_setup_teardown(no_voxel_is_added_if_all_values_are_kept, test_begin,
                                         test_end),
