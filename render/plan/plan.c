@@ -266,6 +266,7 @@ static int select_bricks(planning *p, const trip_list *list)
     of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
                              plan->axis_of_view, shown_by(p, planned->table), p->about);
     of.cull.clip = &planned->clip;
+    of.cull.blurs = plan->blurs && list->planes >> TRIP_PLANE_DEVIATIONS & 1;
     planned->shown = trip_code_set_range(of.cull.shown);
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
