@@ -64,6 +64,16 @@ void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
     trip_budget_release(budget, s, sizeof *s);
 }
 
+/* Returns the frame's function, or NULL if it does not fit. */
+static const trip_cpu_tf *take_function(trip_cpu_sheets *s, const trip_cpu *r)
+{
+    const trip_plan *plan = r->frame->plan;
+    const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
+    return trip_cpu_tfs_take(&s->functions, r->budget, r->frame->table,
+                             closed ? &plan->closed : NULL, s->store.codes,
+                             r->frame->camera->voxel_world, plan->blurs);
+}
+
 int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
 {
     s->of = r;
@@ -83,12 +93,13 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
         : trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
         : closed                                          ? r->kernels->sheet_pane_closed
                                                           : r->kernels->sheet_pane;
-    s->function =
-        trip_cpu_tfs_take(&s->functions, r->budget, r->frame->table, closed ? &plan->closed : NULL,
-                          s->store.codes, r->frame->camera->voxel_world, plan->blurs);
-    if (s->function)
-        return 0;
-    return no_memory(r->budget, 2 * trip_cpu_tf_blurred_bytes());
+    s->function = take_function(s, r);
+    if (!s->function) { /* the sheets of an earlier frame may hold most of the memory */
+        trip_cpu_store_release(&s->store);
+        trip_cpu_windows_release(&s->windows, r->budget);
+        s->function = take_function(s, r);
+    }
+    return s->function ? 0 : no_memory(r->budget, trip_cpu_tf_blurred_bytes());
 }
 
 /* ---- layers and passes ---- */

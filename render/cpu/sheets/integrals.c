@@ -324,13 +324,14 @@ static int32_t set_first_row(trip_cpu_tf *f)
 static bool set_rows(trip_cpu_tf *f, const trip_tf_entry *table, trip_budget *budget)
 {
     trip_blurred_function blurred;
-    if (!create_blurred(f, budget) || !trip_blurred_function_create(&blurred, table, budget))
+    if (!trip_blurred_function_create(&blurred, table, budget))
         return false;
-    int32_t first = set_first_row(f);
-    for (int row = 1; row < TRIP_BLURRED_ROWS; row++)
+    const bool created = create_blurred(f, budget);
+    int32_t first = created ? set_first_row(f) : 0;
+    for (int row = 1; row < TRIP_BLURRED_ROWS && created; row++)
         first = set_row(f, &blurred, row, first);
     trip_blurred_function_destroy(&blurred, budget);
-    return true;
+    return created;
 }
 
 /* Finds the visible codes nearest to the range of stretched codes. */
