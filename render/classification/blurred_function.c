@@ -7,7 +7,7 @@ enum { CODES = TRIP_SEGMENT_CODES, LAST_ROW = TRIP_BLURRED_ROWS - 1 };
 /* The minimum number of entries in a row's deviation. Row 1 then has every second code. */
 #define ENTRIES_EACH_DEVIATION 15.9
 
-/* The largest number of bins on each side of an entry: those of TRIP_BLURRED_REACH. */
+/* The maximum number of bins within TRIP_BLURRED_REACH on each side of an entry. */
 enum { BINS_MAX = 2 * 16 * 4 + 2 };
 
 /* Extinction, and extinction times red, green and blue. */

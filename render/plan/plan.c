@@ -266,7 +266,6 @@ static int select_bricks(planning *p, const trip_list *list)
     of.cull = trip_cull_make(p->data, &planned->camera, &planned->grid, p->settings,
                              plan->axis_of_view, shown_by(p, planned->table), p->about);
     of.cull.clip = &planned->clip;
-    of.cull.blurs = plan->blurs && list->planes >> TRIP_PLANE_DEVIATIONS & 1;
     planned->shown = trip_code_set_range(of.cull.shown);
     for (int i = 0; i < plan->layers[list->axis].pass_count; i++)
         of.selections[i] = selection_in(plan, list->axis, i, list);
@@ -363,7 +362,8 @@ static int plan_layer(planning *p, int axis)
 static int plan_sheets(planning *p, int axis)
 {
     trip_brick_ranges about;
-    trip_brick_ranges_create(&about, p->data, &p->plan->draw, axis, p->settings->kernel, p->budget);
+    trip_brick_ranges_create(&about, p->data, &p->plan->draw, axis, p->settings->kernel,
+                             p->plan->blurs, p->budget);
     p->about = &about;
     int status = plan_layer(p, axis);
     p->about = NULL;

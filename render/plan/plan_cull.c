@@ -138,7 +138,7 @@ static bool may_weigh(const trip_cull *cull, const box *b, double radius, int ax
 }
 
 /* Whether no part of a brick is visible. Cells between the brick and its neighbours take values
- * between both, so the neighbours' codes count too. Deviations may make any code visible. */
+ * between both, so the neighbours' codes count too. */
 static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
                            const trip_file_slab *slab)
 {
@@ -147,8 +147,6 @@ static bool is_transparent(trip_cull *cull, const trip_file_brick *brick,
         range = trip_draw_codes_range(cull->about->draw, range.min, range.max);
     if (trip_code_set_has_some(cull->shown, range.min, range.max))
         return false;
-    if (cull->blurs)
-        return !trip_code_set_has_some(cull->shown, 0, UINT16_MAX);
     if (!cull->about)
         return true;
     range = trip_brick_ranges_about(cull->about, slab->slab, brick);

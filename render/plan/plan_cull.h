@@ -38,7 +38,6 @@ typedef struct trip_cull {
     double behind;              /* depth behind the eye up to which splats may be visible */
     const trip_clip *clip;      /* in the list's index space; the caller sets it afterwards */
     const trip_code_set *shown; /* codes with extinction */
-    bool blurs;                 /* deviations, with unknown bounds, blur these codes */
     trip_brick_ranges *about;   /* post: code ranges with neighbouring bricks; NULL for splats */
 } trip_cull;
 

@@ -149,7 +149,7 @@ typedef struct trip_cpu_integrals {
 typedef struct trip_cpu_blurred_row {
     int32_t first;    /* the entry of code 0 */
     int32_t log2;     /* log2 of the codes from one entry to the next */
-    int32_t half;     /* half of these codes, times TRIP_CPU_CODE_PARTS */
+    int32_t half;     /* half of an entry's codes, times TRIP_CPU_CODE_PARTS */
     float extinction; /* extinction per voxel_world for one unit of sums[0] */
 } trip_cpu_blurred_row;
 

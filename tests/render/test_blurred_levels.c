@@ -6,6 +6,7 @@
 #include "dataset_level.h"
 #include "deviation.h"
 #include "kernel.h"
+#include "plan.h"
 #include "splat.h"
 #include "test.h"
 
@@ -263,6 +264,59 @@ static void values_that_only_deviations_show_are_drawn(void **state)
     destroy(&l);
 }
 
+/* All values are the same and not visible. Voxels beyond a border have a deviation that shows
+ * them. */
+static unsigned deviation_beyond(void *user, int i, int j, int k)
+{
+    const int *border = user;
+    (void)j, (void)k;
+    return i >= *border ? 160 : 0;
+}
+
+static bool unseen_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)i, (void)j, (void)k, (void)gradient;
+    *code = 30000;
+    return true;
+}
+
+/* The frame reads only the bricks beyond the border, and their neighbours. */
+static void bricks_out_of_reach_are_transparent(void **state)
+{
+    (void)state;
+    int border = 80;
+    level_scene l;
+    create(&l, &(contents){ unseen_voxel, deviation_beyond, &border, 16, { 128, 32, 16 } });
+    scene_colour(&l.of, 40000, 65535, 1, 0.5, 0.25, 0.2);
+    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 600, 40, PIXELS);
+    view.ortho_height = 270;
+    trip_settings settings = settings_of_levels();
+    trip_camera camera;
+    trip_plan plan;
+    assert_int_equal(trip_camera_make(&camera, &view, &l.at.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, l.at.data, &camera, &settings, l.at.table, l.at.budget),
+                     0);
+    assert_true(plan.blurs);
+    const trip_list *list = trip_dataset_find(l.at.data, 2, 0, TRIP_KIND_VALUES);
+    const trip_plan_list *planned = &plan.lists[list->index];
+    /* Along z: 8 tiles along i, 2 along j, 2 slabs. The tiles from voxel 80 on, and one more. */
+    assert_int_equal(planned->bricks, 8 * 2 * 2);
+    assert_int_equal(planned->bricks_transparent, 4 * 2 * 2);
+    assert_int_equal(planned->bricks_selected, 4 * 2 * 2);
+    trip_plan_release(&plan, l.at.budget);
+    const even e = { 30000, 160 };
+    const double depth = l.at.table[65535].extinction * share_above(39999.5, &e) * 2 * 15;
+    scene_picture p = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+    const float *seen = scene_pixel(&p, PIXELS / 2 + PIXELS / 4, PIXELS / 2);
+    const float *unseen = scene_pixel(&p, PIXELS / 2 - PIXELS / 4, PIXELS / 2);
+    const float *other = seen[3] > unseen[3] ? unseen : seen;
+    assert_close(seen[3] + unseen[3], 1 - exp(-depth), 0.006);
+    assert_true(other[3] == 0);
+    scene_picture_free(&p);
+    destroy(&l);
+}
+
 /* ---- the same bits ---- */
 
 static void assert_same(const scene_picture *a, const scene_picture *b)
@@ -395,6 +449,7 @@ int main(void)
         cmocka_unit_test(colours_are_weighted_by_extinction),
         cmocka_unit_test(cpu_agrees_with_the_reference),
         cmocka_unit_test(values_that_only_deviations_show_are_drawn),
+        cmocka_unit_test(bricks_out_of_reach_are_transparent),
         cmocka_unit_test(threads_and_tiles_draw_the_same),
         cmocka_unit_test(any_memory_draws_the_same_or_is_reported_as_too_little),
         cmocka_unit_test(instruction_sets_agree),
