@@ -55,9 +55,24 @@
  * linear in the value, or nearly, cpu and gl use a closed form instead, within 0.16/255 of a
  * picture (closed_form.h).
  *
+ * Deviations
+ * ----------
+ * Voxels of a coarse level may have deviations beside their codes: the spread of the voxels below
+ * them (deviation.h). The deviation codes d are interpolated like the codes, and kept within 0 and
+ * 255. A segment has the mean d of the two samples at its planes, wherever it is cut. Blurred by
+ * this deviation, k and k q replace k and k q in the formulas above (blurred_function.h). So thin
+ * or noisy matter keeps its mean extinction. Voxels without a deviation have d = 0.
+ *
+ * The mean of the voxels' opacities along a ray is smaller than the opacity of their mean
+ * extinction. The formula therefore suits matter that is thin in a coarse voxel's length, and
+ * matter that is spread evenly.
+ *
+ * Light does not depend on deviations: a plane surface has a large deviation and a single normal.
+ *
  * Nearest value
  * -------------
- * Values between two labels are no labels. With TRIP_KERNEL_NEAREST the field in a cell is the code
+ * Values between two labels are no labels, and labels have no deviations. With TRIP_KERNEL_NEAREST
+ * the field in a cell is the code
  * of the nearest corner. So each voxel fills a box that ends half-way to its neighbours. A point
  * half-way between two voxels belongs to the voxel with the greater index. A voxel beside a missing
  * one, or at the edge of the grid, has only the part of its box that lies in cells with all

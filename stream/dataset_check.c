@@ -399,7 +399,7 @@ static int check_brick(list_check *c, uint64_t i, uint64_t first_sheet)
     const trip_file_header *h = c->h;
     const trip_file_brick *b = &c->bricks[i];
     uint64_t tile = UINT64_C(1) << h->tile_log2;
-    if (b->reserved)
+    if (b->reserved || (b->deviation_max && !(c->f->planes >> TRIP_PLANE_DEVIATIONS & 1)))
         return fail_brick(c, i, "reserved bytes of a brick are not zero");
     if (b->u_min > b->u_max || b->v_min > b->v_max || b->u_max >= tile || b->v_max >= tile ||
         b->tile_u * tile + b->u_max >= c->f->dims[(c->f->axis + 1) % 3] ||

@@ -121,8 +121,12 @@ static int check_run(list_verifier *v, const run_stream *s)
     if (!kind->is_padded(&s->block))
         return fail_run(v->data, v->list, run, "the padding is not zero");
     kind->unpack(&s->block, 0, run->count, v->voxels);
-    for (uint32_t i = 0; i < run->count; i++)
+    for (uint32_t i = 0; i < run->count; i++) {
         v->beside[i] = s->block.deviations ? s->block.deviations[i] : 0;
+        if (v->beside[i] > v->list->bricks[run->brick].deviation_max)
+            return fail_run(v->data, v->list, run,
+                            "a deviation is larger than the maximum of its brick");
+    }
     if (s->block.normals)
         trip_block_normals(&s->block, 0, run->count, v->beside);
     p[axis] = (uint64_t)run->sheet;

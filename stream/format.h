@@ -126,7 +126,8 @@ typedef struct trip_file_brick {
     uint16_t code_min, code_max;        /* of its records, as 16-bit codes */
     uint8_t u_min, u_max, v_min, v_max; /* tight bounds within the tile, inclusive */
     uint8_t sheet_min, sheet_max;       /* within the slab, inclusive */
-    uint16_t reserved;
+    uint8_t deviation_max;              /* of its records; 0 without the plane */
+    uint8_t reserved;
 } trip_file_brick;
 
 typedef struct trip_file_run {

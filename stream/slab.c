@@ -104,7 +104,8 @@ static void widen(trip_file_brick *b, const uint32_t *voxels, uint32_t count)
 
 TRIP_ALSO_V3 const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u,
                                                   uint32_t tile_v, const uint32_t *voxels,
-                                                  uint32_t count, uint32_t words)
+                                                  const uint32_t *deviations, uint32_t count,
+                                                  uint32_t words)
 {
     trip_slab_brick *b = find(s, sheet, tile_u, tile_v);
     if (!b)
@@ -114,6 +115,9 @@ TRIP_ALSO_V3 const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, 
     s->runs[(size_t)(b - s->bricks) * s->sheets + sheet] =
         (trip_file_run){ (uint16_t)count, (uint16_t)words };
     widen(&b->brick, voxels, count);
+    for (uint32_t i = 0; i < count && deviations; i++)
+        if (deviations[i] > b->brick.deviation_max)
+            b->brick.deviation_max = (uint8_t)deviations[i];
     return &b->brick;
 }
 

@@ -25,10 +25,11 @@ typedef struct trip_slab {
 void trip_slab_init(trip_slab *s, unsigned sheets, trip_budget *budget);
 void trip_slab_free(trip_slab *s);
 /* Adds a run. Runs of a sheet come by ascending tile. Call trip_slab_end_sheet() after the last run
- * of each sheet. `words` is the length of the run's block. Returns the run's brick, or NULL after a
- * reported failure. */
+ * of each sheet. `words` is the length of the run's block. `deviations` is NULL if the list has
+ * none. Returns the run's brick, or NULL after a reported failure. */
 const trip_file_brick *trip_slab_add(trip_slab *s, unsigned sheet, uint32_t tile_u, uint32_t tile_v,
-                                     const uint32_t *voxels, uint32_t count, uint32_t words);
+                                     const uint32_t *voxels, const uint32_t *deviations,
+                                     uint32_t count, uint32_t words);
 void trip_slab_end_sheet(trip_slab *s);
 void trip_slab_clear(trip_slab *s);
 

@@ -420,8 +420,10 @@ static int append_beside(trip_list_writer *l, const uint32_t *beside, uint32_t c
 
 /* Appends a run that is in order. */
 static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint32_t tile_u,
-                      uint32_t tile_v, const uint32_t *voxels, uint32_t count)
+                      uint32_t tile_v, const uint32_t *voxels, const uint32_t *beside,
+                      uint32_t count)
 {
+    const bool deviates = l->planes_present >> TRIP_PLANE_DEVIATIONS & 1;
     uint64_t block[TRIP_BLOCK_WORDS_MAX];
     uint32_t words = trip_kind_of(l->is.kind)->pack(&l->form, voxels, count, block);
     if (words == 0)
@@ -429,8 +431,9 @@ static int append_run(trip_writer *w, trip_list_writer *l, uint32_t sheet, uint3
                          "list %c: records of tile (%u, %u) of sheet %u are out of order, outside "
                          "the tile, or have codes of more than %u bytes",
                          'x' + l->is.axis, tile_u, tile_v, sheet, l->form.code_bytes);
-    const trip_file_brick *b = trip_slab_add(&l->slab, sheet % w->params.slab_sheets, tile_u,
-                                             tile_v, voxels, count, words);
+    const trip_file_brick *b =
+        trip_slab_add(&l->slab, sheet % w->params.slab_sheets, tile_u, tile_v, voxels,
+                      deviates ? beside : NULL, count, words);
     int status = b ? check_bounds(w, l, sheet, b) : TRIP_ERROR;
     if (status == TRIP_OK)
         status = trip_output_append(&l->planes[TRIP_PLANE_VOXELS], block, words * sizeof *block);
@@ -450,7 +453,7 @@ int trip_writer_append(trip_writer *w, unsigned list, uint32_t sheet, uint32_t t
     if (status == TRIP_OK)
         status = enter_sheet(w, l, sheet, trip_morton(tile_u, tile_v));
     if (status == TRIP_OK)
-        status = append_run(w, l, sheet, tile_u, tile_v, voxels, count);
+        status = append_run(w, l, sheet, tile_u, tile_v, voxels, beside, count);
     if (status == TRIP_OK && beside)
         status = append_beside(l, beside, count);
     l->records += count;

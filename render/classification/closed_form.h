@@ -53,6 +53,7 @@ typedef enum trip_closed_form_fault {
     TRIP_CLOSED_FORM_COLOUR,     /* colour is not linear */
     TRIP_CLOSED_FORM_NEAREST,    /* not tried: the nearest value has one code a segment */
     TRIP_CLOSED_FORM_EFFECTS,    /* not tried: frames with effects use tables */
+    TRIP_CLOSED_FORM_BLURRED,    /* not tried: blurred functions are tables (blurred_function.h) */
 } trip_closed_form_fault;
 
 /* Finds the closed form over the codes from `min` to `max` of a table of 65536 entries. `longest`

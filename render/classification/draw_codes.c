@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "deviation.h"
+
 enum { LAST = TRIP_CODES - 1 };
 
 /* Limit of exact codes. Single precision and its products hold them. */
@@ -201,6 +203,16 @@ double trip_draw_code_exact(const trip_draw_codes *d, unsigned stored)
         return 0;
     const double code = LAST * ((trip_codes_value(&d->stored, stored) - d->lo) / (d->hi - d->lo));
     return fmin(FARTHEST, fmax(-FARTHEST, code));
+}
+
+double trip_draw_deviation(const trip_draw_codes *d, unsigned stored, unsigned deviation)
+{
+    if (!d->of_stored || deviation == 0)
+        return deviation;
+    const unsigned before = stored > 0 ? stored - 1 : 0, behind = stored < LAST ? stored + 1 : LAST;
+    const double growth = (trip_draw_code_exact(d, behind) - trip_draw_code_exact(d, before)) /
+                          (double)(behind - before);
+    return fmin(TRIP_DEVIATION_MAX, deviation * sqrt(fmax(0, growth)));
 }
 
 /* ---- tables ---- */

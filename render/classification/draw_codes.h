@@ -64,6 +64,10 @@ static inline trip_code_range trip_draw_codes_range(const trip_draw_codes *d, un
  * 65535]. */
 double trip_draw_code_exact(const trip_draw_codes *d, unsigned stored);
 
+/* Returns the deviation code of a draw code, from the deviation code d of its stored code
+ * (deviation.h). It grows by the draw codes per stored code there, and is at most 255. */
+double trip_draw_deviation(const trip_draw_codes *d, unsigned stored, unsigned deviation);
+
 static inline double trip_draw_value_per_code(const trip_draw_codes *d)
 {
     return (d->hi - d->lo) / (TRIP_CODES - 1);

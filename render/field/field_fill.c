@@ -4,6 +4,7 @@ void trip_field_fill_begin(trip_field_fill *f, const trip_dataset *data,
                            const trip_draw_codes *draw, trip_field *field, unsigned planes)
 {
     f->field = field;
+    f->deviations = NULL;
     f->draw = *draw;
     f->has_normals = planes >> TRIP_PLANE_NORMALS & 1;
     f->header = &data->header;
@@ -17,6 +18,14 @@ static void unpack_gradient(const trip_field_fill *f, uint32_t normal, double gr
         trip_compact_normal_unpack(&f->compact, normal, gradient);
     else
         trip_normal_unpack(normal, f->header->gradient_full, gradient);
+}
+
+static int put_deviation(trip_field_fill *f, const int64_t at[3], const trip_block *block,
+                         uint32_t n)
+{
+    const unsigned d = block->deviations ? block->deviations[n] : 0;
+    return trip_field_put(f->deviations, at,
+                          trip_draw_deviation(&f->draw, trip_voxel_code(f->voxels[n]), d), NULL);
 }
 
 int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_run *run)
@@ -37,6 +46,8 @@ int trip_field_fill_run(trip_field_fill *f, const trip_batch *batch, const trip_
             unpack_gradient(f, f->normals[n], gradient);
         const double code = trip_draw_code_exact(&f->draw, trip_voxel_code(f->voxels[n]));
         status = trip_field_put(f->field, at, code, normals ? gradient : NULL);
+        if (f->deviations && !status)
+            status = put_deviation(f, at, &block, n);
     }
     return status;
 }

@@ -10,6 +10,9 @@
 
 typedef struct trip_field_fill {
     trip_field *field;
+    /* Takes the deviation code of each voxel (deviation.h) in draw codes, if not NULL. The caller
+     * sets it afterwards. Voxels without a deviation have 0. */
+    trip_field *deviations;
     bool has_normals;
     const trip_file_header *header;
     trip_draw_codes draw;

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "blurred_function.h"
 #include "field.h"
 
 /* Maximum number of tiles: 4 bytes each, for a few slabs. */
@@ -43,7 +44,7 @@ static void find_tiles(trip_brick_ranges *r)
 }
 
 void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data,
-                              const trip_draw_codes *draw, int axis, trip_kernel kernel,
+                              const trip_draw_codes *draw, int axis, trip_kernel kernel, bool blurs,
                               trip_budget *budget)
 {
     int sheets = (int)data->header.slab_sheets;
@@ -59,10 +60,13 @@ void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data,
     if (r->across == 0 || r->down > TILES_MAX / r->across)
         return;
     size_t tiles = (size_t)(r->across * r->down);
-    r->bytes = (size_t)r->slabs * tiles * sizeof *r->tiles[0];
+    r->bytes = (size_t)r->slabs * tiles * (sizeof *r->tiles[0] + (blurs ? 1 : 0));
     trip_code_range *memory = trip_budget_take(budget, r->bytes);
     for (int i = 0; i < r->slabs && memory; i++)
         r->tiles[i] = memory + (size_t)i * tiles;
+    uint8_t *deviations = (uint8_t *)(memory ? memory + (size_t)r->slabs * tiles : NULL);
+    for (int i = 0; i < r->slabs && memory && blurs; i++)
+        r->deviations[i] = deviations + (size_t)i * tiles;
 }
 
 void trip_brick_ranges_destroy(trip_brick_ranges *r)
@@ -74,9 +78,9 @@ void trip_brick_ranges_destroy(trip_brick_ranges *r)
     r->tiles[0] = NULL;
 }
 
-static trip_code_range *tile_at(const trip_brick_ranges *r, int layer, int64_t u, int64_t v)
+static int64_t position_of(const trip_brick_ranges *r, int64_t u, int64_t v)
 {
-    return &r->tiles[layer][(v - r->first_v) * r->across + u - r->first_u];
+    return (v - r->first_v) * r->across + u - r->first_u;
 }
 
 static void fill_from(trip_brick_ranges *r, int layer, const trip_list *list, int64_t slab)
@@ -94,7 +98,10 @@ static void fill_from(trip_brick_ranges *r, int layer, const trip_list *list, in
     const trip_file_slab *s = &list->slabs[lo];
     for (uint64_t k = s->first_brick; k < s->first_brick + s->brick_count; k++) {
         const trip_file_brick *b = &list->bricks[k];
-        trip_code_range *tile = tile_at(r, layer, b->tile_u, b->tile_v);
+        const int64_t at = position_of(r, b->tile_u, b->tile_v);
+        trip_code_range *tile = &r->tiles[layer][at];
+        if (r->deviations[layer] && b->deviation_max > r->deviations[layer][at])
+            r->deviations[layer][at] = b->deviation_max;
         *tile = both(*tile, trip_draw_codes_range(r->draw, b->code_min, b->code_max));
     }
 }
@@ -103,6 +110,8 @@ static void fill(trip_brick_ranges *r, int layer, int64_t slab)
 {
     for (int64_t i = 0; i < r->across * r->down; i++)
         r->tiles[layer][i] = nothing;
+    if (r->deviations[layer])
+        memset(r->deviations[layer], 0, (size_t)(r->across * r->down));
     for (unsigned i = 0; i < r->data->list_count; i++)
         if (is_of(r, &r->data->lists[i]))
             fill_from(r, layer, &r->data->lists[i], slab);
@@ -117,6 +126,9 @@ static void move_to(trip_brick_ranges *r, int64_t slab)
         trip_code_range *first = r->tiles[0];
         memmove(r->tiles, r->tiles + 1, (size_t)(r->slabs - 1) * sizeof *r->tiles);
         r->tiles[r->slabs - 1] = first;
+        uint8_t *deviations = r->deviations[0];
+        memmove(r->deviations, r->deviations + 1, (size_t)(r->slabs - 1) * sizeof *r->deviations);
+        r->deviations[r->slabs - 1] = deviations;
         fill(r, r->slabs - 1, slab + r->reach);
     } else {
         for (int i = 0; i < r->slabs; i++)
@@ -136,17 +148,34 @@ static trip_code_range widened(trip_kernel kernel, trip_code_range range)
                               (uint16_t)fmin(65535, ceil(bounds[1])) };
 }
 
+/* Widens the range by the reach of deviations up to d. The weights of kernels of 64 voxels may
+ * enlarge deviations, and a map of codes may enlarge them anywhere. */
+static trip_code_range blurred(const trip_brick_ranges *r, trip_code_range range, unsigned d)
+{
+    const bool bounded = !trip_kernel_is_wide(r->kernel) && !r->draw->of_stored;
+    const double reach = ceil(trip_blurred_reach(bounded ? d : TRIP_DEVIATION_MAX));
+    if (d == 0 || range.min > range.max)
+        return range;
+    return (trip_code_range){ (uint16_t)fmax(0, range.min - reach),
+                              (uint16_t)fmin(65535, range.max + reach) };
+}
+
 trip_code_range trip_brick_ranges_about(trip_brick_ranges *r, uint32_t slab,
                                         const trip_file_brick *brick)
 {
     trip_code_range range = nothing;
+    unsigned deviation = 0;
     if (!r->tiles[0])
         return (trip_code_range){ 0, 65535 };
     move_to(r, slab);
     for (int layer = 0; layer < r->slabs; layer++)
         for (int dv = -1; dv <= 1; dv++)
-            for (int du = -1; du <= 1; du++)
-                range = both(range, *tile_at(r, layer, (int64_t)brick->tile_u + du,
-                                             (int64_t)brick->tile_v + dv));
-    return widened(r->kernel, range);
+            for (int du = -1; du <= 1; du++) {
+                const int64_t at =
+                    position_of(r, (int64_t)brick->tile_u + du, (int64_t)brick->tile_v + dv);
+                range = both(range, r->tiles[layer][at]);
+                if (r->deviations[layer] && r->deviations[layer][at] > deviation)
+                    deviation = r->deviations[layer][at];
+            }
+    return blurred(r, widened(r->kernel, range), deviation);
 }

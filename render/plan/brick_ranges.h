@@ -1,5 +1,6 @@
 /* The range of draw codes in all cells that a brick's voxels touch (sheet.h). It covers the brick
- * and its neighbours, in all lists of voxels and halo along an axis. The plan owns it. */
+ * and its neighbours, in all lists of voxels and halo along an axis. If their deviations blur the
+ * transfer function, the range also covers all codes that these reach. The plan owns it. */
 #ifndef TRIP_BRICK_RANGES_H
 #define TRIP_BRICK_RANGES_H
 
@@ -21,6 +22,7 @@ typedef struct trip_brick_ranges {
     int64_t first_u, first_v, across, down;          /* tiles with bricks, plus one on every side */
     int reach, slabs;                                /* slabs on each side, and in all */
     trip_code_range *tiles[TRIP_BRICK_RANGES_SLABS]; /* [i] is slab middle - reach + i */
+    uint8_t *deviations[TRIP_BRICK_RANGES_SLABS];    /* maxima; NULL if nothing is blurred */
     int64_t middle;
     trip_budget *budget;
     size_t bytes;
@@ -29,7 +31,7 @@ typedef struct trip_brick_ranges {
 /* Prepares the ranges of the level 0 lists along an axis. If memory is too short or tiles are too
  * far apart, every range covers all codes. */
 void trip_brick_ranges_create(trip_brick_ranges *r, const trip_dataset *data,
-                              const trip_draw_codes *draw, int axis, trip_kernel kernel,
+                              const trip_draw_codes *draw, int axis, trip_kernel kernel, bool blurs,
                               trip_budget *budget);
 void trip_brick_ranges_destroy(trip_brick_ranges *r);
 

@@ -362,7 +362,8 @@ static int plan_layer(planning *p, int axis)
 static int plan_sheets(planning *p, int axis)
 {
     trip_brick_ranges about;
-    trip_brick_ranges_create(&about, p->data, &p->plan->draw, axis, p->settings->kernel, p->budget);
+    trip_brick_ranges_create(&about, p->data, &p->plan->draw, axis, p->settings->kernel,
+                             p->plan->blurs, p->budget);
     p->about = &about;
     int status = plan_layer(p, axis);
     p->about = NULL;
@@ -387,9 +388,19 @@ static unsigned planes_of(const trip_dataset *data, const trip_settings *setting
     bool wanted = settings->shading || settings->flatten > 1;
     bool read = wanted && settings->classify == TRIP_CLASSIFY_PRE;
     unsigned normals = read ? 1u << TRIP_PLANE_NORMALS : 0;
-    bool coarse = settings->classify == TRIP_CLASSIFY_POST && trip_settings_has_levels(settings);
+    bool coarse = settings->classify == TRIP_CLASSIFY_POST && trip_settings_has_levels(settings) &&
+                  settings->kernel != TRIP_KERNEL_NEAREST;
     unsigned deviations = coarse ? 1u << TRIP_PLANE_DEVIATIONS : 0;
     return 1u << TRIP_PLANE_VOXELS | (data->header.planes & (normals | deviations));
+}
+
+/* Returns whether a list that the frame may draw has deviations, and the frame reads them. */
+static bool has_deviations(const trip_dataset *data, unsigned planes)
+{
+    bool some = false;
+    for (unsigned i = 0; i < data->list_count; i++)
+        some |= data->lists[i].level == 0 && data->lists[i].planes >> TRIP_PLANE_DEVIATIONS & 1;
+    return some && planes >> TRIP_PLANE_DEVIATIONS & 1;
 }
 
 int trip_plan_check_cells(const trip_dataset *data, const char *instead)
@@ -429,15 +440,16 @@ static void plan_classification(const planning *p)
     trip_classification *c = p->classified;
     const bool effects = trip_effects_some(&p->settings->effects);
     const bool nearest = p->settings->kernel == TRIP_KERNEL_NEAREST;
-    if (effects || nearest)
+    if (effects || nearest || plan->blurs)
         trip_classification_codes(c, p->data, p->settings->kernel);
     else
         trip_classification_form(c, p->data, p->settings->kernel, p->table);
     plan->code_min = c->code_min;
     plan->code_max = c->code_max;
-    plan->not_closed = effects   ? TRIP_CLOSED_FORM_EFFECTS
-                       : nearest ? TRIP_CLOSED_FORM_NEAREST
-                                 : c->not_closed;
+    plan->not_closed = effects       ? TRIP_CLOSED_FORM_EFFECTS
+                       : nearest     ? TRIP_CLOSED_FORM_NEAREST
+                       : plan->blurs ? TRIP_CLOSED_FORM_BLURRED
+                                     : c->not_closed;
     plan->closed = c->closed;
 }
 
@@ -488,6 +500,7 @@ int trip_plan_make_next(trip_plan *plan, const trip_dataset *data, const trip_ca
                          .coordinates = &data->coordinates,
                          .planes = planes_of(data, settings),
                          .draw = draw_codes_of(data, interpolates ? classified->draw : NULL) };
+    plan->blurs = has_deviations(data, plan->planes);
     place_whole_clip(plan, data, camera, settings);
     int status = trip_settings_check(settings);
     if (!status)
@@ -713,6 +726,7 @@ static void explain_classification(const trip_plan *plan, const trip_settings *s
         [TRIP_CLOSED_FORM_COLOUR] = "colours are not linear in the value",
         [TRIP_CLOSED_FORM_NEAREST] = "values are not interpolated",
         [TRIP_CLOSED_FORM_EFFECTS] = "frames with effects always do so",
+        [TRIP_CLOSED_FORM_BLURRED] = "deviations of coarse values blur the function",
     };
     const double *k = plan->closed.k;
     if (plan->gathers || s->classify != TRIP_CLASSIFY_POST)

@@ -63,7 +63,10 @@ typedef struct trip_plan {
     unsigned planes;                     /* the planes to read, a bit per trip_plane */
     /* The codes that the frame interpolates. Splats have the stored codes. */
     trip_draw_codes draw;
-    /* Post only: see classification.h. Frames with effects have no closed form. */
+    /* Post only: coarse values have deviations, which blur the function (blurred_function.h). */
+    bool blurs;
+    /* Post only: see classification.h. Frames with effects or a blurred function have no closed
+     * form. */
     unsigned code_min, code_max;
     trip_closed_form_fault not_closed;
     trip_closed_form closed; /* set if not_closed is TRIP_CLOSED_FORM_FOUND */

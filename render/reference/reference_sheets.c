@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "blurred_function.h"
 #include "emission.h"
 #include "field_fill.h"
 #include "light_map.h"
@@ -17,12 +18,27 @@ struct trip_reference_sheets {
     const trip_coordinates *coordinates;
     double value_per_code, gradient_full;
     double early_termination;
-    trip_field *field; /* gradients are in index space, codes per index; or of outlines */
+    trip_field *field;      /* gradients are in index space, codes per index; or of outlines */
+    trip_field *deviations; /* of the voxels as codes (deviation.h); NULL if nothing is blurred */
     bool nearest, has_gradients;
     trip_field_fill fill;
     trip_segments segments;
+    trip_blurred_function blurred;
     trip_effects_view effects;
 };
+
+/* Takes the memory that blurring needs, and blurs the function. */
+static int begin_blurring(trip_reference_sheets *s, const int64_t dims[3])
+{
+    int status = trip_field_create(&s->deviations, dims, s->budget);
+    if (status)
+        return status;
+    s->fill.deviations = s->deviations;
+    if (trip_blurred_function_create(&s->blurred, s->frame->table, s->budget))
+        return 0;
+    return trip_fail(TRIP_ERROR, "render", "reference renderer",
+                     "the blurred transfer function does not fit the memory given; raise --memory");
+}
 
 int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *frame,
                                  trip_budget *budget)
@@ -46,12 +62,16 @@ int trip_reference_sheets_create(trip_reference_sheets **out, const trip_frame *
                    : trip_shade_gradient_full(h, frame->settings, frame->camera->voxel_world,
                                               frame->plan->level);
     int status = trip_field_create(&s->field, dims, budget);
+    if (!status) {
+        trip_field_fill_begin(&s->fill, data, &frame->plan->draw, s->field,
+                              1u << TRIP_PLANE_VOXELS);
+        status = frame->plan->blurs ? begin_blurring(s, dims) : 0;
+    }
     if (status) {
         trip_reference_sheets_destroy(s);
         *out = NULL;
         return status;
     }
-    trip_field_fill_begin(&s->fill, data, &frame->plan->draw, s->field, 1u << TRIP_PLANE_VOXELS);
     trip_segments_make(&s->segments, frame->table);
     s->effects = trip_effects_view_make(frame->settings, frame->camera, h->dims);
     trip_light_map_view(frame->light, &s->effects);
@@ -65,6 +85,9 @@ void trip_reference_sheets_destroy(trip_reference_sheets *s)
     if (!s)
         return;
     trip_field_destroy(s->field);
+    trip_field_destroy(s->deviations);
+    if (s->blurred.entries)
+        trip_blurred_function_destroy(&s->blurred, s->budget);
     trip_budget_release(s->budget, s, sizeof *s);
 }
 
@@ -137,11 +160,12 @@ typedef struct passage {
     double layer[TRIP_CHANNELS_MAX];
 } passage;
 
-/* A sample: the voxels it is interpolated from, their weights, and the code. */
+/* A sample: the voxels it is interpolated from, their weights, the code, and the code of the
+ * deviation. */
 typedef struct position {
     trip_field_cell cell;
     double weights[64];
-    double code;
+    double code, deviation;
 } position;
 
 static trip_vec3 point_at(const passage *p, double t)
@@ -171,8 +195,8 @@ static void set_weights(trip_kernel kernel, position *at, trip_vec3 point)
 
 /* Finds the corners of a cell. For a sample at a sheet it takes the four corners there twice.
  * Returns false if one is missing. */
-static bool take_corners(const passage *p, const int64_t cell[3], double coordinate,
-                         trip_field_cell *out)
+static bool take_corners(const passage *p, const trip_field *field, const int64_t cell[3],
+                         double coordinate, trip_field_cell *out)
 {
     const bool at_sheet = coordinate == floor(coordinate);
     memcpy(out->at, cell, sizeof out->at);
@@ -180,25 +204,41 @@ static bool take_corners(const passage *p, const int64_t cell[3], double coordin
     for (int n = 0; n < 8; n++) {
         int64_t at[3] = { cell[0] + (n & 1), cell[1] + (n >> 1 & 1), cell[2] + (n >> 2) };
         at[p->axis] = at_sheet ? (int64_t)coordinate : at[p->axis];
-        out->voxels[n] = trip_field_at(p->s->field, at[0], at[1], at[2]);
+        out->voxels[n] = trip_field_at(field, at[0], at[1], at[2]);
         if (!out->voxels[n])
             return false;
     }
     return true;
 }
 
-/* Interpolates the code of a sample. Returns false if a voxel is missing. */
+static bool take_cell(const passage *p, const trip_field *field, const int64_t cell[3],
+                      double coordinate, trip_field_cell *out)
+{
+    const trip_kernel kernel = p->s->frame->settings->kernel;
+    return kernel != TRIP_KERNEL_LINEAR ? trip_field_take_cell(field, kernel, cell, out)
+                                        : take_corners(p, field, cell, coordinate, out);
+}
+
+static double weighted(const trip_field_cell *cell, const double weights[64])
+{
+    double sum = 0;
+    for (int n = 0; n < cell->edge * cell->edge * cell->edge; n++)
+        sum += weights[n] * cell->voxels[n]->code;
+    return sum;
+}
+
+/* Interpolates the code of a sample and of its deviation. Returns false if a voxel is missing. */
 static bool interpolate(const passage *p, const int64_t cell[3], trip_vec3 point, double coordinate,
                         position *at)
 {
-    const trip_kernel kernel = p->s->frame->settings->kernel;
-    if (kernel != TRIP_KERNEL_LINEAR ? !trip_field_take_cell(p->s->field, kernel, cell, &at->cell)
-                                     : !take_corners(p, cell, coordinate, &at->cell))
+    trip_field_cell deviations;
+    if (!take_cell(p, p->s->field, cell, coordinate, &at->cell))
         return false;
-    set_weights(kernel, at, point);
-    at->code = 0;
-    for (int n = 0; n < at->cell.edge * at->cell.edge * at->cell.edge; n++)
-        at->code += at->weights[n] * at->cell.voxels[n]->code;
+    set_weights(p->s->frame->settings->kernel, at, point);
+    at->code = weighted(&at->cell, at->weights);
+    at->deviation = 0;
+    if (p->s->deviations && take_cell(p, p->s->deviations, cell, coordinate, &deviations))
+        at->deviation = fmin(TRIP_DEVIATION_MAX, fmax(0, weighted(&deviations, at->weights)));
     return true;
 }
 
@@ -277,11 +317,20 @@ static double code_at(const position ends[2], double t0, double t1, double t)
     return t == t0 ? a : t == t1 ? b : a + (b - a) * ((t - t0) / (t1 - t0));
 }
 
+/* Classifies a part of a segment with the code from `a` to `b`. */
+static trip_segment classify(const trip_reference_sheets *s, const position ends[2], double a,
+                             double b)
+{
+    const double deviation = 0.5 * (ends[0].deviation + ends[1].deviation);
+    return s->deviations ? trip_blurred_segment_of(&s->blurred, &s->segments, a, b, deviation)
+                         : trip_segment_of(&s->segments, a, b);
+}
+
 /* Adds the part of a ray between `from` and `to` with the code from `a` to `b`. Returns false once
  * the pixel takes no more. */
 static bool add_part(passage *p, const position ends[2], double a, double b, double from, double to)
 {
-    trip_segment segment = trip_segment_of(&p->s->segments, a, b);
+    trip_segment segment = classify(p->s, ends, a, b);
     double own[3];
     if (!(segment.extinction > 0))
         return true;

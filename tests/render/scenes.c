@@ -138,9 +138,9 @@ static uint32_t even_bits(uint32_t morton)
     return u;
 }
 
-/* Gathers the voxels of one tile of a sheet in Morton order. */
+/* Gathers the voxels of one tile of a sheet in Morton order, and their normals or deviations. */
 static uint32_t gather_run(const writing *w, unsigned number, int sheet, uint32_t tile_u,
-                           uint32_t tile_v, uint32_t *voxels, uint32_t *normals)
+                           uint32_t tile_v, uint32_t *voxels, uint32_t *beside)
 {
     const trip_writer_list *list = &w->lists[number];
     const scene_part *part = &w->parts[number / 3];
@@ -159,27 +159,29 @@ static uint32_t gather_run(const writing *w, unsigned number, int sheet, uint32_
         if (part->voxel && !part->voxel(part->user, at[0], at[1], at[2], &code, gradient))
             continue;
         voxels[count] = trip_voxel_pack(u, v, code);
-        normals[count++] = pack_normal(w, gradient);
+        beside[count++] = part->deviation ? part->deviation(part->user, at[0], at[1], at[2])
+                                          : pack_normal(w, gradient);
     }
     return count;
 }
 
 static void append_sheet(const writing *w, unsigned number, int sheet)
 {
-    static uint32_t voxels[128 * 128], normals[128 * 128];
+    static uint32_t voxels[128 * 128], beside[128 * 128];
     const trip_writer_list *list = &w->lists[number];
     int64_t tile = w->params.tile_voxels;
     uint32_t tiles_u = (uint32_t)((list->dims[(list->axis + 1) % 3] + tile - 1) / tile);
     uint32_t tiles_v = (uint32_t)((list->dims[(list->axis + 2) % 3] + tile - 1) / tile);
-    bool has_normals = w->params.normal_bytes && list->kind == TRIP_KIND_VOXELS;
+    const bool has_beside = (w->params.normal_bytes && list->kind == TRIP_KIND_VOXELS) ||
+                            w->parts[number / 3].deviation;
     for (uint32_t m = 0; m < 64 * 64; m++) {
         uint32_t tile_u = even_bits(m), tile_v = even_bits(m >> 1);
         if (tile_u >= tiles_u || tile_v >= tiles_v)
             continue;
-        uint32_t count = gather_run(w, number, sheet, tile_u, tile_v, voxels, normals);
+        uint32_t count = gather_run(w, number, sheet, tile_u, tile_v, voxels, beside);
         if (count)
             assert_int_equal(trip_writer_append(w->writer, number, (uint32_t)sheet, tile_u, tile_v,
-                                                voxels, has_normals ? normals : NULL, count),
+                                                voxels, has_beside ? beside : NULL, count),
                              0);
     }
 }
@@ -190,6 +192,9 @@ static void write_dataset(const scene *s, const scene_params *p)
     set_params(&w, p);
     set_lists(&w, p);
     assert_int_equal(trip_writer_open(&w.writer, s->path, &w.params, s->budget), 0);
+    for (unsigned i = 0; i < p->part_count; i++)
+        if (p->parts[i].deviation)
+            assert_int_equal(trip_writer_add_deviations(w.writer), 0);
     for (unsigned i = 0; i < w.params.list_count; i++)
         for (int sheet = 0; sheet < w.lists[i].dims[w.lists[i].axis]; sheet++)
             append_sheet(&w, i, sheet);

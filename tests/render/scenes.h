@@ -28,6 +28,9 @@ typedef struct scene_part {
     int by[3]; /* length of this level's voxels in voxels of level 0; divides dims */
     scene_voxel voxel;
     void *user;
+    /* Returns the deviation code of a voxel of values (deviation.h). NULL stores no deviations; all
+     * parts of values then have none. */
+    unsigned (*deviation)(void *user, int i, int j, int k);
 } scene_part;
 
 typedef struct scene_params {

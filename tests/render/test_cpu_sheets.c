@@ -518,10 +518,46 @@ static void check_between(const trip_cpu_kernels *k, int w, bool gradients, uint
         }
 }
 
+static trip_cpu_deviations deviations[3];
+
+static void fill_deviations(void)
+{
+    for (int b = 0; b < 3; b++)
+        for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++)
+            deviations[b][i] =
+                (int16_t)(scene_hash(i, b, 11) % (255 * TRIP_CPU_DEVIATION_PARTS + 1)) *
+                (i / 500 % 2);
+}
+
+static void check_deviations(const trip_cpu_kernels *k, int w, uint64_t squares)
+{
+    static trip_cpu_deviations between_both;
+    uint8_t rows[64];
+    memcpy(between_both, deviations[2], sizeof between_both);
+    k->sheet_deviations_between(deviations[0], deviations[1], squares, w << 16 | (16384 - w),
+                                between_both);
+    k->sheet_rows(deviations[0], squares, rows);
+    for (int v = 0; v <= 64; v++)
+        for (int u = 0; u <= 64; u++) {
+            const int square = (v < 64 ? v / 8 : 7) * 8 + (u < 64 ? u / 8 : 7);
+            const int i = v * TRIP_CPU_RASTER_STRIDE + u;
+            const int64_t expected = between(deviations[0][i], deviations[1][i], w);
+            assert_int_equal(between_both[i], squares >> square & 1 ? expected : deviations[2][i]);
+        }
+    for (int square = 0; square < 64; square++) {
+        double max = 0;
+        for (int i = 0; i < 81 && squares >> square & 1; i++)
+            max = fmax(max, deviations[0][(square / 8 * 8 + i / 9) * TRIP_CPU_RASTER_STRIDE +
+                                          square % 8 * 8 + i % 9]);
+        assert_int_equal(rows[square], (int)ceil(max * 32 / (255 * TRIP_CPU_DEVIATION_PARTS)));
+    }
+}
+
 static void kernels_prepare_sheets_like_plain_code(void **state)
 {
     (void)state;
     fill_rasters();
+    fill_deviations();
     for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
         check_ranges(*isa, UINT64_MAX);
         check_ranges(*isa, UINT64_C(0x8040201008040281));
@@ -533,6 +569,8 @@ static void kernels_prepare_sheets_like_plain_code(void **state)
         check_between(*isa, 8192, true, UINT64_MAX);
         check_between(*isa, 5461, true, UINT64_C(0x8040201008040281));
         check_between(*isa, 0, false, UINT64_MAX);
+        check_deviations(*isa, 8192, UINT64_MAX);
+        check_deviations(*isa, 5461, UINT64_C(0x8040201008040281));
     }
 }
 

@@ -153,10 +153,10 @@ def runs(index, header, a_list):
         bricks = []
         for b in range(first_brick, first_brick + brick_count):
             brick_at = a_list["bricks_offset"] + 24 * b
-            brick = struct.unpack_from("<3I2H6BH", index, brick_at)
+            brick = struct.unpack_from("<3I2H8B", index, brick_at)
             runs_at = a_list["runs_offset"] + 4 * sheets * b
             numbers = struct.unpack_from(f"<{2 * sheets}H", index, runs_at)
-            if sum(numbers[::2]) != brick[2] or brick[11]:
+            if sum(numbers[::2]) != brick[2] or brick[12]:
                 fail("index.trip", brick_at, "brick")
             bricks.append((brick[0], brick[1], numbers[::2], numbers[1::2]))
         codes = [morton(u, v) for u, v, _, _ in bricks]

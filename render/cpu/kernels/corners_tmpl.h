@@ -76,9 +76,8 @@ typedef struct four_corners {
     wide top, bottom;
 } four_corners;
 
-INLINE four_corners corners_from(const trip_cpu_group *g, vi at)
+INLINE four_corners corners_from(const int16_t *pool, vi at)
 {
-    const int16_t *pool = (const int16_t *)g->pool;
     int32_t positions[V];
     vi_store(positions, at);
     return (four_corners){ two_codes(pool, positions),
@@ -89,12 +88,20 @@ INLINE four_corners corners_from(const trip_cpu_group *g, vi at)
 INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi at, sample *s)
 {
     const halves missing = (halves){ 0 } + TRIP_CPU_CODE_MISSING;
-    const four_corners c = corners_from(g, at);
+    const four_corners c = corners_from((const int16_t *)g->pool, at);
     vi sum =
         (vi)WIDE(madd_epi16)(c.top, (wide)s->top) + (vi)WIDE(madd_epi16)(c.bottom, (wide)s->bottom);
     wide min = WIDE(min_epi16)(c.top, c.bottom); /* TRIP_CPU_CODE_MISSING if any is missing */
     s->there = vi_is_0((vi)((halves)min == missing));
     s->index = index_of(in, sum);
+}
+
+/* Interpolates the deviations of the samples. */
+INLINE void find_deviations(const trip_cpu_group *g, sample *s)
+{
+    const four_corners c = corners_from(g->deviations[0], s->deviation_at);
+    s->deviation =
+        (vi)WIDE(madd_epi16)(c.top, (wide)s->top) + (vi)WIDE(madd_epi16)(c.bottom, (wide)s->bottom);
 }
 
 /* Pairs the gradients of two neighbouring corners: both components along u, both along v, both
@@ -165,6 +172,16 @@ INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi
     }
     s->there = vi_is_0(lack);
     s->index = index_of(in, sum);
+}
+
+INLINE void find_deviations(const trip_cpu_group *g, sample *s)
+{
+    for (int i = 0; i < V; i++) {
+        const int16_t *top = g->deviations[0] + s->deviation_at[i],
+                      *bottom = top + TRIP_CPU_RASTER_STRIDE;
+        s->deviation[i] =
+            of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
+    }
 }
 
 INLINE void find_gradients(const trip_cpu_group *g, sample *s)

@@ -51,6 +51,11 @@ typedef struct trip_cpu_voxels {
     trip_cpu_gradient gradients[TRIP_CPU_RASTER_VOXELS]; /* undefined for missing voxels */
 } trip_cpu_voxels;
 
+/* The deviation codes of a raster (deviation.h), times TRIP_CPU_DEVIATION_PARTS. They exist only in
+ * frames that blur the function, and are undefined for missing voxels. */
+typedef int16_t trip_cpu_deviations[TRIP_CPU_RASTER_VOXELS];
+#define TRIP_CPU_DEVIATION_PARTS 128
+
 /* An index of a code in a pool of rasters must fit 32 bits. */
 #define TRIP_CPU_RASTERS_MAX (INT32_MAX / (int32_t)(sizeof(trip_cpu_voxels) / sizeof(int16_t)))
 
@@ -139,12 +144,29 @@ typedef struct trip_cpu_integrals {
     trip_cpu_closed_form closed;
 } trip_cpu_integrals;
 
+/* The integrals of a blurred function (blurred_function.h), row after row. Row 0 is the function
+ * itself. The layout of a row lets kernels read it like four integrals. */
+typedef struct trip_cpu_blurred_row {
+    int32_t first;    /* the entry of code 0 */
+    int32_t log2;     /* log2 of the codes from one entry to the next */
+    int32_t half;     /* half of an entry's codes, times TRIP_CPU_CODE_PARTS */
+    float extinction; /* extinction per voxel_world for one unit of sums[0] */
+} trip_cpu_blurred_row;
+
+typedef struct trip_cpu_blurred {
+    trip_cpu_blurred_row *rows;   /* NULL if nothing is blurred */
+    int32_t (*sums)[4], (*at)[4]; /* as in trip_cpu_integrals; each row has a unit of its own */
+} trip_cpu_blurred;
+
+#define TRIP_CPU_BLURRED_ROWS 33
+
 /* Maximum number of segments in a group. A group has one sample plane more than segments. */
 #define TRIP_CPU_SEGMENTS 64
 
 typedef struct trip_cpu_group {
     trip_cpu_voxels *pool;
-    int64_t first_u, first_v; /* voxel at the corner of the grid of rasters */
+    trip_cpu_deviations *deviations; /* of the pool's rasters; NULL if nothing is blurred */
+    int64_t first_u, first_v;        /* voxel at the corner of the grid of rasters */
     int32_t across, down;
     unsigned segments;
     trip_cpu_sample samples[TRIP_CPU_SEGMENTS + 1]; /* in draw order */
@@ -167,6 +189,7 @@ typedef struct trip_cpu_group {
 typedef struct trip_cpu_sheet_view {
     const struct trip_frame *of;
     const trip_cpu_integrals *integrals;
+    const trip_cpu_blurred *blurred;
     const trip_coordinates *coordinates; /* NULL with even spacing */
     int axis;
     trip_kernel kernel;

@@ -353,9 +353,17 @@ typedef struct trip_cpu_kernels {
     void (*sheet_outlines)(trip_cpu_voxels *raster, uint64_t squares, const trip_cpu_voxels *left,
                            const trip_cpu_voxels *above, const trip_cpu_voxels *sheet_before,
                            const trip_cpu_voxels *sheet_behind);
+    /* Does the work of sheet_between() for deviations. */
+    void (*sheet_deviations_between)(const int16_t *from, const int16_t *to, uint64_t squares,
+                                     int32_t weights, int16_t *out);
+    /* Finds the row of the blurred function, 0 to 32, that suffices for all voxels of each square.
+     * Other squares get 0. */
+    void (*sheet_rows)(const int16_t *deviations, uint64_t squares, uint8_t out[64]);
     /* sheet_pane_closed is for segments in closed form (closed_form.h), sheet_pane_effects for
-     * frames with effects, sheet_pane_nearest for the nearest value. */
-    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed, *sheet_pane_effects, *sheet_pane_nearest;
+     * frames with effects, sheet_pane_nearest for the nearest value, and sheet_pane_blurred for
+     * blurred functions, with or without effects. */
+    trip_cpu_sheet_kernel *sheet_pane, *sheet_pane_closed, *sheet_pane_effects, *sheet_pane_nearest,
+        *sheet_pane_blurred;
 } trip_cpu_kernels;
 
 #endif

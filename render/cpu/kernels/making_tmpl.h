@@ -75,6 +75,10 @@ static void make(const trip_cpu_group *g, const trip_cpu_making *m, bool gradien
     }
     sheet_between(raster_of(g, m->from->rasters, at), raster_of(g, m->to->rasters, at), squares,
                   m->weights, gradients, raster);
+    if (TRIP_CPU_BLURRED)
+        sheet_deviations_between(g->deviations[m->from->rasters[at]],
+                                 g->deviations[m->to->rasters[at]], squares, m->weights,
+                                 g->deviations[m->rasters[at]]);
 }
 
 static void make_squares(const trip_cpu_group *g, const trip_cpu_making *m, bool gradients,

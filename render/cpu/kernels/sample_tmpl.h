@@ -411,6 +411,38 @@ INLINE void squares_between(const trip_cpu_voxels *from, const trip_cpu_voxels *
     }
 }
 
+/* Interpolates the deviations of squares as squares_between() interpolates codes. */
+static __attribute__((noinline)) void sheet_deviations_between(const int16_t *from,
+                                                               const int16_t *to, uint64_t squares,
+                                                               int32_t weights, int16_t *out)
+{
+    const int last = TRIP_CPU_SQUARES_ACROSS - 1;
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        const int square = __builtin_ctzll(rest);
+        const int rows = square / TRIP_CPU_SQUARES_ACROSS == last ? 9 : 8;
+        int at = square_first(square);
+        for (int row = 0; row < rows; row++, at += TRIP_CPU_RASTER_STRIDE) {
+            vh_store(out + at, mean_or_between(vh_load(from + at), vh_load(to + at), weights));
+            if (square % TRIP_CPU_SQUARES_ACROSS == last)
+                out[at + 8] = number_between(from[at + 8], to[at + 8], weights);
+        }
+    }
+}
+
+static void sheet_rows(const int16_t *deviations, uint64_t squares, uint8_t out[64])
+{
+    enum { UNIT = 255 * TRIP_CPU_DEVIATION_PARTS, LAST = TRIP_CPU_BLURRED_ROWS - 1 };
+    memset(out, 0, 64);
+    for (uint64_t rest = squares; rest; rest &= rest - 1) {
+        const int square = __builtin_ctzll(rest);
+        const int16_t *at = deviations + square_first(square);
+        vh max = vh_set(0);
+        for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE)
+            max = vh_max(max, vh_max(vh_load(at), vh_load(at + 1)));
+        out[square] = (uint8_t)(((int16_t)~vh_lowest(~max) * LAST + UNIT - 1) / UNIT);
+    }
+}
+
 static __attribute__((noinline)) void sheet_between(const trip_cpu_voxels *from,
                                                     const trip_cpu_voxels *to, uint64_t squares,
                                                     int32_t weights, bool gradients,

@@ -78,6 +78,9 @@ INLINE bool is_uneven(const pane_path *path)
 /* A kernel of its own draws the nearest value. So the other kernels cost no extra instruction. */
 #define NEAREST TRIP_CPU_NEAREST
 
+/* A kernel of its own draws blurred functions, for the same reason. */
+#define BLURRED TRIP_CPU_BLURRED
+
 /* Only the plain kernels sample with 64 voxels, so that linear sampling costs no extra instruction.
  */
 INLINE bool is_wide(const trip_cpu_group *g)
@@ -733,7 +736,8 @@ typedef struct wide_position {
 } wide_position;
 
 /* The samples of the rays at a sample plane. `index` is the entry of the transfer function's
- * integrals nearest to the code. With TRIP_CPU_CLOSED it is the biased code times 2^WEIGHT_LOG2.
+ * integrals nearest to the code. With TRIP_CPU_CLOSED and with TRIP_CPU_BLURRED it is the biased
+ * code times 2^WEIGHT_LOG2.
  * Gradients and sums are computed from the other fields on demand. */
 typedef struct sample {
     vi index;
@@ -741,6 +745,8 @@ typedef struct sample {
     vi top, bottom;      /* weights of two corners, the right one's in the higher 16 bits */
     vi gradient_at;      /* offset of the first corner's gradient in the pool, in 16-bit numbers */
     vi gradient[3];      /* times 2^WEIGHT_LOG2 */
+    vi deviation;        /* its code times 2^WEIGHT_LOG2 TRIP_CPU_DEVIATION_PARTS, if blurred */
+    vi deviation_at;     /* offset of the first corner's deviation, if blurred */
     vi sums[4];          /* the integrals at the entry */
     bool lit, summed;    /* `gradient` is valid; `sums` is valid */
     int32_t near[2];     /* uneven spacing: start of the search in index_near() */
@@ -794,14 +800,22 @@ INLINE vi raster_starts(const trip_cpu_group *g, const int32_t *rasters, const v
     return vi_load(starts);
 }
 
+/* Returns the offset of a raster's deviations from the offset of its codes, in 16-bit numbers. */
+INLINE int32_t deviations_from(int32_t raster)
+{
+    return raster / RASTER_NUMBERS * TRIP_CPU_RASTER_VOXELS;
+}
+
 /* Returns the offsets of the first corners' codes in the pool, in 16-bit numbers, and sets
- * gradient_at. With uneven spacing it also sets the weights. If `beyond`, rays may be beyond a side
- * of the grid. */
+ * gradient_at and deviation_at. With uneven spacing it also sets the weights. If `beyond`, rays may
+ * be beyond a side of the grid. */
 INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const patch_path *area,
                          unsigned n, bool beyond, const corners *c, sample *s)
 {
     if (area->raster[n] >= 0) {
         vi in = c->whole[1] * TRIP_CPU_RASTER_STRIDE + c->whole[0] + area->within[n];
+        if (BLURRED)
+            s->deviation_at = in + deviations_from(area->raster[n]);
         s->gradient_at = in * 3 + (area->raster[n] + GRADIENTS_FROM);
         return in + area->raster[n];
     }
@@ -816,6 +830,8 @@ INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const p
         find_cells(g, path, n, c, whole);
     }
     vi in = position_in_raster(whole), from = raster_starts(g, g->samples[n].rasters, whole);
+    for (int i = 0; i < V && BLURRED; i++)
+        s->deviation_at[i] = in[i] + deviations_from(from[i]);
     s->gradient_at = from + (in * 3 + GRADIENTS_FROM);
     return from + in;
 }
@@ -824,7 +840,7 @@ INLINE vi find_positions(const trip_cpu_group *g, const pane_path *path, const p
 INLINE vi index_of(const trip_cpu_integrals *in, vi code)
 {
     const int log2 = WEIGHT_LOG2 + in->entry_log2;
-    if (TRIP_CPU_CLOSED)
+    if (TRIP_CPU_CLOSED || BLURRED)
         return code;
     return ((code + (1 << (log2 - 1))) >> log2) + (TRIP_CPU_CODE_BIAS >> in->entry_log2);
 }
@@ -840,6 +856,8 @@ INLINE void sample_at(const trip_cpu_group *g, const trip_cpu_integrals *in, con
         move_inside(path, n, &c);
     set_weights(c.part, s);
     find_codes(g, in, find_positions(g, path, area, n, beyond, &c, s), s);
+    if (BLURRED)
+        find_deviations(g, s);
     s->lit = s->summed = false;
 }
 
@@ -861,10 +879,10 @@ typedef struct medium {
 } medium;
 
 /* Replaces the sums by the transfer function's values where both ends have the same entry. */
-INLINE void use_entries_alone(const trip_cpu_integrals *in, vi index, vm same, vi sums[4])
+INLINE void use_entries_alone(int32_t (*entries)[4], vi index, vm same, vi sums[4])
 {
     vi at[4];
-    find_rows(in->at, index, at);
+    find_rows(entries, index, at);
     for (int k = 0; k < 4; k++)
         sums[k] = (vi)v_select(same, (vf)at[k], (vf)sums[k]);
 }
@@ -892,7 +910,7 @@ INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
         sums[k] = b->sums[k] - a->sums[k];
     vf over = v_from_int(entries);
     if (vm_any(same)) {
-        use_entries_alone(in, a->index, same, sums);
+        use_entries_alone(in->at, a->index, same, sums);
         over = v_select(same, v_set(1), over);
     }
     vf extinction = v_from_int(sums[0]);
@@ -908,6 +926,61 @@ INLINE medium classified(const trip_cpu_integrals *in, sample *a, sample *b)
         s.rgb[k] = v_from_int(sums[k + 1]) * per_extinction;
     s.extinction =
         v_select(some, extinction * (inverse * extinction) * v_set(in->extinction), v_set(0));
+    return s;
+}
+
+/* Returns the entries of rows nearest to a biased code times 2^WEIGHT_LOG2. */
+INLINE vi entries_of(const vi row[4], vi code)
+{
+    const vi bias = (vi){ 0 } + TRIP_CPU_CODE_BIAS;
+    return row[0] + ((code + row[2]) >> (row[1] + WEIGHT_LOG2)) + (bias >> row[1]);
+}
+
+/* Adds the means of rows over a segment from code a to code b, weighted by `share`: extinction, and
+ * extinction times each colour. */
+INLINE void add_row(const trip_cpu_blurred *f, vi number, vf share, vi a, vi b, vf means[4])
+{
+    vi row[4], first[4], last[4];
+    find_rows((int32_t(*)[4])(uintptr_t)f->rows, number, row);
+    const vi from = entries_of(row, a), to = entries_of(row, b), entries = to - from;
+    const vm same = vi_is_0(entries);
+    vf over = v_from_int(entries);
+    find_rows(f->sums, from, first);
+    find_rows(f->sums, to, last);
+    for (int k = 0; k < 4; k++)
+        last[k] = last[k] - first[k];
+    if (vm_any(same)) {
+        use_entries_alone(f->at, from, same, last);
+        over = v_select(same, v_set(1), over);
+    }
+    const vf unit = share * ((vf)row[3] / over);
+    for (int k = 0; k < 4; k++)
+        means[k] = v_fma(unit, v_from_int(last[k]), means[k]);
+}
+
+/* Classifies a segment by the blurred function, with the mean deviation of samples a and b. The
+ * ends of the segment are `first` and `last`. A row without weight adds exactly nothing. */
+INLINE medium classified_blurred(const trip_cpu_blurred *f, vm open, const sample *a,
+                                 const sample *b, const sample *first, const sample *last)
+{
+    const float rows = TRIP_CPU_BLURRED_ROWS - 1;
+    const float unit = rows / (2.0f * 255 * TRIP_CPU_DEVIATION_PARTS * (1 << WEIGHT_LOG2));
+    const vf none = v_set(0), one = v_set(1);
+    vf at = v_from_int(a->deviation + b->deviation) * v_set(unit);
+    at = v_select(open, v_min(v_max(at, none), v_set(rows)), none);
+    const vi row = vi_lesser(v_truncate(at), (vi){ 0 } + (TRIP_CPU_BLURRED_ROWS - 2));
+    const vf share = at - v_from_int(row);
+    const vi from = (vi)v_select(open, (vf)first->index, none);
+    const vi to = (vi)v_select(open, (vf)last->index, none);
+    vf means[4] = { none, none, none, none };
+    add_row(f, row, one - share, from, to, means);
+    if (vm_any(v_gt(share, none)))
+        add_row(f, row + 1, share, from, to, means);
+    const vm some = v_gt(means[0], none);
+    const vf inverse = one / v_select(some, means[0], one);
+    medium s = { .extinction = v_select(some, means[0], none) };
+    for (int k = 0; k < 3; k++)
+        s.rgb[k] = means[1 + k] * inverse;
     return s;
 }
 
@@ -1126,7 +1199,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
                               sample *a, sample *b, const remnant *box, vf pixel[CHANNELS])
 {
     vm open = vm_and(vm_and(a->there, b->there), v_gt(pixel[3], v_set(0)));
-    open = vm_and(open, TRIP_CPU_CLOSED || NEAREST
+    open = vm_and(open, TRIP_CPU_CLOSED || NEAREST || BLURRED
                             ? l->along
                             : vm_and(l->along, may_show(view->integrals, a->index, b->index)));
     if (view->ortho) /* leaves out segments that begin behind the eye's plane */
@@ -1164,6 +1237,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     if (!vm_any(open))
         return false;
     medium s = NEAREST           ? classified_nearest(view, open, first)
+               : BLURRED         ? classified_blurred(view->blurred, open, a, b, first, last)
                : TRIP_CPU_CLOSED ? classified_closed(&view->integrals->closed, open, first, last)
                                  : classified(view->integrals, first, last);
     for (int k = 0; k < 3 && view->has_debug_colour; k++)
@@ -1175,7 +1249,7 @@ INLINE bool composite_segment(const trip_cpu_sheet_view *view, const trip_cpu_gr
     light_way of_position;
     const light_way *way = &l->way;
     vf at[3];
-    const bool effects = TRIP_CPU_EFFECTS || (NEAREST && view->effects.some);
+    const bool effects = TRIP_CPU_EFFECTS || ((NEAREST || BLURRED) && view->effects.some);
     if (effects || view->point_light)
         positions_at(g, path, l, n, middle - v_set(path->along[n]), at);
     if (view->point_light) {

@@ -3,7 +3,7 @@
 #ifndef TRIP_CPU_TABLE_H
 #define TRIP_CPU_TABLE_H
 
-#if TRIP_CPU_CLOSED || TRIP_CPU_EFFECTS || TRIP_CPU_NEAREST
+#if TRIP_CPU_CLOSED || TRIP_CPU_EFFECTS || TRIP_CPU_NEAREST || TRIP_CPU_BLURRED
 #pragma GCC diagnostic ignored "-Wunused-function"
 #endif
 
@@ -22,7 +22,8 @@
  * - With TRIP_CPU_DEPTH it defines name##_depth, the table for layers with depth.
  * - With TRIP_CPU_CLOSED it defines only the kernel for segments in closed form.
  * - With TRIP_CPU_EFFECTS it defines only the kernels for frames with effects.
- * - With TRIP_CPU_NEAREST it defines only the kernel for the nearest value. */
+ * - With TRIP_CPU_NEAREST it defines only the kernel for the nearest value.
+ * - With TRIP_CPU_BLURRED it defines only the kernel for blurred functions. */
 #if TRIP_CPU_DEPTH
 #define TRIP_CPU_TABLE(name, isa_name) DEFINE(name##_depth, isa_name, NULL)
 #else
@@ -57,6 +58,10 @@
 #define DEFINE(name, isa_name, depth_table)                                                        \
     SHEET_KERNEL(name##_sheet_nearest)                                                             \
     static_assert(TRIP_CPU_NEAREST, "it alone is compiled then")
+#elif TRIP_CPU_BLURRED
+#define DEFINE(name, isa_name, depth_table)                                                        \
+    SHEET_KERNEL(name##_sheet_blurred)                                                             \
+    static_assert(TRIP_CPU_BLURRED, "it alone is compiled then")
 #elif TRIP_CPU_EFFECTS
 #define DEFINE(name, isa_name, depth_table)                                                        \
     SHEET_KERNEL(name##_sheet_effects)                                                             \
@@ -64,14 +69,16 @@
     static_assert(TRIP_CPU_EFFECTS, "they alone are compiled then")
 #else
 #define DEFINE(name, isa_name, depth_table)                                                        \
-    extern trip_cpu_sheet_kernel name##_sheet_closed, name##_sheet_effects, name##_sheet_nearest;  \
+    extern trip_cpu_sheet_kernel name##_sheet_closed, name##_sheet_effects, name##_sheet_nearest,  \
+        name##_sheet_blurred;                                                                      \
     extern trip_cpu_project_kernel name##_project_effects;                                         \
     const trip_cpu_kernels name =                                                                  \
         KERNELS(isa_name, depth_table, name##_sheet_closed, name##_sheet_effects,                  \
-                name##_sheet_nearest, name##_project_effects)
+                name##_sheet_nearest, name##_sheet_blurred, name##_project_effects)
 #endif
 
-#define KERNELS(isa_name, depth_table, closed, with_effects, nearest, project_with_effects)        \
+#define KERNELS(isa_name, depth_table, closed, with_effects, nearest, blurred,                     \
+                project_with_effects)                                                              \
     {                                                                                              \
         .isa = isa_name, .lanes = V, .channels = CHANNELS, .with_depth = depth_table,              \
         .squares = squares, .stage = stage, .project = project, .pane_clear = pane_clear,          \
@@ -80,9 +87,10 @@
         .reaching = reaching, .sheet_clear = sheet_clear, .sheet_composite = sheet_composite,      \
         .sheet_ranges = sheet_ranges, .sheet_cells = sheet_cells,                                  \
         .sheet_gradients = sheet_gradients, .sheet_outlines = sheet_outlines,                      \
-        .sheet_between = sheet_between, .sheet_pane = sheet_pane, .sheet_pane_closed = (closed),   \
+        .sheet_between = sheet_between, .sheet_deviations_between = sheet_deviations_between,      \
+        .sheet_rows = sheet_rows, .sheet_pane = sheet_pane, .sheet_pane_closed = (closed),         \
         .sheet_pane_effects = (with_effects), .sheet_pane_nearest = (nearest),                     \
-        .project_effects = (project_with_effects),                                                 \
+        .sheet_pane_blurred = (blurred), .project_effects = (project_with_effects),                \
     }
 
 #endif

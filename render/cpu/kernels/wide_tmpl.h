@@ -78,6 +78,17 @@ static void find_tap_weights(const trip_cpu_sheet_view *view, const wide_positio
         weights[n] = (float)(w[0][n & 3] * w[1][n >> 2 & 3] * w[2][n >> 4]);
 }
 
+/* Interpolates the deviation for one ray, times 2^WEIGHT_LOG2 TRIP_CPU_DEVIATION_PARTS. */
+static int32_t interpolated_deviation(const trip_cpu_sheet_view *view, const trip_cpu_group *g,
+                                      const wide_position *p, int lane, const tap taps[64])
+{
+    float weights[64], sum = 0;
+    find_tap_weights(view, p, lane, weights);
+    for (int k = 0; k < 64; k++)
+        sum += weights[k] * (float)g->deviations[taps[k].raster - g->pool][taps[k].at];
+    return (int32_t)(within((double)sum, 0, 255 * TRIP_CPU_DEVIATION_PARTS) * (1 << WEIGHT_LOG2));
+}
+
 /* Interpolates the code for one ray. It sums differences from a corner of the cell. If all codes
  * are equal, the result is exactly that code, however the weights are rounded. */
 static double interpolated_code(const trip_cpu_sheet_view *view, const wide_position *p, int lane,
@@ -114,7 +125,7 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
                            const pane_path *path, const stamp_rays *l, unsigned n, unsigned segment,
                            sample *s)
 {
-    vi code = { 0 }, lack = { 0 };
+    vi code = { 0 }, lack = { 0 }, deviation = { 0 };
     find_wide_positions(g, path, l, n, segment, s->wide);
     for (int i = 0; i < V; i++) {
         tap taps[64];
@@ -123,7 +134,10 @@ static void wide_sample_at(const trip_cpu_sheet_view *view, const trip_cpu_group
             code[i] = (int32_t)(within(interpolated_code(view, s->wide, i, taps), TRIP_CPU_CODE_MIN,
                                        INT16_MAX) *
                                 (1 << WEIGHT_LOG2));
+        if (!lack[i] && BLURRED)
+            deviation[i] = interpolated_deviation(view, g, s->wide, i, taps);
     }
+    s->deviation = deviation;
     s->there = vi_is_0(lack);
     s->index = index_of(view->integrals, code);
     s->lit = s->summed = false;

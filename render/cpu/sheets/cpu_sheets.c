@@ -20,13 +20,13 @@ static trip_cpu_sheet *sheet_of(trip_cpu_sheets *s, int i)
     return &s->store.sheets[s->held[i]];
 }
 
-/* Reports that the transfer function's integrals do not fit. */
-static int no_memory(const trip_budget *budget)
+/* Reports that the transfer function's integrals, with `further` bytes, do not fit. */
+static int no_memory(const trip_budget *budget, uint64_t further)
 {
     return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                      "the transfer function's integrals do not fit the memory given; raise "
                      "--memory to more than %llu MiB",
-                     trip_cpu_memory_mib(budget, trip_cpu_tf_bytes()));
+                     trip_cpu_memory_mib(budget, trip_cpu_tf_bytes() + further));
 }
 
 /* Reports that the sheets need more memory than the index of the data set called for. */
@@ -43,14 +43,14 @@ int trip_cpu_sheets_create(trip_cpu_sheets **out, const trip_cpu *r)
     trip_cpu_sheets *s = trip_budget_take(r->budget, sizeof *s);
     *out = s;
     if (!s)
-        return no_memory(r->budget);
+        return no_memory(r->budget, 0);
     s->store.budget = r->budget;
     s->store.pool = r->pool;
     if (trip_cpu_tfs_create(&s->functions, r->budget))
         return 0;
     trip_cpu_sheets_destroy(s);
     *out = NULL;
-    return no_memory(r->budget);
+    return no_memory(r->budget, 0);
 }
 
 void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
@@ -64,6 +64,16 @@ void trip_cpu_sheets_destroy(trip_cpu_sheets *s)
     trip_budget_release(budget, s, sizeof *s);
 }
 
+/* Returns the frame's function, or NULL if it does not fit. */
+static const trip_cpu_tf *take_function(trip_cpu_sheets *s, const trip_cpu *r)
+{
+    const trip_plan *plan = r->frame->plan;
+    const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
+    return trip_cpu_tfs_take(&s->functions, r->budget, r->frame->table,
+                             closed ? &plan->closed : NULL, s->store.codes,
+                             r->frame->camera->voxel_world, plan->blurs);
+}
+
 int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
 {
     s->of = r;
@@ -73,18 +83,23 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
     s->run_count = s->taken_count = 0;
     const trip_plan *plan = r->frame->plan;
     const bool closed = plan->not_closed == TRIP_CLOSED_FORM_FOUND;
-    s->store.drawn = plan->draw.of_stored;
+    s->store.draw = &plan->draw;
+    s->store.blurs = plan->blurs;
     s->store.codes = trip_cpu_codes_of(plan->code_min, plan->code_max);
     s->store.coordinates = &r->frame->data->coordinates;
     s->sheet_pane =
         r->frame->settings->kernel == TRIP_KERNEL_NEAREST ? r->kernels->sheet_pane_nearest
+        : plan->blurs                                     ? r->kernels->sheet_pane_blurred
         : trip_effects_some(&r->frame->settings->effects) ? r->kernels->sheet_pane_effects
         : closed                                          ? r->kernels->sheet_pane_closed
                                                           : r->kernels->sheet_pane;
-    s->function =
-        trip_cpu_tfs_take(&s->functions, r->budget, r->frame->table, closed ? &plan->closed : NULL,
-                          s->store.codes, r->frame->camera->voxel_world);
-    return 0;
+    s->function = take_function(s, r);
+    if (!s->function) { /* sheets of an earlier frame may hold most of the memory */
+        trip_cpu_store_release(&s->store);
+        trip_cpu_windows_release(&s->windows, r->budget);
+        s->function = take_function(s, r);
+    }
+    return s->function ? 0 : no_memory(r->budget, trip_cpu_tf_blurred_bytes());
 }
 
 /* ---- layers and passes ---- */
@@ -141,7 +156,7 @@ static bool fit_sheets(trip_cpu_sheets *s, const trip_cpu_rasters *all, const tr
     const uint64_t min = need->rasters + s->sample_rasters;
     const uint64_t max = rasters_in(all) * (TRIP_CPU_SHEETS_MAX + TRIP_CPU_SAMPLES_MAX);
     unsigned sheets = TRIP_CPU_SHEETS_MAX;
-    while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * min) > room)
+    while (sheets > fewest && trip_cpu_store_bytes(all, sheets, 2 * min, s->store.blurs) > room)
         sheets--;
     s->max = (int)(sheets > fewest + 2 ? sheets - 4 : fewest - 2);
     return trip_cpu_store_fit(&s->store, all, sheets, min, max, room);
@@ -191,11 +206,13 @@ static int find_min(const trip_cpu_sheets *s, uint64_t *bytes)
         const trip_cpu_rasters all = rasters_of_layer(layer);
         trip_cpu_need need;
         const int held_sheets = trip_cpu_sheets_held(frame);
-        status = trip_cpu_need_find(&need, layer, rasters_in(&all), held_sheets, s->store.budget);
+        status = trip_cpu_need_find(&need, layer, rasters_in(&all), held_sheets, s->store.blurs,
+                                    s->store.budget);
         if (status)
             break;
-        uint64_t min = trip_cpu_windows_min_bytes(&all, reach_of(frame), &need, held_sheets,
-                                                  frame->settings->samples_per_sheet);
+        uint64_t min =
+            trip_cpu_windows_min_bytes(&all, reach_of(frame), &need, held_sheets,
+                                       frame->settings->samples_per_sheet, s->store.blurs);
         *bytes = min > *bytes ? min : *bytes;
     }
     return status;
@@ -230,7 +247,7 @@ static int fit_layer(trip_cpu_sheets *s, const trip_plan_layer *layer)
     trip_cpu_need need = { .rasters = (uint64_t)sheets * grid, .of_sheet = grid };
     if (fit_sheets(s, &all, &need, room))
         return 0;
-    int status = trip_cpu_need_find(&need, layer, grid, sheets, s->store.budget);
+    int status = trip_cpu_need_find(&need, layer, grid, sheets, s->store.blurs, s->store.budget);
     if (status || fit_sheets(s, &all, &need, room))
         return status;
     trip_cpu_store_release(&s->store);
@@ -513,6 +530,7 @@ void trip_cpu_sheets_draw_some(trip_cpu_sheets *s, int last)
     const unsigned segments = (unsigned)s->of->frame->settings->samples_per_sheet;
     const trip_cpu_group given = s->group;
     s->group = (trip_cpu_group){ .pool = store->voxels,
+                                 .deviations = store->blurs ? store->deviations : NULL,
                                  .first_u = store->first_u * TRIP_CPU_RASTER,
                                  .first_v = store->first_v * TRIP_CPU_RASTER,
                                  .across = store->across,

@@ -32,7 +32,8 @@ typedef struct trip_cpu_kept_run {
     int32_t u, v;
     uint16_t kind, part; /* kind and part of the list */
     uint32_t count, words;
-    size_t at; /* offset in trip_cpu_kept_sheet.words */
+    bool has_deviations; /* they follow the block */
+    size_t at;           /* offset in trip_cpu_kept_sheet.words */
 } trip_cpu_kept_run;
 
 typedef struct trip_cpu_kept_sheet {
@@ -120,7 +121,7 @@ void trip_cpu_sheets_find_gradients(trip_cpu_sheets *s, const trip_cpu_sheet_wor
  * small. */
 uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
                                     const trip_cpu_need *need, int held_sheets,
-                                    int samples_per_sheet);
+                                    int samples_per_sheet, bool blurs);
 bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64_t reach,
                           const trip_cpu_need *need, uint64_t room);
 void trip_cpu_windows_release(trip_cpu_windows *w, trip_budget *budget);
@@ -148,10 +149,17 @@ void trip_cpu_open_squares_forget(trip_cpu_sheets *s);
 
 /* ---- need.c ---- */
 
+/* Returns the words that the deviations of `count` records take. */
+static inline uint64_t trip_cpu_deviation_words(uint32_t count)
+{
+    return ((uint64_t)count + 7) / 8;
+}
+
 /* Finds the need of a layer. A sheet has at most `rasters` rasters, and `held_sheets` sheets are in
- * memory at a time. Returns TRIP_ERROR if the budget has too little left for the search. */
+ * memory at a time. `words` covers deviations if `blurs`. Returns TRIP_ERROR if the budget has too
+ * little left for the search. */
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
-                       int held_sheets, trip_budget *budget);
+                       int held_sheets, bool blurs, trip_budget *budget);
 
 /* ---- pass_view.c: the constants of a pass over sheets, in the form of kernel_sheets.h ---- */
 

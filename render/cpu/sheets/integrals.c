@@ -1,6 +1,7 @@
 #include "cpu/sheets/integrals.h"
 
 #include <math.h>
+#include <string.h>
 #include <xxhash.h>
 
 #include "segments.h"
@@ -13,6 +14,55 @@ enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MAX, LOG2_MAX = 2 };
 uint64_t trip_cpu_tf_bytes(void)
 {
     return ENTRIES * 2 * sizeof(int32_t[4]) + CODES * sizeof(uint32_t);
+}
+
+/* The rows of a blurred function for one stretch of codes. Entries are at most a thirty-second part
+ * of a row's deviation apart, because samples take the nearest entry. */
+#define ENTRIES_EACH_DEVIATION 31.8
+
+/* Returns log2 of the codes from one entry of a row to the next. */
+static unsigned log2_of_row(const trip_blurred_row *row, trip_cpu_codes codes)
+{
+    unsigned log2 = codes.shift;
+    while (log2 < 15 &&
+           ldexp(1, (int)(log2 + 1 - codes.shift)) <= row->deviation / ENTRIES_EACH_DEVIATION)
+        log2++;
+    return log2;
+}
+
+/* Returns the maximum number of entries of all rows but row 0. Stretched codes need fewer. */
+static uint32_t entries_of_rows(void)
+{
+    const trip_blurred_function shape = trip_blurred_function_shape();
+    uint32_t sum = 0;
+    for (int r = 1; r < TRIP_BLURRED_ROWS; r++)
+        sum += (CODES >> log2_of_row(&shape.rows[r], (trip_cpu_codes){ 0 })) + 1;
+    return sum;
+}
+
+uint64_t trip_cpu_tf_blurred_bytes(void)
+{
+    const uint64_t rows = TRIP_CPU_BLURRED_ROWS * sizeof(trip_cpu_blurred_row);
+    return rows + (ENTRIES + entries_of_rows()) * 2 * sizeof(int32_t[4]);
+}
+
+static bool create_blurred(trip_cpu_tf *f, trip_budget *budget)
+{
+    const uint32_t entries = ENTRIES + entries_of_rows();
+    char *memory = f->blurred.rows ? NULL : trip_budget_take(budget, trip_cpu_tf_blurred_bytes());
+    if (!memory)
+        return f->blurred.rows != NULL;
+    void *sums = memory, *at = memory + entries * sizeof *f->blurred.sums;
+    void *rows = memory + 2 * entries * sizeof *f->blurred.sums;
+    f->blurred = (trip_cpu_blurred){ .rows = rows, .sums = sums, .at = at };
+    return true;
+}
+
+static void destroy_blurred(trip_cpu_tf *f, trip_budget *budget)
+{
+    if (f->blurred.rows)
+        trip_budget_release(budget, f->blurred.sums, trip_cpu_tf_blurred_bytes());
+    f->blurred = (trip_cpu_blurred){ NULL };
 }
 
 bool trip_cpu_tf_create(trip_cpu_tf *f, trip_budget *budget)
@@ -31,6 +81,7 @@ bool trip_cpu_tf_create(trip_cpu_tf *f, trip_budget *budget)
 void trip_cpu_tf_destroy(trip_cpu_tf *f, trip_budget *budget)
 {
     trip_cpu_integrals *in = &f->integrals;
+    destroy_blurred(f, budget);
     trip_budget_release(budget, in->sums, ENTRIES * sizeof *in->sums);
     trip_budget_release(budget, in->at, ENTRIES * sizeof *in->at);
     trip_budget_release(budget, f->next_visible, CODES * sizeof *f->next_visible);
@@ -208,6 +259,111 @@ static void set_integrals(trip_cpu_tf *f, const trip_tf_entry *table)
         1e25, f->voxel_world / ldexp(factor, f->integrals.entry_log2)); /* opaque at this limit */
 }
 
+/* ---- blurred functions ---- */
+
+/* Returns a row of the blurred function at a stretched code. */
+static void blurred_at(const trip_blurred_function *f, int row, trip_cpu_codes codes, int code,
+                       double out[4])
+{
+    const trip_blurred_row *r = &f->rows[row];
+    const double last = (double)(r->entries - 1);
+    const double at =
+        fmin(last, ldexp(codes.first + ldexp(code, -(int)codes.shift), -(int)r->log2));
+    const uint32_t i = at < last ? (uint32_t)at : r->entries - 2;
+    const float *a = f->entries[r->first + i], *b = f->entries[r->first + i + 1];
+    for (int k = 0; k < 4; k++)
+        out[k] = a[k] + (at - i) * ((double)b[k] - a[k]);
+}
+
+/* Sets the integrals of a row by trapezoids between its entries. Returns the entry behind them. */
+static int32_t set_row(trip_cpu_tf *f, const trip_blurred_function *blurred, int row, int32_t first)
+{
+    const unsigned log2 = log2_of_row(&blurred->rows[row], f->codes);
+    const int entries = (CODES >> log2) + 1;
+    double all = 0, before[4], here[4], sum[4] = { 0 };
+    for (int i = 0; i < entries; i++) {
+        blurred_at(blurred, row, f->codes, i << log2, here);
+        all += i > 0 ? 0.5 * (before[0] + here[0]) : 0;
+        before[0] = here[0];
+    }
+    const double factor = all > 0 ? GREATEST / all : 1;
+    for (int i = 0; i < entries; i++) {
+        blurred_at(blurred, row, f->codes, i << log2, here);
+        for (int k = 0; k < 4; k++) {
+            sum[k] += i > 0 ? 0.5 * (before[k] + here[k]) : 0;
+            f->blurred.sums[first + i][k] = rounded(fmin(GREATEST, factor * sum[k]));
+            f->blurred.at[first + i][k] = rounded(fmin(INT32_MAX - 1, factor * here[k]));
+            before[k] = here[k];
+        }
+    }
+    f->blurred.rows[row] = (trip_cpu_blurred_row){
+        .first = first,
+        .log2 = (int32_t)log2,
+        .half = (int32_t)(TRIP_CPU_CODE_PARTS << log2 >> 1),
+        .extinction = (float)fmin(1e25, f->voxel_world / factor),
+    };
+    return first + entries;
+}
+
+/* Copies the integrals of the function itself to row 0. */
+static int32_t set_first_row(trip_cpu_tf *f)
+{
+    const trip_cpu_integrals *in = &f->integrals;
+    const int entries = (CODES >> in->entry_log2) + 1;
+    memcpy(f->blurred.sums, in->sums, (size_t)entries * sizeof *in->sums);
+    memcpy(f->blurred.at, in->at, (size_t)entries * sizeof *in->at);
+    f->blurred.rows[0] = (trip_cpu_blurred_row){
+        .first = 0,
+        .log2 = in->entry_log2,
+        .half = TRIP_CPU_CODE_PARTS << in->entry_log2 >> 1,
+        .extinction = in->extinction,
+    };
+    return entries;
+}
+
+static bool set_rows(trip_cpu_tf *f, const trip_tf_entry *table, trip_budget *budget)
+{
+    trip_blurred_function blurred;
+    if (!trip_blurred_function_create(&blurred, table, budget))
+        return false;
+    const bool created = create_blurred(f, budget);
+    int32_t first = created ? set_first_row(f) : 0;
+    for (int row = 1; row < TRIP_BLURRED_ROWS && created; row++)
+        first = set_row(f, &blurred, row, first);
+    trip_blurred_function_destroy(&blurred, budget);
+    return created;
+}
+
+/* Finds the visible codes nearest to the range of stretched codes. */
+static void set_visible_beyond(trip_cpu_tf *f, const trip_tf_entry *table)
+{
+    const int64_t first = f->codes.first, last = first + ((CODES - 1) >> f->codes.shift);
+    int64_t below = first - 1, above = last + 1;
+    while (below >= 0 && !(table[below].extinction > 0))
+        below--;
+    while (above < CODES && !(table[above].extinction > 0))
+        above++;
+    const int64_t never = INT64_C(1) << 40, unit = INT64_C(1) << f->codes.shift;
+    f->visible_below = below >= 0 ? (below - first) * unit : -never;
+    f->visible_above = above < CODES ? (above - first) * unit : never;
+}
+
+int64_t trip_cpu_tf_reach(const trip_cpu_tf *f, unsigned row)
+{
+    const unsigned d = row * TRIP_DEVIATION_MAX / (TRIP_BLURRED_ROWS - 1);
+    return (int64_t)ceil(ldexp(trip_blurred_reach(d), (int)f->codes.shift));
+}
+
+bool trip_cpu_tf_shows_within(const trip_cpu_tf *f, int16_t min, int16_t max, int64_t reach)
+{
+    const int64_t from = min + TRIP_CPU_CODE_BIAS - reach, to = max + TRIP_CPU_CODE_BIAS + reach;
+    if (min > max)
+        return false;
+    if (reach > 0 && (from <= f->visible_below || to >= f->visible_above))
+        return true;
+    return f->next_visible[from > 0 ? from : 0] <= (uint32_t)(to < CODES ? to : CODES - 1);
+}
+
 /* Converts a closed form to the codes of samples, and from world units to voxels. */
 static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cpu_codes codes,
                                            double voxel_world)
@@ -230,20 +386,22 @@ static trip_cpu_closed_form closed_form_of(const trip_closed_form *form, trip_cp
 }
 
 static bool is_of(const trip_cpu_tf *f, XXH128_hash_t table, const trip_closed_form *closed,
-                  trip_cpu_codes codes, double voxel_world)
+                  trip_cpu_codes codes, double voxel_world, bool blurs)
 {
     return f->voxel_world == voxel_world && f->integrals.is_closed == (closed != NULL) &&
-           f->codes.first == codes.first && f->codes.shift == codes.shift &&
+           f->blurs == blurs && f->codes.first == codes.first && f->codes.shift == codes.shift &&
            f->table_hash[0] == table.low64 && f->table_hash[1] == table.high64;
 }
 
-static void set(trip_cpu_tf *f, const trip_tf_entry *table, XXH128_hash_t hash,
-                const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world)
+/* `budget` is NULL if nothing is blurred. Returns false if it has too little left. */
+static bool set(trip_cpu_tf *f, const trip_tf_entry *table, XXH128_hash_t hash,
+                const trip_closed_form *closed, trip_cpu_codes codes, double voxel_world,
+                trip_budget *budget)
 {
     if (closed) /* depends on more than is_of() compares */
         f->integrals.closed = closed_form_of(closed, codes, voxel_world);
-    if (is_of(f, hash, closed, codes, voxel_world))
-        return;
+    if (is_of(f, hash, closed, codes, voxel_world, budget != NULL))
+        return true;
     f->table_hash[0] = hash.low64;
     f->table_hash[1] = hash.high64;
     f->codes = codes;
@@ -253,6 +411,14 @@ static void set(trip_cpu_tf *f, const trip_tf_entry *table, XXH128_hash_t hash,
     if (!closed)
         set_integrals(f, table);
     set_next_visible(f, table);
+    f->blurs = budget != NULL;
+    if (!budget)
+        return true;
+    set_visible_beyond(f, table);
+    if (set_rows(f, table, budget))
+        return true;
+    f->voxel_world = 0; /* nothing is valid */
+    return false;
 }
 
 static XXH128_hash_t hash_of(const trip_tf_entry *table)
@@ -263,7 +429,13 @@ static XXH128_hash_t hash_of(const trip_tf_entry *table)
 void trip_cpu_tf_set(trip_cpu_tf *f, const trip_tf_entry *table, const trip_closed_form *closed,
                      trip_cpu_codes codes, double voxel_world)
 {
-    set(f, table, hash_of(table), closed, codes, voxel_world);
+    (void)set(f, table, hash_of(table), closed, codes, voxel_world, NULL);
+}
+
+bool trip_cpu_tf_set_blurred(trip_cpu_tf *f, const trip_tf_entry *table, trip_cpu_codes codes,
+                             double voxel_world, trip_budget *budget)
+{
+    return set(f, table, hash_of(table), NULL, codes, voxel_world, budget);
 }
 
 /* ---- kept functions ---- */
@@ -283,14 +455,15 @@ void trip_cpu_tfs_destroy(trip_cpu_tfs *f, trip_budget *budget)
 
 /* Returns the index for the next function. Takes an unused entry if it needs only a small part of
  * the free memory, otherwise the entry taken longest ago. */
-static int position_of_next(trip_cpu_tfs *f, trip_budget *budget)
+static int position_of_next(trip_cpu_tfs *f, trip_budget *budget, bool blurs)
 {
     enum { SMALL_PART = 32 };
     int longest = 0;
     for (int i = 0; i < TRIP_CPU_TFS; i++) {
         if (!f->kept[i].next_visible) {
             const uint64_t left = trip_budget_left_bytes(budget);
-            const bool is_small = trip_cpu_tf_bytes() < left / SMALL_PART;
+            const uint64_t bytes = trip_cpu_tf_bytes() + (blurs ? trip_cpu_tf_blurred_bytes() : 0);
+            const bool is_small = bytes < left / SMALL_PART;
             return is_small && trip_cpu_tf_create(&f->kept[i], budget) ? i : longest;
         }
         longest = f->turns[i] < f->turns[longest] ? i : longest;
@@ -300,17 +473,18 @@ static int position_of_next(trip_cpu_tfs *f, trip_budget *budget)
 
 const trip_cpu_tf *trip_cpu_tfs_take(trip_cpu_tfs *f, trip_budget *budget,
                                      const trip_tf_entry *table, const trip_closed_form *closed,
-                                     trip_cpu_codes codes, double voxel_world)
+                                     trip_cpu_codes codes, double voxel_world, bool blurs)
 {
     const XXH128_hash_t hash = hash_of(table);
     int at = 0;
-    while (at < TRIP_CPU_TFS && !is_of(&f->kept[at], hash, closed, codes, voxel_world))
+    while (at < TRIP_CPU_TFS && !is_of(&f->kept[at], hash, closed, codes, voxel_world, blurs))
         at++;
     if (at == TRIP_CPU_TFS)
-        at = position_of_next(f, budget);
+        at = position_of_next(f, budget, blurs);
     f->turns[at] = ++f->turn;
-    set(&f->kept[at], table, hash, closed, codes, voxel_world);
-    return &f->kept[at];
+    const bool is_set =
+        set(&f->kept[at], table, hash, closed, codes, voxel_world, blurs ? budget : NULL);
+    return is_set ? &f->kept[at] : NULL;
 }
 
 trip_cpu_codes trip_cpu_codes_of(unsigned min, unsigned max)

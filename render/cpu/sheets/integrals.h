@@ -6,6 +6,7 @@
 #define TRIP_CPU_SHEETS_INTEGRALS_H
 
 #include "budget.h"
+#include "blurred_function.h"
 #include "closed_form.h"
 #include "cpu/kernels/kernel_sheets.h"
 #include "transfer_function.h"
@@ -40,13 +41,19 @@ typedef struct trip_cpu_tf {
     bool in_a_row; /* exactly the biased codes from first_visible to last_visible */
     int16_t first_visible, last_visible;
     uint32_t *next_visible; /* 65536 entries: the first visible code from here on, or 65536 */
+    /* Blurred functions only. Codes beyond `codes` may be visible too: the nearest ones below 0 and
+     * above 65535. */
+    bool blurs;
+    trip_cpu_blurred blurred;
+    int64_t visible_below, visible_above;
     /* With `codes`, the inputs from which everything was made. */
     uint64_t table_hash[2];
     double voxel_world; /* 0 if nothing was made yet */
 } trip_cpu_tf;
 
-/* Returns the bytes that trip_cpu_tf_create() takes. */
+/* Returns the bytes that trip_cpu_tf_create() takes, and further bytes of a blurred function. */
 uint64_t trip_cpu_tf_bytes(void);
+uint64_t trip_cpu_tf_blurred_bytes(void);
 /* Takes memory from the budget. Returns false if the budget has too little left. */
 bool trip_cpu_tf_create(trip_cpu_tf *f, trip_budget *budget);
 void trip_cpu_tf_destroy(trip_cpu_tf *f, trip_budget *budget);
@@ -56,6 +63,9 @@ void trip_cpu_tf_destroy(trip_cpu_tf *f, trip_budget *budget);
  * form. */
 void trip_cpu_tf_set(trip_cpu_tf *f, const trip_tf_entry *table, const trip_closed_form *closed,
                      trip_cpu_codes codes, double voxel_world);
+/* Also sets `blurred`, and takes its memory. Returns false if the budget has too little left. */
+bool trip_cpu_tf_set_blurred(trip_cpu_tf *f, const trip_tf_entry *table, trip_cpu_codes codes,
+                             double voxel_world, trip_budget *budget);
 
 enum { TRIP_CPU_TFS = 6 };
 
@@ -67,12 +77,19 @@ typedef struct trip_cpu_tfs {
 /* Takes memory for one function. Returns false if the budget has too little left. */
 bool trip_cpu_tfs_create(trip_cpu_tfs *f, trip_budget *budget);
 void trip_cpu_tfs_destroy(trip_cpu_tfs *f, trip_budget *budget);
-/* Returns a function as set by trip_cpu_tf_set(), if possible one that is kept. Otherwise sets a
- * new one: in new memory if that is a small part of the free memory, else over the one taken
- * longest ago. */
+/* Returns a function as set by trip_cpu_tf_set(), or if `blurs` by trip_cpu_tf_set_blurred(), if
+ * possible one that is kept. Otherwise sets a new one: in new memory if that is a small part of the
+ * free memory, else over the one taken longest ago. Returns NULL if the budget has too little left
+ * for a blurred one. */
 const trip_cpu_tf *trip_cpu_tfs_take(trip_cpu_tfs *f, trip_budget *budget,
                                      const trip_tf_entry *table, const trip_closed_form *closed,
-                                     trip_cpu_codes codes, double voxel_world);
+                                     trip_cpu_codes codes, double voxel_world, bool blurs);
+
+/* Returns how far values reach in `codes` at a row of the blurred function or below
+ * (trip_blurred_reach()). */
+int64_t trip_cpu_tf_reach(const trip_cpu_tf *f, unsigned row);
+/* Returns whether a code in [min, max] may be visible at deviations with this reach. */
+bool trip_cpu_tf_shows_within(const trip_cpu_tf *f, int16_t min, int16_t max, int64_t reach);
 
 /* Returns whether a code in [min, max] may be visible. Both are biased codes. */
 static inline bool trip_cpu_tf_shows(const trip_cpu_tf *f, int16_t min, int16_t max)

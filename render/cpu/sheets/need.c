@@ -39,7 +39,7 @@ static uint64_t rasters_of_tile(const trip_pass *pass)
 }
 
 static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_cursor *cursors,
-                     uint64_t rasters, int count)
+                     uint64_t rasters, int count, bool blurs)
 {
     row held_sheets = { .count = count };
     sheet now = { 0 };
@@ -53,7 +53,7 @@ static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_curso
         }
         number = run.sheet;
         now.runs++;
-        now.words += run.words;
+        now.words += run.words + (blurs ? trip_cpu_deviation_words(run.count) : 0);
         now.rasters += now.rasters + of_tile <= rasters ? of_tile : rasters - now.rasters;
     }
     for (int i = 0; i < count; i++, now = (sheet){ 0 })
@@ -61,7 +61,7 @@ static void add_pass(trip_cpu_need *need, const trip_pass *pass, trip_pass_curso
 }
 
 int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64_t rasters,
-                       int held_sheets, trip_budget *budget)
+                       int held_sheets, bool blurs, trip_budget *budget)
 {
     *need = (trip_cpu_need){ 0 };
     for (int i = 0; i < layer->pass_count; i++) {
@@ -72,7 +72,7 @@ int trip_cpu_need_find(trip_cpu_need *need, const trip_plan_layer *layer, uint64
             return trip_fail(TRIP_ERROR, "render", "CPU renderer",
                              "%u lists do not fit the memory given; raise --memory",
                              pass->selection_count);
-        add_pass(need, pass, cursors, rasters, held_sheets);
+        add_pass(need, pass, cursors, rasters, held_sheets, blurs);
         trip_budget_release(budget, cursors, bytes);
     }
     return 0;

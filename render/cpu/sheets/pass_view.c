@@ -124,6 +124,7 @@ void trip_cpu_pass_view_make(trip_cpu_sheet_view *view, const trip_frame *frame,
     *view = (trip_cpu_sheet_view){
         .of = frame,
         .integrals = &function->integrals,
+        .blurred = &function->blurred,
         .coordinates =
             trip_coordinates_uneven(&frame->data->coordinates) ? &frame->data->coordinates : NULL,
         .axis = axis,

@@ -9,7 +9,10 @@
 #include "field.h"
 #include "report.h"
 
-static const size_t raster_bytes = sizeof(trip_cpu_voxels);
+static size_t raster_bytes(bool blurs)
+{
+    return sizeof(trip_cpu_voxels) + (blurs ? sizeof(trip_cpu_deviations) : 0);
+}
 
 /* ---- memory ---- */
 
@@ -18,6 +21,8 @@ void trip_cpu_store_clear(const trip_cpu_store *s, int32_t raster)
     int16_t *codes = s->voxels[raster].codes;
     for (int i = 0; i < TRIP_CPU_RASTER_VOXELS; i++)
         codes[i] = TRIP_CPU_CODE_MISSING;
+    if (s->blurs)
+        memset(s->deviations[raster], 0, sizeof *s->deviations);
 }
 
 static void free_all(trip_cpu_store *s)
@@ -30,25 +35,31 @@ static void free_all(trip_cpu_store *s)
 static void release_voxels(trip_cpu_store *s)
 {
     trip_budget_release(s->budget, s->voxels, s->voxels_bytes);
+    trip_budget_release(s->budget, s->deviations, s->deviations_bytes);
     trip_budget_release(s->budget, s->free, s->rasters * sizeof *s->free);
     s->voxels = NULL;
+    s->deviations = NULL;
+    s->deviations_bytes = 0;
     s->free = NULL;
     s->voxels_bytes = 0;
     s->rasters = 0;
 }
 
 /* Takes `wanted` rasters. Keeps the present pool if it has at least `min` rasters and half of
- * `wanted`. Returns false without memory. */
+ * `wanted`, and deviations if they are needed. Returns false without memory. */
 static bool take_voxels(trip_cpu_store *s, uint64_t min, uint64_t wanted)
 {
-    if (s->rasters >= min && s->rasters >= wanted / 2)
+    if (s->rasters >= min && s->rasters >= wanted / 2 && (s->deviations || !s->blurs))
         return true;
     release_voxels(s);
     s->rasters = (uint32_t)wanted;
-    s->voxels_bytes = wanted * raster_bytes;
+    s->voxels_bytes = wanted * raster_bytes(false);
+    s->deviations_bytes = s->blurs ? wanted * sizeof *s->deviations : 0;
+    if (s->blurs)
+        s->deviations = trip_budget_take(s->budget, s->deviations_bytes);
     s->voxels = trip_budget_take(s->budget, s->voxels_bytes);
     s->free = trip_budget_take(s->budget, s->rasters * sizeof *s->free);
-    if (!s->voxels || !s->free)
+    if (!s->voxels || !s->free || (s->blurs && !s->deviations))
         release_voxels(s);
     return s->voxels != NULL;
 }
@@ -74,6 +85,8 @@ static size_t lay_out(trip_cpu_store *s, char *memory)
         sheet->visible = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->visible);
         sheet->cells = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->cells);
         sheet->edges = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->edges);
+        if (s->blurs)
+            sheet->rows = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->rows);
         sheet->needed = trip_cpu_take_array(memory, &at, grid * sizeof *sheet->needed);
         at = lay_out_making(sheet, memory, at, grid);
     }
@@ -136,32 +149,34 @@ void trip_cpu_store_move(trip_cpu_store *s, const trip_cpu_rasters *to)
     trip_cpu_store_clear(s, 0);
 }
 
-static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets)
+static uint64_t grid_bytes(const trip_cpu_rasters *all, unsigned sheets, bool blurs)
 {
-    trip_cpu_store of = { .sheet_room = sheets };
+    trip_cpu_store of = { .sheet_room = sheets, .blurs = blurs };
     set_grid(&of, all);
     return lay_out(&of, NULL);
 }
 
-uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters)
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters,
+                              bool blurs)
 {
-    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets) : UINT64_MAX / 2;
-    return grids + (rasters + 1) * (raster_bytes + sizeof(int32_t));
+    uint64_t grids = has_grid(all) ? grid_bytes(all, sheets, blurs) : UINT64_MAX / 2;
+    return grids + (rasters + 1) * (raster_bytes(blurs) + sizeof(int32_t));
 }
 
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s)
 {
-    return s->voxels_bytes + s->rasters * sizeof *s->free + s->grids_bytes;
+    return s->voxels_bytes + s->deviations_bytes + s->rasters * sizeof *s->free + s->grids_bytes;
 }
 
 bool trip_cpu_store_fit(trip_cpu_store *s, const trip_cpu_rasters *all, unsigned sheets,
                         uint64_t min, uint64_t max, uint64_t room)
 {
     const uint64_t greatest = TRIP_CPU_RASTERS_MAX - 1;
-    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, min) > room)
+    if (min > greatest || !has_grid(all) || trip_cpu_store_bytes(all, sheets, min, s->blurs) > room)
         return false;
     max = max < greatest ? max : greatest;
-    uint64_t fit = (room - grid_bytes(all, sheets)) / (raster_bytes + sizeof *s->free) - 1;
+    uint64_t fit =
+        (room - grid_bytes(all, sheets, s->blurs)) / (raster_bytes(s->blurs) + sizeof *s->free) - 1;
     s->sheet_room = sheets;
     set_grid(s, all);
     if (s->rasters > fit + 1)
@@ -198,6 +213,7 @@ void trip_cpu_store_drop(trip_cpu_store *s, trip_cpu_sheet *sheet)
         memset(sheet->needed, 0, grid * sizeof *sheet->needed);
     }
     sheet->prepared = sheet->shaded = false;
+    atomic_store_explicit(&sheet->largest_row, 0, memory_order_relaxed);
 }
 
 /* ---- from a run to voxels ---- */
@@ -220,9 +236,9 @@ static void square_codes(const trip_cpu_store *s, const trip_square *at, int16_t
     const uint32_t count = at->count;
     const trip_cpu_codes stretch = s->codes;
     trip_square_codes(at, codes);
-    if (s->drawn)
+    if (s->draw->of_stored)
         for (uint32_t i = 0; i < count; i++)
-            codes[i] = s->drawn[codes[i]];
+            codes[i] = s->draw->of_stored[codes[i]];
     if (stretch.shift > 0)
         for (uint32_t i = 0; i < count; i++)
             codes[i] = trip_cpu_code(stretch, codes[i]);
@@ -243,6 +259,23 @@ static void decode_square(const trip_cpu_store *s, int16_t *to, const trip_squar
     }
     for (uint64_t rest = at->mask; rest; rest &= rest - 1)
         to[positions[__builtin_ctzll(rest)]] = *next++;
+}
+
+/* Writes the deviations of a square's records, which begin at `from`. */
+static void decode_deviations(const trip_cpu_store *s, int16_t *to, const trip_square *at,
+                              const uint8_t *from)
+{
+    uint16_t codes[64];
+    uint32_t n = 0;
+    if (s->draw->of_stored)
+        trip_square_codes(at, codes);
+    for (uint64_t rest = at->mask; rest; rest &= rest - 1, n++) {
+        int16_t *d = &to[positions[__builtin_ctzll(rest)]];
+        *d = (int16_t)(from[n] * TRIP_CPU_DEVIATION_PARTS);
+        if (s->draw->of_stored)
+            *d = (int16_t)lrint(trip_draw_deviation(s->draw, codes[n], from[n]) *
+                                TRIP_CPU_DEVIATION_PARTS);
+    }
 }
 
 static bool is_within(const trip_cpu_store *s, int64_t u, int64_t v)
@@ -268,8 +301,11 @@ void trip_cpu_store_decode(const trip_cpu_store *s, const trip_cpu_sheet *sheet,
         const uint64_t bit = UINT64_C(1) << (v / 8 * TRIP_CPU_SQUARES_ACROSS + u / 8);
         if (!sheet->rasters[at] || !(s->open[at] & bit))
             continue;
-        decode_square(s, s->voxels[sheet->rasters[at]].codes + v * TRIP_CPU_RASTER_STRIDE + u,
-                      square);
+        const int first = v * TRIP_CPU_RASTER_STRIDE + u;
+        decode_square(s, s->voxels[sheet->rasters[at]].codes + first, square);
+        if (s->blurs && block->deviations)
+            decode_deviations(s, s->deviations[sheet->rasters[at]] + first, square,
+                              block->deviations + square->first);
         atomic_fetch_or_explicit(&sheet->filled[at], bit, memory_order_relaxed);
     }
 }
@@ -319,18 +355,43 @@ static trip_cpu_voxels *raster_at(const trip_cpu_store *s, const trip_cpu_sheet 
 
 /* Copies the first column of the raster to the right, the first row of the raster below, and the
  * first voxel of the raster diagonally behind. */
-static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+static void copy_beside(int16_t *to, const int16_t *right, const int16_t *below,
+                        const int16_t *behind)
 {
-    const trip_cpu_store *s = job->store;
-    size_t across = (size_t)s->across;
-    int16_t *to = raster_at(s, w->sheet, at)->codes;
-    const int16_t *right = raster_at(s, w->sheet, at + 1)->codes;
-    const int16_t *below = raster_at(s, w->sheet, at + across)->codes;
     for (int v = 0; v < TRIP_CPU_RASTER; v++)
         to[v * TRIP_CPU_RASTER_STRIDE + TRIP_CPU_RASTER] = right[v * TRIP_CPU_RASTER_STRIDE];
     int16_t *last = to + TRIP_CPU_RASTER * TRIP_CPU_RASTER_STRIDE;
     memcpy(last, below, TRIP_CPU_RASTER * sizeof *last);
-    last[TRIP_CPU_RASTER] = raster_at(s, w->sheet, at + across + 1)->codes[0];
+    last[TRIP_CPU_RASTER] = behind[0];
+}
+
+static void copy_codes_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
+{
+    const trip_cpu_store *s = job->store;
+    const size_t across = (size_t)s->across;
+    copy_beside(raster_at(s, w->sheet, at)->codes, raster_at(s, w->sheet, at + 1)->codes,
+                raster_at(s, w->sheet, at + across)->codes,
+                raster_at(s, w->sheet, at + across + 1)->codes);
+}
+
+static int16_t *deviations_at(const trip_cpu_store *s, const trip_cpu_sheet *sheet, size_t at)
+{
+    return s->deviations[sheet->rasters[at]];
+}
+
+static void find_rows(const trip_cpu_store *s, trip_cpu_sheet *sheet, size_t at, uint64_t filled)
+{
+    const size_t across = (size_t)s->across;
+    unsigned largest = atomic_load_explicit(&sheet->largest_row, memory_order_relaxed);
+    copy_beside(deviations_at(s, sheet, at), deviations_at(s, sheet, at + 1),
+                deviations_at(s, sheet, at + across), deviations_at(s, sheet, at + across + 1));
+    s->kernels->sheet_rows(deviations_at(s, sheet, at), filled, sheet->rows[at]);
+    for (int i = 0; i < 64; i++)
+        while (sheet->rows[at][i] > largest &&
+               !atomic_compare_exchange_weak_explicit(&sheet->largest_row, &largest,
+                                                      sheet->rows[at][i], memory_order_relaxed,
+                                                      memory_order_relaxed)) {
+        }
 }
 
 static void copy_gradients_beside(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
@@ -353,6 +414,8 @@ static void find_ranges(const work_job *job, const trip_cpu_sheet_work *w, size_
     copy_codes_beside(job, w, at);
     const uint64_t filled = atomic_load_explicit(&w->sheet->filled[at], memory_order_relaxed);
     s->kernels->sheet_ranges(raster_at(s, w->sheet, at), filled, &w->sheet->ranges[at]);
+    if (s->blurs)
+        find_rows(s, w->sheet, at, filled);
 }
 
 void trip_cpu_store_prepare(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)
@@ -392,20 +455,83 @@ static void find_cells_one_by_one(const trip_cpu_tf *f, const trip_cpu_voxels *f
     }
 }
 
-/* Finds the cells that may be visible in the given squares. */
-static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
-                       uint64_t squares)
+/* Returns a biased code moved by `by` and kept within the codes of voxels. */
+static int16_t moved(int16_t code, int64_t by)
+{
+    const int64_t to = code + by;
+    return (int16_t)(to < TRIP_CPU_CODE_MIN ? TRIP_CPU_CODE_MIN : to < INT16_MAX ? to : INT16_MAX);
+}
+
+/* Finds the cells in the given squares that may be visible with deviations up to a row. */
+static void find_cells_of_row(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
+                              uint64_t squares, unsigned row, trip_cpu_cells *cells)
 {
     const trip_cpu_store *s = job->store;
     const trip_cpu_tf *f = job->function;
     const trip_cpu_voxels *from = raster_at(s, w->sheet, at), *to = raster_at(s, w->other, at);
-    trip_cpu_cells *cells = &w->sheet->cells[at];
-    if (trip_kernel_is_wide(w->kernel))
+    const int64_t reach = row ? trip_cpu_tf_reach(f, row) : 0;
+    const bool known =
+        reach == 0 || (f->visible_below + reach < 0 && f->visible_above - reach > UINT16_MAX);
+    if (trip_kernel_is_wide(w->kernel) || (reach > 0 && !(f->in_a_row && known)))
         s->kernels->sheet_cells(from, to, squares, TRIP_CPU_CODE_MIN, INT16_MAX, cells);
     else if (f->in_a_row)
-        s->kernels->sheet_cells(from, to, squares, f->first_visible, f->last_visible, cells);
+        s->kernels->sheet_cells(from, to, squares, moved(f->first_visible, -reach),
+                                moved(f->last_visible, reach), cells);
     else
         find_cells_one_by_one(f, from, to, squares, cells);
+}
+
+/* Returns the row that suffices for all segments that meet a square. Their ends may lie in the
+ * squares around it, or if rays leap, in any square. */
+static unsigned row_about(const trip_cpu_store *s, const trip_cpu_sheet_work *w, size_t at,
+                          int square)
+{
+    enum { ACROSS = TRIP_CPU_SQUARES_ACROSS };
+    const trip_cpu_sheet *sheets[2] = { w->sheet, w->other };
+    unsigned row = 0;
+    for (int k = 0; k < 2; k++) {
+        const unsigned largest =
+            atomic_load_explicit(&sheets[k]->largest_row, memory_order_relaxed);
+        if (w->everywhere || largest <= row) {
+            row = largest > row ? largest : row;
+            continue;
+        }
+        for (int n = 0; n < 9; n++) {
+            const int u = square % ACROSS + n % 3 - 1, v = square / ACROSS + n / 3 - 1;
+            const size_t below = v < 0 ? -(size_t)s->across : v < ACROSS ? 0 : (size_t)s->across;
+            const size_t raster = at + below + (u < 0 ? (size_t)-1 : u < ACROSS ? 0 : 1);
+            if (!sheets[k]->rasters[raster])
+                continue;
+            const unsigned there =
+                sheets[k]->rows[raster][(v + ACROSS) % ACROSS * ACROSS + (u + ACROSS) % ACROSS];
+            row = there > row ? there : row;
+        }
+    }
+    return row;
+}
+
+/* Finds the cells that may be visible in the given squares. `rows` has the row of each square, or
+ * is NULL if nothing is blurred. */
+static void find_cells(const work_job *job, const trip_cpu_sheet_work *w, size_t at,
+                       uint64_t squares, const uint8_t *of_squares)
+{
+    trip_cpu_cells *cells = &w->sheet->cells[at];
+    if (!of_squares)
+        find_cells_of_row(job, w, at, squares, 0, cells);
+    else
+        *cells = (trip_cpu_cells){ .rows = { 0 } };
+    for (uint64_t rest = of_squares ? squares : 0; rest;) {
+        const unsigned row = of_squares[__builtin_ctzll(rest)];
+        trip_cpu_cells of_row;
+        uint64_t same = 0;
+        for (uint64_t left = rest; left; left &= left - 1)
+            if (of_squares[__builtin_ctzll(left)] == row)
+                same |= left & -left;
+        find_cells_of_row(job, w, at, same, row, &of_row);
+        for (int v = 0; v < TRIP_CPU_RASTER; v++)
+            cells->rows[v] |= of_row.rows[v];
+        rest &= ~same;
+    }
     const uint64_t *rows = cells->rows;
     for (int v = 0; v < TRIP_CPU_RASTER; v++)
         cells->fours[v] = rows[v];
@@ -467,28 +593,40 @@ static bool shows_about(const work_job *job, const trip_cpu_sheet_work *w, size_
     double bounds[2];
     for (int i = 0; i < 4; i++)
         add_ranges_about(job->store, about[i], at, square, range);
+    if (range[0] > range[1])
+        return false;
+    /* The weights of a kernel may enlarge deviations. */
+    const int64_t reach =
+        job->store->blurs ? trip_cpu_tf_reach(job->function, TRIP_CPU_BLURRED_ROWS - 1) : 0;
     trip_field_code_bounds(w->kernel, range[0], range[1], bounds);
-    return trip_cpu_tf_shows(job->function, (int16_t)fmax(TRIP_CPU_CODE_MIN, floor(bounds[0])),
-                             (int16_t)fmin(INT16_MAX, ceil(bounds[1])));
+    return trip_cpu_tf_shows_within(job->function,
+                                    (int16_t)fmax(TRIP_CPU_CODE_MIN, floor(bounds[0])),
+                                    (int16_t)fmin(INT16_MAX, ceil(bounds[1])), reach);
 }
 
 static void find_visible(const work_job *job, const trip_cpu_sheet_work *w, size_t at)
 {
     const trip_cpu_square_ranges *a = &w->sheet->ranges[at], *b = &w->other->ranges[at];
     uint64_t visible = 0, *edges = w->sheet->edges[at];
+    const bool blurs = job->store->blurs;
+    uint8_t rows[64];
     if (w->other->rasters[at])
         for (int i = 0; i < 64; i++) {
             bool any = a->min[i] <= a->max[i] && b->min[i] <= b->max[i];
             int16_t min = a->min[i] < b->min[i] ? a->min[i] : b->min[i];
             int16_t max = a->max[i] > b->max[i] ? a->max[i] : b->max[i];
+            if (any && blurs)
+                rows[i] = (uint8_t)row_about(job->store, w, at, i);
             if (any &&
                 (trip_kernel_is_wide(w->kernel) ? shows_about(job, w, at, i)
+                 : blurs                        ? trip_cpu_tf_shows_within(job->function, min, max,
+                                                                           trip_cpu_tf_reach(job->function, rows[i]))
                                                 : trip_cpu_tf_shows(job->function, min, max)))
                 visible |= UINT64_C(1) << i;
         }
     memset(edges, 0, sizeof w->sheet->edges[at]);
     if (visible) {
-        find_cells(job, w, at, visible);
+        find_cells(job, w, at, visible, blurs ? rows : NULL);
         find_edges(edges, &w->sheet->cells[at]);
     }
     w->sheet->visible[at] = edges[TRIP_CPU_ALL];
@@ -590,6 +728,10 @@ static void cut_raster(const work_job *job, const trip_cpu_sheet_work *w, size_t
     s->kernels->sheet_between(raster_at(s, w->other, at), raster_at(s, w->third, at), UINT64_MAX,
                               w->sheet->making.weights, w->other->shaded,
                               raster_at(s, w->sheet, at));
+    if (s->blurs)
+        s->kernels->sheet_deviations_between(
+            deviations_at(s, w->other, at), deviations_at(s, w->third, at), UINT64_MAX,
+            w->sheet->making.weights, deviations_at(s, w->sheet, at));
 }
 
 void trip_cpu_store_cut(trip_cpu_store *s, const trip_cpu_sheet_work *work, unsigned count)

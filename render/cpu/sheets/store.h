@@ -8,6 +8,7 @@
 #include "cpu/kernels/kernels.h"
 #include "cpu/pool.h"
 #include "cpu/sheets/integrals.h"
+#include "draw_codes.h"
 #include "reader.h"
 
 /* Sets of squares of a raster. ALL holds the squares with cells that may be visible. LEFT, RIGHT,
@@ -30,9 +31,13 @@ typedef struct trip_cpu_sheet {
     int32_t *rasters;               /* numbers in the pool; 0 stands for absent */
     trip_cpu_square_ranges *ranges; /* defined for present rasters */
     _Atomic uint64_t *filled;       /* squares with voxels; defined for present rasters */
-    uint64_t *visible;      /* squares with cells that may be visible up to the next sheet */
-    trip_cpu_cells *cells;  /* these cells; defined for rasters with visible squares */
-    trip_cpu_edges *edges;  /* `visible`, split by edges */
+    uint64_t *visible;     /* squares with cells that may be visible up to the next sheet */
+    trip_cpu_cells *cells; /* these cells; defined for rasters with visible squares */
+    trip_cpu_edges *edges; /* `visible`, split by edges */
+    /* Blurred functions only: the row that suffices for each square (sheet_rows()), defined for
+     * present rasters, and the largest of them. */
+    uint8_t (*rows)[64];
+    _Atomic unsigned largest_row;
     uint64_t *needed;       /* squares from which visible segments read voxels */
     trip_cpu_making making; /* unused if trip_cpu_sheets_at_once() */
     bool prepared, shaded;  /* all ranges are found; all gradients are found */
@@ -52,13 +57,16 @@ typedef struct trip_cpu_store {
     trip_budget *budget;
     const trip_cpu_kernels *kernels;
     trip_cpu_pool *pool;
-    const uint16_t *drawn; /* draw code of each stored code; NULL if the two are the same */
-    trip_cpu_codes codes;  /* stretch of the frame's draw codes */
+    const trip_draw_codes *draw; /* the codes that are interpolated */
+    bool blurs;                  /* rasters have deviations */
+    trip_cpu_codes codes;        /* stretch of the frame's draw codes */
     const trip_coordinates *coordinates;
     int axis; /* axis of the layer's lists */
 
     trip_cpu_voxels *voxels; /* the pool of rasters; raster 0 has only missing voxels */
     size_t voxels_bytes;
+    trip_cpu_deviations *deviations; /* of the pool's rasters; NULL unless a frame has blurred */
+    size_t deviations_bytes;
     int32_t *free; /* numbers of free rasters */
     uint32_t rasters, free_count;
 
@@ -73,8 +81,10 @@ typedef struct trip_cpu_store {
     uint64_t *open; /* squares to decode in the current sheet; at first all */
 } trip_cpu_store;
 
-/* Returns the bytes of `sheets` sheets of a rectangle, with a pool of `rasters` rasters. */
-uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters);
+/* Returns the bytes of `sheets` sheets of a rectangle, with a pool of `rasters` rasters. They have
+ * deviations if `blurs`. */
+uint64_t trip_cpu_store_bytes(const trip_cpu_rasters *all, unsigned sheets, uint64_t rasters,
+                              bool blurs);
 /* Returns the bytes that the store holds from the budget. */
 uint64_t trip_cpu_store_held_bytes(const trip_cpu_store *s);
 /* Makes room for `sheets` sheets of a rectangle and for `min` to `max` rasters, in at most `room`

@@ -38,10 +38,11 @@ static uint64_t rasters_of(const trip_cpu_rasters *b, int sheets_and_samples)
 }
 
 static uint64_t bytes_of(const trip_cpu_rasters *all, const int64_t size[2], int64_t reach,
-                         int sheets, int samples_per_sheet)
+                         int sheets, int samples_per_sheet, bool blurs)
 {
     trip_cpu_rasters b = held_rasters(all, size, reach);
-    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + samples_per_sheet));
+    return trip_cpu_store_bytes(&b, (unsigned)sheets, rasters_of(&b, sheets + samples_per_sheet),
+                                blurs);
 }
 
 static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
@@ -50,10 +51,11 @@ static uint64_t kept_bytes(const trip_cpu_need *need, int sheets)
 }
 
 uint64_t trip_cpu_windows_min_bytes(const trip_cpu_rasters *all, int64_t reach,
-                                    const trip_cpu_need *need, int sheets, int samples_per_sheet)
+                                    const trip_cpu_need *need, int sheets, int samples_per_sheet,
+                                    bool blurs)
 {
     const int64_t one[2] = { 1, 1 };
-    return kept_bytes(need, sheets) + bytes_of(all, one, reach, sheets, samples_per_sheet);
+    return kept_bytes(need, sheets) + bytes_of(all, one, reach, sheets, samples_per_sheet, blurs);
 }
 
 static bool take_runs(trip_cpu_windows *w, const trip_cpu_need *need, trip_budget *budget)
@@ -86,7 +88,8 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
     const int samples_per_sheet = s->of->frame->settings->samples_per_sheet;
     const int sheets = trip_cpu_sheets_held(s->of->frame);
     const uint64_t kept = kept_bytes(need, sheets);
-    if (trip_cpu_windows_min_bytes(all, reach, need, sheets, samples_per_sheet) > room)
+    if (trip_cpu_windows_min_bytes(all, reach, need, sheets, samples_per_sheet, s->store.blurs) >
+        room)
         return false;
     w->room = sheets;
     w->about = trip_cpu_sheets_about(s->of->frame);
@@ -95,7 +98,7 @@ bool trip_cpu_windows_fit(trip_cpu_sheets *s, const trip_cpu_rasters *all, int64
     w->count = w->from = 0;
     for (int a = 0; a < 2; a++)
         w->size[a] = all->last[a] - all->first[a] + 1;
-    while (bytes_of(all, w->size, reach, sheets, samples_per_sheet) > room - kept) {
+    while (bytes_of(all, w->size, reach, sheets, samples_per_sheet, s->store.blurs) > room - kept) {
         int longer = w->size[0] > w->size[1] ? 0 : 1;
         w->size[longer] = (w->size[longer] + 1) / 2;
     }
@@ -128,8 +131,9 @@ static void decode_run(void *context, unsigned task, unsigned thread)
     const trip_block_form form =
         trip_block_form_of(&d->s->of->frame->data->header, (trip_kind)kept->kind);
     (void)thread;
-    const trip_block block =
-        trip_block_make(&form, kept->count, kept->words, d->words + kept->at, NULL);
+    trip_block block = trip_block_make(&form, kept->count, kept->words, d->words + kept->at, NULL);
+    if (kept->has_deviations)
+        block.deviations = (const uint8_t *)(d->words + kept->at + kept->words);
     trip_cpu_store_decode(&d->s->store, d->to, &block, &(trip_run){ .u = kept->u, .v = kept->v });
 }
 
@@ -335,14 +339,21 @@ int trip_cpu_windows_add_run(trip_cpu_sheets *s, const trip_run *run)
     const trip_list *list = trip_batch_list(s->batch, run);
     trip_cpu_kept_sheet *sheet = &w->sheets[w->count - 1];
     const unsigned char *from = s->batch->planes[TRIP_PLANE_VOXELS] + run->at[TRIP_PLANE_VOXELS];
+    const trip_block block = trip_block_of(s->batch, run);
+    const bool deviations = s->store.blurs && block.deviations;
     sheet->runs[sheet->run_count++] = (trip_cpu_kept_run){ .u = run->u,
                                                            .v = run->v,
                                                            .kind = (uint16_t)list->kind,
                                                            .part = (uint16_t)list->part,
                                                            .count = run->count,
                                                            .words = run->words,
+                                                           .has_deviations = deviations,
                                                            .at = sheet->word_count };
     memcpy(sheet->words + sheet->word_count, from, (size_t)run->words * 8);
     sheet->word_count += run->words;
+    if (deviations) {
+        memcpy(sheet->words + sheet->word_count, block.deviations, run->count);
+        sheet->word_count += trip_cpu_deviation_words(run->count);
+    }
     return 0;
 }

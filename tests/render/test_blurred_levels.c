@@ -1,0 +1,458 @@
+/* Frames of coarse levels with deviations. Pictures are compared with closed forms, and the CPU
+ * renderer with the reference. Threads, memory and tiles must not change a bit. */
+#include "cpu/cpu_renderer.h"
+#include "cpu/kernels/isa.h"
+#include "cpu_scenes.h"
+#include "dataset_level.h"
+#include "deviation.h"
+#include "kernel.h"
+#include "plan.h"
+#include "splat.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 48, PIXELS = TEST_BY_TURNS ? 40 : 72 };
+
+/* A scene with a coarse level, which `at` presents. */
+typedef struct level_scene {
+    scene of, at;
+} level_scene;
+
+typedef struct contents {
+    scene_voxel voxel;
+    unsigned (*deviation)(void *user, int i, int j, int k);
+    void *user;
+    unsigned tile;
+    int64_t dims[3];
+} contents;
+
+/* Level 0 is empty, since no frame here draws it. */
+static bool nothing(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)i, (void)j, (void)k, (void)code, (void)gradient;
+    return false;
+}
+
+static void create(level_scene *l, const contents *c)
+{
+    const scene_part part = { .level = 1,
+                              .kind = TRIP_KIND_VALUES,
+                              .by = { 2, 2, 2 },
+                              .voxel = c->voxel,
+                              .deviation = c->deviation,
+                              .user = c->user };
+    scene_create(&l->of,
+                 &(scene_params){ .dims = { 2 * c->dims[0], 2 * c->dims[1], 2 * c->dims[2] },
+                                  .tile_voxels = c->tile ? c->tile : 64,
+                                  .slab_sheets = 8,
+                                  .voxel = nothing,
+                                  .parts = &part,
+                                  .part_count = 1 });
+    l->at = l->of;
+    l->at.level = 1;
+    assert_int_equal(trip_dataset_level_open(&l->at.data, l->of.data, 1), 0);
+}
+
+static void destroy(level_scene *l)
+{
+    trip_dataset_level_close(l->at.data);
+    scene_destroy(&l->of);
+}
+
+static trip_settings settings_of_levels(void)
+{
+    trip_settings s = scene_post(2);
+    s.lod_px = 1;
+    return s;
+}
+
+/* ---- closed forms ---- */
+
+/* A constant value with a constant deviation. */
+typedef struct even {
+    unsigned code, deviation;
+} even;
+
+static bool even_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    const even *e = user;
+    (void)i, (void)j, (void)k, (void)gradient;
+    *code = e->code;
+    return true;
+}
+
+static unsigned even_deviation(void *user, int i, int j, int k)
+{
+    const even *e = user;
+    (void)i, (void)j, (void)k;
+    return e->deviation;
+}
+
+/* Returns the share of a normal distribution above a threshold. */
+static double share_above(double threshold, const even *e)
+{
+    const double deviation = trip_deviation(e->deviation);
+    return 0.5 * erfc((threshold - e->code) / deviation * sqrt(0.5));
+}
+
+static const scene_renderer *const renderers[] = { &cpu_scenes_reference, &cpu_scenes_cpu };
+
+/* Codes from THRESHOLD on have a constant extinction. Blurred, the extinction of a value is in
+ * proportion to the share of its distribution above the threshold. The tested deviations are rows
+ * of the blurred function, up to the rounding of their codes. */
+static void a_step_has_the_mean_extinction_of_the_distribution(void **state)
+{
+    (void)state;
+    enum { THRESHOLD = 40000, LENGTH = 24 };
+    const even cases[] = { { 36000, 64 },  { 40500, 96 }, { 20000, 191 },
+                           { 45000, 128 }, { 39900, 16 }, { 30000, 255 } };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        even e = cases[i];
+        level_scene l;
+        create(&l, &(contents){ even_voxel, even_deviation, &e, .dims = { 32, 32, LENGTH } });
+        scene_colour(&l.of, THRESHOLD, 65535, 1, 0.5, 0.25, 0.05);
+        memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+        trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 300, 40, PIXELS);
+        view.ortho_height = 40;
+        const trip_settings settings = settings_of_levels();
+        const double depth =
+            l.at.table[65535].extinction * share_above(THRESHOLD - 0.5, &e) * 2 * (LENGTH - 1);
+        for (size_t n = 0; n < 2; n++) {
+            scene_picture p = scene_draw(&l.at, renderers[n], &view, &settings);
+            const float *pixel = scene_pixel(&p, PIXELS / 2, PIXELS / 2);
+            assert_close(pixel[3], 1 - exp(-depth), 0.004);
+            assert_close(pixel[1], 0.5 * (1 - exp(-depth)), 0.004);
+            scene_picture_free(&p);
+        }
+        destroy(&l);
+    }
+}
+
+/* Bands of different colours: the colour is the mean, weighted by extinction. */
+static void colours_are_weighted_by_extinction(void **state)
+{
+    (void)state;
+    enum { LENGTH = 16 };
+    even e = { 30000, 128 };
+    level_scene l;
+    create(&l, &(contents){ even_voxel, even_deviation, &e, .dims = { 32, 32, LENGTH } });
+    scene_colour(&l.of, 0, 29999, 1, 0, 0, 0.02);
+    scene_colour(&l.of, 30000, 65535, 0, 0, 1, 0.08);
+    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    const double red = l.of.table[0].extinction * (1 - share_above(29999.5, &e));
+    const double blue = l.of.table[65535].extinction * share_above(29999.5, &e);
+    const double alpha = 1 - exp(-(red + blue) * 2 * (LENGTH - 1));
+    trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 300, 40, PIXELS);
+    view.ortho_height = 40;
+    const trip_settings settings = settings_of_levels();
+    for (size_t n = 0; n < 2; n++) {
+        scene_picture p = scene_draw(&l.at, renderers[n], &view, &settings);
+        const float *pixel = scene_pixel(&p, PIXELS / 2, PIXELS / 2);
+        assert_close(pixel[3], alpha, 0.003);
+        assert_close(pixel[0], alpha * red / (red + blue), 0.003);
+        assert_close(pixel[2], alpha * blue / (red + blue), 0.003);
+        scene_picture_free(&p);
+    }
+    destroy(&l);
+}
+
+/* ---- the renderers agree ---- */
+
+/* Waves with deviations in some places. Voxels are missing where the wave is low. */
+static double wave(int i, int j, int k)
+{
+    return 0.5 + 0.25 * sin(0.31 * i + 0.2) + 0.25 * sin(0.27 * j) * cos(0.35 * k);
+}
+
+static bool wave_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user;
+    (void)gradient;
+    *code = (unsigned)(65535 * wave(i, j, k));
+    return wave(i, j, k) > 0.2 && scene_hash(i, j, k) % 300 != 0;
+}
+
+static unsigned wave_deviation(void *user, int i, int j, int k)
+{
+    (void)user;
+    const double at = sin(0.2 * i) * sin(0.23 * j + 1) * sin(0.17 * k + 2);
+    return at > 0 ? (unsigned)(160 * at) : scene_hash(i, j, k) % 97 == 0 ? 200 : 0;
+}
+
+static const contents waves = { wave_voxel, wave_deviation, .dims = { SIDE, SIDE - 8, SIDE - 6 } };
+
+static void make_waves(level_scene *l, unsigned tile)
+{
+    contents c = waves;
+    c.tile = tile;
+    create(l, &c);
+    scene_colour(&l->of, 33000, 36000, 0.2, 0.5, 1, 0.1);
+    scene_colour(&l->of, 45001, 47000, 0.9, 0.4, 0.1, 0.15);
+    scene_colour(&l->of, 57000, 65535, 1, 1, 0.6, 0.25);
+    memcpy(l->at.table, l->of.table, 65536 * sizeof *l->of.table);
+}
+
+static trip_camera_params view_of(const level_scene *l, int number)
+{
+    const trip_vec3 from[] = { { 1, 0.8, 0.6 }, { -0.2, 1, 0.1 }, { 0.5, -0.4, -1 } };
+    trip_camera_params view =
+        scene_view(&l->at, from[number % 3], number == 1 ? 20 : 190, number == 1 ? 80 : 40, PIXELS);
+    if (number == 2)
+        view.ortho_height = 90;
+    return view;
+}
+
+static double compare(const level_scene *l, const trip_camera_params *view,
+                      const trip_settings *settings)
+{
+    scene_picture a = scene_draw(&l->at, &cpu_scenes_reference, view, settings);
+    scene_picture b = scene_draw(&l->at, &cpu_scenes_cpu, view, settings);
+    const double difference = scene_difference(&a, &b);
+    assert_true(scene_max_opaque(&a) > 0.5);
+    scene_picture_free(&a);
+    scene_picture_free(&b);
+    return difference;
+}
+
+/* Samples take the nearest entry of a row, and deviations are rounded between sheets. */
+#define ROUNDING (1.0 / 255)
+
+static void cpu_agrees_with_the_reference(void **state)
+{
+    (void)state;
+    level_scene l;
+    make_waves(&l, 64);
+    for (int number = 0; number < 3; number++) {
+        const trip_camera_params view = view_of(&l, number);
+        for (int kind = 0; kind < 5; kind++) {
+            trip_settings settings = settings_of_levels();
+            settings.shading = kind == 1;
+            settings.depth = kind == 2;
+            settings.effects.cueing = kind == 3 ? 0.5 : 0;
+            settings.samples_per_sheet = kind == 4 ? 3 : 2;
+            if (kind == 4)
+                trip_clip_add(&settings.clip, trip_v3(1, 0.3, 0.2), -40);
+            assert_close(compare(&l, &view, &settings), 0, scene_bound(&settings) + ROUNDING);
+        }
+        trip_settings cubic = settings_of_levels();
+        cubic.kernel = TRIP_KERNEL_CUBIC;
+        assert_close(compare(&l, &view, &cubic), 0, scene_bound(&cubic) + ROUNDING);
+    }
+    destroy(&l);
+}
+
+/* A function that shows values only by their deviations. */
+static void values_that_only_deviations_show_are_drawn(void **state)
+{
+    (void)state;
+    level_scene l;
+    create(&l, &waves);
+    scene_colour(&l.of, 100, 4000, 1, 0.5, 0.25, 0.4); /* below all values */
+    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    const trip_settings settings = settings_of_levels();
+    for (int number = 0; number < 3; number++) {
+        const trip_camera_params view = view_of(&l, number);
+        scene_picture a = scene_draw(&l.at, &cpu_scenes_reference, &view, &settings);
+        scene_picture b = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+        assert_true(scene_max_opaque(&a) > 0.03);
+        assert_close(scene_difference(&a, &b), 0, scene_bound(&settings) + ROUNDING);
+        scene_picture_free(&a);
+        scene_picture_free(&b);
+    }
+    destroy(&l);
+}
+
+/* All values are the same and not visible. Voxels beyond a border have a deviation that shows
+ * them. */
+static unsigned deviation_beyond(void *user, int i, int j, int k)
+{
+    const int *border = user;
+    (void)j, (void)k;
+    return i >= *border ? 160 : 0;
+}
+
+static bool unseen_voxel(void *user, int i, int j, int k, unsigned *code, double gradient[3])
+{
+    (void)user, (void)i, (void)j, (void)k, (void)gradient;
+    *code = 30000;
+    return true;
+}
+
+/* The frame reads only the bricks beyond the border, and their neighbours. */
+static void bricks_out_of_reach_are_transparent(void **state)
+{
+    (void)state;
+    int border = 80;
+    level_scene l;
+    create(&l, &(contents){ unseen_voxel, deviation_beyond, &border, 16, { 128, 32, 16 } });
+    scene_colour(&l.of, 40000, 65535, 1, 0.5, 0.25, 0.2);
+    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    trip_camera_params view = scene_view(&l.at, trip_v3(0, 0, 1), 600, 40, PIXELS);
+    view.ortho_height = 270;
+    trip_settings settings = settings_of_levels();
+    trip_camera camera;
+    trip_plan plan;
+    assert_int_equal(trip_camera_make(&camera, &view, &l.at.data->index_to_world), 0);
+    assert_int_equal(trip_plan_make(&plan, l.at.data, &camera, &settings, l.at.table, l.at.budget),
+                     0);
+    assert_true(plan.blurs);
+    const trip_list *list = trip_dataset_find(l.at.data, 2, 0, TRIP_KIND_VALUES);
+    const trip_plan_list *planned = &plan.lists[list->index];
+    /* Along z: 8 tiles along i, 2 along j, 2 slabs. The tiles from voxel 80 on, and one more. */
+    assert_int_equal(planned->bricks, 8 * 2 * 2);
+    assert_int_equal(planned->bricks_transparent, 4 * 2 * 2);
+    assert_int_equal(planned->bricks_selected, 4 * 2 * 2);
+    trip_plan_release(&plan, l.at.budget);
+    const even e = { 30000, 160 };
+    const double depth = l.at.table[65535].extinction * share_above(39999.5, &e) * 2 * 15;
+    scene_picture p = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+    const float *seen = scene_pixel(&p, PIXELS / 2 + PIXELS / 4, PIXELS / 2);
+    const float *unseen = scene_pixel(&p, PIXELS / 2 - PIXELS / 4, PIXELS / 2);
+    const float *other = seen[3] > unseen[3] ? unseen : seen;
+    assert_close(seen[3] + unseen[3], 1 - exp(-depth), 0.006);
+    assert_true(other[3] == 0);
+    scene_picture_free(&p);
+    destroy(&l);
+}
+
+/* ---- the same bits ---- */
+
+static void assert_same(const scene_picture *a, const scene_picture *b)
+{
+    assert_memory_equal(a->rgba, b->rgba, 4 * sizeof(float) * (size_t)a->width * (size_t)a->height);
+}
+
+static void threads_and_tiles_draw_the_same(void **state)
+{
+    (void)state;
+    level_scene l, tiles;
+    make_waves(&l, 64);
+    make_waves(&tiles, 16);
+    for (int number = 0; number < 3; number++) {
+        const trip_camera_params view = view_of(&l, number);
+        trip_settings settings = settings_of_levels();
+        settings.shading = number == 1;
+        scene_picture a = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+        scene_picture b = scene_draw(&tiles.at, &cpu_scenes_cpu, &view, &settings);
+        cpu_scenes_threads = 1;
+        scene_picture c = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+        cpu_scenes_threads = 3;
+        assert_same(&a, &b);
+        assert_same(&a, &c);
+        scene_picture_free(&a);
+        scene_picture_free(&b);
+        scene_picture_free(&c);
+    }
+    destroy(&l);
+    destroy(&tiles);
+}
+
+/* Draws with a limited memory. Returns a negative status if the memory does not suffice. */
+static int draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
+                       const trip_camera_params *view, float *rgba)
+{
+    trip_budget *budget;
+    trip_renderer *renderer = NULL;
+    trip_reader *reader = NULL;
+    trip_plan plan = { 0 };
+    trip_camera camera;
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_budget_create(&budget, bytes), 0);
+    trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = settings, .plan = &plan, .table = s->table
+    };
+    trip_frame_stats stats;
+    int status = trip_plan_make(&plan, s->data, &camera, settings, s->table, budget);
+    if (!status)
+        status = trip_cpu_create(&renderer, budget, 2);
+    if (!status)
+        status = trip_reader_create(
+            &reader, s->data,
+            &(trip_reader_params){ .planes = plan.planes, .slots = 2, .slot_bytes = 65536 },
+            budget);
+    if (!status)
+        status = trip_frame_draw(renderer, reader, &frame, rgba, NULL, &stats);
+    trip_reader_destroy(reader);
+    if (renderer)
+        renderer->ops->destroy(renderer);
+    trip_plan_release(&plan, budget);
+    trip_budget_destroy(budget);
+    return status;
+}
+
+/* The level is so wide that its sheets do not fit the smaller memories, which draw it in windows.
+ */
+static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
+{
+    (void)state;
+    level_scene l;
+    contents wide = waves;
+    wide.dims[0] = 400;
+    wide.dims[1] = 320;
+    wide.dims[2] = 8;
+    create(&l, &wide);
+    scene_colour(&l.of, 33000, 36000, 0.2, 0.5, 1, 0.1);
+    scene_colour(&l.of, 57000, 65535, 1, 1, 0.6, 0.4);
+    memcpy(l.at.table, l.of.table, 65536 * sizeof *l.of.table);
+    const trip_camera_params view = scene_view(&l.at, trip_v3(0.6, 0.3, 1), 900, 50, PIXELS);
+    const size_t bytes = 16 * (size_t)PIXELS * PIXELS;
+    float *whole = malloc(bytes), *some = malloc(bytes);
+    for (int kernel = TRIP_KERNEL_LINEAR; kernel <= TRIP_KERNEL_CUBIC; kernel++) {
+        trip_settings settings = settings_of_levels();
+        int drawn = 0, refused = 0;
+        settings.kernel = (trip_kernel)kernel;
+        assert_int_equal(draw_within(&l.at, UINT64_C(256) << 20, &settings, &view, whole), 0);
+        for (uint64_t memory = 4 << 20; memory < 40 << 20; memory += 2000000) {
+            memset(some, 0, bytes);
+            const int status = draw_within(&l.at, memory, &settings, &view, some);
+            if (status == 0)
+                assert_memory_equal(some, whole, bytes);
+            drawn += status == 0;
+            refused += status != 0;
+        }
+        print_message("%d memories drew, %d were too little\n", drawn, refused);
+        assert_true(drawn > 4 && refused > 0);
+    }
+    free(whole);
+    free(some);
+    destroy(&l);
+}
+
+/* Every instruction set draws the same, within the rounding of single precision. */
+static void instruction_sets_agree(void **state)
+{
+    (void)state;
+    level_scene l;
+    make_waves(&l, 64);
+    const trip_camera_params view = view_of(&l, 0);
+    const trip_settings settings = settings_of_levels();
+    setenv("TRIPTYCH_ISA", "plain", 1);
+    scene_picture plain = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+    for (const trip_cpu_kernels *const *isa = trip_cpu_isas(); *isa; isa++) {
+        setenv("TRIPTYCH_ISA", (*isa)->isa, 1);
+        scene_picture p = scene_draw(&l.at, &cpu_scenes_cpu, &view, &settings);
+        print_message("%s: %g\n", (*isa)->isa, scene_difference(&plain, &p));
+        assert_true(scene_difference(&plain, &p) < 0.5 / 255);
+        scene_picture_free(&p);
+    }
+    unsetenv("TRIPTYCH_ISA");
+    scene_picture_free(&plain);
+    destroy(&l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_step_has_the_mean_extinction_of_the_distribution),
+        cmocka_unit_test(colours_are_weighted_by_extinction),
+        cmocka_unit_test(cpu_agrees_with_the_reference),
+        cmocka_unit_test(values_that_only_deviations_show_are_drawn),
+        cmocka_unit_test(bricks_out_of_reach_are_transparent),
+        cmocka_unit_test(threads_and_tiles_draw_the_same),
+        cmocka_unit_test(any_memory_draws_the_same_or_is_reported_as_too_little),
+        cmocka_unit_test(instruction_sets_agree),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
