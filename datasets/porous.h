@@ -1,7 +1,7 @@
 /* A scan of a porous solid, as a CT scanner sees it: solid, pores, boundaries one voxel wide, and
  * noise. The solid is where a sum of 24 plane waves exceeds a threshold (Berk, Scattering
- * properties of a model bicontinuous structure, 1987). Such a sum is nearly Gaussian, so the
- * threshold determines the share of the solid. Pure functions. */
+ * properties of a model bicontinuous structure, 1987). The sum is nearly Gaussian. Its
+ * threshold thus determines the share of the solid. Pure functions. */
 #ifndef TRIP_POROUS_H
 #define TRIP_POROUS_H
 

@@ -94,6 +94,16 @@ def function_text(kind, lowest, highest):
 FUNCTIONS = "gentle", "step", "peak", "stripes"
 
 
+def write_path(folder, keys):
+    """Writes a camera path with a frame each second and returns its name."""
+    path = os.path.join(folder, "path.json")
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump({"triptych_path": 1, "frames_per_second": 1, "keys": [
+            {"seconds": second, "eye": view["eye"], "look": view["look"], "up": view["up"],
+             "fov": view["fov_degrees"]} for second, view in keys]}, file)
+    return path
+
+
 class Data:
     """A bricked volume. `info` is the output of `triptych info --json`."""
 
@@ -125,29 +135,27 @@ class Data:
         return max(8, round(1 / (voxels_per_px * self.voxel_px(1))))
 
     def draw(self, size, setting, frames=1):
-        """Returns the picture, premultiplied, and the statistics of `render`."""
+        """Returns the first picture, premultiplied, and the statistics of `render`. Frames have one
+        view."""
+        keys = [(second, self.view()) for second in (0, frames - 1)] if frames > 1 else []
+        drawn, stats = self.draw_path(size, setting, keys)
+        return drawn[0], stats
+
+    def draw_path(self, size, setting, keys):
+        """Returns the pictures at each second of a path, and the statistics. `keys` are pairs of a
+        second and a view. Without keys, the camera's view is drawn."""
         with tempfile.TemporaryDirectory() as folder:
             stats, out = os.path.join(folder, "stats.json"), os.path.join(folder, "p.exr")
-            view = self.camera if frames == 1 else [
-                "--path", self._path(folder, frames), "--in-flight", "1"]
+            view = self.camera
+            if keys:
+                view = ["--path", write_path(folder, keys), "--in-flight", "1"]
             run([self.options.triptych, "render", self.dataset, "-o", out, "--stats", stats,
                  "--size", "%dx%d" % (size, size), "--threads", str(self.options.threads),
                  *view, *self.look, *setting])
-            first = out if frames == 1 else next(
-                os.path.join(folder, name) for name in sorted(os.listdir(folder))
-                if name.endswith(".exr"))
+            drawn = [read_exr(os.path.join(folder, name)) for name in sorted(os.listdir(folder))
+                     if name.endswith(".exr")]
             with open(stats, encoding="utf-8") as file:
-                return read_exr(first), json.load(file)
-
-    def _path(self, folder, frames):
-        """Writes a path of equal views and returns its name."""
-        key = self.view()
-        key["fov"] = key.pop("fov_degrees")
-        path = os.path.join(folder, "path.json")
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump({"triptych_path": 1, "frames_per_second": 10, "keys": [
-                dict(key, seconds=0), dict(key, seconds=(frames - 1) / 10)]}, file)
-        return path
+                return drawn, json.load(file)
 
     def truth(self, size):
         """Returns the mean over each pixel's area. The work folder keeps it."""
@@ -376,7 +384,38 @@ def turntable(options):
     return result
 
 
-TABLES = {"pixels": pixels, "functions": by_functions, "front": front, "turntable": turntable}
+def zoom(options):
+    """Jumps of the picture while the lens zooms in, beyond the motion's own."""
+    path = find(options, options.zoom)
+    if not path:
+        raise SystemExit("screen: %s is not in --data" % options.zoom)
+    data, size = Data(options, path, "zoom-" + options.zoom.split(".")[0]), 96
+    widths = 0.125 * 80 ** np.linspace(0, 1, options.steps + 1)  # of a voxel, in pixels
+    keys = []
+    for second, width in enumerate(widths):
+        half = np.tan(np.radians(data.view()["fov_degrees"] / 2)) * data.voxel_px(size) / width
+        keys.append((second, dict(data.view(), fov_degrees=float(np.degrees(2 * np.arctan(half))))))
+    true = data.draw_path(size, ["--quality", "exact", "--samples", "8", *FINEST], keys)[0]
+    drawn = data.draw_path(size, [], keys)[0]
+
+    def changes(frames):
+        return np.array([255 * np.abs(b - a).mean() for a, b in zip(frames, frames[1:])])
+    jumps = changes(drawn) - changes(true)
+    errors = [error_of(a, b) or 0 for a, b in zip(drawn, true)]
+    worst = int(np.argmax(jumps))
+    print("%s, %d x %d px, %d steps from 8 voxels a pixel to a tenth:\n" %
+          (options.zoom, size, size, options.steps))
+    print(table(["greatest jump, mean of all pixels, of 255", "at voxels a pixel", "median jump",
+                 "greatest mean error"],
+                [[number(jumps[worst]), number(1 / widths[worst]), number(np.median(jumps)),
+                  number(max(errors))]]))
+    print("\nA jump is the mean change from a picture to the next, less the change of the true "
+          "pictures (`--quality exact --samples 8 --lod 0`).\n")
+    return {"widths_px": widths.tolist(), "jumps": jumps.tolist(), "errors": errors}
+
+
+TABLES = {"pixels": pixels, "functions": by_functions, "front": front, "turntable": turntable,
+          "zoom": zoom}
 
 
 def parse_options():
@@ -416,6 +455,10 @@ def parse_options():
                         help="scenes of the table front (default: %s)" % ",".join(FRONT))
     parser.add_argument("--frames", type=int, default=6, metavar="N",
                         help="frames of each setting of the table front (default: 6)")
+    parser.add_argument("--zoom", default="ch2better.nii.gz", metavar="FILE",
+                        help="volume of the table zoom (default: %(default)s)")
+    parser.add_argument("--steps", type=int, default=200, metavar="N",
+                        help="steps of the table zoom (default: 200)")
     parser.add_argument("--threads", type=int, default=min(4, len(os.sched_getaffinity(0))),
                         help="threads of each program (default: %(default)s)")
     options = parser.parse_args()
