@@ -10,6 +10,7 @@ import pictures
 from contenders import Unavailable
 
 TOLERANCE = 1e-3
+MANY_RAYS_PX = 0.35  # voxels narrower than this get 8 x 8 rays per pixel, others 4 x 4
 LARGE_VOXELS = 100e6  # the integral would take 12 bytes a voxel and minutes for a picture
 
 
@@ -25,8 +26,8 @@ def voxel_px(info, view, size):
 
 
 def rays_of_area(info, view, size):
-    """Returns N for N x N rays per pixel, two a voxel along each side or more."""
-    return 8 if voxel_px(info, view, size) < 0.5 else 4
+    """Returns N for N x N rays per pixel."""
+    return 8 if voxel_px(info, view, size) < MANY_RAYS_PX else 4
 
 
 def is_large(info):

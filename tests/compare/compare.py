@@ -41,14 +41,14 @@ NOTES = [
     "triptych-cpu and triptych-gl use --classify pre. vtk-cpu-half: vtk-cpu with a sample every "
     "half voxel. VTK's ray caster gets a view wider by a pixel, which it needs to show the same.",
     "Errors: of 255, against the mean over each pixel's area of the integral through the source "
-    "volume (8 x 8 rays per pixel, or 4 x 4 if a voxel is wider than half a pixel; linear "
-    "interpolation, tolerance %g, 8 bits per channel), as the mean over the measured views. The "
+    "volume (8 x 8 rays per pixel, or 4 x 4 if a voxel is wider than %g of a pixel; "
+    "linear interpolation, tolerance %g, 8 bits per channel), as the mean over the measured views. The "
     "last two columns are against one ray per pixel. For volumes of more than 100 million voxels, "
     "the rays are by `--quality exact`. Errors cover the "
     "pixels where either opacity is above 1/255, in red, green, blue (premultiplied) and opacity, "
     "and in opacity alone. Light does not change opacity. VTK has its own gradients and lights "
     "flat regions, so its error of colour includes that difference." %
-    accuracy.TOLERANCE,
+    (accuracy.MANY_RAYS_PX, accuracy.TOLERANCE),
     "triptych-draft, -normal, -high: `triptych render --quality` along a path with these views. The "
     "time includes reading the data set from files.",
     "vdb_render, triptych-cpu and triptych-gl apply the transfer function to voxels, VTK and "

@@ -43,9 +43,9 @@ FRONT = ["bonsai", "brain-translucent", "aneurism", "porous"]
 
 NOTES = {
     "truth": "The truth is the mean over each pixel's area: the mean of 8 x 8 rays of the integral "
-             "renderer (tolerance %g), or of 4 x 4 rays where a voxel is wider than half a pixel. "
+             "renderer (tolerance %g), or of 4 x 4 rays where a voxel is wider than %g of a pixel. "
              "For volumes of more than 100 million voxels, the rays are by `--quality exact`." %
-             accuracy.TOLERANCE,
+             (accuracy.TOLERANCE, accuracy.MANY_RAYS_PX),
     "error": "Errors are means of 255 in red, green, blue (premultiplied) and opacity, over the "
              "pixels where either opacity is above 1/255.",
     "drawn": "Drawn: voxels that the frame reads at all levels, as a share of `--lod 0`.",
@@ -246,7 +246,7 @@ def by_functions(options):
     """Error by functions, with the promises."""
     result, rows = [], []
     for volume, path in volumes(options, 6):
-        # The range is that of the whole volume.
+        # The whole volume has this range, whatever the function keeps.
         values = Data(options, path, volume.name).info
         for kind in options.functions:
             function = os.path.join(options.work, "%s-%s.tf" % (volume.name, kind))
@@ -445,8 +445,8 @@ def parse_options():
                         "four) and functions (default: all): " + ", ".join(names))
     parser.add_argument("--functions", type=comma(str, FUNCTIONS), default=FUNCTIONS,
                         metavar="NAME[,..]", help="functions: " + ", ".join(FUNCTIONS))
-    parser.add_argument("--sizes", type=comma(int), default=[64, 160, 400], metavar="N[,..]",
-                        help="edges of the pictures of the table functions (default: 64,160,400)")
+    parser.add_argument("--sizes", type=comma(int), default=[64, 160, 256], metavar="N[,..]",
+                        help="edges of the pictures of the table functions (default: 64,160,256)")
     parser.add_argument("--voxels-per-px", type=comma(float), metavar="X[,..]",
                         help="voxels a pixel of the tables pixels (default: by the volume) and "
                         "front (default: 1,2,4)")
