@@ -1,5 +1,5 @@
-/* triptych-generate: writes a volume of any size with values known in closed form. It holds only a
- * few slices or one cube at a time, so memory use does not grow with the volume. */
+/* triptych-generate: writes a volume of any size with values from formulas. It holds only a few
+ * slices or one cube at a time, so memory use does not grow with the volume. */
 #include <argp.h>
 #include <errno.h>
 #include <pthread.h>
@@ -11,13 +11,16 @@
 #include "fields.h"
 #include "interrupt.h"
 #include "new_file.h"
+#include "porous.h"
 #include "report.h"
 #include "text.h"
 #include "write_vdb.h"
 
-enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, SLICES = 8 };
+enum { ROWS_PER_TASK = 8, MAX_THREADS = 64, SLICES = 8, PIECE = 256 };
 
-typedef enum sample_type { SAMPLE_U8, SAMPLE_U16, SAMPLE_F32 } sample_type;
+#define POROUS "porous"
+
+typedef enum sample_type { SAMPLE_U8, SAMPLE_U16, SAMPLE_F32, SAMPLE_DEFAULT } sample_type;
 
 static const struct {
     const char *name;
@@ -25,9 +28,9 @@ static const struct {
 } sample_types[] = { { "uint8", 1 }, { "uint16", 2 }, { "float", 4 } };
 
 typedef struct job {
-    const trip_field *field;
-    const char *output;
-    long dims[3];
+    const trip_field *field; /* or NULL for the porous scan */
+    const char *name, *output;
+    long dims[3]; /* 0: the default of the field */
     sample_type type;
     double detail;
     long threads;
@@ -55,21 +58,44 @@ static trip_vec3 position(const job *j, long x, long y, long z)
                    ((double)z - (double)(j->dims[2] - 1) / 2) * step);
 }
 
+/* Stores a value in [0, 1] as voxel number `at`. */
+static void store(const box *b, size_t at, double v)
+{
+    if (b->job->type == SAMPLE_U8)
+        ((uint8_t *)b->values)[at] = (uint8_t)lrint(v * 255);
+    else if (b->job->type == SAMPLE_U16)
+        ((uint16_t *)b->values)[at] = (uint16_t)lrint(v * 65535);
+    else
+        ((float *)b->values)[at] = (float)v;
+}
+
+/* Floats of the scan are values of 16 bits before rounding. */
+static void porous_row(const box *b, long y, long z, size_t start)
+{
+    float piece[PIECE];
+    for (long x = 0; x < b->size[0]; x += PIECE) {
+        long left = b->size[0] - x, n = left < PIECE ? left : PIECE;
+        trip_porous_row(b->job->dims, b->job->detail, b->first[0] + x, y, z, n, piece);
+        for (long i = 0; i < n; i++)
+            if (b->job->type == SAMPLE_F32)
+                ((float *)b->values)[start + (size_t)(x + i)] = piece[i];
+            else
+                store(b, start + (size_t)(x + i), (double)piece[i] / TRIP_POROUS_MAX);
+    }
+}
+
 static void sample_row(const box *b, long row)
 {
     const job *j = b->job;
     long y = b->first[1] + row % b->size[1], z = b->first[2] + row / b->size[1];
     size_t start = (size_t)row * b->stride;
-    for (long x = 0; x < b->size[0]; x++) {
-        double v = j->field->sample(position(j, b->first[0] + x, y, z), j->detail, NULL);
-        size_t at = start + (size_t)x;
-        if (j->type == SAMPLE_U8)
-            ((uint8_t *)b->values)[at] = (uint8_t)lrint(v * 255);
-        else if (j->type == SAMPLE_U16)
-            ((uint16_t *)b->values)[at] = (uint16_t)lrint(v * 65535);
-        else
-            ((float *)b->values)[at] = (float)v;
+    if (!j->field) {
+        porous_row(b, y, z, start);
+        return;
     }
+    for (long x = 0; x < b->size[0]; x++)
+        store(b, start + (size_t)x,
+              j->field->sample(position(j, b->first[0] + x, y, z), j->detail, NULL));
 }
 
 static void *sample_rows(void *user)
@@ -141,8 +167,7 @@ static int write_dense(const job *j, const char *path, bool header)
         fprintf(file,
                 "NRRD0004\n# %s, detail %g\ntype: %s\ndimension: 3\nsizes: %ld %ld %ld\n"
                 "spacings: 1 1 1\nendian: little\nencoding: raw\n\n",
-                j->field->name, j->detail, sample_types[j->type].name, j->dims[0], j->dims[1],
-                j->dims[2]);
+                j->name, j->detail, sample_types[j->type].name, j->dims[0], j->dims[1], j->dims[2]);
     int status = write_slices(j, file);
     if (fclose(file) != 0 && status == TRIP_OK)
         status = trip_fail_errno("generate", path, "cannot write");
@@ -246,13 +271,15 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
                        MAX_THREADS);
         return 0;
     case ARGP_KEY_ARG:
-        j->field = state->arg_num == 0 ? trip_field_find(arg) : NULL;
-        if (!j->field)
-            argp_error(state, "unknown field '%s'; use marschner-lobb, cloud, shells or filaments",
-                       arg);
+        j->name = state->arg_num == 0 ? arg : "";
+        j->field = trip_field_find(j->name);
+        if (!j->field && strcmp(j->name, POROUS) != 0)
+            argp_error(
+                state,
+                "unknown field '%s'; use marschner-lobb, cloud, shells, filaments or " POROUS, arg);
         return 0;
     case ARGP_KEY_END:
-        if (!j->field || !j->output)
+        if (!j->name || !j->output)
             argp_error(state, "FIELD and -o FILE are required");
         return 0;
     default:
@@ -262,9 +289,11 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option options[] = {
     { "output", 'o', "FILE", 0, "Writes this file: .nrrd, .raw or .vdb (sparse)", 0 },
-    { "size", 's', "N|NXxNYxNZ", 0, "Sets the number of voxels along each axis (default: 256)", 0 },
+    { "size", 's', "N|NXxNYxNZ", 0,
+      "Sets the number of voxels along each axis (default: 256; porous: 1024x1024x300)", 0 },
     { "type", 't', "TYPE", 0,
-      "Sets the type of a voxel: uint8, uint16 or float (default: uint8); .vdb is always float",
+      "Sets the type of a voxel: uint8, uint16 or float (default: uint8; porous: uint16); .vdb is "
+      "always float",
       0 },
     { "detail", 'd', "X", 0,
       "Sets the fineness of the structure (default: longest side / 256, at least 1)", 0 },
@@ -274,29 +303,41 @@ static const struct argp_option options[] = {
     { 0 },
 };
 
+static void choose_defaults(job *j)
+{
+    static const long scan[3] = { 1024, 1024, 300 };
+    long longest = 0;
+    for (int a = 0; a < 3; a++) {
+        if (j->dims[a] == 0)
+            j->dims[a] = j->field ? 256 : scan[a];
+        longest = j->dims[a] > longest ? j->dims[a] : longest;
+    }
+    if (j->type == SAMPLE_DEFAULT)
+        j->type = j->field ? SAMPLE_U8 : SAMPLE_U16;
+    if (j->detail == 0)
+        j->detail = fmax(1, (double)longest / 256);
+}
+
 int main(int argc, char **argv)
 {
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    job j = { .dims = { 256, 256, 256 },
+    job j = { .type = SAMPLE_DEFAULT,
               .threads = processors < MAX_THREADS ? processors : MAX_THREADS };
     struct argp argp = {
         options,
         parse_option,
         "FIELD",
         "Writes a volume of a function in closed form. FIELD is marschner-lobb (dense), cloud "
-        "(about half empty), shells or filaments (almost empty).",
+        "(about half empty), shells or filaments (almost empty), or porous. porous is like a CT "
+        "scan "
+        "of a porous solid: solid 32000, pores 12000, and noise with the standard deviation 900.",
         NULL,
         NULL,
         NULL
     };
     argp_err_exit_status = 2;
     argp_parse(&argp, argc, argv, ARGP_NO_HELP, NULL, &j);
-    if (j.detail == 0) {
-        long longest = j.dims[0];
-        for (int a = 1; a < 3; a++)
-            longest = j.dims[a] > longest ? j.dims[a] : longest;
-        j.detail = fmax(1, (double)longest / 256);
-    }
+    choose_defaults(&j);
     trip_interrupt_install();
     int status = generate(&j);
     return status == TRIP_OK ? 0 : status == TRIP_USAGE ? 2 : 1;

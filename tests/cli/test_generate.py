@@ -45,6 +45,24 @@ def filaments(dims, detail):
     return numpy.maximum(0, 1 - (gyroid**2 + schwarz**2) / 0.02) ** 2
 
 
+def porous_share(dims, detail):
+    """Returns the share of solid in each voxel of the scan, by the formulas of datasets/porous.h."""
+    n = numpy.arange(24)
+    k = 2 * numpy.pi * 3 * detail * 2 / (max(dims) - 1) * (0.6 + 0.8 * (n * 0.7548776662 % 1))
+    along, around = (n + 0.5) / 24, 2 * numpy.pi * (n * 0.61803398875 % 1)
+    across = numpy.sqrt(1 - along**2)
+    waves = k * (across * numpy.cos(around), across * numpy.sin(around), along)
+    axes = [numpy.arange(size) - (size - 1) / 2 for size in dims]
+    z, y, x = numpy.meshgrid(*axes[::-1], indexing="ij")
+    total, gradient = 0, numpy.zeros((3, *x.shape))
+    for (kx, ky, kz), phase in zip(waves.T, 2 * numpy.pi * ((n + 1) * 0.5698402910 % 1)):
+        angle = kx * x + ky * y + kz * z + phase
+        total = total + numpy.cos(angle) * (2 / 24) ** 0.5
+        gradient -= numpy.multiply.outer([kx, ky, kz], numpy.sin(angle) * (2 / 24) ** 0.5)
+    slope = numpy.sqrt((gradient**2).sum(0))
+    return numpy.clip(0.5 + (total - 0.772193214) / numpy.maximum(slope, 1e-9), 0, 1)
+
+
 FIELDS = {"marschner-lobb": marschner_lobb, "shells": shells, "filaments": filaments}
 
 
@@ -87,6 +105,45 @@ class Generate(program.ProgramTest):
                 self.made(field, dims, "v.raw", "--type", "float", "--detail", detail)
                 self.assertLess(abs(read_raw("v.raw", dims, "<f4") - wanted).max(), 1e-6, field)
 
+    def test_the_porous_scan_has_two_phases_and_normal_noise(self):
+        """The values minus the shares of the formula leave the noise alone. Its moments and its
+        correlations have the standard errors 1 / sqrt(n) of a normal distribution."""
+        for dims, detail in ((300, 90, 70), 1.3), ((45, 61, 52), 1):
+            self.made("porous", dims, "v.raw", "--detail", detail)
+            codes = read_raw("v.raw", dims, "<u2").astype("f8")
+            self.made("porous", dims, "v.raw", "--detail", detail, "--type", "float")
+            self.assertLessEqual(abs(read_raw("v.raw", dims, "<f4") - codes).max(), 0.5)
+            share = porous_share(dims, detail)
+            noise = (codes - 12000 - 20000 * share) / 900
+            error = 5 / noise.size**0.5
+            for phase in noise[share == 0], noise[share == 1], noise:
+                within = 5 / phase.size**0.5
+                self.assertLess(abs(phase.mean()), within)
+                self.assertLess(abs(phase.std() - 1), within)
+                self.assertLess(abs((phase**3).mean()), within * 15**0.5)
+                self.assertLess(abs((phase**4).mean() - 3), within * 96**0.5)
+            for axis in 0, 1, 2:
+                for away in 1, 2:
+                    a, b = numpy.split(noise, [away], axis)[1], numpy.split(noise, [-away], axis)[0]
+                    self.assertLess(abs((a * b).mean()), 1.1 * error, (axis, away))
+
+    def test_the_threshold_of_the_porous_scan_gives_its_porosity(self):
+        """A sum of many waves with the variance 1 is normal. It exceeds 0.7722 in 22 % of the
+        volume. This volume is 24 waves wide."""
+        dims = 512, 512, 60
+        self.made("porous", dims, "v.raw", "--detail", 4)
+        solid = read_raw("v.raw", dims, "<u2") > (12000 + 32000) / 2
+        self.assertLess(abs(solid.mean() - 0.22), 0.01)
+
+    def test_the_defaults_of_the_porous_scan(self):
+        self.made("porous", (1024, 1024, 2), "v.nrrd")
+        with open("v.nrrd", "rb") as f:
+            head = f.read(300).split(b"\n\n")[0]
+        self.assertIn(b"type: uint16", head)
+        self.assertIn(b"# porous, detail 4", head)
+        r = subprocess.run([program.GENERATE, "--help"], capture_output=True, text=True)
+        self.assertIn("porous: 1024x1024x300", " ".join(r.stdout.split()))
+
     def test_the_header_describes_the_data(self):
         dims = 20, 10, 30
         self.made("cloud", dims, "v.raw", "--type", "uint16")
@@ -112,13 +169,13 @@ class Generate(program.ProgramTest):
                 self.assertEqual(grid.gridClass, "fog volume")
 
     def test_the_number_of_threads_does_not_change_files(self):
-        for name in "a.raw", "a.vdb":
+        for field, name in ("cloud", "a.raw"), ("cloud", "a.vdb"), ("porous", "a.raw"):
             contents = set()
             for threads in 1, 3, 8:
-                self.made("cloud", (90, 80, 70), name, "--threads", threads)
+                self.made(field, (290, 80, 70), name, "--threads", threads)
                 with open(name, "rb") as f:  # a VDB file begins with a random identifier
                     contents.add(f.read()[64:])
-            self.assertEqual(len(contents), 1, name)
+            self.assertEqual(len(contents), 1, (field, name))
 
     def test_output_that_cannot_be_written_leaves_nothing(self):
         os.mkdir("folder.raw")

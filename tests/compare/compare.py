@@ -40,13 +40,17 @@ NOTES = [
     "triptych-post-1, -2, -4: triptych-cpu with --classify post and 1, 2 or 4 samples per sheet. "
     "triptych-cpu and triptych-gl use --classify pre. vtk-cpu-half: vtk-cpu with a sample every "
     "half voxel. VTK's ray caster gets a view wider by a pixel, which it needs to show the same.",
-    "Errors: of 255, against the exact picture: the mean of the integral through the source volume "
-    "over the area of each pixel (linear interpolation, "
-    "tolerance %g, 8 bits per channel), as the mean over the measured views. They cover the "
+    "Errors: of 255, against the mean over each pixel's area of the integral through the source "
+    "volume (8 x 8 rays per pixel, or 4 x 4 if a voxel is wider than %g of a pixel; "
+    "linear interpolation, tolerance %g, 8 bits per channel), as the mean over the measured views. The "
+    "last two columns are against one ray per pixel. For volumes of more than 100 million voxels, "
+    "the rays are by `--quality exact`. Errors cover the "
     "pixels where either opacity is above 1/255, in red, green, blue (premultiplied) and opacity, "
     "and in opacity alone. Light does not change opacity. VTK has its own gradients and lights "
     "flat regions, so its error of colour includes that difference." %
-    accuracy.TOLERANCE,
+    (accuracy.MANY_RAYS_PX, accuracy.TOLERANCE),
+    "triptych-draft, -normal, -high: `triptych render --quality` along a path with these views. The "
+    "time includes reading the data set from files.",
     "vdb_render, triptych-cpu and triptych-gl apply the transfer function to voxels, VTK and "
     "triptych-post to interpolated values.",
     "Triptych leaves flat regions unlit; VTK lights them like all others.",
@@ -391,7 +395,8 @@ def choose_scenes(options):
     for scene in scenes.SCENES:
         if options.scenes and scene.name not in options.scenes:
             continue
-        volume = scenes.find(scene, folders, os.path.join(options.out, "work"))
+        volume = scenes.find(scene, folders, os.path.join(options.out, "work"),
+                             options.triptych)
         if volume:
             yield scene, volume
         else:

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
 
 from prepare import DENSITY_SCALE
@@ -65,6 +66,33 @@ class Triptych:
 
     def close(self):
         pass
+
+
+class Quality(Triptych):
+    """Runs `triptych render --quality NAME` along a path with a key for each view. The first view is
+    drawn twice, and its first frame does not count."""
+
+    def __init__(self, prepared, quality, threads):
+        super().__init__(prepared, "cpu", threads, "triptych-" + quality,
+                         ["--classify", "auto", "--quality", quality])
+
+    def time_views(self, size, views):
+        views = Triptych(self.prepared, "cpu", self.threads).time_views(64, views)
+        with tempfile.TemporaryDirectory() as folder:
+            path, stats = os.path.join(folder, "path.json"), os.path.join(folder, "stats.json")
+            keys = [{"seconds": second, "eye": view["eye"], "look": view["look"],
+                     "up": view["up"], "fov": view["fov_degrees"]}
+                    for second, view in enumerate(views[:1] + views)]
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump({"triptych_path": 1, "frames_per_second": 1, "keys": keys}, file)
+            _run([self.prepared.triptych, "render", self.prepared.dataset, "-o",
+                  os.path.join(folder, "p.png"), "--path", path, "--stats", stats, "--in-flight",
+                  "1", "--renderer", "cpu", "--threads", str(self.threads), "--size",
+                  "%dx%d" % (size, size)] + self.look)
+            with open(stats, encoding="utf-8") as file:
+                report = json.load(file)
+        self.device = report["device"]
+        return [dict(view, ms=[frame["ms"]]) for view, frame in zip(views, report["frames"][1:])]
 
 
 class Vtk:
@@ -147,7 +175,8 @@ class VdbRender:
 
 
 POST = "triptych-post-"  # followed by the samples per sheet
-NAMES = ["triptych-cpu", POST + "1", POST + "2", POST + "4", "triptych-gl", "vtk-cpu",
+QUALITIES = ["draft", "normal", "high"]
+NAMES = ["triptych-cpu", *["triptych-" + quality for quality in QUALITIES], POST + "1", POST + "2", POST + "4", "triptych-gl", "vtk-cpu",
          "vtk-cpu-half", "vtk-gpu", "vdb_render"]
 
 
@@ -155,6 +184,8 @@ def make(name, prepared, threads):
     if name.startswith(POST):
         return Triptych(prepared, "cpu", threads, name,
                         ["--classify", "post", "--samples-per-sheet", name[len(POST):]])
+    if name[len("triptych-"):] in QUALITIES:
+        return Quality(prepared, name[len("triptych-"):], threads)
     if name == "vtk-cpu-half":
         return Vtk(prepared, "cpu", threads, name, 0.5)
     if name.startswith("triptych-"):

@@ -1,10 +1,12 @@
 """Makes volumes by formula and writes them to the work folder if they are missing."""
 import os
+import subprocess
 
 import numpy as np
 
 EDGE = 256
 MARSCHNER_LOBB = "marschner-lobb_%dx%dx%d_uint8.nhdr" % (EDGE, EDGE, EDGE)
+POROUS = "porous.nrrd"
 
 
 def marschner_lobb(edge):
@@ -18,16 +20,21 @@ def marschner_lobb(edge):
     return np.rint(255 * values).astype(np.uint8)
 
 
-def make(name, folder):
+def make(name, folder, triptych):
     """Returns the path of the volume `name` in the folder, or None if `name` is not a generated
-    volume."""
-    if name != MARSCHNER_LOBB:
+    volume. triptych-generate lies beside the program `triptych`."""
+    if name not in (MARSCHNER_LOBB, POROUS):
         return None
     path = os.path.join(folder, name)
-    if not os.path.exists(path):
-        raw = name.replace(".nhdr", ".raw")
-        marschner_lobb(EDGE).tofile(os.path.join(folder, raw))
-        with open(path, "w", encoding="ascii") as file:
-            file.write("NRRD0004\ntype: uint8\ndimension: 3\nsizes: %d %d %d\nencoding: raw\n"
-                       "data file: %s\n\n" % (EDGE, EDGE, EDGE, raw))
+    if os.path.exists(path):
+        return path
+    if name == POROUS:
+        generate = os.path.join(os.path.dirname(triptych), "triptych-generate")
+        subprocess.run([generate, "porous", "-o", path], check=True)
+        return path
+    raw = name.replace(".nhdr", ".raw")
+    marschner_lobb(EDGE).tofile(os.path.join(folder, raw))
+    with open(path, "w", encoding="ascii") as file:
+        file.write("NRRD0004\ntype: uint8\ndimension: 3\nsizes: %d %d %d\nencoding: raw\n"
+                   "data file: %s\n\n" % (EDGE, EDGE, EDGE, raw))
     return path

@@ -32,6 +32,9 @@ SCENES = [
           "all of a brain, opacity 0 to 0.4 from value 60 to 255"),
     Scene("marschner-lobb", generated.MARSCHNER_LOBB, "marschner-lobb", True, "dense",
           "the signal of Marschner and Lobb"),
+    Scene("porous", generated.POROUS, "porous", True, "sparse",
+          "a scan of a porous solid, larger than the screen"),
+    Scene("porous-flat", generated.POROUS, "porous", False, "sparse", "the same without light"),
 ]
 
 
@@ -40,10 +43,10 @@ def function_path(scene):
     return own if os.path.exists(own) else os.path.join(INCLUDED, scene.function + ".tf")
 
 
-def find(scene, folders, work):
+def find(scene, folders, work, triptych):
     """Returns the path of the scene's volume, or None. A generated volume is made in the folder
     `work`. Others are searched in `folders` and their subfolders, in order."""
-    made = generated.make(scene.file, work)
+    made = generated.make(scene.file, work, triptych)
     if made:
         return made
     for folder in folders:
