@@ -158,7 +158,7 @@ static bool coarse_rod(void *user, int i, int j, int k, unsigned *code, double g
 static void make_rod(scene *s, bool coarse)
 {
     trip_mean_scale scale = { 0, 65535 };
-    const scene_part part = { 1, TRIP_KIND_MEANS, { 2, 2, 2 }, coarse_rod, &scale };
+    const scene_part part = { 1, TRIP_KIND_MEANS, { 2, 2, 2 }, coarse_rod, &scale, NULL };
     scene_create(s, &(scene_params){ .dims = { ROD, 8, 8 },
                                      .tile_voxels = 64,
                                      .slab_sheets = 8,
