@@ -255,14 +255,23 @@ class BadDeviations(FileTests, Damage):
         cls.good = cls.draw(cls, "a.trip")[1]
 
     @staticmethod
-    def fill(data, byte):
+    def put_maxima(data, byte):
+        """Changes the maximum deviation of every brick."""
+        for number, names in enumerate(data.names):
+            for brick in data.bricks(number) if 2 in names else ():
+                data.put("<B", brick + 22, byte)
+
+    @classmethod
+    def fill(cls, data, byte):
+        cls.put_maxima(data, byte)
         for name, plane in data.planes.items():
             if name.endswith(".deviations"):
                 plane[:] = bytes([byte]) * len(plane)
 
-    @staticmethod
-    def old(data):
+    @classmethod
+    def old(cls, data):
         """Makes a data set of version 6, which has no deviations."""
+        cls.put_maxima(data, 0)
         data.put("<I", 8, 6)
         data.put("<I", 276, data.number("<I", 276) & 3)
         for number, names in enumerate(data.names):
@@ -286,8 +295,13 @@ class BadDeviations(FileTests, Damage):
                 self.assertTrue(numpy.isfinite(picture).all())
                 self.assertGreater(picture[..., 3].max(), 0)
 
+    def test_deviations_above_the_maximum_are_found(self):
+        self.fails(1, "info", "--verify", self.hostile(lambda data: self.put_maxima(data, 0)),
+                   says="a deviation is larger than the maximum of its brick")
+
     def test_lists_with_other_deviations_are_found(self):
         def change(data):
+            self.put_maxima(data, 255)
             data.planes["y1.deviations"][7] ^= 1
 
         self.fails(1, "info", "--verify", self.hostile(change),
