@@ -332,7 +332,8 @@ class BadDeviations(FileTests, Damage):
             os.remove(f"{path}/{axis}1.deviations")
         self.works("info", "--verify", path)
         self.assertEqual(self.info(path)["format_version"], 6)
-        self.assertTrue(numpy.array_equal(self.picture(path, *self.VIEW), zero))
+        # a blurred function is looked up in a table, and a plain one can have a closed form
+        self.assertLess(255 * abs(self.picture(path, *self.VIEW) - zero).max(), 0.5)
 
 
 if __name__ == "__main__":
