@@ -49,7 +49,8 @@ static void values_are_weighted_by_their_known_share(void **state)
 }
 
 /* Codes 1, 1, 3, 3 have the variance 1 about 2, and codes 2 and 8 have 9 about 5. Both cubes have
- * the same share, so together they have (1 + 9) / 2 + (1.5 * 1.5). A single voxel has variance 0. */
+ * the same share, so together they have (1 + 9) / 2 + (1.5 * 1.5). A single voxel has variance 0.
+ */
 static void variances_of_voxels_and_of_their_means_add_up(void **state)
 {
     (void)state;
