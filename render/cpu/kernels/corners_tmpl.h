@@ -177,7 +177,7 @@ INLINE void find_codes(const trip_cpu_group *g, const trip_cpu_integrals *in, vi
 INLINE void find_deviations(const trip_cpu_group *g, sample *s)
 {
     for (int i = 0; i < V; i++) {
-        const int16_t *top = g->deviations[0] + s->deviation_at[i],
+        const int16_t *top = (const int16_t *)g->deviations + s->deviation_at[i],
                       *bottom = top + TRIP_CPU_RASTER_STRIDE;
         s->deviation[i] =
             of_two(top[0], top[1], s->top[i]) + of_two(bottom[0], bottom[1], s->bottom[i]);
