@@ -78,6 +78,7 @@ enum {
 typedef struct trip_renderer_ops {
     const char *name;     /* "reference", "gl", "cpu", "integral" */
     bool classifies_post; /* draws frames with classify post (sheet.h) */
+    bool blurs;           /* deviations of coarse values blur its function (sheet.h) */
     bool closed_forms;    /* needs no lookup if segments have a closed form (closed_form.h) */
     unsigned effects;     /* draws frames with effects; a bit per trip_classify */
     unsigned forms;       /* sum of TRIP_DRAWS_FIXED, ... */

@@ -19,6 +19,7 @@ trip_settings trip_settings_default(void)
         .low_pass_px = TRIP_LOW_PASS_PX,
         .flatten = 1,
         .background = { 0, 0, 0, 1 },
+        .deviations = true,
         .tolerance = 1e-4,
         .samples = 1,
         .effects = { .cells = TRIP_LIGHT_CELLS },

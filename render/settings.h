@@ -155,6 +155,8 @@ typedef struct trip_settings {
     /* Upper bound of the bytes read. Coarser levels than lod_px asks for are drawn to keep it
      * (lod.h). 0 sets no bound. */
     double max_bytes;
+    /* Post: reads the deviations of coarse values, which blur the transfer function (sheet.h). */
+    bool deviations;
     trip_kernel kernel; /* of values, in post and the integral */
     /* For the integral renderer alone. */
     trip_field_kind field;

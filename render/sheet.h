@@ -61,7 +61,8 @@
  * them (deviation.h). The deviation codes d are interpolated like the codes, and kept within 0 and
  * 255. A segment has the mean d of the two samples at its planes, wherever it is cut. Blurred by
  * this deviation, k and k q replace k and k q in the formulas above (blurred_function.h). So thin
- * or noisy matter keeps its mean extinction. Voxels without a deviation have d = 0.
+ * or noisy matter keeps its mean extinction. Voxels without a deviation have d = 0. gl does not
+ * read deviations yet.
  *
  * The mean of the voxels' opacities along a ray is smaller than the opacity of their mean
  * extinction. The formula therefore suits matter that is thin in a coarse voxel's length, and
@@ -72,11 +73,10 @@
  * Nearest value
  * -------------
  * Values between two labels are no labels, and labels have no deviations. With TRIP_KERNEL_NEAREST
- * the field in a cell is the code
- * of the nearest corner. So each voxel fills a box that ends half-way to its neighbours. A point
- * half-way between two voxels belongs to the voxel with the greater index. A voxel beside a missing
- * one, or at the edge of the grid, has only the part of its box that lies in cells with all
- * corners.
+ * the field in a cell is the code of the nearest corner. So each voxel fills a box that ends
+ * half-way to its neighbours. A point half-way between two voxels belongs to the voxel with the
+ * greater index. A voxel beside a missing one, or at the edge of the grid, has only the part of its
+ * box that lies in cells with all corners.
  *
  * S is 2, so that a plane lies half-way between two sheets, and no segment crosses it. A segment is
  * divided where the ray leaves a box through a face along u or v, and cut at the sides of the grid.

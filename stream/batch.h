@@ -6,8 +6,8 @@
 #include "selection.h"
 
 /* Runs ready to draw, in draw order. The block of run i, already checked, is at
- * planes[TRIP_PLANE_VOXELS] + runs[i].at[TRIP_PLANE_VOXELS]. Its normals and
- * deviations are found in the same way. */
+ * planes[TRIP_PLANE_VOXELS] + runs[i].at[TRIP_PLANE_VOXELS]. Its normals and deviations are found
+ * in the same way. */
 typedef struct trip_batch {
     const trip_pass *pass;
     /* NULL for planes that are not read, and if only runs are wanted. */

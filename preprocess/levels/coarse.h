@@ -91,8 +91,7 @@ static inline void trip_coarse_value_add(trip_coarse_value_sum *s, const trip_co
     trip_coarse_value_add_around(s, kept ? value->around : trip_coarse_turned(value->value, round));
 }
 
-/* Adds several level 0 voxels at once by the sums of their codes and of
- * the squares. */
+/* Adds several level 0 voxels at once, by the sums of their codes and of the squares. */
 static inline void trip_coarse_value_add_whole(trip_coarse_value_sum *s, uint32_t count,
                                                uint32_t codes, uint64_t squares, bool kept)
 {

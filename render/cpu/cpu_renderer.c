@@ -339,6 +339,7 @@ static void run_tasks(void *renderer, void (*task)(void *context, unsigned numbe
 static const trip_renderer_ops cpu_ops = {
     .name = "cpu",
     .classifies_post = true,
+    .blurs = true,
     .closed_forms = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .destroy = destroy,

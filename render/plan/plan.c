@@ -390,7 +390,7 @@ static unsigned planes_of(const trip_dataset *data, const trip_settings *setting
     unsigned normals = read ? 1u << TRIP_PLANE_NORMALS : 0;
     bool coarse = settings->classify == TRIP_CLASSIFY_POST && trip_settings_has_levels(settings) &&
                   settings->kernel != TRIP_KERNEL_NEAREST;
-    unsigned deviations = coarse ? 1u << TRIP_PLANE_DEVIATIONS : 0;
+    unsigned deviations = coarse && settings->deviations ? 1u << TRIP_PLANE_DEVIATIONS : 0;
     return 1u << TRIP_PLANE_VOXELS | (data->header.planes & (normals | deviations));
 }
 

@@ -619,6 +619,7 @@ static trip_list_stats stats(const trip_renderer *base, unsigned list)
 static const trip_renderer_ops reference_ops = {
     .name = "reference",
     .classifies_post = true,
+    .blurs = true,
     .effects = 1u << TRIP_CLASSIFY_PRE | 1u << TRIP_CLASSIFY_POST,
     .forms = TRIP_DRAWS_FIXED | TRIP_DRAWS_VERTEX_WEIGHTS | TRIP_DRAWS_IMAGE_SHEETS,
     .destroy = destroy,

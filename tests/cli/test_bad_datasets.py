@@ -21,6 +21,16 @@ class Damage(program.ProgramTest):
 
     VIEW = VIEW
 
+    @classmethod
+    def make_two(cls, *options):
+        """Bricks two volumes into a.trip and b.trip. Draws the good picture of a.trip."""
+        for seed, name in (1, "a"), (2, "b"):
+            program.write_nrrd(f"{name}.nrrd", program.noise((20, 30, 40), seed=seed))
+            run = program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q",
+                               "--range=100:255", *options)
+            assert run.returncode == 0
+        cls.good = cls.draw(cls, "a.trip")[1]
+
     def draw(self, path):
         """Draws a data set. Returns the finished process, and the picture or None."""
         output = f"{path}.exr"
@@ -123,18 +133,8 @@ class BadDatasets(FileTests, Damage):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        program.write_nrrd("a.nrrd", program.noise((20, 30, 40)))
-        program.write_nrrd("b.nrrd", program.noise((20, 30, 40), seed=2))
-        for name in "a", "b":
-            assert (
-                program.call(
-                    "brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q", "--range=100:255",
-                    "--normals=stored"
-                ).returncode
-                == 0
-            )
+        cls.make_two("--normals=stored")
         assert sorted(os.listdir("a.trip")) == sorted(FILES)
-        cls.good = cls.draw(cls, "a.trip")[1]
 
     def test_numbers_that_no_grid_has_are_refused_with_valid_checksums(self):
         def set_step(value):
@@ -246,13 +246,7 @@ class BadDeviations(FileTests, Damage):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        program.write_nrrd("a.nrrd", program.noise((20, 30, 40)))
-        program.write_nrrd("b.nrrd", program.noise((20, 30, 40), seed=2))
-        for name in "a", "b":
-            run = program.call("brick", f"{name}.nrrd", "-o", f"{name}.trip", "-q",
-                               "--range=100:255", "--levels=1")
-            assert run.returncode == 0
-        cls.good = cls.draw(cls, "a.trip")[1]
+        cls.make_two("--levels=1")
 
     @staticmethod
     def put_maxima(data, byte):
@@ -334,6 +328,12 @@ class BadDeviations(FileTests, Damage):
         self.assertEqual(self.info(path)["format_version"], 6)
         # a blurred function is looked up in a table, and a plain one can have a closed form
         self.assertLess(255 * abs(self.picture(path, *self.VIEW) - zero).max(), 0.5)
+        for gl in program.GL:  # draws without deviations
+            old, new = (self.picture(of, *self.VIEW, "--renderer", gl) for of in (path, "a.trip"))
+            self.assertTrue(numpy.array_equal(old, new))
+            run = self.works("render", "a.trip", "-o", "a.png", "--explain", *self.VIEW,
+                             "--renderer", gl)
+            self.assertNotIn(b"deviations", run.stdout)
 
 
 if __name__ == "__main__":

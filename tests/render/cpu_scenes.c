@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "test.h"
+
 unsigned cpu_scenes_threads = 3;
 
 static int create_cpu(trip_renderer **out, trip_budget *budget)
@@ -43,4 +45,36 @@ void cpu_scenes_blobs(scene *s, unsigned tile_voxels, const trip_affine *index_t
 trip_affine cpu_scenes_sheared(void)
 {
     return (trip_affine){ { { 0.8, 0.1, 0.05, 3 }, { -0.05, 1.1, 0.2, -7 }, { 0, 0.1, 1.9, 1 } } };
+}
+
+int cpu_scenes_draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
+                           const trip_camera_params *view, float *rgba)
+{
+    trip_budget *budget;
+    trip_renderer *renderer = NULL;
+    trip_reader *reader = NULL;
+    trip_plan plan = { 0 };
+    trip_camera camera;
+    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
+    assert_int_equal(trip_budget_create(&budget, bytes), 0);
+    trip_frame frame = {
+        .data = s->data, .camera = &camera, .settings = settings, .plan = &plan, .table = s->table
+    };
+    trip_frame_stats stats;
+    int status = trip_plan_make(&plan, s->data, &camera, settings, s->table, budget);
+    if (!status)
+        status = trip_cpu_create(&renderer, budget, 2);
+    if (!status)
+        status = trip_reader_create(
+            &reader, s->data,
+            &(trip_reader_params){ .planes = plan.planes, .slots = 2, .slot_bytes = 65536 },
+            budget);
+    if (!status)
+        status = trip_frame_draw(renderer, reader, &frame, rgba, NULL, &stats);
+    trip_reader_destroy(reader);
+    if (renderer)
+        renderer->ops->destroy(renderer);
+    trip_plan_release(&plan, budget);
+    trip_budget_destroy(budget);
+    return status;
 }

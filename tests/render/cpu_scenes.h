@@ -15,4 +15,9 @@ extern unsigned cpu_scenes_threads;
 
 extern const scene_renderer cpu_scenes_cpu, cpu_scenes_reference;
 
+/* Draws by the CPU renderer with a limited memory and 2 threads. Returns a negative status if the
+ * memory does not suffice. */
+int cpu_scenes_draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
+                           const trip_camera_params *view, float *rgba);
+
 #endif

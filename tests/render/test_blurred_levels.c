@@ -349,39 +349,6 @@ static void threads_and_tiles_draw_the_same(void **state)
     destroy(&tiles);
 }
 
-/* Draws with a limited memory. Returns a negative status if the memory does not suffice. */
-static int draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
-                       const trip_camera_params *view, float *rgba)
-{
-    trip_budget *budget;
-    trip_renderer *renderer = NULL;
-    trip_reader *reader = NULL;
-    trip_plan plan = { 0 };
-    trip_camera camera;
-    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
-    assert_int_equal(trip_budget_create(&budget, bytes), 0);
-    trip_frame frame = {
-        .data = s->data, .camera = &camera, .settings = settings, .plan = &plan, .table = s->table
-    };
-    trip_frame_stats stats;
-    int status = trip_plan_make(&plan, s->data, &camera, settings, s->table, budget);
-    if (!status)
-        status = trip_cpu_create(&renderer, budget, 2);
-    if (!status)
-        status = trip_reader_create(
-            &reader, s->data,
-            &(trip_reader_params){ .planes = plan.planes, .slots = 2, .slot_bytes = 65536 },
-            budget);
-    if (!status)
-        status = trip_frame_draw(renderer, reader, &frame, rgba, NULL, &stats);
-    trip_reader_destroy(reader);
-    if (renderer)
-        renderer->ops->destroy(renderer);
-    trip_plan_release(&plan, budget);
-    trip_budget_destroy(budget);
-    return status;
-}
-
 /* The level is so wide that its sheets do not fit the smaller memories, which draw it in windows.
  */
 static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
@@ -403,10 +370,11 @@ static void any_memory_draws_the_same_or_is_reported_as_too_little(void **state)
         trip_settings settings = settings_of_levels();
         int drawn = 0, refused = 0;
         settings.kernel = (trip_kernel)kernel;
-        assert_int_equal(draw_within(&l.at, UINT64_C(256) << 20, &settings, &view, whole), 0);
+        assert_int_equal(
+            cpu_scenes_draw_within(&l.at, UINT64_C(256) << 20, &settings, &view, whole), 0);
         for (uint64_t memory = 4 << 20; memory < 40 << 20; memory += 2000000) {
             memset(some, 0, bytes);
-            const int status = draw_within(&l.at, memory, &settings, &view, some);
+            const int status = cpu_scenes_draw_within(&l.at, memory, &settings, &view, some);
             if (status == 0)
                 assert_memory_equal(some, whole, bytes);
             drawn += status == 0;

@@ -160,39 +160,6 @@ static void any_tile_of_the_data_and_any_batch_draw_the_same(void **state)
     scene_destroy(&first);
 }
 
-/* Draws with a limited memory. Returns a negative status if the memory does not suffice. */
-static int draw_within(const scene *s, uint64_t bytes, const trip_settings *settings,
-                       const trip_camera_params *view, float *rgba)
-{
-    trip_budget *budget;
-    trip_renderer *renderer = NULL;
-    trip_reader *reader = NULL;
-    trip_plan plan = { 0 };
-    trip_camera camera;
-    assert_int_equal(trip_camera_make(&camera, view, &s->data->index_to_world), 0);
-    assert_int_equal(trip_budget_create(&budget, bytes), 0);
-    trip_frame frame = {
-        .data = s->data, .camera = &camera, .settings = settings, .plan = &plan, .table = s->table
-    };
-    trip_frame_stats stats;
-    int status = trip_plan_make(&plan, s->data, &camera, settings, s->table, budget);
-    if (!status)
-        status = trip_cpu_create(&renderer, budget, 2);
-    if (!status)
-        status = trip_reader_create(
-            &reader, s->data,
-            &(trip_reader_params){ .planes = plan.planes, .slots = 2, .slot_bytes = 65536 },
-            budget);
-    if (!status)
-        status = trip_frame_draw(renderer, reader, &frame, rgba, NULL, &stats);
-    trip_reader_destroy(reader);
-    if (renderer)
-        renderer->ops->destroy(renderer);
-    trip_plan_release(&plan, budget);
-    trip_budget_destroy(budget);
-    return status;
-}
-
 /* Draws with more and more memory, from too little on, in steps smaller than a sheet of the linear
  * kernel. Each frame either fails with a message or has the same bits, whether it holds one pair
  * of sheets at a time or all of them. */
@@ -208,11 +175,11 @@ static void check_memories(trip_kernel kernel, bool clipped, int pixels, uint64_
     view.width = view.height = pixels;
     size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
     float *whole = malloc(bytes), *some = malloc(bytes);
-    assert_int_equal(draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
+    assert_int_equal(cpu_scenes_draw_within(&s, UINT64_C(256) << 20, &settings, &view, whole), 0);
     int drawn = 0, refused = 0;
     for (uint64_t memory = 1 << 20; memory < 20 << 20; memory += step) {
         memset(some, 0, bytes);
-        int status = draw_within(&s, memory, &settings, &view, some);
+        int status = cpu_scenes_draw_within(&s, memory, &settings, &view, some);
         if (status == 0)
             assert_memory_equal(some, whole, bytes);
         drawn += status == 0;
@@ -276,8 +243,8 @@ static void check_windows(const scene *s, trip_kernel kernel, int first, int end
         settings.kernel = kernel;
         size_t bytes = 16 * (size_t)view.width * (size_t)view.height;
         float *much = malloc(bytes), *little = malloc(bytes);
-        assert_int_equal(draw_within(s, UINT64_C(256) << 20, &settings, &view, much), 0);
-        assert_int_equal(draw_within(s, LITTLE, &settings, &view, little), 0);
+        assert_int_equal(cpu_scenes_draw_within(s, UINT64_C(256) << 20, &settings, &view, much), 0);
+        assert_int_equal(cpu_scenes_draw_within(s, LITTLE, &settings, &view, little), 0);
         const scene_picture p = { .width = view.width, .height = view.height, .rgba = much };
         assert_shows(&p);
         assert_memory_equal(much, little, bytes);

@@ -1,10 +1,13 @@
 #include "cpu/sheets/integrals.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 #include <xxhash.h>
 
 #include "segments.h"
+
+static_assert(TRIP_CPU_BLURRED_ROWS == (int)TRIP_BLURRED_ROWS, "kernels know no other header");
 
 enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MAX, LOG2_MAX = 2 };
 
