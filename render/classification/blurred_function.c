@@ -4,7 +4,7 @@
 
 enum { CODES = TRIP_SEGMENT_CODES, LAST_ROW = TRIP_BLURRED_ROWS - 1 };
 
-/* The minimum number of entries in a row's deviation. Row 1 then has every second code. */
+/* The minimum number of entries in a row's deviation, unless every code has an entry. */
 #define ENTRIES_EACH_DEVIATION 15.9
 
 /* The maximum number of bins within TRIP_BLURRED_REACH on each side of an entry. */
@@ -21,9 +21,19 @@ static void add(sums *to, const sums *s, double factor)
         to->of[c] += s->of[c] * factor;
 }
 
-static double of_row(int row)
+double trip_blurred_d_of_row(unsigned row)
 {
-    return trip_deviation((double)TRIP_DEVIATION_MAX * row / LAST_ROW);
+    const double part = (row + TRIP_BLURRED_BEFORE) / (double)(LAST_ROW + TRIP_BLURRED_BEFORE);
+    return row == 0 ? 0 : TRIP_DEVIATION_MAX * part * part;
+}
+
+/* Returns the row at a deviation code or before it, less than the last row. */
+static unsigned row_before(double d)
+{
+    unsigned row = 0;
+    while (row + 2 < TRIP_BLURRED_ROWS && trip_blurred_d_of_row(row + 1) <= d)
+        row++;
+    return row;
 }
 
 trip_blurred_function trip_blurred_function_shape(void)
@@ -31,7 +41,7 @@ trip_blurred_function trip_blurred_function_shape(void)
     trip_blurred_function f = { .entries = NULL };
     uint32_t first = 0;
     for (int r = 1; r <= LAST_ROW; r++) {
-        const double deviation = of_row(r);
+        const double deviation = trip_deviation(trip_blurred_d_of_row((unsigned)r));
         unsigned log2 = 0;
         while (ldexp(1, (int)log2 + 1) <= deviation / ENTRIES_EACH_DEVIATION)
             log2++;
@@ -121,6 +131,19 @@ static void blur_row(const trip_blurred_row *row, const sums *bins, int beyond,
     }
 }
 
+/* Returns the mean over a bin around a code. A bin of one code has the mean of the code. */
+static sums mean_of_bin(const trip_tf_entry *table, const sums *up_to, int64_t code, int64_t width)
+{
+    const int64_t last = CODES - 1;
+    if (width == 1)
+        return entry_of(&table[code < 0 ? 0 : code < last ? code : last]);
+    const sums before = integral_to(table, up_to, code - width / 2);
+    sums mean = integral_to(table, up_to, code + width / 2);
+    for (int c = 0; c < 4; c++)
+        mean.of[c] = (mean.of[c] - before.of[c]) / (double)width;
+    return mean;
+}
+
 static void make_row(const trip_blurred_row *row, const trip_tf_entry *table, const sums *up_to,
                      sums *memory, float (*out)[4])
 {
@@ -128,12 +151,8 @@ static void make_row(const trip_blurred_row *row, const trip_tf_entry *table, co
     const int beyond = find_weights(row, weights);
     const int64_t width = INT64_C(1) << row->log2;
     sums *bins = memory + beyond;
-    for (int64_t i = -beyond; i < (int64_t)row->entries + beyond; i++) {
-        const sums before = integral_to(table, up_to, i * width - width / 2);
-        const sums behind = integral_to(table, up_to, i * width + width / 2);
-        for (int c = 0; c < 4; c++)
-            bins[i].of[c] = (behind.of[c] - before.of[c]) / (double)width;
-    }
+    for (int64_t i = -beyond; i < (int64_t)row->entries + beyond; i++)
+        bins[i] = mean_of_bin(table, up_to, i * width, width);
     blur_row(row, bins, beyond, weights, out);
 }
 
@@ -163,10 +182,15 @@ void trip_blurred_function_destroy(trip_blurred_function *f, trip_budget *budget
 
 /* Two entries may lie beyond the reach of g, since bins and lines between entries widen it. Room
  * for the rounding of codes is two more. */
+double trip_blurred_reach_of_row(unsigned row)
+{
+    const double deviation = trip_deviation(trip_blurred_d_of_row(row));
+    return row == 0 ? 0 : deviation * (TRIP_BLURRED_REACH + 4 / ENTRIES_EACH_DEVIATION) + 2;
+}
+
 double trip_blurred_reach(unsigned d)
 {
-    const unsigned row = (d * LAST_ROW + TRIP_DEVIATION_MAX - 1) / TRIP_DEVIATION_MAX;
-    return row == 0 ? 0 : of_row((int)row) * (TRIP_BLURRED_REACH + 4 / ENTRIES_EACH_DEVIATION) + 2;
+    return trip_blurred_reach_of_row(d == 0 ? 0 : row_before(d) + 1);
 }
 
 /* ---- segments ---- */
@@ -217,11 +241,12 @@ static sums plain_means(const trip_segments *plain, double a, double b)
 trip_segment trip_blurred_segment_of(const trip_blurred_function *f, const trip_segments *plain,
                                      double a, double b, double d)
 {
-    const double from = fmin(a, b), to = fmax(a, b), at = d * LAST_ROW / TRIP_DEVIATION_MAX;
-    const int row = at < LAST_ROW - 1 ? (int)at : LAST_ROW - 1;
-    const double share = at - row;
-    const sums low = row ? means_of_row(f, row, from, to) : plain_means(plain, from, to);
-    const sums high = share > 0 ? means_of_row(f, row + 1, from, to) : low;
+    const double from = fmin(a, b), to = fmax(a, b);
+    const unsigned row = row_before(d);
+    const double before = pow(trip_blurred_d_of_row(row), 4);
+    const double share = (pow(d, 4) - before) / (pow(trip_blurred_d_of_row(row + 1), 4) - before);
+    const sums low = row ? means_of_row(f, (int)row, from, to) : plain_means(plain, from, to);
+    const sums high = share > 0 ? means_of_row(f, (int)row + 1, from, to) : low;
     double k[4];
     for (int c = 0; c < 4; c++)
         k[c] = (1 - share) * low.of[c] + share * high.of[c];

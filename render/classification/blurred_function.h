@@ -8,11 +8,12 @@
  * g is the normal density of deviation 1, cut at TRIP_BLURRED_REACH and divided by its integral.
  * Below code 0 and above code 65535 the function k is constant.
  *
- * Row r of 33 has the deviation of d = 255 r / 32. Row 0 is the function itself. Between rows, K is
- * linear in d. Entries of a row are at most a sixteenth of its deviation apart, and K is linear
- * between them. So all rows but row 0 take less than a megabyte. Each entry is within
- * TRIP_BLURRED_ERROR of the integral, relative to the function's maximum. Read-only once made; any
- * thread may use it. */
+ * Row 0 of 33 is the function itself. Row r > 0 has the deviation of d = 255 ((r + 4) / 36)^2, from
+ * 12 codes on. Between rows, K is linear in the variance, as it is where s is small beside the
+ * structure of k: data may use few of the codes. Entries of a row are at most a sixteenth of its
+ * deviation apart, or one code, and K is linear between them. So all rows but row 0 take less than
+ * 4 megabytes. Each entry is within TRIP_BLURRED_ERROR of the integral, relative to the function's
+ * maximum. Read-only once made; any thread may use it. */
 #ifndef TRIP_BLURRED_FUNCTION_H
 #define TRIP_BLURRED_FUNCTION_H
 
@@ -20,7 +21,8 @@
 #include "deviation.h"
 #include "segments.h"
 
-enum { TRIP_BLURRED_ROWS = 33 };
+/* TRIP_BLURRED_BEFORE is the 4 in the formula of d. */
+enum { TRIP_BLURRED_ROWS = 33, TRIP_BLURRED_BEFORE = 4 };
 
 #define TRIP_BLURRED_REACH 4.0
 #define TRIP_BLURRED_ERROR 5e-4
@@ -47,8 +49,11 @@ bool trip_blurred_function_create(trip_blurred_function *f, const trip_tf_entry 
                                   trip_budget *budget);
 void trip_blurred_function_destroy(trip_blurred_function *f, trip_budget *budget);
 
-/* Returns how many codes away from a visible code a value of deviation code d or less may be
- * visible. The result is 0 if d is 0. */
+/* Returns the deviation code d of a row. */
+double trip_blurred_d_of_row(unsigned row);
+/* Return how many codes away from a visible code a value may be visible, if its row is `row` or
+ * less, or if its deviation code is d or less. The result is 0 if they are 0. */
+double trip_blurred_reach_of_row(unsigned row);
 double trip_blurred_reach(unsigned d);
 
 /* Returns the means over a segment from code a to code b, with deviation code d from 0 to 255.

@@ -159,6 +159,7 @@ typedef struct trip_cpu_blurred {
 } trip_cpu_blurred;
 
 #define TRIP_CPU_BLURRED_ROWS 33
+#define TRIP_CPU_BLURRED_BEFORE 4
 
 /* Maximum number of segments in a group. A group has one sample plane more than segments. */
 #define TRIP_CPU_SEGMENTS 64

@@ -429,9 +429,18 @@ static __attribute__((noinline)) void sheet_deviations_between(const int16_t *fr
     }
 }
 
+/* Returns the least row with a deviation of at least this one. */
+INLINE uint8_t row_that_suffices(int16_t deviation)
+{
+    enum { LAST = TRIP_CPU_BLURRED_ROWS - 1 };
+    const float d = (float)deviation / (255 * TRIP_CPU_DEVIATION_PARTS);
+    const float at = (LAST + TRIP_CPU_BLURRED_BEFORE) * sqrtf(d) - TRIP_CPU_BLURRED_BEFORE;
+    const int row = at > 1 ? (int)ceilf(at + 1e-3f) : 1;
+    return (uint8_t)(deviation <= 0 ? 0 : row < LAST ? row : LAST);
+}
+
 static void sheet_rows(const int16_t *deviations, uint64_t squares, uint8_t out[64])
 {
-    enum { UNIT = 255 * TRIP_CPU_DEVIATION_PARTS, LAST = TRIP_CPU_BLURRED_ROWS - 1 };
     memset(out, 0, 64);
     for (uint64_t rest = squares; rest; rest &= rest - 1) {
         const int square = __builtin_ctzll(rest);
@@ -439,7 +448,7 @@ static void sheet_rows(const int16_t *deviations, uint64_t squares, uint8_t out[
         vh max = vh_set(0);
         for (int row = 0; row < 9; row++, at += TRIP_CPU_RASTER_STRIDE)
             max = vh_max(max, vh_max(vh_load(at), vh_load(at + 1)));
-        out[square] = (uint8_t)(((int16_t)~vh_lowest(~max) * LAST + UNIT - 1) / UNIT);
+        out[square] = row_that_suffices((int16_t)~vh_lowest(~max));
     }
 }
 

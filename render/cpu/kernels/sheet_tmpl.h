@@ -958,18 +958,31 @@ INLINE void add_row(const trip_cpu_blurred *f, vi number, vf share, vi a, vi b, 
         means[k] = v_fma(unit, v_from_int(last[k]), means[k]);
 }
 
+INLINE vf eighth_power(vf a)
+{
+    const vf a2 = a * a, a4 = a2 * a2;
+    return a4 * a4;
+}
+
 /* Classifies a segment by the blurred function, with the mean deviation of samples a and b. The
  * ends of the segment are `first` and `last`. A row without weight adds exactly nothing. */
 INLINE medium classified_blurred(const trip_cpu_blurred *f, vm open, const sample *a,
                                  const sample *b, const sample *first, const sample *last)
 {
-    const float rows = TRIP_CPU_BLURRED_ROWS - 1;
-    const float unit = rows / (2.0f * 255 * TRIP_CPU_DEVIATION_PARTS * (1 << WEIGHT_LOG2));
+    const float rows = TRIP_CPU_BLURRED_ROWS - 1 + TRIP_CPU_BLURRED_BEFORE;
+    const float unit = 1 / (2.0f * 255 * TRIP_CPU_DEVIATION_PARTS * (1 << WEIGHT_LOG2));
     const vf none = v_set(0), one = v_set(1);
-    vf at = v_from_int(a->deviation + b->deviation) * v_set(unit);
-    at = v_select(open, v_min(v_max(at, none), v_set(rows)), none);
-    const vi row = vi_lesser(v_truncate(at), (vi){ 0 } + (TRIP_CPU_BLURRED_ROWS - 2));
-    const vf share = at - v_from_int(row);
+    vf d = v_from_int(a->deviation + b->deviation) * v_set(unit);
+    d = v_select(open, v_min(v_max(d, none), one), none);
+    /* The row before d, and the share of the next one by variances. These are d to the power of 4,
+     * and the square root of d is linear in the row. */
+    const vf beyond = v_sqrt(d) * v_set(rows) - v_set(TRIP_CPU_BLURRED_BEFORE);
+    const vi row =
+        vi_lesser(v_truncate(v_max(beyond, none)), (vi){ 0 } + (TRIP_CPU_BLURRED_ROWS - 2));
+    const vf first_part = (v_from_int(row) + v_set(TRIP_CPU_BLURRED_BEFORE)) * v_set(1 / rows);
+    const vf before = v_select(v_gt(one, v_from_int(row)), none, eighth_power(first_part));
+    const vf behind = eighth_power(first_part + v_set(1 / rows));
+    const vf share = v_min(v_max((d * d * (d * d) - before) / (behind - before), none), one);
     const vi from = (vi)v_select(open, (vf)first->index, none);
     const vi to = (vi)v_select(open, (vf)last->index, none);
     vf means[4] = { none, none, none, none };

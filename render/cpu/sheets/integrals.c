@@ -7,7 +7,8 @@
 
 #include "segments.h"
 
-static_assert(TRIP_CPU_BLURRED_ROWS == (int)TRIP_BLURRED_ROWS, "kernels know no other header");
+static_assert(TRIP_CPU_BLURRED_ROWS == (int)TRIP_BLURRED_ROWS, "kernels read the same rows");
+static_assert(TRIP_CPU_BLURRED_BEFORE == (int)TRIP_BLURRED_BEFORE, "kernels find the same rows");
 
 enum { CODES = 65536, ENTRIES = TRIP_CPU_ENTRIES_MAX, LOG2_MAX = 2 };
 
@@ -20,13 +21,15 @@ uint64_t trip_cpu_tf_bytes(void)
 }
 
 /* The rows of a blurred function for one stretch of codes. Entries are at most a thirty-second part
- * of a row's deviation apart, because samples take the nearest entry. */
+ * of a row's deviation apart, because samples take the nearest entry. Closer than every fourth
+ * stretched code they need not be (TRIP_CPU_ENTRIES), nor closer than the codes themselves. */
 #define ENTRIES_EACH_DEVIATION 31.8
+enum { CLOSEST_LOG2 = 2 };
 
 /* Returns log2 of the codes from one entry of a row to the next. */
 static unsigned log2_of_row(const trip_blurred_row *row, trip_cpu_codes codes)
 {
-    unsigned log2 = codes.shift;
+    unsigned log2 = codes.shift > CLOSEST_LOG2 ? codes.shift : CLOSEST_LOG2;
     while (log2 < 15 &&
            ldexp(1, (int)(log2 + 1 - codes.shift)) <= row->deviation / ENTRIES_EACH_DEVIATION)
         log2++;
@@ -353,8 +356,7 @@ static void set_visible_beyond(trip_cpu_tf *f, const trip_tf_entry *table)
 
 int64_t trip_cpu_tf_reach(const trip_cpu_tf *f, unsigned row)
 {
-    const unsigned d = row * TRIP_DEVIATION_MAX / (TRIP_BLURRED_ROWS - 1);
-    return (int64_t)ceil(ldexp(trip_blurred_reach(d), (int)f->codes.shift));
+    return (int64_t)ceil(ldexp(trip_blurred_reach_of_row(row), (int)f->codes.shift));
 }
 
 bool trip_cpu_tf_shows_within(const trip_cpu_tf *f, int16_t min, int16_t max, int64_t reach)
