@@ -9,10 +9,10 @@
  * Below code 0 and above code 65535 the function k is constant.
  *
  * Row 0 of 33 is the function itself. Row r > 0 has the deviation of d = 255 ((r + 4) / 36)^2, from
- * 12 codes on. Between rows, K is linear in the variance, as it is where s is small beside the
- * structure of k: data may use few of the codes. Entries of a row are at most a sixteenth of its
- * deviation apart, or one code, and K is linear between them. So all rows but row 0 take less than
- * 4 megabytes. Each entry is within TRIP_BLURRED_ERROR of the integral, relative to the function's
+ * 12 codes on. Between rows, K is linear in the variance. For a smooth k and a small s, the
+ * integral is linear in the variance too. Entries of a row are at most a sixteenth of its deviation
+ * apart, or one code, and K is linear between them. So all rows but row 0 take less than 4
+ * megabytes. Each entry is within TRIP_BLURRED_ERROR of the integral, relative to the function's
  * maximum. Read-only once made; any thread may use it. */
 #ifndef TRIP_BLURRED_FUNCTION_H
 #define TRIP_BLURRED_FUNCTION_H
@@ -51,8 +51,8 @@ void trip_blurred_function_destroy(trip_blurred_function *f, trip_budget *budget
 
 /* Returns the deviation code d of a row. */
 double trip_blurred_d_of_row(unsigned row);
-/* Return how many codes away from a visible code a value may be visible, if its row is `row` or
- * less, or if its deviation code is d or less. The result is 0 if they are 0. */
+/* Return how many codes away from a visible code a value may be visible. It has a row or a
+ * deviation code up to the argument. The result is 0 for 0. */
 double trip_blurred_reach_of_row(unsigned row);
 double trip_blurred_reach(unsigned d);
 

@@ -143,7 +143,8 @@ static void a_step_becomes_the_error_function(void **state)
         const trip_segment s =
             trip_blurred_segment_of(&blurred, &plain, code, code, 255.0 * 14 * 14 / (36 * 36));
         assert_close(s.extinction, 4 * (1 + erf(t * sqrt(0.5))), 8 * TRIP_BLURRED_ERROR);
-        assert_close(s.rgb[1], s.extinction > 0 ? 0.5 : 0, 1e-4);
+        /* Between the codes 19999 and 20000 the colour rises too, and counts less. */
+        assert_close(s.rgb[1], s.extinction > 0 ? 0.5 : 0, 3e-3);
     }
     end();
 }

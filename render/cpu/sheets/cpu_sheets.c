@@ -94,7 +94,7 @@ int trip_cpu_sheets_begin_frame(trip_cpu_sheets *s, trip_cpu *r)
         : closed                                          ? r->kernels->sheet_pane_closed
                                                           : r->kernels->sheet_pane;
     s->function = take_function(s, r);
-    if (!s->function) { /* sheets may still take most of the memory */
+    if (!s->function) { /* the last frame may have left too little */
         trip_cpu_store_release(&s->store);
         trip_cpu_windows_release(&s->windows, r->budget);
         s->function = take_function(s, r);
