@@ -244,7 +244,7 @@ static void print_explanation(FILE *f, const accuracy_report *r)
             "picture, of 255,\n       in red, green, blue and opacity, in the worst of the views.\n"
             "       The exact picture has the mean of the integral over the area of each pixel.\n"
             "mean:  the mean difference from the exact picture, over all views.\n"
-            "aim: the mean that the quality aims at, and may miss.\n"
+            "aim:   the mean that the quality aims at, and may miss.\n"
             "along rays: the mean difference from the integral along the same rays, one per "
             "pixel.\n"
             "ms:    the median time of a frame, in milliseconds. The fastest setting comes first.\n"
