@@ -183,7 +183,6 @@ static int choose_settings(triptych *t)
     const bool automatic = draw_settings_classify(&t->given) == TRIPTYCH_CLASSIFY_AUTO;
     t->drawn_settings = bounded_settings(t);
     t->drawn_settings.shading_range = t->session.shading_range;
-    t->drawn_settings.deviations = t->renderer->ops->blurs;
     t->why_pre = automatic && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || integral)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
@@ -413,6 +412,7 @@ static int plan_first(triptych *t)
 {
     uint64_t start = trip_now_ns();
     int status = choose_settings(t);
+    t->drawn_settings.deviations = t->renderer->ops->blurs;
     check_rounding(t);
     if (!status)
         status = make_camera(t, t->session.data);
