@@ -89,7 +89,7 @@ static int make_reader(triptych *t, unsigned planes)
  * pixel, renderers draw a larger picture. The integral traces several rays itself. */
 static int pixels_a_side(const triptych *t)
 {
-    return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->settings.samples;
+    return t->resources.renderer == TRIPTYCH_RENDERER_INTEGRAL ? 1 : t->choice.rays;
 }
 
 static int make_camera(triptych *t, const trip_dataset *data)
@@ -186,7 +186,7 @@ static int choose_settings(triptych *t)
     t->why_pre = automatic && !integral ? needs_splats(t) : NULL;
     if (t->why_pre || integral)
         t->drawn_settings.classify = TRIP_CLASSIFY_PRE;
-    if (integral && !t->given.all.samples)
+    if (integral && t->given.all.samples <= 0)
         choose_areas(t);
     if (trip_coordinates_uneven(&t->session.data->coordinates) && !integral &&
         trip_settings_sum_sheets(&t->drawn_settings) &&
@@ -243,8 +243,8 @@ static int enter_part(triptych *t)
         return status;
     t->samples_per_sheet =
         trip_sheet_samples_of_view(&t->camera, drawn_session(t).data->header.dims);
-    t->drawn_settings.samples_per_sheet = t->settings.samples_per_sheet
-                                              ? t->settings.samples_per_sheet
+    t->drawn_settings.samples_per_sheet = t->choice.samples_per_sheet
+                                              ? t->choice.samples_per_sheet
                                               : t->samples_per_sheet.samples_per_sheet;
     if (t->drawn_settings.kernel == TRIP_KERNEL_NEAREST) /* boxes are exact (sheet.h) */
         t->drawn_settings.samples_per_sheet = 2;
@@ -284,9 +284,15 @@ static void keep_small_before(triptych *t)
         drop_before(t);
 }
 
+static int make_renderer(triptych *t)
+{
+    return t->renderer ? 0
+                       : trip_renderer_create(&t->renderer, (trip_renderer_kind)t->required,
+                                              t->resources.threads, t->session.budget);
+}
+
 static int prepare(triptych *t)
 {
-    session *s = &t->session;
     const triptych_resources *r = &t->resources;
     triptych_renderer renderer = r->renderer;
     int status = trip_context_check_idle(t, true);
@@ -301,10 +307,7 @@ static int prepare(triptych *t)
         status = trip_context_use_transfer_function(t, &(triptych_transfer_function){ 0 });
     if (!status && !t->has_view)
         status = trip_context_find_view(t, &(triptych_view){ 0 });
-    if (!status && !t->renderer)
-        status =
-            trip_renderer_create(&t->renderer, (trip_renderer_kind)renderer, r->threads, s->budget);
-    return status;
+    return status ? status : make_renderer(t);
 }
 
 /* Plans a frame of the integral renderer, by the kinds of lists that make up its field. */
@@ -408,12 +411,30 @@ static int plan(triptych *t)
     return status;
 }
 
+int triptych_choose(triptych *t)
+{
+    trip_scope *before = trip_context_enter_anew(t);
+    const int later = t->resources.choose_later;
+    int status = prepare(t);
+    if (!status)
+        status = choose_settings(t);
+    t->resources.choose_later = 0;
+    if (!status)
+        status = trip_context_choose_quality(t);
+    t->resources.choose_later = later;
+    return trip_context_leave(before, status);
+}
+
 static int plan_first(triptych *t)
 {
     uint64_t start = trip_now_ns();
     int status = choose_settings(t);
     t->drawn_settings.deviations = t->renderer->ops->blurs;
     check_rounding(t);
+    if (!status)
+        status = trip_context_choose_quality(t);
+    if (!status) /* a trial releases the renderer */
+        status = make_renderer(t);
     if (!status)
         status = make_camera(t, t->session.data);
     if (!status)

@@ -15,6 +15,7 @@
 #include "lod_parts.h"
 #include "renderer_choice.h"
 #include "library_session.h"
+#include "quality_choice.h"
 #include "sheet_samples.h"
 #include "triptych.h"
 
@@ -75,6 +76,17 @@ struct triptych {
     trip_light_map *light;
     trip_emission *heat; /* NULL if no data set of heat is open */
     bool reader_counts;  /* `reader` was made for exact counts */
+
+    trip_choices choices;     /* of earlier frames */
+    uint64_t choices_read;    /* checksum of the data set whose stored choices were read; or 0 */
+    char *choices_folder;     /* keeps choices; NULL: none */
+    trip_choice choice;       /* of the begun frame */
+    const trip_choice *fixed; /* in the context of a trial: the choice; otherwise NULL */
+    int choice_step;          /* of the begun frame (quality_choice.h) */
+    double promise;           /* of the begun frame, of 255; 0: none is made */
+    bool choice_waits;        /* the begun frame has the defaults until triptych_choose() */
+    unsigned trials;          /* made by this context */
+    double trial_ms;          /* time of the trial for the begun frame; 0 without one */
 
     bool has_view;
     trip_camera_params view, turned;
@@ -143,6 +155,11 @@ int trip_context_choose_effects(triptych *t);
 int trip_context_begin_light(triptych *t);
 void trip_context_drop_light(triptych *t);
 void trip_context_drop_heat(triptych *t);
+/* Chooses samples, rays and levels for the planned frame, and sets them in drawn_settings
+ * (quality_choice.h). */
+int trip_context_choose_quality(triptych *t);
+/* Prints the choice and its error. */
+void trip_context_explain_quality(const triptych *t, FILE *out);
 /* Prints one line per effect: whether it runs, and why. */
 void trip_context_explain_effects(const triptych *t, FILE *out);
 /* Records the statistics of the frame, once its picture is complete. */

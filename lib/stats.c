@@ -48,16 +48,17 @@ static void explain_choices(const triptych *t, FILE *out)
     if (t->why_pre)
         fprintf(out, "default     pre instead of post: %s\n", t->why_pre);
     explain_parts(t, out);
+    trip_context_explain_quality(t, out);
     const bool nearest = t->drawn_settings.kernel == TRIP_KERNEL_NEAREST;
     if (t->nearest_chosen)
         fputs("default     nearest instead of linear interpolation: the values are labels\n", out);
     if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && nearest)
         fputs("samples     one per voxel that a ray meets, as always with the nearest value\n",
               out);
-    else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->settings.samples_per_sheet)
+    else if (t->drawn_settings.classify == TRIP_CLASSIFY_POST && !t->choice.samples_per_sheet)
         fprintf(out, "samples     %d per sheet, by the view: voxels are up to %.3g %s wide\n",
                 t->samples_per_sheet.samples_per_sheet, t->samples_per_sheet.voxel_px,
-                t->settings.samples > 1 ? "samples" : "px");
+                t->choice.rays > 1 ? "samples" : "px");
 }
 
 int triptych_explain(triptych *t, char **text)
@@ -146,6 +147,13 @@ static triptych_frame_stats frame_stats(const triptych *t)
         .samples_per_sheet = t->drawn_settings.classify == TRIP_CLASSIFY_POST
                                  ? t->drawn_settings.samples_per_sheet
                                  : 0,
+        .rays = trip_context_draws_values(t) && t->plan.gathers ? 0 : t->choice.rays,
+        .lod_px = t->drawn_settings.lod_px,
+        .expected_error = t->promise > 0 && !t->choice_waits ? t->choice.error : -1,
+        .promised_error = t->promise,
+        .trial_ms = t->trial_ms,
+        .trials = t->trials,
+        .choice_waits = t->choice_waits,
         .interpolation = trip_context_draws_values(t)
                              ? (triptych_interpolation)(t->drawn_settings.kernel + 1)
                              : TRIPTYCH_INTERPOLATION_DEFAULT,
