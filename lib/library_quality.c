@@ -151,6 +151,7 @@ static int make_choice(triptych *t, const trip_trial *trial, trip_choice_key key
                   "no trial of the quality was possible, so the picture has the default samples "
                   "and rays: %s",
                   why);
+        trip_choices_add(&t->choices, key, &t->choice); /* with no error, and not in the file */
         return 0;
     }
     t->trials++;

@@ -12,6 +12,7 @@
 enum {
     LOOK_PX = 64,  /* side of the picture that finds the places */
     PLACE_PX = 24, /* side of a place's picture */
+    SMALL_PX = 16, /* the same for narrow voxels, which average out */
     WHOLE_PX = 48, /* a smaller object needs one place for each direction */
     DIRECTIONS = 2,
     PLACES_EACH = 3, /* places for each direction */
@@ -24,6 +25,10 @@ enum {
 #define PART_OF_PROMISE 0.7
 /* More rays or samples are not tried if the last ones left more than this share of the error. */
 #define STUCK_SHARE 0.9
+/* More samples are not tried if the error is farther away than this many gains. */
+#define MAX_GAINS 4
+/* Pixels of voxels below this width average several voxels. Errors along rays average out too. */
+#define NARROW_PX 0.5
 /* Opacity from which a pixel shows something. */
 #define SEEN_ALPHA (0.5f / 255)
 
@@ -43,6 +48,7 @@ typedef struct trying {
     float *rgba;       /* room for the largest picture */
     double line_error; /* of the truth along its rays */
     trip_choice best;  /* the best so far */
+    double gain;       /* decrease of the error from two to four samples, at the last rays */
     double least;      /* least error of the last tries of samples or rays */
     double best_cost;  /* of a choice within the promise; HUGE_VAL if there is none */
 } trying;
@@ -143,7 +149,8 @@ static void choose_places(trying *y, trip_vec3 middle, trip_vec3 toward_eye, dou
         if (!is_seen(y->rgba, i) || met++ < (2 * next + 1) * seen / (2 * PLACES_EACH))
             continue;
         set_place(y, middle, toward_eye, i % LOOK_PX + 0.5 - LOOK_PX / 2,
-                  LOOK_PX / 2 - (i / LOOK_PX + 0.5), unit, PLACE_PX);
+                  LOOK_PX / 2 - (i / LOOK_PX + 0.5), unit,
+                  y->trial->voxel_px < NARROW_PX ? SMALL_PX : PLACE_PX);
         next++;
     }
 }
@@ -191,10 +198,10 @@ static int find_places(trying *y)
 
 /* ---- truth ---- */
 
-/* Returns the rays along each side of a pixel: four, and two for each voxel. */
+/* Returns the rays along each side of a pixel: four, and three for two voxels. */
 static int truth_rays(double voxel_px)
 {
-    return (int)fmin(fmax(4, ceil(2 / voxel_px)), 16);
+    return (int)fmin(fmax(4, ceil(1.5 / voxel_px)), 12);
 }
 
 /* Estimates the error of the truth along its rays. The error falls with the square of the samples,
@@ -220,7 +227,8 @@ static int find_line_error(trying *y)
 
 static int find_truth(trying *y)
 {
-    const trip_choice choice = { .samples_per_sheet = TRUTH_SAMPLES,
+    const bool narrow = y->trial->voxel_px < NARROW_PX;
+    const trip_choice choice = { .samples_per_sheet = narrow ? TRUTH_SAMPLES / 2 : TRUTH_SAMPLES,
                                  .rays = truth_rays(y->trial->voxel_px) };
     double *ends = &y->t->settings.early_termination;
     const double of_frames = *ends;
@@ -228,7 +236,7 @@ static int find_truth(trying *y)
     *ends = TRIP_EARLY_TERMINATION_PRE;
     for (int i = 0; i < y->count && !status; i++)
         status = draw_place(y, &y->places[i], &choice, y->places[i].truth);
-    if (!status)
+    if (!status && !narrow)
         status = find_line_error(y);
     *ends = of_frames;
     return status;
@@ -290,8 +298,9 @@ static int try(trying *y, trip_choice *c)
     if (better && is_within(y, c))
         y->best_cost = cost;
     if (getenv("TRIPTYCH_TRIAL"))
-        fprintf(stderr, "trial w %.3f: samples %d rays %d lod %g: %.3f cost %.3f\n",
-                y->trial->voxel_px, c->samples_per_sheet, c->rays, c->lod_px, c->error, cost);
+        fprintf(stderr, "%.0f ms trial w %.3f: samples %d rays %d lod %g: %.3f cost %.3f\n",
+                trip_now_ms(), y->trial->voxel_px, c->samples_per_sheet, c->rays, c->lod_px,
+                c->error, cost);
     return 0;
 }
 
@@ -321,6 +330,10 @@ static int try_samples(trying *y, int rays, double lod_px)
         const bool within = is_within(y, &c);
         if ((within && way > 0) || (!within && way < 0))
             return status;
+        if (i == 1 && !within && c.error - MAX_GAINS * y->gain > PART_OF_PROMISE * t->promise)
+            return status;
+        if (i == 2 && way > 0)
+            y->gain = fmax(before - c.error, 0);
         /* more samples no longer help: the rest of the error has another cause */
         if (!within && way > 0 && c.error > STUCK_SHARE * before)
             return status;
@@ -378,7 +391,7 @@ static int try_levels(trying *y)
 static int try_all(trying *y)
 {
     y->best = (trip_choice){ .error = HUGE_VAL };
-    y->best_cost = y->least = HUGE_VAL;
+    y->best_cost = y->least = y->gain = HUGE_VAL;
     if (y->trial->preferred) {
         trip_choice c = *y->trial->preferred;
         int status = try(y, &c);
