@@ -52,6 +52,9 @@ static void drop_before(triptych *t)
 void trip_context_drop_renderer(triptych *t)
 {
     drop_before(t);
+    trip_budget_release(t->session.budget, t->banded, t->banded_bytes);
+    t->banded = NULL;
+    t->banded_bytes = 0;
     trip_context_drop_reader(t);
     trip_context_drop_light(t);
     if (t->renderer)
@@ -253,9 +256,53 @@ static int enter_part(triptych *t)
     return 0;
 }
 
+/* ---- bands ---- */
+
+/* Returns the number of rows of the current band, in pixels of the frame. */
+static int rows_drawn(const triptych *t)
+{
+    const int rest = t->camera.height - t->band * t->band_rows;
+    return t->bands > 1 && t->band_rows < rest ? t->band_rows : rest;
+}
+
 static size_t pixels_drawn(const triptych *t)
 {
-    return (size_t)t->camera.width * (size_t)t->camera.height;
+    return (size_t)t->camera.width * (size_t)rows_drawn(t);
+}
+
+static void drop_banded(triptych *t)
+{
+    trip_budget_release(t->session.budget, t->banded, t->banded_bytes);
+    t->banded = NULL;
+    t->banded_bytes = 0;
+}
+
+/* Divides a frame of several rays per pixel into bands, if its pixels would take more than a part
+ * of the memory. Only the CPU renderer can draw bands. Bits do not depend on bands. */
+static int choose_bands(triptych *t)
+{
+    enum { BYTES = 48, PART = 4 }; /* two layers and a picture; the rest is for voxels */
+    const int side = t->choice.rays, unit = TRIP_FRAME_ROWS * side;
+    const bool can = !strcmp(t->renderer->ops->name, "cpu") && trip_context_draws_values(t);
+    const double limit = (double)trip_budget_limit_bytes(t->session.budget) / PART;
+    const double rows = limit / ((double)BYTES * t->camera.width);
+    t->band = 0;
+    t->bands = 1;
+    t->band_rows = t->camera.height;
+    drop_banded(t);
+    if (side < 2 || !can || rows >= t->camera.height)
+        return 0;
+    t->band_rows = rows > unit ? (int)(rows / unit) * unit : unit;
+    t->bands = (t->camera.height + t->band_rows - 1) / t->band_rows;
+    t->banded_bytes = (size_t)t->turned.width * (size_t)t->turned.height * 4 * sizeof *t->banded;
+    t->banded = trip_budget_take(t->session.budget, t->banded_bytes);
+    if (t->banded)
+        return 0;
+    t->banded_bytes = 0;
+    return trip_fail(TRIP_ERROR, "render", "samples",
+                     "a picture of %d x %d pixels with %d rays per pixel does not fit in memory; "
+                     "raise --memory or lower --size",
+                     t->turned.width, t->turned.height, side * side);
 }
 
 /* Allocates the picture of the parts already drawn, and one more if there are three parts or more.
@@ -440,6 +487,8 @@ static int plan_first(triptych *t)
     if (!status)
         status = trip_context_choose_effects(t);
     if (!status)
+        status = choose_bands(t);
+    if (!status)
         status = choose_parts(t);
     const double ms = (double)(trip_now_ns() - start) * 1e-6;
     if (!status)
@@ -508,6 +557,8 @@ static int start(triptych *t)
         .count = t->given.all.count_exactly,
         .progress = t->show ? show_progress : NULL,
         .progress_user = t,
+        .first_row = t->bands > 1 ? t->band * t->band_rows : 0,
+        .rows = t->bands > 1 ? rows_drawn(t) : 0,
     };
     t->drawn = status == 0;
     if (!status)
@@ -612,9 +663,31 @@ static int take_colours(triptych *t, float *rgba, float *depth)
                          side);
     int status = take_drawn(t, fine, NULL);
     if (!status)
-        take_means(fine, side, t->turned.width, t->turned.height, rgba);
+        take_means(fine, side, t->turned.width, rows_drawn(t) / side, rgba);
     trip_budget_release(budget, fine, bytes);
     return status;
+}
+
+/* Returns the number of floats of the picture above the current band. */
+static size_t floats_above(const triptych *t)
+{
+    return (size_t)t->turned.width * (size_t)(t->band * t->band_rows / t->choice.rays) * 4;
+}
+
+/* Takes the picture of all bands drawn so far. Rows below show the background. */
+static int take_bands(triptych *t, float *rgba, float *depth)
+{
+    const size_t above = floats_above(t);
+    const size_t all = (size_t)t->turned.width * (size_t)t->turned.height * 4;
+    const double *b = t->settings.background;
+    int status = take_colours(t, rgba + above, depth);
+    if (t->bands == 1 || status)
+        return status;
+    memcpy(rgba, t->banded, above * sizeof *rgba);
+    const size_t drawn = (size_t)t->turned.width * (size_t)(rows_drawn(t) / t->choice.rays) * 4;
+    for (size_t i = above + drawn; i < all; i++)
+        rgba[i] = (float)(i % 4 < 3 ? b[i % 4] * b[3] : b[3]);
+    return 0;
 }
 
 /* Adds the drawn part to the picture of the earlier parts. */
@@ -627,18 +700,27 @@ static int keep_before(triptych *t)
     return status;
 }
 
-/* Ends a part that is drawn, and begins the next. */
+static bool has_next(const triptych *t)
+{
+    return t->part + 1 < t->parts.count || t->band + 1 < t->bands;
+}
+
+/* Ends a part or band that is drawn, and begins the next. */
 static int begin_next(triptych *t)
 {
-    int status = keep_before(t);
+    const bool ends_band = t->part + 1 == t->parts.count;
+    int status = ends_band ? take_colours(t, t->banded + floats_above(t), NULL) : keep_before(t);
     if (!status)
         status = trip_context_note_stats(t);
     if (status)
         return status;
     t->before_stats = t->stats;
     end(t);
-    t->part++;
+    t->part = ends_band ? 0 : t->part + 1;
+    t->band += ends_band;
     status = plan(t);
+    if (!status)
+        status = take_before(t);
     return status ? status : start(t);
 }
 
@@ -648,7 +730,7 @@ int triptych_step(triptych *t, uint64_t deadline_ns)
     int status = check_drawing(t);
     if (!status)
         status = trip_frame_step(&t->drawing, deadline_ns);
-    while (status == TRIP_FRAME_DONE && t->part + 1 < t->parts.count) {
+    while (status == TRIP_FRAME_DONE && has_next(t)) {
         status = begin_next(t);
         status = status ? status : trip_frame_step(&t->drawing, deadline_ns);
     }
@@ -679,7 +761,7 @@ static int take_picture(triptych *t, float *rgba, float *depth)
                            depth ? "the frame was begun without distances"
                                  : "the frame has distances; use triptych_picture_and_depth()");
     if (!status)
-        status = take_colours(t, rgba, depth);
+        status = take_bands(t, rgba, depth);
     if (!status && t->settings.show == TRIP_SHOW_MERGE)
         draw_merge_map(t, rgba);
     if (!status && t->drawing.done)
@@ -704,6 +786,7 @@ void triptych_end(triptych *t)
     trip_scope *before = trip_scope_enter(&t->scope); /* keeps the error of the last call */
     end(t);
     keep_small_before(t);
+    drop_banded(t);
     trip_context_leave(before, 0);
 }
 

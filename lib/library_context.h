@@ -62,14 +62,18 @@ struct triptych {
     float *before;
     /* Size of `before`, which may be kept for the next frame. */
     size_t before_bytes;
-    triptych_frame_stats before_stats; /* of the parts before `part` */
-    draw_settings given;               /* as set */
-    trip_settings settings;            /* of `given`; samples_per_sheet is 0 if the view selects */
-    double bytes_per_ms;               /* measured in bounded frames; 0 if none was drawn */
-    bool kernel_warned;                /* warned about the halo for the kernel */
-    bool levels_warned;                /* warned about missing levels for the classification */
-    bool light_noted;                  /* noted the light that was chosen for shadows */
-    double kelvin[2];                  /* of emission */
+    triptych_frame_stats before_stats; /* of the parts and bands before */
+    /* Bands of rows, drawn one after the other if the frame does not fit in memory at once. */
+    int band, bands, band_rows; /* rows of pixels of the frame; a multiple of the rays */
+    float *banded;              /* the picture of the bands before, from the budget; or NULL */
+    size_t banded_bytes;
+    draw_settings given;    /* as set */
+    trip_settings settings; /* of `given`; samples_per_sheet is 0 if the view selects */
+    double bytes_per_ms;    /* measured in bounded frames; 0 if none was drawn */
+    bool kernel_warned;     /* warned about the halo for the kernel */
+    bool levels_warned;     /* warned about missing levels for the classification */
+    bool light_noted;       /* noted the light that was chosen for shadows */
+    double kelvin[2];       /* of emission */
     /* Reason for the choice of TRIPTYCH_EFFECT_AUTO; NULL without it. */
     const char *why_effects;
     /* For shadows and occlusion. NULL if the last frames had neither. */

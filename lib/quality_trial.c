@@ -45,12 +45,13 @@ typedef struct trying {
     double voxel_world, reach; /* `reach`: from the middle of the box to a corner */
     place places[PLACES];
     int count;
-    float *rgba;       /* room for the largest picture */
-    double line_error; /* of the truth along its rays */
-    trip_choice best;  /* the best so far */
-    double gain;       /* decrease of the error from two to four samples, at the last rays */
-    double least;      /* least error of the last tries of samples or rays */
-    double best_cost;  /* of a choice within the promise; HUGE_VAL if there is none */
+    float *rgba; /* room for the largest picture */
+    int truth_rays;
+    double truth_error, across_error; /* that the truth may have; its part of the rays */
+    trip_choice best;                 /* the best so far */
+    double gain;      /* decrease of the error from two to four samples, at the last rays */
+    double least;     /* least error of the last tries of samples or rays */
+    double best_cost; /* of a choice within the promise; HUGE_VAL if there is none */
 } trying;
 
 /* ---- pictures ---- */
@@ -150,7 +151,7 @@ static void choose_places(trying *y, trip_vec3 middle, trip_vec3 toward_eye, dou
             continue;
         set_place(y, middle, toward_eye, i % LOOK_PX + 0.5 - LOOK_PX / 2,
                   LOOK_PX / 2 - (i / LOOK_PX + 0.5), unit,
-                  y->trial->voxel_px < NARROW_PX ? SMALL_PX : PLACE_PX);
+                  y->trial->voxel_px < 1 ? SMALL_PX : PLACE_PX);
         next++;
     }
 }
@@ -198,46 +199,84 @@ static int find_places(trying *y)
 
 /* ---- truth ---- */
 
-/* Returns the rays along each side of a pixel: four, and three for two voxels. */
-static int truth_rays(double voxel_px)
-{
-    return (int)fmin(fmax(4, ceil(1.5 / voxel_px)), 12);
-}
+/* Rays of the truth along each side of a pixel. Wide voxels have fewer edges in a pixel. If the
+ * truth then differs too much from half the rays, it gets twice as many. */
+enum { WIDE_RAYS = 4, RAYS = 8, MOST_RAYS = 16 };
 
-/* Estimates the error of the truth along its rays. The error falls with the square of the samples,
- * so a third of the change from half of the samples remains. */
-static int find_line_error(trying *y)
+/* Measures the mean difference of two choices. */
+static int compare(trying *y, const trip_choice *a, const trip_choice *b, double *out)
 {
-    const trip_choice half = { .samples_per_sheet = TRUTH_SAMPLES / 2, .rays = 1 };
-    const trip_choice full = { .samples_per_sheet = TRUTH_SAMPLES, .rays = 1 };
-    float *other = y->rgba + 4 * LOOK_PX * LOOK_PX;
+    float *other = y->rgba + (size_t)4 * LOOK_PX * LOOK_PX;
     difference d = { 0 };
     int status = 0;
     for (int i = 0; i < y->count && !status; i++) {
         const place *p = &y->places[i];
-        status = draw_place(y, p, &half, y->rgba);
+        status = draw_place(y, p, a, y->rgba);
         if (!status)
-            status = draw_place(y, p, &full, other);
+            status = draw_place(y, p, b, other);
         if (!status)
             add_difference(&d, y->rgba, other, p->px * p->px);
     }
-    y->line_error = mean_of(d) / 3;
+    *out = mean_of(d);
     return status;
+}
+
+/* Measures the mean difference of a choice from the truth. */
+static int compare_with_truth(trying *y, const trip_choice *c, double *out)
+{
+    difference d = { 0 };
+    int status = 0;
+    for (int i = 0; i < y->count && !status; i++) {
+        const place *p = &y->places[i];
+        status = draw_place(y, p, c, y->rgba);
+        if (!status)
+            add_difference(&d, y->rgba, p->truth, p->px * p->px);
+    }
+    *out = mean_of(d);
+    return status;
+}
+
+/* Estimates the error of the truth. The error along rays falls with the square of the samples, so
+ * that a third of the change from half of the samples remains. Edges at random positions have an
+ * error that falls with the rays to the power of 1.5. So a third of the change from half the rays
+ * remains. */
+static int find_truth_error(trying *y, const trip_choice *truth)
+{
+    const trip_choice coarse = { .samples_per_sheet = truth->samples_per_sheet / 2, .rays = 1 };
+    const trip_choice fine = { .samples_per_sheet = truth->samples_per_sheet, .rays = 1 };
+    const trip_choice sparse = { .samples_per_sheet = truth->samples_per_sheet / 2,
+                                 .rays = truth->rays / 2 };
+    double along = 0, across = 0;
+    int status = y->trial->voxel_px < NARROW_PX ? 0 : compare(y, &coarse, &fine, &along);
+    if (!status)
+        status = compare_with_truth(y, &sparse, &across);
+    y->across_error = across / 3;
+    y->truth_error = hypot(along, across) / 3;
+    return status;
+}
+
+static int draw_truth(trying *y)
+{
+    const bool narrow = y->trial->voxel_px < NARROW_PX;
+    const trip_choice choice = { .samples_per_sheet = narrow ? TRUTH_SAMPLES / 2 : TRUTH_SAMPLES,
+                                 .rays = y->truth_rays };
+    int status = 0;
+    for (int i = 0; i < y->count && !status; i++)
+        status = draw_place(y, &y->places[i], &choice, y->places[i].truth);
+    return status ? status : find_truth_error(y, &choice);
 }
 
 static int find_truth(trying *y)
 {
-    const bool narrow = y->trial->voxel_px < NARROW_PX;
-    const trip_choice choice = { .samples_per_sheet = narrow ? TRUTH_SAMPLES / 2 : TRUTH_SAMPLES,
-                                 .rays = truth_rays(y->trial->voxel_px) };
     double *ends = &y->t->settings.early_termination;
     const double of_frames = *ends;
-    int status = 0;
     *ends = TRIP_EARLY_TERMINATION_PRE;
-    for (int i = 0; i < y->count && !status; i++)
-        status = draw_place(y, &y->places[i], &choice, y->places[i].truth);
-    if (!status && !narrow)
-        status = find_line_error(y);
+    y->truth_rays = y->trial->voxel_px >= 1 ? WIDE_RAYS : RAYS;
+    int status = draw_truth(y);
+    if (!status && y->across_error > 0.5 * PART_OF_PROMISE * y->trial->promise) {
+        y->truth_rays = y->trial->voxel_px >= 1 ? RAYS : MOST_RAYS;
+        status = draw_truth(y);
+    }
     *ends = of_frames;
     return status;
 }
@@ -266,15 +305,9 @@ static double cost_of(const trying *y, const trip_choice *c)
 /* Measures the expected error of a candidate. */
 static int measure(trying *y, trip_choice *c)
 {
-    difference d = { 0 };
-    int status = 0;
-    for (int i = 0; i < y->count && !status; i++) {
-        const place *p = &y->places[i];
-        status = draw_place(y, p, c, y->rgba);
-        if (!status)
-            add_difference(&d, y->rgba, p->truth, p->px * p->px);
-    }
-    c->error = hypot(mean_of(d), y->line_error);
+    double apart = 0;
+    int status = compare_with_truth(y, c, &apart);
+    c->error = hypot(apart, y->truth_error);
     return status;
 }
 
@@ -350,9 +383,9 @@ static bool is_stuck(const trying *y, double before)
 
 static int try_rays(trying *y, double lod_px)
 {
-    static const int numbers[] = { 1, 2, 3, 4, 6, 8 };
+    static const int numbers[] = { 1, 2, 3, 4, 6, 8, 12, 16 };
     const trip_trial *t = y->trial;
-    const int most = truth_rays(t->voxel_px);
+    const int most = y->truth_rays;
     int status = 0;
     if (t->has_rays)
         return try_samples(y, t->given.rays, lod_px);

@@ -234,6 +234,17 @@ static bool is_of_part_before(const triptych *t, unsigned i)
     return false;
 }
 
+/* Records the statistics of a list. Later bands add their reads. */
+static void note_list(triptych *t, unsigned i)
+{
+    const triptych_list_stats before = t->list_stats[i];
+    t->list_stats[i] = list_stats(t, i);
+    if (t->band == 0)
+        return;
+    t->list_stats[i].splats_read += before.splats_read;
+    t->list_stats[i].bytes_read += before.bytes_read;
+}
+
 int trip_context_note_stats(triptych *t)
 {
     unsigned count = t->session.data->list_count;
@@ -245,11 +256,11 @@ int trip_context_note_stats(triptych *t)
     t->stats = frame_stats(t);
     snprintf(t->device, sizeof t->device, "%s", t->stats.device);
     t->stats.device = t->device;
-    if (t->part > 0)
+    if (t->part > 0 || t->band > 0)
         add_stats(&t->stats, &t->before_stats);
     for (unsigned i = 0; i < count; i++)
         if (!is_of_part_before(t, i))
-            t->list_stats[i] = list_stats(t, i);
+            note_list(t, i);
     t->has_stats = true;
     note_rate(t);
     return 0;
