@@ -389,7 +389,7 @@ static int try_rays(trying *y, double lod_px)
     int status = 0;
     if (t->has_rays)
         return try_samples(y, t->given.rays, lod_px);
-    double before = HUGE_VAL;
+    double before = y->least = HUGE_VAL;
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers && !status; i++) {
         if (numbers[i] > most || is_stuck(y, before))
             return 0;
@@ -415,7 +415,6 @@ static int try_levels(trying *y)
         if (level > 0 && y->least > PART_OF_PROMISE * t->promise)
             return 0;
         level = level_of(y, &c);
-        y->least = HUGE_VAL;
         status = try_rays(y, widths[i]);
     }
     return status;

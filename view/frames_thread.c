@@ -593,7 +593,8 @@ static int draw_whole(trip_frames *f)
     const double wanted = f->params.frames_per_second;
     const double target_ms = 1000 / (wanted > 0 ? wanted : DEFAULT_FPS);
     const double whole_ms = trip_pace_expect_ms(&f->whole_pace, wanted_pixels(f));
-    if (whole_ms > 0 && whole_ms < target_ms)
+    /* the memory of a small frame could be too much beside a full one */
+    if (f->plain || (whole_ms > 0 && whole_ms < target_ms))
         return draw(f, 1, 1, whole, true);
     int status = draw_moving(f, target_ms);
     if (!status && !f->whole && whole_ms > LONG_MS && !has_newer(f))

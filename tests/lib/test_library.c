@@ -1134,6 +1134,8 @@ static draw_settings with_effects(int effects)
     memcpy(s.light.toward, light, sizeof light);
     s.effects.which = effects;
     s.effects.light_cells = 32;
+    s.all.samples = 1; /* the reference is slow */
+    s.sheet.samples = 2;
     return s;
 }
 
