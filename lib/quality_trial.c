@@ -330,10 +330,6 @@ static int try(trying *y, trip_choice *c)
         y->best = *c;
     if (better && is_within(y, c))
         y->best_cost = cost;
-    if (getenv("TRIPTYCH_TRIAL"))
-        fprintf(stderr, "%.0f ms trial w %.3f: samples %d rays %d lod %g: %.3f cost %.3f\n",
-                trip_now_ms(), y->trial->voxel_px, c->samples_per_sheet, c->rays, c->lod_px,
-                c->error, cost);
     return 0;
 }
 
