@@ -156,6 +156,7 @@ static void add_renderers(sweep *w)
 {
     draw_settings s = w->post;
     s.all.samples = s.sheet.samples = 0; /* the mean over the area */
+    s.lod.voxel_px = 0;
     add(w, TRIPTYCH_RENDERER_GL, w->post, "gl-post");
     add(w, TRIPTYCH_RENDERER_GL, w->pre, "gl-pre");
     add(w, TRIPTYCH_RENDERER_REFERENCE, w->post, "reference-post");
@@ -186,7 +187,7 @@ draw_settings accuracy_setting_fixed(const draw_settings *defaults, triptych_cla
     draw_settings s = *defaults;
     s.all.classify = classify;
     s.all.samples = 1;
-    s.lod.voxel_px = 0;
+    s.lod.voxel_px = TRIPTYCH_ZERO;
     if (classify == TRIPTYCH_CLASSIFY_POST)
         s.sheet.samples = 4;
     return s;
