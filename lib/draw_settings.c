@@ -560,6 +560,14 @@ char *draw_settings_text(const draw_settings *s)
     return NULL;
 }
 
+double draw_settings_promise(triptych_quality quality)
+{
+    return quality == TRIPTYCH_QUALITY_DRAFT   ? 4
+           : quality == TRIPTYCH_QUALITY_HIGH  ? 0.3
+           : quality == TRIPTYCH_QUALITY_EXACT ? 0
+                                               : 1;
+}
+
 const char *draw_settings_choice(const draw_settings *s, int row)
 {
     const int value = *(const int *)((const char *)s + rows[row].at) - rows[row].first;

@@ -13,15 +13,6 @@ enum { CODES = 65536, EXACT_RAYS_MIN = 2, EXACT_RAYS_MAX = 8 };
 /* Raise it if trials choose otherwise: stored choices then count as unknown. */
 #define TRIAL_VERSION 1u
 
-/* Returns the promised mean error, of 255; 0 without a promise. */
-static double promise_of(triptych_quality quality)
-{
-    return quality == TRIPTYCH_QUALITY_DRAFT   ? 4
-           : quality == TRIPTYCH_QUALITY_HIGH  ? 0.3
-           : quality == TRIPTYCH_QUALITY_EXACT ? 0
-                                               : 1;
-}
-
 /* Returns the distances from the eye to the nearest and farthest point of the kept voxels' box, in
  * world units. */
 static void find_distances(const triptych *t, trip_vec3 eye, double out[2])
@@ -196,7 +187,7 @@ static int choose(triptych *t, bool now)
     if (exact && t->given.all.samples <= 0 && !s->depth)
         t->choice.rays = exact_rays(px);
     t->choice_step = trip_choice_step(px);
-    t->promise = promise_of(t->given.all.quality);
+    t->promise = draw_settings_promise(t->given.all.quality);
     trip_trial trial = trial_of(t, &defaults);
     if (exact || (trial.has_samples && trial.has_rays && trial.has_lod)) {
         t->promise = 0;

@@ -512,7 +512,8 @@ int trip_quality_trial(triptych *t, const trip_trial *trial, trip_choice *out, c
     session_return_function(&y.t->session);
     triptych_destroy(y.t);
     free(y.rgba);
-    return status == TRIP_INTERRUPTED
-               ? trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted")
-               : status;
+    if (status != TRIP_INTERRUPTED)
+        return status;
+    trip_scope_report_again(); /* the trial's context kept the report to itself */
+    return trip_fail(TRIP_INTERRUPTED, "render", t->name, "interrupted");
 }

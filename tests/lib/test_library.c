@@ -290,7 +290,7 @@ static void settings_for_splats_select_pre(void **state)
     draw_settings defaults = { 0 }, s = defaults;
     assert_int_equal(defaults.all.classify, TRIPTYCH_CLASSIFY_AUTO);
     open_data(t, TRIPTYCH_RENDERER_CPU);
-    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "by the view");
+    check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "normal promises 1");
     s.sheet.samples = 4;
     check_classified(t, &s, TRIPTYCH_CLASSIFY_POST, "at 4 samples per sheet");
     s = defaults;
@@ -324,8 +324,12 @@ static void depth_is_the_distance_of_the_visible_surface(void **state)
     draw_settings settings = { 0 };
     triptych_info info;
     int seen = 0;
-    settings.all.depth = 1;
+    settings.all.samples = 1;
+    settings.sheet.samples = 4;
+    settings.lod.voxel_px = TRIPTYCH_ZERO;
     open_data(t, TRIPTYCH_RENDERER_CPU);
+    assert_int_equal(draw_settings_use(t, &settings), TRIPTYCH_OK);
+    settings.all.depth = 1;
     assert_int_equal(triptych_get_info(t, &info), TRIPTYCH_OK);
     const double middle = (info.lo[1] + info.hi[1]) / 2, far = 1000;
     const triptych_view view = {
