@@ -109,7 +109,7 @@ static uint64_t look_of(const triptych *t, const trip_trial *trial)
         trial->has_samples ? trial->given.samples_per_sheet : -1,
         trial->has_rays ? trial->given.rays : -1,
         trial->has_lod ? trial->given.lod_px : -1,
-        d->kernel,
+        d->kernel == TRIP_KERNEL_NEAREST,
         d->shading,
         d->shading ? s->shading_range : 0,
         trip_settings_early_termination(d),

@@ -458,7 +458,8 @@ static int use_settings(trying *y, const triptych *of)
     const triptych_light light = { .no_shading = !drawn->shading, .kind = TRIPTYCH_LIGHT_HEAD };
     const triptych_settings settings = {
         .classify = TRIPTYCH_CLASSIFY_POST,
-        .interpolation = (triptych_interpolation)(drawn->kernel + 1),
+        .interpolation = drawn->kernel == TRIP_KERNEL_NEAREST ? TRIPTYCH_INTERPOLATION_NEAREST
+                                                              : TRIPTYCH_INTERPOLATION_LINEAR,
         .early_termination = trip_settings_early_termination(drawn) > 0
                                  ? trip_settings_early_termination(drawn)
                                  : TRIPTYCH_ZERO,

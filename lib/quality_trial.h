@@ -3,6 +3,8 @@
  *
  * - Places: parallel views from two fixed directions, at places where the transfer function shows
  *   something. A voxel is as wide as in the frame.
+ * - Interpolation: linear, or nearest. Cubic and gaussian take the choice of linear, because their
+ *   pictures take many times longer.
  * - Truth: the CPU renderer with 16 samples per sheet and many rays per pixel, at the finest level.
  * - Error: the mean difference of red, green, blue and opacity, over the pixels that the object
  *   covers. The error that the truth itself may have is added.
