@@ -91,6 +91,7 @@ struct triptych {
     bool choice_waits;        /* the begun frame has the defaults until triptych_choose() */
     unsigned trials;          /* made by this context */
     double trial_ms;          /* time of the trial for the begun frame; 0 without one */
+    char no_trial[512];       /* why the trial failed; empty if it did not */
 
     bool has_view;
     trip_camera_params view, turned;
@@ -162,6 +163,8 @@ void trip_context_drop_heat(triptych *t);
 /* Chooses samples, rays and levels for the planned frame, and sets them in drawn_settings
  * (quality_choice.h). */
 int trip_context_choose_quality(triptych *t);
+/* Warns if the trial failed. A fault that ends the frame too is then reported only once. */
+void trip_context_note_quality(triptych *t);
 /* Prints the choice and its error. */
 void trip_context_explain_quality(const triptych *t, FILE *out);
 /* Prints one line per effect: whether it runs, and why. */

@@ -138,10 +138,7 @@ static int make_choice(triptych *t, const trip_trial *trial, trip_choice_key key
         return status;
     if (status) {
         t->choice = trial->given;
-        trip_warn(t->session.input,
-                  "no trial of the quality was possible, so the picture has the default samples "
-                  "and rays: %s",
-                  why);
+        snprintf(t->no_trial, sizeof t->no_trial, "%s", why);
         trip_choices_add(&t->choices, key, &t->choice); /* with no error, and not in the file */
         return 0;
     }
@@ -236,6 +233,16 @@ void trip_context_explain_quality(const triptych *t, FILE *out)
     else if (t->choice.error >= 0 && !t->choice_waits)
         fputs("; known from an earlier trial", out);
     fputc('\n', out);
+}
+
+void trip_context_note_quality(triptych *t)
+{
+    if (*t->no_trial)
+        trip_warn(t->session.input,
+                  "no trial of the quality was possible, so the picture has the default samples "
+                  "and rays: %s",
+                  t->no_trial);
+    *t->no_trial = 0;
 }
 
 static void use_choice(triptych *t)

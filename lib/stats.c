@@ -263,6 +263,7 @@ int trip_context_note_stats(triptych *t)
             note_list(t, i);
     t->has_stats = true;
     note_rate(t);
+    trip_context_note_quality(t);
     return 0;
 }
 
